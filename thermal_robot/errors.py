@@ -1,0 +1,72 @@
+"""Everything the program raises on purpose: one root, and each error carries the data that offended."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+
+class ThermalRobotError(Exception):
+    """Root of the errors that are the user's to mend; the command line prints them in one line."""
+
+
+class RobotError(ThermalRobotError):
+    """A robot description that cannot be used.
+
+    Parameters
+    ----------
+    message
+        One plain sentence.
+    name
+        The file, frame or joint that offends.
+    candidates
+        Names that would have been accepted, nearest first.
+    """
+
+    def __init__(self, message: str, *, name: str = "", candidates: Sequence[str] = ()) -> None:
+        super().__init__(message)
+        self.name = name
+        self.candidates = tuple(candidates)
+
+
+class CampaignError(ThermalRobotError):
+    """A campaign file that cannot be used; names file, row and column, what was found and what was expected.
+
+    Parameters
+    ----------
+    file
+        Path of the offending file as the user gave it.
+    problem
+        One plain sentence without the location.
+    row
+        Row in the file, counted as a text editor does (the header is row 1); ``None`` for the whole file.
+    column
+        Column or TOML key; ``None`` for the whole row.
+    found, expected
+        What stands there and what should.
+    """
+
+    def __init__(
+        self,
+        file: str,
+        problem: str,
+        *,
+        row: int | None = None,
+        column: str | None = None,
+        found: str | None = None,
+        expected: str | None = None,
+    ) -> None:
+        self.file, self.problem, self.row, self.column = file, problem, row, column
+        self.found, self.expected = found, expected
+        place = file + (f", row {row}" if row is not None else "") + (f", column {column!r}" if column else "")
+        detail = (f"; found {found}" if found is not None else "") + (
+            f", expected {expected}" if expected is not None else ""
+        )
+        super().__init__(f"{place}: {problem}{detail}")
+
+
+class EffectError(ThermalRobotError):
+    """An effect that breaks its contract, or a name that no effect has."""
+
+
+class EstimationError(ThermalRobotError):
+    """Data that do not determine what was asked of them."""
