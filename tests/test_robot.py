@@ -1,0 +1,202 @@
+"""Loading robots, and what a Robot says of itself."""
+
+import dataclasses
+import io
+import pickle
+import shutil
+
+import numpy as np
+import pinocchio
+import pytest
+import yourdfpy
+
+from thermal_robot import kinematics as kin
+from thermal_robot import robot as robot_module
+from thermal_robot.robot import load_robot
+
+
+def parsed(urdf):
+    """The tree as yourdfpy reads it, a second opinion."""
+    return yourdfpy.URDF.load(io.BytesIO(urdf.encode()), load_meshes=False, build_scene_graph=False)
+
+
+def same_robot(one, other, configurations, atol=0.0):
+    assert one.joint_names == other.joint_names
+    assert one.joint_types == other.joint_types
+    assert one.has_masses == other.has_masses
+    assert [s.name for s in one.segments] == [s.name for s in other.segments]
+    np.testing.assert_array_equal(one.lower, other.lower)
+    np.testing.assert_array_equal(one.upper, other.upper)
+    np.testing.assert_allclose(one.gravity, other.gravity, rtol=0.0, atol=atol)
+    q = configurations(one, 100)
+    for function in (kin.tool_poses, kin.gravity_torques):
+        np.testing.assert_allclose(function(one, q), function(other, q), rtol=0.0, atol=atol)
+
+
+def test_an_arm_is_what_its_urdf_says(arm):
+    tree = parsed(arm.urdf)
+    joints = {joint.name: joint for joint in tree.robot.joints}
+    by_child = {joint.child: joint for joint in tree.robot.joints}
+    chain, link = [], arm.tool_frame
+    while link != arm.root_frame:
+        chain.insert(0, by_child[link])
+        link = by_child[link].parent
+    assert arm.chain.names == tuple(joint.name for joint in chain)
+    assert arm.joint_names == tuple(joint.name for joint in chain if joint.type != "fixed")
+    assert arm.joint_types == tuple(joint.type for joint in chain if joint.type != "fixed")
+    for joint, lower, upper in zip(arm.joint_names, arm.lower, arm.upper, strict=True):
+        limit = joints[joint].limit
+        if joints[joint].type == "continuous":
+            assert (lower, upper) == (-np.inf, np.inf)
+        else:
+            assert (lower, upper) == (limit.lower or 0.0, limit.upper or 0.0)
+    for k, joint in enumerate(chain):
+        origin = np.eye(4) if joint.origin is None else joint.origin
+        np.testing.assert_allclose(arm.chain.rotations[k], origin[:3, :3], atol=1e-12)
+        np.testing.assert_allclose(arm.chain.translations[k], origin[:3, 3], atol=1e-12)
+    for segment in arm.segments:
+        joint = joints[segment.name]
+        length = 0.0 if joint.origin is None else np.linalg.norm(joint.origin[:3, 3])
+        assert segment.parent_link == joint.parent
+        assert segment.length == pytest.approx(length, abs=1e-12)
+        assert segment.movable == (joint.type != "fixed")
+        assert np.linalg.norm(segment.direction) == pytest.approx(1.0 if length > 1e-9 else 0.0)
+    placed = [
+        k
+        for k, joint in enumerate(chain)
+        if joint.type != "fixed" or np.linalg.norm(joint.origin[:3, 3]) > 1e-9
+    ]
+    assert [segment.index for segment in arm.segments] == placed
+
+
+def test_a_saved_robot_comes_back(arm, configurations):
+    same_robot(arm, pickle.loads(pickle.dumps(arm)), configurations)
+
+
+def test_a_yourdfpy_robot_is_the_same_robot(arm, configurations):
+    again = load_robot(parsed(arm.urdf), arm.tool_frame, root_frame=arm.root_frame)
+    same_robot(arm, again, configurations, atol=1e-10)
+
+
+def test_a_file_is_read_by_its_name_its_path_or_its_text(rv_m2, configurations, tmp_path):
+    file = tmp_path / "a robot ü.urdf"
+    file.write_text("\ufeff" + rv_m2.urdf, encoding="utf-8")
+    for source in (file, str(file), rv_m2.urdf, "\n  " + rv_m2.urdf):
+        same_robot(rv_m2, load_robot(source, "tool0"), configurations)
+
+
+def test_builtin_robots_are_found_inside_the_package_too(rv_m2, configurations, tmp_path, monkeypatch):
+    package = tmp_path / "thermal_robot"
+    (package / "robots").mkdir(parents=True)
+    (package / "robots" / "rv_m2.urdf").write_text(rv_m2.urdf, encoding="utf-8")
+    monkeypatch.setattr(robot_module, "__file__", str(package / "robot.py"))
+    same_robot(rv_m2, load_robot("builtin:rv_m2", "tool0"), configurations)
+    shutil.rmtree(package / "robots")
+    (tmp_path / "robots").mkdir()
+    (tmp_path / "robots" / "rv_m2.urdf").write_text(rv_m2.urdf, encoding="utf-8")
+    same_robot(rv_m2, load_robot("builtin:rv_m2", "tool0"), configurations)
+
+
+@pytest.mark.parametrize(("name", "forearm"), [("ur3", 0.21325), ("ur5", 0.39225), ("ur10", 0.5723)])
+def test_each_universal_robot_has_its_own_lengths(name, forearm):
+    pytest.importorskip(
+        "example_robot_data", reason="these arms are in the package example-robot-data-loaders"
+    )
+    robot = load_robot(f"example-robot-data:{name}", "tool0")
+    assert robot.name == name
+    assert {s.name: s.length for s in robot.segments}["wrist_1_joint"] == pytest.approx(forearm, abs=1e-12)
+
+
+def test_nothing_of_a_robot_can_be_changed(rv_m2):
+    with pytest.raises(dataclasses.FrozenInstanceError):
+        rv_m2.name = "other"
+    arrays = [rv_m2.gravity, rv_m2.lower, rv_m2.upper, rv_m2.segments[0].direction]
+    arrays += [value for value in vars(rv_m2.chain).values() if isinstance(value, np.ndarray)]
+    assert len(arrays) == 12
+    assert not any(array.flags.writeable for array in arrays)
+
+
+def test_a_robot_introduces_itself(rv_m2):
+    assert repr(rv_m2) == f"Robot('rv_m2', 'base_link' to 'tool0', 5 joints, {len(rv_m2.segments)} segments)"
+
+
+def test_loading_prints_nothing(awkward_urdf, capfd):
+    load_robot(awkward_urdf, "tip")
+    assert capfd.readouterr() == ("", "")
+
+
+def test_other_joints_are_held_at_the_limit_nearest_to_zero(awkward_urdf):
+    full = pinocchio.buildModelFromXML(awkward_urdf)
+    held = load_robot(awkward_urdf, "tip", root_frame="base")
+    assert held.joint_names == ("turret", "slide", "roll_joint", "rail_joint", "hand_joint")
+    data, q = full.createData(), pinocchio.neutral(full)
+    lift, branch = (full.joints[full.getJointId(name)] for name in ("lift", "branch_joint"))
+    q[lift.idx_q], q[branch.idx_q] = 0.2, -0.3
+    locked = [lift.idx_v, branch.idx_v]
+    np.testing.assert_allclose(
+        pinocchio.computeGeneralizedGravity(
+            held.model, held.model.createData(), pinocchio.neutral(held.model)
+        ),
+        np.delete(pinocchio.computeGeneralizedGravity(full, data, q), locked),
+        atol=1e-12,
+    )
+
+
+def test_gravity_is_meant_in_the_root_frame(awkward_urdf):
+    robot = load_robot(awkward_urdf, "tip", root_frame="base", gravity=(1, 2, 3))
+    np.testing.assert_array_equal(robot.gravity, [1.0, 2.0, 3.0])
+    base = robot.model.frames[robot.model.getFrameId("base", pinocchio.FrameType.BODY)].placement
+    np.testing.assert_allclose(base.rotation.T @ robot.model.gravity.linear, [1.0, 2.0, 3.0], atol=1e-14)
+
+
+def test_a_limit_without_bounds_is_no_limit():
+    urdf = """<robot name="r"><link name="a"/><link name="b"/><joint name="j" type="revolute">
+      <parent link="a"/><child link="b"/><axis xyz="0 0 1"/>
+      <limit effort="1" velocity="1"/></joint></robot>"""
+    robot = load_robot(urdf, "b")
+    assert (robot.lower[0], robot.upper[0]) == (-np.inf, np.inf)
+
+
+def test_rv_m2_is_stretched_along_y_at_zero(rv_m2):
+    expected = np.eye(4)
+    expected[:3, 3] = [0.0, 0.12 + 0.25 + 0.20 + 0.15, 0.40]
+    np.testing.assert_allclose(kin.tool_poses(rv_m2, np.zeros(5))[0], expected, atol=1e-15)
+
+
+def test_rv_m2_grows_as_equations_9_to_11_say(rv_m2, configurations):
+    q = configurations(rv_m2, 1000)
+    growing = [(s, segment) for s, segment in enumerate(rv_m2.segments) if segment.length > 0.0]
+    assert [segment.length for _, segment in growing] == pytest.approx(
+        [0.40, 0.12, 0.25, 0.20, 0.15], abs=1e-15
+    )
+    sensitivities = kin.placement_sensitivities(rv_m2, q)
+    ours = np.stack([sensitivities[:, :3, s, :3] @ segment.direction for s, segment in growing], axis=-1)
+
+    q1, q2, q3, q4 = q[:, 0], q[:, 1], q[:, 2], q[:, 3]
+    pitches = [np.zeros_like(q1), q2, q2 + q3, q2 + q3 + q4]  # of l2, l3, l4, l5
+    horizontal = np.stack([np.zeros_like(q1), *(np.cos(p) for p in pitches)], axis=-1)
+    vertical = np.stack([np.ones_like(q1), *(np.sin(p) for p in pitches)], axis=-1)
+    paper = np.stack([np.sin(q1)[:, None] * horizontal, np.cos(q1)[:, None] * horizontal, vertical], axis=1)
+    np.testing.assert_allclose(ours, paper, rtol=0.0, atol=1e-12)
+
+
+def test_rv_m2_gives_table_2_of_the_paper(rv_m2):
+    # The calculated columns of Table 2 (mm) before the paper truncated them, from the Δl of its section 3.
+    q = np.deg2rad([[30.0, 50.0, -80.0, -60.0, 0.0], [80.0, 22.0, -70.0, -42.0, 0.0]])
+    sensitivities = kin.placement_sensitivities(rv_m2, q)
+    growing = [(s, segment) for s, segment in enumerate(rv_m2.segments) if segment.length > 0.0]
+    elongations = np.array([0.014, 0.005, 0.009, 0.007, 0.008])
+    shift = sum(
+        sensitivities[:, :3, s, :3] @ segment.direction * grown
+        for (s, segment), grown in zip(growing, elongations, strict=True)
+    )
+    np.testing.assert_allclose(shift, [[0.00842, 0.01459, 0.00939], [0.01775, 0.00313, 0.00417]], atol=1e-5)
+
+
+def test_rv_m2_is_as_its_sources_say(rv_m2):
+    degrees = np.rad2deg(np.stack([rv_m2.lower, rv_m2.upper], axis=1))
+    np.testing.assert_allclose(
+        degrees, [[-150, 150], [-30, 100], [-120, 0], [-110, 110], [-180, 180]], atol=1e-10
+    )
+    np.testing.assert_allclose(np.rad2deg(rv_m2.model.velocityLimit), [140, 79, 140, 163, 223], rtol=1e-5)
+    assert sum(inertia.mass for inertia in rv_m2.model.inertias) == pytest.approx(28.0)

@@ -1,0 +1,185 @@
+"""What is said of a robot that cannot be used."""
+
+import re
+import sys
+
+import pytest
+
+from thermal_robot.errors import RobotError
+from thermal_robot.robot import load_robot
+
+TWO_LINKS = """<robot name="two"><link name="a"/><link name="b"/>
+<joint name="j" type="{type}"><parent link="a"/><child link="b"/>{more}</joint></robot>"""
+
+
+def refusal(*args, **kwargs):
+    with pytest.raises(RobotError) as refused:
+        load_robot(*args, **kwargs)
+    assert "\n" not in str(refused.value)
+    return refused.value
+
+
+def two_links(kind, more=""):
+    return TWO_LINKS.format(type=kind, more=more)
+
+
+def test_no_such_file():
+    error = refusal("no/such/arm.urdf", "tool0")
+    assert str(error) == "the robot file 'no/such/arm.urdf' does not exist"
+    assert error.name == "no/such/arm.urdf"
+
+
+def test_a_folder(tmp_path):
+    assert str(refusal(tmp_path, "tool0")).endswith("is a folder, not a URDF file")
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("", "is empty"),
+        ("  \n", "is empty"),
+        ("<html><body/></html>", r"is XML but not a URDF: its root element is <html>, expected <robot>"),
+        ("<robot name='r'>", "is not XML: no element found"),
+        ("<robot name='r'/>", "is not a valid URDF: No link elements found"),
+        ("<robot name='r'><xacro:arm/></robot>", "is a xacro file; expand it"),
+        (
+            two_links("revolute"),
+            r"is not a valid URDF: Joint \[j\] is of type REVOLUTE but it does not specify limits",
+        ),
+        (two_links("wobbly"), r"is not a valid URDF: Joint \[j\] has no known type"),
+        (
+            two_links("fixed").replace("<link name", "<link name='c'/><link name", 1),
+            "is not a valid URDF: Failed to find root link: Two root links found",
+        ),
+    ],
+)
+def test_not_a_urdf(text, words, capfd, tmp_path):
+    assert re.match(f"the robot description {words}", str(refusal(text, "b")))
+    file = tmp_path / "arm.urdf"
+    file.write_text(text)
+    assert re.search(rf"arm.urdf' {words}", str(refusal(file, "b")))
+    assert capfd.readouterr() == ("", "")
+
+
+def test_garbage_in_a_file(tmp_path):
+    file = tmp_path / "arm.urdf"
+    file.write_bytes(bytes(range(256)))
+    assert "arm.urdf' is not XML" in str(refusal(file, "tool0"))
+
+
+def test_not_a_robot_at_all():
+    assert str(refusal(3, "tool0")) == "a robot is a path, URDF text or a yourdfpy.URDF, not int"
+
+
+def test_unknown_tool_frame_names_the_nearest():
+    error = refusal("builtin:rv_m2", "Tool_0")
+    assert str(error).startswith("tool frame 'Tool_0' is not a link of robot 'rv_m2'; nearest: tool0, ")
+    assert error.name == "Tool_0"
+    assert error.candidates[0] == "tool0"
+
+
+def test_a_joint_is_not_a_tool_frame():
+    assert refusal("builtin:rv_m2", "joint_4").name == "joint_4"
+
+
+def test_unknown_root_frame_names_the_nearest():
+    error = refusal("builtin:rv_m2", "tool0", root_frame="base")
+    assert str(error).startswith("root frame 'base' is not a link of robot 'rv_m2'; nearest: base_link")
+    assert error.candidates[0] == "base_link"
+
+
+@pytest.mark.parametrize("tool", ["", None])
+def test_no_tool_frame_names_the_ends(tool, awkward_urdf):
+    error = refusal(awkward_urdf, tool)
+    assert error.candidates == ("branch", "tip")
+    assert str(error) == "no tool frame is given; the links at the ends of this robot are branch, tip"
+
+
+@pytest.mark.parametrize(("tool", "root"), [("base_link", "tool0"), ("column", "upper_arm")])
+def test_tool_not_below_root(tool, root):
+    assert str(refusal("builtin:rv_m2", tool, root_frame=root)) == (
+        f"tool frame {tool!r} is not below root frame {root!r}"
+    )
+
+
+def test_tool_on_another_branch(awkward_urdf):
+    assert "is not below" in str(refusal(awkward_urdf, "tip", root_frame="branch"))
+
+
+@pytest.mark.parametrize("kind", ["floating", "planar"])
+def test_joints_with_more_freedoms_are_named(kind):
+    error = refusal(two_links(kind, '<axis xyz="0 0 1"/>'), "b")
+    assert error.name == "j"
+    assert str(error) == (
+        f"joint 'j' of the chain is {kind}; "
+        "only revolute, continuous, prismatic and fixed joints are supported"
+    )
+
+
+def test_mimic_joint_is_named():
+    error = refusal(two_links("continuous", '<axis xyz="0 0 1"/><mimic joint="k"/>'), "b")
+    assert str(error) == "joint 'j' of the chain mimics another joint, which is not supported"
+    assert error.name == "j"
+
+
+def test_a_mimic_tag_in_a_comment_is_none():
+    assert load_robot(two_links("continuous", '<axis xyz="0 0 1"/><!-- <mimic joint="k"/> -->'), "b").n == 1
+
+
+def test_mimic_fingers_beyond_the_tool_do_not_matter():
+    pytest.importorskip("example_robot_data", reason="the arm is in the package example-robot-data-loaders")
+    assert load_robot("example-robot-data:panda", "panda_hand").n == 7
+    assert refusal("example-robot-data:panda", "panda_rightfinger").name == "panda_finger_joint2"
+
+
+def test_an_axis_without_direction_is_named():
+    assert refusal(two_links("continuous", '<axis xyz="0 0 0"/>'), "b").name == "j"
+
+
+def test_a_joint_with_the_name_of_the_world():
+    urdf = two_links("continuous", '<axis xyz="0 0 1"/>').replace('"j"', '"universe"')
+    assert refusal(urdf, "b").name == "universe"
+
+
+def test_nothing_that_moves():
+    assert str(refusal(two_links("fixed"), "b")) == (
+        "the chain has no movable joint between its root frame and its tool frame"
+    )
+    assert "no movable joint" in str(refusal("builtin:rv_m2", "base_link"))
+
+
+@pytest.mark.parametrize(
+    "gravity", [[0, 0], [0, 0, float("nan")], "down", [[0, 0, -9.81]], -9.81, [0, 0, None]]
+)
+def test_gravity_is_three_finite_numbers(gravity):
+    assert str(refusal("builtin:rv_m2", "tool0", gravity=gravity)).startswith(
+        "gravity must be three finite numbers"
+    )
+
+
+def test_unknown_builtin_robot():
+    error = refusal("builtin:rv_m1", "tool0")
+    assert str(error) == "there is no built-in robot 'rv_m1'; nearest: rv_m2"
+    assert error.candidates == ("rv_m2",)
+
+
+def test_unknown_example_robot():
+    pytest.importorskip("example_robot_data", reason="names of the package example-robot-data-loaders")
+    error = refusal("example-robot-data:ur1O", "tool0")
+    assert "ur10" in error.candidates
+    assert str(error).startswith("there is no robot of example-robot-data 'ur1O'; nearest: ")
+
+
+def test_example_robot_without_urdf():
+    pytest.importorskip("example_robot_data", reason="names of the package example-robot-data-loaders")
+    assert (
+        str(refusal("example-robot-data:cassie", "pelvis"))
+        == "robot 'cassie' of example-robot-data has no URDF file"
+    )
+
+
+def test_package_of_example_robots_is_missing(monkeypatch):
+    monkeypatch.setitem(sys.modules, "example_robot_data", None)
+    error = refusal("example-robot-data:ur10", "tool0")
+    assert 'pip install "thermal-robot[robots]"' in str(error)
+    assert error.name == "ur10"

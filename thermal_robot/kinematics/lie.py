@@ -1,0 +1,169 @@
+"""Rotations and rigid motions in batches: exponentials, logarithms, quaternions.
+
+Every function takes any number of leading dimensions and is accurate to rounding at both ends, near the
+identity and near a half turn. Twists are ordered (linear, angular), quaternions (w, x, y, z).
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+Array = NDArray[np.float64]
+
+# (θ − sin θ)/θ³ cancels below half a radian; there its series, whose eighth term is below 1e-17, takes over.
+_CUBIC_SERIES = (1 / 6, -1 / 120, 1 / 5040, -1 / 362880, 1 / 39916800, -1 / 6227020800, 1 / 1307674368000)
+_CUBIC_SERIES_BELOW = 0.5
+
+
+def skew(vectors: ArrayLike) -> Array:
+    """Matrix of the cross product, ``skew(a) @ b = a × b``.
+
+    Parameters
+    ----------
+    vectors
+        (..., 3).
+
+    Returns
+    -------
+    ndarray
+        (..., 3, 3).
+    """
+    v = np.asarray(vectors, dtype=float)
+    out = np.zeros((*v.shape, 3))
+    out[..., 0, 1], out[..., 0, 2] = -v[..., 2], v[..., 1]
+    out[..., 1, 0], out[..., 1, 2] = v[..., 2], -v[..., 0]
+    out[..., 2, 0], out[..., 2, 1] = -v[..., 1], v[..., 0]
+    return out
+
+
+def exp3(vectors: ArrayLike) -> Array:
+    """Rotation about each vector by its length (Rodrigues' formula).
+
+    Parameters
+    ----------
+    vectors
+        (..., 3) rad.
+
+    Returns
+    -------
+    ndarray
+        (..., 3, 3) rotation matrices.
+    """
+    w = np.asarray(vectors, dtype=float)
+    first, second, _ = _rodrigues_coefficients(w)
+    turn = skew(w)
+    rotation: Array = np.eye(3) + first * turn + second * (turn @ turn)
+    return rotation
+
+
+def exp6(twists: ArrayLike) -> Array:
+    """Rigid motion reached by following each twist for a unit of time.
+
+    Parameters
+    ----------
+    twists
+        (..., 6), linear part in m, angular part in rad.
+
+    Returns
+    -------
+    ndarray
+        (..., 4, 4) homogeneous matrices; equal to ``pinocchio.exp6``.
+    """
+    xi = np.asarray(twists, dtype=float)
+    linear, angular = xi[..., :3], xi[..., 3:]
+    first, second, third = _rodrigues_coefficients(angular)
+    turn = skew(angular)
+    turn_twice = turn @ turn
+    motion = np.zeros((*xi.shape[:-1], 4, 4))
+    motion[..., :3, :3] = np.eye(3) + first * turn + second * turn_twice
+    left_jacobian = np.eye(3) + second * turn + third * turn_twice
+    motion[..., :3, 3] = (left_jacobian @ linear[..., None])[..., 0]
+    motion[..., 3, 3] = 1.0
+    return motion
+
+
+def log3(rotations: ArrayLike) -> Array:
+    """Rotation vector of each rotation, of length at most π.
+
+    Parameters
+    ----------
+    rotations
+        (..., 3, 3) rotation matrices.
+
+    Returns
+    -------
+    ndarray
+        (..., 3) rad.
+    """
+    quaternion = rotation_to_quaternion(rotations)
+    imaginary = quaternion[..., 1:]
+    sine = np.linalg.norm(imaginary, axis=-1, keepdims=True)
+    # atan2 keeps full accuracy at both ends, where arccos of the trace loses half of the digits.
+    half_angle = np.arctan2(sine, quaternion[..., :1])
+    factor = np.divide(2.0 * half_angle, sine, out=np.full_like(sine, 2.0), where=sine > 0.0)
+    vector: Array = factor * imaginary
+    return vector
+
+
+def quaternion_to_rotation(quaternions: ArrayLike) -> Array:
+    """Rotation matrix of each quaternion; a quaternion is normalised first.
+
+    Parameters
+    ----------
+    quaternions
+        (..., 4), ordered w, x, y, z, not zero.
+
+    Returns
+    -------
+    ndarray
+        (..., 3, 3).
+    """
+    q = np.asarray(quaternions, dtype=float)
+    q = q / np.linalg.norm(q, axis=-1, keepdims=True)
+    scalar, imaginary = q[..., :1, None], q[..., 1:]
+    turn = skew(imaginary)
+    rotation: Array = np.eye(3) + 2.0 * scalar * turn + 2.0 * (turn @ turn)
+    return rotation
+
+
+def rotation_to_quaternion(rotations: ArrayLike) -> Array:
+    """Find the unit quaternion of each rotation, with w ≥ 0 (Shepperd's method).
+
+    Parameters
+    ----------
+    rotations
+        (..., 3, 3) rotation matrices.
+
+    Returns
+    -------
+    ndarray
+        (..., 4), ordered w, x, y, z.
+    """
+    r = np.asarray(rotations, dtype=float)
+    trace = np.trace(r, axis1=-2, axis2=-1)
+    # Row a of this table is 4·q_a·q; the row with the largest q_a has no cancellation.
+    table = np.empty((*r.shape[:-2], 4, 4))
+    table[..., 0, 0] = 1.0 + trace
+    for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
+        table[..., 0, i + 1] = table[..., i + 1, 0] = r[..., k, j] - r[..., j, k]
+        table[..., i + 1, i + 1] = 1.0 + 2.0 * r[..., i, i] - trace
+        table[..., j + 1, k + 1] = table[..., k + 1, j + 1] = r[..., j, k] + r[..., k, j]
+    largest = np.argmax(np.diagonal(table, axis1=-2, axis2=-1), axis=-1)
+    row = np.take_along_axis(table, largest[..., None, None], axis=-2)[..., 0, :]
+    row = row / np.linalg.norm(row, axis=-1, keepdims=True)
+    quaternion: Array = np.where(row[..., :1] < 0.0, -row, row)
+    return quaternion
+
+
+def _rodrigues_coefficients(vectors: Array) -> tuple[Array, Array, Array]:
+    """Sin θ/θ, (1 − cos θ)/θ², (θ − sin θ)/θ³, each (..., 1, 1)."""
+    angle = np.linalg.norm(vectors, axis=-1)[..., None, None]
+    first = np.sinc(angle / np.pi)
+    second = 0.5 * np.sinc(angle / (2.0 * np.pi)) ** 2
+    near = angle < _CUBIC_SERIES_BELOW
+    square = np.where(near, angle, 0.0) ** 2
+    series = np.polynomial.polynomial.polyval(square, _CUBIC_SERIES)
+    safe = np.where(near, 1.0, angle)
+    third = np.where(near, series, (1.0 - first) / safe**2)
+    return first, second, third

@@ -1,0 +1,310 @@
+"""From URDF text to a Pinocchio model and to the constant arrays of one kinematic chain."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from thermal_robot.errors import RobotError
+from thermal_robot.kinematics.urdf import mimic_joints, nearest, parse_urdf
+
+Array = NDArray[np.float64]
+
+STANDARD_GRAVITY = 9.81
+"""m/s²; the value Pinocchio uses."""
+
+SHORTEST_SEGMENT = 1e-9
+"""m; a placement shorter than this has no direction along which it could grow."""
+
+FIXED, REVOLUTE, PRISMATIC = 0, 1, 2
+"""Kinds of chain element."""
+
+
+@dataclass(frozen=True, eq=False)
+class Chain:
+    """Constant arrays of the chain, taken once from Pinocchio.
+
+    It has K elements (URDF joints, fixed ones too), n movable joints and S segments.
+
+    Parameters
+    ----------
+    names
+        K names of URDF joints.
+    parent_links
+        K names of the links to which they are attached.
+    rotations, translations
+        (K, 3, 3) and (K, 3) m: placement of each element in the frame of its parent link.
+    kinds
+        (K,) ``FIXED``, ``REVOLUTE`` or ``PRISMATIC``.
+    axes
+        (K, 3) unit axis of motion in the element's frame; zero for a fixed one.
+    movable
+        (n,) elements of the movable joints.
+    placed
+        (S,) segments: elements of the movable joints, and of fixed frames that have a length.
+    masses
+        (n,) kg carried by each movable joint up to the next one, held branches included.
+    mass_centres
+        (n, 3) m: centre of these masses in the frame of the element *after* the joint (the tool frame for the
+        last), which is fixed to the same body.
+    """
+
+    names: tuple[str, ...]
+    parent_links: tuple[str, ...]
+    rotations: Array
+    translations: Array
+    kinds: NDArray[np.int64]
+    axes: Array
+    movable: NDArray[np.int64]
+    placed: NDArray[np.int64]
+    masses: Array
+    mass_centres: Array
+
+
+@dataclass(frozen=True, eq=False)
+class ChainModel:
+    """What Pinocchio says about a URDF between two of its links.
+
+    Parameters
+    ----------
+    model
+        ``pinocchio.Model`` reduced to the movable joints of the chain; its gravity is set.
+    root_frame
+        Name of the link in which poses are expressed.
+    gravity
+        (3,) m/s² in the root frame.
+    joint_types
+        ``revolute``, ``continuous`` or ``prismatic`` for each movable joint.
+    lower, upper
+        (n,) limits in rad or m; infinite where there is none.
+    chain
+        Constant arrays for the batch functions.
+    """
+
+    model: pin.Model
+    root_frame: str
+    gravity: Array
+    joint_types: tuple[str, ...]
+    lower: Array
+    upper: Array
+    chain: Chain
+
+
+def build_chain_model(
+    urdf: str,
+    tool_frame: str,
+    root_frame: str | None,
+    gravity: Array | None,
+    source: str = "the robot description",
+) -> ChainModel:
+    """Read a URDF and keep the chain from the root frame to the tool frame; every other joint is held.
+
+    A joint is held at 0, or at the limit nearest to 0.
+
+    Parameters
+    ----------
+    urdf
+        XML text.
+    tool_frame, root_frame
+        Names of links; ``None`` for the root link of the URDF.
+    gravity
+        (3,) m/s² in the root frame; ``None`` for 9.81 down the z axis of the root of the URDF.
+    source
+        What to call the URDF in an error.
+
+    Raises
+    ------
+    RobotError
+        If the text is not a URDF, a link is unknown, the tool is not below the root frame, or the chain holds
+        no movable joint or one that is not revolute, continuous or prismatic.
+    """
+    full = parse_urdf(urdf, source)
+    links = {frame.name: i for i, frame in enumerate(full.frames) if frame.type == pin.FrameType.BODY}
+    root = _find_link(full, links, root_frame, "root frame") if root_frame is not None else _root_link(links)
+    tool = _find_link(full, links, tool_frame, "tool frame")
+    elements = _elements_between(full, root, tool)
+    joint_types = _joint_types(full, elements, mimic_joints(urdf))
+
+    held = _held_configuration(full)
+    in_chain = {full.frames[e].parentJoint for e in elements if full.frames[e].type == pin.FrameType.JOINT}
+    model = _reduced(full, [j for j in range(1, full.njoints) if j not in in_chain], held)
+
+    data = full.createData()
+    pin.framesForwardKinematics(full, data, held)
+    root_rotation = data.oMf[root].rotation
+    if gravity is None:
+        gravity = root_rotation.T @ np.array([0.0, 0.0, -STANDARD_GRAVITY])
+    model.gravity.linear = root_rotation @ gravity
+
+    lower, upper = _limits(model, joint_types)
+    chain = _chain_arrays(full, model, elements)
+    _freeze(gravity, lower, upper)
+    return ChainModel(model, full.frames[root].name, gravity, joint_types, lower, upper, chain)
+
+
+def leaf_links(urdf: str, source: str = "the robot description") -> tuple[str, ...]:
+    """Links at the ends of the tree: what a tool frame is usually chosen from."""
+    model = parse_urdf(urdf, source)
+    links = [i for i, frame in enumerate(model.frames) if frame.type == pin.FrameType.BODY]
+    parents = {frame.parentFrame for frame in model.frames}
+    return tuple(model.frames[i].name for i in links if i not in parents)
+
+
+def _reduced(full: pin.Model, held_joints: list[int], held: Array) -> pin.Model:
+    """Hold joints where they are; a link may have the name of a joint."""
+    # Pinocchio's reduction asks for frames by name alone, and stops where a link and a joint share one.
+    mark = "link "
+    renamed = full.copy()
+    for i, frame in enumerate(renamed.frames):
+        if frame.type == pin.FrameType.BODY:
+            frame.name = mark + frame.name
+        elif i > 0 and frame.name == full.names[0]:
+            raise RobotError(
+                f"a joint is called {frame.name!r}, Pinocchio's name for the world: rename it",
+                name=frame.name,
+            )
+    model = pin.buildReducedModel(renamed, held_joints, held)
+    for frame in model.frames:
+        if frame.type == pin.FrameType.BODY:
+            frame.name = frame.name.removeprefix(mark)
+    return model
+
+
+def _chain_arrays(full: pin.Model, model: pin.Model, elements: list[int]) -> Chain:
+    frames = [full.frames[e] for e in elements]
+    placements = [_placement(full, e) for e in elements]
+    kinds = np.zeros(len(elements), dtype=np.int64)
+    axes = np.zeros((len(elements), 3))
+    for k, frame in enumerate(frames):
+        if frame.type == pin.FrameType.JOINT:
+            motion = unit_motion(full, full.joints[frame.parentJoint])
+            kinds[k] = PRISMATIC if np.any(motion[:3]) else REVOLUTE
+            axes[k] = motion[:3] + motion[3:]
+            if not np.isclose(np.linalg.norm(axes[k]), 1.0):
+                raise RobotError(f"the axis of joint {frame.name!r} has no direction", name=frame.name)
+    movable = np.flatnonzero(kinds)
+    masses = np.array([model.inertias[j].mass for j in range(1, model.njoints)])
+    centres = np.empty((len(movable), 3))
+    for j, k in enumerate(movable.tolist()):
+        centre = model.inertias[j + 1].lever
+        centres[j] = placements[k + 1].actInv(centre) if k + 1 < len(elements) else centre
+    rotations = np.array([p.rotation for p in placements])
+    translations = np.array([p.translation for p in placements])
+    long = np.linalg.norm(translations, axis=1) > SHORTEST_SEGMENT
+    long[movable] = True
+    placed = np.flatnonzero(long)
+    _freeze(rotations, translations, kinds, axes, movable, placed, masses, centres)
+    names = tuple(frame.name for frame in frames)
+    parents = tuple(full.frames[frame.parentFrame].name for frame in frames)
+    return Chain(names, parents, rotations, translations, kinds, axes, movable, placed, masses, centres)
+
+
+def _placement(model: pin.Model, element: int) -> pin.SE3:
+    """Placement of a URDF joint in the frame of its parent link."""
+    frame = model.frames[element]
+    parent = model.frames[frame.parentFrame].placement
+    if frame.type == pin.FrameType.JOINT:
+        return parent.actInv(model.jointPlacements[frame.parentJoint])
+    return parent.actInv(frame.placement)
+
+
+def unit_motion(model: pin.Model, joint: pin.JointModel) -> Array:
+    """Twist (6,) of a joint with one degree of freedom, in its own frame, for a unit speed."""
+    data = joint.createData()
+    # Pinocchio reads at the joint's place in the whole configuration; past the end of a shorter vector.
+    joint.calc(data, pin.neutral(model))
+    return np.asarray(data.S, dtype=float).reshape(6)
+
+
+def _elements_between(model: pin.Model, root: int, tool: int) -> list[int]:
+    """Frames of the URDF joints on the way from one link down to another."""
+    elements: list[int] = []
+    frame = tool
+    while frame != root:
+        if frame == 0:
+            raise RobotError(
+                f"tool frame {model.frames[tool].name!r} is not below root frame {model.frames[root].name!r}",
+                name=model.frames[tool].name,
+            )
+        if model.frames[frame].type in (pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT):
+            elements.append(frame)
+        frame = model.frames[frame].parentFrame
+    return elements[::-1]
+
+
+def _joint_types(model: pin.Model, elements: list[int], mimic: set[str]) -> tuple[str, ...]:
+    types = []
+    for element in elements:
+        frame = model.frames[element]
+        if frame.type != pin.FrameType.JOINT:
+            continue
+        kind = model.joints[frame.parentJoint].shortname()
+        if frame.name in mimic:
+            raise RobotError(
+                f"joint {frame.name!r} of the chain mimics another joint, which is not supported",
+                name=frame.name,
+            )
+        if kind.startswith("JointModelRUB") or kind == "JointModelRevoluteUnboundedUnaligned":
+            types.append("continuous")
+        elif kind.startswith("JointModelR"):
+            types.append("revolute")
+        elif kind.startswith("JointModelPrismatic") or kind in (
+            "JointModelPX",
+            "JointModelPY",
+            "JointModelPZ",
+        ):
+            types.append("prismatic")
+        else:
+            named = {"JointModelFreeFlyer": "floating", "JointModelPlanar": "planar"}.get(kind, kind)
+            raise RobotError(
+                f"joint {frame.name!r} of the chain is {named}; "
+                "only revolute, continuous, prismatic and fixed joints are supported",
+                name=frame.name,
+            )
+    if not types:
+        raise RobotError("the chain has no movable joint between its root frame and its tool frame")
+    return tuple(types)
+
+
+def _held_configuration(model: pin.Model) -> Array:
+    q = np.asarray(pin.neutral(model), dtype=float)
+    for joint in model.joints:
+        if joint.nq == 1:
+            low, high = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
+            if low < high:
+                q[joint.idx_q] = min(max(0.0, low), high)
+    return q
+
+
+def _limits(model: pin.Model, joint_types: tuple[str, ...]) -> tuple[Array, Array]:
+    lower, upper = np.full(len(joint_types), -np.inf), np.full(len(joint_types), np.inf)
+    for i, kind in enumerate(joint_types):
+        q = model.joints[i + 1].idx_q
+        low, high = model.lowerPositionLimit[q], model.upperPositionLimit[q]
+        # A URDF <limit> without its bounds reads as 0 and 0: an absent limit, not a joint that cannot move.
+        if kind != "continuous" and low < high:
+            lower[i], upper[i] = low, high
+    return lower, upper
+
+
+def _root_link(links: dict[str, int]) -> int:
+    return min(links.values())
+
+
+def _find_link(model: pin.Model, links: dict[str, int], name: str, role: str) -> int:
+    if name in links:
+        return links[name]
+    near = nearest(name, links)
+    raise RobotError(
+        f"{role} {name!r} is not a link of robot {model.name!r}; nearest: {', '.join(near)}",
+        name=name,
+        candidates=near,
+    )
+
+
+def _freeze(*arrays: NDArray[np.generic]) -> None:
+    for array in arrays:
+        array.setflags(write=False)
