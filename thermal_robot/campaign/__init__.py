@@ -1,0 +1,21 @@
+"""The only room that knows files, units and tables."""
+
+from thermal_robot.campaign.campaign import Campaign
+from thermal_robot.campaign.describe import describe
+from thermal_robot.campaign.from_table import campaign_from_table
+from thermal_robot.campaign.read import read_campaign, read_samples
+from thermal_robot.campaign.settings import Settings, Units
+from thermal_robot.campaign.write import write_campaign, write_predictions, write_table
+
+__all__ = [
+    "Campaign",
+    "Settings",
+    "Units",
+    "campaign_from_table",
+    "describe",
+    "read_campaign",
+    "read_samples",
+    "write_campaign",
+    "write_predictions",
+    "write_table",
+]

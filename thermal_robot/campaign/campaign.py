@@ -1,0 +1,235 @@
+"""A campaign: what was commanded, what was measured, and the conditions, in SI units and without gaps."""
+
+from __future__ import annotations
+
+import dataclasses
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from thermal_robot.campaign.settings import STANDARD_TEMPERATURE, Settings, Units, as_vector
+from thermal_robot.errors import CampaignError
+from thermal_robot.robot import Robot
+
+FloatArray: TypeAlias = NDArray[np.float64]
+IntArray: TypeAlias = NDArray[np.int64]
+TextArray: TypeAlias = NDArray[np.str_]
+
+_PER_SAMPLE = ("q", "position", "orientation", "simulated_position", "simulated_orientation", "rows")
+_BY_NAME = ("covariates", "labels", "missing")
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Campaign:
+    """N measurements of one robot, SI units, arrays read-only.
+
+    Made by :func:`read_campaign`, :func:`read_samples` or :func:`campaign_from_table`, which validate. The
+    constructor checks shapes only, so that a program can put a campaign together from arrays.
+
+    Attributes
+    ----------
+    name
+        Name of the campaign's directory, or the file's stem.
+    robot
+        The robot with its chain of n movable joints.
+    q
+        (N, n) commanded joint positions, rad (m for a prismatic joint), in the chain's order.
+    position
+        (N, 3) measured positions of the target, m, measurement frame; ``None`` for samples to predict.
+    orientation
+        (N, 4) measured orientations, unit quaternions wxyz that turn vectors of the target's frame into the
+        measurement frame, either sign; ``None`` when not measured.
+    covariates
+        (N,) per name as in the table (``"time"``, ``"temperature.<link>"``, ``"approach.<joint>"`` …), SI
+        units, no NaN: gaps were filled on reading.
+    extra
+        Names of those covariates that the format does not define; in the unit of the file.
+    labels
+        (N,) text for ``"session"`` and ``"pose"`` where the table has them; ``""`` where a cell is empty.
+    simulated_position, simulated_orientation
+        (N, 3) m and (N, 4) wxyz in the root frame: what the user's own simulator predicts; ``None`` if it is
+        not given.
+    base_known, tool_known
+        Whether the measurements are in the root frame, and whether the target is where ``target`` says.
+    target
+        (3,) the measured point in the tool frame, m; a start value unless ``tool_known``.
+    noise_position, noise_orientation
+        One sigma per axis of the instrument, m and rad; ``None`` when not given.
+    payload_com
+        (3,) centre of mass of the payload in the tool frame, m.
+    reference_temperature
+        °C at which the URDF's lengths hold.
+    priors, gears
+        Expected sizes by effect; transmission ratios by joint.
+    units
+        Units of the files this campaign came from and is written to.
+    rows
+        (N,) row numbers as a text editor counts them, the header being row 1.
+    warnings
+        Plain sentences about what is doubtful but was accepted.
+    missing
+        (N,) bool per covariate that had empty cells: true where the value was filled in.
+    urdf
+        The robot's reference as written in the campaign file.
+
+    Raises
+    ------
+    CampaignError
+        Arrays whose shapes do not fit together.
+    """
+
+    name: str
+    robot: Robot
+    q: FloatArray
+    position: FloatArray | None = None
+    orientation: FloatArray | None = None
+    covariates: Mapping[str, FloatArray] = field(default_factory=dict)
+    extra: tuple[str, ...] = ()
+    labels: Mapping[str, TextArray] = field(default_factory=dict)
+    simulated_position: FloatArray | None = None
+    simulated_orientation: FloatArray | None = None
+    base_known: bool = False
+    tool_known: bool = False
+    target: FloatArray = field(default_factory=lambda: np.zeros(3))
+    noise_position: float | None = None
+    noise_orientation: float | None = None
+    payload_com: FloatArray = field(default_factory=lambda: np.zeros(3))
+    reference_temperature: float = STANDARD_TEMPERATURE
+    priors: Mapping[str, float] = field(default_factory=dict)
+    gears: Mapping[str, float] = field(default_factory=dict)
+    units: Units = field(default_factory=Units)
+    rows: IntArray = field(default_factory=lambda: np.empty(0, dtype=np.int64))
+    warnings: tuple[str, ...] = ()
+    missing: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
+    urdf: str = ""
+
+    def __post_init__(self) -> None:
+        samples = len(self.q)
+        if len(self.rows) == 0 and samples:
+            object.__setattr__(self, "rows", np.arange(2, samples + 2))
+        shapes: dict[str, tuple[int, ...]] = {
+            "q": (samples, self.robot.n),
+            "position": (samples, 3),
+            "orientation": (samples, 4),
+            "simulated_position": (samples, 3),
+            "simulated_orientation": (samples, 4),
+            "rows": (samples,),
+            "target": (3,),
+            "payload_com": (3,),
+        }
+        for key, shape in shapes.items():
+            value = getattr(self, key)
+            if value is not None:
+                number = np.int64 if key == "rows" else np.float64
+                object.__setattr__(self, key, self._frozen(key, value, shape, number))
+        kinds: dict[str, Any] = {"covariates": np.float64, "labels": np.str_, "missing": np.bool_}
+        for key, kind in kinds.items():
+            arrays = {
+                name: self._frozen(name, value, (samples,), kind)
+                for name, value in getattr(self, key).items()
+            }
+            object.__setattr__(self, key, arrays)
+
+    def _frozen(self, key: str, value: ArrayLike, shape: tuple[int, ...], kind: Any) -> NDArray[Any]:
+        """Return the array read-only; a copy unless it already was: the caller's own stays writable."""
+        array = np.asarray(value, dtype=kind)
+        if array.shape != shape:
+            raise CampaignError(
+                f"<{self.name}>",
+                "wrong shape",
+                column=key,
+                found=str(array.shape),
+                expected=str(shape),
+            )
+        if array.flags.writeable:
+            array = array.copy()
+            array.flags.writeable = False
+        return array
+
+    def __repr__(self) -> str:
+        """One line; the arrays stay out of a notebook."""
+        what = "to predict" if self.position is None else f"of {self.measures}"
+        return (
+            f"<Campaign {self.name!r}: {self.samples} samples {what}, {self.robot.n} joints, "
+            f"{len(self.covariates)} covariate{'' if len(self.covariates) == 1 else 's'}>"
+        )
+
+    @property
+    def samples(self) -> int:
+        """Number of rows N."""
+        return len(self.q)
+
+    @property
+    def measures(self) -> str:
+        """``"pose"`` where orientations were measured, otherwise ``"position"``."""
+        return "position" if self.orientation is None else "pose"
+
+    @property
+    def settings(self) -> Settings:
+        """What is not in the table; the chain's root and gravity as the robot has them."""
+        return Settings(
+            urdf=self.urdf,
+            tool_frame=self.robot.tool_frame,
+            root_frame=self.robot.root_frame,
+            gravity=as_vector(self.robot.gravity),
+            reference_temperature=self.reference_temperature,
+            units=self.units,
+            base_known=self.base_known,
+            tool_known=self.tool_known,
+            target=as_vector(self.target),
+            noise_position=self.noise_position,
+            noise_orientation=self.noise_orientation,
+            payload_com=as_vector(self.payload_com),
+            priors=dict(self.priors),
+            gears=dict(self.gears),
+        )
+
+    def take(self, rows: ArrayLike) -> Campaign:
+        """Return the campaign of some of the rows, without validating again.
+
+        Parameters
+        ----------
+        rows
+            (N,) booleans, or indices in any order, repeats allowed.
+        """
+        index = np.asarray(rows)
+        if index.size == 0:
+            index = index.astype(np.int64)
+        changes: dict[str, Any] = {}
+        for key in _PER_SAMPLE:
+            value = getattr(self, key)
+            if value is not None:
+                changes[key] = _read_only(value[index])
+        for key in _BY_NAME:
+            changes[key] = {name: _read_only(value[index]) for name, value in getattr(self, key).items()}
+        return dataclasses.replace(self, **changes)
+
+    def drop_covariate(self, name: str) -> Campaign:
+        """Return the campaign as if the table had no such column (a covariate or a label).
+
+        Raises
+        ------
+        CampaignError
+            The campaign has no such column.
+        """
+        if name not in self.covariates and name not in self.labels:
+            present = ", ".join([*self.covariates, *self.labels]) or "none"
+            raise CampaignError(
+                f"<{self.name}>", "no such covariate", column=name, expected=f"one of {present}"
+            )
+        changes: dict[str, Any] = {
+            key: {other: value for other, value in getattr(self, key).items() if other != name}
+            for key in _BY_NAME
+        }
+        changes["extra"] = tuple(other for other in self.extra if other != name)
+        return dataclasses.replace(self, **changes)
+
+
+def _read_only(array: NDArray[Any]) -> NDArray[Any]:
+    """Freeze an array that nobody else holds, so that the constructor need not copy it."""
+    if array.base is None:
+        array.flags.writeable = False
+    return array

@@ -1,0 +1,118 @@
+"""Reading campaign.toml: what it declares about robot, units, frames, noise and payload, converted to SI."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from thermal_robot.campaign.document import SECTIONS, Document
+from thermal_robot.campaign.names import did_you_mean, listed
+from thermal_robot.campaign.settings import (
+    ANGLE_UNITS,
+    LENGTH_UNITS,
+    STANDARD_TEMPERATURE,
+    Settings,
+    Units,
+    Vector,
+    as_vector,
+)
+from thermal_robot.errors import CampaignError
+
+FILE_NAME = "campaign.toml"
+
+
+@dataclass(frozen=True)
+class Declaration:
+    """What campaign.toml says.
+
+    Attributes
+    ----------
+    file
+        Path of the file as the user gave it.
+    table
+        Path of the table.
+    settings
+        All the rest, SI.
+    gear_rows
+        Line of each key of ``[gears]``, for a message once the robot's joints are known.
+    """
+
+    file: Path
+    table: Path
+    settings: Settings
+    gear_rows: Mapping[str, int | None]
+
+    @property
+    def robot(self) -> str | Path:
+        """What :func:`thermal_robot.robot.load_robot` wants: a reference to a known robot, or a path."""
+        urdf = self.settings.urdf
+        return urdf if urdf.startswith(("example-robot-data:", "builtin:")) else self.file.parent / urdf
+
+
+def read_declaration(path: Path) -> Declaration:
+    """Read campaign.toml.
+
+    Parameters
+    ----------
+    path
+        The file, or the directory that holds it.
+
+    Raises
+    ------
+    CampaignError
+        No such file, a syntax error, a section or key that is unknown or missing, a value of the wrong kind.
+    """
+    file = path / FILE_NAME if path.is_dir() else path
+    if not file.is_file():
+        raise CampaignError(
+            str(file), "there is no such file", expected=f"{FILE_NAME}, or the directory that holds it"
+        )
+    document = Document(file)
+    length = Units(length=document.word("measurements", "length_unit", LENGTH_UNITS)).length_scale
+    noise = [document.size("noise", key) for key in SECTIONS["noise"]]
+    settings = Settings(
+        urdf=document.string("robot", "urdf"),
+        tool_frame=document.string("robot", "tool_frame"),
+        root_frame=document.string("robot", "root_frame", None),
+        gravity=document.vector("robot", "gravity", None),
+        reference_temperature=document.number("robot", "reference_temperature", STANDARD_TEMPERATURE),
+        units=Units(
+            document.word("measurements", "angle_unit", ANGLE_UNITS),
+            document.word("measurements", "length_unit", LENGTH_UNITS),
+        ),
+        base_known=document.word("frames", "base", ("unknown", "known"), "unknown") == "known",
+        tool_known=document.word("frames", "tool", ("unknown", "known"), "unknown") == "known",
+        target=_scaled(document.vector("frames", "target", (0.0, 0.0, 0.0)), length),
+        noise_position=noise[0] * length or None,
+        noise_orientation=noise[1] or None,
+        payload_com=_scaled(document.vector("payload", "com", (0.0, 0.0, 0.0)), length),
+        priors=document.positive("priors"),
+        gears=document.positive("gears"),
+    )
+    table = file.parent / document.string("measurements", "file")
+    rows = {joint: document.row("gears", joint) for joint in settings.gears}
+    return Declaration(file, table, settings, rows)
+
+
+def check_gears(declaration: Declaration, joints: tuple[str, ...]) -> None:
+    """Refuse a transmission ratio for a joint that the chain does not have.
+
+    Raises
+    ------
+    CampaignError
+        Naming the joint, its line, and the nearest joint of the chain.
+    """
+    for joint in declaration.settings.gears:
+        if joint not in joints:
+            raise CampaignError(
+                str(declaration.file),
+                f"the chain has no such joint{did_you_mean(joint, joints)}",
+                row=declaration.gear_rows.get(joint),
+                column=f"gears.{joint}",
+                expected=f"one of {listed(joints)}",
+            )
+
+
+def _scaled(vector: Vector, scale: float) -> Vector:
+    return as_vector(value * scale for value in vector)

@@ -1,0 +1,52 @@
+"""The table's column names: which the format defines, what a typing error was probably meant to be."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Iterable
+
+POSITION = ("x", "y", "z")
+ORIENTATION = ("qw", "qx", "qy", "qz")
+SIMULATED_POSITION = ("sim.x", "sim.y", "sim.z")
+SIMULATED_ORIENTATION = ("sim.qw", "sim.qx", "sim.qy", "sim.qz")
+LABELS = ("session", "pose")
+PLAIN_COVARIATES = ("time", "order", "temperature", "payload", "speed")
+PER_JOINT = ("approach", "velocity", "acceleration", "torque", "encoder")
+PER_LINK = ("temperature",)
+RESERVED = (
+    *POSITION,
+    *ORIENTATION,
+    *SIMULATED_POSITION,
+    *SIMULATED_ORIENTATION,
+    *LABELS,
+    *PLAIN_COVARIATES,
+)
+"""Names that mean the same in every campaign."""
+
+
+def nearest(name: str, candidates: Iterable[str], count: int = 3, cutoff: float = 0.5) -> list[str]:
+    """Return the candidates most like ``name``, best first; upper and lower case count as equal."""
+    by_lower: dict[str, str] = {}
+    for candidate in candidates:
+        by_lower.setdefault(candidate.lower(), candidate)
+    close = difflib.get_close_matches(name.lower(), by_lower, n=count, cutoff=cutoff)
+    return [by_lower[lower] for lower in close]
+
+
+def did_you_mean(name: str, candidates: Iterable[str], cutoff: float = 0.5) -> str:
+    """Return ``"; did you mean 'elbow_joint'?"``, or nothing when no candidate is like ``name``."""
+    close = nearest(name, candidates, count=1, cutoff=cutoff)
+    return f"; did you mean {close[0]!r}?" if close else ""
+
+
+def listed(names: Iterable[str], limit: int = 12) -> str:
+    """Return names in quotes, separated by commas, cut off after ``limit``."""
+    quoted = [repr(name) for name in names]
+    more = f" and {len(quoted) - limit} more" if len(quoted) > limit else ""
+    return ", ".join(quoted[:limit]) + more
+
+
+def split_name(column: str) -> tuple[str, str]:
+    """Return quantity and place of ``approach.elbow_joint``; the place is empty without a dot."""
+    quantity, _, place = column.partition(".")
+    return quantity, place

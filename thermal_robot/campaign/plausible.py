@@ -1,0 +1,134 @@
+"""What is accepted but doubtful: one plain sentence each, for the user to judge."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+import numpy as np
+
+from thermal_robot.campaign.campaign import Campaign
+from thermal_robot.campaign.names import listed
+
+LIMIT_TOLERANCE = 1e-6
+"""rad or m by which a command may pass a limit: the last digit of a file is not a violation."""
+SAME_COMMAND = 1e-3
+"""rad or m within which commands of one pose label count as the same."""
+
+
+def doubts(campaign: Campaign) -> list[str]:
+    """Return the sentences, none for an ordinary campaign."""
+    return [
+        *_angle_unit(campaign),
+        *_length_unit(campaign),
+        *_limits(campaign),
+        *_time(campaign),
+        *_speed(campaign),
+        *_temperature(campaign),
+        *_pose_labels(campaign),
+    ]
+
+
+def _angle_unit(campaign: Campaign) -> Iterator[str]:
+    robot, units = campaign.robot, campaign.units
+    turning = np.array([kind != "prismatic" for kind in robot.joint_types])
+    values = np.abs(campaign.q[:, turning])
+    if not values.size:
+        return
+    if units.angle == "rad" and values.max() > 4 * math.pi:
+        row, joint = np.unravel_index(int(values.argmax()), values.shape)
+        name = np.array(robot.joint_names)[turning][joint]
+        yield (
+            f"joint {str(name)!r} is commanded to {campaign.q[:, turning][row, joint]:.6g} rad in row "
+            f'{campaign.rows[row]}, more than two turns: is angle_unit = "deg" meant?'
+        )
+    small = math.radians(2 * math.pi)
+    if units.angle == "deg" and campaign.samples >= 3 and values.max() <= small and np.ptp(values) > 0:
+        yield f'no joint leaves ±{values.max() / units.angle_scale:.3g} degrees: is angle_unit = "rad" meant?'
+
+
+def _length_unit(campaign: Campaign) -> Iterator[str]:
+    """Compare lengths with the arm's reach: a wrong unit is wrong by a thousand, so coarse bounds do."""
+    robot, unit = campaign.robot, campaign.units.length
+    travel = np.maximum(np.abs(robot.lower), np.abs(robot.upper))[np.array(robot.joint_types) == "prismatic"]
+    reach = sum(segment.length for segment in robot.segments) + float(travel.sum())
+    if not np.isfinite(reach):
+        return
+    ask = f'the arm reaches {reach:.3g} m: is length_unit = "{unit}" right?'
+    target = float(np.linalg.norm(campaign.target))
+    if target > 3 * reach:
+        yield f"the target lies {target:.3g} m away from {robot.tool_frame!r} and {ask}"
+    if campaign.noise_position is not None and campaign.noise_position > 0.01 * reach:
+        yield f"the noise of position is {campaign.noise_position:.3g} m and {ask}"
+    if campaign.position is None:
+        return
+    extent = float(np.ptp(campaign.position, axis=0).max())
+    # A target on the last axes stays in place while they turn, so more than three joints have to move.
+    moved = int((np.ptp(campaign.q, axis=0) > 0.5).sum())
+    if extent > 4 * (reach + target) or (extent < reach / 200 and moved > 3):
+        yield f"the measured positions extend over {extent:.3g} m and {ask}"
+
+
+def _limits(campaign: Campaign) -> Iterator[str]:
+    robot = campaign.robot
+    for j, (name, kind) in enumerate(zip(robot.joint_names, robot.joint_types, strict=True)):
+        q, lower, upper = campaign.q[:, j], float(robot.lower[j]), float(robot.upper[j])
+        outside = (q < lower - LIMIT_TOLERANCE) | (q > upper + LIMIT_TOLERANCE)
+        if outside.any():
+            first = int(np.argmax(outside))
+            scale, unit = campaign.units.joint_scale(kind), campaign.units.joint_unit(kind)
+            limit = upper if q[first] > upper else lower
+            yield (
+                f"joint {name!r} is outside its limits in {_rows(int(outside.sum()))}, first in row "
+                f"{campaign.rows[first]}: {q[first] / scale:.6g} {unit}, limit {limit / scale:.6g} {unit}"
+            )
+
+
+def _time(campaign: Campaign) -> Iterator[str]:
+    time = campaign.covariates.get("time")
+    if time is None:
+        return
+    back = np.diff(time) < 0
+    if back.any():
+        first = int(np.argmax(back)) + 1
+        yield (
+            f"column 'time' runs backwards {int(back.sum())} time{'s' if back.sum() > 1 else ''}, "
+            f"first in row {campaign.rows[first]}: {time[first]:.6g} s after {time[first - 1]:.6g} s"
+        )
+
+
+def _speed(campaign: Campaign) -> Iterator[str]:
+    speed = campaign.covariates.get("speed")
+    if speed is None:
+        return
+    outside = (speed < 0) | (speed > 1)
+    if outside.any():
+        first = int(np.argmax(outside))
+        yield (
+            f"column 'speed' is outside 0..1 in {_rows(int(outside.sum()))}, "
+            f"first in row {campaign.rows[first]}: {speed[first]:.6g}; "
+            "it is a fraction of the maximum, not per cent"
+        )
+
+
+def _temperature(campaign: Campaign) -> Iterator[str]:
+    for name, values in campaign.covariates.items():
+        if name.split(".")[0] == "temperature" and name not in campaign.extra and np.median(values) > 150.0:
+            yield f"column {name!r} has a median of {np.median(values):.4g} °C: are these kelvin?"
+
+
+def _pose_labels(campaign: Campaign) -> Iterator[str]:
+    labels = campaign.labels.get("pose")
+    if labels is None:
+        return
+    different = [
+        str(label)
+        for label in np.unique(labels[labels != ""])
+        if np.ptp(campaign.q[labels == label], axis=0).max() > SAME_COMMAND
+    ]
+    if different:
+        yield f"rows with the same pose label have different joint commands: {listed(different, 5)}"
+
+
+def _rows(count: int) -> str:
+    return f"{count} row{'s' if count != 1 else ''}"

@@ -1,0 +1,83 @@
+"""From files to a campaign."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+from thermal_robot.campaign.campaign import Campaign
+from thermal_robot.campaign.declaration import FILE_NAME, check_gears, read_declaration
+from thermal_robot.campaign.settings import Settings
+from thermal_robot.campaign.tabular import read_table
+from thermal_robot.campaign.validate import build_campaign
+from thermal_robot.errors import RobotError
+from thermal_robot.robot import Robot, load_robot
+
+
+def read_campaign(path: str | Path) -> Campaign:
+    """Read and validate a campaign.
+
+    Parameters
+    ----------
+    path
+        campaign.toml, or the directory that holds it.
+
+    Returns
+    -------
+    Campaign
+        In SI units; what is doubtful but was accepted stands in its ``warnings``.
+
+    Raises
+    ------
+    CampaignError
+        A file that cannot be used: names file, row and column, what was found and what was expected.
+    RobotError
+        A robot that cannot be loaded, or has no such frame.
+    """
+    declaration = read_declaration(Path(path))
+    settings = declaration.settings
+    try:
+        robot = load_robot(
+            declaration.robot, settings.tool_frame, root_frame=settings.root_frame, gravity=settings.gravity
+        )
+    except RobotError as error:
+        raise RobotError(
+            f"{declaration.file}, [robot]: {error}", name=error.name, candidates=error.candidates
+        ) from error
+    check_gears(declaration, robot.joint_names)
+    file = Path(os.path.abspath(declaration.file))  # the parent of "." and ".." has a name, too
+    name = file.parent.name if file.name == FILE_NAME else file.stem
+    return build_campaign(read_table(declaration.table), settings, robot, name=name)
+
+
+def read_samples(path: str | Path, settings: Settings | Campaign, robot: Robot | None = None) -> Campaign:
+    """Read a table of commands and conditions to predict.
+
+    Parameters
+    ----------
+    path
+        CSV or Parquet, with the columns and units of the campaign. Measured columns are ignored.
+    settings
+        Of the campaign that the model was fitted to, or that campaign itself.
+    robot
+        The robot; may be left out when a campaign is given.
+
+    Returns
+    -------
+    Campaign
+        With ``position`` and ``orientation`` ``None``, one sample per row in the file's order.
+
+    Raises
+    ------
+    CampaignError
+        A table that cannot be used.
+    TypeError
+        Settings without a robot.
+    """
+    if isinstance(settings, Campaign):
+        robot = robot or settings.robot
+        settings = settings.settings
+    if robot is None:
+        raise TypeError("read_samples() needs the robot when it is given settings instead of a campaign")
+    file = Path(path)
+    return build_campaign(read_table(file), settings, robot, name=file.stem, measured=False)

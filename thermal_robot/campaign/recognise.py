@@ -1,0 +1,197 @@
+"""Which column is what, given the robot; the ambiguous is refused, what fits nothing is noted."""
+
+from __future__ import annotations
+
+import xml.etree.ElementTree as ElementTree
+from collections.abc import Collection, Iterable, Sequence
+from dataclasses import dataclass
+
+from thermal_robot.campaign import names
+from thermal_robot.campaign.names import did_you_mean, listed, nearest, split_name
+from thermal_robot.campaign.table import Table
+from thermal_robot.errors import CampaignError
+from thermal_robot.robot import Robot
+
+
+@dataclass(frozen=True)
+class Columns:
+    """A table's columns by their part in the campaign.
+
+    Attributes
+    ----------
+    covariates
+        Those that the format defines, except empty ones.
+    extra
+        Numeric columns that the format does not define.
+    labels
+        ``session`` and ``pose`` where present.
+    has_orientation, has_simulated_position, has_simulated_orientation
+        Whether these groups are there, each whole.
+    warnings
+        Columns left out, and names that look like typing errors.
+    """
+
+    covariates: tuple[str, ...]
+    extra: tuple[str, ...]
+    labels: tuple[str, ...]
+    has_orientation: bool
+    has_simulated_position: bool
+    has_simulated_orientation: bool
+    warnings: tuple[str, ...]
+
+
+def recognise(table: Table, robot: Robot, *, measured: bool) -> Columns:
+    """Sort a table's columns.
+
+    Parameters
+    ----------
+    table
+        As read.
+    robot
+        Whose joints and links the columns name.
+    measured
+        Whether positions are required; without, measured columns are ignored.
+
+    Raises
+    ------
+    CampaignError
+        A joint or a coordinate without a column, some of a quaternion's four, a name with two meanings.
+    """
+    present = table.columns
+    _refuse_two_meanings(table, robot)
+    _require_joints(table, robot)
+    if measured:
+        _require(table, names.POSITION, "a measured position needs x, y and z")
+    has_orientation = measured and _whole_group(table, names.ORIENTATION)
+    has_simulated_position = _whole_group(table, names.SIMULATED_POSITION)
+    has_simulated_orientation = _whole_group(table, names.SIMULATED_ORIENTATION)
+    if has_simulated_orientation and not has_simulated_position:
+        _require(table, names.SIMULATED_POSITION, "a simulated orientation needs a simulated position")
+
+    taken = {*robot.joint_names, *names.POSITION, *names.ORIENTATION, *names.LABELS}
+    taken |= {*names.SIMULATED_POSITION, *names.SIMULATED_ORIENTATION}
+    covariates: list[str] = []
+    extra: list[str] = []
+    warnings: list[str] = []
+    links, joints = _urdf_names(robot)
+    for column in present:
+        if column in taken:
+            continue
+        quantity, place = split_name(column)
+        if table.is_empty(column):
+            warnings.append(f"column {column!r} is empty and counts as absent")
+        elif column in names.PLAIN_COVARIATES:
+            covariates.append(column)
+        elif place and quantity in names.PER_JOINT:
+            if place in robot.joint_names:
+                covariates.append(column)
+            else:
+                warnings.append(_ignored(column, "the chain has no joint", place, robot.joint_names))
+        elif place and quantity in names.PER_LINK:
+            if place in links:
+                covariates.append(column)
+                if place not in {segment.parent_link for segment in robot.segments}:
+                    warnings.append(f"column {column!r}: no length of the chain belongs to that link")
+            else:
+                warnings.append(_ignored(column, "the robot has no link", place, links))
+        else:
+            warnings += _judge_extra(table, column, extra, robot, joints)
+    return Columns(
+        tuple(covariates),
+        tuple(extra),
+        tuple(label for label in names.LABELS if label in present),
+        has_orientation,
+        has_simulated_position,
+        has_simulated_orientation,
+        tuple(warnings),
+    )
+
+
+def _judge_extra(
+    table: Table, column: str, extra: list[str], robot: Robot, joints: Collection[str]
+) -> list[str]:
+    """Keep a column that the format does not define if it is numeric; say what is doubtful about it."""
+    text = table.first_text(column)
+    if text is not None:
+        found = table.columns[column][text]
+        return [f"column {column!r} is not numeric (row {table.rows[text]}: {found!r}) and is ignored"]
+    extra.append(column)
+    if column in joints:
+        return [f"column {column!r} is a joint outside the chain: it is kept as an extra covariate only"]
+    if column in names.PER_JOINT:
+        meant = f"did you mean '{column}.<joint>'?"
+        return [f"column {column!r} names no joint and is kept as an extra covariate; {meant}"]
+    known = [
+        *names.RESERVED,
+        *(f"{quantity}.{joint}" for quantity in names.PER_JOINT for joint in robot.joint_names),
+    ]
+    meant = did_you_mean(column, known, cutoff=0.85)
+    return (
+        [f"column {column!r} is not defined by the format and is kept as an extra covariate{meant}"]
+        if meant
+        else []
+    )
+
+
+def _ignored(column: str, reason: str, place: str, candidates: Iterable[str]) -> str:
+    return f"column {column!r} is ignored: {reason} {place!r}{did_you_mean(place, candidates)}"
+
+
+def _refuse_two_meanings(table: Table, robot: Robot) -> None:
+    for column in table.columns:
+        quantity, place = split_name(column)
+        reserved = column in names.RESERVED or (quantity in names.PER_JOINT and place in robot.joint_names)
+        if column in robot.joint_names and reserved:
+            raise CampaignError(
+                table.file,
+                "this name is both a joint of the chain and a column that the format defines",
+                row=table.header,
+                column=column,
+                expected="a joint of another name; rename it in the URDF and in the table",
+            )
+
+
+def _require_joints(table: Table, robot: Robot) -> None:
+    chain = f"{robot.root_frame!r} to {robot.tool_frame!r}"
+    _require(table, robot.joint_names, f"every movable joint of the chain from {chain} needs a column")
+
+
+def _require(table: Table, wanted: Sequence[str], why: str) -> None:
+    """Refuse a table that lacks one of the columns, with the names that come nearest to it."""
+    spare = [column for column in table.columns if column not in wanted]
+    for name in wanted:
+        if name not in table.columns:
+            close = nearest(name, spare, cutoff=0.4)
+            found = f"the nearest names {listed(close)}" if close else f"the columns {listed(table.columns)}"
+            raise CampaignError(
+                table.file,
+                f"there is no such column; {why}",
+                row=table.header,
+                column=name,
+                found=found,
+                expected=listed(wanted),
+            )
+
+
+def _whole_group(table: Table, group: Sequence[str]) -> bool:
+    """Return whether all columns of a group are there; some of them only is an error."""
+    here = [name for name in group if name in table.columns]
+    if here and len(here) < len(group):
+        lacking = next(name for name in group if name not in table.columns)
+        raise CampaignError(
+            table.file,
+            "the columns of this group stand together or not at all",
+            row=table.header,
+            column=lacking,
+            found=f"only {listed(here)}",
+            expected=listed(group),
+        )
+    return bool(here)
+
+
+def _urdf_names(robot: Robot) -> tuple[set[str], set[str]]:
+    """Return the names of all links and of all joints of the robot, inside the chain or not."""
+    root = ElementTree.fromstring(robot.urdf)
+    links = {element.get("name", "") for element in root.findall("link")}
+    joints = {element.get("name", "") for element in root.findall("joint")}
+    return links, joints

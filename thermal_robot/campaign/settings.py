@@ -1,0 +1,174 @@
+"""What a campaign says once about all its rows: units, frames, noise, payload; no table."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any, TypeAlias
+
+from thermal_robot.errors import CampaignError
+
+Vector: TypeAlias = tuple[float, float, float]
+
+ANGLE_UNITS: dict[str, float] = {"rad": 1.0, "deg": math.pi / 180.0}
+"""Radians in one of the unit."""
+LENGTH_UNITS: dict[str, float] = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
+"""Metres in one of the unit."""
+
+STANDARD_TEMPERATURE = 20.0
+"""°C; ISO 1, the temperature at which lengths are specified unless somebody says otherwise."""
+
+
+@dataclass(frozen=True)
+class Units:
+    """The units of a file. SI value = value in the file × scale.
+
+    Parameters
+    ----------
+    angle
+        ``"rad"`` or ``"deg"``.
+    length
+        ``"m"``, ``"mm"`` or ``"um"``.
+
+    Raises
+    ------
+    CampaignError
+        A word that is not one of these.
+    """
+
+    angle: str = "rad"
+    length: str = "m"
+
+    def __post_init__(self) -> None:
+        for key, word, allowed in (
+            ("angle_unit", self.angle, ANGLE_UNITS),
+            ("length_unit", self.length, LENGTH_UNITS),
+        ):
+            if word not in allowed:
+                raise CampaignError(
+                    "<units>", "unknown unit", column=key, found=repr(word), expected=" or ".join(allowed)
+                )
+
+    @property
+    def angle_scale(self) -> float:
+        """Radians per angle unit."""
+        return ANGLE_UNITS[self.angle]
+
+    @property
+    def length_scale(self) -> float:
+        """Metres per length unit."""
+        return LENGTH_UNITS[self.length]
+
+    def joint_scale(self, joint_type: str) -> float:
+        """Radians, or metres for a prismatic joint, per unit of its column."""
+        return self.length_scale if joint_type == "prismatic" else self.angle_scale
+
+    def joint_unit(self, joint_type: str) -> str:
+        """Word for the unit of a joint's column."""
+        return self.length if joint_type == "prismatic" else self.angle
+
+
+@dataclass(frozen=True)
+class Settings:
+    """The part of a campaign that is not in the table, in SI units; a model file stores it as a plain dict.
+
+    Attributes
+    ----------
+    urdf
+        The robot's reference as written in the campaign: a path relative to it, ``example-robot-data:…`` or
+        ``builtin:…``; empty for a campaign that was made without files.
+    tool_frame, root_frame
+        Ends of the chain; ``root_frame`` ``None`` for the URDF's root.
+    gravity
+        m/s², in the root frame; ``None`` for the robot's default.
+    reference_temperature
+        °C at which the URDF's lengths hold.
+    units
+        Units of the table's columns; everything else here is SI.
+    base_known, tool_known
+        Whether the measurements are in the root frame, and whether the target is where ``target`` says.
+    target
+        The measured point in the tool frame, m.
+    noise_position, noise_orientation
+        One sigma per axis of the instrument, m and rad; ``None`` when not given.
+    payload_com
+        Centre of mass of the payload in the tool frame, m.
+    priors
+        Expected size (one sigma) of an effect's parameters, by the effect's name, in their unit.
+    gears
+        Transmission ratio by joint name.
+    """
+
+    urdf: str
+    tool_frame: str
+    root_frame: str | None = None
+    gravity: Vector | None = None
+    reference_temperature: float = STANDARD_TEMPERATURE
+    units: Units = Units()
+    base_known: bool = False
+    tool_known: bool = False
+    target: Vector = (0.0, 0.0, 0.0)
+    noise_position: float | None = None
+    noise_orientation: float | None = None
+    payload_com: Vector = (0.0, 0.0, 0.0)
+    priors: Mapping[str, float] = field(default_factory=dict)
+    gears: Mapping[str, float] = field(default_factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return a dict of strings, numbers, booleans, lists and dicts only, ready for JSON; lengths in m."""
+        return {
+            "urdf": self.urdf,
+            "tool_frame": self.tool_frame,
+            "root_frame": self.root_frame,
+            "gravity": None if self.gravity is None else list(self.gravity),
+            "reference_temperature": self.reference_temperature,
+            "units": {"angle": self.units.angle, "length": self.units.length},
+            "base_known": self.base_known,
+            "tool_known": self.tool_known,
+            "target": list(self.target),
+            "noise_position": self.noise_position,
+            "noise_orientation": self.noise_orientation,
+            "payload_com": list(self.payload_com),
+            "priors": dict(self.priors),
+            "gears": dict(self.gears),
+        }
+
+    @classmethod
+    def from_dict(cls, data: Mapping[str, Any], file: str = "<settings>") -> Settings:
+        """Build settings from what :meth:`to_dict` returned.
+
+        Parameters
+        ----------
+        data
+            The dict, possibly after a journey through JSON.
+        file
+            Name of the file it came from, for the error message.
+
+        Raises
+        ------
+        CampaignError
+            A key that is missing or unknown, or a value of the wrong kind.
+        """
+        values = dict(data)
+        known = set(cls.__dataclass_fields__)
+        for key in sorted(known.symmetric_difference(values)):
+            problem = "is missing from the settings" if key in known else "is not a setting"
+            raise CampaignError(file, problem, column=key)
+        try:
+            values["units"] = Units(**values["units"])
+            for key in ("target", "payload_com"):
+                values[key] = as_vector(values[key])
+            if values["gravity"] is not None:
+                values["gravity"] = as_vector(values["gravity"])
+            for key in ("priors", "gears"):
+                values[key] = {str(name): float(value) for name, value in values[key].items()}
+        except (TypeError, ValueError, AttributeError) as error:
+            raise CampaignError(file, f"settings cannot be read ({error})") from error
+        return cls(**values)
+
+
+def as_vector(values: Any) -> Vector:
+    """Return three floats; ``ValueError`` for any other number of them."""
+    x, y, z = (float(value) for value in values)
+    return x, y, z

@@ -1,0 +1,144 @@
+"""A table as text or numbers, with its row numbers; knows nothing of robots or of what columns mean."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any, TypeAlias
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.errors import CampaignError
+
+Cells: TypeAlias = "Sequence[str] | NDArray[np.float64]"
+"""A column: text as it stands in the file, or numbers where the source has a type of its own."""
+
+_EMPTY = frozenset({"", "nan", "na", "n/a", "null", "none", "<na>"})
+
+
+@dataclass(frozen=True)
+class Table:
+    """Columns of equal length with the row number of each entry.
+
+    Attributes
+    ----------
+    file
+        Name of the file as the user gave it, for messages.
+    columns
+        Cells by name, names stripped of blanks.
+    rows
+        (N,) row numbers: as a text editor counts them, or the integer index of a data frame.
+    header
+        Row number of the header, ``None`` for a data frame.
+    decimal_comma
+        Numbers are written 1,5.
+    warnings
+        What was odd about the file.
+    """
+
+    file: str
+    columns: Mapping[str, Cells]
+    rows: NDArray[np.int64]
+    header: int | None = None
+    decimal_comma: bool = False
+    warnings: tuple[str, ...] = ()
+
+    def numbers(self, column: str, *, gaps: bool = False) -> NDArray[np.float64]:
+        """Return a column as (N,) numbers in the file's unit.
+
+        Parameters
+        ----------
+        column
+            Its name.
+        gaps
+            Accept empty cells, as NaN.
+
+        Raises
+        ------
+        CampaignError
+            Text, an infinite number, or an empty cell where none may be.
+        """
+        cells = self.columns[column]
+        values = cells if isinstance(cells, np.ndarray) else self._parse(column, cells)
+        refused = np.isinf(values) if gaps else ~np.isfinite(values)
+        if refused.any():
+            index = int(np.argmax(refused))
+            raise CampaignError(
+                self.file,
+                "a value is missing" if np.isnan(values[index]) else "not a finite number",
+                row=int(self.rows[index]),
+                column=column,
+                found=self._as_found(cells[index]),
+                expected="a number",
+            )
+        return values
+
+    def text(self, column: str) -> list[str]:
+        """Return a column as N strings; numbers as short as they can be, empty cells as ``""``."""
+        cells = self.columns[column]
+        if isinstance(cells, np.ndarray):
+            return ["" if np.isnan(value) else f"{value:.15g}" for value in cells]
+        return ["" if cell.lower() in _EMPTY else cell for cell in cells]
+
+    def first_text(self, column: str) -> int | None:
+        """Return the index of the first cell that is not a number, ``None`` for a numeric column."""
+        cells = self.columns[column]
+        if isinstance(cells, np.ndarray):
+            return None
+        values = self._numbers_or_none(cells)
+        return values.index(None) if None in values else None
+
+    def is_empty(self, column: str) -> bool:
+        """Return whether no cell of the column holds anything."""
+        cells = self.columns[column]
+        if isinstance(cells, np.ndarray):
+            return bool(np.isnan(cells).all())
+        return all(cell.lower() in _EMPTY for cell in cells)
+
+    def _parse(self, column: str, cells: Sequence[str]) -> NDArray[np.float64]:
+        values = self._numbers_or_none(cells)
+        if None in values:
+            index = values.index(None)
+            mixed = self.decimal_comma and "." in cells[index]
+            raise CampaignError(
+                self.file,
+                "text where a number should be",
+                row=int(self.rows[index]),
+                column=column,
+                found=repr(cells[index]),
+                expected="a number" + (" with a decimal comma, as elsewhere in this file" if mixed else ""),
+            )
+        return np.array(values, dtype=np.float64)
+
+    def _numbers_or_none(self, cells: Sequence[str]) -> list[float | None]:
+        """Return the number in each cell, NaN for an empty one, ``None`` for text."""
+        if not self.decimal_comma and "_" not in "".join(cells):
+            try:
+                return [float(cell) for cell in cells]  # nearly every column of nearly every file
+            except ValueError:
+                pass
+        return [self._number(cell) for cell in cells]
+
+    def _number(self, cell: str) -> float | None:
+        """Return the number in a cell, NaN for an empty one, ``None`` for text."""
+        if self.decimal_comma and "," in cell:
+            if "." in cell:  # 1.234,5: a thousands separator, which cannot be told from a decimal point
+                return None
+            cell = cell.replace(",", ".")
+        elif self.decimal_comma and "." in cell:
+            return None
+        try:
+            value = float(cell)
+        except ValueError:
+            if cell.lower() in _EMPTY:
+                return float("nan")
+            # A spreadsheet's or a document's minus sign is still a minus sign.
+            return self._number(cell.replace("−", "-")) if "−" in cell else None
+        return None if "_" in cell else value  # Python reads 1_000 as a number; no instrument writes it
+
+    @staticmethod
+    def _as_found(cell: Any) -> str:
+        if isinstance(cell, str):
+            return repr(cell) if cell else "an empty cell"
+        return "an empty cell" if np.isnan(cell) else repr(float(cell))

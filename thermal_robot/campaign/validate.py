@@ -1,0 +1,180 @@
+"""Table and settings become a campaign: every value checked, converted to SI, gaps of covariates filled."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.campaign import names
+from thermal_robot.campaign.campaign import Campaign, FloatArray
+from thermal_robot.campaign.fill import fill
+from thermal_robot.campaign.names import split_name
+from thermal_robot.campaign.plausible import doubts
+from thermal_robot.campaign.recognise import recognise
+from thermal_robot.campaign.settings import Settings, Units
+from thermal_robot.campaign.table import Table
+from thermal_robot.errors import CampaignError
+from thermal_robot.robot import Robot
+
+QUATERNION_TOLERANCE = 0.1
+"""A quaternion whose length differs from 1 by more is a mistake, not a rounding."""
+MINIMUM_POSES = 3
+"""Distinct configurations without which a rigid frame can turn about the line through two points."""
+
+
+def build_campaign(
+    table: Table, settings: Settings, robot: Robot, *, name: str, measured: bool = True
+) -> Campaign:
+    """Validate a table and return the campaign.
+
+    Parameters
+    ----------
+    table
+        As read.
+    settings
+        Units and everything else that is not in the table.
+    robot
+        The chain that the joint columns command.
+    name
+        Name of the campaign.
+    measured
+        Whether the rows were measured; otherwise they are to be predicted and measured columns are ignored.
+
+    Raises
+    ------
+    CampaignError
+        Whatever cannot be used, with row and column.
+    """
+    columns = recognise(table, robot, measured=measured)
+    warnings = [*table.warnings, *columns.warnings]
+    units = settings.units
+    q = np.column_stack(
+        [
+            table.numbers(joint) * units.joint_scale(kind)
+            for joint, kind in zip(robot.joint_names, robot.joint_types, strict=True)
+        ]
+    )
+    covariates: dict[str, FloatArray] = {}
+    missing: dict[str, NDArray[np.bool_]] = {}
+    for column in (*columns.covariates, *columns.extra):
+        values = table.numbers(column, gaps=True)
+        _check_covariate(table, column, values)
+        gaps = np.isnan(values)
+        if gaps.any():
+            values, how = fill(column, values)
+            missing[column] = gaps
+            count = int(gaps.sum())
+            warnings.append(f"column {column!r} is empty in {count} of {len(gaps)} rows: {how}")
+        covariates[column] = values * covariate_scale(column, robot, units)
+    campaign = Campaign(
+        name=name,
+        robot=robot,
+        q=q,
+        position=_vectors(table, names.POSITION, units) if measured else None,
+        orientation=_quaternions(table, names.ORIENTATION) if columns.has_orientation else None,
+        covariates=covariates,
+        extra=columns.extra,
+        labels={label: np.array(table.text(label), dtype=np.str_) for label in columns.labels},
+        simulated_position=_vectors(table, names.SIMULATED_POSITION, units)
+        if columns.has_simulated_position
+        else None,
+        simulated_orientation=(
+            _quaternions(table, names.SIMULATED_ORIENTATION) if columns.has_simulated_orientation else None
+        ),
+        base_known=settings.base_known,
+        tool_known=settings.tool_known,
+        target=np.array(settings.target),
+        noise_position=settings.noise_position,
+        noise_orientation=settings.noise_orientation,
+        payload_com=np.array(settings.payload_com),
+        reference_temperature=settings.reference_temperature,
+        priors=dict(settings.priors),
+        gears=dict(settings.gears),
+        units=units,
+        rows=table.rows,
+        missing=missing,
+        urdf=settings.urdf,
+    )
+    if measured:
+        _require_enough(table.file, campaign)
+    warnings += doubts(campaign)
+    object.__setattr__(campaign, "warnings", tuple(warnings))
+    return campaign
+
+
+def covariate_scale(column: str, robot: Robot, units: Units) -> float:
+    """SI value of one unit of a covariate's column; 1 where it is in SI, in °C, or as given."""
+    quantity, place = split_name(column)
+    if quantity in ("velocity", "acceleration", "encoder") and place in robot.joint_names:
+        return units.joint_scale(robot.joint_types[robot.joint_names.index(place)])
+    return 1.0
+
+
+def _check_covariate(table: Table, column: str, values: NDArray[np.float64]) -> None:
+    """Refuse numbers that cannot be what the column says; NaN passes."""
+    quantity, place = split_name(column)
+    if quantity == "approach" and place:
+        refused, expected = ~np.isin(values, (-1.0, 0.0, 1.0)) & ~np.isnan(values), "-1, 0 or 1"
+    elif column == "payload":
+        refused, expected = values < 0, "a mass in kg that is not negative"
+    elif quantity == "temperature":
+        refused, expected = values < -273.15, "°C"
+    else:
+        return
+    if refused.any():
+        index = int(np.argmax(refused))
+        raise CampaignError(
+            table.file,
+            "impossible value",
+            row=int(table.rows[index]),
+            column=column,
+            found=f"{values[index]:.15g}",
+            expected=expected,
+        )
+
+
+def _vectors(table: Table, group: Sequence[str], units: Units) -> FloatArray:
+    """(N, 3) m."""
+    vectors: FloatArray = np.column_stack([table.numbers(column) for column in group]) * units.length_scale
+    return vectors
+
+
+def _quaternions(table: Table, group: Sequence[str]) -> FloatArray:
+    """(N, 4) unit quaternions wxyz."""
+    quaternions: FloatArray = np.column_stack([table.numbers(column) for column in group])
+    lengths = np.linalg.norm(quaternions, axis=1)
+    refused = np.abs(lengths - 1.0) > QUATERNION_TOLERANCE
+    if refused.any():
+        index = int(np.argmax(refused))
+        raise CampaignError(
+            table.file,
+            "no orientation: the quaternion's length is not 1",
+            row=int(table.rows[index]),
+            column=group[0],
+            found=f"({', '.join(f'{part:g}' for part in quaternions[index])}) of length {lengths[index]:.3g}",
+            expected="qw, qx, qy, qz of length 1",
+        )
+    unit: FloatArray = quaternions / lengths[:, None]
+    return unit
+
+
+def _require_enough(file: str, campaign: Campaign) -> None:
+    """Refuse a campaign whose rows cannot determine the frames that it declares unknown."""
+    pose = campaign.measures == "pose"
+    equations = 6 if pose else 3
+    base = 0 if campaign.base_known else 6
+    tool = 0 if campaign.tool_known else equations  # the target's orientation is fitted where it is measured
+    needed = -(-(base + tool) // equations)
+    if base:
+        needed = max(needed, MINIMUM_POSES)
+    distinct = len(np.unique(np.round(campaign.q, 9), axis=0))
+    if distinct < needed:
+        unknown = " and ".join(word for word, count in (("base", base), ("tool", tool)) if count)
+        raise CampaignError(
+            file,
+            f"too few measurements to find the unknown {unknown} frame{'s' if base and tool else ''}",
+            found=f"{campaign.samples} rows with {distinct} different joint configurations",
+            expected=f"at least {needed} different configurations",
+        )

@@ -1,0 +1,159 @@
+"""From a campaign to files: campaign.toml, its table and its robot; and the table of predictions."""
+
+from __future__ import annotations
+
+import csv
+from collections.abc import Iterator, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from thermal_robot.campaign import names
+from thermal_robot.campaign.campaign import Campaign
+from thermal_robot.campaign.declaration import FILE_NAME
+from thermal_robot.campaign.settings import Units
+from thermal_robot.campaign.validate import covariate_scale
+from thermal_robot.errors import CampaignError
+
+TABLE_NAME = "measurements.csv"
+ROBOT_NAME = "robot.urdf"
+
+
+def write_campaign(campaign: Campaign, directory: str | Path) -> Path:
+    """Write a campaign so that reading it again gives the same arrays.
+
+    Filled gaps are written with the values that filled them.
+
+    Parameters
+    ----------
+    campaign
+        With measured positions.
+    directory
+        Is made if need be; campaign.toml, measurements.csv and robot.urdf in it are replaced.
+
+    Returns
+    -------
+    Path
+        Of the campaign.toml.
+
+    Raises
+    ------
+    CampaignError
+        Samples without measured positions, which :func:`write_table` writes; a directory that cannot be
+        written.
+    """
+    folder = Path(directory)
+    if campaign.position is None:
+        raise CampaignError(str(folder), "samples without measured positions are no campaign")
+    import tomli_w
+
+    file = folder / FILE_NAME
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / ROBOT_NAME).write_text(campaign.robot.urdf, encoding="utf-8")
+        file.write_text(tomli_w.dumps(_document(campaign)), encoding="utf-8")
+    except OSError as error:
+        raise CampaignError(str(folder), f"cannot be written: {error.strerror}") from error
+    write_table(campaign, folder / TABLE_NAME)
+    return file
+
+
+def write_table(campaign: Campaign, path: str | Path) -> None:
+    """Write the table of a campaign, or of samples, as CSV in the campaign's units, with all digits."""
+    columns: list[str] = []
+    data: list[Sequence[str]] = []
+    for name, values in _columns(campaign):
+        columns.append(name)
+        data.append([repr(float(value)) for value in values])
+    for name, labels in campaign.labels.items():
+        columns.append(name)
+        data.append([str(label) for label in labels])
+    _write_csv(Path(path), columns, data)
+
+
+def write_predictions(
+    path: str | Path, positions: ArrayLike, orientations: ArrayLike | None, units: Units
+) -> None:
+    """Write predicted poses: the columns x y z, and qw qx qy qz if given, only.
+
+    Parameters
+    ----------
+    path
+        CSV file to write.
+    positions
+        (N, 3) m.
+    orientations
+        (N, 4) unit quaternions wxyz, or ``None``.
+    units
+        The positions are written in their length unit.
+    """
+    values = np.asarray(positions, dtype=np.float64).reshape(-1, 3) / units.length_scale
+    columns: tuple[str, ...] = names.POSITION
+    if orientations is not None:
+        values = np.hstack([values, np.asarray(orientations, dtype=np.float64).reshape(-1, 4)])
+        columns += names.ORIENTATION
+    _write_csv(Path(path), columns, [[repr(float(value)) for value in column] for column in values.T])
+
+
+def _columns(campaign: Campaign) -> Iterator[tuple[str, np.ndarray[Any, np.dtype[np.float64]]]]:
+    """Yield the numeric columns by name, in the units of the file."""
+    robot, units = campaign.robot, campaign.units
+    for j, (joint, kind) in enumerate(zip(robot.joint_names, robot.joint_types, strict=True)):
+        yield joint, campaign.q[:, j] / units.joint_scale(kind)
+    for group, values, scale in (
+        (names.POSITION, campaign.position, units.length_scale),
+        (names.ORIENTATION, campaign.orientation, 1.0),
+        (names.SIMULATED_POSITION, campaign.simulated_position, units.length_scale),
+        (names.SIMULATED_ORIENTATION, campaign.simulated_orientation, 1.0),
+    ):
+        if values is not None:
+            yield from zip(group, values.T / scale, strict=True)
+    for name, values in campaign.covariates.items():
+        yield name, values / covariate_scale(name, robot, units)
+
+
+def _write_csv(path: Path, columns: Sequence[str], data: Sequence[Sequence[str]]) -> None:
+    try:
+        with path.open("w", encoding="utf-8", newline="") as file:
+            writer = csv.writer(file, lineterminator="\n")
+            writer.writerow(columns)
+            writer.writerows(zip(*data, strict=True))
+    except OSError as error:
+        raise CampaignError(str(path), f"cannot be written: {error.strerror}") from error
+
+
+def _document(campaign: Campaign) -> dict[str, Any]:
+    """Return campaign.toml as a dict, lengths in the campaign's unit."""
+    settings = campaign.settings
+    scale = settings.units.length_scale
+    noise: dict[str, float] = {}
+    if settings.noise_position is not None:
+        noise["position"] = settings.noise_position / scale
+    if settings.noise_orientation is not None:
+        noise["orientation"] = settings.noise_orientation
+    document: dict[str, Any] = {
+        "robot": {
+            "urdf": ROBOT_NAME,
+            "tool_frame": settings.tool_frame,
+            "root_frame": settings.root_frame,
+            "gravity": list(settings.gravity or ()),
+            "reference_temperature": settings.reference_temperature,
+        },
+        "measurements": {
+            "file": TABLE_NAME,
+            "angle_unit": settings.units.angle,
+            "length_unit": settings.units.length,
+        },
+        "frames": {
+            "base": "known" if settings.base_known else "unknown",
+            "tool": "known" if settings.tool_known else "unknown",
+            "target": [value / scale for value in settings.target],
+        },
+        "noise": noise,
+        "payload": {"com": [value / scale for value in settings.payload_com]},
+        "priors": dict(settings.priors),
+        "gears": dict(settings.gears),
+    }
+    return {section: content for section, content in document.items() if content}
