@@ -1,0 +1,37 @@
+"""The base does not stand where the file says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from thermal_robot.effects.effect import Effect, Parameter, at_base
+
+if TYPE_CHECKING:
+    from thermal_robot.observations import Observations
+
+COMPONENTS = (*(f"translation {a}" for a in "xyz"), *(f"rotation {a}" for a in "xyz"))
+
+
+@dataclass(frozen=True)
+class BaseFrame(Effect):
+    """The declared registration of the base is off by a constant twist in the root frame.
+
+    Expected size 2 mm and 2 mrad. Only where the campaign declares ``base = "known"``: an unknown base is fitted
+    before any effect is asked for.
+    """
+
+    name: ClassVar[str] = "base_frame"
+
+    def missing(self, observations: Observations) -> tuple[str, ...]:
+        """Return the declaration that would make the base an effect."""
+        return () if observations.campaign.base_known else ('frames.base = "known"',)
+
+    def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
+        """The base's twist in the root frame: m and rad."""
+        return tuple(
+            Parameter(component, "m" if k < 3 else "rad", 2e-3, "base", "base", (at_base(np.eye(6)[k]),))
+            for k, component in enumerate(COMPONENTS)
+        )

@@ -1,0 +1,74 @@
+"""The base, or the instrument, settles while the campaign runs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from thermal_robot.effects.effect import Effect, Parameter, at_base
+
+if TYPE_CHECKING:
+    from thermal_robot.observations import Observations
+
+_COMPONENTS = (*(f"translation {a}" for a in "xyz"), *(f"rotation {a}" for a in "xyz"))
+
+
+@dataclass(frozen=True)
+class Drift(Effect):
+    """The base moves by a twist that grows with time from zero at the first row: exp(β(t)) T.
+
+    Linear, β(t) = β (t − t₀)/span, or exponential, β(t) = β (1 − exp(−(t − t₀)/τ)) / (1 − exp(−span/τ)), so that β is
+    the displacement over the campaign in both. Expected size 0.1 mm and 0.1 mrad. ``order`` takes the place of
+    ``time`` where there is no time column.
+
+    Attributes
+    ----------
+    origin, span
+        t₀ and the campaign's duration, in the unit of the column; taken from the campaign.
+    time_constant
+        τ as a share of the span; 0 is linear.
+    """
+
+    origin: float = 0.0
+    span: float = 1.0
+    time_constant: float = 0.0
+
+    name: ClassVar[str] = "drift"
+
+    def missing(self, observations: Observations) -> tuple[str, ...]:
+        """Return ``time`` unless time or order varies."""
+        return () if observations.clock is not None and np.ptp(observations.clock) > 0 else ("time",)
+
+    def reads(self, observations: Observations) -> tuple[str, ...]:
+        """Return ``time``, or ``order`` in its place."""
+        return ("time",) if "time" in observations.covariates else ("order",)
+
+    def variants(self, observations: Observations) -> tuple[Effect, ...]:
+        """Linear, and exponential with time constants of 0.1, 0.25 and 0.6 of the campaign."""
+        clock = observations.clock
+        if clock is None:
+            return (self,)
+        fitted = replace(self, origin=float(clock[0]), span=float(np.ptp(clock)) or 1.0)
+        return tuple(replace(fitted, time_constant=share) for share in (0.0, 0.1, 0.25, 0.6))
+
+    def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
+        """The base's twist over the campaign, in the root frame: m and rad."""
+        clock = observations.clock
+        if clock is None:
+            return ()
+        elapsed = (clock - self.origin) / self.span
+        tau = self.time_constant
+        grown = elapsed if tau == 0.0 else np.expm1(-elapsed / tau) / np.expm1(-1.0 / tau)
+        return tuple(
+            Parameter(
+                component,
+                "m" if k < 3 else "rad",
+                1e-4,
+                "base",
+                "base",
+                (at_base(grown[:, None] * np.eye(6)[k]),),
+            )
+            for k, component in enumerate(_COMPONENTS)
+        )

@@ -1,0 +1,28 @@
+"""The instrument's scale: it measures every distance a little too long."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+from thermal_robot.effects.effect import Effect, Parameter, at_instrument
+
+if TYPE_CHECKING:
+    from thermal_robot.observations import Observations
+
+
+@dataclass(frozen=True)
+class InstrumentScale(Effect):
+    """Measured = (1 + s) · true, about the instrument's origin.
+
+    Expected size 1e-4: a tracker whose refraction is corrected with a wrong temperature errs by 1e-6 per kelvin, a camera
+    or a photogrammetric scale bar by a hundred times that. All link lengths wrong by the same share look exactly alike, so
+    :class:`Geometric` contains it; with an unknown base the place of the origin does not matter.
+    """
+
+    name: ClassVar[str] = "instrument_scale"
+
+    def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
+        """One scale error; dimensionless."""
+        response = at_instrument(observations.predicted_position)
+        return (Parameter("scale error", "1", 1e-4, "instrument", "instrument", (response,)),)

@@ -1,0 +1,29 @@
+"""Encoder or gear-ratio error: proportional to the joint position."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+from thermal_robot.effects.effect import Effect, Parameter, at_joint
+
+if TYPE_CHECKING:
+    from thermal_robot.observations import Observations
+
+
+@dataclass(frozen=True)
+class JointGain(Effect):
+    """Every joint moves by a little more or less than commanded: q_actual = q_command + g_j q_command.
+
+    Expected size 5e-4: a belt's pitch, a ball screw's lead or a mis-set ratio, where the encoder sits on the motor.
+    Over a small range of a joint it cannot be told from one period of :class:`TransmissionError`.
+    """
+
+    name: ClassVar[str] = "joint_gain"
+
+    def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
+        """One gain error a joint; dimensionless."""
+        return tuple(
+            Parameter("gain error", "1", 5e-4, "joint", joint, (at_joint(j, observations.q[:, j]),))
+            for j, joint in enumerate(observations.robot.joint_names)
+        )

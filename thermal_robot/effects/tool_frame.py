@@ -1,0 +1,37 @@
+"""The target does not sit on the tool where the file says."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from thermal_robot.effects.base_frame import COMPONENTS
+from thermal_robot.effects.effect import Effect, Parameter, at_tool
+
+if TYPE_CHECKING:
+    from thermal_robot.observations import Observations
+
+
+@dataclass(frozen=True)
+class ToolFrame(Effect):
+    """The declared place of the target is off by a constant twist in the tool frame.
+
+    Expected size 2 mm and 2 mrad; a campaign of positions shows the three translations only. Only where the campaign
+    declares ``tool = "known"``: an unknown tool is fitted before any effect is asked for.
+    """
+
+    name: ClassVar[str] = "tool_frame"
+
+    def missing(self, observations: Observations) -> tuple[str, ...]:
+        """Return the declaration that would make the tool an effect."""
+        return () if observations.campaign.tool_known else ('frames.tool = "known"',)
+
+    def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
+        """The tool's twist in the tool frame: m, and rad where orientation is measured."""
+        components = COMPONENTS if observations.campaign.measures == "pose" else COMPONENTS[:3]
+        return tuple(
+            Parameter(component, "m" if k < 3 else "rad", 2e-3, "tool", "tool", (at_tool(np.eye(6)[k]),))
+            for k, component in enumerate(components)
+        )

@@ -1,0 +1,48 @@
+"""Eccentric gears and encoders: an error that is periodic in the joint position."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from thermal_robot.effects.effect import Effect, Parameter, at_joint
+
+if TYPE_CHECKING:
+    from thermal_robot.observations import Observations
+
+
+@dataclass(frozen=True)
+class TransmissionError(Effect):
+    """Every joint deviates periodically: q_actual = q_command + Σ_k a_k sin(k q) + b_k cos(k q).
+
+    An eccentric wheel or encoder disc on the joint's side gives order 1, an oval one order 2; where the campaign
+    states a gear ratio (``[gears]``), the motor's side gives the order of the ratio. Expected size 0.3 mrad, one
+    minute of arc.
+
+    Attributes
+    ----------
+    harmonics
+        Orders on the joint's side.
+    """
+
+    harmonics: tuple[int, ...] = (1, 2)
+
+    name: ClassVar[str] = "transmission_error"
+
+    def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
+        """Two amplitudes a joint and order; rad. Prismatic joints have a period only with a ratio in rad/m."""
+        robot, gears = observations.robot, observations.campaign.gears
+        found = []
+        for j, (joint, kind) in enumerate(zip(robot.joint_names, robot.joint_types, strict=True)):
+            orders = [float(k) for k in self.harmonics] if kind != "prismatic" else []
+            orders += [float(gears[joint])] if joint in gears else []
+            unit = "m" if kind == "prismatic" else "rad"
+            for order in orders:
+                angle = order * observations.q[:, j]
+                found += [
+                    Parameter(f"sine, order {order:g}", unit, 3e-4, "joint", joint, (at_joint(j, np.sin(angle)),)),
+                    Parameter(f"cosine, order {order:g}", unit, 3e-4, "joint", joint, (at_joint(j, np.cos(angle)),)),
+                ]
+        return tuple(found)
