@@ -1,0 +1,35 @@
+"""Say where the gap between a robot and its model lies, which effect causes it, and how far it shrinks."""
+
+from thermal_robot.campaign import Campaign, campaign_from_table, describe, read_campaign, read_samples, write_campaign
+from thermal_robot.correction import CorrectedModel
+from thermal_robot.datasets import demo_campaign
+from thermal_robot.diagnosis import Diagnosis, diagnose
+from thermal_robot.effects import Effect
+from thermal_robot.errors import CampaignError, EffectError, EstimationError, RobotError, ThermalRobotError
+from thermal_robot.observations import Observations, observe
+from thermal_robot.robot import Robot, load_robot
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "Campaign",
+    "CampaignError",
+    "CorrectedModel",
+    "Diagnosis",
+    "Effect",
+    "EffectError",
+    "EstimationError",
+    "Observations",
+    "Robot",
+    "RobotError",
+    "ThermalRobotError",
+    "campaign_from_table",
+    "demo_campaign",
+    "describe",
+    "diagnose",
+    "load_robot",
+    "observe",
+    "read_campaign",
+    "read_samples",
+    "write_campaign",
+]

@@ -1,0 +1,174 @@
+"""The command line: arguments in, exit status out."""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+from thermal_robot.errors import CampaignError, ThermalRobotError
+
+DONE, FAILED, BAD_INPUT = 0, 1, 2
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Run one command.
+
+    Parameters
+    ----------
+    arguments
+        Of the command line; ``sys.argv`` where absent.
+
+    Returns
+    -------
+    int
+        0 done, 1 a failure of the program, 2 bad input (one line on stderr).
+    """
+    options = _parser().parse_args(arguments)
+    try:
+        options.run(options)
+    except ThermalRobotError as error:
+        print(f"thermal-robot: {' '.join(str(error).split())}", file=sys.stderr)
+        return BAD_INPUT
+    except BrokenPipeError:
+        return DONE
+    return DONE
+
+
+def _parser() -> argparse.ArgumentParser:
+    from thermal_robot import __version__
+
+    parser = argparse.ArgumentParser(
+        prog="thermal-robot",
+        description="Say where the gap between a robot and its model lies, which effect causes it, and how far it shrinks.",
+    )
+    parser.add_argument("--version", action="version", version=f"thermal-robot {__version__}")
+    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+
+    demo = commands.add_parser("demo", help="diagnose a campaign that comes with the package")
+    demo.add_argument("--report", metavar="F.html", default="demo.html", help="page to draw (default: %(default)s)")
+    demo.set_defaults(run=_demo)
+
+    check = commands.add_parser("check", help="validate and describe a campaign")
+    check.add_argument("campaign", help="campaign.toml, or its folder")
+    check.set_defaults(run=_check)
+
+    diagnose = commands.add_parser("diagnose", help="where the gap lies, what causes it, how far it shrinks")
+    diagnose.add_argument("campaign", help="campaign.toml, or its folder")
+    diagnose.add_argument("--json", metavar="F", help="write the diagnosis as JSON ('-' prints it instead of the text)")
+    diagnose.add_argument("--report", metavar="F.html", help="write a page with figures")
+    diagnose.add_argument("--model", metavar="F", help="save the corrected model for `predict`")
+    diagnose.add_argument("--without", metavar="EFFECT", nargs="+", action="extend", default=[], help="leave effects out")
+    diagnose.add_argument("--only", metavar="EFFECT", nargs="+", action="extend", default=[], help="consider these only")
+    diagnose.set_defaults(run=_diagnose)
+
+    predict = commands.add_parser("predict", help="the corrected model's prediction for new commands")
+    predict.add_argument("model", help="file that `diagnose --model` wrote")
+    predict.add_argument("samples", help="table with the campaign's columns and units")
+    predict.add_argument("-o", "--output", metavar="F", required=True, help="table to write")
+    predict.set_defaults(run=_predict)
+    return parser
+
+
+def _demo(options: argparse.Namespace) -> None:
+    from thermal_robot.datasets import demo_directory
+
+    campaign = demo_directory()
+    print(f"The demo's campaign is simulated; its answer lies in {campaign / 'truth.json'}.\n")
+    found = _diagnosis(campaign, (), ())
+    print(found)
+    _write(options.report, lambda path: _page(found, path))
+    print(f"Drawn in {options.report}")
+
+
+def _check(options: argparse.Namespace) -> None:
+    from thermal_robot.campaign import describe, read_campaign
+
+    print(describe(read_campaign(options.campaign)))
+
+
+def _diagnose(options: argparse.Namespace) -> None:
+    found = _diagnosis(Path(options.campaign), options.only, options.without)
+    if options.json == "-":
+        import json
+
+        print(json.dumps(found.to_dict(), indent=2, ensure_ascii=False))
+    else:
+        print(found)
+        if options.json:
+            _write(options.json, found.to_json)
+    if options.model:
+        _write(options.model, found.model.save)
+    if options.report:
+        _write(options.report, lambda path: _page(found, path))
+
+
+def _predict(options: argparse.Namespace) -> None:
+    from thermal_robot.campaign import write_predictions
+    from thermal_robot.correction import CorrectedModel
+
+    model = CorrectedModel.load(options.model)
+    position, orientation = model.predict(model.samples(options.samples))
+    _write(options.output, lambda path: write_predictions(path, position, orientation, model.settings.units))
+
+
+def _diagnosis(campaign: Path, only: Sequence[str], without: Sequence[str]):  # type: ignore[no-untyped-def]
+    from thermal_robot.diagnosis import diagnose
+
+    with _progress() as progress:
+        return diagnose(campaign, only=only, without=without, progress=progress)
+
+
+def _page(found, path: Path) -> None:  # type: ignore[no-untyped-def]
+    from thermal_robot.report import html
+
+    path.write_text(html(found, generated=time.strftime("%Y-%m-%d %H:%M")), encoding="utf-8")
+
+
+def _write(target: str, write: Callable[[Path], object]) -> None:
+    try:
+        write(Path(target))
+    except OSError as error:
+        raise CampaignError(target, "cannot be written", found=error.strerror or str(error)) from None
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[str], None]]:
+    """Show the stages on a terminal once two seconds have passed; nothing elsewhere."""
+    if not sys.stderr.isatty():
+        yield lambda _: None
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    begun, stages = time.monotonic(), 9
+    bar = Progress(
+        SpinnerColumn(),
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TimeElapsedColumn(),
+        console=Console(stderr=True),
+        transient=True,
+    )
+    task = bar.add_task("", total=stages)
+    shown = False
+
+    def progress(stage: str) -> None:
+        nonlocal shown
+        bar.update(task, description=stage, advance=1)
+        if not shown and time.monotonic() - begun > 2.0:
+            bar.start()
+            shown = True
+
+    try:
+        yield progress
+    finally:
+        if shown:
+            bar.stop()
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,206 @@
+"""The corrected model: the nominal robot, its frames, and the effects that were found; saved, loaded, used to predict."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.campaign import Campaign, Settings, read_samples
+from thermal_robot.effects import Effect, library
+from thermal_robot.errors import CampaignError, EffectError
+from thermal_robot.estimation.columns import displacement
+from thermal_robot.kinematics import rotation_to_quaternion
+from thermal_robot.observations import Frames, observe
+from thermal_robot.robot import Robot, load_robot
+
+Array = NDArray[np.float64]
+
+SCHEMA = "thermal-robot/model/1"
+
+
+@dataclass(frozen=True, eq=False)
+class CorrectedModel:
+    """What predicts where the target is: frames, and each effect with its values.
+
+    Attributes
+    ----------
+    robot, settings
+        The nominal robot, and the declarations of the campaign it was fitted to (units, frames, payload).
+    frames
+        Fitted base and tool.
+    effects
+        Each effect of the explanation with the (P,) values of its parameters, SI.
+    measures
+        ``position`` or ``pose``.
+    needs
+        Columns that samples to predict must have beside the joints.
+    simulated
+        Whether the nominal prediction is that of the user's own simulator (``sim.*``).
+    last_order
+        First and last ``order`` of the campaign, where it had that column.
+    """
+
+    robot: Robot
+    settings: Settings
+    frames: Frames
+    effects: tuple[tuple[Effect, Array], ...]
+    measures: str
+    needs: tuple[str, ...] = ()
+    simulated: bool = False
+    last_order: tuple[float, float] | None = None
+
+    def predict(self, samples: Campaign) -> tuple[Array, Array | None]:
+        """Predict what the instrument would measure.
+
+        Parameters
+        ----------
+        samples
+            Commands and conditions; measurements, if any, are not looked at.
+
+        Returns
+        -------
+        position
+            (N, 3) in the measurement frame, m.
+        orientation
+            (N, 4) quaternions wxyz; ``None`` where the campaign measured positions only.
+
+        Raises
+        ------
+        CampaignError
+            If a column that the model needs is missing or has an empty cell; names it.
+        """
+        self._require(samples)
+        samples = self._in_sequence(samples)
+        nominal = observe(samples, self.frames)
+        moved, instrument = displacement(nominal, self.effects)
+        corrected = observe(samples, self.frames, displacement=moved)
+        position = corrected.predicted_position + (0.0 if instrument is None else instrument)
+        if self.measures != "pose":
+            return position, None
+        return position, rotation_to_quaternion(self.frames.base[:3, :3] @ corrected.rotation)
+
+    def _in_sequence(self, samples: Campaign) -> Campaign:
+        """Put samples whose ``order`` only counts their own file's rows after the end of the campaign.
+
+        An order that starts again where the campaign's did, without gaps, and ends before it, does not say when in the campaign a
+        sample would be measured; what has settled by its end is then taken as settled.
+        """
+        order = samples.covariates.get("order")
+        if order is None or self.last_order is None or "order" not in self.needs:
+            return samples
+        first, last = self.last_order
+        if len(order) < last - first and np.array_equal(order, first + np.arange(len(order))):
+            return replace(samples, covariates={**samples.covariates, "order": np.full(len(order), last)})
+        return samples
+
+    def _require(self, samples: Campaign) -> None:
+        for column in self.needs:
+            held = ", ".join(e.name for e, _ in self.effects)
+            reason = f"the model ({held}) needs this column"
+            if column not in samples.covariates:
+                raise CampaignError(samples.name, reason, column=column, found="no such column", expected="numbers")
+            gaps = np.flatnonzero(samples.missing.get(column, np.zeros(0, dtype=bool)))
+            if gaps.size:
+                row = int(samples.rows[gaps[0]])
+                raise CampaignError(
+                    samples.name, reason, row=row, column=column, found="an empty cell", expected="a number"
+                )
+        if self.simulated and samples.simulated_position is None:
+            raise CampaignError(
+                samples.name,
+                "the model corrects the prediction of your simulator",
+                column="sim.x",
+                found="no such column",
+                expected="sim.x, sim.y, sim.z",
+            )
+
+    def samples(self, path: str | Path) -> Campaign:
+        """Read a table of commands and conditions in the units of the campaign that the model was fitted to."""
+        return read_samples(path, self.settings, self.robot)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything, the URDF's text included, as plain values."""
+        return {
+            "schema": SCHEMA,
+            "robot": {
+                "urdf": self.robot.urdf,
+                "tool_frame": self.robot.tool_frame,
+                "root_frame": self.robot.root_frame,
+                "gravity": np.asarray(self.robot.gravity).tolist(),
+            },
+            "settings": self.settings.to_dict(),
+            "frames": {"base": self.frames.base.tolist(), "tool": self.frames.tool.tolist()},
+            "effects": [
+                {"name": e.name, "arguments": e.arguments(), "values": np.asarray(v).tolist()}
+                for e, v in self.effects
+            ],
+            "measures": self.measures,
+            "needs": list(self.needs),
+            "simulated": self.simulated,
+            "last_order": self.last_order,
+        }
+
+    @classmethod
+    def from_dict(cls, plain: dict[str, Any]) -> CorrectedModel:
+        """Return the model that :meth:`to_dict` described.
+
+        Raises
+        ------
+        EffectError
+            If it holds an effect that is not installed here.
+        """
+        robot = load_robot(
+            plain["robot"]["urdf"],
+            plain["robot"]["tool_frame"],
+            root_frame=plain["robot"]["root_frame"],
+            gravity=plain["robot"]["gravity"],
+        )
+        known = library()
+        effects = []
+        for entry in plain["effects"]:
+            if entry["name"] not in known:
+                raise EffectError(f"the model holds the effect {entry['name']!r}, which is not installed here")
+            arguments = {k: tuple(v) if isinstance(v, list) else v for k, v in entry["arguments"].items()}
+            effects.append((type(known[entry["name"]])(**arguments), np.array(entry["values"], dtype=float)))
+        frames = Frames(np.array(plain["frames"]["base"]), np.array(plain["frames"]["tool"]))
+        return cls(
+            robot,
+            Settings.from_dict(plain["settings"]),
+            frames,
+            tuple(effects),
+            plain["measures"],
+            tuple(plain["needs"]),
+            bool(plain["simulated"]),
+            tuple(plain["last_order"]) if plain["last_order"] else None,
+        )
+
+    def save(self, path: str | Path) -> None:
+        """Write the model to a JSON file that stands alone."""
+        Path(path).write_text(json.dumps(self.to_dict(), indent=1) + "\n", encoding="utf-8")
+
+    @classmethod
+    def load(cls, path: str | Path) -> CorrectedModel:
+        """Read a file that :meth:`save` wrote.
+
+        Raises
+        ------
+        CampaignError
+            If it is not such a file.
+        """
+        try:
+            plain = json.loads(Path(path).read_text(encoding="utf-8"))
+            found = plain.get("schema") if isinstance(plain, dict) else None
+        except FileNotFoundError:
+            raise CampaignError(str(path), "no such file") from None
+        except (UnicodeDecodeError, json.JSONDecodeError):
+            found = None
+        if found != SCHEMA:
+            raise CampaignError(
+                str(path), "this is not a model that `diagnose --model` wrote", found=repr(found), expected=repr(SCHEMA)
+            )
+        return cls.from_dict(plain)

@@ -1,0 +1,17 @@
+"""Campaigns that come with the package."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from thermal_robot.campaign import Campaign, read_campaign
+
+
+def demo_directory() -> Path:
+    """Return the folder of the demo's campaign; its answer lies beside it in ``truth.json``."""
+    return Path(__file__).parent / "data" / "demo"
+
+
+def demo_campaign() -> Campaign:
+    """Read the demo's campaign: simulated, with a stated seed."""
+    return read_campaign(demo_directory())

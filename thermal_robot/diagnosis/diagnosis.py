@@ -1,0 +1,152 @@
+"""One verb: a campaign goes in, a diagnosis comes out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable, Sequence
+from pathlib import Path
+
+import numpy as np
+
+from thermal_robot.campaign import Campaign, read_campaign
+from thermal_robot.correction import CorrectedModel
+from thermal_robot.diagnosis.attribute import findings
+from thermal_robot.diagnosis.heldout import Shrinkage, held_out
+from thermal_robot.diagnosis.result import Diagnosis, Gap, Rows
+from thermal_robot.diagnosis.unexplained import test_remainder
+from thermal_robot.diagnosis.verdict import advise, sentence
+from thermal_robot.diagnosis.where import locate
+from thermal_robot.effects import Effect, choose, library
+from thermal_robot.errors import CampaignError
+from thermal_robot.estimation.fit import Fit, fit
+
+
+def diagnose(
+    campaign: Campaign | str | Path,
+    *,
+    only: Iterable[str] = (),
+    without: Iterable[str] = (),
+    effects: Sequence[Effect] = (),
+    progress: Callable[[str], None] = lambda _: None,
+) -> Diagnosis:
+    """Say where the gap between a robot and its model lies, which effects cause it, and how far it shrinks.
+
+    Parameters
+    ----------
+    campaign
+        A campaign, or the path of one.
+    only, without
+        Names of effects to consider, or to leave out.
+    effects
+        Effects of your own, considered beside those of the library.
+    progress
+        Called with a few words at each stage.
+
+    Returns
+    -------
+    Diagnosis
+        Prints as text, writes as JSON, shows itself in Jupyter.
+
+    Raises
+    ------
+    CampaignError, RobotError
+        If the campaign cannot be used.
+    EffectError
+        If an effect's name is not known.
+    EstimationError
+        If there are too few measurements for the unknown frames.
+    """
+    if not isinstance(campaign, Campaign):
+        progress("reading the campaign")
+        campaign = read_campaign(campaign)
+    candidates = (*choose(only, without), *effects)
+    _check_priors(campaign, {e.name for e in candidates} | set(library()))
+    progress("frames and effects")
+    fitted = fit(campaign, candidates)
+    shrinkage = held_out(fitted, progress)
+    unexplained, floor, source = test_remainder(fitted, progress)
+    progress("places")
+    shares = {name: value for name, (value, _) in shrinkage.shares.items()}
+    where, locations = locate(fitted, shares)
+    found = findings(fitted, shrinkage.shares, locations)
+    order = [f.name for f in found if f.name in {e.name for e, _ in fitted.effects}]
+    gap = _gap(fitted, shrinkage, floor, source)
+    probability = float(fitted.explanation.probabilities[0])
+    advice, separates = advise(found, unexplained)
+    return Diagnosis(
+        campaign=campaign.name,
+        robot=campaign.robot.name,
+        tool_frame=campaign.robot.tool_frame,
+        samples=campaign.samples,
+        measures=campaign.measures,
+        joint_names=campaign.robot.joint_names,
+        outliers=tuple(campaign.rows[fitted.explanation.outliers].tolist()),
+        gap=gap,
+        effects=found,
+        where=where,
+        unexplained=unexplained,
+        verdict=tuple(order),
+        probability=probability,
+        summary=sentence(gap, found, order, probability, unexplained),
+        advice=advice,
+        separates=separates,
+        model=_model(fitted),
+        rows=_rows(fitted, shrinkage),
+        warnings=campaign.warnings,
+    )
+
+
+def _check_priors(campaign: Campaign, known: set[str]) -> None:
+    for name in campaign.priors:
+        if name not in known:
+            expected = "one of " + ", ".join(sorted(known))
+            raise CampaignError(campaign.name, "no effect has this name", column=f"priors.{name}", expected=expected)
+
+
+def _gap(fitted: Fit, shrinkage: Shrinkage, floor: float, source: str) -> Gap:
+    kept = ~fitted.explanation.outliers
+    before, after = fitted.nominal.gap[kept], fitted.corrected.gap[kept]
+
+    def rms(rows: np.ndarray) -> float:  # type: ignore[type-arg]
+        return float(np.sqrt((rows**2).sum(axis=1).mean()))
+
+    turned = before.shape[1] == 6
+    return Gap(
+        rms(before[:, :3]),
+        rms(after[:, :3]),
+        float(np.sqrt(3.0) * floor),
+        source,
+        shrinkage.overall,
+        rms(before[:, 3:]) if turned else None,
+        rms(after[:, 3:]) if turned else None,
+    )
+
+
+def _model(fitted: Fit) -> CorrectedModel:
+    campaign = fitted.campaign
+    needs = [column for effect, _ in fitted.effects for column in effect.reads(fitted.nominal)]
+    clock = campaign.covariates.get("order")
+    return CorrectedModel(
+        robot=campaign.robot,
+        settings=campaign.settings,
+        frames=fitted.corrected.frames,
+        effects=fitted.effects,
+        measures=campaign.measures,
+        needs=tuple(dict.fromkeys(needs)),
+        simulated=campaign.simulated_position is not None,
+        last_order=None if clock is None else (float(clock.min()), float(clock.max())),
+    )
+
+
+def _rows(fitted: Fit, shrinkage: Shrinkage) -> Rows:
+    campaign = fitted.campaign
+    return Rows(
+        rows=campaign.rows,
+        gap=fitted.nominal.gap,
+        remainder=fitted.corrected.gap,
+        outliers=fitted.explanation.outliers,
+        position=fitted.nominal.position,
+        q=campaign.q,
+        covariates=campaign.covariates,
+        held_out_before=shrinkage.before,
+        held_out_after=shrinkage.after,
+    )

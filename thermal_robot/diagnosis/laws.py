@@ -1,0 +1,56 @@
+"""Smooth laws of one quantity: the columns that a scan puts into a place."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.observations import Observations
+
+Array = NDArray[np.float64]
+
+_KNOTS = 5
+_FEW = 6
+
+
+def smooth_law(values: Array) -> Array:
+    """(N, k) columns of a smooth function of a quantity, its constant removed: levels for a quantity with few values, a
+    natural cubic spline with five knots at its quantiles otherwise (Hastie, Tibshirani and Friedman, *Elements*, 5.2.1).
+
+    Empty (N, 0) where the quantity does not vary.
+    """
+    levels = np.unique(values)
+    if len(levels) < 2:
+        return np.zeros((len(values), 0))
+    if len(levels) <= _FEW:
+        columns = (values[:, None] == levels[1:]).astype(float)
+    else:
+        scaled = (values - values.min()) / np.ptp(values)
+        knots = np.unique(np.quantile(scaled, np.linspace(0.02, 0.98, _KNOTS)))
+        columns = np.column_stack([scaled, *_natural(scaled, knots)])
+    columns = columns - columns.mean(axis=0)
+    u, s, _ = np.linalg.svd(columns, full_matrices=False)
+    kept: Array = u[:, s > 1e-8 * s[0]] * np.sqrt(len(values))
+    return kept
+
+
+def _natural(x: Array, knots: Array) -> list[Array]:
+    def term(k: int) -> Array:
+        last = knots[-1]
+        return np.asarray(
+            (np.maximum(x - knots[k], 0) ** 3 - np.maximum(x - last, 0) ** 3) / (last - knots[k])
+        )
+
+    return [term(k) - term(len(knots) - 2) for k in range(len(knots) - 2)] if len(knots) > 2 else []
+
+
+def quantities(observations: Observations) -> dict[str, Array]:
+    """Return what a remainder might follow, by name, (N,) each: recorded covariates, then each joint's position."""
+    recorded = {name: np.asarray(v) for name, v in observations.covariates.items() if np.ptp(v) > 0}
+    if "time" not in recorded and "order" not in recorded:
+        recorded["order"] = np.arange(observations.campaign.samples, dtype=float)
+    sessions = observations.campaign.labels.get("session")
+    if sessions is not None and len(set(sessions.tolist())) > 1:
+        recorded["session"] = np.unique(sessions, return_inverse=True)[1].astype(float)
+    joints = {name: observations.q[:, j] for j, name in enumerate(observations.robot.joint_names)}
+    return {**recorded, **{k: v for k, v in joints.items() if np.ptp(v) > 0}}

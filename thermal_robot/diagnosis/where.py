@@ -1,0 +1,79 @@
+"""Where the gap lies: axes, joints, links, quantities; and where each effect sits."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.diagnosis.laws import quantities, smooth_law
+from thermal_robot.diagnosis.result import Location, Where
+from thermal_robot.estimation.fit import Fit
+
+Array = NDArray[np.float64]
+
+
+def locate(fit: Fit, shrinkage: dict[str, float]) -> tuple[Where, dict[str, tuple[Location, ...]]]:
+    """Share the gap out over places.
+
+    Parameters
+    ----------
+    fit
+        The fit.
+    shrinkage
+        Held-out share of each effect of the explanation, which its places divide among them.
+
+    Returns
+    -------
+    where
+        Shares over axes, joints, links and quantities.
+    locations
+        By effect, its places, largest first. A place's part is in proportion to the mean square of the displacement
+        that its parameters cause beyond what the unknown frames would take up.
+    """
+    e = fit.explanation
+    rows = np.flatnonzero(~e.outliers)
+    gap = fit.nominal.gap[rows, :3]
+    frames = e.linear.frames[rows].reshape(-1, e.linear.frames.shape[2]) if e.linear.frames.shape[2] else None
+    basis = np.linalg.qr(frames)[0] if frames is not None else None
+    locations: dict[str, tuple[Location, ...]] = {}
+    by_kind: dict[str, dict[str, float]] = {"joint": defaultdict(float), "link": defaultdict(float)}
+    for b, (effect, values) in zip(e.best.blocks, fit.effects, strict=True):
+        block = e.linear.blocks[b]
+        power: dict[tuple[str, str], float] = {}
+        for place in dict.fromkeys((p.kind, p.place) for p in block.parameters):
+            mine = [k for k, p in enumerate(block.parameters) if (p.kind, p.place) == place]
+            moved = (block.columns[rows][:, :, mine] @ values[mine]).ravel()
+            if basis is not None:
+                moved = moved - basis @ (basis.T @ moved)
+            power[place] = float((moved.reshape(len(rows), -1)[:, :3] ** 2).sum())
+        total = sum(power.values()) or 1.0
+        share = max(shrinkage.get(effect.name, 0.0), 0.0)
+        found = [Location(kind, name, min(share * part / total, 1.0)) for (kind, name), part in power.items()]
+        locations[effect.name] = tuple(sorted(found, key=lambda place: -place.share))
+        for place in found:
+            if place.kind in by_kind:
+                by_kind[place.kind][place.name] += place.share
+    return Where(_axes(gap), dict(by_kind["joint"]), dict(by_kind["link"]), _covariates(fit, gap, rows)), locations
+
+
+def _axes(gap: Array) -> dict[str, float]:
+    power = (gap**2).sum(axis=0)
+    return dict(zip("xyz", (power / (power.sum() or 1.0)).tolist(), strict=True))
+
+
+def _covariates(fit: Fit, gap: Array, rows: NDArray[np.int64]) -> dict[str, float]:
+    """Adjusted share of the gap that a smooth law of each quantity alone would explain, axis by axis."""
+    centred = gap - gap.mean(axis=0)
+    total = float((centred**2).sum()) or 1.0
+    shares = {}
+    for name, values in quantities(fit.corrected).items():
+        law = smooth_law(values[rows])
+        k = law.shape[1]
+        if not k or len(rows) - k - 1 < 3:
+            continue
+        taken = float(((law.T @ centred) ** 2).sum()) / len(rows)
+        rest = (total - taken) / (len(rows) - k - 1) * (len(rows) - 1)
+        shares[name] = float(np.clip(1.0 - rest / total, 0.0, 1.0))
+    return dict(sorted(shares.items(), key=lambda item: -item[1]))

@@ -1,0 +1,100 @@
+"""Which rows belong together: repeats of a pose, neighbours in joint space, and spells of time."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.campaign import Campaign
+
+Array = NDArray[np.float64]
+Labels = NDArray[np.int64]
+
+NEAR = 0.01  # rad (m for a prismatic joint): closer commands repeat a pose
+_LARGEST_SHARE = 0.1
+
+
+def near_repeats(campaign: Campaign) -> Labels:
+    """(N,) label of the cluster of commands that lie within :data:`NEAR` of each other.
+
+    Samples along a path chain into one cluster; the distance is then halved until no cluster holds more than a tenth of the
+    rows, so that only closer repeats count. Rows with the same ``pose`` label always belong together.
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    samples, radius = campaign.samples, NEAR
+    tree = cKDTree(campaign.q)
+    while True:
+        pairs = tree.query_pairs(radius, output_type="ndarray")
+        graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(samples, samples))
+        count, labels = connected_components(graph, directed=False)
+        if radius < 1e-7 or np.bincount(labels, minlength=count).max() <= max(_LARGEST_SHARE * samples, 2):
+            break
+        radius /= 2
+    stated = campaign.labels.get("pose")
+    if stated is not None and np.any(stated != ""):
+        _, named = np.unique(stated, return_inverse=True)
+        key = np.where(stated != "", named + count, labels)
+        joined = coo_matrix((np.ones(samples), (labels, key)), shape=(2 * count + samples,) * 2)
+        _, merged = connected_components(joined, directed=False)
+        labels = merged[labels]
+    return np.unique(labels, return_inverse=True)[1].astype(np.int64)
+
+
+def in_order(campaign: Campaign) -> Labels:
+    """(N,) row numbers in the sequence of measurement: by ``time`` or ``order`` where recorded, else as in the file."""
+    clock = campaign.covariates.get("time", campaign.covariates.get("order"))
+    return np.arange(campaign.samples) if clock is None else np.argsort(clock, kind="stable")
+
+
+def spells(campaign: Campaign, count: int) -> Labels:
+    """(N,) label of one of ``count`` uninterrupted spells of equal length."""
+    labels = np.empty(campaign.samples, dtype=np.int64)
+    labels[in_order(campaign)] = np.arange(campaign.samples) * count // campaign.samples
+    return labels
+
+
+def neighbourhoods(campaign: Campaign, count: int) -> Labels:
+    """(N,) label of one of about ``count`` boxes of joint space with equally many rows (median splits)."""
+    labels = np.zeros(campaign.samples, dtype=np.int64)
+    boxes = [np.arange(campaign.samples)]
+    while len(boxes) < count:
+        boxes.sort(key=len)
+        box = boxes.pop()
+        if len(box) < 2:
+            boxes.append(box)
+            break
+        widest = int(np.argmax(np.ptp(campaign.q[box], axis=0)))
+        order = box[np.argsort(campaign.q[box, widest], kind="stable")]
+        boxes += [order[: len(box) // 2], order[len(box) // 2 :]]
+    for label, box in enumerate(boxes):
+        labels[box] = label
+    return labels
+
+
+def folds(campaign: Campaign, count: int = 5, blocks_a_fold: int = 4) -> tuple[Labels, Labels]:
+    """Assign rows to folds, in blocks of consecutive measurements, near-repeats never apart.
+
+    Returns
+    -------
+    fold
+        (N,) fold of each row.
+    block
+        (N,) block of each row: the unit that a bootstrap resamples.
+    """
+    cluster = near_repeats(campaign)
+    rank = np.empty(campaign.samples)
+    rank[in_order(campaign)] = np.arange(campaign.samples)
+    sizes = np.bincount(cluster)
+    # a cluster stands where its middle measurement does
+    middle = np.bincount(cluster, rank) / sizes
+    order = np.argsort(middle, kind="stable")
+    ahead = np.empty(len(order))
+    ahead[order] = np.cumsum(sizes[order]) - sizes[order]
+    count = min(count, len(order))
+    blocks = min(count * blocks_a_fold, len(order))
+    block = np.minimum(ahead * blocks // campaign.samples, blocks - 1).astype(np.int64)[cluster]
+    block = np.unique(block, return_inverse=True)[1].astype(np.int64)
+    return block % count, block

@@ -1,0 +1,227 @@
+"""Robot meets campaign, once: everything that an effect may read and estimation needs, frozen.
+
+An :class:`Observations` means "kinematics have been run": the chain is evaluated at the commands, with the frames and
+displacements that are known so far, and the gap is there. Gauss-Newton re-observes with the corrected model.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.campaign import Campaign
+from thermal_robot.kinematics import (
+    ChainFrames,
+    Displacement,
+    chain_frames,
+    frame_jacobians,
+    gravity_torques,
+    log3,
+    placement_sensitivities,
+    quaternion_to_rotation,
+)
+from thermal_robot.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Frames:
+    """Where the robot stands and where the target sits.
+
+    Attributes
+    ----------
+    base
+        (4, 4) pose of the root frame in the measurement frame.
+    tool
+        (4, 4) pose of the target in the tool frame.
+    """
+
+    base: Array
+    tool: Array
+
+    @classmethod
+    def declared(cls, campaign: Campaign) -> Frames:
+        """Return the frames as the file declares them: identity base, target without turning."""
+        tool = np.eye(4)
+        tool[:3, 3] = campaign.target
+        return cls(np.eye(4), tool)
+
+
+@dataclass(frozen=True, eq=False)
+class Observations:
+    """A campaign seen through a robot, with the gap between them.
+
+    Use :func:`observe` to make one. N rows, n joints, S segments, m = 3 (positions) or 6 (poses).
+
+    Attributes
+    ----------
+    campaign, frames
+        What was observed, and the frames used.
+    chain
+        Frames along the chain, root frame, displaced by what is known so far.
+    position, rotation
+        (N, 3) m and (N, 3, 3): the target's predicted pose in the root frame. Where the campaign brings the prediction
+        of the user's own simulator, it stands here.
+    instrument
+        (N, 3) displacement of the measured point that the instrument adds, measurement frame, m.
+    """
+
+    campaign: Campaign
+    frames: Frames
+    chain: ChainFrames
+    position: Array
+    rotation: Array
+    instrument: Array | None = None
+
+    @property
+    def robot(self) -> Robot:
+        """The robot."""
+        return self.campaign.robot
+
+    @property
+    def q(self) -> Array:
+        """(N, n) commanded joint positions, rad or m."""
+        return self.campaign.q
+
+    @property
+    def covariates(self) -> Mapping[str, Array]:
+        """Recorded quantities by column name, SI."""
+        return self.campaign.covariates
+
+    @property
+    def clock(self) -> Array | None:
+        """(N,) ``time`` in s, or ``order`` where there is no time; ``None`` where there is neither."""
+        return self.covariates.get("time", self.covariates.get("order"))
+
+    def temperature(self, link: str) -> Array | None:
+        """Return the (N,) temperature that applies to a link, °C: its own, or the robot's; ``None`` where unrecorded."""
+        return self.covariates.get(f"temperature.{link}", self.covariates.get("temperature"))
+
+    def varies(self, column: str) -> bool:
+        """Tell whether a covariate was recorded and takes more than one value."""
+        values = self.covariates.get(column)
+        return values is not None and len(values) > 0 and bool(np.ptp(values) > 0)
+
+    @cached_property
+    def torque(self) -> Array | None:
+        """(N, n) joint torque in N·m: as the robot reports it where it does, else what holds the chain against gravity.
+
+        ``None`` where neither masses, nor payload, nor a torque column are there.
+        """
+        robot, covariates = self.robot, self.covariates
+        payload = covariates.get("payload")
+        reported = [covariates.get(f"torque.{joint}") for joint in robot.joint_names]
+        if not robot.has_masses and payload is None and all(r is None for r in reported):
+            return None
+        holding = gravity_torques(robot, self.q, payload=payload, payload_com=self.campaign.payload_com)
+        for j, values in enumerate(reported):
+            if values is not None:
+                holding[:, j] = values
+        return holding
+
+    @cached_property
+    def predicted_position(self) -> Array:
+        """(N, 3) predicted position of the target in the measurement frame, before the instrument's own error, m."""
+        base = self.frames.base
+        return self.position @ base[:3, :3].T + base[:3, 3]
+
+    @cached_property
+    def gap(self) -> Array:
+        """(N, m) measured − predicted: displacement (m) and rotation vector (rad), in the root frame's axes."""
+        campaign, base = self.campaign, self.frames.base
+        if campaign.position is None:
+            raise ValueError("these observations hold no measurements")
+        shift = campaign.position - self.predicted_position
+        if self.instrument is not None:
+            shift = shift - self.instrument
+        linear = shift @ base[:3, :3]
+        if campaign.orientation is None:
+            return linear
+        measured = base[:3, :3].T @ quaternion_to_rotation(campaign.orientation)
+        return np.hstack([linear, log3(measured @ self.rotation.transpose(0, 2, 1))])
+
+    @cached_property
+    def lever(self) -> Array:
+        """(N, 3) from the tool frame's origin to the target, root frame axes, m."""
+        return self.chain.tool_rotation @ self.frames.tool[:3, 3]
+
+    @cached_property
+    def joint_sensitivity(self) -> Array:
+        """(N, 6, n) LOCAL_WORLD_ALIGNED Jacobian at the target."""
+        return frame_jacobians(self.robot, self.q, frames=self.chain, point=self.frames.tool[:3, 3])
+
+    @cached_property
+    def segment_sensitivity(self) -> Array:
+        """(N, 6, S, 6) twist of the target (LOCAL_WORLD_ALIGNED) a unit twist of each segment's placement."""
+        return placement_sensitivities(self.robot, self.q, frames=self.chain, point=self.frames.tool[:3, 3])
+
+    @cached_property
+    def base_sensitivity(self) -> Array:
+        """(N, 6, 6) twist of the target a unit twist of the base, root frame."""
+        point = self.chain.tool_position + self.lever
+        return _twist_map(np.broadcast_to(np.eye(3), (len(point), 3, 3)), point)
+
+    @cached_property
+    def tool_sensitivity(self) -> Array:
+        """(N, 6, 6) twist of the target a unit twist of the tool, tool frame."""
+        return _twist_map(self.chain.tool_rotation, self.lever)
+
+
+def _twist_map(axes: Array, arm: Array) -> Array:
+    """Twist at a point ``arm`` away from a frame with the given axes: [[R, −[arm]× R], [0, R]] in rows of 6."""
+    mapped = np.zeros((len(arm), 6, 6))
+    mapped[:, :3, :3] = axes
+    mapped[:, 3:, 3:] = axes
+    # column k of the rotational part: (axis_k) × arm
+    mapped[:, :3, 3:] = np.cross(axes.transpose(0, 2, 1), arm[:, None, :]).transpose(0, 2, 1)
+    return mapped
+
+
+def observe(
+    campaign: Campaign,
+    frames: Frames | None = None,
+    *,
+    displacement: Displacement | None = None,
+    instrument: Array | None = None,
+) -> Observations:
+    """Run the kinematics of a campaign.
+
+    Parameters
+    ----------
+    campaign
+        Commands, measurements and conditions.
+    frames
+        Base and tool; as declared where absent.
+    displacement
+        What is displaced in the chain (the corrected model); nothing where absent.
+    instrument
+        (N, 3) what the instrument adds to the measured position, measurement frame, m.
+
+    Returns
+    -------
+    Observations
+        Frozen; everything further is computed when first asked for.
+
+    Notes
+    -----
+    With ``sim.*`` columns the prediction is the simulator's pose plus what the displacement does to the URDF's pose: the
+    simulator says where the nominal robot is, the URDF how an error moves it.
+    """
+    frames = frames or Frames.declared(campaign)
+    robot = campaign.robot
+    chain = chain_frames(robot, campaign.q, displacement)
+    position = chain.tool_position + chain.tool_rotation @ frames.tool[:3, 3]
+    rotation = chain.tool_rotation @ frames.tool[:3, :3]
+    if campaign.simulated_position is not None:
+        nominal = chain_frames(robot, campaign.q)
+        shift = position - nominal.tool_position - nominal.tool_rotation @ frames.tool[:3, 3]
+        position = campaign.simulated_position + shift
+        if campaign.simulated_orientation is not None:
+            turn = chain.tool_rotation @ nominal.tool_rotation.transpose(0, 2, 1)
+            rotation = turn @ quaternion_to_rotation(campaign.simulated_orientation)
+    return Observations(campaign, frames, chain, position, rotation, instrument)

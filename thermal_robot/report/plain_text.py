@@ -1,0 +1,178 @@
+"""A diagnosis as plain text: what the command line prints."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from textwrap import fill
+from typing import TYPE_CHECKING
+
+from thermal_robot.report import units
+from thermal_robot.report.words import (
+    STATUS,
+    campaign,
+    in_words,
+    law,
+    needs,
+    noise,
+    parameters,
+    rows_in_words,
+    sentences,
+    verdict,
+)
+
+if TYPE_CHECKING:
+    from thermal_robot.diagnosis.result import Diagnosis, Finding
+
+WIDTH = 96
+_BAR = 24
+_NAME = 26
+
+
+def plain_text(diagnosis: Diagnosis) -> str:
+    """Write a diagnosis for the person who measured.
+
+    Parameters
+    ----------
+    diagnosis
+        The result.
+
+    Returns
+    -------
+    str
+        Plain text, at most 96 columns wide, without a newline at the end: the verdict, then how far the gap shrinks,
+        which effects cause it, where they act, what stays unexplained, what to measure next.
+    """
+    blocks = [
+        [_wrap(diagnosis.summary, "")],
+        list(_facts(diagnosis)),
+        ["HOW FAR", *_how_far(diagnosis)],
+        ["WHICH", *_which(diagnosis)],
+        ["WHERE", *_where(diagnosis)],
+        ["UNEXPLAINED", *(_wrap(s) for s in sentences(diagnosis))],
+        ["NEXT", *_next(diagnosis)],
+        ["WARNINGS", *(_wrap(w, "  - ") for w in diagnosis.warnings)],
+    ]
+    return "\n\n".join("\n".join(block) for block in blocks if len(block) > 1 or block is blocks[0])
+
+
+def _wrap(sentence: str, indent: str = "  ", hang: int = 0) -> str:
+    rest = " " * (len(indent) + hang)
+    return fill(sentence, WIDTH, initial_indent=indent, subsequent_indent=rest, break_on_hyphens=False)
+
+
+def _facts(diagnosis: Diagnosis) -> Iterator[str]:
+    yield _wrap(verdict(diagnosis), f"{'verdict':11}")
+    yield _wrap(campaign(diagnosis), f"{'campaign':11}")
+    aside = f"as outliers: {rows_in_words(diagnosis.outliers)}" if diagnosis.outliers else "no row"
+    yield _wrap(aside, f"{'set aside':11}")
+
+
+def _how_far(diagnosis: Diagnosis) -> Iterator[str]:
+    gap, held = diagnosis.gap, diagnosis.gap.held_out
+    before, after, held_before, held_after, floor = units.together(
+        (gap.rms_before, gap.rms_after, held.rms_before, held.rms_after, gap.noise_floor), "m"
+    )
+    lines = [("gap, rms distance", before, after, "all rows that were not set aside")]
+    if gap.orientation_before is not None:
+        pair = units.together((gap.orientation_before, gap.orientation_after), "rad")
+        lines.append(("gap of orientation, rms", pair[0], pair[1], ""))
+    lines.append(
+        ("gap on rows held out", held_before, held_after, f"not used for the fit: {held.scheme}, {held.folds} folds")
+    )
+    wide = max(len(cell) for line in lines for cell in line[1:3])
+    for name, first, second, note in lines:
+        yield f"  {name:{_NAME}}{first:>{wide}} → {second:<{wide}}   {note}".rstrip()
+    yield f"  {'shrinkage, held out':{_NAME}}{units.percent(held.shrinkage)}   95 % interval {_bounds(held.shrinkage_ci95)}"
+    yield _wrap(noise(diagnosis, floor), f"  {'noise floor':{_NAME}}")
+    yield _wrap("Shrinkage is the share of the gap's mean square that goes away.")
+
+
+def _bounds(bounds: tuple[float, float] | None) -> str:
+    return f"{units.interval(bounds)} %" if bounds is not None else ""
+
+
+def _which(diagnosis: Diagnosis) -> Iterator[str]:
+    wide = max([len(f.name) for f in diagnosis.effects], default=0)
+    yield f"    {'':{wide}}{'probability':>13}   share of the gap, on rows held out (95 %)"
+    for status, heading in STATUS.items():
+        group = [f for f in diagnosis.effects if f.status == status]
+        if group:
+            yield f"  {heading}"
+        elif status == "found":
+            yield "  found: none"
+        for finding in group:
+            if status in ("found", "confounded"):
+                yield from _at_length(finding, wide)
+            else:
+                yield _in_short(finding, wide, diagnosis.joint_names)
+
+
+def _share(finding: Finding) -> str:
+    bounds = f"({_bounds(finding.shrinkage_ci95)})" if finding.shrinkage_ci95 else ""
+    return f"{units.percent(finding.shrinkage):>7}  {bounds}".rstrip()
+
+
+def _at_length(finding: Finding, wide: int) -> Iterator[str]:
+    inner = " " * 6
+    yield f"    {finding.name:{wide}}{units.probability(finding.probability):>13}   {_share(finding)}"
+    if finding.confounded_with:
+        yield _wrap(f"these data cannot tell it from {', '.join(finding.confounded_with)}", inner)
+    if described := law(finding):
+        yield _wrap(described, inner)
+    if finding.locations:
+        top = [f"{units.place(p)} {units.percent(p.share)}" for p in finding.locations]
+        yield _wrap(f"where: {in_words(top, most=4)}", inner, hang=7)
+    known = parameters(finding)
+    if known.heading:
+        yield f"{inner}{known.heading}"
+    column = max([len(name) for name, _ in known.shown], default=0)
+    for name, value in known.shown:
+        yield f"{inner}{name:{column}}  {value}"
+    if known.more:
+        yield f"{inner}and {known.more} more, which stand in the JSON"
+    if known.undetermined:
+        yield _wrap(f"not determined by these data: {known.undetermined}", inner, hang=2)
+
+
+def _in_short(finding: Finding, wide: int, joints: Sequence[str]) -> str:
+    if finding.status == "not_testable":
+        return _wrap(f"needs {needs(finding, joints)}", f"    {finding.name:{wide}}{'':13}   ")
+    told = f"; not to be told from {', '.join(finding.confounded_with)}" if finding.confounded_with else ""
+    return f"    {finding.name:{wide}}{units.probability(finding.probability):>13}   {_share(finding)}{told}"
+
+
+def _where(diagnosis: Diagnosis) -> Iterator[str]:
+    where = diagnosis.where
+    yield "  share of the gap's mean square"
+    yield from _bars("axis of the root frame", where.axes, ranked=False)
+    yield from _bars("joint", where.joints)
+    yield from _bars("link", where.links)
+    yield from _bars("recorded quantity: what a law of it alone would explain", where.covariates)
+
+
+def _bars(heading: str, shares: Mapping[str, float], ranked: bool = True, most: int = 7) -> Iterator[str]:
+    if not shares:
+        return
+    ordered = sorted(shares.items(), key=lambda item: -item[1]) if ranked else list(shares.items())
+    shown = [(name, s) for name, s in ordered if not ranked or s >= 0.005][:most]
+    yield f"  {heading}"
+    wide = max([_NAME, *(len(name) for name, _ in shown)])
+    for name, share in shown:
+        yield f"    {name:{wide}}  {bar(share):{_BAR}}  {units.percent(share):>7}"
+    if not shown:
+        yield "    none above 0.5 %"
+    elif rest := ordered[len(shown) :]:
+        yield f"    {len(rest)} more, at most {units.percent(max(0.0, rest[0][1]))}"
+
+
+def bar(share: float, width: int = _BAR) -> str:
+    """Draw a share as a bar of characters, full at one; nothing for what is not above zero."""
+    halves = round(2 * width * min(max(share, 0.0), 1.0)) if share == share else 0
+    return "█" * (halves // 2) + "▌" * (halves % 2)
+
+
+def _next(diagnosis: Diagnosis) -> Iterator[str]:
+    if diagnosis.advice:
+        yield _wrap(diagnosis.advice)
+    for group in diagnosis.separates:
+        yield _wrap(f"would tell apart: {', '.join(group)}", "  - ")

@@ -1,0 +1,164 @@
+"""How numbers are written: SI in, the unit that a metrologist would choose out. The only place that knows."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from math import floor, isfinite, log10
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from thermal_robot.diagnosis.result import Estimate, Location
+
+MISSING = "–"
+
+# leading unit: (smallest size in SI, what it is multiplied by, what it is then called), largest first
+_LADDERS: dict[str, tuple[tuple[float, float, str], ...]] = {
+    "m": ((1e1, 1.0, "m"), (1e-3, 1e3, "mm"), (0.0, 1e6, "µm")),
+    "rad": ((1e0, 1.0, "rad"), (1e-4, 1e3, "mrad"), (0.0, 1e6, "µrad")),
+    "s": ((1e0, 1.0, "s"), (1e-3, 1e3, "ms"), (0.0, 1e6, "µs")),
+    "1": ((1e-2, 1e2, "%"), (0.0, 1e6, "ppm")),
+    "1/K": ((0.0, 1e6, "µm/(m·K)"),),
+}
+_OF_QUANTITY = {
+    "time": "s",
+    "temperature": "°C",
+    "payload": "kg",
+    "torque": "N·m",
+    "speed": "share of the maximum",
+    "velocity": "rad/s",
+    "acceleration": "rad/s²",
+    "encoder": "rad",
+    "approach": "−1, 0, 1",
+    "order": "number",
+}
+
+
+@dataclass(frozen=True)
+class Scale:
+    """What an SI value is multiplied by, and the unit it then has."""
+
+    factor: float
+    unit: str
+
+
+def scale(unit: str, size: float) -> Scale:
+    """Choose the unit in which values of about ``size`` (SI) are read most easily."""
+    if unit in _LADDERS:
+        lead, rest = unit, ""
+    else:
+        cut = next((k for k, c in enumerate(unit) if c in "/·"), len(unit))
+        lead, rest = unit[:cut], unit[cut:]
+    if lead not in ("m", "rad", "s") and rest or lead not in _LADDERS:
+        return Scale(1.0, unit)
+    # rounding must not show 1000 µm where 1.00 mm is meant
+    step = next(s for s in _LADDERS[lead] if abs(size) >= 0.9995 * s[0])
+    return Scale(step[1], step[2] + rest)
+
+
+def _decimals(value: float, digits: int) -> int:
+    if value == 0.0 or not isfinite(value):
+        return 0
+    return max(0, digits - 1 - floor(log10(abs(value))))
+
+
+def number(value: float, digits: int = 3) -> str:
+    """Write a number with so many significant digits, without an exponent unless it is far from one."""
+    if not isfinite(value):
+        return MISSING
+    if value != 0.0 and not 1e-4 <= abs(value) < 1e6:
+        return f"{value:.{digits - 1}e}".replace("-", "−")
+    return f"{value:.{_decimals(value, digits)}f}".replace("-", "−")
+
+
+def quantity(value: float | None, unit: str) -> str:
+    """Write one SI value in its best unit: ``412 µm``."""
+    if value is None or not isfinite(value):
+        return MISSING
+    best = scale(unit, value)
+    return f"{number(value * best.factor)} {best.unit}"
+
+
+def together(values: Iterable[float | None], unit: str) -> list[str]:
+    """Write values that are to be compared in one unit, with equally many decimals.
+
+    The largest decides the unit; the smallest keeps two significant digits where four decimals suffice.
+    """
+    wanted = list(values)
+    known = [abs(v) for v in wanted if v is not None and isfinite(v) and v != 0.0]
+    best = scale(unit, max(known, default=0.0))
+    decimals = 0
+    if known:
+        decimals = max(_decimals(max(known) * best.factor, 3), _decimals(min(known) * best.factor, 2))
+    return [
+        MISSING if v is None or not isfinite(v) else f"{v * best.factor:.{min(decimals, 4)}f} {best.unit}"
+        for v in wanted
+    ]
+
+
+def estimate(parameter: Estimate, beside: Iterable[Estimate] = ()) -> str:
+    """Write a parameter with its standard deviation, in the unit that suits those it stands beside.
+
+    What the data do not determine is never written as a number.
+    """
+    if not parameter.identified or parameter.value is None or not isfinite(parameter.value):
+        return "not determined by these data"
+    alike = [parameter, *(p for p in beside if p.unit == parameter.unit)]
+    best = scale(parameter.unit, max(max(abs(p.value or 0.0), p.std or 0.0) for p in alike))
+    unit = "" if best.unit in ("", "1") else f" {best.unit}"
+    value, std = parameter.value * best.factor, (parameter.std or 0.0) * best.factor
+    if std <= 0.0 or not isfinite(std):
+        return f"{number(value)}{unit}"
+    largest = max(abs(value), std)
+    if not 1e-3 <= largest < 1e6:
+        return f"{number(value)} ± {number(std, 2)}{unit}"
+    decimals = min(_decimals(std, 2), _decimals(largest, 6))
+    return f"{value:.{decimals}f} ± {std:.{decimals}f}{unit}".replace("-", "−")
+
+
+def percent(share: float | None) -> str:
+    """Write a share as ``96.0 %``."""
+    if share is None or not isfinite(share):
+        return MISSING
+    rounded = round(100.0 * share, 1) + 0.0
+    return f"{rounded:.1f} %".replace("-", "−")
+
+
+def interval(bounds: tuple[float, float] | None) -> str:
+    """Write a 95 % interval of shares as ``94.0 to 97.0``, without the per cent sign."""
+    if bounds is None:
+        return ""
+    return " to ".join(percent(b).removesuffix(" %") for b in bounds)
+
+
+def probability(value: float | None) -> str:
+    """Write a probability in per cent; certainty is never claimed."""
+    if value is None or not isfinite(value):
+        return MISSING
+    if value > 0.999:
+        return "> 99.9 %"
+    return "< 0.1 %" if value < 0.001 else percent(value)
+
+
+def p_value(value: float) -> str:
+    """Write ``p = 0.012``, ``p = 3e-7``."""
+    if not isfinite(value):
+        return "p unknown"
+    if value < 1e-12:
+        return "p < 1e-12"
+    if value < 1e-3:
+        mantissa, exponent = f"{value:.0e}".split("e")
+        return f"p = {mantissa}e{int(exponent)}"
+    return f"p = {value:.2g}"
+
+
+def place(location: Location) -> str:
+    """Write a place with its kind, since a link and a joint may share a name."""
+    if location.kind in ("", location.name) or not location.name:
+        return location.name or location.kind
+    return f"{location.kind} {location.name}"
+
+
+def recorded_unit(column: str) -> str:
+    """Return the unit of a recorded quantity; empty for one that is kept as it came."""
+    return _OF_QUANTITY.get(column.partition(".")[0], "")

@@ -1,0 +1,148 @@
+"""What of a diagnosis is shown where there is not room for all, and the sentences that text and page share."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from thermal_robot.report import units
+
+if TYPE_CHECKING:
+    from thermal_robot.diagnosis.result import Diagnosis, Estimate, Finding
+
+STATUS = {
+    "found": "found",
+    "confounded": "cannot be told apart",
+    "not_found": "not found",
+    "not_testable": "not testable with these data",
+}
+_ALL_UP_TO = 7
+_MOST = 6
+
+
+@dataclass(frozen=True)
+class Shown:
+    """An effect's parameters as far as they are printed.
+
+    Attributes
+    ----------
+    heading
+        What was chosen; empty where all are shown.
+    shown
+        Name, and value with its standard deviation and unit.
+    more
+        How many identified ones are not shown.
+    undetermined
+        Names of those that the data do not determine; empty where there is none.
+    """
+
+    heading: str
+    shown: tuple[tuple[str, str], ...]
+    more: int
+    undetermined: str
+
+
+def parameters(finding: Finding) -> Shown:
+    """Choose the parameters to print: all of a few in the order of the chain, else the most significant."""
+    known = [p for p in finding.parameters if p.identified and p.value is not None]
+    chosen, heading = known, ""
+    if len(known) > _ALL_UP_TO:
+        chosen = sorted(known, key=lambda p: -_significance(p))[:_MOST]
+        heading = f"the {_MOST} most significant of {len(known)} parameters:"
+    undetermined = [p.name for p in finding.parameters if p not in known]
+    return Shown(
+        heading,
+        tuple((p.name, units.estimate(p, chosen)) for p in chosen),
+        len(known) - len(chosen),
+        in_words(undetermined, most=4),
+    )
+
+
+def _significance(parameter: Estimate) -> float:
+    return abs(parameter.value or 0.0) / max(parameter.std or 0.0, 1e-300)
+
+
+def in_words(names: Sequence[str], most: int = 10) -> str:
+    """List names, at most so many, then say how many more there are."""
+    more = len(names) - most
+    if more <= 0:
+        return ", ".join(names)
+    return f"{', '.join(names[:most])} and {more} more"
+
+
+def rows_in_words(rows: Sequence[int], most: int = 10) -> str:
+    """Say which rows of the file: ``rows 17, 80 and 3 more``."""
+    return f"{'row' if len(rows) == 1 else 'rows'} {in_words([str(r) for r in rows], most)}"
+
+
+def verdict(diagnosis: Diagnosis) -> str:
+    """Name the explanation and how probable exactly this one is."""
+    names = in_words(diagnosis.verdict) or "no effect"
+    said = f"{names}; probability of exactly this explanation {units.probability(diagnosis.probability)}"
+    return said + ("; a remainder stays unexplained" if diagnosis.unexplained.flagged else "")
+
+
+def campaign(diagnosis: Diagnosis) -> str:
+    """Say what was measured on which robot."""
+    what = "position and orientation" if diagnosis.measures == "pose" else "position"
+    name = f"{diagnosis.campaign}: " if diagnosis.campaign else ""
+    rows = f"{diagnosis.samples} {'row' if diagnosis.samples == 1 else 'rows'}"
+    return f"{name}robot {diagnosis.robot}, tool frame {diagnosis.tool_frame}, {rows}, {what} measured"
+
+
+def noise(diagnosis: Diagnosis, floor: str) -> str:
+    """Say what noise alone would leave, where that is known from, and how the gap after compares with it."""
+    gap = diagnosis.gap
+    parts = [f"{floor}; {gap.noise_source}" if gap.noise_source else floor]
+    if gap.noise_floor > 0.0:
+        parts.append(f"the gap after is {gap.rms_after / gap.noise_floor:.1f} times that")
+    return "; ".join(parts)
+
+
+def needs(finding: Finding, joints: Sequence[str]) -> str:
+    """Say what would make an effect testable; one name stands for the columns of all joints, or of all links."""
+    by_quantity: dict[str, list[str]] = {}
+    for need in finding.needs:
+        quantity, dot, _ = need.partition(".")
+        by_quantity.setdefault(quantity + dot, []).append(need)
+    named = []
+    for quantity, columns in by_quantity.items():
+        of_joints = any(c.removeprefix(quantity) in joints for c in columns)
+        named.append(columns[0] if len(columns) == 1 else f"{quantity}<{'joint' if of_joints else 'link'}>")
+    return one_of(named)
+
+
+def law(finding: Finding) -> str:
+    """Describe a law that was discovered in the data; empty for an effect of the library."""
+    quantity, shape = getattr(finding, "quantity", None), getattr(finding, "shape", None)
+    if not quantity:
+        return ""
+    return f"a law found in the data: follows {quantity}" + (f", shape: {shape}" if shape else "")
+
+
+def sentences(diagnosis: Diagnosis) -> Iterator[str]:
+    """Say in plain words what the explanation leaves."""
+    left = diagnosis.unexplained
+    if not left.flagged:
+        yield f"Nothing: what remains is no larger and no more structured than the noise ({units.p_value(left.p_value)})."
+        return
+    size = f"{units.quantity(left.rms, 'm')} rms beyond the noise" if left.rms > 0 else "a remainder"
+    yield f"The known effects leave {size} that chance does not explain ({units.p_value(left.p_value)})."
+    yield from left.reasons
+    if left.locations:
+        spots = [f"{units.place(p)} ({units.probability(p.share)})" for p in left.locations[:3]]
+        yield f"It enters most probably at {one_of(spots)}."
+    if left.depends_on:
+        quantities = [f"{d.covariate} ({units.p_value(d.p_value)})" for d in left.depends_on[:3]]
+        yield f"It follows {', '.join(quantities)}."
+    for name in diagnosis.verdict:
+        if name.startswith("discovered."):
+            yield f"{name} is the law that describes it; no known effect has that shape."
+
+
+def one_of(items: Sequence[str]) -> str:
+    """List alternatives: ``a, b or c``."""
+    if len(items) < 2:
+        return "".join(items)
+    return f"{', '.join(items[:-1])} or {items[-1]}"
