@@ -172,7 +172,9 @@ def unexplained():
     shifted = drawn.remainder + step[:, None] * np.array([0.2, -1.0, 0.6])
     return replace(
         base,
-        gap=replace(base.gap, rms_after=1.12e-4, held_out=replace(base.gap.held_out, rms_after=1.2e-4, shrinkage=0.91)),
+        gap=replace(
+            base.gap, rms_after=1.12e-4, held_out=replace(base.gap.held_out, rms_after=1.2e-4, shrinkage=0.91)
+        ),
         rows=replace(drawn, remainder=shifted),
         unexplained=Unexplained(
             True,
@@ -189,7 +191,8 @@ def confounded():
     """Two effects that the data cannot tell apart, orientation measured, a long list of parameters."""
     base = found()
     offsets = tuple(
-        Estimate(f"zero offset, {joint}", -1.2e-3 + 4e-4 * j, 2.2e-5, "rad", True) for j, joint in enumerate(JOINTS)
+        Estimate(f"zero offset, {joint}", -1.2e-3 + 4e-4 * j, 2.2e-5, "rad", True)
+        for j, joint in enumerate(JOINTS)
     )
     geometric = tuple(
         Estimate(
@@ -230,9 +233,7 @@ def confounded():
             *NOT_FOUND[1:2],
             *NOT_TESTABLE,
         ),
-        where=replace(
-            base.where, joints=dict(zip(JOINTS, (0.24, 0.1, 0.05, 0.01, 0.0, 0.0), strict=True))
-        ),
+        where=replace(base.where, joints=dict(zip(JOINTS, (0.24, 0.1, 0.05, 0.01, 0.0, 0.0), strict=True))),
         verdict=("geometric", "joint_offset"),
         separates=(("joint_offset", "base_frame"),),
         rows=rows(aside=(17, 80), before=2.4e-3, pose=True),

@@ -53,6 +53,12 @@ class Drift(Effect):
         fitted = replace(self, origin=float(clock[0]), span=float(np.ptp(clock)) or 1.0)
         return tuple(replace(fitted, time_constant=share) for share in (0.0, 0.1, 0.25, 0.6))
 
+    def nearby(self, factor: float) -> tuple[Effect, ...]:
+        """Time constants longer and shorter by a factor; beside the linear law, long ones."""
+        shares = (0.0, 1.0, 2.0) if self.time_constant == 0.0 else (1.0, factor, 1.0 / factor)
+        base = self.time_constant or 1.0
+        return tuple(replace(self, time_constant=base * share) for share in shares)
+
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """The base's twist over the campaign, in the root frame: m and rad."""
         clock = observations.clock

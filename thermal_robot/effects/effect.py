@@ -142,6 +142,10 @@ class Effect(ABC):
         """Return the settings of the nonlinear arguments that estimation should compare."""
         return (self,)
 
+    def nearby(self, factor: float) -> tuple[Effect, ...]:
+        """Return settings near this one, by about a factor, with which estimation refines it; itself among them."""
+        return (self,)
+
     def arguments(self) -> dict[str, Any]:
         """Return the constructor's arguments, for saving."""
         return asdict(self)

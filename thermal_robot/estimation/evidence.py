@@ -131,11 +131,21 @@ class Search:
 
         Every neighbour of the best combination is evaluated, so that its probability is against all of them.
         """
-        best = self.evaluate(())
-        if start:
-            best = max(best, self.evaluate(start), key=lambda c: c.log_evidence)
+        best = self._climb(start, frozenset())
+        large = {b for pair in self.exclusive for b in pair if self._width(b) == max(map(self._width, pair))}
+        if large & set(best.blocks):
+            # several smaller effects may suffice where one that contains them all came first
+            best = max(best, self._climb((), frozenset(large)), key=lambda c: c.log_evidence)
+            best = self._climb(best.blocks, frozenset())
+        return best
+
+    def _width(self, block: int) -> int:
+        return self.gram.slices[block].stop - self.gram.slices[block].start
+
+    def _climb(self, start: Sequence[int], barred: frozenset[int]) -> Combination:
+        best = max(self.evaluate(()), self.evaluate(start), key=lambda c: c.log_evidence)
         while True:
-            around = [self.evaluate(blocks, best) for blocks in self._neighbours(best.blocks)]
+            around = [self.evaluate(n, best) for n in self._neighbours(best.blocks) if not barred & set(n)]
             better = max(around, key=lambda c: c.log_evidence, default=best)
             if better.log_evidence <= best.log_evidence + 1e-9:
                 return best

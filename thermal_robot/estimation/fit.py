@@ -21,6 +21,7 @@ Array = NDArray[np.float64]
 
 _STEPS = 12
 _REVISIONS = 3
+_REFINEMENT = 1.6
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,20 +76,24 @@ def fit(campaign: Campaign, effects: Sequence[Effect]) -> Fit:
     noise = Noise(campaign.noise_position, campaign.noise_orientation)
     nominal = observe(campaign, register(campaign))
     needs = {e.name: missing for e in effects if (missing := e.missing(nominal))}
-    candidates = [v for e in effects if e.name not in needs for v in e.variants(nominal)]
-    families = tuple(v.name for v in candidates)
+    settings = {e.name: e.variants(nominal) for e in effects if e.name not in needs}
+    candidates, families = _listed(settings)
     linear = _linear(nominal, candidates)
     groups = row_groups(campaign)
     explanation = explain(linear, noise, families=families, groups=groups)
     nominal = observe(campaign, register(campaign, ~explanation.outliers))
     before = Linear(nominal.gap, frame_columns(nominal)[0], ())
-    observations, values = nominal, [np.zeros(len(b.parameters)) for b in linear.blocks]
-    for _ in range(_REVISIONS):
-        chosen = explanation.best.blocks
-        observations, frames, values = _gauss_newton(nominal, observations.frames, explanation, values)
+    observations = nominal
+    for revision in range(_REVISIONS):
+        held = [(candidates[b], explanation.values[b][0]) for b in explanation.best.blocks]
+        observations, held = _gauss_newton(nominal, observations.frames, explanation, held)
+        for effect, _ in held:
+            settings[effect.name] = effect.nearby(_REFINEMENT ** (1 / 2**revision))
+        candidates, families = _listed(settings)
+        chosen = [candidates.index(effect) for effect, _ in held]
         blocks = tuple(block(observations, c) for c in candidates)
         gap = observations.gap + sum(
-            (blocks[b].columns @ values[b] for b in chosen), np.zeros_like(observations.gap)
+            (blocks[b].columns @ v for b, (_, v) in zip(chosen, held, strict=True)), np.zeros_like(observations.gap)
         )
         explanation = explain(
             Linear(gap, frame_columns(observations)[0], blocks),
@@ -98,11 +103,11 @@ def fit(campaign: Campaign, effects: Sequence[Effect]) -> Fit:
             outliers=explanation.outliers,
             groups=groups,
         )
-        if explanation.best.blocks == chosen:
+        if set(explanation.best.blocks) == set(chosen):
             break
-    observations, _, values = _gauss_newton(nominal, observations.frames, explanation, values)
-    found = tuple((candidates[b], values[b]) for b in explanation.best.blocks)
-    return Fit(campaign, nominal, before, observations, explanation, found, families, needs)
+    held = [(candidates[b], explanation.values[b][0]) for b in explanation.best.blocks]
+    observations, held = _gauss_newton(nominal, observations.frames, explanation, held)
+    return Fit(campaign, nominal, before, observations, explanation, tuple(held), families, needs)
 
 
 def row_groups(campaign: Campaign) -> tuple[NDArray[np.int64], ...]:
@@ -117,35 +122,33 @@ def _linear(observations: Observations, candidates: Sequence[Effect]) -> Linear:
 
 
 def _gauss_newton(
-    nominal: Observations, frames: Frames, explanation: Explanation, values: list[Array]
-) -> tuple[Observations, Frames, list[Array]]:
+    nominal: Observations, frames: Frames, explanation: Explanation, held: Sequence[tuple[Effect, Array]]
+) -> tuple[Observations, list[tuple[Effect, Array]]]:
     """Refit frames and the explanation's parameters with the exact model, the priors held at their scales."""
-    campaign, whitening = nominal.campaign, explanation.whitening
-    chosen = explanation.best.blocks
-    candidates = [explanation.linear.blocks[b] for b in chosen]
-    prior = np.concatenate([b.sizes * explanation.best.scales[k] for k, b in zip(chosen, candidates, strict=True)] or [[]])
-    state = np.concatenate([explanation.values[k][0] for k in chosen] or [np.zeros(0)])
-    noise = whitening.noise * explanation.best.noise
+    campaign, whitening, best = nominal.campaign, explanation.whitening, explanation.best
+    effects = [effect for effect, _ in held]
+    sizes = [explanation.linear.blocks[b].sizes * best.scales[b] for b in best.blocks]
+    ends = np.cumsum([len(size) for size in sizes])[:-1]
+    prior = np.concatenate([*sizes, np.zeros(0)])
+    state = np.concatenate([*(values for _, values in held), np.zeros(0)])
     used = np.flatnonzero(whitening.weights > 0)
-    root = (np.sqrt(whitening.weights[used])[:, None] / noise).ravel()
-    observations = nominal
+    root = (np.sqrt(whitening.weights[used])[:, None] / (whitening.noise * best.noise)).ravel()
+
+    def pairs() -> list[tuple[Effect, Array]]:
+        return list(zip(effects, np.split(state, ends), strict=True)) if effects else []
+
+    observations = _corrected(campaign, frames, pairs())
     for _ in range(_STEPS):
-        split = np.split(state, np.cumsum([len(b.parameters) for b in candidates])[:-1]) if candidates else []
-        pairs = [(b.effect, v) for b, v in zip(candidates, split, strict=True)]
-        observations = _corrected(campaign, frames, nominal, pairs)
         flat, names = frame_columns(observations)
-        columns = [block(observations, b.effect).columns for b in candidates]
+        columns = [block(observations, effect).columns for effect in effects]
         design = np.concatenate([flat, *columns], axis=2)[used].reshape(len(root), -1) * root[:, None]
         step, size = _ridge_step(design, observations.gap[used].ravel() * root, state, prior)
         frames = moved(frames, step[: len(names)], names)
         state = state + step[len(names) :]
+        observations = _corrected(campaign, frames, pairs())
         if size < 1e-6:
             break
-    split = np.split(state, np.cumsum([len(b.parameters) for b in candidates])[:-1]) if candidates else []
-    pairs = [(b.effect, v) for b, v in zip(candidates, split, strict=True)]
-    for b, v in zip(chosen, split, strict=True):
-        values[b] = v
-    return _corrected(campaign, frames, nominal, pairs), frames, values
+    return observations, pairs()
 
 
 def _ridge_step(design: Array, gap: Array, state: Array, prior: Array) -> tuple[Array, float]:
@@ -164,8 +167,12 @@ def _ridge_step(design: Array, gap: Array, state: Array, prior: Array) -> tuple[
     return step / length, float(np.abs(step).max(initial=0.0))
 
 
-def _corrected(
-    campaign: Campaign, frames: Frames, nominal: Observations, pairs: Sequence[tuple[Effect, Array]]
-) -> Observations:
+def _corrected(campaign: Campaign, frames: Frames, pairs: Sequence[tuple[Effect, Array]]) -> Observations:
+    """Observe with the effects at work; their responses are read from the nominal robot, as prediction reads them."""
     moved_by, instrument = displacement(observe(campaign, frames), pairs)
     return observe(campaign, frames, displacement=moved_by, instrument=instrument)
+
+
+def _listed(settings: dict[str, tuple[Effect, ...]]) -> tuple[list[Effect], tuple[str, ...]]:
+    listed = [setting for own in settings.values() for setting in own]
+    return listed, tuple(setting.name for setting in listed)

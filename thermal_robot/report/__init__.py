@@ -1,20 +1,57 @@
-"""Draws a diagnosis, computes none: text, HTML, figures, and the schema of its JSON.
+"""Draws a diagnosis, computes none: text, HTML, figures, and the JSON Schema of its data.
 
 Nothing is loaded before it is used; Matplotlib only where something is drawn.
 """
 
 from __future__ import annotations
 
+from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
+    from thermal_robot.report.json_schema import schema
+    from thermal_robot.report.page import fragment, html
+    from thermal_robot.report.plain_text import text
+    from thermal_robot.report.plots_how_far import plot_how_far
+    from thermal_robot.report.plots_map import plot_map
+    from thermal_robot.report.plots_overview import overview
+    from thermal_robot.report.plots_remainder import plot_remainder
+    from thermal_robot.report.plots_where import plot_where
+    from thermal_robot.report.plots_which import plot_which
 
-    from thermal_robot.diagnosis.result import Diagnosis
+_HOME = {
+    "fragment": "page",
+    "html": "page",
+    "overview": "plots_overview",
+    "plot_how_far": "plots_how_far",
+    "plot_map": "plots_map",
+    "plot_remainder": "plots_remainder",
+    "plot_where": "plots_where",
+    "plot_which": "plots_which",
+    "schema": "json_schema",
+    "text": "plain_text",
+}
 
 
-def text(diagnosis: Diagnosis) -> str:
-    """Return the report as plain text, at most 96 columns wide."""
-    from thermal_robot.report.plain_text import plain_text
+def __getattr__(name: str) -> Any:
+    if name not in _HOME:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
 
-    return plain_text(diagnosis)
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOME})
+
+
+__all__ = [
+    "fragment",
+    "html",
+    "overview",
+    "plot_how_far",
+    "plot_map",
+    "plot_remainder",
+    "plot_where",
+    "plot_which",
+    "schema",
+    "text",
+]

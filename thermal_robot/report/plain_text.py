@@ -28,7 +28,7 @@ _BAR = 24
 _NAME = 26
 
 
-def plain_text(diagnosis: Diagnosis) -> str:
+def text(diagnosis: Diagnosis) -> str:
     """Write a diagnosis for the person who measured.
 
     Parameters
@@ -77,7 +77,12 @@ def _how_far(diagnosis: Diagnosis) -> Iterator[str]:
         pair = units.together((gap.orientation_before, gap.orientation_after), "rad")
         lines.append(("gap of orientation, rms", pair[0], pair[1], ""))
     lines.append(
-        ("gap on rows held out", held_before, held_after, f"not used for the fit: {held.scheme}, {held.folds} folds")
+        (
+            "gap on rows held out",
+            held_before,
+            held_after,
+            f"not used for the fit: {held.scheme}, {held.folds} folds",
+        )
     )
     wide = max(len(cell) for line in lines for cell in line[1:3])
     for name, first, second, note in lines:

@@ -1,0 +1,91 @@
+"""What all figures share: colours, axes, and how much of a long campaign is drawn."""
+
+from __future__ import annotations
+
+from io import BytesIO
+from typing import TYPE_CHECKING
+
+import numpy as np
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+
+Array = NDArray[np.float64]
+
+# Okabe and Ito's colours where they differ in brightness, too: orange is light and blue dark on a grey print.
+INK, MUTED, FAINT, PAPER = "#22282e", "#6b7681", "#dde2e7", "#fffffe"
+BEFORE, AFTER, THIRD = "#e69f00", "#1f6fb5", "#00916a"
+SMALL, NORMAL, LARGE = 8.0, 9.0, 11.0
+RASTER_ABOVE = 2000
+_DRAWN = 6000
+
+
+class Drawing(Figure):
+    """A Matplotlib figure that needs no display, no pyplot, and shows itself in a notebook."""
+
+    def __init__(self, width: float, height: float) -> None:
+        super().__init__(figsize=(width, height), layout="constrained", facecolor=PAPER)
+
+    def _repr_png_(self) -> bytes:
+        stream = BytesIO()
+        self.savefig(stream, format="png", dpi=110)
+        return stream.getvalue()
+
+
+def plain(text: str) -> str:
+    """Keep a name that holds dollar signs from being read as a formula."""
+    return text.replace("$", r"\$")
+
+
+def tidy(axes: Axes, grid: str = "y") -> None:
+    """Give axes the look that all figures share; ``grid`` is ``x``, ``y``, ``both`` or empty."""
+    axes.set_facecolor("none")
+    for side in ("top", "right"):
+        axes.spines[side].set_visible(False)
+    for side in ("left", "bottom"):
+        axes.spines[side].set_color(MUTED)
+        axes.spines[side].set_linewidth(0.8)
+    axes.tick_params(axis="both", which="both", color=MUTED, labelcolor=INK, labelsize=SMALL, width=0.8)
+    axes.set_axisbelow(True)
+    for which in ("x", "y"):
+        if grid in (which, "both"):
+            axes.grid(visible=True, axis=which, color=FAINT, linewidth=0.7)
+    for label in (axes.xaxis.label, axes.yaxis.label):
+        label.set(size=NORMAL, color=INK)
+
+
+def title(axes: Axes, text: str) -> None:
+    """Write the heading of a panel."""
+    axes.set_title(plain(text), loc="left", fontsize=LARGE, color=INK, fontweight="bold", pad=10)
+
+
+def note(axes: Axes, text: str) -> None:
+    """Say in an empty panel why it is empty."""
+    axes.axis("off")
+    axes.text(0.5, 0.5, plain(text), ha="center", va="center", color=MUTED, fontsize=NORMAL, transform=axes.transAxes)
+
+
+def log_axis(axes: Axes, low: float, high: float) -> None:
+    """Make the x axis logarithmic, with numbers that are read at sight: 1, 2, 5, 10."""
+    axes.set_xscale("log")
+    axes.set_xlim(low, high)
+    subs = (1.0, 2.0, 5.0) if high / low < 2000.0 else (1.0,)
+    axes.xaxis.set_major_locator(LogLocator(base=10.0, subs=subs))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.xaxis.set_minor_formatter(NullFormatter())
+
+
+def thinned(count: int, most: int = _DRAWN) -> NDArray[np.int64]:
+    """Return which of so many points are drawn, in order: all of few, a fixed random choice of many."""
+    if count <= most:
+        return np.arange(count)
+    return np.sort(np.random.default_rng(0).permutation(count)[:most])
+
+
+def round_down(value: float) -> float:
+    """Return the largest 1, 2 or 5 times a power of ten that is not above a positive value."""
+    power = 10.0 ** np.floor(np.log10(value))
+    return float(next(s * power for s in (5.0, 2.0, 1.0) if s * power <= value * (1.0 + 1e-9)))

@@ -1,0 +1,109 @@
+"""How far the gap shrinks: its distribution before and after, against the noise."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thermal_robot.report import units
+from thermal_robot.report.drawing import (
+    AFTER,
+    BEFORE,
+    INK,
+    SMALL,
+    THIRD,
+    Array,
+    Drawing,
+    log_axis,
+    note,
+    tidy,
+    title,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from thermal_robot.diagnosis.result import Diagnosis
+
+
+def plot_how_far(diagnosis: Diagnosis) -> Figure:
+    """Draw how many rows have which distance |gap|: before, after, and after while the row was held out.
+
+    Returns
+    -------
+    Figure
+        One panel for the position; a second one for the orientation where it was measured. Rows that were set aside
+        are not counted.
+    """
+    pose = diagnosis.gap.orientation_before is not None and diagnosis.rows.gap.shape[1] >= 6
+    figure = Drawing(11.0 if pose else 6.8, 3.7)
+    panels = figure.subplots(1, 2 if pose else 1, squeeze=False)[0]
+    draw_how_far(panels[0], diagnosis)
+    title(panels[0], "Position" if pose else "How far")
+    if pose:
+        _draw_orientation(panels[1], diagnosis)
+        title(panels[1], "Orientation")
+    return figure
+
+
+def draw_how_far(axes: Axes, diagnosis: Diagnosis) -> None:
+    """Draw the distances of the position into a panel."""
+    rows, gap = diagnosis.rows, diagnosis.gap
+    used = ~rows.outliers
+    said = units.together((gap.rms_before, gap.rms_after, gap.held_out.rms_after, gap.noise_floor), "m")
+    best = units.scale("m", gap.rms_before)
+    _draw(
+        axes,
+        np.linalg.norm(rows.gap[used, :3], axis=1) * best.factor,
+        np.linalg.norm(rows.remainder[used, :3], axis=1) * best.factor,
+        rows.held_out_after[np.isfinite(rows.held_out_after)] * best.factor,
+        said,
+        gap.noise_floor * best.factor,
+    )
+    axes.set_xlabel(f"distance between measured and predicted position ({best.unit})")
+
+
+def _draw_orientation(axes: Axes, diagnosis: Diagnosis) -> None:
+    rows, gap = diagnosis.rows, diagnosis.gap
+    used = ~rows.outliers
+    best = units.scale("rad", gap.orientation_before or 0.0)
+    _draw(
+        axes,
+        np.linalg.norm(rows.gap[used, 3:6], axis=1) * best.factor,
+        np.linalg.norm(rows.remainder[used, 3:6], axis=1) * best.factor,
+        np.zeros(0),
+        units.together((gap.orientation_before, gap.orientation_after), "rad"),
+        0.0,
+    )
+    axes.set_xlabel(f"angle between measured and predicted orientation ({best.unit})")
+
+
+def _draw(axes: Axes, before: Array, after: Array, held_out: Array, said: list[str], floor: float) -> None:
+    everything = np.concatenate([before, after, held_out])
+    everything = everything[everything > 0.0]
+    if not everything.size:
+        note(axes, "No row is left to be drawn.")
+        return
+    # a few rows that happen to fit perfectly must not stretch the axis over decades
+    low, high = float(np.quantile(everything, 0.01)) / 1.6, float(everything.max()) * 1.25
+    if floor > 0.0:
+        low, high = min(low, floor / 1.3), max(high, floor * 1.3)
+    bins = np.geomspace(low, high, int(np.clip(2.2 * np.sqrt(len(before)), 14, 60)))
+    before, after, held_out = (np.clip(v, low, high) for v in (before, after, held_out))
+    axes.hist(before, bins, color=BEFORE, alpha=0.55, label=f"before: rms {said[0]}")
+    axes.hist(after, bins, color=AFTER, alpha=0.6, label=f"after: rms {said[1]}")
+    axes.hist(before, bins, histtype="step", color=BEFORE, linewidth=1.2)
+    axes.hist(after, bins, histtype="step", color=AFTER, linewidth=1.2)
+    if held_out.size:
+        label = f"after, on rows held out: rms {said[2]}"
+        axes.hist(held_out, bins, histtype="step", color=THIRD, linewidth=1.5, linestyle=(0, (4, 2)), label=label)
+    if floor > 0.0:
+        axes.axvline(floor, color=INK, linewidth=1.2, linestyle=":", label=f"noise floor: rms {said[3]}")
+    log_axis(axes, low, high)
+    axes.set_ylabel("rows")
+    axes.set_ylim(0.0, axes.get_ylim()[1] * 1.3)
+    axes.locator_params(axis="y", integer=True, nbins=5)
+    axes.legend(loc="upper left", ncols=2, fontsize=SMALL, labelcolor=INK, frameon=False, handlelength=1.6)
+    tidy(axes)

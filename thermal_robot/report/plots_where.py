@@ -1,0 +1,104 @@
+"""Where the gap comes from: along the chain, by axis, by recorded quantity."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING
+
+from thermal_robot.report import units
+from thermal_robot.report.drawing import (
+    AFTER,
+    FAINT,
+    INK,
+    MUTED,
+    SMALL,
+    THIRD,
+    Drawing,
+    note,
+    plain,
+    tidy,
+    title,
+)
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+    from thermal_robot.diagnosis.result import Diagnosis
+
+_Group = tuple[str, Mapping[str, float], str]
+_MOST_QUANTITIES = 8
+
+
+def plot_where(diagnosis: Diagnosis) -> Figure:
+    """Draw the shares of the gap's mean square: joints and links from root to tool, axes, recorded quantities."""
+    chain, other = _chain(diagnosis), _other(diagnosis)
+    lines = max(_lines(chain), _lines(other), 5)
+    figure = Drawing(11.0, 1.1 + 0.25 * lines)
+    left, right = figure.subplots(1, 2)
+    draw_where(left, diagnosis)
+    title(left, "Where along the chain")
+    _draw_groups(right, other)
+    title(right, "In which direction, with which quantity")
+    return figure
+
+
+def draw_where(axes: Axes, diagnosis: Diagnosis) -> None:
+    """Draw joints and links into a panel, the root above, the tool below."""
+    chain = _chain(diagnosis)
+    if not any(share > 0.0 for _, shares, _ in chain for share in shares.values()):
+        note(axes, "No effect was found,\nso none is placed along the chain.")
+        return
+    _draw_groups(axes, chain)
+
+
+def _chain(diagnosis: Diagnosis) -> list[_Group]:
+    where = diagnosis.where
+    names = dict.fromkeys((*diagnosis.joint_names, *where.joints)) if where.joints else {}
+    joints = {name: where.joints.get(name, 0.0) for name in names}
+    return [
+        (f"{kind}, from root to tool", shares, colour)
+        for kind, shares, colour in (("joints", joints, AFTER), ("links", where.links, THIRD))
+        if shares
+    ]
+
+
+def _other(diagnosis: Diagnosis) -> list[_Group]:
+    where = diagnosis.where
+    quantities = dict(sorted(where.covariates.items(), key=lambda item: -item[1])[:_MOST_QUANTITIES])
+    groups: list[_Group] = [("axes of the root frame", where.axes, MUTED)]
+    if quantities:
+        groups.append(("quantities: what a law of each alone would explain", quantities, AFTER))
+    return groups
+
+
+def _lines(groups: Sequence[_Group]) -> int:
+    return sum(len(shares) + 2 for _, shares, _ in groups)
+
+
+def _draw_groups(axes: Axes, groups: Sequence[_Group]) -> None:
+    """Draw groups of bars below each other; the axis ends beyond the longest so that short chains stay readable."""
+    ticks: list[float] = []
+    names: list[str] = []
+    line = 0.0
+    largest = max((100.0 * s for _, shares, _ in groups for s in shares.values()), default=0.0)
+    end = min(max(1.18 * largest, 10.0), 118.0)
+    for heading, shares, colour in groups:
+        axes.text(0.0, line, heading, fontsize=SMALL, color=MUTED, va="center", style="italic")
+        line += 1.0
+        for name, share in shares.items():
+            axes.barh(line, end, height=0.66, color=FAINT, alpha=0.35, linewidth=0)
+            axes.barh(line, 100.0 * max(share, 0.0), height=0.66, color=colour, linewidth=0)
+            if share >= 5e-4:
+                beside = 100.0 * share + 0.01 * end
+                axes.text(beside, line, units.percent(share), fontsize=SMALL, color=INK, va="center")
+            ticks.append(line)
+            names.append(name)
+            line += 1.0
+        line += 0.6
+    axes.set_yticks(ticks, [plain(n) for n in names])
+    axes.set_ylim(line - 0.9, -0.8)
+    axes.set_xlim(0.0, end)
+    axes.set_xlabel("share of the gap's mean square (%)")
+    tidy(axes, grid="")
+    axes.tick_params(axis="y", length=0)
