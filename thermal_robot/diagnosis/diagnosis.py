@@ -70,7 +70,7 @@ def diagnose(
     found = findings(fitted, shrinkage.shares, locations)
     order = [f.name for f in found if f.name in {e.name for e, _ in fitted.effects}]
     gap = _gap(fitted, shrinkage, floor, source)
-    probability = float(fitted.explanation.probabilities[0])
+    probability = _probability(fitted)
     advice, separates = advise(found, unexplained)
     return Diagnosis(
         campaign=campaign.name,
@@ -100,6 +100,13 @@ def _check_priors(campaign: Campaign, known: set[str]) -> None:
         if name not in known:
             expected = "one of " + ", ".join(sorted(known))
             raise CampaignError(campaign.name, "no effect has this name", column=f"priors.{name}", expected=expected)
+
+
+def _probability(fitted: Fit) -> float:
+    """Posterior probability of exactly these effects, whatever the settings of their nonlinear arguments."""
+    e, chosen = fitted.explanation, {effect.name for effect, _ in fitted.effects}
+    same = [{fitted.families[b] for b in c.blocks} == chosen for c in e.combinations]
+    return float(e.probabilities[same].sum())
 
 
 def _gap(fitted: Fit, shrinkage: Shrinkage, floor: float, source: str) -> Gap:

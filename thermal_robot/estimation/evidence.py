@@ -17,7 +17,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import cho_factor, cho_solve
+from scipy.linalg.lapack import dpotrf, dpotri
 
 Array = NDArray[np.float64]
 
@@ -31,27 +31,26 @@ class Gram:
 
     Attributes
     ----------
-    design, gap
-        X (rows·m, D) and y of the rows with weight.
     matrix, vector, total
         G (D, D), b (D,), y'y.
     slices
         Where each block's D_b columns stand; blocks are reduced to what the data can see of them.
     bases
         Per block, (P_b, D_b): parameter values, in prior sizes, of a unit of each reduced column.
+    projector
+        (f, P) what the frames take up of each parameter's column.
     equations
         n: scalar equations with weight, less the rank of the frames.
     noise_dof
         How firmly the whitening noise is held (degrees of freedom); 0 where it is not known.
     """
 
-    design: Array
-    gap: Array
     matrix: Array
     vector: Array
     total: float
     slices: tuple[slice, ...]
     bases: tuple[Array, ...]
+    projector: Array
     equations: float
     noise_dof: float
 
@@ -180,10 +179,11 @@ def _evidence(gram: Gram, blocks: tuple[int, ...], prior: float, start: Combinat
         if size:
             precision = matrix / variance
             precision[np.diag_indices(size)] += 1.0 / scale[owner] ** 2
-            factor = cho_factor(precision, lower=True, check_finite=False)
-            covariance = cho_solve(factor, np.eye(size), check_finite=False)
+            factor, _ = dpotrf(precision, lower=1, clean=1)
+            lower, _ = dpotri(factor, lower=1)
+            covariance = lower + np.tril(lower, -1).T
             values = covariance @ vector / variance
-            log_det = 2.0 * np.log(np.diag(factor[0])).sum() + 2.0 * np.log(scale[owner]).sum()
+            log_det = 2.0 * np.log(np.diag(factor)).sum() + 2.0 * np.log(scale[owner]).sum()
             quadratic = gram.total - vector @ values
             well = 1.0 - np.diag(covariance) / scale[owner] ** 2
             effective = float(well.sum())

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from thermal_robot.estimation.evidence import Combination, Gram, Search
-from thermal_robot.estimation.linear import Linear, Whitening, contained, frame_step, gram, parameter_values
+from thermal_robot.estimation.linear import Linear, Whitening, contained, frame_step, gram, parameter_values, scores
 
 Array = NDArray[np.float64]
 
@@ -145,7 +145,7 @@ def explain(
         leverage = (best.effective + linear.frames.shape[2]) / max(problem.equations + linear.frames.shape[2], 1)
         whitening, aside = _reweigh(remainder, noise, use, min(leverage, 0.9), measures)
         seed = best.blocks
-    worth = design_effect(problem, remainder, whitening, groups)
+    worth = design_effect(linear, problem, remainder, whitening, groups)
     if worth > 1.0:
         search = Search(problem.tempered(worth), log_prior, contained(problem) | settings)
         best = search.run(best.blocks)
@@ -165,28 +165,27 @@ def _remainder(linear: Linear, values: dict[int, tuple[Array, Array]]) -> Array:
 
 
 def design_effect(
-    problem: Gram, remainder: Array, whitening: Whitening, groups: Sequence[NDArray[np.int64]]
+    linear: Linear, problem: Gram, remainder: Array, whitening: Whitening, groups: Sequence[NDArray[np.int64]]
 ) -> float:
     """Return how many rows are worth one, because the remainder of rows that belong together is alike.
 
     The variance of the columns' scores summed within groups, over what it would be if rows were independent (Kish, *Survey
     Sampling*, 1965); the largest over the groupings, 1 where chance would give as much.
     """
-    used = np.flatnonzero(whitening.weights > 0)
-    if not problem.design.shape[1] or not groups:
+    if not groups or not problem.slices or not problem.slices[-1].stop:
         return 1.0
-    root = np.sqrt(whitening.weights[used])[:, None] / whitening.noise
-    left = (remainder[used] * root).ravel()
-    scores = (problem.design * left[:, None]).reshape(len(used), -1, problem.design.shape[1]).sum(axis=1)
-    alone = (scores**2).sum(axis=0) + 1e-300
+    used = np.flatnonzero(whitening.weights > 0)
+    each = scores(linear, whitening, problem, remainder)
+    alone = (each**2).sum(axis=0) + 1e-300
+    value = np.linalg.eigvalsh(problem.matrix / np.sqrt(np.outer(np.diag(problem.matrix), np.diag(problem.matrix))))
+    independent = value.sum() ** 2 / (value**2).sum()
     worst = 1.0
     for labels in groups:
-        _, label = np.unique(labels[used], return_inverse=True)
-        together = np.zeros((int(label.max()) + 1, scores.shape[1]))
-        np.add.at(together, label, scores)
+        kept = labels[used]
+        together = np.stack([np.bincount(kept, column) for column in each.T], axis=1)
         ratio = float(np.mean((together**2).sum(axis=0) / alone))
-        rank = np.linalg.matrix_rank(problem.design[:: max(1, len(problem.design) // 2000)])
-        chance = np.sqrt(2.0 * len(used) / len(together) / max(len(together) * max(rank, 1), 1))
+        pairs = float((np.bincount(kept).astype(float) ** 2).sum()) / len(used) - 1.0
+        chance = np.sqrt(2.0 * max(pairs, 0.0) / (len(used) * independent))
         worst = max(worst, ratio if ratio > 1.0 + 4.0 * chance else 1.0)
     return worst
 

@@ -146,7 +146,7 @@ def _gauss_newton(
         frames = moved(frames, step[: len(names)], names)
         state = state + step[len(names) :]
         observations = _corrected(campaign, frames, pairs())
-        if size < 1e-6:
+        if size < 1e-4:
             break
     return observations, pairs()
 

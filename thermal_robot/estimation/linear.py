@@ -3,15 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import block_diag
 
 from thermal_robot.estimation.columns import Block
 from thermal_robot.estimation.evidence import Combination, Gram
 
 Array = NDArray[np.float64]
 
+_FRAME_FLOOR = 1e-11
+_ROUNDING = 1e-12
 _INFORMATION_FLOOR = 1e-5  # a column that moves the whole gap by less than this, squared and in noise, is not seen
 _CONTAINED = 1e-3
 
@@ -39,6 +43,12 @@ class Linear:
         """Components a row: 3 for positions, 6 for poses."""
         return self.gap.shape[1]
 
+    @cached_property
+    def stack(self) -> Array:
+        """(N, m, f + P + 1) frames, all blocks' columns, gap."""
+        columns = [self.frames, *(b.columns for b in self.blocks), self.gap[:, :, None]]
+        return np.concatenate(columns, axis=2)
+
     def contribution(self, block: int, values: Array) -> Array:
         """(N, m) what a block's parameter values do to the gap."""
         return np.asarray(self.blocks[block].columns @ values)
@@ -64,46 +74,57 @@ class Whitening:
 
 
 def gram(linear: Linear, whitening: Whitening) -> Gram:
-    """Project the frames out, reduce each block to what the data see of it, and form the normal equations."""
-    used = np.flatnonzero(whitening.weights > 0)
-    root = (np.sqrt(whitening.weights[used])[:, None] / whitening.noise).ravel()
-    gap = linear.gap[used].ravel() * root
-    flat = linear.frames[used].reshape(len(gap), -1) * root[:, None]
-    flat /= np.linalg.norm(flat, axis=0) + 1e-300
-    basis, triangle, _ = _pivoted(flat)
-    rank = int(np.count_nonzero(np.abs(np.diag(triangle)) > 1e-9)) if flat.shape[1] else 0
-    basis = basis[:, :rank]
-    gap = gap - basis @ (basis.T @ gap)
-    reduced, bases, slices, start = [], [], [], 0
+    """Form the normal equations, project the frames out, reduce each block to what the data see of it."""
+    stack, flat = whitened(linear, whitening), linear.frames.shape[2]
+    sizes = np.concatenate([*(b.sizes for b in linear.blocks), [1.0]])
+    full = stack.T @ stack
+    cross = full[:flat, flat:] * sizes
+    length = np.sqrt(np.diag(full)[:flat]) + 1e-300
+    value, vector = np.linalg.eigh(full[:flat, :flat] / np.outer(length, length))
+    known = value > _FRAME_FLOOR
+    inverse = (vector[:, known] / value[known]) @ vector[:, known].T / np.outer(length, length)
+    projector = inverse @ cross
+    rest = full[flat:, flat:] * np.outer(sizes, sizes) - cross.T @ projector
+    bases, slices, start, parameter = [], [], 0, 0
     for item in linear.blocks:
-        columns = item.columns[used].reshape(len(gap), -1) * (root[:, None] * item.sizes)
-        columns -= basis @ (basis.T @ columns)
-        value, vector = np.linalg.eigh(columns.T @ columns) if columns.shape[1] else (np.zeros(0), np.zeros((0, 0)))
-        seen = value > max(_INFORMATION_FLOOR, 1e-11 * float(value.max(initial=0.0)))
+        own = slice(parameter, parameter + len(item.sizes))
+        value, vector = np.linalg.eigh(rest[own, own])
+        # what is left of an exact alias of the frames is rounding of what it was before they were projected out
+        before = float((np.diag(full)[flat:][own] * item.sizes**2).max(initial=0.0))
+        seen = value > max(_INFORMATION_FLOOR, _ROUNDING * before)
         bases.append(vector[:, seen])
-        reduced.append(columns @ vector[:, seen])
         slices.append(slice(start, start + int(seen.sum())))
-        start += int(seen.sum())
-    design = np.hstack(reduced) if reduced else np.zeros((len(gap), 0))
+        start, parameter = start + int(seen.sum()), own.stop
+    reduction = block_diag(*bases) if bases else np.zeros((0, 0))
     return Gram(
-        design,
-        gap,
-        design.T @ design,
-        design.T @ gap,
-        float(gap @ gap),
+        reduction.T @ rest[:-1, :-1] @ reduction,
+        reduction.T @ rest[:-1, -1],
+        float(rest[-1, -1]),
         tuple(slices),
         tuple(bases),
-        len(gap) - rank,
+        (projector[:, :-1] / sizes[:-1]) if flat else np.zeros((0, len(sizes) - 1)),
+        len(stack) - int(known.sum()),
         whitening.held,
     )
 
 
-def _pivoted(flat: Array) -> tuple[Array, Array, Array]:
-    from scipy.linalg import qr
+def whitened(linear: Linear, whitening: Whitening) -> Array:
+    """(rows·m, f + P + 1) frames, parameters and gap of the rows with weight, in units of noise."""
+    used = np.flatnonzero(whitening.weights > 0)
+    stack = linear.stack[used]
+    stack *= (np.sqrt(whitening.weights[used])[:, None] / whitening.noise)[:, :, None]
+    return stack.reshape(-1, stack.shape[2])
 
-    if not flat.shape[1]:
-        return np.zeros((len(flat), 0)), np.zeros((0, 0)), np.zeros(0)
-    return tuple(qr(flat, mode="economic", pivoting=True, check_finite=False))  # type: ignore[return-value]
+
+def scores(linear: Linear, whitening: Whitening, problem: Gram, remainder: Array) -> Array:
+    """(rows, D) each row's part in the derivative of the misfit by the reduced columns, frames projected out."""
+    used = np.flatnonzero(whitening.weights > 0)
+    left = remainder[used] * (whitening.weights[used][:, None] / whitening.noise**2)
+    raw = np.einsum("nmk,nm->nk", linear.stack[used][:, :, :-1], left)
+    flat = linear.frames.shape[2]
+    own = raw[:, flat:] - raw[:, :flat] @ problem.projector
+    sizes = [b.sizes[:, None] * basis for b, basis in zip(linear.blocks, problem.bases, strict=True)]
+    return np.asarray(own @ block_diag(*sizes)) if sizes else np.zeros((len(used), 0))
 
 
 def contained(problem: Gram) -> frozenset[frozenset[int]]:
@@ -148,8 +169,12 @@ def frame_step(linear: Linear, whitening: Whitening, remainder: Array) -> Array:
     if not linear.frames.shape[2]:
         return np.zeros(0)
     used = np.flatnonzero(whitening.weights > 0)
-    root = (np.sqrt(whitening.weights[used])[:, None] / whitening.noise).ravel()
-    flat = linear.frames[used].reshape(len(root), -1) * root[:, None]
-    length = np.linalg.norm(flat, axis=0) + 1e-300
-    step = np.linalg.lstsq(flat / length, remainder[used].ravel() * root, rcond=1e-9)[0] / length
-    return np.asarray(step)
+    weight = whitening.weights[used][:, None] / whitening.noise**2
+    flat = linear.frames[used]
+    matrix = np.einsum("nmf,nm,nmg->fg", flat, weight, flat, optimize=True)
+    vector = np.einsum("nmf,nm->f", flat, weight * remainder[used])
+    length = np.sqrt(np.diag(matrix)) + 1e-300
+    value, basis = np.linalg.eigh(matrix / np.outer(length, length))
+    known = value > _FRAME_FLOOR
+    step = basis[:, known] @ ((basis[:, known].T @ (vector / length)) / value[known])
+    return np.asarray(step / length)

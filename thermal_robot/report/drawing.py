@@ -65,7 +65,16 @@ def title(axes: Axes, text: str) -> None:
 def note(axes: Axes, text: str) -> None:
     """Say in an empty panel why it is empty."""
     axes.axis("off")
-    axes.text(0.5, 0.5, plain(text), ha="center", va="center", color=MUTED, fontsize=NORMAL, transform=axes.transAxes)
+    axes.text(
+        0.5,
+        0.5,
+        plain(text),
+        ha="center",
+        va="center",
+        color=MUTED,
+        fontsize=NORMAL,
+        transform=axes.transAxes,
+    )
 
 
 def log_axis(axes: Axes, low: float, high: float) -> None:

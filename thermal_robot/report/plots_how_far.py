@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -94,16 +94,35 @@ def _draw(axes: Axes, before: Array, after: Array, held_out: Array, said: list[s
     before, after, held_out = (np.clip(v, low, high) for v in (before, after, held_out))
     axes.hist(before, bins, color=BEFORE, alpha=0.55, label=f"before: rms {said[0]}")
     axes.hist(after, bins, color=AFTER, alpha=0.6, label=f"after: rms {said[1]}")
-    axes.hist(before, bins, histtype="step", color=BEFORE, linewidth=1.2)
-    axes.hist(after, bins, histtype="step", color=AFTER, linewidth=1.2)
+    _outline(axes, before, bins, BEFORE, "-")
+    _outline(axes, after, bins, AFTER, "-")
     if held_out.size:
-        label = f"after, on rows held out: rms {said[2]}"
-        axes.hist(held_out, bins, histtype="step", color=THIRD, linewidth=1.5, linestyle=(0, (4, 2)), label=label)
+        _outline(axes, held_out, bins, THIRD, (0, (4, 2)), f"after, on rows held out: rms {said[2]}")
     if floor > 0.0:
-        axes.axvline(floor, color=INK, linewidth=1.2, linestyle=":", label=f"noise floor: rms {said[3]}")
+        axes.plot(
+            [floor, floor],
+            [0.0, 0.76],
+            transform=axes.get_xaxis_transform(),
+            color=INK,
+            linewidth=1.2,
+            linestyle=":",
+            label=f"noise floor: rms {said[3]}",
+        )
     log_axis(axes, low, high)
     axes.set_ylabel("rows")
     axes.set_ylim(0.0, axes.get_ylim()[1] * 1.3)
     axes.locator_params(axis="y", integer=True, nbins=5)
     axes.legend(loc="upper left", ncols=2, fontsize=SMALL, labelcolor=INK, frameon=False, handlelength=1.6)
     tidy(axes)
+
+
+def _outline(
+    axes: Axes, values: Array, bins: Array, colour: str, style: Any, label: str | None = None
+) -> None:
+    """Draw the outline of a histogram from its first filled bin to its last."""
+    counts, _ = np.histogram(values, bins)
+    filled = np.flatnonzero(counts)
+    first, last = int(filled[0]), int(filled[-1]) + 1
+    axes.stairs(
+        counts[first:last], bins[first : last + 1], color=colour, linewidth=1.5, linestyle=style, label=label
+    )

@@ -15,7 +15,6 @@ from thermal_robot.report.drawing import (
     Array,
     Drawing,
     note,
-    plain,
     round_down,
     thinned,
     tidy,
@@ -29,7 +28,8 @@ if TYPE_CHECKING:
     from thermal_robot.diagnosis.result import Diagnosis
 
 _ARROWS = 250
-_LONGEST = 0.12  # of the workspace's extent, for an arrow of the gap's 95th percentile
+_SHAPES, _FILLED = (1.0, 1.6), 0.84  # width to height of a panel, and how much of the height arrows may fill
+_LONGEST = 0.18  # of the workspace's extent, for an arrow of the gap's 95th percentile
 
 
 def plot_map(diagnosis: Diagnosis) -> Figure:
@@ -59,34 +59,62 @@ def draw_map(axes: Axes, diagnosis: Diagnosis, across: int = 0, up: int = 1) -> 
     if not used.size:
         note(axes, "No row is left to be drawn.")
         return
-    plane = [across, up]
-    factor, sample = _exaggeration(rows.position[used], rows.gap[used, :3])
+    sample, factor = _exaggeration(rows.position[used], rows.gap[used, :3])
     chosen = used[thinned(len(used), _ARROWS)]
-    start = rows.position[np.ix_(chosen, plane)]
-    before, after = rows.gap[np.ix_(chosen, plane)], rows.remainder[np.ix_(chosen, plane)]
-    _arrows(axes, start, before * factor, BEFORE, "before", 0.0042)
-    _arrows(axes, start, after * factor, AFTER, "after", 0.0042)
-    ends = np.vstack([start, start + before * factor, start + after * factor])
-    _frame(axes, ends)
-    key = units.quantity(sample, "m")
-    axes.plot([], [], linestyle="none", label=f"drawn {units.number(factor, 1)} times larger")
-    x, y = _key_place(axes)
-    axes.annotate(
-        "",
-        xy=(x + sample * factor, y),
-        xytext=(x, y),
-        arrowprops={"arrowstyle": "|-|,widthA=0.25,widthB=0.25", "color": INK, "linewidth": 1.2, "shrinkA": 0, "shrinkB": 0},
-        annotation_clip=False,
+    start = rows.position[np.ix_(chosen, [across, up])]
+    ends = [start]
+    for values, colour, label in ((rows.gap, BEFORE, "before"), (rows.remainder, AFTER, "after")):
+        arrow = values[np.ix_(chosen, [across, up])] * factor
+        drawn = axes.quiver(
+            *start.T,
+            *arrow.T,
+            color=colour,
+            units="inches",
+            width=0.018,
+            minlength=1.5,
+            label=label,
+            angles="xy",
+            scale_units="xy",
+            scale=1.0,
+        )
+        ends.append(start + arrow)
+    _frame(axes, np.vstack(ends))
+    exaggerated = (
+        f"drawn {factor:,.0f} times larger".replace(",", "\u2009") if factor > 1.0 else "drawn to scale"
     )
-    axes.annotate(
-        f"gap of {key}, drawn {factor:,.0f} times larger".replace(",", " "),
-        xy=(x + sample * factor, y),
-        xytext=(6, 0),
-        textcoords="offset points",
-        va="center",
-        fontsize=SMALL,
+    axes.quiverkey(
+        drawn,
+        0.05,
+        0.90,
+        sample * factor,
+        f"gap of {units.quantity(sample, 'm')}, {exaggerated}",
+        labelpos="E",
         color=INK,
+        labelcolor=INK,
+        fontproperties={"size": SMALL},
     )
+    axes.legend(loc="upper left", ncols=2, fontsize=SMALL, labelcolor=INK, frameon=False, borderaxespad=0.2)
     axes.set_xlabel(f"{'xyz'[across]} of the root frame (m)")
     axes.set_ylabel(f"{'xyz'[up]} of the root frame (m)")
     tidy(axes, grid="both")
+
+
+def _exaggeration(position: Array, gap: Array) -> tuple[float, float]:
+    """Return a round length of the gap for the key, m, and how many times larger arrows are drawn."""
+    typical = float(np.quantile(np.linalg.norm(gap, axis=1), 0.95))
+    extent = float(np.ptp(position, axis=0).max())
+    if typical <= 0.0 or extent <= 0.0:
+        return 1e-3, 1.0
+    return round_down(typical), max(round_down(_LONGEST * extent / typical), 1.0)
+
+
+def _frame(axes: Axes, points: Array) -> None:
+    """Show all points undistorted, in a panel that is neither narrow nor flat, with room above them for the key."""
+    low, high = points.min(axis=0), points.max(axis=0)
+    middle, size = (low + high) / 2.0, 1.06 * np.maximum(high - low, 1e-6)
+    shape = float(np.clip(_FILLED * size[0] / size[1], *_SHAPES))
+    width = max(size[0], shape * size[1] / _FILLED)
+    height = width / shape
+    axes.set_xlim(middle[0] - width / 2.0, middle[0] + width / 2.0)
+    axes.set_ylim(middle[1] - _FILLED * height / 2.0, middle[1] + (1.0 - _FILLED / 2.0) * height)
+    axes.set_aspect("equal", adjustable="box")

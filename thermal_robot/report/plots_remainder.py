@@ -88,7 +88,9 @@ def _extent(diagnosis: Diagnosis) -> tuple[units.Scale, float]:
     """Return the unit and the largest value drawn, which rows that were set aside do not decide."""
     rows = diagnosis.rows
     used = np.abs(rows.remainder[~rows.outliers, :3])
-    largest = max(float(used.max()) if used.size else 0.0, 2.4 * diagnosis.gap.noise_floor / np.sqrt(3.0), 1e-12)
+    largest = max(
+        float(used.max()) if used.size else 0.0, 2.4 * diagnosis.gap.noise_floor / np.sqrt(3.0), 1e-12
+    )
     best = units.scale("m", largest)
     return best, 1.15 * largest * best.factor
 

@@ -28,18 +28,24 @@ if TYPE_CHECKING:
 
 _Group = tuple[str, Mapping[str, float], str]
 _MOST_QUANTITIES = 8
+_BETWEEN = 0.6  # lines
 
 
 def plot_where(diagnosis: Diagnosis) -> Figure:
     """Draw the shares of the gap's mean square: joints and links from root to tool, axes, recorded quantities."""
     chain, other = _chain(diagnosis), _other(diagnosis)
-    lines = max(_lines(chain), _lines(other), 5)
-    figure = Drawing(11.0, 1.1 + 0.25 * lines)
-    left, right = figure.subplots(1, 2)
-    draw_where(left, diagnosis)
-    title(left, "Where along the chain")
-    _draw_groups(right, other)
-    title(right, "In which direction, with which quantity")
+    left, right = max(_lines(chain), 1.0), _lines(other)
+    lines = max(left, right)
+    figure = Drawing(11.0, 1.2 + 0.24 * lines)
+    # panels as high as their bars, so that a bar is equally thick everywhere
+    grid = figure.add_gridspec(2, 2, height_ratios=(min(left, right), max(lines - min(left, right), 0.01)))
+    panels = [
+        figure.add_subplot(grid[:, k] if n == lines else grid[0, k]) for k, n in enumerate((left, right))
+    ]
+    draw_where(panels[0], diagnosis)
+    title(panels[0], "Where along the chain")
+    _draw_groups(panels[1], other)
+    title(panels[1], "In which direction, with which quantity")
     return figure
 
 
@@ -72,8 +78,8 @@ def _other(diagnosis: Diagnosis) -> list[_Group]:
     return groups
 
 
-def _lines(groups: Sequence[_Group]) -> int:
-    return sum(len(shares) + 2 for _, shares, _ in groups)
+def _lines(groups: Sequence[_Group]) -> float:
+    return sum(len(shares) + 1.0 + _BETWEEN for _, shares, _ in groups)
 
 
 def _draw_groups(axes: Axes, groups: Sequence[_Group]) -> None:
@@ -84,7 +90,7 @@ def _draw_groups(axes: Axes, groups: Sequence[_Group]) -> None:
     largest = max((100.0 * s for _, shares, _ in groups for s in shares.values()), default=0.0)
     end = min(max(1.18 * largest, 10.0), 118.0)
     for heading, shares, colour in groups:
-        axes.text(0.0, line, heading, fontsize=SMALL, color=MUTED, va="center", style="italic")
+        axes.text(0.01 * end, line, heading, fontsize=SMALL, color=MUTED, va="center", style="italic")
         line += 1.0
         for name, share in shares.items():
             axes.barh(line, end, height=0.66, color=FAINT, alpha=0.35, linewidth=0)
@@ -95,9 +101,9 @@ def _draw_groups(axes: Axes, groups: Sequence[_Group]) -> None:
             ticks.append(line)
             names.append(name)
             line += 1.0
-        line += 0.6
+        line += _BETWEEN
     axes.set_yticks(ticks, [plain(n) for n in names])
-    axes.set_ylim(line - 0.9, -0.8)
+    axes.set_ylim(line - _BETWEEN - 0.4, -0.8)
     axes.set_xlim(0.0, end)
     axes.set_xlabel("share of the gap's mean square (%)")
     tidy(axes, grid="")

@@ -60,7 +60,15 @@ def draw_which(axes: Axes, diagnosis: Diagnosis, *, brief: bool = False) -> None
             fontsize=SMALL,
             color=INK if finding.status in ("found", "confounded") else MUTED,
         )
-    axes.text(1.02, -0.95, "probability", transform=axes.get_yaxis_transform(), fontsize=SMALL, color=MUTED, va="center")
+    axes.text(
+        1.02,
+        -0.95,
+        "probability",
+        transform=axes.get_yaxis_transform(),
+        fontsize=SMALL,
+        color=MUTED,
+        va="center",
+    )
     axes.set_yticks(range(len(ordered)), [plain(f.name) for f in ordered])
     axes.set_ylim(len(ordered) - 0.4, -1.3)
     axes.set_xlim(100.0 * max(low, _FURTHEST_BELOW_ZERO) - 1.0, 100.0 * high + 2.0)

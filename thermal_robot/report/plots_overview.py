@@ -1,0 +1,41 @@
+"""The whole answer in one figure."""
+
+from __future__ import annotations
+
+from textwrap import fill
+from typing import TYPE_CHECKING
+
+from thermal_robot.report.drawing import INK, LARGE, Drawing, plain, title
+from thermal_robot.report.plots_how_far import draw_how_far
+from thermal_robot.report.plots_map import draw_map
+from thermal_robot.report.plots_where import draw_where
+from thermal_robot.report.plots_which import draw_which
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+    from thermal_robot.diagnosis.result import Diagnosis
+
+
+def overview(diagnosis: Diagnosis) -> Figure:
+    """Draw how far, which, where, and the map from above, under the sentence of the verdict."""
+    lines = max(len(diagnosis.effects), len(diagnosis.joint_names) + len(diagnosis.where.links), 12)
+    figure = Drawing(12.5, 5.4 + 0.2 * lines)
+    (how_far, which), (where, map_) = figure.subplots(2, 2)
+    draw_how_far(how_far, diagnosis)
+    title(how_far, "How far")
+    draw_which(which, diagnosis, brief=True)
+    title(which, "Which")
+    draw_where(where, diagnosis)
+    title(where, "Where")
+    draw_map(map_, diagnosis)
+    title(map_, "Gap, seen from above")
+    figure.suptitle(
+        plain(fill(diagnosis.summary, 115)),
+        x=0.01,
+        ha="left",
+        fontsize=LARGE + 1,
+        color=INK,
+        fontweight="bold",
+    )
+    return figure
