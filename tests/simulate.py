@@ -1,5 +1,6 @@
-"""Campaigns with known answers, made with the exact perturbed model. For the demo and the tests; the blind trial has its own
-reality, which shares nothing with the program's.
+"""Campaigns with known answers, made with the exact perturbed model, for the demo and the tests.
+
+It shares the effects' formulas with the program, so it tests estimation and diagnosis, not the physics.
 """
 
 from __future__ import annotations
@@ -28,7 +29,7 @@ def random_motion(rng, reach):
 
 
 def commands(robot, samples, rng, share=0.75):
-    """Joint positions within a share of the limits (±2.4 rad where wider), no closer to the axis than a third of the reach."""
+    """Joint positions within a share of the limits (±2.4 rad where wider), the nearest third left out."""
     lower, upper = np.maximum(robot.lower, -2.4), np.minimum(robot.upper, 2.4)
     middle, half = (lower + upper) / 2, share * (upper - lower) / 2
     drawn = rng.uniform(middle - half, middle + half, (4 * samples + 50, robot.n))
@@ -124,9 +125,7 @@ def simulate(
     )
     nominal = observe(campaign, frames)
     chosen, truth = [], {"effects": list(effects), "parts": {}, "noise": noise, "seed": seed}
-    others = [
-        n for n, e in library().items() if background and n not in effects and not e.missing(nominal)
-    ]
+    others = [n for n, e in library().items() if background and n not in effects and not e.missing(nominal)]
     for name in [*effects, *others]:
         effect, values = draw_effect(name, nominal, rng, places if name in effects else None)
         wanted = noise * np.sqrt(3.0) * (rng.uniform(*ratio) if name in effects else background)
@@ -164,7 +163,7 @@ DEMO_SEED = 2018
 
 
 def demo():
-    """The demo: a UR-like arm that was not told that its links grow with the hall's temperature, nor that a joint has play."""
+    """The demo: an RV-M2 whose links grow with the hall's temperature, and whose elbow has play; it was told neither."""
     robot = load_robot("builtin:rv_m2", "tool0")
     return simulate(
         robot,

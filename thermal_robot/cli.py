@@ -43,7 +43,7 @@ def _parser() -> argparse.ArgumentParser:
 
     parser = argparse.ArgumentParser(
         prog="thermal-robot",
-        description="Say where the gap between a robot and its model lies, which effect causes it, and how far it shrinks.",
+        description="Say where the gap between robot and model lies, which effect causes it, how far it shrinks.",
     )
     parser.add_argument("--version", action="version", version=f"thermal-robot {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
@@ -61,8 +61,12 @@ def _parser() -> argparse.ArgumentParser:
     diagnose.add_argument("--json", metavar="F", help="write the diagnosis as JSON ('-' prints it instead of the text)")
     diagnose.add_argument("--report", metavar="F.html", help="write a page with figures")
     diagnose.add_argument("--model", metavar="F", help="save the corrected model for `predict`")
-    diagnose.add_argument("--without", metavar="EFFECT", nargs="+", action="extend", default=[], help="leave effects out")
-    diagnose.add_argument("--only", metavar="EFFECT", nargs="+", action="extend", default=[], help="consider these only")
+    diagnose.add_argument(
+        "--without", metavar="EFFECT", nargs="+", action="extend", default=[], help="leave effects out"
+    )
+    diagnose.add_argument(
+        "--only", metavar="EFFECT", nargs="+", action="extend", default=[], help="consider these only"
+    )
     diagnose.set_defaults(run=_diagnose)
 
     predict = commands.add_parser("predict", help="the corrected model's prediction for new commands")

@@ -1,4 +1,4 @@
-"""The corrected model: the nominal robot, its frames, and the effects that were found; saved, loaded, used to predict."""
+"""The corrected model: nominal robot, frames, and the effects that were found; saved, loaded, used to predict."""
 
 from __future__ import annotations
 
@@ -87,8 +87,8 @@ class CorrectedModel:
     def _in_sequence(self, samples: Campaign) -> Campaign:
         """Put samples whose ``order`` only counts their own file's rows after the end of the campaign.
 
-        An order that starts again where the campaign's did, without gaps, and ends before it, does not say when in the campaign a
-        sample would be measured; what has settled by its end is then taken as settled.
+        An order that starts again where the campaign's did, without gaps, and ends before it, does not say when in
+        the campaign a sample would be measured; what has settled by its end is then taken as settled.
         """
         order = samples.covariates.get("order")
         if order is None or self.last_order is None or "order" not in self.needs:
@@ -136,8 +136,7 @@ class CorrectedModel:
             "settings": self.settings.to_dict(),
             "frames": {"base": self.frames.base.tolist(), "tool": self.frames.tool.tolist()},
             "effects": [
-                {"name": e.name, "arguments": e.arguments(), "values": np.asarray(v).tolist()}
-                for e, v in self.effects
+                {"name": e.name, "arguments": e.arguments(), "values": np.asarray(v).tolist()} for e, v in self.effects
             ],
             "measures": self.measures,
             "needs": list(self.needs),

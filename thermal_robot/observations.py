@@ -99,7 +99,7 @@ class Observations:
         return self.covariates.get("time", self.covariates.get("order"))
 
     def temperature(self, link: str) -> Array | None:
-        """Return the (N,) temperature that applies to a link, °C: its own, or the robot's; ``None`` where unrecorded."""
+        """Return the (N,) temperature of a link, °C: its own or the robot's; ``None`` where unrecorded."""
         return self.covariates.get(f"temperature.{link}", self.covariates.get("temperature"))
 
     def varies(self, column: str) -> bool:
@@ -209,8 +209,8 @@ def observe(
 
     Notes
     -----
-    With ``sim.*`` columns the prediction is the simulator's pose plus what the displacement does to the URDF's pose: the
-    simulator says where the nominal robot is, the URDF how an error moves it.
+    With ``sim.*`` columns the prediction is the simulator's pose plus what the displacement does to the URDF's pose:
+    the simulator says where the nominal robot is, the URDF how an error moves it.
     """
     frames = frames or Frames.declared(campaign)
     robot = campaign.robot

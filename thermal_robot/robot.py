@@ -244,9 +244,7 @@ def _read(path: Path) -> tuple[str, str]:
 def _builtin_path(name: str) -> Path:
     package = Path(__file__).parent
     # A wheel carries the folder inside the package, a checkout beside it.
-    folder = next(
-        (f for f in (package / "robots", package.parent / "robots") if f.is_dir()), package / "robots"
-    )
+    folder = next((f for f in (package / "robots", package.parent / "robots") if f.is_dir()), package / "robots")
     known = sorted(path.stem for path in folder.glob("*.urdf"))
     if name not in known:
         raise _unknown(name, known, "built-in robot")

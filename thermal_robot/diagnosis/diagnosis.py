@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.correction import CorrectedModel
@@ -113,7 +114,7 @@ def _gap(fitted: Fit, shrinkage: Shrinkage, floor: float, source: str) -> Gap:
     kept = ~fitted.explanation.outliers
     before, after = fitted.nominal.gap[kept], fitted.corrected.gap[kept]
 
-    def rms(rows: np.ndarray) -> float:  # type: ignore[type-arg]
+    def rms(rows: NDArray[np.float64]) -> float:
         return float(np.sqrt((rows**2).sum(axis=1).mean()))
 
     turned = before.shape[1] == 6

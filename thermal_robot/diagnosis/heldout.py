@@ -34,8 +34,8 @@ class Shrinkage:
     before, after
         (N,) distance of each row while it was held out, m; NaN where it was set aside.
     shares
-        By effect: share of the gap's mean square with its 95 % interval. Shapley values for the effects of the explanation,
-        the gain on top of it for the others.
+        By effect: share of the gap's mean square with its 95 % interval. Shapley values for the effects of the
+        explanation, the gain on top of it for the others.
     """
 
     overall: HeldOut
@@ -47,8 +47,8 @@ class Shrinkage:
 def held_out(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Shrinkage:
     """Cross-validate in blocks of consecutive measurements.
 
-    Frames, outliers, prior scales and the choice of effects are found anew from the other folds' rows. A held-out row is
-    set aside only where both its own fold's model and the whole diagnosis call it a gross error.
+    Frames, outliers, prior scales and the choice of effects are found anew from the other folds' rows. A held-out row
+    is set aside only where both its own fold's model and the whole diagnosis call it a gross error.
     """
     campaign, explanation = fit.campaign, fit.explanation
     fold, block = folds(campaign)
@@ -86,7 +86,7 @@ def held_out(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Shri
 
 
 def _sums(values: Array, block: NDArray[np.int64]) -> Array:
-    return np.bincount(block, np.nan_to_num(values), int(block.max()) + 1)
+    return np.bincount(block, np.nan_to_num(values), int(block.max()) + 1).astype(float)
 
 
 def _share(squares: Array) -> float:
@@ -140,10 +140,15 @@ class _Subsets:
         self.variance = e.best.noise**2 * e.design_effect
 
     def squares(self, scales: dict[int, float]) -> Array:
-        """(B,) sum of squared held-out distances of each block under a model with the given blocks and prior scales, m²."""
-        index = np.concatenate([np.arange(self.frames), *(np.arange(s.start, s.stop) for s in map(self.slices.__getitem__, scales))])
+        """(B,) squared held-out distances, summed a block of rows, with the given effects at their prior scales, m²."""
+        index = np.concatenate(
+            [np.arange(self.frames), *(np.arange(s.start, s.stop) for s in map(self.slices.__getitem__, scales))]
+        )
         ridge = np.concatenate(
-            [np.full(self.frames, 1e-9), *(np.full(self.slices[b].stop - self.slices[b].start, self.variance / v**2) for b, v in scales.items())]
+            [
+                np.full(self.frames, 1e-9),
+                *(np.full(self.slices[b].stop - self.slices[b].start, self.variance / v**2) for b, v in scales.items()),
+            ]
         )
         index = index.astype(int)
         result = np.zeros(len(self.block_fold))
@@ -202,4 +207,3 @@ def _relative(value: Array, base: tuple[float, Array], draws: Array) -> tuple[fl
     if base[0] <= 0:
         return 0.0, (0.0, 0.0)
     return float(value.sum() / base[0]), _interval((draws @ value) / np.maximum(base[1], 1e-300))
-

@@ -15,7 +15,8 @@ _FEW = 6
 
 def smooth_law(values: Array) -> Array:
     """(N, k) columns of a smooth function of a quantity, its constant removed: levels for a quantity with few values, a
-    natural cubic spline with five knots at its quantiles otherwise (Hastie, Tibshirani and Friedman, *Elements*, 5.2.1).
+    natural cubic spline with five knots at its quantiles otherwise (Hastie, Tibshirani and Friedman, *Elements*,
+    5.2.1).
 
     Empty (N, 0) where the quantity does not vary.
     """
@@ -37,9 +38,7 @@ def smooth_law(values: Array) -> Array:
 def _natural(x: Array, knots: Array) -> list[Array]:
     def term(k: int) -> Array:
         last = knots[-1]
-        return np.asarray(
-            (np.maximum(x - knots[k], 0) ** 3 - np.maximum(x - last, 0) ** 3) / (last - knots[k])
-        )
+        return np.asarray((np.maximum(x - knots[k], 0) ** 3 - np.maximum(x - last, 0) ** 3) / (last - knots[k]))
 
     return [term(k) - term(len(knots) - 2) for k in range(len(knots) - 2)] if len(knots) > 2 else []
 

@@ -52,8 +52,8 @@ class Finding:
     probability
         Posterior probability that it is at work; ``None`` where it is not testable.
     shrinkage, shrinkage_ci95
-        Its share of the gap's mean square, on data not used for the fit: Shapley value over the explanation for an effect
-        that belongs to it; what adding it brings for another; ``None`` where it is not testable.
+        Its share of the gap's mean square, on data not used for the fit: Shapley value over the explanation for an
+        effect that belongs to it; what adding it brings for another; ``None`` where it is not testable.
     needs
         What would make it testable.
     confounded_with
@@ -104,8 +104,8 @@ class Gap:
 class Where:
     """Shares 0..1 of the gap's mean square: by axis of the root frame, joint, link, and recorded quantity.
 
-    Axes sum to one. Joints and links share what the explanation explains. A quantity's share is what a smooth law of it alone
-    would explain, so these overlap.
+    Axes sum to one. Joints and links share what the explanation explains. A quantity's share is what a smooth law of
+    it alone would explain, so these overlap.
     """
 
     axes: Mapping[str, float]
@@ -279,7 +279,7 @@ class Diagnosis:
             },
             "next": {"separates": self.separates, "advice": self.advice, "samples": []},
         }
-        return _jsonable(plain)  # type: ignore[no-any-return]
+        return dict(_jsonable(plain))
 
     def to_json(self, path: str | Path) -> None:
         """Write :meth:`to_dict` to a file."""
@@ -293,7 +293,7 @@ class Diagnosis:
     def _repr_html_(self) -> str:
         from thermal_robot.report import fragment
 
-        return fragment(self)
+        return str(fragment(self))
 
 
 def _jsonable(value: Any) -> Any:

@@ -109,7 +109,11 @@ def test_remainder(fit: Fit, progress: Callable[[str], None] = lambda _: None) -
     """
     e, left = fit.explanation, remainder(fit)
     stated, again = fit.campaign.noise_position, repeats(fit, left)
-    rms = float(np.sqrt(3.0 * (left.white[:, :3] ** 2).sum() * e.whitening.noise[0] ** 2 / (left.freedom * 3 / left.white.shape[1])))
+    rms = float(
+        np.sqrt(
+            3.0 * (left.white[:, :3] ** 2).sum() * e.whitening.noise[0] ** 2 / (left.freedom * 3 / left.white.shape[1])
+        )
+    )
     if stated is not None:
         floor, source = stated, "stated"
     elif again is not None:
@@ -167,7 +171,7 @@ def _lack_of_fit(left: Remainder, again: Repeats | None) -> tuple[float, str]:
 
 
 def _neighbours(fit: Fit, left: Remainder) -> tuple[tuple[float, str], float]:
-    """Are the remainders of neighbours alike: in joint space, and in the order of measurement? Against shuffles of the rows.
+    """Are the remainders of neighbours alike, in joint space or in order, more than with shuffled rows?
 
     Returns p-value and reason, and the largest correlation that is not chance.
     """
@@ -201,9 +205,7 @@ def _neighbours(fit: Fit, left: Remainder) -> tuple[tuple[float, str], float]:
     return worst, most
 
 
-def _scan(
-    fit: Fit, left: Remainder
-) -> tuple[tuple[float, str], tuple[Location, ...], tuple[Dependence, ...], float]:
+def _scan(fit: Fit, left: Remainder) -> tuple[tuple[float, str], tuple[Location, ...], tuple[Dependence, ...], float]:
     """F tests of a smooth law of every quantity in every place; p-values after counting them all.
 
     Returns p-value and reason, places, quantities, and the share of the remainder that the best law explains.

@@ -28,7 +28,13 @@ def plain(effect: str) -> str:
 
 def length(metres: float) -> str:
     """Return a length in the unit that a metrologist would use."""
-    return f"{metres * 1e3:.2f} mm" if metres >= 1e-3 else f"{metres * 1e3:.3f} mm" if metres >= 1e-5 else f"{metres * 1e6:.2f} µm"
+    return (
+        f"{metres * 1e3:.2f} mm"
+        if metres >= 1e-3
+        else f"{metres * 1e3:.3f} mm"
+        if metres >= 1e-5
+        else f"{metres * 1e6:.2f} µm"
+    )
 
 
 def sentence(
@@ -43,12 +49,17 @@ def sentence(
     names = [plain(name) for name in explained]
     listed = names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]
     by_name = {f.name: f for f in found}
-    doubts = [f"{plain(n)} cannot be told from {' or '.join(map(plain, by_name[n].confounded_with))}" for n in explained if by_name[n].confounded_with]
+    doubts = [
+        f"{plain(n)} cannot be told from {' or '.join(map(plain, by_name[n].confounded_with))}"
+        for n in explained
+        if by_name[n].confounded_with
+    ]
     sure = f"{min(probability, 0.999):.0%} sure" if probability < 0.995 else "more than 99 % sure"
     share = gap.held_out.shrinkage
     text = (
         f"The gap of {size} comes from {listed} ({sure.replace('%', ' %').replace('  ', ' ')}); "
-        f"correcting for {'it' if len(names) == 1 else 'them'} removes {100 * share:.1f} % of its mean square on held-out "
+        f"correcting for {'it' if len(names) == 1 else 'them'} removes {100 * share:.1f} % of its mean square on "
+        f"held-out "
         f"data and leaves {length(gap.held_out.rms_after)}"
     )
     if unexplained.flagged:
@@ -81,5 +92,8 @@ def advise(found: Sequence[Finding], unexplained: Unexplained) -> tuple[str, tup
         listed = ", ".join(plain(f.name) for f in missing)
         return f"Record {', '.join(columns)}: {listed} could not be tested, and a remainder is unexplained.", ()
     if unexplained.flagged:
-        return "Repeat a few poses, in another order and on another day: it tells what is repeatable in the remainder.", ()
+        return (
+            "Repeat a few poses, in another order and on another day: it tells what is repeatable in the remainder.",
+            (),
+        )
     return "Nothing: the data determine the explanation.", ()

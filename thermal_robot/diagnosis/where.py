@@ -42,12 +42,12 @@ def locate(fit: Fit, shrinkage: dict[str, float]) -> tuple[Where, dict[str, tupl
     for b, (effect, values) in zip(e.best.blocks, fit.effects, strict=True):
         block = e.linear.blocks[b]
         power: dict[tuple[str, str], float] = {}
-        for place in dict.fromkeys((p.kind, p.place) for p in block.parameters):
-            mine = [k for k, p in enumerate(block.parameters) if (p.kind, p.place) == place]
+        for site in dict.fromkeys((p.kind, p.place) for p in block.parameters):
+            mine = [k for k, p in enumerate(block.parameters) if (p.kind, p.place) == site]
             moved = (block.columns[rows][:, :, mine] @ values[mine]).ravel()
             if basis is not None:
                 moved = moved - basis @ (basis.T @ moved)
-            power[place] = float((moved.reshape(len(rows), -1)[:, :3] ** 2).sum())
+            power[site] = float((moved.reshape(len(rows), -1)[:, :3] ** 2).sum())
         total = sum(power.values()) or 1.0
         share = max(shrinkage.get(effect.name, 0.0), 0.0)
         found = [Location(kind, name, min(share * part / total, 1.0)) for (kind, name), part in power.items()]

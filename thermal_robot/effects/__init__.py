@@ -52,7 +52,7 @@ def library() -> dict[str, Effect]:
     EffectError
         If an entry point gives something that is not an effect, or a name that is already taken.
     """
-    found: dict[str, Effect] = {kind.name: kind() for kind in _BUILTIN}  # type: ignore[abstract]
+    found: dict[str, Effect] = {kind.name: kind() for kind in _BUILTIN}
     for point in entry_points(group="thermal_robot.effects"):
         loaded = point.load()
         effect = loaded() if isinstance(loaded, type) else loaded

@@ -15,9 +15,10 @@ if TYPE_CHECKING:
 class InstrumentScale(Effect):
     """Measured = (1 + s) · true, about the instrument's origin.
 
-    Expected size 1e-4: a tracker whose refraction is corrected with a wrong temperature errs by 1e-6 per kelvin, a camera
-    or a photogrammetric scale bar by a hundred times that. All link lengths wrong by the same share look exactly alike, so
-    :class:`Geometric` contains it; with an unknown base the place of the origin does not matter.
+    Expected size 1e-4: a tracker whose refraction is corrected with a wrong temperature errs by 1e-6 per kelvin, a
+    camera or a photogrammetric scale bar by a hundred times that. All link lengths wrong by the same share look
+    exactly
+    alike, so :class:`Geometric` contains it; with an unknown base the place of the origin does not matter.
     """
 
     name: ClassVar[str] = "instrument_scale"

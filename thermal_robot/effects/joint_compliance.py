@@ -48,8 +48,6 @@ class JointCompliance(Effect):
         size = _WIND_UP / max(float(np.abs(torque).max()), 1e-9)
         units = {"prismatic": "m/N"}
         return tuple(
-            Parameter(
-                "compliance", units.get(kind, "rad/(N·m)"), size, "joint", joint, (at_joint(j, -torque[:, j]),)
-            )
+            Parameter("compliance", units.get(kind, "rad/(N·m)"), size, "joint", joint, (at_joint(j, -torque[:, j]),))
             for j, (joint, kind) in enumerate(zip(robot.joint_names, robot.joint_types, strict=True))
         )

@@ -48,7 +48,5 @@ class ThermalElongation(Effect):
             along = np.concatenate([segment.direction, np.zeros(3)]) * segment.length
             twist = (temperature - reference)[:, None] * along
             label = f"strain per kelvin of {segment.name}"
-            found.append(
-                Parameter(label, "1/K", 1.5e-5, "link", segment.parent_link, (at_segment(s, twist),))
-            )
+            found.append(Parameter(label, "1/K", 1.5e-5, "link", segment.parent_link, (at_segment(s, twist),)))
         return tuple(found)

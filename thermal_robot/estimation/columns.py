@@ -54,8 +54,8 @@ def column(observations: Observations, response: Response, measures: int) -> Arr
     }[response.channel]()
     if values.ndim == 1:
         used = np.flatnonzero(values)  # most twists move along or about one axis
-        return sensitivity[:, :, used] @ values[used]
-    return np.einsum("nrk,nk->nr", sensitivity, values)
+        return np.asarray(sensitivity[:, :, used] @ values[used])
+    return np.asarray(np.einsum("nrk,nk->nr", sensitivity, values))
 
 
 def block(observations: Observations, effect: Effect) -> Block:

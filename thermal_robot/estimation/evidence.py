@@ -1,12 +1,13 @@
 """Which combination of effects the data speak for: marginal likelihoods from one Gram matrix.
 
-The whitened gap is y = F f + Σ_b X_b θ_b + e, with flat frames f, e ~ N(0, s²), and θ_b ~ N(0, λ_b² size²) for the blocks
-that are in the combination. F is projected out first. For a combination γ
+The whitened gap is y = F f + Σ_b X_b θ_b + e, with flat frames f, e ~ N(0, s²), and θ_b ~ N(0, λ_b² size²) for the
+blocks that are in the combination. F is projected out first. For a combination γ
 
     log p(y | γ) = −½ [ n log s² + log|I + Λ G/s²| + (y'y − b'(G + s²Λ⁻¹)⁻¹ b)/s² ] + log p(s) + log p(λ),
 
-with G = X'X and b = X'y restricted to γ. The scales s and λ_b are found by MacKay's fixed point (*Neural Computation* 4,
-1992), their priors being scaled inverse chi-square about the stated noise, and log-normal about the stated sizes; λ is
+with G = X'X and b = X'y restricted to γ. The scales s and λ_b are found by MacKay's fixed point (*Neural Computation*
+4, 1992), their priors being scaled inverse chi-square about the stated noise, and log-normal about the stated sizes;
+λ is
 integrated out by Laplace's method.
 """
 
@@ -94,7 +95,6 @@ class Combination:
     effective: float
 
 
-
 @dataclass(eq=False)
 class Search:
     """Evaluates combinations, each once, and keeps them all.
@@ -139,7 +139,7 @@ class Search:
         return best
 
     def _width(self, block: int) -> int:
-        return self.gram.slices[block].stop - self.gram.slices[block].start
+        return int(self.gram.slices[block].stop - self.gram.slices[block].start)
 
     def _climb(self, start: Sequence[int], barred: frozenset[int]) -> Combination:
         best = max(self.evaluate(()), self.evaluate(start), key=lambda c: c.log_evidence)
@@ -166,15 +166,17 @@ class Search:
 
 
 def _evidence(gram: Gram, blocks: tuple[int, ...], prior: float, start: Combination | None) -> Combination:
-    used = np.concatenate([np.arange(gram.slices[b].start, gram.slices[b].stop) for b in blocks] or [[]]).astype(int)
-    owner = np.concatenate([np.full(gram.bases[b].shape[1], k) for k, b in enumerate(blocks)] or [[]]).astype(int)
+    spans = [np.arange(gram.slices[b].start, gram.slices[b].stop) for b in blocks]
+    used = np.concatenate([*spans, np.zeros(0, dtype=int)])
+    owner = np.repeat(np.arange(len(blocks)), [len(span) for span in spans])
     matrix, vector = gram.matrix[np.ix_(used, used)], gram.vector[used]
     scale = np.array([start.scales.get(b, 1.0) if start else 1.0 for b in blocks])
     equations, held = gram.equations, gram.noise_dof
     variance = start.noise**2 if start else max((held + gram.total) / (held + equations), 1e-12)
     size = len(used)
     values, covariance = np.zeros(size), np.zeros((size, size))
-    effective, quadratic, log_det, determined = 0.0, gram.total, 0.0, np.zeros(len(blocks))
+    effective, quadratic, log_det = 0.0, gram.total, 0.0
+    determined: Array = np.zeros(len(blocks))
     for _ in range(_ITERATIONS):
         if size:
             precision = matrix / variance
@@ -188,7 +190,7 @@ def _evidence(gram: Gram, blocks: tuple[int, ...], prior: float, start: Combinat
             well = 1.0 - np.diag(covariance) / scale[owner] ** 2
             effective = float(well.sum())
             fitted = np.bincount(owner, values**2, len(blocks)) / scale**2
-            determined = np.bincount(owner, well, len(blocks))
+            determined = np.asarray(np.bincount(owner, well, len(blocks)), dtype=float)
             log_scale = np.log(scale)
             slope = fitted - determined - log_scale / _SIZE_SPREAD**2
             step = np.clip(slope / (fitted + determined + 1.0 / _SIZE_SPREAD**2), -1.0, 1.0)

@@ -71,7 +71,7 @@ class Explanation:
     def far(self, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """(N,) True for those of the given rows that lie further from this explanation than noise allows."""
         distance2 = ((self.remainder / (self.whitening.noise * self.best.noise)) ** 2).sum(axis=1)
-        return rows & (distance2 > distance_limit(self.linear.measures, len(rows)))
+        return np.asarray(rows & (distance2 > distance_limit(self.linear.measures, len(rows))))
 
     def probability(self, blocks: Sequence[int]) -> float:
         """Posterior probability that any of the blocks is at work."""
@@ -105,8 +105,8 @@ def explain(
     rows
         (N,) rows to use; all where absent. What is learnt comes from these alone.
     families
-        Name of the effect that each block belongs to: blocks of one effect are settings that exclude each other and share
-        its prior probability.
+        Name of the effect that each block belongs to: blocks of one effect are settings that exclude each other and
+        share its prior probability.
     start, outliers
         Where the search starts: blocks and rows set aside.
     groups
@@ -115,8 +115,8 @@ def explain(
     Returns
     -------
     Explanation
-        Gross errors do not bear on it: rows further than noise allows from the explanation are set aside, and rows in the
-        tail weigh less (Huber).
+        Gross errors do not bear on it: rows further than noise allows from the explanation are set aside, and rows in
+        the tail weigh less (Huber).
     """
     measures, samples = linear.measures, len(linear.gap)
     use = np.ones(samples, dtype=bool) if rows is None else rows
@@ -124,9 +124,7 @@ def explain(
     families = families or [str(k) for k in range(len(linear.blocks))]
     odds = np.log(PRIOR_PROBABILITY / (1 - PRIOR_PROBABILITY))
     log_prior = [odds - np.log(list(families).count(f)) for f in families]
-    settings = {
-        frozenset((a, b)) for a, f in enumerate(families) for b, g in enumerate(families) if a < b and f == g
-    }
+    settings = {frozenset((a, b)) for a, f in enumerate(families) for b, g in enumerate(families) if a < b and f == g}
     whitening = _first_whitening(linear, noise, use & ~aside)
     history: list[tuple[tuple[int, ...], bytes]] = []
     seed = tuple(start)
@@ -169,8 +167,8 @@ def design_effect(
 ) -> float:
     """Return how many rows are worth one, because the remainder of rows that belong together is alike.
 
-    The variance of the columns' scores summed within groups, over what it would be if rows were independent (Kish, *Survey
-    Sampling*, 1965); the largest over the groupings, 1 where chance would give as much.
+    The variance of the columns' scores summed within groups, over what it would be if rows were independent (Kish,
+    *Survey Sampling*, 1965); the largest over the groupings, 1 where chance would give as much.
     """
     if not groups or not problem.slices or not problem.slices[-1].stop:
         return 1.0
@@ -194,7 +192,7 @@ def robust_noise(remainder: Array, leverage: float = 0.0) -> Array:
     """Return one sigma per axis of each three components, from the median of their squared length."""
     parts = remainder.reshape(len(remainder), -1, 3)
     middle = np.median((parts**2).sum(axis=2), axis=0) / float(chdtri(3, 0.5))
-    return np.sqrt(middle / (1.0 - leverage)) + 1e-15
+    return np.asarray(np.sqrt(middle / (1.0 - leverage)) + 1e-15)
 
 
 def _settle(measured: Array, noise: Noise, measures: int) -> tuple[Array, float]:
@@ -203,7 +201,9 @@ def _settle(measured: Array, noise: Noise, measures: int) -> tuple[Array, float]
     A remainder well above the stated noise is not noise: it then sets the scale by which effects are judged.
     """
     stated = noise.parts(measures)
-    sigma = np.array([m if g is None else max(g, m if m > 1.3 * g else g) for g, m in zip(stated, measured, strict=True)])
+    sigma = np.array(
+        [m if g is None else max(g, m if m > 1.3 * g else g) for g, m in zip(stated, measured, strict=True)]
+    )
     firm = all(g is not None and s <= g for g, s in zip(stated, sigma, strict=True))
     return np.repeat(sigma, 3), _GIVEN_NOISE_DOF if firm else 0.0
 

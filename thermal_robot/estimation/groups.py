@@ -17,8 +17,8 @@ _LARGEST_SHARE = 0.1
 def near_repeats(campaign: Campaign) -> Labels:
     """(N,) label of the cluster of commands that lie within :data:`NEAR` of each other.
 
-    Samples along a path chain into one cluster; the distance is then halved until no cluster holds more than a tenth of the
-    rows, so that only closer repeats count. Rows with the same ``pose`` label always belong together.
+    Samples along a path chain into one cluster; the distance is then halved until no cluster holds more than a tenth
+    of the rows, so that only closer repeats count. Rows with the same ``pose`` label always belong together.
     """
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components

@@ -41,7 +41,7 @@ class Linear:
     @property
     def measures(self) -> int:
         """Components a row: 3 for positions, 6 for poses."""
-        return self.gap.shape[1]
+        return int(self.gap.shape[1])
 
     @cached_property
     def stack(self) -> Array:

@@ -31,11 +31,11 @@ def align(source: Array, target: Array, weights: Array) -> Array:
     return motion
 
 
-def register(campaign: Campaign, keep: Array | None = None) -> Frames:
+def register(campaign: Campaign, keep: NDArray[np.bool_] | None = None) -> Frames:
     """Fit the unknown frames to the nominal robot, and nothing else.
 
-    Alternates the rigid alignment of the base with the linear fit of the target's place, from several starts (the target
-    may sit 0.3 m from the tool frame), on a sample of the rows and with weights that let gross errors go; then
+    Alternates the rigid alignment of the base with the linear fit of the target's place, from several starts (the
+    target may sit 0.3 m from the tool frame), on a sample of the rows and with weights that let gross errors go; then
     Gauss-Newton on all rows.
 
     Parameters
@@ -43,7 +43,8 @@ def register(campaign: Campaign, keep: Array | None = None) -> Frames:
     campaign
         With measurements.
     keep
-        (N,) 1 for the rows to fit by least squares, 0 for those set aside; where absent all are fitted, robustly.
+        (N,) True for the rows to fit by least squares, False for those set aside; where absent all are fitted,
+        robustly.
 
     Returns
     -------

@@ -39,8 +39,8 @@ def text(diagnosis: Diagnosis) -> str:
     Returns
     -------
     str
-        Plain text, at most 96 columns wide, without a newline at the end: the verdict, then how far the gap shrinks,
-        which effects cause it, where they act, what stays unexplained, what to measure next.
+        Plain text, at most 96 columns wide unless a name is longer, without a newline at the end: the verdict, how
+        far the gap shrinks, which effects cause it, where they act, what stays unexplained, what to measure next.
     """
     blocks = [
         [_wrap(diagnosis.summary, "")],
@@ -87,7 +87,8 @@ def _how_far(diagnosis: Diagnosis) -> Iterator[str]:
     wide = max(len(cell) for line in lines for cell in line[1:3])
     for name, first, second, note in lines:
         yield f"  {name:{_NAME}}{first:>{wide}} → {second:<{wide}}   {note}".rstrip()
-    yield f"  {'shrinkage, held out':{_NAME}}{units.percent(held.shrinkage)}   95 % interval {_bounds(held.shrinkage_ci95)}"
+    shrinkage = f"{units.percent(held.shrinkage)}   95 % interval {_bounds(held.shrinkage_ci95)}"
+    yield f"  {'shrinkage, held out':{_NAME}}{shrinkage}"
     yield _wrap(noise(diagnosis, floor), f"  {'noise floor':{_NAME}}")
     yield _wrap("Shrinkage is the share of the gap's mean square that goes away.")
 
@@ -143,7 +144,8 @@ def _in_short(finding: Finding, wide: int, joints: Sequence[str]) -> str:
     if finding.status == "not_testable":
         return _wrap(f"needs {needs(finding, joints)}", f"    {finding.name:{wide}}{'':13}   ")
     told = f"; not to be told from {', '.join(finding.confounded_with)}" if finding.confounded_with else ""
-    return f"    {finding.name:{wide}}{units.probability(finding.probability):>13}   {_share(finding)}{told}"
+    line = f"    {finding.name:{wide}}{units.probability(finding.probability):>13}   {_share(finding)}"
+    return _wrap(told, line) if told else line
 
 
 def _where(diagnosis: Diagnosis) -> Iterator[str]:

@@ -11,6 +11,7 @@ from thermal_robot.report.drawing import (
     AFTER,
     BEFORE,
     INK,
+    PAPER,
     SMALL,
     THIRD,
     Array,
@@ -34,8 +35,8 @@ def plot_how_far(diagnosis: Diagnosis) -> Figure:
     Returns
     -------
     Figure
-        One panel for the position; a second one for the orientation where it was measured. Rows that were set aside
-        are not counted.
+        One panel for the position; a second one for the orientation where it was measured. Rows that were set
+        aside are not counted.
     """
     pose = diagnosis.gap.orientation_before is not None and diagnosis.rows.gap.shape[1] >= 6
     figure = Drawing(11.0 if pose else 6.8, 3.7)
@@ -91,13 +92,12 @@ def _draw(axes: Axes, before: Array, after: Array, held_out: Array, said: list[s
     if floor > 0.0:
         low, high = min(low, floor / 1.3), max(high, floor * 1.3)
     bins = np.geomspace(low, high, int(np.clip(2.2 * np.sqrt(len(before)), 14, 60)))
-    before, after, held_out = (np.clip(v, low, high) for v in (before, after, held_out))
-    axes.hist(before, bins, color=BEFORE, alpha=0.55, label=f"before: rms {said[0]}")
-    axes.hist(after, bins, color=AFTER, alpha=0.6, label=f"after: rms {said[1]}")
-    _outline(axes, before, bins, BEFORE, "-")
-    _outline(axes, after, bins, AFTER, "-")
+    before, after, held_out = (np.clip(v, bins[0], bins[-1]) for v in (before, after, held_out))
+    # the outline before is the broader one, so that it is seen where the one after covers it
+    _shape(axes, before, bins, BEFORE, f"before: rms {said[0]}", width=3.0, fill=0.5)
+    _shape(axes, after, bins, AFTER, f"after: rms {said[1]}", fill=0.6)
     if held_out.size:
-        _outline(axes, held_out, bins, THIRD, (0, (4, 2)), f"after, on rows held out: rms {said[2]}")
+        _shape(axes, held_out, bins, THIRD, f"after, on rows held out: rms {said[2]}", style=(0, (4, 2)))
     if floor > 0.0:
         axes.plot(
             [floor, floor],
@@ -112,17 +112,37 @@ def _draw(axes: Axes, before: Array, after: Array, held_out: Array, said: list[s
     axes.set_ylabel("rows")
     axes.set_ylim(0.0, axes.get_ylim()[1] * 1.3)
     axes.locator_params(axis="y", integer=True, nbins=5)
-    axes.legend(loc="upper left", ncols=2, fontsize=SMALL, labelcolor=INK, frameon=False, handlelength=1.6)
+    axes.legend(
+        loc="upper left",
+        ncols=2,
+        fontsize=SMALL,
+        labelcolor=INK,
+        facecolor=PAPER,
+        edgecolor="none",
+        framealpha=0.9,
+        handlelength=1.6,
+    )
     tidy(axes)
 
 
-def _outline(
-    axes: Axes, values: Array, bins: Array, colour: str, style: Any, label: str | None = None
+def _shape(
+    axes: Axes,
+    values: Array,
+    bins: Array,
+    colour: str,
+    label: str,
+    *,
+    width: float = 1.5,
+    style: Any = "-",
+    fill: float = 0.0,
 ) -> None:
-    """Draw the outline of a histogram from its first filled bin to its last."""
+    """Draw a histogram from its first filled bin to its last: the outline, and the area with opacity ``fill``."""
     counts, _ = np.histogram(values, bins)
     filled = np.flatnonzero(counts)
-    first, last = int(filled[0]), int(filled[-1]) + 1
-    axes.stairs(
-        counts[first:last], bins[first : last + 1], color=colour, linewidth=1.5, linestyle=style, label=label
-    )
+    part = slice(int(filled[0]), int(filled[-1]) + 1)
+    counts, edges = counts[part], bins[part.start : part.stop + 1]
+    if fill > 0.0:
+        axes.stairs(counts, edges, color=colour, alpha=fill, fill=True, linewidth=0, label=label)
+    line = axes.stairs(counts, edges, color=colour, linewidth=width, linestyle=style)
+    if fill == 0.0:
+        line.set_label(label)

@@ -28,7 +28,7 @@ if TYPE_CHECKING:
     from thermal_robot.diagnosis.result import Diagnosis
 
 _ARROWS = 250
-_SHAPES, _FILLED = (1.0, 1.6), 0.84  # width to height of a panel, and how much of the height arrows may fill
+_SHAPE, _FILLED = 1.2, 0.84  # width to height of a panel, and how much of the height arrows may fill
 _LONGEST = 0.18  # of the workspace's extent, for an arrow of the gap's 95th percentile
 
 
@@ -61,10 +61,11 @@ def draw_map(axes: Axes, diagnosis: Diagnosis, across: int = 0, up: int = 1) -> 
         return
     sample, factor = _exaggeration(rows.position[used], rows.gap[used, :3])
     chosen = used[thinned(len(used), _ARROWS)]
-    start = rows.position[np.ix_(chosen, [across, up])]
+    plane = np.ix_(chosen, np.array([across, up]))
+    start = rows.position[plane]
     ends = [start]
     for values, colour, label in ((rows.gap, BEFORE, "before"), (rows.remainder, AFTER, "after")):
-        arrow = values[np.ix_(chosen, [across, up])] * factor
+        arrow = values[plane] * factor
         drawn = axes.quiver(
             *start.T,
             *arrow.T,
@@ -79,12 +80,10 @@ def draw_map(axes: Axes, diagnosis: Diagnosis, across: int = 0, up: int = 1) -> 
         )
         ends.append(start + arrow)
     _frame(axes, np.vstack(ends))
-    exaggerated = (
-        f"drawn {factor:,.0f} times larger".replace(",", "\u2009") if factor > 1.0 else "drawn to scale"
-    )
+    exaggerated = f"drawn {factor:,.0f} times larger".replace(",", "\u2009") if factor > 1.0 else "drawn to scale"
     axes.quiverkey(
         drawn,
-        0.05,
+        0.02 + sample * factor / float(np.ptp(axes.get_xlim())),  # where its tip is
         0.90,
         sample * factor,
         f"gap of {units.quantity(sample, 'm')}, {exaggerated}",
@@ -109,12 +108,11 @@ def _exaggeration(position: Array, gap: Array) -> tuple[float, float]:
 
 
 def _frame(axes: Axes, points: Array) -> None:
-    """Show all points undistorted, in a panel that is neither narrow nor flat, with room above them for the key."""
+    """Show all points undistorted, with room above them for the key; every panel has the same shape."""
     low, high = points.min(axis=0), points.max(axis=0)
     middle, size = (low + high) / 2.0, 1.06 * np.maximum(high - low, 1e-6)
-    shape = float(np.clip(_FILLED * size[0] / size[1], *_SHAPES))
-    width = max(size[0], shape * size[1] / _FILLED)
-    height = width / shape
+    width = max(size[0], _SHAPE * size[1] / _FILLED)
+    height = width / _SHAPE
     axes.set_xlim(middle[0] - width / 2.0, middle[0] + width / 2.0)
     axes.set_ylim(middle[1] - _FILLED * height / 2.0, middle[1] + (1.0 - _FILLED / 2.0) * height)
     axes.set_aspect("equal", adjustable="box")

@@ -40,9 +40,9 @@ def plot_remainder(diagnosis: Diagnosis) -> Figure:
     Returns
     -------
     Figure
-        Left against the row in the file, right against the quantity that the remainder follows most, if any; the line
-        is the running median, the band two sigma of the noise, crosses are rows that were set aside (at the edge where
-        they lie beyond it).
+        Left against the row in the file, right against the quantity that the remainder follows most, if any. The
+        line is the running median, the band two sigma of the noise; crosses are rows that were set aside, at the
+        edge where they lie beyond it.
     """
     rows = diagnosis.rows
     columns = [("row in the file", rows.rows.astype(float))]
@@ -65,14 +65,12 @@ def plot_remainder(diagnosis: Diagnosis) -> Figure:
     if followed is not None:
         title(panels[0][1], f"Against {diagnosis.unexplained.depends_on[0].covariate}")
     handles, labels = panels[0][0].get_legend_handles_labels()
-    figure.legend(
-        handles, labels, loc="outside lower center", ncols=4, fontsize=SMALL, labelcolor=INK, frameon=False
-    )
+    figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=SMALL, labelcolor=INK, frameon=False)
     return figure
 
 
 def _followed(diagnosis: Diagnosis) -> tuple[str, Array] | None:
-    """Return label and values of the quantity that the remainder follows most; ``None`` where it is not recorded."""
+    """Return label and values of the quantity that the remainder follows most; ``None`` if not recorded."""
     if not diagnosis.unexplained.depends_on:
         return None
     name, rows = diagnosis.unexplained.depends_on[0].covariate, diagnosis.rows
@@ -88,9 +86,7 @@ def _extent(diagnosis: Diagnosis) -> tuple[units.Scale, float]:
     """Return the unit and the largest value drawn, which rows that were set aside do not decide."""
     rows = diagnosis.rows
     used = np.abs(rows.remainder[~rows.outliers, :3])
-    largest = max(
-        float(used.max()) if used.size else 0.0, 2.4 * diagnosis.gap.noise_floor / np.sqrt(3.0), 1e-12
-    )
+    largest = max(float(used.max()) if used.size else 0.0, 2.4 * diagnosis.gap.noise_floor / np.sqrt(3.0), 1e-12)
     best = units.scale("m", largest)
     return best, 1.15 * largest * best.factor
 

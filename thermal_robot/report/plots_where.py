@@ -32,16 +32,15 @@ _BETWEEN = 0.6  # lines
 
 
 def plot_where(diagnosis: Diagnosis) -> Figure:
-    """Draw the shares of the gap's mean square: joints and links from root to tool, axes, recorded quantities."""
+    """Draw the shares of the gap's mean square: joints and links from root to tool, axes, quantities."""
     chain, other = _chain(diagnosis), _other(diagnosis)
-    left, right = max(_lines(chain), 1.0), _lines(other)
+    right = _lines(other)
+    left = _lines(chain) if _placed(chain) else right
     lines = max(left, right)
     figure = Drawing(11.0, 1.2 + 0.24 * lines)
     # panels as high as their bars, so that a bar is equally thick everywhere
     grid = figure.add_gridspec(2, 2, height_ratios=(min(left, right), max(lines - min(left, right), 0.01)))
-    panels = [
-        figure.add_subplot(grid[:, k] if n == lines else grid[0, k]) for k, n in enumerate((left, right))
-    ]
+    panels = [figure.add_subplot(grid[:, k] if n == lines else grid[0, k]) for k, n in enumerate((left, right))]
     draw_where(panels[0], diagnosis)
     title(panels[0], "Where along the chain")
     _draw_groups(panels[1], other)
@@ -52,10 +51,14 @@ def plot_where(diagnosis: Diagnosis) -> Figure:
 def draw_where(axes: Axes, diagnosis: Diagnosis) -> None:
     """Draw joints and links into a panel, the root above, the tool below."""
     chain = _chain(diagnosis)
-    if not any(share > 0.0 for _, shares, _ in chain for share in shares.values()):
+    if not _placed(chain):
         note(axes, "No effect was found,\nso none is placed along the chain.")
         return
     _draw_groups(axes, chain)
+
+
+def _placed(chain: Sequence[_Group]) -> bool:
+    return any(share > 0.0 for _, shares, _ in chain for share in shares.values())
 
 
 def _chain(diagnosis: Diagnosis) -> list[_Group]:
@@ -83,7 +86,7 @@ def _lines(groups: Sequence[_Group]) -> float:
 
 
 def _draw_groups(axes: Axes, groups: Sequence[_Group]) -> None:
-    """Draw groups of bars below each other; the axis ends beyond the longest so that short chains stay readable."""
+    """Draw groups of bars below each other; the axis ends a little beyond the longest."""
     ticks: list[float] = []
     names: list[str] = []
     line = 0.0

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from thermal_robot.report import units
 from thermal_robot.report.drawing import AFTER, FAINT, INK, MUTED, SMALL, Drawing, note, plain, tidy, title
@@ -14,7 +14,7 @@ if TYPE_CHECKING:
 
     from thermal_robot.diagnosis.result import Diagnosis, Finding
 
-_LOOK = {
+_LOOK: dict[str, dict[str, Any]] = {
     "found": {"color": AFTER, "edgecolor": AFTER},
     "confounded": {"color": "none", "edgecolor": AFTER, "hatch": "////"},
     "not_found": {"color": FAINT, "edgecolor": MUTED},
@@ -28,7 +28,8 @@ def plot_which(diagnosis: Diagnosis) -> Figure:
     Returns
     -------
     Figure
-        Filled: found; hatched: cannot be told apart from another; pale: not found. What is not testable says why.
+        Filled: found; hatched: cannot be told apart from another; pale: not found. What is not testable says
+        why.
     """
     figure = Drawing(7.6, 1.3 + 0.27 * max(len(diagnosis.effects), 3))
     axes = figure.subplots()

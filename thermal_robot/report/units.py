@@ -49,7 +49,7 @@ def scale(unit: str, size: float) -> Scale:
     else:
         cut = next((k for k, c in enumerate(unit) if c in "/·"), len(unit))
         lead, rest = unit[:cut], unit[cut:]
-    if lead not in ("m", "rad", "s") and rest or lead not in _LADDERS:
+    if lead not in _LADDERS or (rest and lead not in ("m", "rad", "s")):
         return Scale(1.0, unit)
     # rounding must not show 1000 µm where 1.00 mm is meant
     step = next(s for s in _LADDERS[lead] if abs(size) >= 0.9995 * s[0])

@@ -1,4 +1,4 @@
-"""What of a diagnosis is shown where there is not room for all, and the sentences that text and page share."""
+"""The sentences that text and page share, and what is shown where there is not room for all."""
 
 from __future__ import annotations
 
@@ -100,8 +100,14 @@ def noise(diagnosis: Diagnosis, floor: str) -> str:
     return "; ".join(parts)
 
 
+def noise_of(diagnosis: Diagnosis) -> str:
+    """Say the same of a diagnosis that stands alone, in the unit that suits the gap."""
+    gap = diagnosis.gap
+    return noise(diagnosis, units.together((gap.rms_before, gap.rms_after, gap.noise_floor), "m")[2])
+
+
 def needs(finding: Finding, joints: Sequence[str]) -> str:
-    """Say what would make an effect testable; one name stands for the columns of all joints, or of all links."""
+    """Say what would make an effect testable; one name stands for the columns of all joints or links."""
     by_quantity: dict[str, list[str]] = {}
     for need in finding.needs:
         quantity, dot, _ = need.partition(".")
@@ -125,7 +131,8 @@ def sentences(diagnosis: Diagnosis) -> Iterator[str]:
     """Say in plain words what the explanation leaves."""
     left = diagnosis.unexplained
     if not left.flagged:
-        yield f"Nothing: what remains is no larger and no more structured than the noise ({units.p_value(left.p_value)})."
+        chance = units.p_value(left.p_value)
+        yield f"Nothing: what remains is no larger and no more structured than the noise ({chance})."
         return
     size = f"{units.quantity(left.rms, 'm')} rms beyond the noise" if left.rms > 0 else "a remainder"
     yield f"The known effects leave {size} that chance does not explain ({units.p_value(left.p_value)})."

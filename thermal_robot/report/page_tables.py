@@ -1,0 +1,121 @@
+"""The page's big numbers and tables."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thermal_robot.report import units
+from thermal_robot.report.words import STATUS, in_words, law, needs, parameters
+
+if TYPE_CHECKING:
+    from thermal_robot.diagnosis.result import Diagnosis, Finding
+
+_MOST_OUTLIERS = 40
+
+
+def numbers(diagnosis: Diagnosis) -> str:
+    """Show the gap before, after, and the held-out shrinkage."""
+    gap, held = diagnosis.gap, diagnosis.gap.held_out
+    before, after, floor = units.together((gap.rms_before, gap.rms_after, gap.noise_floor), "m")
+    turned = ("", "")
+    if gap.orientation_before is not None:
+        pair = units.together((gap.orientation_before, gap.orientation_after), "rad")
+        turned = (f"orientation {pair[0]}", f"orientation {pair[1]}")
+    held_before, held_after = units.together((held.rms_before, held.rms_after), "m")
+    cards = (
+        ("before", "Gap before, rms", before, (turned[0],)),
+        ("after", "Gap after, rms", after, (turned[1], f"noise floor {floor}")),
+        (
+            "held",
+            "Shrinkage on rows held out",
+            units.percent(held.shrinkage),
+            (f"95 % interval {units.interval(held.shrinkage_ci95)} %", f"{held_before} → {held_after}"),
+        ),
+    )
+    shown = (
+        f'<div class="tr-number tr-is-{kind}"><span>{heading}</span><b>{escape(value)}</b>'
+        f"{''.join(f'<span>{escape(line)}</span>' for line in lines if line)}</div>"
+        for kind, heading, value, lines in cards
+    )
+    return f'<div class="tr-numbers">{"".join(shown)}</div>'
+
+
+def effects_table(diagnosis: Diagnosis) -> str:
+    """Show every candidate: status, probability, share, and what is known of it."""
+    head = "<th>effect</th><th>status</th><th class=tr-n>probability</th><th class=tr-n>share of the gap, held out</th>"
+    ordered = [f for status in STATUS for f in diagnosis.effects if f.status == status]
+    body = "".join(_effect(f, diagnosis) for f in ordered)
+    return f"<table><thead><tr>{head}<th>what the data say</th></tr></thead><tbody>{body}</tbody></table>"
+
+
+def _effect(finding: Finding, diagnosis: Diagnosis) -> str:
+    quiet = finding.status in ("not_found", "not_testable")
+    share = units.percent(finding.shrinkage)
+    if finding.shrinkage_ci95 is not None:
+        share += f"\n({units.interval(finding.shrinkage_ci95)} %)"
+    status = "not testable" if finding.status == "not_testable" else STATUS[finding.status]
+    return (
+        f"<tr{' class=tr-quiet' if quiet else ''}><td>{_span(finding.name, not quiet)}</td><td>{status}</td>"
+        f"<td class=tr-n>{escape(units.probability(finding.probability))}</td>"
+        f"<td class=tr-n>{escape(share).replace(chr(10), '<br>')}</td>"
+        f"<td>{''.join(_known(finding, diagnosis))}</td></tr>"
+    )
+
+
+def _span(name: str, found: bool) -> str:
+    return f'<span class="tr-found">{escape(name)}</span>' if found else escape(name)
+
+
+def _known(finding: Finding, diagnosis: Diagnosis) -> Iterator[str]:
+    if finding.status == "not_testable":
+        yield _line(f"needs {needs(finding, diagnosis.joint_names)}")
+    if finding.confounded_with:
+        yield _line(f"these data cannot tell it from {', '.join(finding.confounded_with)}")
+    if described := law(finding):
+        yield _line(described)
+    if finding.locations:
+        top = [f"{units.place(p)} {units.percent(p.share)}" for p in finding.locations]
+        yield _line(f"where: {in_words(top, most=4)}")
+    known = parameters(finding)
+    if known.heading:
+        yield _line(known.heading)
+    if known.shown:
+        yield f"<table><tbody>{''.join(_row(r) for r in known.shown)}</tbody></table>"
+    if known.more:
+        yield _line(f"and {known.more} more, which stand in the JSON")
+    if known.undetermined:
+        yield _line(f"not determined by these data: {known.undetermined}")
+
+
+def _line(sentence: str) -> str:
+    return f"<div>{escape(sentence)}</div>"
+
+
+def _row(cells: Iterable[str]) -> str:
+    return f"<tr>{''.join(f'<td>{escape(c)}</td>' for c in cells)}</tr>"
+
+
+def outliers_table(diagnosis: Diagnosis) -> str:
+    """Show the rows that were set aside: how far off they are, before and after."""
+    rows = diagnosis.rows
+    chosen = np.flatnonzero(np.isin(rows.rows, diagnosis.outliers))
+    before = np.linalg.norm(rows.gap[chosen, :3], axis=1)
+    after = np.linalg.norm(rows.remainder[chosen, :3], axis=1)
+    best = units.scale("m", float(max(before.max(initial=0.0), after.max(initial=0.0))))
+    head = (
+        "<th>row in the file</th>"
+        + "".join(f"<th class=tr-n>{h} ({best.unit})</th>" for h in ("gap", "remainder"))
+        + "".join(f"<th class=tr-n>remainder {a} ({best.unit})</th>" for a in "xyz")
+    )
+    body = []
+    for k, i in enumerate(chosen[:_MOST_OUTLIERS]):
+        cells = (before[k], after[k], *rows.remainder[i, :3])
+        values = "".join(f"<td class=tr-n>{units.number(float(v) * best.factor)}</td>" for v in cells)
+        body.append(f"<tr><td>{int(rows.rows[i])}</td>{values}</tr>")
+    more = len(chosen) - len(body)
+    rest = f"<p class=tr-muted>and {more} more, which stand in the JSON</p>" if more > 0 else ""
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(body)}</tbody></table>{rest}"
