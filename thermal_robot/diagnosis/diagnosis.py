@@ -7,13 +7,14 @@ from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.diagnosis.attribute import findings
 from thermal_robot.diagnosis.heldout import Shrinkage, held_out
 from thermal_robot.diagnosis.result import Diagnosis, Gap, Rows
-from thermal_robot.diagnosis.unexplained import test_remainder
+from thermal_robot.diagnosis.unexplained import examine
 from thermal_robot.diagnosis.verdict import advise, sentence
 from thermal_robot.diagnosis.where import locate
 from thermal_robot.effects import Effect, choose, library
@@ -62,9 +63,11 @@ def diagnose(
     candidates = (*choose(only, without), *effects)
     _check_priors(campaign, {e.name for e in candidates} | set(library()))
     progress("frames and effects")
-    fitted = fit(campaign, candidates)
-    shrinkage = held_out(fitted, progress)
-    unexplained, floor, source = test_remainder(fitted, progress)
+    # matrices are small: threads that wait for each other cost several times what they bring
+    with threadpool_limits(1):
+        fitted = fit(campaign, candidates)
+        shrinkage = held_out(fitted, progress)
+        unexplained, floor, source = examine(fitted, progress)
     progress("places")
     shares = {name: value for name, (value, _) in shrinkage.shares.items()}
     where, locations = locate(fitted, shares)

@@ -14,9 +14,10 @@ _FEW = 6
 
 
 def smooth_law(values: Array) -> Array:
-    """(N, k) columns of a smooth function of a quantity, its constant removed: levels for a quantity with few values, a
-    natural cubic spline with five knots at its quantiles otherwise (Hastie, Tibshirani and Friedman, *Elements*,
-    5.2.1).
+    """Return (N, k) columns of a smooth function of a quantity, its constant removed.
+
+    Levels for a quantity with few values, a natural cubic spline with five knots at its quantiles otherwise (Hastie,
+    Tibshirani and Friedman, *The Elements of Statistical Learning*, 5.2.1).
 
     Empty (N, 0) where the quantity does not vary.
     """

@@ -1,4 +1,4 @@
-"""Is what remains noise? If not: where does it enter, and what does it follow?"""
+"""Tell noise from a remainder: where it enters, and what it follows."""
 
 from __future__ import annotations
 
@@ -95,7 +95,7 @@ def repeats(fit: Fit, left: Remainder) -> Repeats | None:
     return Repeats(len(pairs), float((difference**2).mean() / 2.0), float(np.sqrt(place.mean())))
 
 
-def test_remainder(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> tuple[Unexplained, float, str]:
+def examine(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> tuple[Unexplained, float, str]:
     """Say whether the remainder is noise.
 
     Returns
@@ -171,7 +171,7 @@ def _lack_of_fit(left: Remainder, again: Repeats | None) -> tuple[float, str]:
 
 
 def _neighbours(fit: Fit, left: Remainder) -> tuple[tuple[float, str], float]:
-    """Are the remainders of neighbours alike, in joint space or in order, more than with shuffled rows?
+    """Compare the remainders of neighbours, in joint space and in order, with those of shuffled rows.
 
     Returns p-value and reason, and the largest correlation that is not chance.
     """

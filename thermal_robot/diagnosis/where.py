@@ -64,7 +64,7 @@ def _axes(gap: Array) -> dict[str, float]:
 
 
 def _covariates(fit: Fit, gap: Array, rows: NDArray[np.int64]) -> dict[str, float]:
-    """Adjusted share of the gap that a smooth law of each quantity alone would explain, axis by axis."""
+    """Return the adjusted share of the gap that a smooth law of each quantity alone would explain."""
     centred = gap - gap.mean(axis=0)
     total = float((centred**2).sum()) or 1.0
     shares = {}

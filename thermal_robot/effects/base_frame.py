@@ -30,7 +30,7 @@ class BaseFrame(Effect):
         return () if observations.campaign.base_known else ('frames.base = "known"',)
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
-        """The base's twist in the root frame: m and rad."""
+        """Return the base's twist in the root frame: m and rad."""
         return tuple(
             Parameter(component, "m" if k < 3 else "rad", 2e-3, "base", "base", (at_base(np.eye(6)[k]),))
             for k, component in enumerate(COMPONENTS)

@@ -60,7 +60,7 @@ class Drift(Effect):
         return tuple(replace(self, time_constant=base * share) for share in shares)
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
-        """The base's twist over the campaign, in the root frame: m and rad."""
+        """Return the base's twist over the campaign, in the root frame: m and rad."""
         clock = observations.clock
         if clock is None:
             return ()

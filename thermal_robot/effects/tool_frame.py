@@ -29,7 +29,7 @@ class ToolFrame(Effect):
         return () if observations.campaign.tool_known else ('frames.tool = "known"',)
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
-        """The tool's twist in the tool frame: m, and rad where orientation is measured."""
+        """Return the tool's twist in the tool frame: m, and rad where orientation is measured."""
         components = COMPONENTS if observations.campaign.measures == "pose" else COMPONENTS[:3]
         return tuple(
             Parameter(component, "m" if k < 3 else "rad", 2e-3, "tool", "tool", (at_tool(np.eye(6)[k]),))

@@ -1,0 +1,1 @@
+"""Frames, columns, evidence, exact fit: from observations to an explanation."""

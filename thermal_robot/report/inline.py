@@ -13,6 +13,7 @@ from thermal_robot.report.drawing import AFTER, BEFORE, FAINT, INK, MUTED, PAPER
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
+_PIXELS = 106.0  # per inch at most, so that letters are equally large in all figures of a page
 _NAMES = {
     INK: "ink",
     MUTED: "muted",
@@ -49,7 +50,8 @@ def svg(figure: Figure, label: str) -> str:
     text = re.sub(r"\s*\n\s*", "\n", text)
     for colour, name in _NAMES.items():
         text = text.replace(colour, f"var(--tr-{name},{colour})")
-    shown = f'<svg role="img" aria-label="{escape(label)}" class="tr-figure"'
+    width = f"max-width:{figure.get_figwidth() * _PIXELS:.0f}px"
+    shown = f'<svg role="img" aria-label="{escape(label)}" class="tr-figure" style="{width}"'
     return _own_names(text).replace("<svg", shown, 1).strip()
 
 

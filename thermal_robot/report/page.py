@@ -62,7 +62,7 @@ def fragment(diagnosis: Diagnosis) -> str:
         (
             _paragraph(diagnosis.summary, strong=True),
             numbers(diagnosis),
-            _figure(overview(diagnosis), f"Overview: {diagnosis.summary}"),
+            _figure(overview(diagnosis, headline=False), f"Overview: {diagnosis.summary}"),
             effects_table(diagnosis),
             *_unexplained(diagnosis),
             *(_paragraph(w) for w in diagnosis.warnings),

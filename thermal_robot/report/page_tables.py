@@ -45,34 +45,39 @@ def numbers(diagnosis: Diagnosis) -> str:
 
 
 def effects_table(diagnosis: Diagnosis) -> str:
-    """Show every candidate: status, probability, share, and what is known of it."""
-    head = "<th>effect</th><th>status</th><th class=tr-n>probability</th><th class=tr-n>share of the gap, held out</th>"
+    """Show every candidate: status, probability, share, and below it what is known of it."""
+    head = "<th>effect</th><th>status</th><th class=tr-n>probability</th>"
+    head += "<th class=tr-n>share of the gap, on rows held out (95 %)</th>"
     ordered = [f for status in STATUS for f in diagnosis.effects if f.status == status]
     body = "".join(_effect(f, diagnosis) for f in ordered)
-    return f"<table><thead><tr>{head}<th>what the data say</th></tr></thead><tbody>{body}</tbody></table>"
+    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
 
 def _effect(finding: Finding, diagnosis: Diagnosis) -> str:
     quiet = finding.status in ("not_found", "not_testable")
-    share = units.percent(finding.shrinkage)
-    if finding.shrinkage_ci95 is not None:
-        share += f"\n({units.interval(finding.shrinkage_ci95)} %)"
-    status = "not testable" if finding.status == "not_testable" else STATUS[finding.status]
-    return (
-        f"<tr{' class=tr-quiet' if quiet else ''}><td>{_span(finding.name, not quiet)}</td><td>{status}</td>"
-        f"<td class=tr-n>{escape(units.probability(finding.probability))}</td>"
-        f"<td class=tr-n>{escape(share).replace(chr(10), '<br>')}</td>"
-        f"<td>{''.join(_known(finding, diagnosis))}</td></tr>"
-    )
+    details = "".join(_known(finding))
+    looks = " ".join([*(["tr-quiet"] if quiet else []), *(["tr-open"] if details else [])])
+    cells = f"<td>{_span(finding.name, not quiet)}</td>"
+    if finding.status == "not_testable":
+        wanted = escape(needs(finding, diagnosis.joint_names))
+        cells += f"<td>not testable</td><td colspan=2>needs {wanted}</td>"
+    else:
+        share = units.percent(finding.shrinkage)
+        if finding.shrinkage_ci95 is not None:
+            share += f" ({units.interval(finding.shrinkage_ci95)} %)"
+        cells += (
+            f"<td>{STATUS[finding.status]}</td><td class=tr-n>{escape(units.probability(finding.probability))}</td>"
+        )
+        cells += f"<td class=tr-n>{escape(share)}</td>"
+    row = f'<tr class="{looks}">{cells}</tr>'
+    return row + (f"<tr><td colspan=4 class=tr-details>{details}</td></tr>" if details else "")
 
 
 def _span(name: str, found: bool) -> str:
     return f'<span class="tr-found">{escape(name)}</span>' if found else escape(name)
 
 
-def _known(finding: Finding, diagnosis: Diagnosis) -> Iterator[str]:
-    if finding.status == "not_testable":
-        yield _line(f"needs {needs(finding, diagnosis.joint_names)}")
+def _known(finding: Finding) -> Iterator[str]:
     if finding.confounded_with:
         yield _line(f"these data cannot tell it from {', '.join(finding.confounded_with)}")
     if described := law(finding):

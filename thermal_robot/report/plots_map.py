@@ -40,7 +40,7 @@ def plot_map(diagnosis: Diagnosis) -> Figure:
     Figure
         Arrows are exaggerated; the labels say by how much. Rows that were set aside are left out.
     """
-    figure = Drawing(11.0, 5.2)
+    figure = Drawing(9.2, 4.4)
     panels = figure.subplots(1, 2)
     position = diagnosis.rows.position
     flat = int(np.argmax(np.ptp(position[:, :2], axis=0))) if len(position) else 0

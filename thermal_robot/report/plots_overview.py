@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from thermal_robot.diagnosis.result import Diagnosis
 
 
-def overview(diagnosis: Diagnosis) -> Figure:
-    """Draw how far, which, where, and the map from above, under the sentence of the verdict."""
+def overview(diagnosis: Diagnosis, *, headline: bool = True) -> Figure:
+    """Draw how far, which, where, and the map from above, under the sentence of the verdict if ``headline``."""
     lines = max(len(diagnosis.effects), len(diagnosis.joint_names) + len(diagnosis.where.links), 12)
     figure = Drawing(12.5, 5.4 + 0.2 * lines)
     (how_far, which), (where, map_) = figure.subplots(2, 2)
@@ -30,12 +30,7 @@ def overview(diagnosis: Diagnosis) -> Figure:
     title(where, "Where")
     draw_map(map_, diagnosis)
     title(map_, "Gap, seen from above")
-    figure.suptitle(
-        plain(fill(diagnosis.summary, 115)),
-        x=0.01,
-        ha="left",
-        fontsize=LARGE + 1,
-        color=INK,
-        fontweight="bold",
-    )
+    if headline:
+        said = plain(fill(diagnosis.summary, 115))
+        figure.suptitle(said, x=0.01, ha="left", fontsize=LARGE + 1, color=INK, fontweight="bold")
     return figure

@@ -49,7 +49,7 @@ def plot_remainder(diagnosis: Diagnosis) -> Figure:
     followed = _followed(diagnosis)
     if followed is not None:
         columns.append(followed)
-    figure = Drawing(5.6 * len(columns) + 0.6, 4.6)
+    figure = Drawing(7.6 if followed is None else 9.2, 4.6)
     panels = figure.subplots(3, len(columns), squeeze=False, sharey=True, sharex="col")
     best, limit = _extent(diagnosis)
     for k, axis in enumerate("xyz"):

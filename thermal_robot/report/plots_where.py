@@ -37,7 +37,7 @@ def plot_where(diagnosis: Diagnosis) -> Figure:
     right = _lines(other)
     left = _lines(chain) if _placed(chain) else right
     lines = max(left, right)
-    figure = Drawing(11.0, 1.2 + 0.24 * lines)
+    figure = Drawing(9.2, 1.2 + 0.24 * lines)
     # panels as high as their bars, so that a bar is equally thick everywhere
     grid = figure.add_gridspec(2, 2, height_ratios=(min(left, right), max(lines - min(left, right), 0.01)))
     panels = [figure.add_subplot(grid[:, k] if n == lines else grid[0, k]) for k, n in enumerate((left, right))]

@@ -34,7 +34,7 @@ def plot_which(diagnosis: Diagnosis) -> Figure:
     figure = Drawing(7.6, 1.3 + 0.27 * max(len(diagnosis.effects), 3))
     axes = figure.subplots()
     draw_which(axes, diagnosis)
-    title(axes, "Which")
+    title(axes, "What each effect explains, and how probable it is")
     return figure
 
 
