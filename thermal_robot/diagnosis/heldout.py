@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.diagnosis.result import HeldOut
+from thermal_robot.errors import EstimationError
 from thermal_robot.estimation.explain import Noise, explain
 from thermal_robot.estimation.fit import Fit, row_groups
 from thermal_robot.estimation.groups import folds
@@ -53,6 +54,8 @@ def held_out(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Shri
     campaign, explanation = fit.campaign, fit.explanation
     fold, block = folds(campaign)
     count = int(fold.max()) + 1
+    if count < 2:
+        raise EstimationError("all rows repeat one pose: nothing can be held out, and nothing told about the robot")
     noise = Noise(campaign.noise_position, campaign.noise_orientation)
     before, after = np.full(campaign.samples, np.nan), np.full(campaign.samples, np.nan)
     for k in range(count):

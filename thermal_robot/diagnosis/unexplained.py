@@ -58,7 +58,7 @@ def remainder(fit: Fit) -> Remainder:
     for b in e.best.blocks:
         columns.append(e.linear.blocks[b].columns[rows] * e.linear.blocks[b].sizes)
     design = np.concatenate(columns, axis=2) / e.whitening.noise[:, None]
-    flat = design.reshape(-1, design.shape[2])
+    flat = design.reshape(design.shape[0] * design.shape[1], design.shape[2])
     flat = flat / (np.linalg.norm(flat, axis=0) + 1e-300)
     value, vector = np.linalg.eigh(flat.T @ flat)
     # what the data see only below the noise was held by its prior: leave it out as the fit did

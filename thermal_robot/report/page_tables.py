@@ -38,10 +38,14 @@ def numbers(diagnosis: Diagnosis) -> str:
     )
     shown = (
         f'<div class="tr-number tr-is-{kind}"><span>{heading}</span><b>{escape(value)}</b>'
-        f"{''.join(f'<span>{escape(line)}</span>' for line in lines if line)}</div>"
+        f"{''.join(f'<span>{_unbroken(line)}</span>' for line in lines if line)}</div>"
         for kind, heading, value, lines in cards
     )
     return f'<div class="tr-numbers">{"".join(shown)}</div>'
+
+
+def _unbroken(line: str) -> str:
+    return escape(line).replace(" %", "&nbsp;%")
 
 
 def effects_table(diagnosis: Diagnosis) -> str:
@@ -60,14 +64,12 @@ def _effect(finding: Finding, diagnosis: Diagnosis) -> str:
     cells = f"<td>{_span(finding.name, not quiet)}</td>"
     if finding.status == "not_testable":
         wanted = escape(needs(finding, diagnosis.joint_names))
-        cells += f"<td>not testable</td><td colspan=2>needs {wanted}</td>"
+        cells += f"<td class=tr-word>not testable</td><td colspan=2>needs {wanted}</td>"
     else:
         share = units.percent(finding.shrinkage)
         if finding.shrinkage_ci95 is not None:
             share += f" ({units.interval(finding.shrinkage_ci95)} %)"
-        cells += (
-            f"<td>{STATUS[finding.status]}</td><td class=tr-n>{escape(units.probability(finding.probability))}</td>"
-        )
+        cells += f"<td class=tr-word>{STATUS[finding.status]}</td><td class=tr-n>{escape(units.probability(finding.probability))}</td>"
         cells += f"<td class=tr-n>{escape(share)}</td>"
     row = f'<tr class="{looks}">{cells}</tr>'
     return row + (f"<tr><td colspan=4 class=tr-details>{details}</td></tr>" if details else "")
@@ -112,7 +114,7 @@ def outliers_table(diagnosis: Diagnosis) -> str:
     after = np.linalg.norm(rows.remainder[chosen, :3], axis=1)
     best = units.scale("m", float(max(before.max(initial=0.0), after.max(initial=0.0))))
     head = (
-        "<th>row in the file</th>"
+        "<th class=tr-n>row in the file</th>"
         + "".join(f"<th class=tr-n>{h} ({best.unit})</th>" for h in ("gap", "remainder"))
         + "".join(f"<th class=tr-n>remainder {a} ({best.unit})</th>" for a in "xyz")
     )
@@ -120,7 +122,7 @@ def outliers_table(diagnosis: Diagnosis) -> str:
     for k, i in enumerate(chosen[:_MOST_OUTLIERS]):
         cells = (before[k], after[k], *rows.remainder[i, :3])
         values = "".join(f"<td class=tr-n>{units.number(float(v) * best.factor)}</td>" for v in cells)
-        body.append(f"<tr><td>{int(rows.rows[i])}</td>{values}</tr>")
+        body.append(f"<tr><td class=tr-n>{int(rows.rows[i])}</td>{values}</tr>")
     more = len(chosen) - len(body)
     rest = f"<p class=tr-muted>and {more} more, which stand in the JSON</p>" if more > 0 else ""
     return f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(body)}</tbody></table>{rest}"

@@ -39,7 +39,7 @@ def plot_how_far(diagnosis: Diagnosis) -> Figure:
         aside are not counted.
     """
     pose = diagnosis.gap.orientation_before is not None and diagnosis.rows.gap.shape[1] >= 6
-    figure = Drawing(7.6, 6.6 if pose else 3.5)
+    figure = Drawing(7.6, 5.6 if pose else 3.5)
     panels = figure.subplots(2 if pose else 1, 1, squeeze=False)[:, 0]
     draw_how_far(panels[0], diagnosis)
     title(panels[0], "Position: measured against predicted")
