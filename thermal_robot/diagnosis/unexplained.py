@@ -132,6 +132,8 @@ def examine(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> tuple
         # nothing tells the noise but the remainder itself: what neighbours have in common is not noise
         floor *= np.sqrt(1.0 - np.clip(max(likeness, share), 0.0, 1.0))
     beyond = np.sqrt(max(rms**2 - 3.0 * floor**2, 0.0)) if flagged else 0.0
+    if flagged and source == "remainder":
+        beyond = rms  # neither a stated noise nor repeats vouch for any of it
     unexplained = Unexplained(
         flagged, float(beyond), float(p_value), reasons, locations if flagged else (), depends if flagged else ()
     )

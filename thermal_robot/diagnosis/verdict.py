@@ -63,7 +63,8 @@ def sentence(
         f"data and leaves {length(gap.held_out.rms_after)}"
     )
     if unexplained.flagged:
-        text += f", of which {length(unexplained.rms)} is unexplained{_place(unexplained)}"
+        share = "" if gap.noise_source == "remainder" else f"{length(unexplained.rms)} of "
+        text += f"; {share}what remains is unexplained{_place(unexplained)}"
     else:
         text += f", which is noise ({floor})"
     return text + ("; but " + ", and ".join(doubts) if doubts else "") + "."

@@ -195,13 +195,13 @@ def _evidence(gram: Gram, blocks: tuple[int, ...], prior: float, start: Combinat
             slope = fitted - determined - log_scale / _SIZE_SPREAD**2
             step = np.clip(slope / (fitted + determined + 1.0 / _SIZE_SPREAD**2), -1.0, 1.0)
         residual = gram.total - 2 * vector @ values + values @ matrix @ values if size else gram.total
-        target = (held + max(residual, 0.0)) / max(held + equations - effective, 1.0)
+        target = max((held + max(residual, 0.0)) / max(held + equations - effective, 1.0), 1e-12)
         moved = abs(np.log(target / variance))
         if size:
             moved = max(moved, float(np.abs(step).max()))
         if moved < 1e-3:
             break
-        variance = max(target, 1e-12)
+        variance = target
         if size:
             scale = np.exp(log_scale + step)
     log_evidence = (

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thermal_robot.report import units
-from thermal_robot.report.words import STATUS, in_words, law, needs, parameters
+from thermal_robot.report.words import STATUS, law, needs, parameters, places
 
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.result import Diagnosis, Finding
@@ -69,7 +69,8 @@ def _effect(finding: Finding, diagnosis: Diagnosis) -> str:
         share = units.percent(finding.shrinkage)
         if finding.shrinkage_ci95 is not None:
             share += f" ({units.interval(finding.shrinkage_ci95)} %)"
-        cells += f"<td class=tr-word>{STATUS[finding.status]}</td><td class=tr-n>{escape(units.probability(finding.probability))}</td>"
+        cells += f"<td class=tr-word>{STATUS[finding.status]}</td>"
+        cells += f"<td class=tr-n>{escape(units.probability(finding.probability))}</td>"
         cells += f"<td class=tr-n>{escape(share)}</td>"
     row = f'<tr class="{looks}">{cells}</tr>'
     return row + (f"<tr><td colspan=4 class=tr-details>{details}</td></tr>" if details else "")
@@ -85,8 +86,7 @@ def _known(finding: Finding) -> Iterator[str]:
     if described := law(finding):
         yield _line(described)
     if finding.locations:
-        top = [f"{units.place(p)} {units.percent(p.share)}" for p in finding.locations]
-        yield _line(f"where: {in_words(top, most=4)}")
+        yield _line(f"where: {places(finding)}")
     known = parameters(finding)
     if known.heading:
         yield _line(known.heading)

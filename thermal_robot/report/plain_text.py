@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from textwrap import fill
 from typing import TYPE_CHECKING
@@ -10,11 +11,11 @@ from thermal_robot.report import units
 from thermal_robot.report.words import (
     STATUS,
     campaign,
-    in_words,
     law,
     needs,
     noise,
     parameters,
+    places,
     rows_in_words,
     sentences,
     verdict,
@@ -56,8 +57,11 @@ def text(diagnosis: Diagnosis) -> str:
 
 
 def _wrap(sentence: str, indent: str = "  ", hang: int = 0) -> str:
+    """Break a sentence into lines, but not between a number and its unit; the first line begins with ``indent``."""
     rest = " " * (len(indent) + hang)
-    return fill(sentence, WIDTH, initial_indent=indent, subsequent_indent=rest, break_on_hyphens=False)
+    bound = re.sub(r"(?<=\d) (?=(%|[mµn]?m\b|[mµ]?rad\b))|(?<=\bp) (?=[<=])|(?<=[<>=]) (?=\d)", "\u00a0", sentence)
+    lines = fill(bound, WIDTH, initial_indent=indent, subsequent_indent=rest, break_on_hyphens=False)
+    return lines.replace("\u00a0", " ")
 
 
 def _facts(diagnosis: Diagnosis) -> Iterator[str]:
@@ -126,8 +130,7 @@ def _at_length(finding: Finding, wide: int) -> Iterator[str]:
     if described := law(finding):
         yield _wrap(described, inner)
     if finding.locations:
-        top = [f"{units.place(p)} {units.percent(p.share)}" for p in finding.locations]
-        yield _wrap(f"where: {in_words(top, most=4)}", inner, hang=7)
+        yield _wrap(f"where: {places(finding)}", inner, hang=7)
     known = parameters(finding)
     if known.heading:
         yield f"{inner}{known.heading}"

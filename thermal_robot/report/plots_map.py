@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -28,8 +29,41 @@ if TYPE_CHECKING:
     from thermal_robot.diagnosis.result import Diagnosis
 
 _ARROWS = 250
-_SHAPE, _FILLED = 1.2, 0.84  # width to height of a panel, and how much of the height arrows may fill
 _LONGEST = 0.18  # of the workspace's extent, for an arrow of the gap's 95th percentile
+_FILLED = 0.84  # of a panel's height; the key stands above
+_SHAPES = (0.85, 1.6)  # width to height of a panel
+
+
+@dataclass(frozen=True, eq=False)
+class _View:
+    """Arrows as they are seen in one plane.
+
+    Attributes
+    ----------
+    start, before, after
+        (N, 2) positions and exaggerated arrows, m.
+    factor
+        How many times longer than in truth the arrows are.
+    sample
+        A round length of the gap for the key, m.
+    """
+
+    start: Array
+    before: Array
+    after: Array
+    factor: float
+    sample: float
+
+    def limits(self) -> tuple[Array, Array]:
+        """Return middle and size of what is to be seen, (2,) each, with a small margin."""
+        ends = np.vstack([self.start, self.start + self.before, self.start + self.after])
+        low, high = ends.min(axis=0), ends.max(axis=0)
+        return (low + high) / 2.0, 1.06 * np.maximum(high - low, 1e-6)
+
+    def shape(self) -> float:
+        """Return the width of the panel over its height."""
+        _, size = self.limits()
+        return float(np.clip(_FILLED * size[0] / size[1], *_SHAPES))
 
 
 def plot_map(diagnosis: Diagnosis) -> Figure:
@@ -40,53 +74,46 @@ def plot_map(diagnosis: Diagnosis) -> Figure:
     Figure
         Arrows are exaggerated; the labels say by how much. Rows that were set aside are left out.
     """
-    figure = Drawing(9.2, 4.4)
-    panels = figure.subplots(1, 2)
     position = diagnosis.rows.position
     flat = int(np.argmax(np.ptp(position[:, :2], axis=0))) if len(position) else 0
-    for axes, (across, up), heading in zip(
-        panels, ((0, 1), (flat, 2)), ("Seen from above", "Seen from the side"), strict=True
-    ):
-        draw_map(axes, diagnosis, across, up)
+    planes = ((0, 1), (flat, 2))
+    views = [_view(diagnosis, *plane) for plane in planes]
+    shapes = [view.shape() if view else 1.0 for view in views]
+    figure = Drawing(9.2, min(0.9 + 8.0 / sum(shapes), 5.2))
+    panels = figure.subplots(1, 2, width_ratios=shapes)
+    for axes, plane, heading in zip(panels, planes, ("Seen from above", "Seen from the side"), strict=True):
+        draw_map(axes, diagnosis, *plane)
         title(axes, heading)
     return figure
 
 
 def draw_map(axes: Axes, diagnosis: Diagnosis, across: int = 0, up: int = 1) -> None:
     """Draw the arrows into a panel: ``across`` and ``up`` are the axes of the root frame that span it."""
-    rows = diagnosis.rows
-    used = np.flatnonzero(~rows.outliers & np.isfinite(rows.position).all(axis=1))
-    if not used.size:
+    view = _view(diagnosis, across, up)
+    if view is None:
         note(axes, "No row is left to be drawn.")
         return
-    sample, factor = _exaggeration(rows.position[used], rows.gap[used, :3])
-    chosen = used[thinned(len(used), _ARROWS)]
-    plane = np.ix_(chosen, np.array([across, up]))
-    start = rows.position[plane]
-    ends = [start]
-    for values, colour, label in ((rows.gap, BEFORE, "before"), (rows.remainder, AFTER, "after")):
-        arrow = values[plane] * factor
+    _frame(axes, view)
+    for arrows, colour, label in ((view.before, BEFORE, "before"), (view.after, AFTER, "after")):
         drawn = axes.quiver(
-            *start.T,
-            *arrow.T,
+            *view.start.T,
+            *arrows.T,
             color=colour,
+            label=label,
             units="inches",
             width=0.018,
             minlength=1.5,
-            label=label,
             angles="xy",
             scale_units="xy",
             scale=1.0,
         )
-        ends.append(start + arrow)
-    _frame(axes, np.vstack(ends))
-    exaggerated = f"drawn {factor:,.0f} times larger".replace(",", "\u2009") if factor > 1.0 else "drawn to scale"
+    times = f"{view.factor:,.0f}".replace(",", "\u2009")
     axes.quiverkey(
         drawn,
-        0.02 + sample * factor / float(np.ptp(axes.get_xlim())),  # where its tip is
+        0.02 + view.sample * view.factor / float(np.ptp(axes.get_xlim())),  # where its tip is
         0.90,
-        sample * factor,
-        f"gap of {units.quantity(sample, 'm')}, {exaggerated}",
+        view.sample * view.factor,
+        f"gap of {units.quantity(view.sample, 'm')}, drawn {times} times larger",
         labelpos="E",
         color=INK,
         labelcolor=INK,
@@ -98,21 +125,27 @@ def draw_map(axes: Axes, diagnosis: Diagnosis, across: int = 0, up: int = 1) -> 
     tidy(axes, grid="both")
 
 
-def _exaggeration(position: Array, gap: Array) -> tuple[float, float]:
-    """Return a round length of the gap for the key, m, and how many times larger arrows are drawn."""
-    typical = float(np.quantile(np.linalg.norm(gap, axis=1), 0.95))
-    extent = float(np.ptp(position, axis=0).max())
-    if typical <= 0.0 or extent <= 0.0:
-        return 1e-3, 1.0
-    return round_down(typical), max(round_down(_LONGEST * extent / typical), 1.0)
+def _view(diagnosis: Diagnosis, across: int, up: int) -> _View | None:
+    """Return the arrows in a plane, ``None`` where every row was set aside."""
+    rows = diagnosis.rows
+    used = np.flatnonzero(~rows.outliers & np.isfinite(rows.position).all(axis=1))
+    if not used.size:
+        return None
+    typical = float(np.quantile(np.linalg.norm(rows.gap[used, :3], axis=1), 0.95))
+    extent = float(np.ptp(rows.position[used], axis=0).max())
+    sample, factor = (1e-3, 1.0)
+    if typical > 0.0 and extent > 0.0:
+        sample, factor = round_down(typical), max(round_down(_LONGEST * extent / typical), 1.0)
+    plane = np.ix_(used[thinned(len(used), _ARROWS)], np.array([across, up]))
+    return _View(rows.position[plane], rows.gap[plane] * factor, rows.remainder[plane] * factor, factor, sample)
 
 
-def _frame(axes: Axes, points: Array) -> None:
-    """Show all points undistorted, with room above them for the key; every panel has the same shape."""
-    low, high = points.min(axis=0), points.max(axis=0)
-    middle, size = (low + high) / 2.0, 1.06 * np.maximum(high - low, 1e-6)
-    width = max(size[0], _SHAPE * size[1] / _FILLED)
-    height = width / _SHAPE
+def _frame(axes: Axes, view: _View) -> None:
+    """Show all arrows undistorted, with room above them for the key."""
+    middle, size = view.limits()
+    width = max(size[0], view.shape() * size[1] / _FILLED)
+    height = width / view.shape()
     axes.set_xlim(middle[0] - width / 2.0, middle[0] + width / 2.0)
     axes.set_ylim(middle[1] - _FILLED * height / 2.0, middle[1] + (1.0 - _FILLED / 2.0) * height)
     axes.set_aspect("equal", adjustable="box")
+    axes.locator_params(axis="both", nbins=6)

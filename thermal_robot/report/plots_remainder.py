@@ -30,7 +30,7 @@ if TYPE_CHECKING:
 
     from thermal_robot.diagnosis.result import Diagnosis
 
-_MIDDLES = 24
+_MIDDLES = 60
 _LEVELS = 12
 
 
@@ -77,6 +77,8 @@ def _followed(diagnosis: Diagnosis) -> tuple[str, Array] | None:
     if name in rows.covariates:
         unit = units.recorded_unit(name)
         return (f"{name} ({unit})" if unit else name), np.asarray(rows.covariates[name], dtype=float)
+    if name == "order":  # not recorded: the rows as they stand in the file
+        return "order of the rows", np.arange(len(rows.rows), dtype=float)
     if name in diagnosis.joint_names:
         return f"{name}, commanded (rad; m where it slides)", rows.q[:, diagnosis.joint_names.index(name)]
     return None
@@ -130,5 +132,5 @@ def _middles(along: Array, values: Array) -> tuple[Array, Array]:
     if len(levels) <= _LEVELS:
         return levels, np.array([np.median(values[along == level]) for level in levels])
     order = np.argsort(along, kind="stable")
-    parts = np.array_split(order, int(np.clip(len(order) // 8, 1, _MIDDLES)))
+    parts = np.array_split(order, int(np.clip(1.4 * np.sqrt(len(order)), 1, _MIDDLES)))
     return np.array([np.median(along[p]) for p in parts]), np.array([np.median(values[p]) for p in parts])

@@ -19,6 +19,13 @@ STATUS = {
 }
 _ALL_UP_TO = 7
 _MOST = 6
+_NEGLIGIBLE = 0.005  # share of the gap that is not worth a line
+_UNLIKELY = 0.02  # probability of a place that is not worth naming
+_SOURCES = {
+    "stated": "the instrument's noise as the campaign states it",
+    "repeats": "from the differences between repeated commands",
+    "remainder": "estimated from the remainder itself, since the campaign states none and repeats no command",
+}
 
 
 @dataclass(frozen=True)
@@ -55,7 +62,7 @@ def parameters(finding: Finding) -> Shown:
         heading,
         tuple((p.name, units.estimate(p, chosen)) for p in chosen),
         len(known) - len(chosen),
-        in_words(undetermined, most=4),
+        in_words(undetermined, most=4, between="; "),  # names hold commas
     )
 
 
@@ -63,17 +70,27 @@ def _significance(parameter: Estimate) -> float:
     return abs(parameter.value or 0.0) / max(parameter.std or 0.0, 1e-300)
 
 
-def in_words(names: Sequence[str], most: int = 10) -> str:
+def in_words(names: Sequence[str], most: int = 10, between: str = ", ") -> str:
     """List names, at most so many, then say how many more there are."""
     more = len(names) - most
     if more <= 0:
-        return ", ".join(names)
-    return f"{', '.join(names[:most])} and {more} more"
+        return between.join(names)
+    return f"{between.join(names[:most])} and {more} more"
 
 
 def rows_in_words(rows: Sequence[int], most: int = 10) -> str:
     """Say which rows of the file: ``rows 17, 80 and 3 more``."""
     return f"{'row' if len(rows) == 1 else 'rows'} {in_words([str(r) for r in rows], most)}"
+
+
+def places(finding: Finding, most: int = 4) -> str:
+    """Say where an effect sits, its largest shares first; empty where that is not known."""
+    shown = [p for p in finding.locations if p.share >= _NEGLIGIBLE][:most] or list(finding.locations[:1])
+    said = ", ".join(f"{units.place(p)} {units.percent(p.share)}" for p in shown)
+    rest = finding.locations[len(shown) :]
+    if not rest:
+        return said
+    return f"{said} and {len(rest)} more, at most {units.percent(max(0.0, rest[0].share))}"
 
 
 def verdict(diagnosis: Diagnosis) -> str:
@@ -94,10 +111,10 @@ def campaign(diagnosis: Diagnosis) -> str:
 def noise(diagnosis: Diagnosis, floor: str) -> str:
     """Say what noise alone would leave, where that is known from, and how the gap after compares with it."""
     gap = diagnosis.gap
-    parts = [f"{floor}; {gap.noise_source}" if gap.noise_source else floor]
+    parts = [floor, _SOURCES.get(gap.noise_source, gap.noise_source)]
     if gap.noise_floor > 0.0:
-        parts.append(f"the gap after is {gap.rms_after / gap.noise_floor:.1f} times that")
-    return "; ".join(parts)
+        parts.append(f"the gap after is {gap.rms_after / gap.noise_floor:.2f} times that")
+    return "; ".join(p for p in parts if p)
 
 
 def noise_of(diagnosis: Diagnosis) -> str:
@@ -136,9 +153,11 @@ def sentences(diagnosis: Diagnosis) -> Iterator[str]:
         return
     size = f"{units.quantity(left.rms, 'm')} rms beyond the noise" if left.rms > 0 else "a remainder"
     yield f"The known effects leave {size} that chance does not explain ({units.p_value(left.p_value)})."
-    yield from left.reasons
+    for reason in left.reasons:
+        yield f"{reason[:1].upper()}{reason[1:].rstrip('.')}."
     if left.locations:
-        spots = [f"{units.place(p)} ({units.probability(p.share)})" for p in left.locations[:3]]
+        likely = [p for p in left.locations if p.share >= _UNLIKELY][:3] or left.locations[:1]
+        spots = [f"{units.place(p)} ({units.probability(p.share)})" for p in likely]
         yield f"It enters most probably at {one_of(spots)}."
     if left.depends_on:
         quantities = [f"{d.covariate} ({units.p_value(d.p_value)})" for d in left.depends_on[:3]]

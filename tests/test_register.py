@@ -1,0 +1,189 @@
+"""Unknown frames are found wherever the instrument stands, and where it stands changes nothing else."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from simulate import commands, simulate
+
+from thermal_robot import EstimationError, diagnose
+from thermal_robot.campaign import Campaign
+from thermal_robot.estimation.register import register
+from thermal_robot.kinematics import exp3, exp6, quaternion_to_rotation, rotation_to_quaternion
+from thermal_robot.observations import Frames, observe
+
+SAMPLES = 60
+on_arms = pytest.mark.parametrize("arm", ["rv_m2", "ur10", "panda"], indirect=True)
+measures = pytest.mark.parametrize("pose", [False, True], ids=["positions", "poses"])
+
+
+def pose(turn, place):
+    motion = np.eye(4)
+    motion[:3, :3], motion[:3, 3] = turn, place
+    return motion
+
+
+def turns(rng):
+    """Directions that a tracker may look: as the robot, upside down about each axis, and anywhere."""
+    return [np.eye(3), *exp3(np.pi * np.eye(3)), *exp3(np.pi * rng.normal(size=(4, 3)))]
+
+
+def measured(robot, frames, rng, *, with_orientation, noise=0.0, turning=0.0, gross=0.0, **declared):
+    """What a tracker at a given place reports of the nominal robot."""
+    campaign = Campaign("registration", robot, commands(robot, SAMPLES, rng), **declared)
+    seen = observe(campaign, frames)
+    position = seen.predicted_position + noise * rng.normal(size=(SAMPLES, 3))
+    spoilt = rng.choice(SAMPLES, int(gross * SAMPLES), replace=False)
+    position[spoilt] += 0.05 * rng.normal(size=(len(spoilt), 3))
+    rotation = exp3(turning * rng.normal(size=(SAMPLES, 3))) @ frames.base[:3, :3] @ seen.rotation
+    rotation[spoilt] = exp3(0.3 * rng.normal(size=(len(spoilt), 3))) @ rotation[spoilt]
+    return replace(
+        campaign, position=position, orientation=rotation_to_quaternion(rotation) if with_orientation else None
+    )
+
+
+def far_frames(rng, turn):
+    """The tracker metres away; the target 0.3 m from the tool frame, turned against it, declared to be at it."""
+    place = rng.normal(size=3)
+    tool = pose(exp3(2.0 * rng.normal(size=3)), 0.3 * place / np.linalg.norm(place))
+    return Frames(pose(turn, rng.uniform(-6.0, 6.0, 3)), tool)
+
+
+def assert_same_frames(found, true, within, turned_tool):
+    np.testing.assert_allclose(found.base, true.base, rtol=0, atol=within)
+    np.testing.assert_allclose(found.tool[:3, 3], true.tool[:3, 3], rtol=0, atol=within)
+    if turned_tool:
+        np.testing.assert_allclose(found.tool[:3, :3], true.tool[:3, :3], rtol=0, atol=within)
+
+
+@on_arms
+@measures
+@pytest.mark.parametrize("gross", [0.0, 0.2])
+def test_frames_are_found_exactly_wherever_the_tracker_stands(arm, pose, gross):
+    rng = np.random.default_rng(1)
+    for turn in turns(rng):
+        true = far_frames(rng, turn)
+        campaign = measured(arm, true, rng, with_orientation=pose, gross=gross)
+        assert_same_frames(register(campaign), true, 1e-10, turned_tool=pose)
+
+
+@on_arms
+@measures
+@pytest.mark.parametrize("gross", [0.0, 0.2])
+def test_frames_are_found_to_the_noise(arm, pose, gross):
+    """With 20 µm and 30 µrad a sample, sixty samples place the frames to a noise, gross errors or not."""
+    rng = np.random.default_rng(2)
+    misses = []
+    for turn in turns(rng):
+        true = far_frames(rng, turn)
+        campaign = measured(arm, true, rng, with_orientation=pose, noise=2e-5, turning=3e-5, gross=gross)
+        found = register(campaign)
+        again, exact = observe(campaign, found), observe(campaign, true)
+        misses.append(np.sqrt(((again.predicted_position - exact.predicted_position) ** 2).sum(axis=1).mean()))
+    # nine parameters, or twelve at orientation's help, of 180 equations: rms miss = noise · √(9/60) = 0.39 noise
+    assert np.median(misses) < 2e-5 * np.sqrt(9 / 60 / (1 - gross)) * 1.3
+    assert max(misses) < 2e-5
+
+
+@on_arms
+@measures
+@pytest.mark.parametrize("base_known", [False, True])
+@pytest.mark.parametrize("tool_known", [False, True])
+def test_only_unknown_frames_are_fitted(arm, pose, base_known, tool_known):
+    rng = np.random.default_rng(3)
+    true = far_frames(rng, exp3(rng.normal(size=3)))
+    if base_known:
+        true = replace(true, base=np.eye(4))
+    if tool_known:
+        tool = np.eye(4)
+        tool[:3, 3] = true.tool[:3, 3]
+        true = replace(true, tool=tool)
+    declared = {"base_known": base_known, "tool_known": tool_known}
+    target = true.tool[:3, 3] if tool_known else np.zeros(3)
+    campaign = measured(arm, true, rng, with_orientation=pose, target=target, **declared)
+    assert_same_frames(register(campaign), true, 1e-10, turned_tool=pose)
+    wrong = replace(campaign, position=campaign.position + [0.0, 0.0, 0.01])
+    found = register(wrong)
+    if base_known:
+        np.testing.assert_array_equal(found.base, np.eye(4))
+    if tool_known:
+        np.testing.assert_array_equal(found.tool, true.tool)
+
+
+def test_rows_that_are_not_kept_do_not_matter(rv_m2):
+    rng = np.random.default_rng(4)
+    true = far_frames(rng, np.eye(3))
+    campaign = measured(rv_m2, true, rng, with_orientation=False)
+    keep = np.arange(SAMPLES) % 3 > 0
+    position = campaign.position.copy()
+    position[~keep] += 0.1
+    assert_same_frames(register(replace(campaign, position=position), keep), true, 1e-10, turned_tool=False)
+    with pytest.raises(EstimationError, match="three rows"):
+        register(campaign, np.arange(SAMPLES) < 2)
+
+
+@measures
+def test_the_order_of_rows_does_not_matter(rv_m2, pose):
+    rng = np.random.default_rng(5)
+    true = far_frames(rng, exp3(rng.normal(size=3)))
+    campaign = measured(rv_m2, true, rng, with_orientation=pose, noise=2e-5, turning=3e-5, gross=0.1)
+    shuffled = campaign.take(rng.permutation(SAMPLES))
+    assert_same_frames(register(shuffled), register(campaign), 1e-9, turned_tool=pose)
+
+
+def carried_off(campaign, motion):
+    """The same campaign as a tracker elsewhere would have reported it."""
+    turn, shift = motion[:3, :3], motion[:3, 3]
+    orientation = campaign.orientation
+    if orientation is not None:
+        orientation = rotation_to_quaternion(turn @ quaternion_to_rotation(orientation))
+    return replace(campaign, position=campaign.position @ turn.T + shift, orientation=orientation)
+
+
+@on_arms
+@pytest.mark.parametrize("turning", [None, 3e-5], ids=["positions", "poses"])
+@pytest.mark.parametrize(
+    "effects", [["joint_offset"], ["thermal_elongation", "backlash"], ["instrument_scale", "drift"]], ids="-".join
+)
+def test_where_the_tracker_stands_changes_nothing_but_the_base(arm, turning, effects):
+    campaign = simulate(arm, effects, seed=6, samples=80, turning=turning, outliers=0.03)[0]
+    here = diagnose(campaign)
+    for motion in (exp6([3.0, -2.0, 1.0, 0.5, 2.0, -1.0]), pose(exp3([0.0, np.pi, 0.0]), [0.0, 0.0, -4.0])):
+        there = diagnose(carried_off(campaign, motion))
+        assert there.verdict == here.verdict
+        assert there.outliers == here.outliers
+        close = {"rtol": 1e-6, "atol": 1e-12}
+        for now, then in zip(there.gap.__dict__.values(), here.gap.__dict__.values(), strict=True):
+            if isinstance(then, float):
+                np.testing.assert_allclose(now, then, **close)
+        np.testing.assert_allclose(there.gap.held_out.rms_after, here.gap.held_out.rms_after, **close)
+        for finding in here.effects:
+            other = there.finding(finding.name)
+            assert other.status == finding.status
+            if finding.probability is not None:
+                np.testing.assert_allclose(other.probability, finding.probability, rtol=1e-6, atol=1e-9)
+            for now, then in zip(other.parameters, finding.parameters, strict=True):
+                assert now.identified == then.identified
+                if then.identified:
+                    np.testing.assert_allclose(now.value, then.value, rtol=1e-6, atol=1e-6 * then.std)
+        np.testing.assert_allclose(there.model.frames.base, motion @ here.model.frames.base, atol=1e-8)
+
+
+@on_arms
+def test_a_simulators_prediction_replaces_the_urdfs_and_keeps_the_declared_target(arm):
+    rng = np.random.default_rng(7)
+    true = far_frames(rng, exp3(rng.normal(size=3)))
+    campaign = measured(arm, true, rng, with_orientation=False, target=np.array([0.0, 0.0, 0.1]))
+    root = observe(campaign, replace(true, base=np.eye(4))).predicted_position
+    # a simulator that knows the target, and links that the URDF does not: its own prediction in the root frame
+    curved = root + 1e-3 * np.sin(3.0 * root[:, ::-1])
+    told = replace(campaign, simulated_position=curved)
+    told = replace(told, position=curved @ true.base[:3, :3].T + true.base[:3, 3])
+    found = register(told)
+    np.testing.assert_allclose(found.base, true.base, atol=1e-10)
+    np.testing.assert_array_equal(found.tool, Frames.declared(told).tool)
+    seen = observe(told, found)
+    np.testing.assert_array_equal(seen.position, curved)
+    assert np.abs(seen.gap).max() < 1e-9
+    assert diagnose(told, only=["geometric"]).gap.rms_before < 1e-9
+    assert diagnose(replace(told, simulated_position=None), only=["geometric"]).gap.rms_before > 1e-4
