@@ -74,7 +74,7 @@ def main():
                 print(f"    {name}: truth {case['effects']}, found {named}, confounded {aside}")
         print(f"open_cases plain and null: {exact} of {total} exact, slowest {slowest:.2f} s with start-up")
         print(
-            f"    prediction of fresh samples: {np.median(ratios):.2f} × noise per axis (median), {max(ratios):.2f} worst"
+            f"    prediction of fresh samples, in noise per axis: median {np.median(ratios):.2f}, worst {max(ratios):.2f}"
         )
         print(f"open_cases hard: {first} of {hard} with a main effect named first")
         for name in ("ipa_ur10_b", "ipa_ur10_a"):
@@ -89,9 +89,8 @@ def report(name, found, seconds):
     gap, verdict, left = found["gap"], found["verdict"], found["unexplained"]
     print(f"{name}: {', '.join(verdict['effects'])}; {seconds:.1f} s")
     held = gap["held_out"]
-    print(
-        f"    gap {gap['rms_before'] * 1e3:.3f} -> {gap['rms_after'] * 1e3:.3f} mm, held out {held['rms_after'] * 1e3:.3f}"
-    )
+    before, after, out = (1e3 * v for v in (gap["rms_before"], gap["rms_after"], held["rms_after"]))
+    print(f"    gap {before:.3f} -> {after:.3f} mm, held out {out:.3f} mm")
     print(f"    unexplained: {verdict['unexplained']}, {left['rms'] * 1e3:.3f} mm; {left['reasons']}")
 
 

@@ -63,8 +63,9 @@ def sentence(
         f"data and leaves {length(gap.held_out.rms_after)}"
     )
     if unexplained.flagged:
-        share = "" if gap.noise_source == "remainder" else f"{length(unexplained.rms)} of "
-        text += f"; {share}what remains is unexplained{_place(unexplained)}"
+        alone = gap.noise_source == "remainder"
+        text += ", which is not explained" if alone else f", of which {length(unexplained.rms)} is not explained"
+        text += _place(unexplained)
     else:
         text += f", which is noise ({floor})"
     return text + ("; but " + ", and ".join(doubts) if doubts else "") + "."
