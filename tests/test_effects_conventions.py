@@ -152,9 +152,7 @@ def test_each_segment_follows_its_parent_links_own_temperature(arm):
     effect = ThermalElongation()
     uniform = commanded(arm, {"temperature": general})
     one = commanded(arm, {"temperature": general, f"temperature.{link}": own})
-    for parameter, plain in zip(
-        effect.parameters(observe(one)), effect.parameters(observe(uniform)), strict=True
-    ):
+    for parameter, plain in zip(effect.parameters(observe(one)), effect.parameters(observe(uniform)), strict=True):
         ratio = parameter.responses[0].values[:, :3] @ plain.responses[0].values[0, :3]
         ratio /= plain.responses[0].values[:, :3] @ plain.responses[0].values[0, :3]
         expected = (own - 20.0) / (general - 20.0) if parameter.place == link else np.ones(SAMPLES)
@@ -204,9 +202,7 @@ def test_declared_frames_are_off_by_a_twist_in_root_and_tool(rv_m2):
     shift = np.array([1e-3, 2e-3, -3e-3])
     moved = tool_with(campaign, BaseFrame(), [*shift, 0, 0, 0]) - nominal
     np.testing.assert_allclose(moved, np.broadcast_to(shift, moved.shape), atol=1e-14)
-    np.testing.assert_allclose(
-        tool_with(campaign, ToolFrame(), shift) - nominal, poses[:, :3, :3] @ shift, atol=1e-14
-    )
+    np.testing.assert_allclose(tool_with(campaign, ToolFrame(), shift) - nominal, poses[:, :3, :3] @ shift, atol=1e-14)
 
 
 @on_arms

@@ -73,9 +73,7 @@ def main():
             if not right:
                 print(f"    {name}: truth {case['effects']}, found {named}, confounded {aside}")
         print(f"open_cases plain and null: {exact} of {total} exact, slowest {slowest:.2f} s with start-up")
-        print(
-            f"    prediction of fresh samples, in noise per axis: median {np.median(ratios):.2f}, worst {max(ratios):.2f}"
-        )
+        print(f"    fresh samples, in noise per axis: median {np.median(ratios):.2f}, worst {max(ratios):.2f}")
         print(f"open_cases hard: {first} of {hard} with a main effect named first")
         for name in ("ipa_ur10_b", "ipa_ur10_a"):
             found, seconds, _ = diagnose(data / name, folder)

@@ -183,7 +183,7 @@ class Rows:
     held_out_after: Array
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class Diagnosis:
     """Where the gap lies, which effects cause it, how far it shrinks.
 
@@ -284,6 +284,9 @@ class Diagnosis:
     def to_json(self, path: str | Path) -> None:
         """Write :meth:`to_dict` to a file."""
         Path(path).write_text(json.dumps(self.to_dict(), indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+
+    def __repr__(self) -> str:
+        return f"Diagnosis({self.campaign!r}: {', '.join(self.verdict) or 'no effect'})"
 
     def __str__(self) -> str:
         from thermal_robot.report import text

@@ -64,8 +64,9 @@ def fragment(diagnosis: Diagnosis) -> str:
             numbers(diagnosis),
             _figure(overview(diagnosis, headline=False), f"Overview: {diagnosis.summary}"),
             effects_table(diagnosis),
+            '<p class="tr-kicker">Unexplained</p>',
             *_unexplained(diagnosis),
-            *(_paragraph(w) for w in diagnosis.warnings),
+            *(['<p class="tr-kicker">Warnings</p>', _list(diagnosis.warnings)] if diagnosis.warnings else []),
         )
     )
     return f'<div class="thermal-robot">\n<style>\n{_css("page.css")}</style>\n{body}\n</div>'

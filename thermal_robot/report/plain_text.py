@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Iterator, Mapping, Sequence
 from textwrap import fill
 from typing import TYPE_CHECKING
 
 from thermal_robot.report import units
 from thermal_robot.report.words import (
+    NO_BREAK,
     STATUS,
+    bound,
     campaign,
     law,
     needs,
@@ -59,9 +60,8 @@ def text(diagnosis: Diagnosis) -> str:
 def _wrap(sentence: str, indent: str = "  ", hang: int = 0) -> str:
     """Break a sentence into lines, but not between a number and its unit; the first line begins with ``indent``."""
     rest = " " * (len(indent) + hang)
-    bound = re.sub(r"(?<=\d) (?=(%|[mµn]?m\b|[mµ]?rad\b))|(?<=\bp) (?=[<=])|(?<=[<>=]) (?=\d)", "\u00a0", sentence)
-    lines = fill(bound, WIDTH, initial_indent=indent, subsequent_indent=rest, break_on_hyphens=False)
-    return lines.replace("\u00a0", " ")
+    lines = fill(bound(sentence), WIDTH, initial_indent=indent, subsequent_indent=rest, break_on_hyphens=False)
+    return lines.replace(NO_BREAK, " ")
 
 
 def _facts(diagnosis: Diagnosis) -> Iterator[str]:

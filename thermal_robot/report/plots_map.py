@@ -74,24 +74,37 @@ def plot_map(diagnosis: Diagnosis) -> Figure:
     Figure
         Arrows are exaggerated; the labels say by how much. Rows that were set aside are left out.
     """
-    position = diagnosis.rows.position
-    flat = int(np.argmax(np.ptp(position[:, :2], axis=0))) if len(position) else 0
-    planes = ((0, 1), (flat, 2))
-    views = [_view(diagnosis, *plane) for plane in planes]
-    shapes = [view.shape() if view else 1.0 for view in views]
+    planes = _planes(diagnosis)
+    shapes = [_shape(diagnosis, plane) for plane in planes.values()]
     figure = Drawing(9.2, min(0.9 + 8.0 / sum(shapes), 5.2))
     panels = figure.subplots(1, 2, width_ratios=shapes)
-    for axes, plane, heading in zip(panels, planes, ("Seen from above", "Seen from the side"), strict=True):
+    for axes, (heading, plane) in zip(panels, planes.items(), strict=True):
         draw_map(axes, diagnosis, *plane)
         title(axes, heading)
     return figure
 
 
-def draw_map(axes: Axes, diagnosis: Diagnosis, across: int = 0, up: int = 1) -> None:
+def broader_view(diagnosis: Diagnosis) -> tuple[str, tuple[int, int]]:
+    """Return heading and axes of the view that fills a panel that is broader than high better."""
+    return max(_planes(diagnosis).items(), key=lambda view: _shape(diagnosis, view[1]))
+
+
+def _planes(diagnosis: Diagnosis) -> dict[str, tuple[int, int]]:
+    position = diagnosis.rows.position
+    broad = int(np.argmax(np.ptp(position[:, :2], axis=0))) if len(position) else 0
+    return {"Seen from above": (0, 1), "Seen from the side": (broad, 2)}
+
+
+def _shape(diagnosis: Diagnosis, plane: tuple[int, int]) -> float:
+    view = _view(diagnosis, *plane)
+    return view.shape() if view else 1.0
+
+
+def draw_map(axes: Axes, diagnosis: Diagnosis, across: int, up: int) -> None:
     """Draw the arrows into a panel: ``across`` and ``up`` are the axes of the root frame that span it."""
     view = _view(diagnosis, across, up)
     if view is None:
-        note(axes, "No row is left to be drawn.")
+        note(axes, "No two places with a gap are left to be mapped.")
         return
     _frame(axes, view)
     for arrows, colour, label in ((view.before, BEFORE, "before"), (view.after, AFTER, "after")):
@@ -126,18 +139,20 @@ def draw_map(axes: Axes, diagnosis: Diagnosis, across: int = 0, up: int = 1) -> 
 
 
 def _view(diagnosis: Diagnosis, across: int, up: int) -> _View | None:
-    """Return the arrows in a plane, ``None`` where every row was set aside."""
+    """Return the arrows in a plane; ``None`` where all rows were set aside or are at one place, or no gap is left."""
     rows = diagnosis.rows
     used = np.flatnonzero(~rows.outliers & np.isfinite(rows.position).all(axis=1))
     if not used.size:
         return None
     typical = float(np.quantile(np.linalg.norm(rows.gap[used, :3], axis=1), 0.95))
     extent = float(np.ptp(rows.position[used], axis=0).max())
-    sample, factor = (1e-3, 1.0)
-    if typical > 0.0 and extent > 0.0:
-        sample, factor = round_down(typical), max(round_down(_LONGEST * extent / typical), 1.0)
+    if typical <= 0.0 or extent <= 0.0:
+        return None
+    factor = max(round_down(_LONGEST * extent / typical), 1.0)
     plane = np.ix_(used[thinned(len(used), _ARROWS)], np.array([across, up]))
-    return _View(rows.position[plane], rows.gap[plane] * factor, rows.remainder[plane] * factor, factor, sample)
+    return _View(
+        rows.position[plane], rows.gap[plane] * factor, rows.remainder[plane] * factor, factor, round_down(typical)
+    )
 
 
 def _frame(axes: Axes, view: _View) -> None:

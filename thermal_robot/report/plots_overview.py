@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 from thermal_robot.report.drawing import INK, LARGE, Drawing, plain, title
 from thermal_robot.report.plots_how_far import draw_how_far
-from thermal_robot.report.plots_map import draw_map
+from thermal_robot.report.plots_map import broader_view, draw_map
 from thermal_robot.report.plots_where import draw_where
 from thermal_robot.report.plots_which import draw_which
+from thermal_robot.report.words import bound
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -18,7 +19,7 @@ if TYPE_CHECKING:
 
 
 def overview(diagnosis: Diagnosis, *, headline: bool = True) -> Figure:
-    """Draw how far, which, where, and the map from above, under the sentence of the verdict if ``headline``."""
+    """Draw how far, which, where, and the map of the gap, under the sentence of the verdict if ``headline``."""
     lines = max(len(diagnosis.effects), len(diagnosis.joint_names) + len(diagnosis.where.links), 12)
     figure = Drawing(12.5, 5.4 + 0.2 * lines)
     (how_far, which), (where, map_) = figure.subplots(2, 2)
@@ -28,9 +29,10 @@ def overview(diagnosis: Diagnosis, *, headline: bool = True) -> Figure:
     title(which, "Which")
     draw_where(where, diagnosis)
     title(where, "Where")
-    draw_map(map_, diagnosis)
-    title(map_, "Gap, seen from above")
+    heading, plane = broader_view(diagnosis)
+    draw_map(map_, diagnosis, *plane)
+    title(map_, f"The gap, {heading[0].lower()}{heading[1:]}")
     if headline:
-        said = plain(fill(diagnosis.summary, 115))
+        said = plain(fill(bound(diagnosis.summary), 115))
         figure.suptitle(said, x=0.01, ha="left", fontsize=LARGE + 1, color=INK, fontweight="bold")
     return figure

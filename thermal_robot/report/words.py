@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
@@ -26,6 +27,10 @@ _SOURCES = {
     "repeats": "from the differences between repeated commands",
     "remainder": "estimated from the remainder itself, since the campaign states none and repeats no command",
 }
+
+
+NO_BREAK = "\u00a0"
+_TOGETHER = re.compile(r"(?<=\d) (?=(%|[mµn]?m\b|[mµ]?rad\b))|(?<=\bp) (?=[<=])|(?<=[<>=]) (?=\d)")
 
 
 @dataclass(frozen=True)
@@ -76,6 +81,11 @@ def in_words(names: Sequence[str], most: int = 10, between: str = ", ") -> str:
     if more <= 0:
         return between.join(names)
     return f"{between.join(names[:most])} and {more} more"
+
+
+def bound(sentence: str) -> str:
+    """Keep numbers and their units on one line."""
+    return _TOGETHER.sub(NO_BREAK, sentence)
 
 
 def rows_in_words(rows: Sequence[int], most: int = 10) -> str:
