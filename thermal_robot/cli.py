@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import sys
+import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
@@ -12,6 +13,9 @@ from pathlib import Path
 from thermal_robot.errors import CampaignError, ThermalRobotError
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
+_STAGES = (
+    14  # that a diagnosis tells of: reading, frames, effects, up to three exact fits, five folds, remainder, places
+)
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -148,7 +152,6 @@ def _progress() -> Iterator[Callable[[str], None]]:
     from rich.console import Console
     from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
 
-    begun, stages = time.monotonic(), 9
     bar = Progress(
         SpinnerColumn(),
         TextColumn("{task.description}"),
@@ -157,21 +160,15 @@ def _progress() -> Iterator[Callable[[str], None]]:
         console=Console(stderr=True),
         transient=True,
     )
-    task = bar.add_task("", total=stages)
-    shown = False
-
-    def progress(stage: str) -> None:
-        nonlocal shown
-        bar.update(task, description=stage, advance=1)
-        if not shown and time.monotonic() - begun > 2.0:
-            bar.start()
-            shown = True
-
+    task = bar.add_task("", total=_STAGES)
+    patience = threading.Timer(2.0, bar.start)
+    patience.daemon = True
+    patience.start()
     try:
-        yield progress
+        yield lambda stage: bar.update(task, description=stage, advance=1)
     finally:
-        if shown:
-            bar.stop()
+        patience.cancel()
+        bar.stop()
 
 
 if __name__ == "__main__":

@@ -62,10 +62,9 @@ def diagnose(
         campaign = read_campaign(campaign)
     candidates = (*choose(only, without), *effects)
     _check_priors(campaign, {e.name for e in candidates} | set(library()))
-    progress("frames and effects")
     # matrices are small: threads that wait for each other cost several times what they bring
     with threadpool_limits(1):
-        fitted = fit(campaign, candidates)
+        fitted = fit(campaign, candidates, progress)
         shrinkage = held_out(fitted, progress)
         unexplained, floor, source = examine(fitted, progress)
     progress("places")

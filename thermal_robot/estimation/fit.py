@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,7 +58,7 @@ class Fit:
     needs: dict[str, tuple[str, ...]]
 
 
-def fit(campaign: Campaign, effects: Sequence[Effect]) -> Fit:
+def fit(campaign: Campaign, effects: Sequence[Effect], progress: Callable[[str], None] = lambda _: None) -> Fit:
     """Fit frames, choose effects, refit the choice exactly.
 
     Parameters
@@ -67,6 +67,8 @@ def fit(campaign: Campaign, effects: Sequence[Effect]) -> Fit:
         With measurements.
     effects
         Candidates.
+    progress
+        Called with a few words at each stage.
 
     Returns
     -------
@@ -74,19 +76,19 @@ def fit(campaign: Campaign, effects: Sequence[Effect]) -> Fit:
         Converged: another Gauss-Newton step would move nothing that can be measured.
     """
     noise = Noise(campaign.noise_position, campaign.noise_orientation)
+    progress("unknown frames")
     nominal = observe(campaign, register(campaign))
     needs = {e.name: missing for e in effects if (missing := e.missing(nominal))}
     settings = {e.name: e.variants(nominal) for e in effects if e.name not in needs}
     candidates, families = _listed(settings)
-    linear = _linear(nominal, candidates)
-    groups = row_groups(campaign)
+    progress("combinations of effects")
+    linear, groups = _linear(nominal, candidates), row_groups(campaign)
     explanation = explain(linear, noise, families=families, groups=groups)
-    nominal = observe(campaign, register(campaign, ~explanation.outliers))
-    before = Linear(nominal.gap, frame_columns(nominal)[0], ())
     observations = nominal
     for revision in range(_REVISIONS):
+        progress(f"exact fit, revision {revision + 1}")
         held = [(candidates[b], explanation.values[b][0]) for b in explanation.best.blocks]
-        observations, held = _gauss_newton(nominal, observations.frames, explanation, held)
+        observations, held = _gauss_newton(campaign, observations.frames, explanation, held)
         for effect, _ in held:
             settings[effect.name] = effect.nearby(_REFINEMENT ** (1 / 2**revision))
         candidates, families = _listed(settings)
@@ -106,7 +108,9 @@ def fit(campaign: Campaign, effects: Sequence[Effect]) -> Fit:
         if set(explanation.best.blocks) == set(chosen):
             break
     held = [(candidates[b], explanation.values[b][0]) for b in explanation.best.blocks]
-    observations, held = _gauss_newton(nominal, observations.frames, explanation, held)
+    observations, held = _gauss_newton(campaign, observations.frames, explanation, held)
+    nominal = observe(campaign, register(campaign, ~explanation.outliers))
+    before = Linear(nominal.gap, frame_columns(nominal)[0], ())
     return Fit(campaign, nominal, before, observations, explanation, tuple(held), families, needs)
 
 
@@ -122,10 +126,10 @@ def _linear(observations: Observations, candidates: Sequence[Effect]) -> Linear:
 
 
 def _gauss_newton(
-    nominal: Observations, frames: Frames, explanation: Explanation, held: Sequence[tuple[Effect, Array]]
+    campaign: Campaign, frames: Frames, explanation: Explanation, held: Sequence[tuple[Effect, Array]]
 ) -> tuple[Observations, list[tuple[Effect, Array]]]:
     """Refit frames and the explanation's parameters with the exact model, the priors held at their scales."""
-    campaign, whitening, best = nominal.campaign, explanation.whitening, explanation.best
+    whitening, best = explanation.whitening, explanation.best
     effects = [effect for effect, _ in held]
     sizes = [explanation.linear.blocks[b].sizes * best.scales[b] for b in best.blocks]
     ends = np.cumsum([len(size) for size in sizes])[:-1]

@@ -85,7 +85,7 @@ def _draw(axes: Axes, before: Array, after: Array, held_out: Array, said: list[s
     everything = np.concatenate([before, after, held_out])
     everything = everything[everything > 0.0]
     if not everything.size:
-        note(axes, "No row is left to be drawn.")
+        note(axes, "There is no gap to be drawn.")
         return
     # a few rows that happen to fit perfectly must not stretch the axis over decades
     low, high = float(np.quantile(everything, 0.01)) / 1.6, float(everything.max()) * 1.25

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
+from matplotlib.transforms import ScaledTranslation, blended_transform_factory
 
 from thermal_robot.report import units
 from thermal_robot.report.drawing import (
@@ -108,7 +109,7 @@ def draw_map(axes: Axes, diagnosis: Diagnosis, across: int, up: int) -> None:
         return
     _frame(axes, view)
     for arrows, colour, label in ((view.before, BEFORE, "before"), (view.after, AFTER, "after")):
-        drawn = axes.quiver(
+        axes.quiver(
             *view.start.T,
             *arrows.T,
             color=colour,
@@ -120,19 +121,8 @@ def draw_map(axes: Axes, diagnosis: Diagnosis, across: int, up: int) -> None:
             scale_units="xy",
             scale=1.0,
         )
-    times = f"{view.factor:,.0f}".replace(",", "\u2009")
-    axes.quiverkey(
-        drawn,
-        0.02 + view.sample * view.factor / float(np.ptp(axes.get_xlim())),  # where its tip is
-        0.90,
-        view.sample * view.factor,
-        f"gap of {units.quantity(view.sample, 'm')}, drawn {times} times larger",
-        labelpos="E",
-        color=INK,
-        labelcolor=INK,
-        fontproperties={"size": SMALL},
-    )
     axes.legend(loc="upper left", ncols=2, fontsize=SMALL, labelcolor=INK, frameon=False, borderaxespad=0.2)
+    _key(axes, view)
     axes.set_xlabel(f"{'xyz'[across]} of the root frame (m)")
     axes.set_ylabel(f"{'xyz'[up]} of the root frame (m)")
     tidy(axes, grid="both")
@@ -164,3 +154,18 @@ def _frame(axes: Axes, view: _View) -> None:
     axes.set_ylim(middle[1] - _FILLED * height / 2.0, middle[1] + (1.0 - _FILLED / 2.0) * height)
     axes.set_aspect("equal", adjustable="box")
     axes.locator_params(axis="both", nbins=6)
+
+
+def _key(axes: Axes, view: _View) -> None:
+    """Show below the legend how long an arrow of a round gap is drawn."""
+    below = ScaledTranslation(0.09, -0.35, axes.get_figure(root=True).dpi_scale_trans)
+    along = blended_transform_factory(axes.transData, axes.transAxes) + below
+    start = axes.get_xlim()[0]
+    tip = (start + view.sample * view.factor, 1.0)
+    arrow = {"arrowstyle": "-|>", "color": INK, "linewidth": 1.3, "shrinkA": 0.0, "shrinkB": 0.0}
+    axes.annotate("", tip, (start, 1.0), xycoords=along, textcoords=along, arrowprops=arrow)
+    times = f"{view.factor:,.0f}".replace(",", "\u2009")
+    said = f"gap of {units.quantity(view.sample, 'm')}, drawn {times} times larger"
+    axes.annotate(
+        said, tip, (6.0, 0.0), xycoords=along, textcoords="offset points", va="center", fontsize=SMALL, color=INK
+    )

@@ -32,6 +32,7 @@ if TYPE_CHECKING:
 
 _MIDDLES = 60
 _LEVELS = 12
+_FEW_CROSSES = 25
 
 
 def plot_remainder(diagnosis: Diagnosis) -> Figure:
@@ -80,7 +81,7 @@ def _followed(diagnosis: Diagnosis) -> tuple[str, Array] | None:
     if name == "order":  # not recorded: the rows as they stand in the file
         return "order of the rows", np.arange(len(rows.rows), dtype=float)
     if name in diagnosis.joint_names:
-        return f"{name}, commanded (rad; m where it slides)", rows.q[:, diagnosis.joint_names.index(name)]
+        return f"{name} (rad or m)", rows.q[:, diagnosis.joint_names.index(name)]
     return None
 
 
@@ -97,7 +98,7 @@ def _draw(axes: Axes, along: Array, values: Array, aside: NDArray[np.bool_], lim
     known = np.isfinite(along) & np.isfinite(values)
     used, marked = np.flatnonzero(known & ~aside), np.flatnonzero(known & aside)
     drawn = used[thinned(len(used))]
-    many = len(used) > RASTER_ABOVE
+    many, few = len(used) > RASTER_ABOVE, len(marked) <= _FEW_CROSSES
     axes.plot(
         along[drawn],
         values[drawn],
@@ -117,8 +118,8 @@ def _draw(axes: Axes, along: Array, values: Array, aside: NDArray[np.bool_], lim
         np.clip(values[marked], -0.94 * limit, 0.94 * limit),
         linestyle="none",
         marker="x",
-        markersize=6,
-        markeredgewidth=1.8,
+        markersize=6.0 if few else 3.0,
+        markeredgewidth=1.8 if few else 0.9,
         color=BEFORE,
         label="set aside",
     )

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from thermal_robot.report import units
 from thermal_robot.report.drawing import (
     AFTER,
@@ -28,6 +30,7 @@ if TYPE_CHECKING:
 
 _Group = tuple[str, Mapping[str, float], str]
 _MOST_QUANTITIES = 8
+_LONG_NAME = 26
 _BETWEEN = 0.6  # lines
 
 
@@ -35,16 +38,22 @@ def plot_where(diagnosis: Diagnosis) -> Figure:
     """Draw the shares of the gap's mean square: joints and links from root to tool, axes, quantities."""
     chain, other = _chain(diagnosis), _other(diagnosis)
     right = _lines(other)
-    left = _lines(chain) if _placed(chain) else right
-    lines = max(left, right)
-    figure = Drawing(9.2, 1.2 + 0.24 * lines)
-    # panels as high as their bars, so that a bar is equally thick everywhere
-    grid = figure.add_gridspec(2, 2, height_ratios=(min(left, right), max(lines - min(left, right), 0.01)))
-    panels = [figure.add_subplot(grid[:, k] if n == lines else grid[0, k]) for k, n in enumerate((left, right))]
+    left = _lines(chain) if _placed(chain) else min(right, 4.0)
+    names = [len(name) for _, shares, _ in (*chain, *other) for name in shares]
+    # panels as high as their bars, so that a bar is equally thick everywhere; below each other where names are long
+    if max(names, default=0) > _LONG_NAME:
+        figure = Drawing(7.6, 1.9 + 0.24 * (left + right))
+        panels = figure.subplots(2, 1, height_ratios=(left, right))
+    else:
+        lines, rest = max(left, right), max(abs(left - right), 0.01)
+        figure = Drawing(9.2, 1.2 + 0.24 * lines)
+        grid = figure.add_gridspec(2, 2, height_ratios=(lines - rest, rest))
+        places = [grid[:, k] if n == lines else grid[0, k] for k, n in enumerate((left, right))]
+        panels = np.array([figure.add_subplot(place) for place in places])
     draw_where(panels[0], diagnosis)
     title(panels[0], "Where along the chain")
     _draw_groups(panels[1], other)
-    title(panels[1], "In which direction, with which quantity")
+    title(panels[1], "By axis and by quantity")
     return figure
 
 
@@ -77,7 +86,7 @@ def _other(diagnosis: Diagnosis) -> list[_Group]:
     quantities = dict(sorted(where.covariates.items(), key=lambda item: -item[1])[:_MOST_QUANTITIES])
     groups: list[_Group] = [("axes of the root frame", where.axes, MUTED)]
     if quantities:
-        groups.append(("quantities: what a law of each alone would explain", quantities, AFTER))
+        groups.append(("quantities, each alone", quantities, AFTER))
     return groups
 
 
