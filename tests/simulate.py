@@ -163,7 +163,7 @@ DEMO_SEED = 2018
 
 
 def demo():
-    """The demo: an RV-M2 whose links grow with the hall's temperature, and whose elbow has play; it was told neither."""
+    """The demo: an RV-M2 whose links grow with the hall's temperature, and whose elbow has play."""
     robot = load_robot("builtin:rv_m2", "tool0")
     return simulate(
         robot,

@@ -183,7 +183,6 @@ def test_thermal_elongation_reads_no_general_temperature_where_every_link_has_it
     assert set(ThermalElongation().reads(observe(given))) == set(own)
 
 
-@pytest.mark.xfail(strict=True, reason="joint_compliance reads the payload even where every joint reports its torque")
 def test_compliance_reads_no_payload_where_every_joint_reports_its_torque(rv_m2):
     campaign = campaign_of(rv_m2)
     sensed = {f"torque.{joint}": 5.0 + k + np.arange(8.0) for k, joint in enumerate(rv_m2.joint_names)}

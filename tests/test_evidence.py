@@ -94,7 +94,6 @@ def test_evidence_is_the_density_of_the_gap(present, held):
         np.testing.assert_allclose(ours - ours[0], theirs - theirs[0], rtol=0, atol=1e-8)
 
 
-@pytest.mark.xfail(strict=True, reason="after the last iteration, scales of one step stand with the fit of another")
 def test_evidence_is_the_density_of_the_gap_for_effects_much_larger_than_expected():
     for seed in range(6):
         linear, whitening = small_problem(seed, present=(0, 2))

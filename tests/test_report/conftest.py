@@ -1,6 +1,7 @@
 """Diagnoses made by hand, one of each kind that a report must be able to tell."""
 
 from dataclasses import replace
+from functools import lru_cache
 
 import numpy as np
 import pytest
@@ -267,3 +268,9 @@ def case():
 def make_rows():
     """Make measurements."""
     return rows
+
+
+@pytest.fixture(scope="session")
+def written():
+    """Write the page or fragment of a kind, once for all tests."""
+    return lru_cache(lambda write, kind: write(CASES[kind]()))

@@ -36,9 +36,11 @@ class JointCompliance(Effect):
         return ()
 
     def reads(self, observations: Observations) -> tuple[str, ...]:
-        """Return the payload and the torques of the chain's joints, where they were recorded."""
-        columns = ["payload", *(f"torque.{joint}" for joint in observations.robot.joint_names)]
-        return tuple(column for column in columns if column in observations.covariates)
+        """Return the torques of the chain's joints that were recorded, and the payload where one was not."""
+        columns = tuple(f"torque.{joint}" for joint in observations.robot.joint_names)
+        recorded = tuple(column for column in columns if column in observations.covariates)
+        computed = ("payload",) if "payload" in observations.covariates and recorded != columns else ()
+        return (*computed, *recorded)
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """One compliance a joint; rad/(N·m), or m/N for a prismatic joint."""

@@ -158,7 +158,7 @@ def _frame(axes: Axes, view: _View) -> None:
 
 def _key(axes: Axes, view: _View) -> None:
     """Show below the legend how long an arrow of a round gap is drawn."""
-    below = ScaledTranslation(0.09, -0.35, axes.get_figure(root=True).dpi_scale_trans)
+    below = ScaledTranslation(0.09, -0.35, axes.figure.dpi_scale_trans)
     along = blended_transform_factory(axes.transData, axes.transAxes) + below
     start = axes.get_xlim()[0]
     tip = (start + view.sample * view.factor, 1.0)

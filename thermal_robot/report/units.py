@@ -59,7 +59,8 @@ def scale(unit: str, size: float) -> Scale:
 def _decimals(value: float, digits: int) -> int:
     if value == 0.0 or not isfinite(value):
         return 0
-    return max(0, digits - 1 - floor(log10(abs(value))))
+    rounded = float(f"{value:.{digits - 1}e}")  # 0.9999 needs the decimals of 1
+    return max(0, digits - 1 - floor(log10(abs(rounded))))
 
 
 def number(value: float, digits: int = 3) -> str:
@@ -76,7 +77,7 @@ def quantity(value: float | None, unit: str) -> str:
     if value is None or not isfinite(value):
         return MISSING
     best = scale(unit, value)
-    return f"{number(value * best.factor)} {best.unit}"
+    return f"{number(value * best.factor)} {best.unit}".rstrip()
 
 
 def together(values: Iterable[float | None], unit: str) -> list[str]:

@@ -1,0 +1,204 @@
+"""The page says the same as the text, stands alone, and trusts no name."""
+
+import re
+from dataclasses import replace
+from html import unescape
+from html.parser import HTMLParser
+
+import pytest
+
+from thermal_robot.diagnosis.result import Dependence, Estimate, Finding, Location, Unexplained, Where
+from thermal_robot.report import fragment, html
+
+KINDS = ("found", "nothing", "unexplained", "confounded")
+EMPTY = {"meta", "link", "br", "img", "input", "hr"}
+UGLY = "$a_1$ <script>alert('x')</script> & \"quote\" \\frac"
+
+
+class Reader(HTMLParser):
+    """Collects text, tags, references and identifiers, and checks that every tag is closed."""
+
+    def __init__(self, page):
+        super().__init__()
+        self.open, self.tags, self.text, self.references, self.ids = [], [], [], [], []
+        self.feed(page)
+        self.close()
+        assert self.open == []
+
+    def handle_starttag(self, tag, attrs):
+        self.tags.append(tag)
+        if tag not in EMPTY:
+            self.open.append(tag)
+        for name, value in attrs:
+            if name in ("href", "src", "xlink:href", "srcset", "action", "data"):
+                self.references.append(value)
+            self.references += re.findall(r"url\(([^)]*)\)", value or "")
+            if name == "id":
+                self.ids.append(value)
+
+    def handle_startendtag(self, tag, attrs):
+        self.handle_starttag(tag, attrs)
+        if tag not in EMPTY:
+            self.open.pop()
+
+    def handle_endtag(self, tag):
+        assert self.open.pop() == tag
+
+    def handle_data(self, data):
+        if not self.open or self.open[-1] != "style":
+            self.text.append(data)
+
+    @property
+    def words(self):
+        return re.sub(r"\s+", " ", " ".join(self.text))
+
+
+@pytest.fixture(params=[html, fragment])
+def write(request):
+    return request.param
+
+
+def ugly(base):
+    """Put a name that is no name wherever a name can stand."""
+    parameters = (Estimate(UGLY, 1.0, 0.1, UGLY, True), Estimate(UGLY, None, None, UGLY, False))
+    effects = (
+        replace(base.effects[0], name=UGLY, locations=(Location("link", UGLY, 0.4),), parameters=parameters),
+        Finding(UGLY + "2", "not_testable", needs=(UGLY,)),
+        Finding(UGLY + "3", "confounded", 0.5, None, None, confounded_with=(UGLY,)),
+    )
+    reasons = Unexplained(True, 1e-5, 0.001, (UGLY,), (Location("joint", UGLY, 0.9),), (Dependence(UGLY, 0.001),))
+    return replace(
+        base,
+        **dict.fromkeys(("campaign", "robot", "tool_frame", "summary", "advice"), UGLY),
+        joint_names=(UGLY, *base.joint_names[1:]),
+        separates=((UGLY, "drift"),),
+        warnings=(UGLY,),
+        verdict=(UGLY,),
+        gap=replace(base.gap, noise_source=UGLY, held_out=replace(base.gap.held_out, scheme=UGLY)),
+        effects=effects,
+        where=Where({"x": 1.0, "y": 0.0, "z": 0.0}, {UGLY: 0.4}, {UGLY: 0.3}, {UGLY: 0.2}),
+        unexplained=reasons,
+        rows=replace(base.rows, covariates={UGLY: base.rows.covariates["time"]}),
+    )
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_it_needs_nothing_from_outside(write, written, kind):
+    page = written(write, kind)
+    assert "//" not in re.sub(r"data:image/png;base64,[\w+/=\s]*", "", page)
+    assert "@import" not in page
+    references = Reader(page).references
+    assert references
+    assert all(r.startswith(("#", "data:image/png;base64,")) for r in references)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_references_within_figures_find_their_own_target(write, written, kind):
+    reader = Reader(written(write, kind))
+    assert len(reader.ids) == len(set(reader.ids))
+    assert {r[1:] for r in reader.references if r.startswith("#")} <= set(reader.ids)
+
+
+def test_every_name_is_escaped(write, case):
+    page = write(ugly(case("unexplained")))
+    assert "<script" not in page
+    assert "script" not in Reader(page).tags
+    assert page.count("&lt;script&gt;") > 5
+    assert UGLY in re.sub(r"\s+", " ", unescape(page))
+
+
+def test_equal_diagnoses_give_equal_pages(write, written, case):
+    assert written(write, "found") == write(case("found"))
+
+
+def test_it_says_what_the_diagnosis_says(write, written, case):
+    words = Reader(written(write, "found")).words
+    for said in (
+        case("found").summary,
+        "412 µm",
+        "28 µm",
+        "99.5 %",
+        "95 % interval",
+        "99.0 to 99.7 %",
+        "12.34 ± 0.41 µm/(m·K)",
+        "96.2 % (94.1 to 97.4 %)",
+        "not determined by these data: strain per kelvin of wrist_2_link",
+        "needs approach.<joint>",
+        case("found").warnings[0],
+    ):
+        assert said in words, said
+
+
+def test_an_undetermined_parameter_is_never_a_number(write, case):
+    wrong = Estimate("strain of nothing", 7.777e-6, 1.111e-6, "1/K", False)
+    finding = replace(case("found").effects[0], parameters=(wrong,))
+    words = Reader(write(replace(case("found"), effects=(finding,)))).words
+    assert "not determined by these data: strain of nothing" in words
+    assert not re.search(r"7\.7[78]|1\.1[12]", words)
+
+
+def test_the_unexplained_is_flagged(write, written):
+    page = written(write, "unexplained")
+    assert 'class="tr-flag"' in page
+    assert "It enters most probably at joint elbow_joint (72.0 %)" in Reader(page).words
+    assert 'class="tr-flag"' not in written(write, "found")
+
+
+def test_the_page_is_a_document_with_every_section(written):
+    page = written(html, "found")
+    assert page.startswith("<!DOCTYPE html>")
+    assert "<title>Diagnosis of hall_3_morning</title>" in page
+    headings = re.findall(r"<h2>(.*?)</h2>", page)
+    assert headings == ["How far", "Which", "Where", "Unexplained", "Next", "Set aside", "Warnings"]
+    assert page.count("<svg") == 5
+    assert "prefers-color-scheme: dark" in page
+    assert "size: A4" in page
+
+
+def test_sections_without_content_are_left_out(written):
+    headings = re.findall(r"<h2>(.*?)</h2>", written(html, "nothing"))
+    assert headings == ["How far", "Which", "Where", "Unexplained"]
+
+
+def test_the_date_is_that_which_was_given(case, written):
+    assert "1 April 2031 &lt;&gt;</footer>" in html(case("found"), generated="1 April 2031 <>")
+    assert re.search(r"<footer>thermal-robot( [\w.+]+)?</footer>", written(html, "found"))
+
+
+def test_rows_set_aside_stand_in_a_table(case, written):
+    diagnosis = case("found")
+    page = written(html, "found")
+    table = page[page.index("<h2>Set aside</h2>") :]
+    table = table[: table.index("</table>")]
+    assert "remainder (mm)" in table
+    rows = [re.findall(r"<td[^>]*>(.*?)</td>", row) for row in table.split("<tr>")[2:]]
+    assert [row[0] for row in rows] == ["17", "80"]
+    row = diagnosis.rows.remainder[list(diagnosis.rows.rows).index(17)] * 1e3
+    assert [float(v) for v in rows[0][3:6]] == pytest.approx(row, abs=0.006)
+    assert float(rows[0][2]) == pytest.approx((row**2).sum() ** 0.5, abs=0.006)
+
+
+def test_many_rows_set_aside_are_cut_off(case, make_rows):
+    aside = tuple(range(2, 102))
+    page = html(replace(case("found"), outliers=aside, rows=make_rows(300, aside=aside)))
+    assert "and 60 more, which stand in the JSON" in page
+
+
+def test_a_notebook_shows_the_fragment(case, written):
+    shown = case("found")._repr_html_()
+    assert shown == written(fragment, "found")
+    assert shown.startswith('<div class="thermal-robot">')
+    assert "<html" not in shown
+    rules = re.search(r"<style>(.*?)</style>", shown, re.DOTALL)[1]
+    assert all(".thermal-robot" in selector for selector in re.findall(r"([^{}]+)\{", rules))
+
+
+def test_figures_take_the_colours_of_the_page(written):
+    page = written(html, "found")
+    assert "var(--tr-ink,#22282e)" in page
+    assert "var(--tr-before,#e69f00)" in page
+
+
+def test_a_long_campaign_stays_small(case, make_rows):
+    long = replace(case("unexplained"), samples=12000, rows=make_rows(12000))
+    assert len(html(long)) < 2_000_000

@@ -1,0 +1,142 @@
+"""The schema accepts every diagnosis and rejects what breaks the contract."""
+
+import copy
+import json
+
+import jsonschema
+import pytest
+
+from thermal_robot.report import schema
+
+
+@pytest.fixture(scope="module")
+def validator():
+    return jsonschema.Draft202012Validator(schema())
+
+
+def test_the_schema_is_a_schema():
+    assert schema()["$schema"].endswith("2020-12/schema")
+    jsonschema.Draft202012Validator.check_schema(schema())
+
+
+def test_the_schema_is_the_callers_own():
+    schema()["properties"].clear()
+    assert schema()["properties"]
+
+
+def test_every_diagnosis_is_valid(validator, diagnosis):
+    validator.validate(json.loads(json.dumps(diagnosis.to_dict())))
+
+
+def test_the_example_of_the_format_is_valid(validator):
+    effect = {
+        "name": "thermal_elongation",
+        "status": "found",
+        "probability": 0.99,
+        "shrinkage": 0.96,
+        "shrinkage_ci95": [0.94, 0.97],
+        "needs": [],
+        "confounded_with": [],
+        "locations": [{"kind": "link", "name": "upper_arm_link", "share": 0.6}],
+        "parameters": [{"name": "strain per kelvin", "value": 1.2e-5, "std": 4e-7, "unit": "1/K", "identified": True}],
+    }
+    law = {**effect, "name": "discovered.1", "quantity": "time", "shape": "step"}
+    held_out = {
+        "scheme": "blocked",
+        "folds": 5,
+        "rms_before": 1.2e-4,
+        "rms_after": 2.2e-5,
+        "shrinkage": 0.966,
+        "shrinkage_ci95": [0.95, 0.975],
+    }
+    plain = {
+        "schema": "thermal-robot/diagnosis/1",
+        "campaign": {"robot": "ur10", "tool_frame": "tool0", "samples": 120, "measures": "pose", "outliers": [17, 80]},
+        "gap": {
+            "rms_before": 1.2e-4,
+            "rms_after": 2.1e-5,
+            "noise_floor": 2.0e-5,
+            "orientation": {"rms_before": 1e-3, "rms_after": 4e-5},
+            "held_out": held_out,
+        },
+        "verdict": {"effects": ["discovered.1"], "probability": 0.98, "unexplained": True, "summary": "A law."},
+        "effects": [effect, law],
+        "where": {
+            "axes": {"x": 0.2, "y": 0.3, "z": 0.5},
+            "joints": {"elbow_joint": 0.1},
+            "links": {"upper_arm_link": 0.6},
+            "covariates": {"temperature": 0.8},
+        },
+        "unexplained": {
+            "rms": 0.0,
+            "p_value": 0.4,
+            "locations": [{"kind": "joint", "name": "elbow_joint", "probability": 0.7}],
+            "depends_on": [{"covariate": "time", "p_value": 1e-6}],
+        },
+        "next": {"separates": [["joint_offset", "tool_frame"]], "advice": "one plain sentence", "samples": []},
+    }
+    validator.validate(plain)
+    del law["shape"]
+    assert not validator.is_valid(plain)
+    law["shape"] = "step"
+    effect["shape"] = "step"  # an effect of the library is no law found in the data
+    assert not validator.is_valid(plain)
+
+
+BREAKAGES = {
+    "another format": lambda d: d.update(schema="thermal-robot/diagnosis/2"),
+    "an unknown key": lambda d: d.update(extra=1),
+    "no effects": lambda d: d.pop("effects"),
+    "an unknown measurement": lambda d: d["campaign"].update(measures="positions"),
+    "a row that is no number": lambda d: d["campaign"].update(outliers=["17"]),
+    "a row twice": lambda d: d["campaign"].update(outliers=[17, 17]),
+    "no sample": lambda d: d["campaign"].update(samples=0),
+    "a negative gap": lambda d: d["gap"].update(rms_before=-1e-4),
+    "a gap that is not a number": lambda d: d["gap"].update(rms_after=None),
+    "an orientation that was not measured": lambda d: d["gap"].update(orientation={"rms_before": 0.1, "rms_after": 0}),
+    "an orientation that is missing": lambda d: d["campaign"].update(measures="pose"),
+    "no word on orientation": lambda d: d["gap"].pop("orientation"),
+    "no held-out interval": lambda d: d["gap"]["held_out"].pop("shrinkage_ci95"),
+    "an interval of three": lambda d: d["gap"]["held_out"].update(shrinkage_ci95=[0.1, 0.2, 0.3]),
+    "a shrinkage above one": lambda d: d["gap"]["held_out"].update(shrinkage=1.2),
+    "a probability above one": lambda d: d["verdict"].update(probability=98.0),
+    "a verdict that is a word": lambda d: d["verdict"].update(effects="drift"),
+    "no sentence": lambda d: d["verdict"].update(summary=""),
+    "an unknown status": lambda d: d["effects"][0].update(status="maybe"),
+    "a found effect without probability": lambda d: d["effects"][0].update(probability=None),
+    "a found effect without shrinkage": lambda d: d["effects"][0].update(shrinkage=None),
+    "a found effect that needs something": lambda d: d["effects"][0].update(needs=["time"]),
+    "a found effect without interval": lambda d: d["effects"][0].update(shrinkage_ci95=None),
+    "a share above one": lambda d: d["effects"][0]["locations"][0].update(share=1.5),
+    "an unknown kind of place": lambda d: d["effects"][0]["locations"][0].update(kind="gearbox"),
+    "an undetermined number": lambda d: d["effects"][0]["parameters"][2].update(value=1e-5),
+    "an undetermined deviation": lambda d: d["effects"][0]["parameters"][2].update(std=1e-5),
+    "a determined nothing": lambda d: d["effects"][0]["parameters"][0].update(value=None),
+    "a parameter without unit": lambda d: d["effects"][0]["parameters"][0].pop("unit"),
+    "an untested effect with a probability": lambda d: d["effects"][-1].update(probability=0.5),
+    "an untested effect with a shrinkage": lambda d: d["effects"][-1].update(shrinkage=0.0),
+    "an untested effect that needs nothing": lambda d: d["effects"][-1].update(needs=[]),
+    "confounded with nothing": lambda d: d["effects"][1].update(status="confounded"),
+    "a law without quantity": lambda d: d["effects"][0].update(name="discovered.1", shape="step"),
+    "a fourth axis": lambda d: d["where"]["axes"].update(w=0.1),
+    "a negative share": lambda d: d["where"]["links"].update(hand=-0.1),
+    "a place without probability": lambda d: d["unexplained"].update(locations=[{"kind": "joint", "name": "a"}]),
+    "a p-value above one": lambda d: d["unexplained"].update(p_value=2),
+    "a group of none": lambda d: d["next"].update(separates=[[]]),
+}
+
+
+@pytest.mark.parametrize("breakage", list(BREAKAGES))
+def test_what_breaks_the_contract_is_rejected(validator, case, breakage):
+    plain = case("found").to_dict()
+    broken = copy.deepcopy(plain)
+    BREAKAGES[breakage](broken)
+    assert validator.is_valid(plain)
+    assert not validator.is_valid(broken)
+
+
+def test_held_out_shares_may_be_negative(validator, case):
+    plain = case("found").to_dict()
+    plain["gap"]["held_out"].update(shrinkage=-0.4, shrinkage_ci95=[-0.9, 0.1])
+    plain["effects"][1].update(shrinkage=-2.0, shrinkage_ci95=[-3.0, -1.0])
+    validator.validate(plain)

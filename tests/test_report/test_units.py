@@ -1,0 +1,90 @@
+"""Numbers in the unit that a metrologist would choose."""
+
+import math
+
+import pytest
+
+from thermal_robot.diagnosis.result import Estimate, Location
+from thermal_robot.report import units
+
+
+@pytest.mark.parametrize(
+    ("value", "unit", "written"),
+    [
+        (4.12e-4, "m", "412 µm"),
+        (2.83e-5, "m", "28.3 µm"),
+        (9.999e-4, "m", "1.00 mm"),
+        (2.41e-3, "m", "2.41 mm"),
+        (0.5, "m", "500 mm"),
+        (12.0, "m", "12.0 m"),
+        (0.0, "m", "0 µm"),
+        (1.04e-3, "rad", "1.04 mrad"),
+        (4.2e-5, "rad", "42.0 µrad"),
+        (-1.2e-3, "rad", "−1.20 mrad"),
+        (1.2e-5, "1/K", "12.0 µm/(m·K)"),
+        (5e-4, "1", "500 ppm"),
+        (0.02, "1", "2.00 %"),
+        (3e-3, "s", "3.00 ms"),
+        (1.7e-5, "rad/(N·m)", "17.0 µrad/(N·m)"),
+        (2e-7, "m/N", "0.200 µm/N"),
+        (0.25, "kg", "0.250 kg"),
+        (3.0, "slips/turn", "3.00 slips/turn"),
+        (1e-9, "", "1.00e−09"),
+        (None, "m", "–"),
+        (math.nan, "m", "–"),
+    ],
+)
+def test_a_quantity_is_written_in_its_best_unit(value, unit, written):
+    assert units.quantity(value, unit) == written
+
+
+def test_values_to_be_compared_share_unit_and_decimals():
+    assert units.together((4.12e-4, 2.83e-5), "m") == ["412 µm", "28 µm"]
+    assert units.together((2.41e-3, 2.83e-5, 0.0), "m") == ["2.410 mm", "0.028 mm", "0.000 mm"]
+    assert units.together((1e-3, None), "rad") == ["1.00 mrad", "–"]
+    assert units.together((0.0, 0.0), "m") == ["0 µm", "0 µm"]
+
+
+def test_an_estimate_carries_two_digits_of_its_standard_deviation():
+    assert units.estimate(Estimate("a", 1.234e-5, 4.1e-7, "1/K", True)) == "12.34 ± 0.41 µm/(m·K)"
+    assert units.estimate(Estimate("a", -1.2e-3, 2.2e-5, "rad", True)) == "−1.200 ± 0.022 mrad"
+    assert units.estimate(Estimate("a", 6.685e-3, 2.74e-4, "1", True)) == "6685 ± 274 ppm"
+    assert units.estimate(Estimate("a", 3.0, 0.0, "", True)) == "3.00"
+
+
+def test_an_estimate_takes_the_unit_of_those_beside_it():
+    small = Estimate("a", 0.0, 2.2e-5, "rad", True)
+    assert units.estimate(small) == "0 ± 22 µrad"
+    assert units.estimate(small, [Estimate("b", 1.2e-3, 2.2e-5, "rad", True)]) == "0.000 ± 0.022 mrad"
+    assert units.estimate(small, [Estimate("b", 1.2e-3, 2.2e-5, "m", True)]) == "0 ± 22 µrad"
+
+
+@pytest.mark.parametrize("value", [None, 1.5, math.nan])
+def test_what_is_not_determined_is_never_a_number(value):
+    assert units.estimate(Estimate("a", value, value, "m", False)) == "not determined by these data"
+
+
+@pytest.mark.parametrize(
+    ("value", "written"),
+    [(0.9996, "> 99.9 %"), (0.978, "97.8 %"), (1e-9, "< 0.1 %"), (0.5, "50.0 %"), (None, "–"), (math.nan, "–")],
+)
+def test_a_probability_is_never_certain(value, written):
+    assert units.probability(value) == written
+
+
+def test_shares_p_values_and_places():
+    assert units.percent(-0.031) == "−3.1 %"
+    assert units.percent(-0.0003) == "0.0 %"
+    assert units.percent(None) == "–"
+    assert units.interval((-0.004, 0.006)) == "−0.4 to 0.6"
+    assert units.interval(None) == ""
+    assert [units.p_value(p) for p in (0.43, 0.012, 3.2e-9, 0.0)] == [
+        "p = 0.43",
+        "p = 0.012",
+        "p = 3e-9",
+        "p < 1e-12",
+    ]
+    assert units.place(Location("joint", "hand", 0.1)) == "joint hand"
+    assert units.place(Location("base", "base", 0.1)) == "base"
+    assert units.recorded_unit("temperature.upper_arm_link") == "°C"
+    assert units.recorded_unit("humidity") == ""
