@@ -107,6 +107,7 @@ BREAKAGES = {
     "a found effect without shrinkage": lambda d: d["effects"][0].update(shrinkage=None),
     "a found effect that needs something": lambda d: d["effects"][0].update(needs=["time"]),
     "a found effect without interval": lambda d: d["effects"][0].update(shrinkage_ci95=None),
+    "an effect's interval of one": lambda d: d["effects"][0].update(shrinkage_ci95=[0.9]),
     "a share above one": lambda d: d["effects"][0]["locations"][0].update(share=1.5),
     "an unknown kind of place": lambda d: d["effects"][0]["locations"][0].update(kind="gearbox"),
     "an undetermined number": lambda d: d["effects"][0]["parameters"][2].update(value=1e-5),
@@ -138,5 +139,6 @@ def test_what_breaks_the_contract_is_rejected(validator, case, breakage):
 def test_held_out_shares_may_be_negative(validator, case):
     plain = case("found").to_dict()
     plain["gap"]["held_out"].update(shrinkage=-0.4, shrinkage_ci95=[-0.9, 0.1])
+    plain["effects"][0].update(shrinkage=1.05, shrinkage_ci95=[0.9, 1.2])  # what another loses, this one gains
     plain["effects"][1].update(shrinkage=-2.0, shrinkage_ci95=[-3.0, -1.0])
     validator.validate(plain)

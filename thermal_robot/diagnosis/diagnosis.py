@@ -109,7 +109,7 @@ def _probability(fitted: Fit) -> float:
     """Posterior probability of exactly these effects, whatever the settings of their nonlinear arguments."""
     e, chosen = fitted.explanation, {effect.name for effect, _ in fitted.effects}
     same = [{fitted.families[b] for b in c.blocks} == chosen for c in e.combinations]
-    return float(e.probabilities[same].sum())
+    return min(float(e.probabilities[same].sum()), 1.0)
 
 
 def _gap(fitted: Fit, shrinkage: Shrinkage, floor: float, source: str) -> Gap:

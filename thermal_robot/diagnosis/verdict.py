@@ -28,13 +28,8 @@ def plain(effect: str) -> str:
 
 def length(metres: float) -> str:
     """Return a length in the unit that a metrologist would use."""
-    return (
-        f"{metres * 1e3:.2f} mm"
-        if metres >= 1e-3
-        else f"{metres * 1e3:.3f} mm"
-        if metres >= 1e-5
-        else f"{metres * 1e6:.2f} µm"
-    )
+    scaled, unit = (metres * 1e3, "mm") if metres >= 1e-3 else (metres * 1e6, "µm")
+    return f"{scaled:.3g} {unit}"
 
 
 def sentence(

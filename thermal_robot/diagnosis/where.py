@@ -55,7 +55,12 @@ def locate(fit: Fit, shrinkage: dict[str, float]) -> tuple[Where, dict[str, tupl
         for place in found:
             if place.kind in by_kind:
                 by_kind[place.kind][place.name] += place.share
-    return Where(_axes(gap), dict(by_kind["joint"]), dict(by_kind["link"]), _covariates(fit, gap, rows)), locations
+    links = dict.fromkeys(segment.parent_link for segment in fit.corrected.robot.segments)
+    order = {"joint": fit.corrected.robot.joint_names, "link": tuple(links)}
+    joints, bodies = (
+        {name: by_kind[kind][name] for name in order[kind] if name in by_kind[kind]} for kind in ("joint", "link")
+    )
+    return Where(_axes(gap), joints, bodies, _covariates(fit, gap, rows)), locations
 
 
 def _axes(gap: Array) -> dict[str, float]:

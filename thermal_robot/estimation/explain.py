@@ -76,7 +76,7 @@ class Explanation:
     def probability(self, blocks: Sequence[int]) -> float:
         """Posterior probability that any of the blocks is at work."""
         held = [bool(set(c.blocks) & set(blocks)) for c in self.combinations]
-        return float(self.probabilities[held].sum())
+        return min(float(self.probabilities[held].sum()), 1.0)
 
 
 def distance_limit(measures: int, rows: int) -> float:

@@ -19,7 +19,7 @@ _LOOK: dict[str, dict[str, Any]] = {
     "confounded": {"color": "none", "edgecolor": AFTER, "hatch": "////"},
     "not_found": {"color": FAINT, "edgecolor": MUTED},
 }
-_FURTHEST_BELOW_ZERO = -0.25
+_FURTHEST_BELOW_ZERO, _FURTHEST = -0.25, 1.5
 
 
 def plot_which(diagnosis: Diagnosis) -> Figure:
@@ -51,6 +51,7 @@ def draw_which(axes: Axes, diagnosis: Diagnosis, *, brief: bool = False) -> None
             axes.text(1.0, line, plain(said), va="center", fontsize=SMALL, color=MUTED, style="italic")
             continue
         low = min(low, *(finding.shrinkage_ci95 or (0.0, 0.0)))
+        high = max(high, *(finding.shrinkage_ci95 or (0.0, 0.0)))
         _draw_bar(axes, line, finding)
         axes.text(
             1.02,
@@ -72,7 +73,7 @@ def draw_which(axes: Axes, diagnosis: Diagnosis, *, brief: bool = False) -> None
     )
     axes.set_yticks(range(len(ordered)), [plain(f.name) for f in ordered])
     axes.set_ylim(len(ordered) - 0.4, -1.3)
-    axes.set_xlim(100.0 * max(low, _FURTHEST_BELOW_ZERO) - 1.0, 100.0 * high + 2.0)
+    axes.set_xlim(100.0 * max(low, _FURTHEST_BELOW_ZERO) - 1.0, 100.0 * min(high, _FURTHEST) + 2.0)
     axes.axvline(0.0, color=MUTED, linewidth=0.8)
     axes.set_xlabel("share of the gap's mean square, rows held out, 95 % bars (%)")
     tidy(axes, grid="x")
