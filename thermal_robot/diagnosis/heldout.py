@@ -140,31 +140,34 @@ class _Subsets:
             self.whole[b] = both.T @ both
             self.position[b] = place.T @ place * metres if measures == 6 else self.whole[b] * metres
         self.total = self.whole.sum(axis=0)
+        self.worth, self.equations = e.design_effect, len(used) * measures
         self.variance = e.best.noise**2 * e.design_effect
 
     def squares(self, scales: dict[int, float]) -> Array:
         """(B,) squared held-out distances, summed a block of rows, with the given effects at their prior scales, m²."""
-        index = np.concatenate(
-            [np.arange(self.frames), *(np.arange(s.start, s.stop) for s in map(self.slices.__getitem__, scales))]
-        )
-        ridge = np.concatenate(
-            [
-                np.full(self.frames, 1e-9),
-                *(np.full(self.slices[b].stop - self.slices[b].start, self.variance / v**2) for b, v in scales.items()),
-            ]
-        )
-        index = index.astype(int)
+        spans = [np.arange(self.slices[b].start, self.slices[b].stop) for b in scales]
+        index = np.concatenate([np.arange(self.frames), *spans]).astype(int)
+        tight = np.repeat([1.0 / v**2 for v in scales.values()], [len(span) for span in spans])
+        picked = np.concatenate([index, [-1]])
         result = np.zeros(len(self.block_fold))
         for k in set(self.block_fold):
             mine = [b for b, f in enumerate(self.block_fold) if f == k]
             train = self.total - self.whole[mine].sum(axis=0)
-            matrix = train[np.ix_(index, index)] + np.diag(ridge)
-            solution = np.linalg.solve(matrix, train[index, -1])
-            signed = np.concatenate([-solution, [1.0]])
-            picked = np.concatenate([index, [-1]])
+            signed = self._fit(train[np.ix_(picked, picked)], tight)
             for b in mine:
                 result[b] = signed @ self.position[b][np.ix_(picked, picked)] @ signed
         return result
+
+    def _fit(self, train: Array, tight: Array) -> Array:
+        """Return the ridge solution, negative, then 1; what a subset of effects leaves out is noise to it."""
+        variance = self.variance
+        for _ in range(3):
+            ridge = np.concatenate([np.full(self.frames, 1e-9), variance * tight])
+            solution = np.linalg.solve(train[:-1, :-1] + np.diag(ridge), train[:-1, -1])
+            signed = np.concatenate([-solution, [1.0]])
+            left = self.worth * float(signed @ train @ signed) / max(self.equations, 1)
+            variance = max(left, self.variance)
+        return signed
 
 
 def _shares(
