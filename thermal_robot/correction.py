@@ -121,7 +121,7 @@ class CorrectedModel:
 
     def samples(self, path: str | Path) -> Campaign:
         """Read a table of commands and conditions in the units of the campaign that the model was fitted to."""
-        return read_samples(path, self.settings, self.robot)
+        return replace(read_samples(path, self.settings, self.robot), name=str(path))
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything, the URDF's text included, as plain values."""

@@ -13,7 +13,7 @@ from thermal_robot.effects import Effect
 from thermal_robot.estimation.columns import block, displacement, frame_columns
 from thermal_robot.estimation.explain import Explanation, Noise, explain
 from thermal_robot.estimation.groups import neighbourhoods, spells
-from thermal_robot.estimation.linear import Linear
+from thermal_robot.estimation.linear import Linear, contained
 from thermal_robot.estimation.register import moved, register
 from thermal_robot.observations import Frames, Observations, observe
 
@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 _STEPS = 12
 _REVISIONS = 3
 _REFINEMENT = 1.6
+_LARGE = 0.02  # rad or m
+_NO_WORSE = 1.02
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,54 +77,97 @@ def fit(campaign: Campaign, effects: Sequence[Effect], progress: Callable[[str],
     Fit
         Converged: another Gauss-Newton step would move nothing that can be measured.
     """
-    noise = Noise(campaign.noise_position, campaign.noise_orientation)
     progress("unknown frames")
     nominal = observe(campaign, register(campaign))
     needs = {e.name: missing for e in effects if (missing := e.missing(nominal))}
     settings = {e.name: e.variants(nominal) for e in effects if e.name not in needs}
-    candidates, families = _listed(settings)
-    progress("combinations of effects")
-    linear, groups = _linear(nominal, candidates), row_groups(campaign)
-    explanation = explain(linear, noise, families=families, groups=groups)
-    observations = nominal
-    for revision in range(_REVISIONS):
-        progress(f"exact fit, revision {revision + 1}")
-        held = [(candidates[b], explanation.values[b][0]) for b in explanation.best.blocks]
-        observations, held = _gauss_newton(campaign, observations.frames, explanation, held)
-        for effect, _ in held:
-            settings[effect.name] = effect.nearby(_REFINEMENT ** (1 / 2**revision))
+    groups = row_groups(campaign)
+    settled = _settle(nominal, settings, groups, progress)
+    if settled.second_order:
+        # a container fits large errors of the effects inside it before they are linear: let those try without it
+        inside = {n: v for n, v in settings.items() if n not in settled.containers}
+        apart = _settle(nominal, inside, groups, progress)
+        if apart.noise <= _NO_WORSE * settled.noise:
+            again = _settle(apart.observations, settings, groups, progress, apart)
+            settled = settled if set(again.names) & settled.containers else again
+    explanation = settled.explanation
+    nominal = observe(campaign, register(campaign, ~explanation.outliers))
+    before = Linear(nominal.gap, frame_columns(nominal)[0], ())
+    return Fit(campaign, nominal, before, settled.observations, explanation, settled.held, settled.families, needs)
+
+
+@dataclass(frozen=True, eq=False)
+class _Settled:
+    """An explanation and the exact model at which it was found."""
+
+    observations: Observations
+    explanation: Explanation
+    held: tuple[tuple[Effect, Array], ...]
+    families: tuple[str, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        return tuple(effect.name for effect, _ in self.held)
+
+    @property
+    def noise(self) -> float:
+        """What remains per axis, m."""
+        return float(self.explanation.whitening.noise[0] * self.explanation.best.noise)
+
+    @property
+    def containers(self) -> set[str]:
+        """Effects of the explanation that contain others."""
+        slices, pairs = self.explanation.problem.slices, contained(self.explanation.problem)
+        larger = {max(pair, key=lambda b: slices[b].stop - slices[b].start) for pair in pairs}
+        return {self.families[b] for b in larger} & set(self.names)
+
+    @property
+    def second_order(self) -> bool:
+        """Whether a container holds so much that products of its parameters show."""
+        moved_by, _ = displacement(self.observations, [h for h in self.held if h[0].name in self.containers])
+        return bool(np.abs(np.asarray(moved_by.segment)).max(initial=0.0) > _LARGE)
+
+
+def _settle(
+    start: Observations,
+    settings: dict[str, tuple[Effect, ...]],
+    groups: Sequence[NDArray[np.int64]],
+    progress: Callable[[str], None],
+    known: _Settled | None = None,
+) -> _Settled:
+    """Choose effects, refit the choice exactly, and choose again there, until the choice stays."""
+    campaign, observations, settings = start.campaign, start, dict(settings)
+    noise = Noise(campaign.noise_position, campaign.noise_orientation)
+    held: list[tuple[Effect, Array]] = []
+    outliers = None
+    if known is not None:
+        held, outliers = list(known.held), known.explanation.outliers
+        settings.update({effect.name: (effect,) for effect, _ in held})
+    for revision in range(_REVISIONS + 1):
+        progress("combinations of effects" if revision == 0 else f"exact fit, revision {revision}")
         candidates, families = _listed(settings)
         chosen = [candidates.index(effect) for effect, _ in held]
         blocks = tuple(block(observations, c) for c in candidates)
-        gap = observations.gap + sum(
-            (blocks[b].columns @ v for b, (_, v) in zip(chosen, held, strict=True)), np.zeros_like(observations.gap)
+        moved_by = (blocks[b].columns @ v for b, (_, v) in zip(chosen, held, strict=True))
+        linear = Linear(
+            observations.gap + sum(moved_by, np.zeros_like(observations.gap)), frame_columns(observations)[0], blocks
         )
-        explanation = explain(
-            Linear(gap, frame_columns(observations)[0], blocks),
-            noise,
-            families=families,
-            start=chosen,
-            outliers=explanation.outliers,
-            groups=groups,
-        )
-        if set(explanation.best.blocks) == set(chosen):
+        explanation = explain(linear, noise, families=families, start=chosen, outliers=outliers, groups=groups)
+        same = revision > 0 and set(explanation.best.blocks) == set(chosen)
+        held = [(candidates[b], explanation.values[b][0]) for b in explanation.best.blocks]
+        observations, held = _gauss_newton(campaign, observations.frames, explanation, held)
+        if same or revision == _REVISIONS:
             break
-    held = [(candidates[b], explanation.values[b][0]) for b in explanation.best.blocks]
-    observations, held = _gauss_newton(campaign, observations.frames, explanation, held)
-    nominal = observe(campaign, register(campaign, ~explanation.outliers))
-    before = Linear(nominal.gap, frame_columns(nominal)[0], ())
-    return Fit(campaign, nominal, before, observations, explanation, tuple(held), families, needs)
+        outliers = explanation.outliers
+        for effect, _ in held:
+            settings[effect.name] = effect.nearby(_REFINEMENT ** (1 / 2**revision))
+    return _Settled(observations, explanation, tuple(held), families)
 
 
 def row_groups(campaign: Campaign) -> tuple[NDArray[np.int64], ...]:
     """Return the groupings within which a remainder may be alike: spells of time and neighbourhoods of poses."""
     count = max(campaign.samples // 5, 2) if campaign.samples < 300 else 60
     return spells(campaign, count), neighbourhoods(campaign, count)
-
-
-def _linear(observations: Observations, candidates: Sequence[Effect]) -> Linear:
-    blocks = tuple(block(observations, c) for c in candidates)
-    return Linear(observations.gap, frame_columns(observations)[0], blocks)
 
 
 def _gauss_newton(

@@ -1,0 +1,271 @@
+"""The command line: exit status, one line for bad input, files that hold what was asked for."""
+
+import csv
+import json
+import subprocess
+import sys
+from dataclasses import replace
+
+import jsonschema
+import numpy as np
+import pytest
+from simulate import simulate
+
+from thermal_robot import __version__, cli, read_campaign
+from thermal_robot.campaign import write_campaign
+from thermal_robot.campaign.write import write_table
+from thermal_robot.datasets import demo_directory
+from thermal_robot.effects import library
+from thermal_robot.report import schema
+
+NOISE = 25e-6
+
+
+@pytest.fixture(scope="module")
+def folder(rv_m2, tmp_path_factory):
+    """A campaign in files, with further samples and their true places in millimetres."""
+    directory = tmp_path_factory.mktemp("cell")
+    campaign, truth, (fresh, place) = simulate(rv_m2, ["thermal_elongation"], seed=0, outliers=0.03, fresh=30)
+    write_campaign(campaign, directory)
+    write_table(fresh, directory / "fresh.csv")
+    np.savetxt(directory / "fresh_truth_mm.txt", 1e3 * place)
+    (directory / "truth.json").write_text(json.dumps(truth))
+    return directory
+
+
+@pytest.fixture(scope="module")
+def poses(rv_m2, tmp_path_factory):
+    """The same with orientations."""
+    directory = tmp_path_factory.mktemp("poses")
+    campaign, _, (fresh, _) = simulate(rv_m2, ["joint_offset"], seed=1, samples=60, turning=3e-5, fresh=30)
+    write_campaign(campaign, directory)
+    write_table(fresh, directory / "fresh.csv")
+    return directory
+
+
+@pytest.fixture
+def run(capsys):
+    """Run a command; give its status, what it printed, and its complaint."""
+
+    def run(*arguments):
+        status = cli.main([str(a) for a in arguments])
+        return status, *capsys.readouterr()
+
+    return run
+
+
+def refused(result, *words):
+    """Assert that a command said in one plain line what is wrong with its input."""
+    status, out, err = result
+    assert status == 2
+    assert out == ""
+    assert err.startswith("thermal-robot: ")
+    assert err.endswith("\n")
+    assert err.count("\n") == 1
+    assert "Traceback" not in err
+    for word in words:
+        assert str(word) in err, f"{word} is not in: {err}"
+
+
+def test_check_describes_a_campaign(run, folder):
+    status, out, err = run("check", folder)
+    assert (status, err) == (0, "")
+    assert "120" in out
+    assert all(joint in out for joint in read_campaign(folder).robot.joint_names)
+    assert run("check", folder / "campaign.toml") == (0, out, "")
+
+
+def test_diagnose_prints_the_verdict_and_writes_what_is_asked_for(run, folder, tmp_path):
+    page, plain, model = tmp_path / "r.html", tmp_path / "d.json", tmp_path / "m.json"
+    status, out, err = run("diagnose", folder, "--json", plain, "--report", page, "--model", model)
+    assert (status, err) == (0, "")
+    found = json.loads(plain.read_text(encoding="utf-8"))
+    jsonschema.validate(found, schema())
+    assert found["schema"] == "thermal-robot/diagnosis/1"
+    assert found["verdict"]["effects"] == ["thermal_elongation"]
+    assert found["verdict"]["unexplained"] is False
+    assert found["campaign"]["samples"] == 120
+    assert set(found["campaign"]["outliers"]) == set(json.loads((folder / "truth.json").read_text())["outliers"])
+    assert "thermal_elongation" in out or "thermal elongation" in out
+    html = page.read_text(encoding="utf-8")
+    assert html.lstrip().lower().startswith("<!doctype html>")
+    assert found["verdict"]["summary"].split(" (")[0] in html
+    assert json.loads(model.read_text())["schema"] == "thermal-robot/model/1"
+
+
+def test_json_to_the_terminal_is_nothing_but_json(run, folder):
+    status, out, err = run("diagnose", folder, "--json", "-")
+    assert (status, err) == (0, "")
+    found = json.loads(out)
+    jsonschema.validate(found, schema())
+    assert found["verdict"]["effects"] == ["thermal_elongation"]
+
+
+def test_json_of_poses_and_of_the_unexplained_keeps_to_its_schema(run, folder, poses):
+    _, out, _ = run("diagnose", poses, "--json", "-")
+    found = json.loads(out)
+    jsonschema.validate(found, schema())
+    assert found["campaign"]["measures"] == "pose"
+    assert found["gap"]["orientation"]["rms_after"] < found["gap"]["orientation"]["rms_before"]
+    _, out, _ = run("diagnose", folder, "--json", "-", "--without", "thermal_elongation")
+    found = json.loads(out)
+    jsonschema.validate(found, schema())
+    assert found["verdict"]["unexplained"] is True
+    assert found["unexplained"]["rms"] > 0.0
+    assert found["unexplained"]["locations"]
+
+
+def test_the_schema_is_strict_enough_to_find_a_mistake(run, folder):
+    found = json.loads(run("diagnose", folder, "--json", "-")[1])
+    for change in (
+        {"schema": "thermal-robot/diagnosis/0"},
+        {"verdict": {"effects": "thermal_elongation"}},
+        {"gap": None},
+        {"effects": [{"name": "drift", "status": "perhaps"}]},
+    ):
+        with pytest.raises(jsonschema.ValidationError):
+            jsonschema.validate({**found, **change}, schema())
+
+
+def test_only_and_without_choose_among_the_effects(run, folder):
+    def candidates(*options):
+        return {e["name"] for e in json.loads(run("diagnose", folder, "--json", "-", *options)[1])["effects"]}
+
+    assert candidates("--only", "drift", "joint_gain") == {"drift", "joint_gain"}
+    assert candidates("--only", "drift", "--only", "joint_gain") == {"drift", "joint_gain"}
+    assert candidates("--without", "drift", "joint_gain") == set(library()) - {"drift", "joint_gain"}
+    refused(run("diagnose", folder, "--only", "thermal_elongatio"), "'thermal_elongatio'", "thermal_elongation")
+    refused(run("diagnose", folder, "--without", "drif"), "'drif'", "drift")
+
+
+def table(path):
+    with path.open(newline="") as file:
+        rows = list(csv.reader(file))
+    return rows[0], np.array(rows[1:], dtype=float)
+
+
+def test_predict_writes_the_same_rows_in_order_and_nothing_else(run, folder, tmp_path):
+    model, out = tmp_path / "m.json", tmp_path / "p.csv"
+    assert run("diagnose", folder, "--model", model)[0] == 0
+    assert run("predict", model, folder / "fresh.csv", "-o", out) == (0, "", "")
+    header, predicted = table(out)
+    assert header == ["x", "y", "z"]
+    truth = np.loadtxt(folder / "fresh_truth_mm.txt")
+    assert predicted.shape == truth.shape == (30, 3)
+    assert np.sqrt(((predicted - truth) ** 2).mean()) < 0.5e3 * NOISE
+    # the campaign's own table, measured columns and all, is as good a table of samples
+    assert run("predict", model, folder / "measurements.csv", "--output", out)[0] == 0
+    header, predicted = table(out)
+    assert (header, len(predicted)) == (["x", "y", "z"], 120)
+
+
+def test_predict_writes_quaternions_for_poses(run, poses, tmp_path):
+    model, out = tmp_path / "m.json", tmp_path / "p.csv"
+    assert run("diagnose", poses, "--model", model)[0] == 0
+    assert run("predict", model, poses / "fresh.csv", "-o", out) == (0, "", "")
+    header, predicted = table(out)
+    assert header == ["x", "y", "z", "qw", "qx", "qy", "qz"]
+    assert len(predicted) == 30
+    np.testing.assert_allclose(np.linalg.norm(predicted[:, 3:], axis=1), 1.0, atol=1e-12)
+
+
+def test_units_of_the_campaign_are_units_of_its_prediction(run, rv_m2, folder, tmp_path):
+    campaign = read_campaign(folder)
+    other = replace(campaign, units=type(campaign.units)("deg", "um"))
+    write_campaign(other, tmp_path / "um")
+    header, degrees = table(tmp_path / "um" / "measurements.csv")
+    assert np.abs(degrees[:, header.index("joint_1")]).max() > 10.0
+    places = []
+    for where in (folder, tmp_path / "um"):
+        assert run("diagnose", where, "--model", tmp_path / "m.json")[0] == 0
+        assert run("predict", tmp_path / "m.json", where / "measurements.csv", "-o", tmp_path / "p.csv")[0] == 0
+        places.append(table(tmp_path / "p.csv")[1])
+    np.testing.assert_allclose(places[1], 1e3 * places[0], rtol=0, atol=1e-2)
+
+
+def test_bad_input_is_said_in_one_line(run, folder, tmp_path):
+    refused(run("check", tmp_path / "absent"), "absent")
+    refused(run("diagnose", tmp_path), "campaign.toml")
+    spoilt = tmp_path / "spoilt"
+    spoilt.mkdir()
+    for name in ("campaign.toml", "robot.urdf", "measurements.csv"):
+        (spoilt / name).write_text((folder / name).read_text())
+    lines = (folder / "measurements.csv").read_text().splitlines()
+    lines[4] = "wrong," + lines[4].split(",", 1)[1]
+    (spoilt / "measurements.csv").write_text("\n".join(lines))
+    for command in ("check", "diagnose"):
+        refused(run(command, spoilt), "measurements.csv", "row 5", "'joint_1'", "wrong")
+    (spoilt / "campaign.toml").write_text((folder / "campaign.toml").read_text().replace('"tool0"', '"tool_0"'))
+    refused(run("check", spoilt), "'tool_0'", "tool0")
+
+
+def test_predict_says_what_it_misses(run, folder, tmp_path):
+    model = tmp_path / "m.json"
+    run("diagnose", folder, "--model", model)
+    header, *rows = (folder / "fresh.csv").read_text().splitlines()
+    at = header.split(",").index("temperature")
+    less = [",".join(c for k, c in enumerate(line.split(",")) if k != at) for line in (header, *rows)]
+    (tmp_path / "less.csv").write_text("\n".join(less))
+    refused(run("predict", model, tmp_path / "less.csv", "-o", tmp_path / "p.csv"), "less", "'temperature'")
+    assert not (tmp_path / "p.csv").exists()
+    refused(run("predict", folder / "truth.json", folder / "fresh.csv", "-o", tmp_path / "p.csv"), "truth.json")
+    refused(run("predict", model, tmp_path / "absent.csv", "-o", tmp_path / "p.csv"), "absent.csv")
+    refused(run("predict", model, folder / "fresh.csv", "-o", tmp_path / "no" / "p.csv"), "p.csv", "cannot be written")
+
+
+def test_predict_names_the_file_that_misses_a_column(run, folder, tmp_path):
+    model, samples = tmp_path / "m.json", tmp_path / "less.csv"
+    run("diagnose", folder, "--model", model)
+    lines = (folder / "fresh.csv").read_text().splitlines()
+    joints = len(read_campaign(folder).robot.joint_names)
+    samples.write_text("\n".join(",".join(line.split(",")[:joints]) for line in lines))
+    refused(run("predict", model, samples, "-o", tmp_path / "p.csv"), samples, "'temperature'")
+
+
+@pytest.mark.parametrize("option", ["--json", "--model", "--report"])
+def test_a_file_that_cannot_be_written_is_bad_input(run, folder, tmp_path, option):
+    status, _, err = run("diagnose", folder, "--only", "drift", option, tmp_path / "no" / "file")
+    assert status == 2
+    assert "cannot be written" in err
+    assert err.count("\n") == 1
+
+
+@pytest.mark.parametrize("arguments", [[], ["diagnos"], ["diagnose"], ["predict", "m", "s"], ["check", "a", "b"]])
+def test_a_command_line_that_is_none_exits_with_two(arguments, capsys):
+    with pytest.raises(SystemExit) as stopped:
+        cli.main(arguments)
+    assert stopped.value.code == 2
+    assert "usage: thermal-robot" in capsys.readouterr().err
+
+
+def test_the_version_is_told(capsys):
+    with pytest.raises(SystemExit) as stopped:
+        cli.main(["--version"])
+    assert stopped.value.code == 0
+    assert capsys.readouterr().out == f"thermal-robot {__version__}\n"
+
+
+def test_the_demo_prints_and_draws(run, tmp_path):
+    page = tmp_path / "demo.html"
+    status, out, err = run("demo", "--report", page)
+    assert (status, err) == (0, "")
+    assert str(page) in out
+    truth = json.loads((demo_directory() / "truth.json").read_text())
+    html = page.read_text(encoding="utf-8")
+    for effect in truth["effects"]:
+        assert effect in out
+        assert effect in html
+
+
+def program(*arguments, cwd):
+    command = [sys.executable, "-m", "thermal_robot.cli", *map(str, arguments)]
+    return subprocess.run(command, capture_output=True, text=True, cwd=cwd, check=False, timeout=120)
+
+
+def test_the_program_itself_exits_as_it_should(folder, tmp_path):
+    good = program("diagnose", folder, "--json", "-", "--only", "thermal_elongation", "drift", cwd=tmp_path)
+    assert (good.returncode, good.stderr) == (0, "")
+    assert json.loads(good.stdout)["verdict"]["effects"] == ["thermal_elongation"]
+    bad = program("diagnose", "absent", cwd=tmp_path)
+    refused((bad.returncode, bad.stdout, bad.stderr), "absent")
+    assert list(tmp_path.iterdir()) == []
