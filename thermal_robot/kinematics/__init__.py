@@ -1,18 +1,23 @@
 """Poses, Jacobians, placement sensitivities and gravity torques in batches; the one room with Pinocchio."""
 
+from thermal_robot.kinematics.augmented import AugmentedModel, augmented_model, elongation_jacobian, growing
 from thermal_robot.kinematics.frames import ChainFrames, Displacement, chain_frames, tool_poses
 from thermal_robot.kinematics.gravity import gravity_torques
 from thermal_robot.kinematics.jacobians import frame_jacobians, placement_sensitivities
 from thermal_robot.kinematics.lie import exp3, exp6, log3, quaternion_to_rotation, rotation_to_quaternion
 
 __all__ = [
+    "AugmentedModel",
     "ChainFrames",
     "Displacement",
+    "augmented_model",
     "chain_frames",
+    "elongation_jacobian",
     "exp3",
     "exp6",
     "frame_jacobians",
     "gravity_torques",
+    "growing",
     "log3",
     "placement_sensitivities",
     "quaternion_to_rotation",

@@ -12,8 +12,8 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from thermal_robot.kinematics.augmented import augmented_model
 from thermal_robot.kinematics.frames import ChainFrames, Displacement
-from thermal_robot.kinematics.model import unit_motion
 
 if TYPE_CHECKING:
     from thermal_robot.robot import Robot
@@ -81,21 +81,19 @@ def frame_jacobians(robot: Robot, q: ArrayLike, *, point: ArrayLike = (0.0, 0.0,
 
 def placement_sensitivities(robot: Robot, q: ArrayLike, *, point: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
     """Regressor (N, 6, S, 6) by Pinocchio; see :func:`thermal_robot.kinematics.placement_sensitivities`."""
-    model, movable = augmented_model(robot)
-    model, frame = _with_point(model, model.njoints - 1, pin.SE3.Identity(), point)
-    data, to_root = model.createData(), _to_root_axes(robot)
-    q = np.atleast_2d(np.asarray(q, dtype=float))
-    out = np.empty((len(q), 6, len(robot.segments), 6))
-    for i, row in enumerate(q):
-        augmented = np.zeros(model.nq)
-        augmented[movable] = row
-        pin.framesForwardKinematics(model, data, augmented)
+    # Pinocchio's kinematic regressor knows placements of joints only: hence the virtual ones of fixed frames.
+    augmented = augmented_model(robot)
+    tool = augmented.model.frames[augmented.tool]
+    model, frame = _with_point(augmented.model, tool.parentJoint, tool.placement, point)
+    data = model.createData()
+    rows = augmented.configurations(q)
+    out = np.empty((len(rows), 6, len(robot.segments), 6))
+    for i, row in enumerate(rows):
+        pin.framesForwardKinematics(model, data, row)
         regressor = pin.computeFrameKinematicRegressor(model, data, frame, pin.LOCAL)
-        rotation = data.oMf[frame].rotation
-        turned = to_root @ np.kron(np.eye(2), rotation) @ regressor
-        out[i] = turned.reshape(6, len(robot.chain.names), 6)[
-            :, [segment.index for segment in robot.segments]
-        ]
+        turned = np.kron(np.eye(2), data.oMf[frame].rotation) @ regressor
+        # The regressor begins with the first joint, which is number 1.
+        out[i] = turned.reshape(6, model.njoints - 1, 6)[:, np.array(augmented.placements) - 1]
     return out
 
 
@@ -104,9 +102,7 @@ def gravity_torques(
 ) -> Array:
     """Return holding torques (N, n) by Pinocchio; see :func:`thermal_robot.kinematics.gravity_torques`."""
     configurations = to_pinocchio(robot, q)
-    payloads = np.broadcast_to(
-        np.asarray(0.0 if payload is None else payload, dtype=float), len(configurations)
-    )
+    payloads = np.broadcast_to(np.asarray(0.0 if payload is None else payload, dtype=float), len(configurations))
     tool = _tool(robot)
     out = np.empty((len(configurations), robot.n))
     for i, (configuration, mass) in enumerate(zip(configurations, payloads, strict=True)):
@@ -115,42 +111,6 @@ def gravity_torques(
         model.appendBodyToJoint(tool.parentJoint, body, tool.placement)
         out[i] = pin.computeGeneralizedGravity(model, model.createData(), configuration)
     return out
-
-
-def augmented_model(robot: Robot) -> tuple[pin.Model, list[int]]:
-    """Model in which every element of the chain is a joint, the fixed ones prismatic and at zero.
-
-    Pinocchio's kinematic regressor knows placements of joints only; so do the paper's virtual prismatic
-    joints. Every joint has one number: a continuous joint is written as a revolute one without limits.
-
-    Returns
-    -------
-    model, movable
-        ``pinocchio.Model`` whose world is the world of the robot's model, and the position of each movable
-        joint in its configuration.
-    """
-    model = pin.Model()
-    parent, before = 0, _pose_of_link(robot, robot.root_frame).placement
-    for name in robot.chain.names:
-        if robot.model.existJointName(name):
-            number = robot.model.getJointId(name)
-            original, joint = (
-                robot.model.jointPlacements[number],
-                _one_number(robot.model, robot.model.joints[number]),
-            )
-            placement, next_before = before.actInv(original), pin.SE3.Identity()
-        else:
-            frame = robot.model.frames[robot.model.getFrameId(name, pin.FrameType.FIXED_JOINT)]
-            placement, next_before, joint = (
-                before.actInv(frame.placement),
-                frame.placement,
-                pin.JointModelPX(),
-            )
-        if parent == 0:
-            placement = _pose_of_link(robot, robot.root_frame).placement * placement
-        parent = model.addJoint(parent, joint, placement, name)
-        before = next_before
-    return model, [model.joints[model.getJointId(name)].idx_q for name in robot.joint_names]
 
 
 def _frames_by_pinocchio(robot: Robot, configuration: Array) -> list[pin.SE3]:
@@ -176,9 +136,7 @@ def _frames_displaced(robot: Robot, q: Array, displacement: Displacement, i: int
     pose, poses = pin.exp6(_row(displacement.base, i, 1, np.zeros(6))), []
     for k in range(len(robot.chain.names)):
         pose = (
-            pose
-            * pin.SE3(robot.chain.rotations[k], robot.chain.translations[k])
-            * pin.exp6(twists.get(k, np.zeros(6)))
+            pose * pin.SE3(robot.chain.rotations[k], robot.chain.translations[k]) * pin.exp6(twists.get(k, np.zeros(6)))
         )
         poses.append(pose)
         if robot.model.existJointName(robot.chain.names[k]):
@@ -213,9 +171,3 @@ def _to_root_axes(robot: Robot) -> Array:
 def _with_point(model: pin.Model, joint: int, placement: pin.SE3, point: ArrayLike) -> tuple[pin.Model, int]:
     at = placement * pin.SE3(np.eye(3), np.asarray(point, dtype=float))
     return model, model.addFrame(pin.Frame("measured_point", joint, 0, at, pin.FrameType.OP_FRAME))
-
-
-def _one_number(model: pin.Model, joint: pin.JointModel) -> pin.JointModel:
-    if joint.nq == 1:
-        return joint
-    return pin.JointModelRevoluteUnaligned(unit_motion(model, joint)[3:])

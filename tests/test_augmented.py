@@ -1,0 +1,103 @@
+"""Virtual prismatic joints: Pinocchio's, the placement sensitivities, the paper's formula and finite differences."""
+
+import numpy as np
+import pytest
+
+from thermal_robot import kinematics as kin
+from thermal_robot.errors import RobotError
+
+ROWS = 200
+
+
+def paper_jacobian(q):
+    """Eqs 9–11 of Kluz et al. (2018), as printed: (N, 3, 5)."""
+    q1, q2, q3, q4 = q[:, 0], q[:, 1], q[:, 2], q[:, 3]
+    zero, one = np.zeros(len(q)), np.ones(len(q))
+    horizontal = np.stack([zero, one, np.cos(q2), np.cos(q2 + q3), np.cos(q2 + q3 + q4)], axis=-1)
+    vertical = np.stack([one, zero, np.sin(q2), np.sin(q2 + q3), np.sin(q2 + q3 + q4)], axis=-1)
+    return np.stack([np.sin(q1)[:, None] * horizontal, np.cos(q1)[:, None] * horizontal, vertical], axis=1)
+
+
+def test_rv_m2_has_the_five_virtual_joints_of_the_paper(rv_m2):
+    augmented = kin.augmented_model(rv_m2)
+    assert augmented.segments == ("column_top", "joint_2", "joint_3", "joint_4", "tool_point")
+    assert list(augmented.model.names)[1:] == [
+        "joint_1",
+        "elongation of column_top",
+        "elongation of joint_2",
+        "joint_2",
+        "elongation of joint_3",
+        "joint_3",
+        "elongation of joint_4",
+        "joint_4",
+        "joint_5",
+        "elongation of tool_point",
+    ]
+    assert augmented.model.nq == augmented.model.nv == 10
+
+
+def test_pinocchios_jacobian_is_equations_9_to_11(rv_m2, configurations):
+    q, augmented = configurations(rv_m2, ROWS), kin.augmented_model(rv_m2)
+    theirs = augmented.jacobians(q)[:, :, augmented.elongations]
+    np.testing.assert_allclose(theirs[:, :3], paper_jacobian(q), rtol=0.0, atol=1e-12)
+    np.testing.assert_allclose(theirs[:, 3:], 0.0, atol=1e-15)
+    np.testing.assert_allclose(kin.elongation_jacobian(rv_m2, q), paper_jacobian(q), rtol=0.0, atol=1e-12)
+
+
+def test_pinocchios_jacobian_is_the_placement_sensitivity_along_each_segment(arm, configurations):
+    q, augmented = configurations(arm, ROWS), kin.augmented_model(arm)
+    jacobians = augmented.jacobians(q)
+    sensitivities = kin.placement_sensitivities(arm, q)
+    along = [sensitivities[:, :, s, :3] @ arm.segments[s].direction for s in kin.growing(arm)]
+    expected = np.stack(along, axis=-1)
+    np.testing.assert_allclose(jacobians[:, :, augmented.elongations], expected, rtol=0.0, atol=1e-10)
+    np.testing.assert_allclose(jacobians[:, :, augmented.joints], kin.frame_jacobians(arm, q), rtol=0.0, atol=1e-10)
+    np.testing.assert_allclose(kin.elongation_jacobian(arm, q, rows=6), expected, rtol=0.0, atol=1e-12)
+    np.testing.assert_array_equal(
+        kin.elongation_jacobian(arm, q), kin.elongation_jacobian(arm, q, frames=kin.chain_frames(arm, q))
+    )
+
+
+def test_segments_with_a_length_are_those_that_grow(arm):
+    chosen = kin.growing(arm)
+    assert [arm.segments[s].name for s in chosen] == [s.name for s in arm.segments if s.length > 1e-9]
+    assert kin.augmented_model(arm).segments == tuple(arm.segments[s].name for s in chosen)
+
+
+def test_at_zero_elongation_it_is_the_same_robot(arm, configurations):
+    q, augmented = configurations(arm, 50), kin.augmented_model(arm)
+    np.testing.assert_allclose(augmented.tool_poses(q), kin.tool_poses(arm, q), rtol=0.0, atol=1e-10)
+    np.testing.assert_array_equal(augmented.model.lowerPositionLimit[augmented.joints], arm.lower)
+    np.testing.assert_array_equal(augmented.model.upperPositionLimit[augmented.joints], arm.upper)
+    np.testing.assert_array_equal(augmented.model.gravity.linear, arm.gravity)
+
+
+def test_elongated_it_is_the_elongated_robot(arm, configurations):
+    q, augmented = configurations(arm, 50), kin.augmented_model(arm)
+    grown = np.random.default_rng(7).normal(0.0, 0.1, (50, len(augmented.segments)))
+    twists = np.zeros((50, len(arm.segments), 6))
+    for column, s in enumerate(kin.growing(arm)):
+        twists[:, s, :3] = grown[:, column, None] * arm.segments[s].direction
+    expected = kin.tool_poses(arm, q, kin.Displacement(segment=twists))
+    np.testing.assert_allclose(augmented.tool_poses(q, grown), expected, rtol=0.0, atol=1e-10)
+
+
+def test_jacobian_is_the_finite_difference(arm, configurations):
+    q, augmented, step = configurations(arm, 20), kin.augmented_model(arm), 1e-3
+    jacobian = kin.elongation_jacobian(arm, q)
+    for column, unit in enumerate(np.eye(len(augmented.segments))):
+        above, below = (augmented.tool_poses(q, sign * step * unit)[:, :3, 3] for sign in (1, -1))
+        # The position is linear in an elongation, so a long step costs nothing but rounding.
+        np.testing.assert_allclose((above - below) / (2 * step), jacobian[:, :, column], rtol=0.0, atol=1e-11)
+
+
+def test_shapes_that_do_not_fit_are_said(rv_m2):
+    augmented = kin.augmented_model(rv_m2)
+    with pytest.raises(RobotError, match=r"\(3, 4\) do not fit: expected \(N, 5\)"):
+        augmented.tool_poses(np.zeros((3, 4)))
+    with pytest.raises(RobotError, match=r"elongations of shape \(4,\) do not fit: expected \(5,\)"):
+        augmented.tool_poses(np.zeros((3, 5)), np.zeros(4))
+    with pytest.raises(RobotError, match="3 or 6 rows, not 4"):
+        kin.elongation_jacobian(rv_m2, np.zeros(5), rows=4)
+    assert augmented.tool_poses(np.empty((0, 5))).shape == (0, 4, 4)
+    assert augmented.jacobians(np.empty((0, 5))).shape == (0, 6, 10)
