@@ -232,10 +232,20 @@ def test_a_file_that_cannot_be_written_is_bad_input(run, folder, tmp_path, optio
 
 @pytest.mark.parametrize("arguments", [[], ["diagnos"], ["diagnose"], ["predict", "m", "s"], ["check", "a", "b"]])
 def test_a_command_line_that_is_none_exits_with_two(arguments, capsys):
-    with pytest.raises(SystemExit) as stopped:
-        cli.main(arguments)
-    assert stopped.value.code == 2
-    assert "usage: thermal-robot" in capsys.readouterr().err
+    try:
+        status = cli.main(arguments)
+    except SystemExit as stopped:
+        status = stopped.code
+    complaint = capsys.readouterr().err
+    assert status == 2
+    assert complaint.startswith("thermal-robot")
+    assert complaint.count("\n") == 1
+
+
+def test_a_campaign_after_the_names_of_effects_is_still_the_campaign(run, folder):
+    status, out, _ = run("diagnose", "--without", "drift", folder)
+    assert status == 0
+    assert "only these effects were considered" in " ".join(out.split())
 
 
 def test_the_version_is_told(capsys):

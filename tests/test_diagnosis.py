@@ -9,6 +9,7 @@ from simulate import simulate
 from thermal_robot import diagnose
 from thermal_robot.effects import library
 from thermal_robot.estimation.register import register
+from thermal_robot.observations import observe
 
 ALONE = [name for name in library() if name not in ("base_frame", "tool_frame")]
 NOISE = 25e-6
@@ -135,8 +136,9 @@ def test_figures_are_consistent(cases):
         shares = [f.shrinkage for f in found.effects if f.name in found.verdict]
         assert sum(shares) == pytest.approx(gap.held_out.shrinkage, abs=0.03)
         kept = ~found.rows.outliers
-        rms = np.sqrt((found.rows.remainder[kept] ** 2).sum(axis=1).mean())
-        assert gap.rms_after == pytest.approx(rms)
+        fitted = observe(case.campaign, register(case.campaign, kept)).gap[kept]
+        assert gap.rms_before == pytest.approx(np.sqrt((fitted**2).sum(axis=1).mean()), rel=1e-9)
+        assert gap.rms_after == pytest.approx(np.sqrt((found.rows.remainder[kept] ** 2).sum(axis=1).mean()))
         predicted, _ = found.model.predict(case.campaign)
         apart = np.linalg.norm(case.campaign.position - predicted, axis=1)
         np.testing.assert_allclose(apart, np.linalg.norm(found.rows.remainder, axis=1), rtol=1e-6, atol=1e-12)
@@ -165,6 +167,25 @@ def test_an_offset_of_the_first_joint_is_never_a_number_with_an_unknown_base(arm
 def test_nothing_is_left_to_chance(arm, cases):
     case = cases[-1]
     assert diagnose(case.campaign).to_dict() == case.found.to_dict()
+
+
+@on_arms
+def test_two_effects_share_the_gap_as_they_caused_it(arm):
+    """Shares add up to the whole; each is near its part of the mean square, noise included."""
+    apart = []
+    for seed in range(2):
+        both = ["thermal_elongation", "backlash"]
+        campaign, truth, _ = simulate(arm, both, seed=seed, outliers=0.03)
+        found = diagnose(campaign)
+        if set(found.verdict) != set(both):
+            continue
+        square = {name: truth["parts"][name]["rms"] ** 2 for name in both}
+        share = {name: found.finding(name).shrinkage for name in both}
+        assert sum(share.values()) == pytest.approx(found.gap.held_out.shrinkage, abs=0.03)
+        assert list(found.verdict) == sorted(both, key=lambda n: -share[n])
+        apart += [share[name] - square[name] / (sum(square.values()) + 3.0 * NOISE**2) for name in both]
+    assert len(apart) >= 2
+    assert np.abs(apart).max() < 0.15
 
 
 # Withheld effects -----------------------------------------------------------------------------------------

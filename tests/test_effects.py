@@ -9,6 +9,7 @@ from simulate import simulate
 
 from thermal_robot import diagnose
 from thermal_robot.effects import Drift, ThermalElongation, TransmissionError, choose, library
+from thermal_robot.errors import EffectError
 from thermal_robot.estimation.columns import block, displacement, frame_columns
 from thermal_robot.estimation.register import moved
 from thermal_robot.kinematics import exp6, rotation_to_quaternion
@@ -277,4 +278,5 @@ def test_choosing_keeps_the_order_of_the_library():
     assert [e.name for e in choose()] == list(library())
     assert {e.name for e in choose(["drift", "geometric"])} == {"drift", "geometric"}
     assert {e.name for e in choose(without=["drift"])} == set(EFFECTS) - {"drift"}
-    assert choose(["drift"], ["drift"]) == ()
+    with pytest.raises(EffectError, match="no effect is left"):
+        choose(["drift"], ["drift"])

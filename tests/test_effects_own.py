@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from simulate import simulate
 
-from thermal_robot import EffectError, diagnose
+from thermal_robot import CampaignError, EffectError, diagnose
 from thermal_robot import effects as effects_module
 from thermal_robot.effects import Effect, JointOffset, Parameter, at_joint, choose, library
 from thermal_robot.estimation.columns import displacement
@@ -63,6 +63,16 @@ def test_an_effect_of_ones_own_is_found_with_its_values(rv_m2):
         assert plain["effects"][0]["name"] == "joint_sag"
         assert plain["effects"][0]["status"] == "found"
     assert hits >= 3
+
+
+def test_the_model_that_holds_it_needs_its_covariate(rv_m2):
+    data = with_sag(rv_m2, 0)
+    model = diagnose(data, effects=[JointSag()], only=["drift"]).model
+    assert model.needs == ("speed",)
+    assert np.sqrt(((model.predict(data)[0] - data.position) ** 2).mean()) < 1.1 * 25e-6
+    with pytest.raises(CampaignError) as refused:
+        model.predict(data.drop_covariate("speed"))
+    assert refused.value.column == "speed"
 
 
 def test_without_its_covariate_ones_own_effect_is_not_testable(rv_m2):

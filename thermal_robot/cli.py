@@ -9,6 +9,7 @@ import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import NoReturn
 
 from thermal_robot.errors import CampaignError, ThermalRobotError
 
@@ -42,10 +43,18 @@ def main(arguments: Sequence[str] | None = None) -> int:
     return DONE
 
 
+class _Parser(argparse.ArgumentParser):
+    """A parser whose complaint is one line, as all complaints of this program."""
+
+    def error(self, message: str) -> NoReturn:
+        print(f"{self.prog}: {message}; see {self.prog} --help", file=sys.stderr)
+        raise SystemExit(BAD_INPUT)
+
+
 def _parser() -> argparse.ArgumentParser:
     from thermal_robot import __version__
 
-    parser = argparse.ArgumentParser(
+    parser = _Parser(
         prog="thermal-robot",
         description="Say where the gap between robot and model lies, which effect causes it, how far it shrinks.",
     )
@@ -61,7 +70,7 @@ def _parser() -> argparse.ArgumentParser:
     check.set_defaults(run=_check)
 
     diagnose = commands.add_parser("diagnose", help="where the gap lies, what causes it, how far it shrinks")
-    diagnose.add_argument("campaign", help="campaign.toml, or its folder")
+    diagnose.add_argument("campaign", nargs="?", help="campaign.toml, or its folder")
     diagnose.add_argument("--json", metavar="F", help="write the diagnosis as JSON ('-' prints it instead of the text)")
     diagnose.add_argument("--report", metavar="F.html", help="write a page with figures")
     diagnose.add_argument("--model", metavar="F", help="save the corrected model for `predict`")
@@ -78,6 +87,12 @@ def _parser() -> argparse.ArgumentParser:
     predict.add_argument("samples", help="table with the campaign's columns and units")
     predict.add_argument("-o", "--output", metavar="F", required=True, help="table to write")
     predict.set_defaults(run=_predict)
+
+    paper = commands.add_parser("paper", help="the paper's figures beside the computed ones")
+    paper.add_argument("--json", metavar="F", help="write the ledger as JSON ('-' prints it instead of the text)")
+    paper.add_argument("--l5", metavar="M", type=float, help="wrist to tool point, m (default: 0.150, assumed)")
+    paper.add_argument("--markdown", action="store_true", help="print the table of the README instead of the text")
+    paper.set_defaults(run=_paper)
     return parser
 
 
@@ -99,6 +114,10 @@ def _check(options: argparse.Namespace) -> None:
 
 
 def _diagnose(options: argparse.Namespace) -> None:
+    _take_back(options)
+    targets = [t for t in (options.json, options.model, options.report) if t and t != "-"]
+    for target in targets:
+        _require_folder(target)
     found = _diagnosis(Path(options.campaign), options.only, options.without)
     if options.json == "-":
         import json
@@ -118,9 +137,28 @@ def _predict(options: argparse.Namespace) -> None:
     from thermal_robot.campaign import write_predictions
     from thermal_robot.correction import CorrectedModel
 
+    _require_folder(options.output)
     model = CorrectedModel.load(options.model)
-    position, orientation = model.predict(model.samples(options.samples))
+    samples = model.samples(options.samples)
+    if model.counts_anew(samples):
+        print(
+            f"thermal-robot: note: order in {options.samples} counts its own rows; predicted as after the campaign",
+            file=sys.stderr,
+        )
+    position, orientation = model.predict(samples)
     _write(options.output, lambda path: write_predictions(path, position, orientation, model.settings.units))
+
+
+def _paper(options: argparse.Namespace) -> None:
+    import json
+
+    from thermal_robot.paper import PaperInputs, ledger
+
+    found = ledger(PaperInputs() if options.l5 is None else PaperInputs(l5=options.l5))
+    written = json.dumps(found.to_dict(), indent=2, ensure_ascii=False, allow_nan=False)
+    if options.json and options.json != "-":
+        _write(options.json, lambda path: path.write_text(written + "\n", encoding="utf-8"))
+    print(written if options.json == "-" else found.markdown() if options.markdown else found.text())
 
 
 def _diagnosis(campaign: Path, only: Sequence[str], without: Sequence[str]):  # type: ignore[no-untyped-def]
@@ -134,6 +172,22 @@ def _page(found, path: Path) -> None:  # type: ignore[no-untyped-def]
     from thermal_robot.report import html
 
     path.write_text(html(found, generated=time.strftime("%Y-%m-%d %H:%M")), encoding="utf-8")
+
+
+def _take_back(options: argparse.Namespace) -> None:
+    """Give back a campaign that `--only a b campaign.toml` took for the name of an effect."""
+    for names in (options.only, options.without):
+        if options.campaign is None and names and Path(names[-1]).exists():
+            options.campaign = names.pop()
+    if options.campaign is None:
+        raise CampaignError("diagnose", "no campaign was named", expected="campaign.toml, or its folder")
+
+
+def _require_folder(target: str) -> None:
+    """Refuse a file that could not be written before anything is computed."""
+    folder = Path(target).resolve().parent
+    if not folder.is_dir() or Path(target).is_dir():
+        raise CampaignError(target, "cannot be written", expected="a file in a folder that exists")
 
 
 def _write(target: str, write: Callable[[Path], object]) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -75,7 +76,9 @@ class CorrectedModel:
             If a column that the model needs is missing or has an empty cell; names it.
         """
         self._require(samples)
-        samples = self._in_sequence(samples)
+        # the model reads just what it was fitted to, whatever else a table holds
+        read = {name: values for name, values in samples.covariates.items() if name in self.needs}
+        samples = self._in_sequence(replace(samples, covariates=read))
         nominal = observe(samples, self.frames)
         moved, instrument = displacement(nominal, self.effects)
         corrected = observe(samples, self.frames, displacement=moved)
@@ -84,19 +87,24 @@ class CorrectedModel:
             return position, None
         return position, rotation_to_quaternion(self.frames.base[:3, :3] @ corrected.rotation)
 
-    def _in_sequence(self, samples: Campaign) -> Campaign:
-        """Put samples whose ``order`` only counts their own file's rows after the end of the campaign.
-
-        An order that starts again where the campaign's did, without gaps, and ends before it, does not say when in
-        the campaign a sample would be measured; what has settled by its end is then taken as settled.
-        """
+    def counts_anew(self, samples: Campaign) -> bool:
+        """Tell whether the model needs ``order``, and that of the samples only counts their own file's rows."""
         order = samples.covariates.get("order")
         if order is None or self.last_order is None or "order" not in self.needs:
-            return samples
+            return False
         first, last = self.last_order
-        if len(order) < last - first and np.array_equal(order, first + np.arange(len(order))):
-            return replace(samples, covariates={**samples.covariates, "order": np.full(len(order), last)})
-        return samples
+        return len(order) < last - first and np.array_equal(order, first + np.arange(len(order)))
+
+    def _in_sequence(self, samples: Campaign) -> Campaign:
+        """Put samples whose ``order`` counts anew after the end of the campaign.
+
+        An order that starts again where the campaign's did, without gaps, and ends before it, does not say when in the
+        campaign a sample would be measured; what has settled by its end is then taken as settled.
+        """
+        if self.last_order is None or not self.counts_anew(samples):
+            return samples
+        late = np.full(samples.samples, self.last_order[1])
+        return replace(samples, covariates={**samples.covariates, "order": late})
 
     def _require(self, samples: Campaign) -> None:
         for column in self.needs:
@@ -145,8 +153,8 @@ class CorrectedModel:
         }
 
     @classmethod
-    def from_dict(cls, plain: dict[str, Any]) -> CorrectedModel:
-        """Return the model that :meth:`to_dict` described.
+    def from_dict(cls, plain: dict[str, Any], effects: Sequence[Effect] = ()) -> CorrectedModel:
+        """Return the model that :meth:`to_dict` described; ``effects`` are those of your own that it may hold.
 
         Raises
         ------
@@ -159,19 +167,19 @@ class CorrectedModel:
             root_frame=plain["robot"]["root_frame"],
             gravity=plain["robot"]["gravity"],
         )
-        known = library()
-        effects = []
+        known = {**library(), **{effect.name: effect for effect in effects}}
+        held = []
         for entry in plain["effects"]:
             if entry["name"] not in known:
                 raise EffectError(f"the model holds the effect {entry['name']!r}, which is not installed here")
             arguments = {k: tuple(v) if isinstance(v, list) else v for k, v in entry["arguments"].items()}
-            effects.append((type(known[entry["name"]])(**arguments), np.array(entry["values"], dtype=float)))
+            held.append((type(known[entry["name"]])(**arguments), np.array(entry["values"], dtype=float)))
         frames = Frames(np.array(plain["frames"]["base"]), np.array(plain["frames"]["tool"]))
         return cls(
             robot,
             Settings.from_dict(plain["settings"]),
             frames,
-            tuple(effects),
+            tuple(held),
             plain["measures"],
             tuple(plain["needs"]),
             bool(plain["simulated"]),
@@ -183,8 +191,8 @@ class CorrectedModel:
         Path(path).write_text(json.dumps(self.to_dict(), indent=1) + "\n", encoding="utf-8")
 
     @classmethod
-    def load(cls, path: str | Path) -> CorrectedModel:
-        """Read a file that :meth:`save` wrote.
+    def load(cls, path: str | Path, effects: Sequence[Effect] = ()) -> CorrectedModel:
+        """Read a file that :meth:`save` wrote; ``effects`` are those of your own that it may hold.
 
         Raises
         ------
@@ -196,10 +204,15 @@ class CorrectedModel:
             found = plain.get("schema") if isinstance(plain, dict) else None
         except FileNotFoundError:
             raise CampaignError(str(path), "no such file") from None
+        except OSError as error:
+            raise CampaignError(str(path), "cannot be read", found=error.strerror) from None
         except (UnicodeDecodeError, json.JSONDecodeError):
             found = None
         if found != SCHEMA:
             raise CampaignError(
                 str(path), "this is not a model that `diagnose --model` wrote", found=repr(found), expected=repr(SCHEMA)
             )
-        return cls.from_dict(plain)
+        try:
+            return cls.from_dict(plain, effects)
+        except (KeyError, TypeError, ValueError, AttributeError) as error:
+            raise CampaignError(str(path), f"this model file is damaged ({error!r})") from None

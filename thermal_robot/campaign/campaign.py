@@ -127,10 +127,7 @@ class Campaign:
                 object.__setattr__(self, key, self._frozen(key, value, shape, number))
         kinds: dict[str, Any] = {"covariates": np.float64, "labels": np.str_, "missing": np.bool_}
         for key, kind in kinds.items():
-            arrays = {
-                name: self._frozen(name, value, (samples,), kind)
-                for name, value in getattr(self, key).items()
-            }
+            arrays = {name: self._frozen(name, value, (samples,), kind) for name, value in getattr(self, key).items()}
             object.__setattr__(self, key, arrays)
 
     def _frozen(self, key: str, value: ArrayLike, shape: tuple[int, ...], kind: Any) -> NDArray[Any]:
@@ -217,12 +214,9 @@ class Campaign:
         """
         if name not in self.covariates and name not in self.labels:
             present = ", ".join([*self.covariates, *self.labels]) or "none"
-            raise CampaignError(
-                f"<{self.name}>", "no such covariate", column=name, expected=f"one of {present}"
-            )
+            raise CampaignError(f"<{self.name}>", "no such covariate", column=name, expected=f"one of {present}")
         changes: dict[str, Any] = {
-            key: {other: value for other, value in getattr(self, key).items() if other != name}
-            for key in _BY_NAME
+            key: {other: value for other, value in getattr(self, key).items() if other != name} for key in _BY_NAME
         }
         changes["extra"] = tuple(other for other in self.extra if other != name)
         return dataclasses.replace(self, **changes)

@@ -65,9 +65,7 @@ def read_declaration(path: Path) -> Declaration:
     """
     file = path / FILE_NAME if path.is_dir() else path
     if not file.is_file():
-        raise CampaignError(
-            str(file), "there is no such file", expected=f"{FILE_NAME}, or the directory that holds it"
-        )
+        raise CampaignError(str(file), "there is no such file", expected=f"{FILE_NAME}, or the directory that holds it")
     document = Document(file)
     length = Units(length=document.word("measurements", "length_unit", LENGTH_UNITS)).length_scale
     noise = [document.size("noise", key) for key in SECTIONS["noise"]]

@@ -95,14 +95,8 @@ def _covariates(campaign: Campaign) -> Iterator[Sequence[str]]:
     groups: dict[tuple[str, str], list[str]] = {}
     for column in campaign.covariates:
         quantity, place = split_name(column)
-        joint = (
-            place in campaign.robot.joint_names
-            and quantity in names.PER_JOINT
-            and column not in campaign.extra
-        )
-        key = (
-            (quantity, _joint_unit(campaign, quantity, place)) if joint else (column, _unit(campaign, column))
-        )
+        joint = place in campaign.robot.joint_names and quantity in names.PER_JOINT and column not in campaign.extra
+        key = (quantity, _joint_unit(campaign, quantity, place)) if joint else (column, _unit(campaign, column))
         groups.setdefault(key, []).append(column)
     for (quantity, unit), columns in groups.items():
         places = [split_name(column)[1] for column in columns]
@@ -115,9 +109,7 @@ def _covariates(campaign: Campaign) -> Iterator[Sequence[str]]:
             [campaign.covariates[c] / covariate_scale(c, campaign.robot, campaign.units) for c in columns]
         )
         gaps = sum(int(campaign.missing[column].sum()) for column in columns if column in campaign.missing)
-        spread = (
-            _range(values.min(), values.max()) if np.ptp(values) > 0 else f"{values[0]:.6g}, does not vary"
-        )
+        spread = _range(values.min(), values.max()) if np.ptp(values) > 0 else f"{values[0]:.6g}, does not vary"
         yield quantity, of, spread, unit, f"{gaps} filled" if gaps else "none"
 
 
@@ -155,9 +147,7 @@ def _repeated(counts: NDArray[np.int64]) -> str:
     repeated = counts[counts > 1]
     if not len(repeated):
         return "no pose is repeated"
-    return (
-        f"{len(repeated)} pose{'s' if len(repeated) > 1 else ''} repeated, {int(repeated.sum())} rows in all"
-    )
+    return f"{len(repeated)} pose{'s' if len(repeated) > 1 else ''} repeated, {int(repeated.sum())} rows in all"
 
 
 def _unit(campaign: Campaign, column: str) -> str:
@@ -175,9 +165,7 @@ def _joint_unit(campaign: Campaign, quantity: str, joint: str) -> str:
 
 
 def _noise(sigma: float | None, unit: str) -> str:
-    return (
-        "not given: estimated from the data" if sigma is None else f"{sigma:.4g} {unit} per axis (one sigma)"
-    )
+    return "not given: estimated from the data" if sigma is None else f"{sigma:.4g} {unit} per axis (one sigma)"
 
 
 def _triple(vector: Sequence[float] | NDArray[np.float64]) -> str:

@@ -42,9 +42,7 @@ class Document:
         except OSError as error:
             raise CampaignError(self.file, f"cannot be read: {error.strerror}") from error
         except UnicodeDecodeError as error:
-            raise CampaignError(
-                self.file, "is not UTF-8 text", expected="a TOML file saved as UTF-8"
-            ) from error
+            raise CampaignError(self.file, "is not UTF-8 text", expected="a TOML file saved as UTF-8") from error
         except tomllib.TOMLDecodeError as error:
             line = re.search(r"at line (\d+)", str(error))
             row = int(line[1]) if line else None

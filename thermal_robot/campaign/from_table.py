@@ -124,18 +124,14 @@ def _size(argument: str, sigma: float | None) -> float | None:
     """Return a standard deviation, ``None`` where it is not given."""
     if sigma is not None and not (np.isfinite(sigma) and sigma >= 0):
         problem = "a standard deviation cannot be negative" if sigma < 0 else "not a finite number"
-        raise CampaignError(
-            FILE, problem, column=argument, found=repr(sigma), expected="a number above 0, or None"
-        )
+        raise CampaignError(FILE, problem, column=argument, found=repr(sigma), expected="a number above 0, or None")
     return float(sigma) if sigma else None
 
 
 def _vector(argument: str, values: Sequence[float], scale: float) -> Vector:
     array = np.asarray(values, dtype=np.float64)
     if array.shape != (3,) or not np.isfinite(array).all():
-        raise CampaignError(
-            FILE, "wrong kind of value", column=argument, found=repr(values), expected="three numbers"
-        )
+        raise CampaignError(FILE, "wrong kind of value", column=argument, found=repr(values), expected="three numbers")
     return as_vector(array * scale)
 
 

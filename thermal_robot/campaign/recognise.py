@@ -107,9 +107,7 @@ def recognise(table: Table, robot: Robot, *, measured: bool) -> Columns:
     )
 
 
-def _judge_extra(
-    table: Table, column: str, extra: list[str], robot: Robot, joints: Collection[str]
-) -> list[str]:
+def _judge_extra(table: Table, column: str, extra: list[str], robot: Robot, joints: Collection[str]) -> list[str]:
     """Keep a column that the format does not define if it is numeric; say what is doubtful about it."""
     text = table.first_text(column)
     if text is not None:
@@ -126,11 +124,7 @@ def _judge_extra(
         *(f"{quantity}.{joint}" for quantity in names.PER_JOINT for joint in robot.joint_names),
     ]
     meant = did_you_mean(column, known, cutoff=0.85)
-    return (
-        [f"column {column!r} is not defined by the format and is kept as an extra covariate{meant}"]
-        if meant
-        else []
-    )
+    return [f"column {column!r} is not defined by the format and is kept as an extra covariate{meant}"] if meant else []
 
 
 def _ignored(column: str, reason: str, place: str, candidates: Iterable[str]) -> str:

@@ -92,9 +92,7 @@ def table_from_frame(frame: pd.DataFrame, file: str = "<table>", *, first_row: i
         if pd.api.types.is_numeric_dtype(series.dtype) and not pd.api.types.is_complex_dtype(series.dtype):
             columns[name] = series.to_numpy(dtype=np.float64, na_value=np.nan)
         else:
-            columns[name] = [
-                "" if gap else str(cell).strip() for cell, gap in zip(series, series.isna(), strict=True)
-            ]
+            columns[name] = ["" if gap else str(cell).strip() for cell, gap in zip(series, series.isna(), strict=True)]
     return Table(file, columns, rows.astype(np.int64), None if first_row is None else 1)
 
 
@@ -127,9 +125,7 @@ def _decode(path: Path) -> tuple[str, tuple[str, ...]]:
     if data.startswith(b"PK\x03\x04"):
         raise CampaignError(file, "is a workbook or an archive", expected="a table saved as CSV or Parquet")
     if data.startswith(b"PAR1"):
-        raise CampaignError(
-            file, "is a Parquet file by its contents", expected="a name that ends in .parquet"
-        )
+        raise CampaignError(file, "is a Parquet file by its contents", expected="a name that ends in .parquet")
     utf16 = data.startswith((b"\xff\xfe", b"\xfe\xff"))
     try:
         text = data.decode("utf-16" if utf16 else "utf-8-sig")

@@ -24,9 +24,7 @@ MINIMUM_POSES = 3
 """Distinct configurations without which a rigid frame can turn about the line through two points."""
 
 
-def build_campaign(
-    table: Table, settings: Settings, robot: Robot, *, name: str, measured: bool = True
-) -> Campaign:
+def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str, measured: bool = True) -> Campaign:
     """Validate a table and return the campaign.
 
     Parameters
@@ -77,9 +75,7 @@ def build_campaign(
         covariates=covariates,
         extra=columns.extra,
         labels={label: np.array(table.text(label), dtype=np.str_) for label in columns.labels},
-        simulated_position=_vectors(table, names.SIMULATED_POSITION, units)
-        if columns.has_simulated_position
-        else None,
+        simulated_position=_vectors(table, names.SIMULATED_POSITION, units) if columns.has_simulated_position else None,
         simulated_orientation=(
             _quaternions(table, names.SIMULATED_ORIENTATION) if columns.has_simulated_orientation else None
         ),

@@ -73,9 +73,7 @@ def write_table(campaign: Campaign, path: str | Path) -> None:
     _write_csv(Path(path), columns, data)
 
 
-def write_predictions(
-    path: str | Path, positions: ArrayLike, orientations: ArrayLike | None, units: Units
-) -> None:
+def write_predictions(path: str | Path, positions: ArrayLike, orientations: ArrayLike | None, units: Units) -> None:
     """Write predicted poses: the columns x y z, and qw qx qy qz if given, only.
 
     Parameters

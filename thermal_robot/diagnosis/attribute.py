@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from thermal_robot.diagnosis.result import Estimate, Finding, Location, Status
 from thermal_robot.estimation.explain import Explanation
 from thermal_robot.estimation.fit import Fit
+from thermal_robot.estimation.linear import contained
 
 Array = NDArray[np.float64]
 Shares = dict[str, tuple[float, tuple[float, float]]]
@@ -15,24 +16,24 @@ Shares = dict[str, tuple[float, tuple[float, float]]]
 _DETERMINED = 0.5  # a parameter is identified when the data leave less than half of its prior's standard deviation
 _SURE = 0.75
 _RIVAL = 0.2
+_ALIAS = 1e-6
+_SAME = 1.0  # squared distance, in noise, between two explanations that no data would tell apart
 
 
 def findings(fit: Fit, shares: Shares, locations: dict[str, tuple[Location, ...]]) -> tuple[Finding, ...]:
     """Return what is said of every candidate, in order of its held-out share; those not testable come last."""
     e = fit.explanation
     explained = {effect.name: b for b, (effect, _) in zip(e.best.blocks, fit.effects, strict=True)}
-    rivals = _rivals(fit, list(explained))
+    rivals = _rivals(fit, explained)
     result = []
     for name in dict.fromkeys(fit.families):
         own = [b for b, f in enumerate(fit.families) if f == name]
-        invisible = all(not e.problem.bases[b].shape[1] for b in own)
         status: Status = "found" if name in explained else "not_found"
         confounded = rivals.get(name, ())
+        if not confounded and name not in explained and all(_within_frames(fit, b) for b in own):
+            confounded = _unknown_frames(fit)
         if confounded:
             status = "confounded"
-        if invisible and name not in explained:
-            # every column lies within the unknown frames
-            status, confounded = "confounded", ("base_frame", "tool_frame")
         share, interval = shares.get(name, (0.0, (0.0, 0.0)))
         result.append(
             Finding(
@@ -46,33 +47,74 @@ def findings(fit: Fit, shares: Shares, locations: dict[str, tuple[Location, ...]
                 parameters=_estimates(fit, explained[name]) if name in explained else (),
             )
         )
-    result.sort(key=lambda f: (f.name not in explained, -(f.shrinkage or 0.0), -(f.probability or 0.0)))
+    result.sort(key=lambda f: (-(f.shrinkage or 0.0), -(f.probability or 0.0)))
     result += [Finding(name, "not_testable", needs=needs) for name, needs in fit.needs.items()]
     return tuple(result)
 
 
-def _rivals(fit: Fit, explained: list[str]) -> dict[str, tuple[str, ...]]:
+def _unknown_frames(fit: Fit) -> tuple[str, ...]:
+    known = {"base_frame": fit.campaign.base_known, "tool_frame": "tool_frame" not in fit.needs}
+    return tuple(name for name, is_known in known.items() if not is_known)
+
+
+def _within_frames(fit: Fit, block: int) -> bool:
+    """Whether all that an effect can do is what the unknown frames can do, too."""
+    item, linear = fit.explanation.linear.blocks[block], fit.explanation.linear
+    if not linear.frames.size or not item.parameters:
+        return False
+    columns = item.columns.reshape(-1, len(item.parameters)) * item.sizes
+    flat = linear.frames.reshape(-1, linear.frames.shape[2])
+    basis = np.linalg.qr(flat / (np.linalg.norm(flat, axis=0) + 1e-300))[0]
+    left = columns - basis @ (basis.T @ columns)
+    return bool(np.linalg.norm(left) < _ALIAS * np.linalg.norm(columns))
+
+
+def _rivals(fit: Fit, explained: dict[str, int]) -> dict[str, tuple[str, ...]]:
     """Effects of the explanation that another could take the place of, and those others.
 
-    An effect is confounded with one outside the explanation when it is itself uncertain, and where it is absent that
-    other is present.
+    An effect is confounded with one outside the explanation when it is itself uncertain and where it is absent that
+    other is present, or when the other could do just what it was found to do. A larger effect that contains it is no
+    rival: the smaller is preferred where it suffices.
     """
     e: Explanation = fit.explanation
     held = [{fit.families[b] for b in c.blocks} for c in e.combinations]
+    containing = contained(e.problem)
     rivals: dict[str, set[str]] = {}
-    for name in explained:
+    for name, block in explained.items():
         absent = np.array([name not in h for h in held])
         mass = float(e.probabilities[absent].sum())
-        if mass < 1.0 - _SURE:
-            continue
         for other in dict.fromkeys(fit.families):
             if other in explained:
                 continue
+            own = [b for b, f in enumerate(fit.families) if f == other]
             both = np.array([other in h for h in held])
-            if float(e.probabilities[absent & both].sum()) > max(_RIVAL, 0.8 * mass):
+            instead = float(e.probabilities[absent & both].sum())
+            doubtful = mass >= 1.0 - _SURE and instead > max(_RIVAL, 0.8 * mass)
+            apart = not any(frozenset((block, b)) in containing for b in own)
+            if doubtful or (apart and any(_imitates(fit, block, b) for b in own)):
                 rivals.setdefault(name, set()).add(other)
                 rivals.setdefault(other, set()).add(name)
     return {name: tuple(sorted(others)) for name, others in rivals.items()}
+
+
+def _imitates(fit: Fit, block: int, other: int) -> bool:
+    """Whether another effect, in the place of one that was found, would do the same to within the noise."""
+    e = fit.explanation
+    matrix, slices = e.problem.matrix, e.problem.slices
+    start = dict(
+        zip(e.best.blocks, np.cumsum([0, *(e.problem.bases[b].shape[1] for b in e.best.blocks)]), strict=False)
+    )
+    own = e.best.values[start[block] : start[block] + e.problem.bases[block].shape[1]]
+    rest = [b for b in (*e.best.blocks, other) if b != block]
+    index = np.concatenate([np.arange(slices[b].start, slices[b].stop) for b in rest])
+    if not index.size or not own.size:
+        return False
+    inner = matrix[np.ix_(index, index)]
+    scale = np.sqrt(np.diag(inner))
+    cross = matrix[index][:, slices[block]] @ own / scale
+    taken = cross @ np.linalg.pinv(inner / np.outer(scale, scale), rcond=1e-10, hermitian=True) @ cross
+    moved = own @ matrix[slices[block], slices[block]] @ own
+    return bool(moved - taken < _SAME * e.best.noise**2)
 
 
 def _estimates(fit: Fit, block: int) -> tuple[Estimate, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -60,8 +61,10 @@ def diagnose(
     if not isinstance(campaign, Campaign):
         progress("reading the campaign")
         campaign = read_campaign(campaign)
-    candidates = (*choose(only, without), *effects)
+    candidates = choose(only, without, effects)
+    narrowed = len(candidates) < len({*library(), *(e.name for e in effects)})
     _check_priors(campaign, {e.name for e in candidates} | set(library()))
+    campaign, notes = _usable(campaign)
     # matrices are small: threads that wait for each other cost several times what they bring
     with threadpool_limits(1):
         fitted = fit(campaign, candidates, progress)
@@ -89,13 +92,51 @@ def diagnose(
         unexplained=unexplained,
         verdict=tuple(order),
         probability=probability,
-        summary=sentence(gap, found, order, probability, unexplained),
+        summary=sentence(gap, found, order, probability, unexplained, reach=_reach(campaign), narrowed=narrowed),
         advice=advice,
         separates=separates,
         model=_model(fitted),
         rows=_rows(fitted, shrinkage),
-        warnings=campaign.warnings,
+        warnings=(*campaign.warnings, *notes, *_doubts(fitted, candidates if narrowed else ())),
     )
+
+
+def _usable(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
+    """Leave out what is no measurement of its own, and say so."""
+    notes = []
+    if (
+        campaign.orientation is not None
+        and campaign.simulated_position is not None
+        and campaign.simulated_orientation is None
+    ):
+        # nothing says how the target is turned there
+        notes.append("orientation was measured, but sim.* predicts positions only: orientation is left out")
+        campaign = replace(campaign, orientation=None, noise_orientation=None)
+    table = np.hstack([campaign.q, np.asarray(campaign.position)])
+    first = np.sort(np.unique(table, axis=0, return_index=True)[1])
+    copies = campaign.samples - len(first)
+    if copies:
+        notes.append(f"{copies} rows repeat another one to the last digit: these copies are left out")
+        campaign = campaign.take(first)
+    return campaign, tuple(notes)
+
+
+def _doubts(fitted: Fit, considered: Sequence[Effect]) -> tuple[str, ...]:
+    """Return what a reader should know before he believes the diagnosis."""
+    notes = []
+    campaign, e = fitted.campaign, fitted.explanation
+    remains = float(e.whitening.noise[0] * e.best.noise)
+    if campaign.noise_position is not None and remains < 0.5 * campaign.noise_position:
+        times = campaign.noise_position / remains
+        notes.append(f"the stated noise of position is {times:.1f} times what remains: it is stated too large")
+    if considered:
+        notes.append("only these effects were considered: " + ", ".join(effect.name for effect in considered))
+    return tuple(notes)
+
+
+def _reach(campaign: Campaign) -> float:
+    """Diagonal of the volume that was measured, m."""
+    return float(np.linalg.norm(np.ptp(np.asarray(campaign.position), axis=0)))
 
 
 def _check_priors(campaign: Campaign, known: set[str]) -> None:

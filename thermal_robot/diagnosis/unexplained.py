@@ -21,6 +21,7 @@ _MATERIAL_SCALE = 1.15  # a remainder less than this times the stated noise is n
 _MATERIAL_SHARE = 0.04  # a law that explains less of the remainder than this is not worth a name
 _FEWEST_PAIRS = 12
 _SHUFFLES = 200
+_ROUNDING = 1e-9  # m: a remainder below it is rounding, whatever its structure
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,18 +82,27 @@ class Repeats:
 
 def repeats(fit: Fit, left: Remainder) -> Repeats | None:
     """Compare each command with its nearest neighbour within :data:`NEAR`; ``None`` where too few have one."""
-    from scipy.spatial import cKDTree
-
-    campaign = fit.campaign
-    distance, neighbour = cKDTree(campaign.q[left.rows]).query(campaign.q[left.rows], k=2)
-    close = np.flatnonzero(distance[:, 1] < NEAR)
-    pairs = np.unique(np.sort(np.column_stack([close, neighbour[close, 1]]), axis=1), axis=0)
-    if len(pairs) < _FEWEST_PAIRS:
-        return None
+    q = fit.campaign.q[left.rows]
+    distance, neighbour = _nearest(q, 1)
+    close = np.flatnonzero(distance[:, 0] < NEAR)
+    pairs = np.unique(np.sort(np.column_stack([close, neighbour[close, 0]]), axis=1), axis=0)
     # the remainder of both: their commands may differ by a little, and their conditions by much
     difference = left.white[pairs[:, 0]] - left.white[pairs[:, 1]]
+    if len(pairs) < _FEWEST_PAIRS:
+        return None
     place = (difference[:, :3] * fit.explanation.whitening.noise[0]) ** 2 / 2.0
     return Repeats(len(pairs), float((difference**2).mean() / 2.0), float(np.sqrt(place.mean())))
+
+
+def _nearest(points: Array, count: int) -> tuple[Array, NDArray[np.int64]]:
+    """Return distances and numbers (N, count) of each point's nearest others, itself left out however many coincide."""
+    from scipy.spatial import cKDTree
+
+    distance, number = cKDTree(points).query(points, k=count + 1)
+    own = number == np.arange(len(points))[:, None]
+    own[~own.any(axis=1), -1] = True  # others at the same place came first: drop the last of them
+    shape = (len(points), count)
+    return distance[~own].reshape(shape), number[~own].reshape(shape)
 
 
 def examine(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> tuple[Unexplained, float, str]:
@@ -127,9 +137,9 @@ def examine(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> tuple
     verdicts = [_size(fit, left), _lack_of_fit(left, again), alike, law]
     p_value = min(1.0, len(verdicts) * min(p for p, _ in verdicts))
     reasons = tuple(reason for p, reason in verdicts if reason and len(verdicts) * p < LEVEL)
-    flagged = bool(reasons)
+    flagged = bool(reasons) and rms > _ROUNDING
     if flagged and source == "remainder":
-        # nothing tells the noise but the remainder itself: what neighbours have in common is not noise
+        # nothing tells the noise but the remainder itself: at most what neighbours do not have in common
         floor *= np.sqrt(1.0 - np.clip(max(likeness, share), 0.0, 1.0))
     beyond = np.sqrt(max(rms**2 - 3.0 * floor**2, 0.0)) if flagged else 0.0
     if flagged and source == "remainder":
@@ -177,8 +187,6 @@ def _neighbours(fit: Fit, left: Remainder) -> tuple[tuple[float, str], float]:
 
     Returns p-value and reason, and the largest correlation that is not chance.
     """
-    from scipy.spatial import cKDTree
-
     q = fit.campaign.q[left.rows]
     spread = q.std(axis=0)
     used = spread > 1e-9
@@ -186,8 +194,8 @@ def _neighbours(fit: Fit, left: Remainder) -> tuple[tuple[float, str], float]:
     white = np.clip(white, -4.0, 4.0)
     pairs = []
     if used.any() and len(q) > 20:
-        _, near = cKDTree(q[:, used] / spread[used]).query(q[:, used] / spread[used], k=4)
-        pairs.append(("joint space", np.column_stack([np.repeat(np.arange(len(q)), 3), near[:, 1:].ravel()])))
+        _, near = _nearest(q[:, used] / spread[used], 3)
+        pairs.append(("joint space", np.column_stack([np.repeat(np.arange(len(q)), 3), near.ravel()])))
     order = np.argsort(np.argsort(in_order(fit.campaign))[left.rows], kind="stable")
     pairs.append(("the order of measurement", np.column_stack([order[:-1], order[1:]])))
     rng = np.random.default_rng(0)

@@ -6,6 +6,9 @@ from collections.abc import Sequence
 
 from thermal_robot.diagnosis.result import Finding, Gap, Unexplained
 
+_ANOTHER_MOTION = 0.02
+_ANOTHER_TURN = 0.2  # rad
+_WEIGHTY = 0.01  # of the gap on held-out rows: an effect with less is named last
 _PLAIN = {
     "base_frame": "a misplaced base frame",
     "tool_frame": "a misplaced tool frame",
@@ -33,37 +36,65 @@ def length(metres: float) -> str:
 
 
 def sentence(
-    gap: Gap, found: Sequence[Finding], explained: Sequence[str], probability: float, unexplained: Unexplained
+    gap: Gap,
+    found: Sequence[Finding],
+    explained: Sequence[str],
+    probability: float,
+    unexplained: Unexplained,
+    *,
+    reach: float,
+    narrowed: bool = False,
 ) -> str:
-    """Return the verdict as one sentence."""
+    """Return the verdict as one sentence.
+
+    Parameters
+    ----------
+    gap, found, explained, probability, unexplained
+        Parts of the diagnosis; ``explained`` in order of share.
+    reach
+        Size of the volume that was measured, m: a gap after correction of more than a fiftieth of it is not a robot's.
+    narrowed
+        Whether effects were left out by request.
+    """
     size, floor = length(gap.rms_before), length(gap.noise_floor)
+    if gap.rms_after > _ANOTHER_MOTION * reach or (gap.orientation_after or 0.0) > _ANOTHER_TURN:
+        turned = gap.rms_after <= _ANOTHER_MOTION * reach
+        left = f"{gap.orientation_after:.2g} rad" if turned else f"{length(gap.rms_after)} of {length(reach)}"
+        return (
+            f"Robot and table do not describe the same motion ({left} remain): check units, signs and order of the joints, "
+            "axes of the instrument, order of the quaternion, and that all rows belong to one set-up."
+        )
     if not explained:
         if not unexplained.flagged:
             return f"No gap beyond the noise: the {size} between model and robot is what noise alone leaves ({floor})."
-        return f"The gap of {size} is explained by no known effect{_place(unexplained)}."
-    names = [plain(name) for name in explained]
-    listed = names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]
+        which = "none of the effects that were considered" if narrowed else "no known effect"
+        return f"The gap of {size} is explained by {which}{_place(unexplained)}."
     by_name = {f.name: f for f in found}
+    weighty = [n for n in explained if (by_name[n].shrinkage or 0.0) >= _WEIGHTY] or list(explained[:1])
+    slight = [plain(n) for n in explained if n not in weighty]
+    listed = _listed([plain(n) for n in weighty]) + (f", and, hardly to be seen, {_listed(slight)}" if slight else "")
+    sure = f"{100 * probability:.0f} % sure" if probability < 0.995 else "more than 99 % sure"
+    text = (
+        f"The gap of {size} comes from {listed} ({sure}); correcting for {'them' if len(explained) > 1 else 'it'} removes "
+        f"{100 * gap.held_out.shrinkage:.1f} % of its mean square on held-out data and leaves "
+        f"{length(gap.held_out.rms_after)}"
+    )
+    if not unexplained.flagged:
+        text += f", which is noise ({floor})"
+    elif gap.noise_source == "remainder" or unexplained.rms == 0.0:
+        text += ", which is more than noise" + _place(unexplained)
+    else:
+        text += f", of which {length(unexplained.rms)} is not explained" + _place(unexplained)
     doubts = [
         f"{plain(n)} cannot be told from {' or '.join(map(plain, by_name[n].confounded_with))}"
         for n in explained
         if by_name[n].confounded_with
     ]
-    sure = f"{min(probability, 0.999):.0%} sure" if probability < 0.995 else "more than 99 % sure"
-    share = gap.held_out.shrinkage
-    text = (
-        f"The gap of {size} comes from {listed} ({sure.replace('%', ' %').replace('  ', ' ')}); "
-        f"correcting for {'it' if len(names) == 1 else 'them'} removes {100 * share:.1f} % of its mean square on "
-        f"held-out "
-        f"data and leaves {length(gap.held_out.rms_after)}"
-    )
-    if unexplained.flagged:
-        alone = gap.noise_source == "remainder"
-        text += ", which is not explained" if alone else f", of which {length(unexplained.rms)} is not explained"
-        text += _place(unexplained)
-    else:
-        text += f", which is noise ({floor})"
     return text + ("; but " + ", and ".join(doubts) if doubts else "") + "."
+
+
+def _listed(names: Sequence[str]) -> str:
+    return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]
 
 
 def _place(unexplained: Unexplained) -> str:
@@ -82,6 +113,8 @@ def advise(found: Sequence[Finding], unexplained: Unexplained) -> tuple[str, tup
     groups = tuple(g for g in groups if not {"base_frame", "tool_frame"} & set(g) or len(groups) == 1)
     if groups:
         pair = " from ".join(plain(n) for n in groups[0][:2])
+        if {"base_frame", "tool_frame"} & set(groups[0]):
+            return f"A frame measured on its own, and declared known, would tell {pair}.", groups
         return f"More poses over the whole range of every joint would tell {pair}.", groups
     missing = [f for f in found if f.status == "not_testable" and not any(n.startswith("frames.") for n in f.needs)]
     if unexplained.flagged and missing:

@@ -64,8 +64,10 @@ def library() -> dict[str, Effect]:
     return found
 
 
-def choose(only: Iterable[str] = (), without: Iterable[str] = ()) -> tuple[Effect, ...]:
-    """Return the effects of the library that a user asked for.
+def choose(
+    only: str | Iterable[str] = (), without: str | Iterable[str] = (), own: Iterable[Effect] = ()
+) -> tuple[Effect, ...]:
+    """Return the effects that a user asked for.
 
     Parameters
     ----------
@@ -73,19 +75,30 @@ def choose(only: Iterable[str] = (), without: Iterable[str] = ()) -> tuple[Effec
         Names to keep; all where empty.
     without
         Names to leave out.
+    own
+        The user's own effects, beside those of the library.
 
     Raises
     ------
     EffectError
-        If a name is not in the library; says the nearest ones.
+        If a name is not known, taken twice, or nothing is left; if one of ``own`` is not an effect.
     """
     known = library()
-    only, without = tuple(only), tuple(without)
+    for effect in own:
+        if not isinstance(effect, Effect) or not effect.name:
+            raise EffectError(f"{effect!r} is not an effect with a name; pass an instance of a subclass of Effect")
+        if effect.name in known:
+            raise EffectError(f"there are two effects named {effect.name!r}")
+        known[effect.name] = effect
+    only, without = ((names,) if isinstance(names, str) else tuple(names) for names in (only, without))
     for name in (*only, *without):
         if name not in known:
             near = difflib.get_close_matches(name, known, n=3, cutoff=0.3) or sorted(known)
             raise EffectError(f"no effect is named {name!r}; near to it: {', '.join(near)}")
-    return tuple(e for name, e in known.items() if (not only or name in only) and name not in without)
+    chosen = tuple(e for name, e in known.items() if (not only or name in only) and name not in without)
+    if not chosen:
+        raise EffectError("no effect is left to consider")
+    return chosen
 
 
 __all__ = [

@@ -17,7 +17,7 @@ _COMPONENTS = (*(f"translation {a}" for a in "xyz"), *(f"rotation {a}" for a in 
 
 @dataclass(frozen=True)
 class Drift(Effect):
-    """The base moves by a twist that grows with time from zero at the first row: exp(β(t)) T.
+    """The base moves by a twist that grows with time from zero at the first measurement: exp(β(t)) T.
 
     Linear, β(t) = β (t − t₀)/span, or exponential, β(t) = β (1 − exp(−(t − t₀)/τ)) / (1 − exp(−span/τ)), so that β is
     the displacement over the campaign in both. Expected size 0.1 mm and 0.1 mrad. ``order`` takes the place of
@@ -50,7 +50,7 @@ class Drift(Effect):
         clock = observations.clock
         if clock is None:
             return (self,)
-        fitted = replace(self, origin=float(clock[0]), span=float(np.ptp(clock)) or 1.0)
+        fitted = replace(self, origin=float(clock.min()), span=float(np.ptp(clock)) or 1.0)
         return tuple(replace(fitted, time_constant=share) for share in (0.0, 0.1, 0.25, 0.6))
 
     def nearby(self, factor: float) -> tuple[Effect, ...]:

@@ -26,7 +26,9 @@ class ToolFrame(Effect):
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return the declaration that would make the tool an effect."""
-        return () if observations.campaign.tool_known else ('frames.tool = "known"',)
+        campaign = observations.campaign
+        # a simulator predicts the declared target: an unknown tool is not refitted to it
+        return () if campaign.tool_known or campaign.simulated_position is not None else ('frames.tool = "known"',)
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """Return the tool's twist in the tool frame: m, and rad where orientation is measured."""

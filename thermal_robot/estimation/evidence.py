@@ -20,6 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotrf, dpotri
 
+from thermal_robot.errors import EstimationError
+
 Array = NDArray[np.float64]
 
 _SIZE_SPREAD = 1.5  # ln λ ~ N(0, 1.5²): an effect three times larger or smaller than stated is no surprise
@@ -122,7 +124,10 @@ class Search:
         """Return the combination's evidence, computed once."""
         key = tuple(sorted(blocks))
         if key not in self.seen:
-            self.seen[key] = _evidence(self.gram, key, sum(self.log_prior[b] for b in key), start)
+            found = _evidence(self.gram, key, sum(self.log_prior[b] for b in key), start)
+            if not np.isfinite(found.log_evidence):
+                raise EstimationError("the measurements do not determine anything: too few, or all alike")
+            self.seen[key] = found
         return self.seen[key]
 
     def run(self, start: Sequence[int] = ()) -> Combination:

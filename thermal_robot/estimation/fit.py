@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign
 from thermal_robot.effects import Effect
+from thermal_robot.errors import EstimationError
 from thermal_robot.estimation.columns import block, displacement, frame_columns
 from thermal_robot.estimation.explain import Explanation, Noise, explain
 from thermal_robot.estimation.groups import neighbourhoods, spells
@@ -24,6 +25,7 @@ _REVISIONS = 3
 _REFINEMENT = 1.6
 _LARGE = 0.02  # rad or m
 _NO_WORSE = 1.02
+_SPARE = 6  # equations that must be left when the frames are fitted
 
 
 @dataclass(frozen=True, eq=False)
@@ -76,8 +78,14 @@ def fit(campaign: Campaign, effects: Sequence[Effect], progress: Callable[[str],
     -------
     Fit
         Converged: another Gauss-Newton step would move nothing that can be measured.
+
+    Raises
+    ------
+    EstimationError
+        If there are too few different poses for the unknown frames.
     """
     progress("unknown frames")
+    _require_enough(campaign)
     nominal = observe(campaign, register(campaign))
     needs = {e.name: missing for e in effects if (missing := e.missing(nominal))}
     settings = {e.name: e.variants(nominal) for e in effects if e.name not in needs}
@@ -93,7 +101,23 @@ def fit(campaign: Campaign, effects: Sequence[Effect], progress: Callable[[str],
     explanation = settled.explanation
     nominal = observe(campaign, register(campaign, ~explanation.outliers))
     before = Linear(nominal.gap, frame_columns(nominal)[0], ())
-    return Fit(campaign, nominal, before, settled.observations, explanation, settled.held, settled.families, needs)
+    corrected = settled.observations if settled.held else nominal
+    return Fit(campaign, nominal, before, corrected, explanation, settled.held, settled.families, needs)
+
+
+def _require_enough(campaign: Campaign) -> None:
+    """Refuse a campaign that leaves nothing to tell effects by once the frames are fitted and a fold is held out."""
+    poses = len(np.unique(np.round(campaign.q, 6), axis=0))
+    unknown, measures = (
+        frame_columns(observe(campaign.take(np.arange(1))))[0].shape[2],
+        campaign.orientation is not None,
+    )
+    fewest = -(-(unknown + _SPARE) // (6 if measures else 3)) + 2
+    if poses < fewest:
+        raise EstimationError(
+            f"{poses} different poses are too few: {unknown} unknowns of the frames need at least {fewest} of them, "
+            "and effects many more"
+        )
 
 
 @dataclass(frozen=True, eq=False)

@@ -98,9 +98,7 @@ def chain_frames(robot: Robot, q: ArrayLike, displacement: Displacement | None =
     joint_of = {int(k): j for j, k in enumerate(chain.movable)}
     turns = skew(chain.axes)
     for part in chunks(rows):
-        joints = np.ascontiguousarray(
-            (q[part] + moved.joint[part if len(moved.joint) > 1 else slice(None)]).T
-        )
+        joints = np.ascontiguousarray((q[part] + moved.joint[part if len(moved.joint) > 1 else slice(None)]).T)
         rotation, position = moved.start(part)
         for k in range(len(chain.names)):
             rotation, position = _compose(rotation, position, chain.rotations[k], chain.translations[k])
@@ -197,9 +195,7 @@ class _Displaced:
         return np.broadcast_to(rotation, (3, 3, size)).copy(), np.broadcast_to(position, (3, size)).copy()
 
 
-def _channel(
-    robot: Robot, name: str, value: ArrayLike | None, shape: tuple[int, ...], rows: int
-) -> Array | None:
+def _channel(robot: Robot, name: str, value: ArrayLike | None, shape: tuple[int, ...], rows: int) -> Array | None:
     if value is None:
         return None
     array = np.asarray(value, dtype=float)
@@ -222,24 +218,18 @@ def _rows_of(motions: Array, part: slice) -> tuple[Array, Array]:
     return chosen[:3, :3], chosen[:3, 3]
 
 
-def _compose(
-    rotation: Array, position: Array, by_rotation: Array, by_translation: Array
-) -> tuple[Array, Array]:
+def _compose(rotation: Array, position: Array, by_rotation: Array, by_translation: Array) -> tuple[Array, Array]:
     """Follow every frame, (3, 3, C) and (3, C), by one constant placement."""
     # rotation[i] is (3, C) over the columns of the matrix: a constant on the right is a matrix on its left.
     return by_rotation.T @ rotation, position + by_translation @ rotation
 
 
-def _compose_rows(
-    rotation: Array, position: Array, by_rotation: Array, by_translation: Array
-) -> tuple[Array, Array]:
+def _compose_rows(rotation: Array, position: Array, by_rotation: Array, by_translation: Array) -> tuple[Array, Array]:
     """Follow every frame by a motion of its own."""
     product = rotation[:, 0, None] * by_rotation[0]
     for m in (1, 2):
         product += rotation[:, m, None] * by_rotation[m]
-    return product, position + np.einsum(
-        "imc,mc->ic", rotation, np.broadcast_to(by_translation, position.shape)
-    )
+    return product, position + np.einsum("imc,mc->ic", rotation, np.broadcast_to(by_translation, position.shape))
 
 
 def _turn(rotation: Array, turn: Array, angle: Array) -> Array:

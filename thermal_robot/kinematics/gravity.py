@@ -65,9 +65,7 @@ def gravity_torques(
     for j in range(robot.n - 1, -1, -1):
         k = chain.movable[j]
         last = k + 1 == len(chain.names)
-        body_rotation, body_position = (
-            (tool_rotation, tool_position) if last else (rotations[k + 1], positions[k + 1])
-        )
+        body_rotation, body_position = (tool_rotation, tool_position) if last else (rotations[k + 1], positions[k + 1])
         moment = moment + chain.masses[j] * (body_position + chain.mass_centres[j] @ body_rotation)
         mass = mass + chain.masses[j]
         axis = chain.axes[k] @ rotations[k]

@@ -25,7 +25,7 @@ _UNLIKELY = 0.02  # probability of a place that is not worth naming
 _SOURCES = {
     "stated": "the instrument's noise as the campaign states it",
     "repeats": "from the differences between repeated commands",
-    "remainder": "estimated from the remainder itself, since the campaign states none and repeats no command",
+    "remainder": "at most: from the remainder itself, since the campaign states none and repeats no command",
 }
 
 
@@ -161,7 +161,8 @@ def sentences(diagnosis: Diagnosis) -> Iterator[str]:
         chance = units.p_value(left.p_value)
         yield f"Nothing: what remains is no larger and no more structured than the noise ({chance})."
         return
-    size = f"{units.quantity(left.rms, 'm')} rms beyond the noise" if left.rms > 0 else "a remainder"
+    known = "" if diagnosis.gap.noise_source == "remainder" else " beyond the noise"
+    size = f"{units.quantity(left.rms, 'm')} rms{known}" if left.rms > 0 else "a remainder"
     yield f"The known effects leave {size} that chance does not explain ({units.p_value(left.p_value)})."
     for reason in left.reasons:
         yield f"{reason[:1].upper()}{reason[1:].rstrip('.')}."

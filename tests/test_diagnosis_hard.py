@@ -1,0 +1,196 @@
+"""Campaigns as they also come: too small, too good, in the wrong convention, on odd robots, with wrong declarations."""
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from simulate import simulate
+
+from thermal_robot import EstimationError, ThermalRobotError, diagnose
+from thermal_robot.observations import Frames, observe
+
+NOISE = 25e-6
+
+
+@pytest.fixture(autouse=True)
+def _nothing_may_overflow_in_silence():
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", RuntimeWarning)
+        yield
+
+
+@pytest.fixture(scope="module")
+def offset(rv_m2):
+    """A campaign of positions with joint offsets."""
+    return simulate(rv_m2, ["joint_offset"], seed=0)[0]
+
+
+def numbers(value):
+    """Every number of a plain structure."""
+    if isinstance(value, dict):
+        value = list(value.values())
+    if isinstance(value, list):
+        return [n for v in value for n in numbers(v)]
+    return [value] if isinstance(value, float) else []
+
+
+@pytest.mark.parametrize("rows", [1, 2, 3, 4, 5, 6])
+@pytest.mark.parametrize("stated", [True, False])
+def test_too_few_poses_are_refused(offset, rows, stated):
+    few = offset.take(np.arange(rows))
+    with pytest.raises(EstimationError):
+        diagnose(few if stated else replace(few, noise_position=None))
+
+
+@pytest.mark.parametrize("rows", [8, 10, 12, 15, 20])
+def test_few_poses_are_diagnosed_or_refused_but_never_by_accident(offset, rows):
+    for stated in (NOISE, None):
+        try:
+            found = diagnose(replace(offset.take(np.arange(rows)), noise_position=stated))
+        except EstimationError:
+            assert rows < 12
+            continue
+        assert np.isfinite(numbers(found.to_dict())).all()
+        assert set(found.verdict) <= {"joint_offset", "geometric"}
+
+
+def test_one_pose_again_and_again_is_refused(offset):
+    with pytest.raises(EstimationError, match="pose"):
+        diagnose(replace(offset, q=np.tile(offset.q[0], (120, 1))))
+
+
+@pytest.mark.parametrize("arm", ["rv_m2", "ur10"], indirect=True)
+def test_a_perfect_robot_leaves_no_gap_and_no_question(arm):
+    """Rounding has a structure, too, but nobody measures 1e-16 m."""
+    for seed in range(3):
+        campaign = simulate(arm, seed=seed)[0]
+        place = observe(campaign, Frames.declared(campaign)).predicted_position
+        found = diagnose(replace(campaign, position=place))
+        assert found.gap.rms_before < 1e-12
+        assert found.verdict == ()
+        assert not found.unexplained.flagged
+        assert found.unexplained.rms == 0.0
+        rounded = diagnose(replace(campaign, position=np.round(place, 6), noise_position=None))
+        assert rounded.gap.rms_before == pytest.approx(1e-6 / np.sqrt(12.0) * np.sqrt(3.0), rel=0.15)
+        assert rounded.verdict == ()
+        assert not rounded.unexplained.flagged
+
+
+def test_what_is_not_flagged_has_no_reasons(rv_m2):
+    campaign = simulate(rv_m2, seed=0)[0]
+    place = observe(campaign, Frames.declared(campaign)).predicted_position
+    left = diagnose(replace(campaign, position=place)).unexplained
+    assert bool(left.reasons) == left.flagged
+
+
+WRONG = {
+    "conjugate": lambda quaternion: quaternion * np.array([1.0, -1.0, -1.0, -1.0]),
+    "scalar last": lambda quaternion: np.roll(quaternion, -1, axis=1),
+    "at random": lambda quaternion: np.random.default_rng(0).normal(size=quaternion.shape),
+}
+
+
+@pytest.mark.parametrize("convention", WRONG)
+def test_orientations_in_another_convention_are_not_explained(rv_m2, convention):
+    for seed in range(2):
+        campaign = simulate(rv_m2, ["joint_offset"], seed=seed, turning=3e-5)[0]
+        wrong = WRONG[convention](campaign.orientation)
+        wrong = wrong / np.linalg.norm(wrong, axis=1, keepdims=True)
+        try:
+            found = diagnose(replace(campaign, orientation=wrong))
+        except ThermalRobotError:
+            continue
+        assert found.unexplained.flagged
+        assert found.gap.orientation_after > 0.1
+
+
+@pytest.mark.parametrize("arm", ["rv_m2", "panda"], indirect=True)
+def test_joints_in_the_wrong_unit_or_order_are_not_explained(arm):
+    campaign = simulate(arm, ["joint_offset"], seed=1)[0]
+    for wrong in (np.rad2deg(campaign.q), campaign.q[:, ::-1]):
+        found = diagnose(replace(campaign, q=wrong))
+        assert found.unexplained.flagged
+        assert found.unexplained.rms > 0.1
+        assert found.gap.held_out.shrinkage < 0.3
+
+
+def test_the_origin_and_the_unit_of_time_do_not_matter(rv_m2):
+    campaign = simulate(rv_m2, ["drift"], seed=2)[0]
+    plain = diagnose(campaign)
+    assert plain.verdict == ("drift",)
+    for origin, unit in ((1.7e9, 1.0), (0.0, 1e3)):
+        time = origin + unit * campaign.covariates["time"]
+        found = diagnose(replace(campaign, covariates={**campaign.covariates, "time": time}))
+        assert found.verdict == plain.verdict
+        assert found.gap.rms_after == pytest.approx(plain.gap.rms_after, rel=1e-4)
+
+
+@pytest.mark.parametrize(("gross", "explained"), [(0.2, True), (0.45, False)])
+def test_a_fifth_of_the_rows_may_be_wrong_but_not_half(rv_m2, gross, explained):
+    right = 0
+    for seed in range(3):
+        campaign, truth, _ = simulate(rv_m2, ["joint_offset"], seed=seed, outliers=gross)
+        found = diagnose(campaign)
+        if explained:
+            right += found.verdict == ("joint_offset",) and not found.unexplained.flagged
+            assert len(set(found.outliers) ^ set(truth["outliers"])) <= 2
+        else:
+            right += found.unexplained.flagged
+    assert right >= 2
+
+
+@pytest.mark.parametrize("arm", ["awkward-from-base"], indirect=True)
+def test_an_arm_with_sliding_joints_is_diagnosed_like_any_other(arm):
+    alone = ["joint_offset", "joint_compliance", "thermal_elongation", "backlash", "geometric"]
+    right = []
+    for seed, name in enumerate(alone):
+        found = diagnose(simulate(arm, [name], seed=seed, outliers=0.03)[0])
+        right.append(found.verdict == (name,) and not found.unexplained.flagged)
+        units = {p.unit for p in found.finding(name).parameters}
+        if name in ("joint_offset", "backlash"):
+            assert units <= {"rad", "m"}
+        if name == "joint_compliance":
+            assert units <= {"rad/(N·m)", "m/N"}
+    assert sum(right) >= len(alone) - 1
+
+
+@pytest.mark.parametrize("name", ["base_frame", "tool_frame"])
+@pytest.mark.parametrize("turning", [None, 3e-5], ids=["positions", "poses"])
+def test_a_frame_that_is_declared_known_and_wrong_is_found_with_its_size(rv_m2, name, turning):
+    shift = np.array([1e-3, -5e-4, 2e-4])
+    plain = simulate(rv_m2, seed=3, turning=turning)[0]
+    nominal = observe(plain, Frames.declared(plain))
+    noise = NOISE * np.random.default_rng(3).normal(size=(120, 3))
+    known = replace(plain, base_known=True, tool_known=True, position=nominal.predicted_position + noise)
+    if turning is not None:
+        from thermal_robot.kinematics import rotation_to_quaternion
+
+        known = replace(known, orientation=rotation_to_quaternion(nominal.rotation))
+    right = diagnose(known)
+    assert right.verdict == ()
+    assert not right.unexplained.flagged
+    if name == "base_frame":
+        wrong = replace(known, position=known.position + shift)
+    else:
+        wrong = replace(known, target=known.target - shift)
+    found = diagnose(wrong)
+    assert found.verdict == (name,)
+    estimates = {p.name.split(",")[0]: p for p in found.finding(name).parameters}
+    for axis, true in zip("xyz", shift, strict=True):
+        estimate = estimates[f"translation {axis}"]
+        assert abs(estimate.value - true) < 5.0 * estimate.std
+
+
+def test_a_prior_that_rules_an_effect_out_leaves_it_to_what_contains_it(offset):
+    assert diagnose(offset).verdict == ("joint_offset",)
+    assert diagnose(replace(offset, priors={"joint_offset": 1e-9})).verdict == ("geometric",)
+
+
+def test_withholding_everything_is_refused_or_leaves_everything_unexplained(offset):
+    try:
+        found = diagnose(offset, only=["drift"], without=["drift"])
+    except ThermalRobotError:
+        return
+    assert found.verdict == ()
+    assert found.unexplained.flagged

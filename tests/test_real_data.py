@@ -1,0 +1,132 @@
+"""Real robots and another simulator's campaigns; they lie in the folder that THERMAL_ROBOT_DATA names."""
+
+import json
+import os
+import resource
+import subprocess
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from thermal_robot import CorrectedModel, diagnose
+
+DATA = os.environ.get("THERMAL_ROBOT_DATA")
+pytestmark = pytest.mark.skipif(not DATA, reason="THERMAL_ROBOT_DATA names no folder of measured campaigns")
+FOLDER = Path(DATA or ".")
+
+
+def table(path, columns):
+    """Columns of a CSV by name, mm."""
+    data = np.genfromtxt(path, delimiter=",", names=True)
+    return np.column_stack([data[c] for c in columns])
+
+
+def predicted_mm(found, samples, directory):
+    """What the model predicts once it is saved and loaded, millimetres."""
+    found.model.save(directory / "model.json")
+    model = CorrectedModel.load(directory / "model.json")
+    return 1e3 * model.predict(model.samples(samples))[0]
+
+
+def shrinks(found):
+    """Held-out rows, not those of the fit, say so; and the interval holds the figure."""
+    held_out = found.gap.held_out
+    low, high = held_out.shrinkage_ci95
+    assert 0.0 < low <= held_out.shrinkage <= high < 1.0
+    assert held_out.rms_after < held_out.rms_before
+    return held_out.shrinkage
+
+
+def test_ur5_is_calibrated_to_a_tenth_of_a_millimetre(tmp_path):
+    found = diagnose(FOLDER / "ur5_jacobi")
+    assert found.verdict[0] == "geometric"
+    assert shrinks(found) > 0.95
+    test = FOLDER / "ur5_jacobi" / "test.csv"
+    miss = predicted_mm(found, test, tmp_path) - table(test, "xyz")
+    rms = np.sqrt((miss**2).sum(axis=1).mean())
+    print(f"ur5_jacobi: {rms:.4f} mm on test.csv")
+    assert rms <= 0.105
+
+
+def test_wam_keeps_a_millimetre_that_nothing_explains():
+    found = diagnose(FOLDER / "wam_jacobi")
+    assert found.unexplained.flagged
+    assert found.unexplained.rms > 1e-3
+    assert found.unexplained.reasons
+    assert found.unexplained.locations
+
+
+def test_ipa_ur10_b_is_geometric_first():
+    found = diagnose(FOLDER / "ipa_ur10_b")
+    assert found.finding("geometric").status == "found"
+    assert found.measures == "pose"
+    assert shrinks(found) > 0.5
+    assert found.gap.orientation_after < found.gap.orientation_before
+
+
+@pytest.fixture(scope="module")
+def ipa_ur10_a(tmp_path_factory):
+    """The diagnosis of 11 911 poses as JSON, and the peak memory of the process that made it, bytes."""
+    file = tmp_path_factory.mktemp("ipa") / "diagnosis.json"
+    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
+    command = [sys.executable, "-m", "thermal_robot.cli", "diagnose", str(FOLDER / "ipa_ur10_a"), "--json", str(file)]
+    subprocess.run(command, check=True, capture_output=True, timeout=600)
+    peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
+    assert peak >= before
+    return json.loads(file.read_text(encoding="utf-8")), peak
+
+
+def test_ipa_ur10_a_is_geometric_and_more(ipa_ur10_a):
+    found, _ = ipa_ur10_a
+    assert found["campaign"]["samples"] == 11911
+    assert found["verdict"]["effects"][0] == "geometric"
+    assert {e["name"]: e["status"] for e in found["effects"]}["geometric"] == "found"
+    assert found["verdict"]["unexplained"] is True
+    assert found["unexplained"]["rms"] > 0.0
+
+
+def test_eleven_thousand_poses_take_two_gigabytes_at_most(ipa_ur10_a):
+    peak = ipa_ur10_a[1]
+    print(f"ipa_ur10_a: {peak / 2**30:.2f} GiB")
+    assert 2**27 < peak <= 2 * 2**30
+
+
+def plain_cases():
+    """Cases whose answer must come out exactly: one or two effects at 2-6 times the noise, or none."""
+    if not DATA:
+        return []
+    cases = json.loads((FOLDER / "open_cases" / "truth.json").read_text(encoding="utf-8"))
+    return [case for case in cases if case["level"] in ("plain", "null")]
+
+
+@pytest.fixture(scope="module")
+def opened():
+    """Every plain case with its diagnosis."""
+    cases = plain_cases()
+    assert len(cases) == 12
+    return [(case, diagnose(FOLDER / "open_cases" / case["case"])) for case in cases]
+
+
+@pytest.mark.parametrize("number", range(12))
+def test_an_open_case_is_told_exactly(opened, number):
+    truth, found = opened[number]
+    assert {f.name for f in found.effects if f.status == "found"} == set(truth["effects"])
+    assert set(found.verdict) == set(truth["effects"])
+    assert not found.unexplained.flagged, found.unexplained.reasons
+    confounded = {f.name: f.confounded_with for f in found.effects if f.status == "confounded"}
+    assert confounded == {}
+    spoilt = truth["outliers"] * truth["n"]
+    assert len(found.outliers) <= 2 * spoilt + 0.02 * truth["n"]
+
+
+def test_fresh_samples_of_open_cases_are_predicted_to_half_a_noise(opened, tmp_path):
+    misses = {}
+    for truth, found in opened:
+        folder = FOLDER / "open_cases" / truth["case"]
+        miss = predicted_mm(found, folder / "fresh.csv", tmp_path) - np.loadtxt(folder / "fresh_truth_mm.txt")
+        misses[truth["case"]] = float(np.sqrt((miss**2).mean()) / truth["noise_mm"])
+    print("per axis, in noises:", {k: round(v, 2) for k, v in misses.items()})
+    assert np.median(list(misses.values())) < 0.5, misses
+    assert max(misses.values()) < 1.0, misses
