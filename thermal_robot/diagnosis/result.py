@@ -131,8 +131,8 @@ class Unexplained:
     flagged
         Whether it is larger or more structured than the noise allows.
     rms
-        Its rms distance, m, noise subtracted where a stated noise or repeats tell it, all of it where nothing does; 0 where
-        nothing is left.
+        Its rms distance, m: noise subtracted where a stated noise or repeats tell it, all of it where nothing does; 0
+        where nothing is left.
     p_value
         Of the most telling test, after counting all of them.
     reasons

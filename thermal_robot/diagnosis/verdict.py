@@ -61,8 +61,8 @@ def sentence(
         turned = gap.rms_after <= _ANOTHER_MOTION * reach
         left = f"{gap.orientation_after:.2g} rad" if turned else f"{length(gap.rms_after)} of {length(reach)}"
         return (
-            f"Robot and table do not describe the same motion ({left} remain): check units, signs and order of the joints, "
-            "axes of the instrument, order of the quaternion, and that all rows belong to one set-up."
+            f"Robot and table do not describe the same motion ({left} remain): check units, signs and order of the "
+            "joints, axes of the instrument, order of the quaternion, and that all rows belong to one set-up."
         )
     if not explained:
         if not unexplained.flagged:
@@ -75,8 +75,8 @@ def sentence(
     listed = _listed([plain(n) for n in weighty]) + (f", and, hardly to be seen, {_listed(slight)}" if slight else "")
     sure = f"{100 * probability:.0f} % sure" if probability < 0.995 else "more than 99 % sure"
     text = (
-        f"The gap of {size} comes from {listed} ({sure}); correcting for {'them' if len(explained) > 1 else 'it'} removes "
-        f"{100 * gap.held_out.shrinkage:.1f} % of its mean square on held-out data and leaves "
+        f"The gap of {size} comes from {listed} ({sure}); correcting for {'them' if len(explained) > 1 else 'it'} "
+        f"removes {100 * gap.held_out.shrinkage:.1f} % of its mean square on held-out data and leaves "
         f"{length(gap.held_out.rms_after)}"
     )
     if not unexplained.flagged:
