@@ -22,6 +22,7 @@ ORDER = (
     "repeatability",
     "thermal",
     "workspace",
+    "paper",
     "campaign",
     "observations",
     "effects",

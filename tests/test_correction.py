@@ -65,7 +65,6 @@ def test_a_saved_model_predicts_the_same(rv_m2, tmp_path, mixture, turning):
 
 def test_a_model_needs_what_its_effects_read_and_nothing_more(rv_m2):
     for effects, needs in (
-        ([], set()),
         (["geometric"], set()),
         (["thermal_elongation"], {"temperature"}),
         (["drift"], {"time"}),

@@ -193,7 +193,7 @@ def test_two_effects_share_the_gap_as_they_caused_it(arm):
 PLACES = {"backlash": "joint", "transmission_error": "joint", "drift": "base"}
 
 
-@on_arms
+@pytest.mark.parametrize("arm", ["rv_m2", "ur10"], indirect=True)
 def test_a_withheld_effect_is_called_unexplained_with_its_place_and_quantity(arm):
     alone = ["transmission_error", "backlash", "joint_compliance", "geometric", "thermal_elongation", "drift"]
     flagged, placed, followed = [], [], []

@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from simulate import simulate
 
-from thermal_robot import EstimationError, ThermalRobotError, diagnose
+from thermal_robot import EffectError, EstimationError, ThermalRobotError, diagnose
+from thermal_robot.kinematics import rotation_to_quaternion
 from thermal_robot.observations import Frames, observe
 
 NOISE = 25e-6
@@ -43,7 +44,7 @@ def test_too_few_poses_are_refused(offset, rows, stated):
         diagnose(few if stated else replace(few, noise_position=None))
 
 
-@pytest.mark.parametrize("rows", [8, 10, 12, 15, 20])
+@pytest.mark.parametrize("rows", [8, 11, 20])
 def test_few_poses_are_diagnosed_or_refused_but_never_by_accident(offset, rows):
     for stated in (NOISE, None):
         try:
@@ -60,21 +61,19 @@ def test_one_pose_again_and_again_is_refused(offset):
         diagnose(replace(offset, q=np.tile(offset.q[0], (120, 1))))
 
 
-@pytest.mark.parametrize("arm", ["rv_m2", "ur10"], indirect=True)
-def test_a_perfect_robot_leaves_no_gap_and_no_question(arm):
+def test_a_perfect_robot_leaves_no_gap_and_no_question(rv_m2):
     """Rounding has a structure, too, but nobody measures 1e-16 m."""
-    for seed in range(3):
-        campaign = simulate(arm, seed=seed)[0]
-        place = observe(campaign, Frames.declared(campaign)).predicted_position
-        found = diagnose(replace(campaign, position=place))
-        assert found.gap.rms_before < 1e-12
-        assert found.verdict == ()
-        assert not found.unexplained.flagged
-        assert found.unexplained.rms == 0.0
-        rounded = diagnose(replace(campaign, position=np.round(place, 6), noise_position=None))
-        assert rounded.gap.rms_before == pytest.approx(1e-6 / np.sqrt(12.0) * np.sqrt(3.0), rel=0.15)
-        assert rounded.verdict == ()
-        assert not rounded.unexplained.flagged
+    campaign = simulate(rv_m2, seed=0)[0]
+    place = observe(campaign, Frames.declared(campaign)).predicted_position
+    found = diagnose(replace(campaign, position=place))
+    assert found.gap.rms_before < 1e-12
+    assert found.verdict == ()
+    assert not found.unexplained.flagged
+    assert found.unexplained.rms == 0.0
+    rounded = diagnose(replace(campaign, position=np.round(place, 6), noise_position=None))
+    assert rounded.gap.rms_before == pytest.approx(1e-6 / np.sqrt(12.0) * np.sqrt(3.0), rel=0.15)
+    assert rounded.verdict == ()
+    assert not rounded.unexplained.flagged
 
 
 def test_what_is_not_flagged_has_no_reasons(rv_m2):
@@ -142,7 +141,7 @@ def test_a_fifth_of_the_rows_may_be_wrong_but_not_half(rv_m2, gross, explained):
 
 @pytest.mark.parametrize("arm", ["awkward-from-base"], indirect=True)
 def test_an_arm_with_sliding_joints_is_diagnosed_like_any_other(arm):
-    alone = ["joint_offset", "joint_compliance", "thermal_elongation", "backlash", "geometric"]
+    alone = ["joint_offset", "joint_compliance", "thermal_elongation", "backlash"]
     right = []
     for seed, name in enumerate(alone):
         found = diagnose(simulate(arm, [name], seed=seed, outliers=0.03)[0])
@@ -164,8 +163,6 @@ def test_a_frame_that_is_declared_known_and_wrong_is_found_with_its_size(rv_m2, 
     noise = NOISE * np.random.default_rng(3).normal(size=(120, 3))
     known = replace(plain, base_known=True, tool_known=True, position=nominal.predicted_position + noise)
     if turning is not None:
-        from thermal_robot.kinematics import rotation_to_quaternion
-
         known = replace(known, orientation=rotation_to_quaternion(nominal.rotation))
     right = diagnose(known)
     assert right.verdict == ()
@@ -187,10 +184,6 @@ def test_a_prior_that_rules_an_effect_out_leaves_it_to_what_contains_it(offset):
     assert diagnose(replace(offset, priors={"joint_offset": 1e-9})).verdict == ("geometric",)
 
 
-def test_withholding_everything_is_refused_or_leaves_everything_unexplained(offset):
-    try:
-        found = diagnose(offset, only=["drift"], without=["drift"])
-    except ThermalRobotError:
-        return
-    assert found.verdict == ()
-    assert found.unexplained.flagged
+def test_withholding_everything_is_refused(offset):
+    with pytest.raises(EffectError):
+        diagnose(offset, only=["drift"], without=["drift"])

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from simulate import simulate
 
-from thermal_robot import diagnose
+from thermal_robot import EffectError, diagnose
 from thermal_robot.effects import Drift, ThermalElongation, TransmissionError, choose, library
-from thermal_robot.errors import EffectError
 from thermal_robot.estimation.columns import block, displacement, frame_columns
 from thermal_robot.estimation.register import moved
 from thermal_robot.kinematics import exp6, rotation_to_quaternion
@@ -276,6 +275,7 @@ def test_a_stated_prior_sets_the_size_and_keeps_proportions(rv_m2):
 
 def test_choosing_keeps_the_order_of_the_library():
     assert [e.name for e in choose()] == list(library())
+    assert [e.name for e in choose("drift")] == ["drift"]
     assert {e.name for e in choose(["drift", "geometric"])} == {"drift", "geometric"}
     assert {e.name for e in choose(without=["drift"])} == set(EFFECTS) - {"drift"}
     with pytest.raises(EffectError, match="no effect is left"):

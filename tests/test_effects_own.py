@@ -67,7 +67,7 @@ def test_an_effect_of_ones_own_is_found_with_its_values(rv_m2):
 
 def test_the_model_that_holds_it_needs_its_covariate(rv_m2):
     data = with_sag(rv_m2, 0)
-    model = diagnose(data, effects=[JointSag()], only=["drift"]).model
+    model = diagnose(data, effects=[JointSag()], only=["joint_sag"]).model
     assert model.needs == ("speed",)
     assert np.sqrt(((model.predict(data)[0] - data.position) ** 2).mean()) < 1.1 * 25e-6
     with pytest.raises(CampaignError) as refused:
@@ -102,6 +102,15 @@ def test_a_name_like_no_other_is_answered_with_all():
     with pytest.raises(EffectError) as refused:
         choose(["#"])
     assert all(name in str(refused.value) for name in library())
+
+
+def test_what_is_no_effect_of_ones_own_is_refused():
+    assert [e.name for e in choose(own=[JointSag()])] == [*library(), "joint_sag"]
+    assert [e.name for e in choose("joint_sag", own=[JointSag()])] == ["joint_sag"]
+    assert [e.name for e in choose(without=list(library()), own=[JointSag()])] == ["joint_sag"]
+    for wrong in ([JointSag], [3], [JointSag(), JointSag()], [JointOffset()]):
+        with pytest.raises(EffectError, match="effect"):
+            choose(own=wrong)
 
 
 def installed(monkeypatch, name, thing):

@@ -253,7 +253,7 @@ def test_geometric_contains_offsets_and_for_positions_scale_and_nothing_else(arm
     assert not any(pair <= set(blocks) for pair in contained(seen) for blocks in search.seen)
 
 
-@on_arms
+@pytest.mark.parametrize("arm", ["ur10"], indirect=True)
 def test_two_effects_of_which_one_contains_the_other_are_never_named_together(arm):
     for seed, both in enumerate([["geometric", "joint_offset"], ["geometric", "instrument_scale"]]):
         campaign = simulate(arm, both, seed=seed)[0]

@@ -152,9 +152,16 @@ def carried_off(campaign, motion):
     return replace(campaign, position=campaign.position @ turn.T + shift, orientation=orientation)
 
 
-@pytest.mark.parametrize("arm", ["rv_m2", "panda"], indirect=True)
-@pytest.mark.parametrize("turning", [None, 3e-5], ids=["positions", "poses"])
-@pytest.mark.parametrize("effects", [["thermal_elongation", "backlash"], ["instrument_scale", "drift"]], ids="-".join)
+@pytest.mark.parametrize(
+    ("arm", "turning", "effects"),
+    [
+        ("rv_m2", None, ["instrument_scale", "drift"]),
+        ("rv_m2", 3e-5, ["thermal_elongation", "backlash"]),
+        ("panda", None, ["thermal_elongation", "backlash"]),
+        ("panda", 3e-5, ["instrument_scale", "drift"]),
+    ],
+    indirect=["arm"],
+)
 def test_where_the_tracker_stands_changes_nothing(arm, turning, effects):
     campaign = simulate(arm, effects, seed=6, samples=80, turning=turning, outliers=0.03)[0]
     motion = pose(exp3([0.3, np.pi, -0.2]), [3.0, -2.0, -4.0])

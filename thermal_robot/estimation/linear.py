@@ -85,6 +85,7 @@ def gram(linear: Linear, whitening: Whitening) -> Gram:
     inverse = (vector[:, known] / value[known]) @ vector[:, known].T / np.outer(length, length)
     projector = inverse @ cross
     rest = full[flat:, flat:] * np.outer(sizes, sizes) - cross.T @ projector
+    rest = 0.5 * (rest + rest.T)
     bases, slices, start, parameter = [], [], 0, 0
     for item in linear.blocks:
         own = slice(parameter, parameter + len(item.sizes))
