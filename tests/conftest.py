@@ -82,9 +82,7 @@ ARMS = {
 def load_arm(name):
     source, tool, root = ARMS[name]
     if source.startswith("example-robot-data:"):
-        pytest.importorskip(
-            "example_robot_data", reason="this arm is in the package example-robot-data-loaders"
-        )
+        pytest.importorskip("example_robot_data", reason="this arm is in the package example-robot-data-loaders")
     return load_robot(source, tool, root_frame=root)
 
 

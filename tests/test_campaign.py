@@ -184,9 +184,7 @@ class TestReading:
         np.testing.assert_allclose(campaign.simulated_orientation, [[1, 0, 0, 0]] * 3)
         assert campaign.warnings == ()
 
-    def test_path_of_file_or_directory_gives_the_same(
-        self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-    ) -> None:
+    def test_path_of_file_or_directory_gives_the_same(self, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
         folder = put(tmp_path / "cell")
         by_file, by_folder = read_campaign(folder / "campaign.toml"), read_campaign(str(folder))
         monkeypatch.chdir(folder)
@@ -214,9 +212,7 @@ class TestReading:
 
     def test_a_builtin_robot_is_not_a_path(self, tmp_path: Path) -> None:
         builtin = load_robot("builtin:rv_m2", _last_link("builtin:rv_m2"))
-        table = pd.DataFrame(
-            np.random.default_rng(0).uniform(-0.5, 0.5, (9, builtin.n)), columns=builtin.joint_names
-        )
+        table = pd.DataFrame(np.random.default_rng(0).uniform(-0.5, 0.5, (9, builtin.n)), columns=builtin.joint_names)
         table[["x", "y", "z"]] = np.random.default_rng(1).uniform(-0.5, 0.5, (9, 3))
         table.to_csv(tmp_path / "t.csv", index=False)
         (tmp_path / "campaign.toml").write_text(
@@ -327,9 +323,7 @@ class TestGaps:
             ("humidity", "40 _ 44 44", [40, 42, 44, 44], "interpolated between rows"),
         ],
     )
-    def test_filled_once_and_said(
-        self, tmp_path: Path, name: str, cells: str, filled: list[float], words: str
-    ) -> None:
+    def test_filled_once_and_said(self, tmp_path: Path, name: str, cells: str, filled: list[float], words: str) -> None:
         campaign = read_campaign(put(tmp_path / "c", add(ROWS + "20,20,30,40,990,0,500\n", **{name: cells})))
         column = name.replace("__", ".")
         np.testing.assert_allclose(campaign.covariates[column], filled)
@@ -430,17 +424,13 @@ class TestFromTable:
             ({"gears": {"left": 3}}, "gears.left", "did you mean 'lift'"),
         ],
     )
-    def test_arguments_are_checked(
-        self, robot: Robot, arguments: dict[str, object], column: str, words: str
-    ) -> None:
+    def test_arguments_are_checked(self, robot: Robot, arguments: dict[str, object], column: str, words: str) -> None:
         with pytest.raises(CampaignError, match=words) as caught:
             campaign_from_table(robot, pd.DataFrame(), **arguments)
         assert (caught.value.file, caught.value.column) == ("<table>", column)
 
     def test_cells_are_checked(self, robot: Robot) -> None:
-        frame = pd.DataFrame(
-            {"turn": [0.1, None], "lift": 0.1, "slide": 0.1, "roll": 0.1, "x": 1, "y": 1, "z": 1}
-        )
+        frame = pd.DataFrame({"turn": [0.1, None], "lift": 0.1, "slide": 0.1, "roll": 0.1, "x": 1, "y": 1, "z": 1})
         with pytest.raises(CampaignError) as caught:
             campaign_from_table(robot, frame, base="known", tool="known")
         assert (caught.value.row, caught.value.column, caught.value.found) == (1, "turn", "an empty cell")
@@ -468,9 +458,7 @@ class TestValue:
         assert campaign.rows.tolist() == [2, 3]
 
     def test_shapes_are_checked(self, robot: Robot) -> None:
-        with pytest.raises(
-            CampaignError, match=r"<mine>, column 'position'.*found \(2, 2\), expected \(2, 3\)"
-        ):
+        with pytest.raises(CampaignError, match=r"<mine>, column 'position'.*found \(2, 2\), expected \(2, 3\)"):
             Campaign("mine", robot, np.zeros((2, 4)), np.zeros((2, 2)))
 
     @pytest.mark.parametrize("rows", [[2, 0], np.array([True, False, True]), []])
@@ -480,9 +468,7 @@ class TestValue:
         index = np.arange(3)[np.asarray(rows, dtype=bool if len(rows) == 3 else int)]
         np.testing.assert_array_equal(part.q, campaign.q[index])
         np.testing.assert_array_equal(part.orientation, campaign.orientation[index])
-        np.testing.assert_array_equal(
-            part.covariates["temperature"], campaign.covariates["temperature"][index]
-        )
+        np.testing.assert_array_equal(part.covariates["temperature"], campaign.covariates["temperature"][index])
         np.testing.assert_array_equal(part.labels["session"], campaign.labels["session"][index])
         np.testing.assert_array_equal(part.rows, campaign.rows[index])
         assert part.samples == len(index)
@@ -530,9 +516,7 @@ class TestWriting:
         campaign = dataclasses.replace(full(tmp_path / "c"), units=Units(angle, length), name="copy")
         again = read_campaign(write_campaign(campaign, tmp_path / "copy"))
         for name in ("q", "position", "orientation", "simulated_position", "simulated_orientation", "target"):
-            np.testing.assert_allclose(
-                getattr(again, name), getattr(campaign, name), rtol=1e-12, err_msg=name
-            )
+            np.testing.assert_allclose(getattr(again, name), getattr(campaign, name), rtol=1e-12, err_msg=name)
         assert list(again.covariates) == list(campaign.covariates)
         for name, values in campaign.covariates.items():
             np.testing.assert_allclose(again.covariates[name], values, rtol=1e-12, err_msg=name)
@@ -620,12 +604,7 @@ class TestDescription:
 
     def test_columns_are_aligned(self, tmp_path: Path) -> None:
         lines = describe(full(tmp_path / "c")).split("Joints\n")[1].split("\n\n")[0].splitlines()
-        assert (
-            len(
-                {line.index(cell) for line, cell in zip(lines[1:], ("rev", "rev", "pri", "con"), strict=True)}
-            )
-            == 1
-        )
+        assert len({line.index(cell) for line, cell in zip(lines[1:], ("rev", "rev", "pri", "con"), strict=True)}) == 1
 
 
 def _squeezed(text: str) -> str:

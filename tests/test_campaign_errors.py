@@ -420,14 +420,10 @@ def test_what_is_ignored_is_no_covariate(tmp_path: Path, name: str) -> None:
 
 def test_radians_called_degrees(tmp_path: Path) -> None:
     warnings = read(tmp_path, toml=TOML.replace('"rad"', '"deg"')).warnings
-    assert any(
-        'no joint leaves ±3.5 degrees: is angle_unit = "rad" meant?' in warning for warning in warnings
-    )
+    assert any('no joint leaves ±3.5 degrees: is angle_unit = "rad" meant?' in warning for warning in warnings)
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "words"), [("80.0]", "80000.0]", "target lies 80 m"), ("0.02", "20", "noise")]
-)
+@pytest.mark.parametrize(("old", "new", "words"), [("80.0]", "80000.0]", "target lies 80 m"), ("0.02", "20", "noise")])
 def test_lengths_in_another_unit(tmp_path: Path, old: str, new: str, words: str) -> None:
     (warning,) = read(tmp_path, toml=TOML.replace(old, new)).warnings
     assert words in warning

@@ -169,7 +169,7 @@ def test_nothing_is_left_to_chance(arm, cases):
     assert diagnose(case.campaign).to_dict() == case.found.to_dict()
 
 
-@on_arms
+@pytest.mark.parametrize("arm", ["rv_m2", "ur10"], indirect=True)
 def test_two_effects_share_the_gap_as_they_caused_it(arm):
     """Shares add up to the whole; each is near its part of the mean square, noise included."""
     apart = []

@@ -112,7 +112,7 @@ def noise_alone(robot):
     yield replace(campaign, noise_position=None), truth, None
 
 
-@on_arms
+@pytest.mark.parametrize("arm", ["rv_m2", "panda"], indirect=True)
 def test_noise_is_not_explained_and_does_not_shrink(arm):
     named, flagged, shrinkage = [], [], []
     for campaign, truth, _ in noise_alone(arm):

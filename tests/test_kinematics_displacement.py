@@ -25,9 +25,7 @@ def central_difference(robot, q, displace):
 def displaced(arm):
     """Large errors everywhere but in the segments, to differentiate about."""
     rng = np.random.default_rng(5)
-    return kin.Displacement(
-        joint=rng.normal(0, 0.3, arm.n), base=rng.normal(0, 0.3, 6), tool=rng.normal(0, 0.3, 6)
-    )
+    return kin.Displacement(joint=rng.normal(0, 0.3, arm.n), base=rng.normal(0, 0.3, 6), tool=rng.normal(0, 0.3, 6))
 
 
 def test_joint_channel_is_the_jacobian(arm, configurations, displaced):
@@ -37,9 +35,7 @@ def test_joint_channel_is_the_jacobian(arm, configurations, displaced):
         response = central_difference(
             arm,
             q,
-            lambda h, u=unit: kin.Displacement(
-                joint=displaced.joint + h * u, base=displaced.base, tool=displaced.tool
-            ),
+            lambda h, u=unit: kin.Displacement(joint=displaced.joint + h * u, base=displaced.base, tool=displaced.tool),
         )
         np.testing.assert_allclose(jacobians[:, :, j], response, rtol=0.0, atol=TOLERANCE)
 
@@ -61,9 +57,7 @@ def test_base_channel_moves_the_whole_robot(arm, configurations):
     position = kin.tool_poses(arm, q)[:, :3, 3]
     for unit in np.eye(6):
         response = central_difference(arm, q, lambda h, u=unit: kin.Displacement(base=h * u))
-        expected = np.concatenate(
-            [unit[:3] + np.cross(unit[3:], position), np.tile(unit[3:], (20, 1))], axis=1
-        )
+        expected = np.concatenate([unit[:3] + np.cross(unit[3:], position), np.tile(unit[3:], (20, 1))], axis=1)
         np.testing.assert_allclose(expected, response, rtol=0.0, atol=TOLERANCE)
 
 
@@ -108,6 +102,4 @@ def test_elongation_lengthens_the_placement_and_turns_nothing(arm):
         moved = after.positions[0, segment.index] - before.positions[0, segment.index]
         k = segment.index
         parent = before.rotations[0, k] @ arm.chain.rotations[k].T
-        np.testing.assert_allclose(
-            moved, 1e-3 * parent @ arm.chain.translations[k] / segment.length, atol=1e-15
-        )
+        np.testing.assert_allclose(moved, 1e-3 * parent @ arm.chain.translations[k] / segment.length, atol=1e-15)

@@ -29,9 +29,7 @@ def test_payload_on_the_stretched_arm(rv_m2):
     q = np.zeros((1, 5))
     share = kin.gravity_torques(rv_m2, q, payload=2.0) - kin.gravity_torques(rv_m2, q)
     # 2 kg at l3 + l4 + l5, l4 + l5 and l5 from the three pitch axes; nothing turns the waist or the roll.
-    np.testing.assert_allclose(
-        share[0], [0.0, 2 * 9.81 * 0.60, 2 * 9.81 * 0.35, 2 * 9.81 * 0.15, 0.0], atol=1e-12
-    )
+    np.testing.assert_allclose(share[0], [0.0, 2 * 9.81 * 0.60, 2 * 9.81 * 0.35, 2 * 9.81 * 0.15, 0.0], atol=1e-12)
 
 
 def test_a_robot_on_the_wall_holds_itself_with_the_waist(configurations):

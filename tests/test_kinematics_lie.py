@@ -31,9 +31,7 @@ ANGLES = [
 def test_log_undoes_exp_to_rounding(angle):
     vectors = angle * AXES
     back = kin.log3(kin.exp3(vectors))
-    np.testing.assert_allclose(
-        back, vectors, rtol=4e-15, atol=2e-15 if angle > 3.0 else 1e-300 + 4e-16 * angle
-    )
+    np.testing.assert_allclose(back, vectors, rtol=4e-15, atol=2e-15 if angle > 3.0 else 1e-300 + 4e-16 * angle)
 
 
 def test_half_turn_has_length_pi_about_either_sense_of_its_axis():
@@ -45,9 +43,7 @@ def test_half_turn_has_length_pi_about_either_sense_of_its_axis():
 @pytest.mark.parametrize("angle", ANGLES)
 def test_exp_gives_rotations(angle):
     rotations = kin.exp3(angle * AXES)
-    np.testing.assert_allclose(
-        rotations @ np.swapaxes(rotations, 1, 2), np.tile(np.eye(3), (200, 1, 1)), atol=2e-15
-    )
+    np.testing.assert_allclose(rotations @ np.swapaxes(rotations, 1, 2), np.tile(np.eye(3), (200, 1, 1)), atol=2e-15)
     np.testing.assert_allclose(np.linalg.det(rotations), 1.0, atol=2e-15)
 
 

@@ -61,11 +61,7 @@ def test_an_arm_is_what_its_urdf_says(arm):
         assert segment.length == pytest.approx(length, abs=1e-12)
         assert segment.movable == (joint.type != "fixed")
         assert np.linalg.norm(segment.direction) == pytest.approx(1.0 if length > 1e-9 else 0.0)
-    placed = [
-        k
-        for k, joint in enumerate(chain)
-        if joint.type != "fixed" or np.linalg.norm(joint.origin[:3, 3]) > 1e-9
-    ]
+    placed = [k for k, joint in enumerate(chain) if joint.type != "fixed" or np.linalg.norm(joint.origin[:3, 3]) > 1e-9]
     assert [segment.index for segment in arm.segments] == placed
 
 
@@ -99,9 +95,7 @@ def test_builtin_robots_are_found_inside_the_package_too(rv_m2, configurations, 
 
 @pytest.mark.parametrize(("name", "forearm"), [("ur3", 0.21325), ("ur5", 0.39225), ("ur10", 0.5723)])
 def test_each_universal_robot_has_its_own_lengths(name, forearm):
-    pytest.importorskip(
-        "example_robot_data", reason="these arms are in the package example-robot-data-loaders"
-    )
+    pytest.importorskip("example_robot_data", reason="these arms are in the package example-robot-data-loaders")
     robot = load_robot(f"example-robot-data:{name}", "tool0")
     assert robot.name == name
     assert {s.name: s.length for s in robot.segments}["wrist_1_joint"] == pytest.approx(forearm, abs=1e-12)
@@ -134,9 +128,7 @@ def test_other_joints_are_held_at_the_limit_nearest_to_zero(awkward_urdf):
     q[lift.idx_q], q[branch.idx_q] = 0.2, -0.3
     locked = [lift.idx_v, branch.idx_v]
     np.testing.assert_allclose(
-        pinocchio.computeGeneralizedGravity(
-            held.model, held.model.createData(), pinocchio.neutral(held.model)
-        ),
+        pinocchio.computeGeneralizedGravity(held.model, held.model.createData(), pinocchio.neutral(held.model)),
         np.delete(pinocchio.computeGeneralizedGravity(full, data, q), locked),
         atol=1e-12,
     )
@@ -166,9 +158,7 @@ def test_rv_m2_is_stretched_along_y_at_zero(rv_m2):
 def test_rv_m2_grows_as_equations_9_to_11_say(rv_m2, configurations):
     q = configurations(rv_m2, 1000)
     growing = [(s, segment) for s, segment in enumerate(rv_m2.segments) if segment.length > 0.0]
-    assert [segment.length for _, segment in growing] == pytest.approx(
-        [0.40, 0.12, 0.25, 0.20, 0.15], abs=1e-15
-    )
+    assert [segment.length for _, segment in growing] == pytest.approx([0.40, 0.12, 0.25, 0.20, 0.15], abs=1e-15)
     sensitivities = kin.placement_sensitivities(rv_m2, q)
     ours = np.stack([sensitivities[:, :3, s, :3] @ segment.direction for s, segment in growing], axis=-1)
 
@@ -195,8 +185,6 @@ def test_rv_m2_gives_table_2_of_the_paper(rv_m2):
 
 def test_rv_m2_is_as_its_sources_say(rv_m2):
     degrees = np.rad2deg(np.stack([rv_m2.lower, rv_m2.upper], axis=1))
-    np.testing.assert_allclose(
-        degrees, [[-150, 150], [-30, 100], [-120, 0], [-110, 110], [-180, 180]], atol=1e-10
-    )
+    np.testing.assert_allclose(degrees, [[-150, 150], [-30, 100], [-120, 0], [-110, 110], [-180, 180]], atol=1e-10)
     np.testing.assert_allclose(np.rad2deg(rv_m2.model.velocityLimit), [140, 79, 140, 163, 223], rtol=1e-5)
     assert sum(inertia.mass for inertia in rv_m2.model.inertias) == pytest.approx(28.0)

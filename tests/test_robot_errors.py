@@ -111,8 +111,7 @@ def test_joints_with_more_freedoms_are_named(kind):
     error = refusal(two_links(kind, '<axis xyz="0 0 1"/>'), "b")
     assert error.name == "j"
     assert str(error) == (
-        f"joint 'j' of the chain is {kind}; "
-        "only revolute, continuous, prismatic and fixed joints are supported"
+        f"joint 'j' of the chain is {kind}; only revolute, continuous, prismatic and fixed joints are supported"
     )
 
 
@@ -148,13 +147,9 @@ def test_nothing_that_moves():
     assert "no movable joint" in str(refusal("builtin:rv_m2", "base_link"))
 
 
-@pytest.mark.parametrize(
-    "gravity", [[0, 0], [0, 0, float("nan")], "down", [[0, 0, -9.81]], -9.81, [0, 0, None]]
-)
+@pytest.mark.parametrize("gravity", [[0, 0], [0, 0, float("nan")], "down", [[0, 0, -9.81]], -9.81, [0, 0, None]])
 def test_gravity_is_three_finite_numbers(gravity):
-    assert str(refusal("builtin:rv_m2", "tool0", gravity=gravity)).startswith(
-        "gravity must be three finite numbers"
-    )
+    assert str(refusal("builtin:rv_m2", "tool0", gravity=gravity)).startswith("gravity must be three finite numbers")
 
 
 def test_unknown_builtin_robot():
@@ -173,8 +168,7 @@ def test_unknown_example_robot():
 def test_example_robot_without_urdf():
     pytest.importorskip("example_robot_data", reason="names of the package example-robot-data-loaders")
     assert (
-        str(refusal("example-robot-data:cassie", "pelvis"))
-        == "robot 'cassie' of example-robot-data has no URDF file"
+        str(refusal("example-robot-data:cassie", "pelvis")) == "robot 'cassie' of example-robot-data has no URDF file"
     )
 
 

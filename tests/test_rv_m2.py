@@ -10,8 +10,6 @@ import pytest
 import yourdfpy
 from scipy.spatial.distance import cdist
 
-import thermal_robot.robot as robot_module
-
 POSES = {
     "stretched": np.zeros(5),
     "Table 1, row 1": np.array([0.5235, 0.8726, -1.3962, -1.0471, 0.0]),
@@ -26,7 +24,7 @@ def tree(rv_m2):
 
 @pytest.fixture(scope="module")
 def readme():
-    path = Path(robot_module.__file__).parent.parent / "robots" / "README.md"
+    path = Path(__file__).parents[1] / "robots" / "README.md"
     return path.read_text(encoding="utf-8")
 
 

@@ -145,7 +145,12 @@ def examine(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> tuple
     if flagged and source == "remainder":
         beyond = rms  # neither a stated noise nor repeats vouch for any of it
     unexplained = Unexplained(
-        flagged, float(beyond), float(p_value), reasons if flagged else (), locations if flagged else (), depends if flagged else ()
+        flagged,
+        float(beyond),
+        float(p_value),
+        reasons if flagged else (),
+        locations if flagged else (),
+        depends if flagged else (),
     )
     return unexplained, float(floor), source
 
