@@ -78,3 +78,9 @@ def test_the_smaller_effect_is_named_at_ten_times_its_usual_size(arm):
 def test_an_offset_of_six_degrees_is_still_an_offset(arm):
     right = [diagnose(measured(arm, {"joint_offset": 0.1}, s, 25e-6)[0]).verdict for s in range(3)]
     assert right.count(("joint_offset",)) >= 2
+
+
+def test_exactness_does_not_add_effects_that_are_not_at_work(rv_m2):
+    both = {"transmission_error": 5e-3, "instrument_scale": 1e-3}
+    right = [set(diagnose(measured(rv_m2, both, s, 1e-9)[0]).verdict) == set(both) for s in range(4)]
+    assert sum(right) >= 3

@@ -44,6 +44,11 @@ def test_too_few_poses_are_refused(offset, rows, stated):
         diagnose(few if stated else replace(few, noise_position=None))
 
 
+def test_seven_poses_without_a_stated_noise_are_refused_without_a_warning(offset):
+    with pytest.raises(EstimationError):
+        diagnose(replace(offset.take(np.arange(7)), noise_position=None))
+
+
 @pytest.mark.parametrize("rows", [8, 11, 20])
 def test_few_poses_are_diagnosed_or_refused_but_never_by_accident(offset, rows):
     for stated in (NOISE, None):

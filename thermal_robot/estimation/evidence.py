@@ -186,7 +186,9 @@ def _evidence(gram: Gram, blocks: tuple[int, ...], prior: float, start: Combinat
         if size:
             precision = matrix / variance
             precision[np.diag_indices(size)] += 1.0 / scale[owner] ** 2
-            factor, _ = dpotrf(precision, lower=1, clean=1)
+            factor, failed = dpotrf(precision, lower=1, clean=1)
+            if failed:
+                raise EstimationError("the measurements do not determine anything: too few, or all alike")
             lower, _ = dpotri(factor, lower=1)
             covariance = lower + np.tril(lower, -1).T
             values = covariance @ vector / variance

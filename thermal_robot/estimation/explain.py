@@ -17,6 +17,7 @@ Array = NDArray[np.float64]
 PRIOR_PROBABILITY = 0.1  # of an effect being at work, before the data
 _GIVEN_NOISE_DOF = 20.0  # a stated noise is trusted to about 15 %
 _ROUNDS = 8
+_ROUNDING = 1e-9  # m and rad: no table and no robot is better
 _MOST_OUTLIERS = 0.25
 
 
@@ -192,7 +193,7 @@ def robust_noise(remainder: Array, leverage: float = 0.0) -> Array:
     """Return one sigma per axis of each three components, from the median of their squared length."""
     parts = remainder.reshape(len(remainder), -1, 3)
     middle = np.median((parts**2).sum(axis=2), axis=0) / float(chdtri(3, 0.5))
-    return np.asarray(np.sqrt(middle / (1.0 - leverage)) + 1e-15)
+    return np.asarray(np.maximum(np.sqrt(middle / (1.0 - leverage)), _ROUNDING))
 
 
 def _settle(measured: Array, noise: Noise, measures: int) -> tuple[Array, float]:
