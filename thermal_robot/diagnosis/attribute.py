@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import chdtri
 
 from thermal_robot.diagnosis.result import Estimate, Finding, Location, Status
 from thermal_robot.estimation.explain import Explanation
@@ -17,7 +18,6 @@ _DETERMINED = 0.5  # a parameter is identified when the data leave less than hal
 _SURE = 0.75
 _RIVAL = 0.2
 _ALIAS = 1e-6
-_SAME = 1.0  # squared distance, in noise, between two explanations that no data would tell apart
 
 
 def findings(fit: Fit, shares: Shares, locations: dict[str, tuple[Location, ...]]) -> tuple[Finding, ...]:
@@ -73,7 +73,7 @@ def _rivals(fit: Fit, explained: dict[str, int]) -> dict[str, tuple[str, ...]]:
     """Effects of the explanation that another could take the place of, and those others.
 
     An effect is confounded with one outside the explanation when it is itself uncertain and where it is absent that
-    other is present, or when the other could do just what it was found to do. A larger effect that contains it is no
+    other is present, or when the other is its exact alias. A larger effect that contains it is no
     rival: the smaller is preferred where it suffices.
     """
     e: Explanation = fit.explanation
@@ -98,23 +98,31 @@ def _rivals(fit: Fit, explained: dict[str, int]) -> dict[str, tuple[str, ...]]:
 
 
 def _imitates(fit: Fit, block: int, other: int) -> bool:
-    """Whether another effect, in the place of one that was found, would do the same to within the noise."""
+    """Whether what an effect was found to do is, but for noise, exactly what another can do.
+
+    Exact aliases are the directions that both column spaces share (principal angle zero, Björck and Golub 1973).
+    Another effect that merely comes near is the evidence's affair.
+    """
     e = fit.explanation
     matrix, slices = e.problem.matrix, e.problem.slices
-    start = dict(
-        zip(e.best.blocks, np.cumsum([0, *(e.problem.bases[b].shape[1] for b in e.best.blocks)]), strict=False)
-    )
-    own = e.best.values[start[block] : start[block] + e.problem.bases[block].shape[1]]
-    rest = [b for b in (*e.best.blocks, other) if b != block]
-    index = np.concatenate([np.arange(slices[b].start, slices[b].stop) for b in rest])
-    if not index.size or not own.size:
+    own, theirs = (_root(matrix[s, s]) for s in (slices[block], slices[other]))
+    if not own.size or not theirs.size:
         return False
-    inner = matrix[np.ix_(index, index)]
-    scale = np.sqrt(np.diag(inner))
-    cross = matrix[index][:, slices[block]] @ own / scale
-    taken = cross @ np.linalg.pinv(inner / np.outer(scale, scale), rcond=1e-10, hermitian=True) @ cross
-    moved = own @ matrix[slices[block], slices[block]] @ own
-    return bool(moved - taken < _SAME * e.best.noise**2)
+    left, cosine, _ = np.linalg.svd(own.T @ matrix[slices[block], slices[other]] @ theirs, full_matrices=False)
+    shared = left[:, cosine > 1.0 - _ALIAS]
+    ends = np.cumsum([0, *(e.problem.bases[b].shape[1] for b in e.best.blocks)])
+    start = ends[e.best.blocks.index(block)]
+    moved = own.T @ matrix[slices[block], slices[block]] @ e.best.values[start : start + own.shape[0]]
+    rest = float(moved @ moved - ((shared.T @ moved) ** 2).sum())
+    noise = float(chdtri(len(moved), 0.01)) * e.best.noise**2
+    return bool(shared.shape[1]) and rest < noise < float(moved @ moved)
+
+
+def _root(gram: Array) -> Array:
+    """(D, r) matrix that makes the columns with this Gram matrix orthonormal."""
+    value, vector = np.linalg.eigh(gram)
+    seen = value > 1e-9 * value.max(initial=0.0)
+    return np.asarray(vector[:, seen] / np.sqrt(value[seen]))
 
 
 def _estimates(fit: Fit, block: int) -> tuple[Estimate, ...]:
