@@ -112,7 +112,9 @@ def _usable(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
         # nothing says how the target is turned there
         notes.append("orientation was measured, but sim.* predicts positions only: orientation is left out")
         campaign = replace(campaign, orientation=None, noise_orientation=None)
-    table = np.hstack([campaign.q, np.asarray(campaign.position)])
+    # a real repetition may well measure the same digits, but not in the same second and conditions
+    recorded = [values[:, None] for values in campaign.covariates.values()]
+    table = np.hstack([campaign.q, np.asarray(campaign.position), *recorded])
     first = np.sort(np.unique(table, axis=0, return_index=True)[1])
     copies = campaign.samples - len(first)
     if copies:

@@ -21,7 +21,6 @@ Array = NDArray[np.float64]
 
 _RESAMPLES = 2000
 _SEED = 20180901  # of the bootstrap: the same campaign always gets the same interval
-_MOST_SHAPLEY = 9
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +30,7 @@ class Shrinkage:
     Attributes
     ----------
     overall
-        Before against after, the whole procedure redone in every fold.
+        Before against after; what is redone in every fold stands at :func:`held_out`.
     before, after
         (N,) distance of each row while it was held out, m; NaN where it was set aside.
     shares
@@ -49,25 +48,20 @@ def held_out(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Shri
     """Cross-validate in blocks of consecutive measurements.
 
     Frames, outliers, prior scales and the choice of effects are found anew from the other folds' rows. A held-out row
-    is set aside only where both its own fold's model and the whole diagnosis call it a gross error.
+    is set aside only where both its own fold's model and the whole diagnosis call it a gross error. The point of
+    linearisation and the settings of nonlinear arguments are those of all rows.
     """
     campaign, explanation = fit.campaign, fit.explanation
     fold, block = folds(campaign)
     count = int(fold.max()) + 1
     if count < 2:
         raise EstimationError("all rows repeat one pose: nothing can be held out, and nothing told about the robot")
-    noise = Noise(campaign.noise_position, campaign.noise_orientation)
+    noise, groups = Noise(campaign.noise_position, campaign.noise_orientation), row_groups(campaign)
     before, after = np.full(campaign.samples, np.nan), np.full(campaign.samples, np.nan)
     for k in range(count):
         progress(f"held out: fold {k + 1} of {count}")
         train, test = fold != k, fold == k
-        found = explain(
-            explanation.linear,
-            noise,
-            rows=train,
-            families=fit.families,
-            groups=row_groups(campaign),
-        )
+        found = explain(explanation.linear, noise, rows=train, families=fit.families, groups=groups)
         plain = Whitening((train & ~found.outliers).astype(float), found.whitening.noise, 0.0)
         step = frame_step(fit.before, plain, fit.before.gap)
         left = fit.before.gap - fit.before.frames @ step
@@ -187,15 +181,14 @@ def _shares(
 
     shares = {}
     base = nothing.sum(), draws @ nothing
-    if len(players) <= _MOST_SHAPLEY:
-        for player in players:
-            others = [p for p in players if p != player]
-            value = np.zeros(len(nothing))
-            for size in range(len(others) + 1):
-                weight = factorial(size) * factorial(len(others) - size) / factorial(len(players))
-                for chosen in combinations(others, size):
-                    value += weight * (gain((*chosen, player)) - gain(chosen))
-            shares[fit.families[player]] = _relative(value, base, draws)
+    for player in players:
+        others = [p for p in players if p != player]
+        value = np.zeros(len(nothing))
+        for size in range(len(others) + 1):
+            weight = factorial(size) * factorial(len(others) - size) / factorial(len(players))
+            for chosen in combinations(others, size):
+                value += weight * (gain((*chosen, player)) - gain(chosen))
+        shares[fit.families[player]] = _relative(value, base, draws)
     scales = {c.blocks: c.scales for c in explanation.combinations}
     for family in dict.fromkeys(fit.families):
         if family in shares:
