@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -20,7 +20,15 @@ class ToolFrame(Effect):
 
     Expected size 2 mm and 2 mrad; a campaign of positions shows the three translations only. Only where the campaign
     declares ``tool = "known"``: an unknown tool is fitted before any effect is asked for.
+
+    Attributes
+    ----------
+    turns
+        Whether the three rotations are parameters, too; ``None`` asks the campaign. A model keeps what it was fitted
+        with, as commands to be predicted carry no measured orientation.
     """
+
+    turns: bool | None = None
 
     name: ClassVar[str] = "tool_frame"
 
@@ -30,9 +38,16 @@ class ToolFrame(Effect):
         # a simulator predicts the declared target: an unknown tool is not refitted to it
         return () if campaign.tool_known or campaign.simulated_position is not None else ('frames.tool = "known"',)
 
+    def variants(self, observations: Observations) -> tuple[Effect, ...]:
+        """Return this effect with the components that the campaign shows."""
+        return (replace(self, turns=self._turns(observations)),)
+
+    def _turns(self, observations: Observations) -> bool:
+        return observations.campaign.measures == "pose" if self.turns is None else self.turns
+
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """Return the tool's twist in the tool frame: m, and rad where orientation is measured."""
-        components = COMPONENTS if observations.campaign.measures == "pose" else COMPONENTS[:3]
+        components = COMPONENTS if self._turns(observations) else COMPONENTS[:3]
         return tuple(
             Parameter(component, "m" if k < 3 else "rad", 2e-3, "tool", "tool", (at_tool(np.eye(6)[k]),))
             for k, component in enumerate(components)

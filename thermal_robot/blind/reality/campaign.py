@@ -1,0 +1,225 @@
+"""One case becomes a folder with a campaign, and the answers that stay outside it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.blind.cases import Case
+from thermal_robot.blind.reality.faults import FAULTS, Fault
+from thermal_robot.blind.reality.instrument import Instrument, measure, registered
+from thermal_robot.blind.reality.rigid import anywhere
+from thermal_robot.blind.reality.setting import Setting, draw_setting
+from thermal_robot.blind.reality.sizes import Gauge, Unseen, place, shares, sized
+from thermal_robot.blind.reality.tables import write_folder
+from thermal_robot.blind.reality.unlisted import UNLISTED
+from thermal_robot.blind.reality.world import World
+from thermal_robot.errors import EffectError
+
+Array = NDArray[np.float64]
+
+FRESH = 100
+_PRESENT = 0.5  # × noise per axis: what leaves less, given the others, is not present
+_TRIES = 25
+_NEEDS = {"thermal_elongation": "temperature", "drift": "time", "backlash": "approach", "tracking_lag": "velocity"}
+
+
+def make(case: Case, folder: Path) -> dict[str, Any]:
+    """Write a case's campaign into a folder and return its answers.
+
+    Parameters
+    ----------
+    case
+        What is asked; everything that is drawn follows from its seed.
+    folder
+        Where campaign.toml, measurements.csv, robot.urdf and fresh.csv (commands to predict, without answers) go.
+
+    Returns
+    -------
+    dict
+        ``truth`` as in :mod:`thermal_robot.blind.cases`, ``noise`` (m), ``samples``, ``measures``,
+        ``fresh_position`` (M, 3) where the target really is, ``fresh_before`` (M, 3) where frames alone put it.
+    """
+    rng = np.random.default_rng(case.seed)
+    world = World(case.robot.urdf, case.robot.tool_frame)
+    for _ in range(_TRIES):
+        try:
+            return _attempt(case, world, rng, folder)
+        except Unseen as unseen:  # this draw hides its own fault: draw again
+            reason = unseen
+    raise EffectError(f"no campaign shows this fault of {case.robot.name}: {reason}")
+
+
+def _attempt(case: Case, world: World, rng: np.random.Generator, folder: Path) -> dict[str, Any]:
+    main = [FAULTS[name] for name in case.effects]
+    if case.unlisted is not None:
+        main.append(UNLISTED[case.unlisted])
+    wants = {want for fault in main for want in fault.wants}
+    samples = int(rng.integers(case.samples[0], case.samples[1] + 1))
+    repeats = int(rng.integers(4, 7)) if "repeats" in wants else 1
+    setting = draw_setting(
+        world,
+        samples + FRESH,
+        rng,
+        moving="moving" in wants,
+        repeats=repeats,
+        sensor="links" if "sensor:links" in wants else None,
+        sessions="sessions" in wants or bool(rng.random() < 0.25),
+    )
+    _record(setting, wants, rng)
+    # the first row is the one from which drift counts
+    rows = np.sort(np.append(0, 1 + rng.permutation(samples + FRESH - 1)[: samples - 1]))
+    instrument = _instrument(case, wants, rng)
+    gauge = Gauge(setting, rows, instrument.target, not instrument.base_known, not instrument.tool_known)
+    done = [(fault, _of_size(case, gauge, fault, instrument.noise, rng)) for fault in main]
+    _require_apart(case, gauge, done, instrument.noise)
+    background = _background(case, gauge, main, instrument.noise, rng)
+    seen, turned = place(setting, [*done, *background], instrument.target, instrument.pose)
+    measured = measure(setting, seen, turned, rows, instrument, rng)
+    others = np.setdiff1d(np.arange(setting.samples), rows)
+    write_folder(folder, case, setting, measured, rows, others, instrument, _gears(setting, done))
+    before = registered(setting, measured, rows, instrument)
+    return {
+        "truth": _truth(case, gauge, done, background, instrument.noise, measured.spoilt),
+        "noise": instrument.noise,
+        "samples": samples,
+        "measures": "pose" if instrument.turning is not None else "position",
+        "fresh_position": seen[others].tolist(),
+        "fresh_before": before[others].tolist(),
+    }
+
+
+def _record(setting: Setting, wants: set[str], rng: np.random.Generator) -> None:
+    """Add the columns that a fault follows, and now and then the same columns where nothing does."""
+    if "humidity" in wants and "humidity" not in setting.extra:
+        setting.extra["humidity"] = np.round(45.0 + np.cumsum(rng.normal(0.0, 0.6, setting.samples)), 1)
+    if "motor_temperature" in wants or rng.random() < 0.2:
+        run = (setting.time - setting.time[0]) / setting.time[-1]
+        load = np.convolve(rng.normal(size=setting.samples + 20), np.ones(21) / 4.6, "valid")
+        setting.extra["motor_temperature"] = np.round(24.0 + 28.0 * -np.expm1(-run / 0.3) + 6.0 * load, 1)
+    if "speed" in wants or rng.random() < 0.4:
+        setting.extra["speed"] = setting.speed
+
+
+def _gears(setting: Setting, done: Sequence[tuple[Fault, Array]]) -> dict[str, float]:
+    """Return the ratios that the file must state for wheels that turn with the motor to be seen."""
+    ratios = {float(v) for fault, values in done if fault.name == "transmission_error" for v in values[:, 4]} - {1.0}
+    return {name: ratio for ratio in sorted(ratios) for name in setting.world.names}
+
+
+def _instrument(case: Case, wants: set[str], rng: np.random.Generator) -> Instrument:
+    base_known = "base_known" in wants or bool(rng.random() < 0.1)
+    tool_known = "tool_known" in wants or bool(rng.random() < 0.1)
+    pose = rng.random() < (1.0 if tool_known and "tool_known" in wants else 0.4)
+    target = rng.uniform([-0.03, -0.03, 0.04], [0.03, 0.03, 0.16])
+    return Instrument(
+        pose=np.eye(4) if base_known else anywhere(rng, 3.0),
+        target=target,
+        declared=target if tool_known else target + rng.uniform(-0.01, 0.01, 3),
+        base_known=base_known,
+        tool_known=tool_known,
+        noise=float(rng.uniform(10e-6, 30e-6)),
+        turning=3e-5 if pose else None,
+        stated=bool(rng.random() < 0.85),
+        heavy=case.heavy,
+        spoilt=float(rng.choice([0.0, 0.03, 0.1] if case.heavy else [0.0, 0.03])),
+    )
+
+
+def _of_size(case: Case, gauge: Gauge, fault: Fault, noise: float, rng: np.random.Generator) -> Array:
+    """Draw a fault and make it as large as the case asks.
+
+    Where the cause is not in the library, or taken from it, what counts is what no single other effect can imitate.
+    """
+    wanted = noise * rng.uniform(*case.ratio)
+    values = fault.draw(gauge.setting, rng)
+    if fault.name not in case.without and fault.name not in UNLISTED:
+        return sized(gauge, fault, values, wanted, lambda moved: gauge.rms(gauge.left(moved)))
+    rough = sized(gauge, fault, values, wanted, lambda moved: gauge.rms(gauge.left(moved)))
+    others = [name for name in FAULTS if name not in case.without]
+    beyond = gauge.beyond(fault, gauge.moved(fault, rough), others)
+    share = min(beyond.values(), default=wanted) / wanted
+    if share < 0.15:
+        raise Unseen(f"{fault.name} is what {min(beyond, key=lambda name: beyond[name])} can do as well")
+    return fault.scaled(rough, 1.0 / share)
+
+
+def _require_apart(case: Case, gauge: Gauge, done: Sequence[tuple[Fault, Array]], noise: float) -> None:
+    """Draw pairs and triples again where one of them leaves nothing that another could not have done as well."""
+    if len(done) < 2:
+        return
+    for fault, values in done:
+        moved = gauge.moved(fault, values)
+        beyond = gauge.beyond(fault, moved, [other.name for other, _ in done])
+        if min(beyond.values(), default=np.inf) < _PRESENT * noise:
+            raise Unseen(f"{fault.name} is hidden by the other effect")
+
+
+def _background(
+    case: Case, gauge: Gauge, main: Sequence[Fault], noise: float, rng: np.random.Generator
+) -> list[tuple[Fault, Array]]:
+    """All the other effects that are always there, each far below the noise."""
+    if not case.background:
+        return []
+    named, quiet = {fault.name for fault in main}, []
+    skipped = {"base_frame", "tool_frame", "tracking_lag", *case.without}
+    for name, fault in FAULTS.items():
+        if name in named or name in skipped:
+            continue
+        values = fault.draw(gauge.setting, rng)
+        try:
+            values = sized(gauge, fault, values, case.background * noise, lambda moved: gauge.rms(gauge.left(moved)))
+        except Unseen:
+            continue  # it cannot be seen here, so there is no size to give it
+        quiet.append((fault, values))
+    return quiet
+
+
+def _truth(
+    case: Case,
+    gauge: Gauge,
+    done: Sequence[tuple[Fault, Array]],
+    background: Sequence[tuple[Fault, Array]],
+    noise: float,
+    spoilt: Sequence[int],
+) -> dict[str, Any]:
+    parts: dict[str, Any] = {}
+    answers: list[dict[str, str]] = []
+    quantities: list[str] = []
+    for fault, values in [*done, *background]:
+        ratio = gauge.rms(gauge.left(gauge.moved(fault, values))) / noise
+        sites = shares(gauge, fault, values)
+        clear = [item for item in sites if item[2] > 0.25 * sites[0][2]] if sites else []
+        where = [item[0] for item in clear]
+        main = any(fault is other for other, _ in done)
+        listed = where if fault.few else []
+        parts[fault.name] = {"ratio": ratio, "main": main, "places": _named(listed)}
+        asked = fault.name == case.unlisted or fault.name in case.without or bool(case.hidden)
+        if main and asked:
+            answers += _named([*where, *_joints_of(gauge.setting, fault, [item[1] for item in clear])])
+            quantities += fault.quantities(gauge.setting, where)
+    return {
+        "effects": list(case.effects),
+        "unlisted": case.unlisted,
+        "parts": parts,
+        "places": answers,
+        "quantities": list(dict.fromkeys(quantities)),
+        "needs": [_NEEDS[name] for name in case.effects if case.hidden and name in _NEEDS],
+        "outliers": list(spoilt),
+    }
+
+
+def _joints_of(setting: Setting, fault: Fault, numbers: Sequence[int]) -> list[tuple[str, str]]:
+    """Name the joints too: a displaced joint placement is as much the joint's as it is the link's that carries it."""
+    chain = setting.world.chain
+    if len(fault.places(setting)) != len(chain) or fault.places(setting)[0][0] != "link":
+        return []
+    return [("joint", chain[p].name) for p in numbers if chain[p].movable]
+
+
+def _named(places: Sequence[tuple[str, str]]) -> list[dict[str, str]]:
+    return [{"kind": kind, "name": name} for kind, name in dict.fromkeys(places)]

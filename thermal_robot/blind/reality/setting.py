@@ -1,0 +1,204 @@
+"""The day of a campaign: where the robot is sent, in which order, and how warm it and its hall become."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.blind.reality.world import World
+
+Array = NDArray[np.float64]
+
+_WIDEST = 2.4  # rad: cables keep a real robot from its whole range
+_SHARE = 0.75
+_PAUSE = 1.0  # s between two steps in which warmth is integrated
+
+
+@dataclass
+class Setting:
+    """What was commanded and what it was like, N rows in the order in which they were measured.
+
+    Attributes
+    ----------
+    world
+        The robot.
+    q, velocity, acceleration
+        (N, n) joint positions at the instant of measurement, and how they change there (zero where it stands still).
+    time
+        (N,) s.
+    approach
+        (N, n) sign of the last move of each joint; 0 where it has not moved yet.
+    payload
+        (N,) kg.
+    air, links
+        (N,) temperature of the hall and (N, S) of each segment's link, °C.
+    sensor
+        What is recorded of it: ``robot`` (one sensor on the robot), ``links`` (one on each) or ``air``.
+    moving
+        Whether poses are measured in passing.
+    pose
+        (N,) number of the commanded pose where poses are repeated, else ``None``.
+    session
+        (N,) number of the session, or ``None``.
+    speed
+        (N,) fraction of the maximum.
+    extra
+        Further columns by name, (N,) each.
+    torque
+        (N, n) what holds the sound robot's joints, N·m.
+    poses
+        (N, 4, 4) of the sound robot's tool frame.
+    """
+
+    world: World
+    q: Array
+    velocity: Array
+    acceleration: Array
+    time: Array
+    approach: Array
+    payload: Array
+    air: Array
+    links: Array
+    sensor: str
+    moving: bool
+    pose: NDArray[np.int64] | None
+    session: NDArray[np.int64] | None
+    speed: Array
+    extra: dict[str, Array]
+    torque: Array = field(default_factory=lambda: np.zeros((0, 0)))
+    poses: Array = field(default_factory=lambda: np.zeros((0, 4, 4)))
+
+    @property
+    def samples(self) -> int:
+        """N."""
+        return len(self.time)
+
+
+def draw_setting(
+    world: World,
+    samples: int,
+    rng: np.random.Generator,
+    *,
+    moving: bool = False,
+    repeats: int = 1,
+    sensor: str | None = None,
+    sessions: bool = False,
+) -> Setting:
+    """Draw one campaign's commands and conditions.
+
+    Parameters
+    ----------
+    world
+        The robot.
+    samples
+        Number of rows.
+    rng
+        Everything follows from it.
+    moving
+        Whether poses are measured in passing.
+    repeats
+        How often each pose is measured.
+    sensor
+        See :class:`Setting`; drawn where absent.
+    sessions
+        Whether the robot is switched off for a while, once or twice.
+    """
+    poses = -(-samples // repeats)
+    q = _commands(world, poses, rng)
+    label = None
+    if repeats > 1:
+        label = rng.permuted(np.repeat(np.arange(poses), repeats))[:samples]
+        q = q[label]
+    length = rng.uniform(1.5, 6.0) * 3600.0
+    steps = rng.gamma(4.0, 1.0, samples)
+    time = np.cumsum(steps) - steps[0]
+    session = None
+    if sessions:
+        breaks = np.sort(rng.choice(np.arange(samples // 5, samples - samples // 5), rng.integers(1, 3), replace=False))
+        session = np.searchsorted(breaks, np.arange(samples), side="right")
+        time = time + session * rng.uniform(0.3, 1.0) * time[-1]
+    time = np.round(time / time[-1] * length, 1)
+    heaviest = _heaviest(world)
+    payload = rng.choice([0.0, heaviest / 2, heaviest], samples).round(2)
+    speed = rng.choice([0.1, 0.3, 0.6, 1.0], samples)
+    velocity, acceleration = np.zeros_like(q), np.zeros_like(q)
+    approach = np.sign(np.diff(q, axis=0, prepend=q[:1]))
+    if moving:
+        velocity = rng.uniform(0.05, 0.8, q.shape) * rng.choice([-1.0, 1.0], q.shape) * speed[:, None]
+        acceleration = rng.normal(0.0, 1.5, q.shape) * speed[:, None]
+        approach = np.sign(velocity)
+    air, links = _warmth(world, time, session, rng)
+    extra = {"humidity": np.round(45.0 + np.cumsum(rng.normal(0.0, 0.6, samples)), 1)} if rng.random() < 0.5 else {}
+    sensor = sensor or str(rng.choice(["robot", "links", "air"], p=[0.45, 0.4, 0.15]))
+    if sensor == "robot":  # one casting: its links warm nearly alike, or one sensor would be of no use
+        common = links.mean(axis=1, keepdims=True)
+        links = common + 0.06 * (links - common)
+    elif sensor == "air":  # nothing heats the links but the air, after which they lag
+        links = np.repeat(_lag(time, air, rng.uniform(600.0, 2400.0))[:, None], links.shape[1], axis=1)
+    setting = Setting(
+        world,
+        q,
+        velocity,
+        acceleration,
+        time,
+        approach,
+        payload,
+        air,
+        links,
+        sensor,
+        moving,
+        label,
+        session,
+        speed,
+        extra,
+    )
+    setting.poses, setting.torque = world.poses(q, payload, world.sound(samples))
+    return setting
+
+
+def _commands(world: World, count: int, rng: np.random.Generator) -> Array:
+    """Within a share of the limits, the third nearest to the first axis left out, and nothing below the floor."""
+    lower, upper = np.maximum(world.lower, -_WIDEST), np.minimum(world.upper, _WIDEST)
+    middle, half = (lower + upper) / 2, _SHARE * (upper - lower) / 2
+    drawn = rng.uniform(middle - half, middle + half, (4 * count + 60, world.n))
+    place = world.poses(drawn, np.zeros(len(drawn)), world.sound(len(drawn)))[0][:, :3, 3]
+    reach = np.linalg.norm(place, axis=1)
+    usable = drawn[reach > np.quantile(reach, 0.3)]
+    return np.asarray(usable[:count])
+
+
+def _heaviest(world: World) -> float:
+    """Return a payload that suits the robot: 0.15 of what it weighs, between 0.5 and 8 kg."""
+    return float(np.clip(0.15 * sum(world.tree.mass.values()), 0.5, 8.0))
+
+
+def _warmth(
+    world: World, time: Array, session: NDArray[np.int64] | None, rng: np.random.Generator
+) -> tuple[Array, Array]:
+    """Air that swings and rises; links that follow it with a time constant each, and are warmed by their motors."""
+    swing = rng.uniform(1.0, 4.0) * np.sin(time / time[-1] * rng.uniform(1.5, 9.0) + rng.uniform(0, 6.0))
+    air = 21.0 + swing + rng.uniform(-1.0, 5.0) * time / time[-1]
+    working = np.ones_like(time)
+    if session is not None:  # cold at the start of each session
+        for s in np.unique(session):
+            rows = session == s
+            working[rows] = 1.0 - np.exp(-(time[rows] - time[rows][0]) / 1200.0)
+    warmth = {}
+    for link in dict.fromkeys(world.links):
+        motor = rng.uniform(2.0, 10.0) * working
+        warmth[link] = _lag(time, air + motor, rng.uniform(600.0, 3600.0), start=float(air[0]))
+    return air, np.column_stack([warmth[link] for link in world.links])
+
+
+def _lag(time: Array, drive: Array, constant: float, start: float | None = None) -> Array:
+    """Integrate T' = (drive − T) / constant, between rows in steps of a second on a drive that runs straight."""
+    fine = np.arange(time[0], time[-1] + _PAUSE, _PAUSE)
+    driven = np.interp(fine, time, drive)
+    kept = np.empty_like(fine)
+    value, decay = driven[0] if start is None else start, 1.0 - np.exp(-_PAUSE / constant)
+    for i, target in enumerate(driven):
+        value += decay * (target - value)
+        kept[i] = value
+    return np.interp(time, fine, kept)

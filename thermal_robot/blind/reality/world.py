@@ -1,0 +1,275 @@
+"""The robot as bodies in MuJoCo: stretched, bent, on springs under gravity and payload."""
+
+from __future__ import annotations
+
+from copy import copy
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.blind.reality.rigid import from_vector, quaternion, rpy_matrix
+from thermal_robot.blind.reality.urdf import Joint, read
+
+Array = NDArray[np.float64]
+
+NODES = 3  # hinges into which a beam's bending is lumped
+_SHORTEST = 1e-6  # m
+_SETTLED = 1e-13  # rad
+_ROUNDS = 60
+
+
+@dataclass
+class Body:
+    """What is wrong with a robot over N measurements; everything is zero, empty or one in a sound one.
+
+    Attributes
+    ----------
+    joints
+        (N, n) by how much each joint stands elsewhere than commanded, rad or m.
+    springs
+        (n,) compliance of each joint, rad/(N·m).
+    beams
+        (S, 2) bending compliance 1/(E I) of each segment about its two cross axes, 1/(N·m²).
+    bow
+        (N, S, 2) curvature that each segment has by itself about the same axes, 1/m.
+    growth
+        (N, S) relative growth of each segment.
+    placements
+        (N, S', 6) or (S', 6) displacement of the placements of the joints of the chain (m, then rotation vector), in
+        their own frames; S' counts every joint of the chain.
+    base, tool
+        (N, 4, 4) motion of the base as seen by the instrument, of the target on the tool frame.
+    scale
+        Of the instrument: measured = (1 + scale) · true.
+    """
+
+    joints: Array
+    springs: Array
+    beams: Array
+    bow: Array
+    growth: Array
+    placements: Array
+    base: Array
+    tool: Array
+    scale: float = 0.0
+
+    def move(self, where: str, twists: Array) -> None:
+        """Move the ``base`` (in its own frame) or the ``tool`` by (N, 6) translations (m) and rotation vectors."""
+        motion = from_vector(twists)
+        if where == "base":
+            self.base = self.base @ motion
+        else:
+            self.tool = self.tool @ motion
+
+
+class World:
+    """One robot in MuJoCo.
+
+    Parameters
+    ----------
+    urdf
+        XML text.
+    tool_frame
+        Link that carries the target.
+    payload_com
+        (3,) centre of mass of what it carries, in the tool frame, m.
+
+    Attributes
+    ----------
+    joints
+        The n movable joints of the chain.
+    chain
+        All its joints, fixed ones too.
+    segments
+        Indices into ``chain`` of placements with a length, S of them.
+    """
+
+    def __init__(self, urdf: str, tool_frame: str, payload_com: tuple[float, float, float] = (0.0, 0.0, 0.05)):
+        self.tree = read(urdf)
+        self.tool_frame = tool_frame
+        self.chain = self.tree.chain(tool_frame)
+        self.joints: tuple[Joint, ...] = tuple(j for j in self.chain if j.movable)
+        self.names = tuple(j.name for j in self.joints)
+        self.segments = tuple(k for k, j in enumerate(self.chain) if np.linalg.norm(j.xyz) > _SHORTEST)
+        self.links = tuple(self.chain[k].parent for k in self.segments)
+        self.lower = np.array([j.lower for j in self.joints])
+        self.upper = np.array([j.upper for j in self.joints])
+        self._com = payload_com
+        self._sound: tuple[mujoco.MjModel, bool] | None = None
+
+    @property
+    def n(self) -> int:
+        """Number of movable joints."""
+        return len(self.joints)
+
+    def sound(self, samples: int) -> Body:
+        """Return the state of a robot without fault."""
+        s = len(self.segments)
+        return Body(
+            joints=np.zeros((samples, self.n)),
+            springs=np.zeros(self.n),
+            beams=np.zeros((s, 2)),
+            bow=np.zeros((samples, s, 2)),
+            growth=np.zeros((samples, s)),
+            placements=np.zeros((len(self.chain), 6)),
+            base=np.tile(np.eye(4), (samples, 1, 1)),
+            tool=np.tile(np.eye(4), (samples, 1, 1)),
+        )
+
+    def poses(self, q: Array, payload: Array, body: Body) -> tuple[Array, Array]:
+        """Return where the tool frame stands in the root, (N, 4, 4), and what holds the joints there, (N, n) N·m.
+
+        Each row is a statics problem of its own: springs and beams yield until they balance gravity.
+        """
+        bending = bool(np.any(body.beams) or np.any(body.bow))
+        # a copy: rows stretch it
+        model = copy(self._compile(bending, body.placements if body.placements.ndim == 2 else None))
+        data = mujoco.MjData(model)
+        tool = model.body(f"link:{self.tool_frame}").id
+        carried = model.body("payload").id
+        address = [int(model.joint(name).qposadr[0]) for name in self.names]
+        steps = [self._steps(model, k, bending) for k in self.segments]
+        rest = model.body_pos.copy()
+        compliance = np.zeros(model.nv)
+        compliance[address] = body.springs
+        nodes = self._nodes(model) if bending else np.zeros((0, 2, NODES), dtype=int)
+        lengths = np.array([np.linalg.norm(self.chain[k].xyz) for k in self.segments])
+        for s in range(len(nodes)):
+            compliance[nodes[s]] = (body.beams[s] * lengths[s] / NODES)[:, None]
+        yields = bool(np.any(compliance))
+        poses, torque = np.tile(np.eye(4), (len(q), 1, 1)), np.zeros((len(q), self.n))
+        bias, free = np.zeros(model.nv), np.zeros(model.nv)
+        heaviness = np.nan
+        each = body.placements if body.placements.ndim == 3 else None
+        for i in range(len(q)):
+            if payload[i] != heaviness:
+                heaviness = payload[i]
+                model.body_mass[carried] = heaviness
+                mujoco.mj_setConst(model, data)
+            model.body_pos[:] = rest
+            for s, ids in enumerate(steps):
+                model.body_pos[ids] = rest[ids] * (1.0 + body.growth[i, s])
+            if each is not None:
+                self._place(model, each[i])
+            free[:] = 0.0
+            free[address] = q[i] + body.joints[i]
+            for s in range(len(nodes)):
+                free[nodes[s]] = (body.bow[i, s] * lengths[s] / NODES)[:, None]
+            data.qpos[:] = free
+            for _ in range(_ROUNDS):
+                mujoco.mj_kinematics(model, data)
+                mujoco.mj_comPos(model, data)
+                mujoco.mj_rne(model, data, 0, bias)
+                settled = free - compliance * bias
+                change = float(np.abs(settled - data.qpos).max())
+                data.qpos[:] = settled
+                if not yields or change < _SETTLED:
+                    break
+            mujoco.mj_kinematics(model, data)
+            poses[i, :3, :3] = data.xmat[tool].reshape(3, 3)
+            poses[i, :3, 3] = data.xpos[tool]
+            torque[i] = bias[address]
+        return poses, torque
+
+    def _compile(self, bending: bool, placements: Array | None) -> mujoco.MjModel:
+        plain = placements is None or not placements.any()
+        if plain and self._sound is not None and self._sound[1] == bending:
+            return self._sound[0]
+        spec = mujoco.MjSpec()
+        spec.compiler.degree = False
+        spec.compiler.fusestatic = False
+        spec.compiler.boundmass = 1e-12
+        spec.compiler.boundinertia = 1e-12
+        spec.option.gravity = [0.0, 0.0, -9.81]
+        in_chain = {j.name: k for k, j in enumerate(self.chain)}
+        bodies = {self.tree.root: self._body(spec.worldbody, self.tree.root, np.zeros(3), np.eye(3))}
+        for joint in self.tree.joints:
+            k = in_chain.get(joint.name)
+            rotation, offset = rpy_matrix(joint.rpy), joint.xyz
+            if k is not None and placements is not None:
+                error = from_vector(placements[k][None])[0]
+                offset = offset + rotation @ error[:3, 3]
+                rotation = rotation @ error[:3, :3]
+            parent = bodies[joint.parent]
+            if bending and k in self.segments:
+                parent = self._beam(parent, joint, offset)
+                offset = offset / (2 * NODES)
+            body = self._body(parent, joint.child, offset, rotation)
+            if joint.movable and k is not None:
+                slide = joint.kind == "prismatic"
+                kind = mujoco.mjtJoint.mjJNT_SLIDE if slide else mujoco.mjtJoint.mjJNT_HINGE
+                body.add_joint(name=joint.name, type=kind, axis=joint.axis)
+            elif joint.movable and joint.held:
+                self._hold(body, joint, rotation)
+            bodies[joint.child] = body
+        self._mass(bodies[self.tool_frame].add_body(name="payload"), 0.0, np.array(self._com))
+        model = spec.compile()
+        if plain:
+            self._sound = (model, bending)
+        return model
+
+    def _body(self, parent: mujoco.MjsBody, link: str, offset: Array, rotation: Array) -> mujoco.MjsBody:
+        body = parent.add_body(name=f"link:{link}", pos=offset, quat=quaternion(rotation))
+        return self._mass(body, self.tree.mass[link], self.tree.centre[link])
+
+    @staticmethod
+    def _mass(body: mujoco.MjsBody, mass: float, centre: Array) -> mujoco.MjsBody:
+        # statics: how the mass is spread about its centre plays no part
+        body.explicitinertial = True
+        body.mass, body.ipos, body.inertia = mass, centre, np.full(3, 1e-3 * mass)
+        return body
+
+    @staticmethod
+    def _hold(body: mujoco.MjsBody, joint: Joint, rotation: Array) -> None:
+        if joint.kind == "prismatic":
+            body.pos = body.pos + rotation @ joint.axis * joint.held
+        else:
+            turn = from_vector(np.concatenate([np.zeros(3), joint.axis * joint.held])[None])[0, :3, :3]
+            body.quat = quaternion(rotation @ turn)
+
+    def _beam(self, parent: mujoco.MjsBody, joint: Joint, offset: Array) -> mujoco.MjsBody:
+        """Put a row of hinges, two at each node, between a link and its joint's placement."""
+        first, second = cross_axes(offset)
+        for node in range(NODES):
+            step = offset / NODES * (0.5 if node == 0 else 1.0)
+            parent = parent.add_body(name=f"{joint.name}/{node}", pos=step)
+            self._mass(parent, 0.0, np.zeros(3))
+            for axis, vector in enumerate((first, second)):
+                parent.add_joint(name=f"{joint.name}/{node}/{axis}", type=mujoco.mjtJoint.mjJNT_HINGE, axis=vector)
+        return parent
+
+    def _steps(self, model: mujoco.MjModel, k: int, bending: bool) -> list[int]:
+        joint = self.chain[k]
+        names = [f"{joint.name}/{node}" for node in range(NODES)] if bending else []
+        return [int(model.body(name).id) for name in (*names, f"link:{joint.child}")]
+
+    def _nodes(self, model: mujoco.MjModel) -> NDArray[np.int64]:
+        """(S, 2, NODES) addresses of the hinges of the beams."""
+        return np.array(
+            [
+                [
+                    [int(model.joint(f"{self.chain[k].name}/{node}/{axis}").qposadr[0]) for node in range(NODES)]
+                    for axis in (0, 1)
+                ]
+                for k in self.segments
+            ]
+        )
+
+    def _place(self, model: mujoco.MjModel, placements: Array) -> None:
+        """Displace placements of this row; a fault that comes and goes cannot be compiled once for all."""
+        for k, joint in enumerate(self.chain):
+            body, rotation = model.body(f"link:{joint.child}").id, rpy_matrix(joint.rpy)
+            error = from_vector(placements[k][None])[0]
+            model.body_pos[body] += rotation @ error[:3, 3]
+            model.body_quat[body] = quaternion(rotation @ error[:3, :3])
+
+
+def cross_axes(direction: Array) -> tuple[Array, Array]:
+    """Two unit vectors across a direction."""
+    along = direction / np.linalg.norm(direction)
+    least = np.eye(3)[np.argmin(np.abs(along))]
+    first = np.cross(along, least)
+    first /= np.linalg.norm(first)
+    return first, np.cross(along, first)
