@@ -29,10 +29,10 @@ ORDER = (
     "estimation",
     "correction",
     "diagnosis",
-    "blind",
     "datasets",
     "report",
     "viewer",
+    "blind",
     "cli",
 )
 """Rooms from the ground up: each may import those before it."""

@@ -93,6 +93,12 @@ def _parser() -> argparse.ArgumentParser:
     paper.add_argument("--l5", metavar="M", type=float, help="wrist to tool point, m (default: 0.150, assumed)")
     paper.add_argument("--markdown", action="store_true", help="print the table of the README instead of the text")
     paper.set_defaults(run=_paper)
+
+    from thermal_robot.blind import command  # light: it loads the trial once it is run
+
+    blind = commands.add_parser("blind", help="the blind trial: effects withheld, then named")
+    command.add_arguments(blind)
+    blind.set_defaults(run=command.run)
     return parser
 
 

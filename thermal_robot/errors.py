@@ -70,3 +70,7 @@ class EffectError(ThermalRobotError):
 
 class EstimationError(ThermalRobotError):
     """Data that do not determine what was asked of them."""
+
+
+class SealError(ThermalRobotError):
+    """Sealed answers that are not those that were sealed."""

@@ -7,7 +7,7 @@ A **record** is what is known of one case after its seal was opened, as plain JS
      "without": ["backlash"],          effects taken out of the library
      "hidden": ["temperature"],        columns taken out of the table
      "truth": {
-        "effects": ["drift"],          what is really at work and large: names of formats.md; [] for none or unlisted only
+        "effects": ["drift"],          what is really at work and large, by name; [] for none, or unlisted only
         "unlisted": "cable_pull" | null,   a cause that no library knows
         "parts": {"drift": {"ratio": 3.1, "main": true, "places": [{"kind": "joint", "name": "elbow_joint"}]}, ...},
                                        ratio: what it leaves after the best rigid alignment, rms per axis over noise;
@@ -24,7 +24,7 @@ A **record** is what is known of one case after its seal was opened, as plain JS
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import Literal
 
 Kind = Literal["single", "pair", "triple", "null", "hard", "removed", "hidden", "unlisted", "real"]
@@ -79,6 +79,8 @@ class Case:
         Ratio at which every other effect is present, 0 for none.
     heavy
         Whether the noise has Student's law with 4 degrees of freedom.
+    own
+        ``file.py:NAME`` of a fault of the user's own; its name is the unlisted cause, or the only effect.
     """
 
     id: str
@@ -93,4 +95,4 @@ class Case:
     samples: tuple[int, int] = (75, 140)
     background: float = 0.0
     heavy: bool = False
-    notes: dict[str, str] = field(default_factory=dict)
+    own: str = ""

@@ -180,7 +180,7 @@ def _draw_manufacture(setting: Setting, rng: np.random.Generator) -> Array:
     values[[not (j.movable or k in setting.world.segments) for k, j in enumerate(setting.world.chain)]] = 0.0
     if rng.random() < 0.3:  # a crash: one link is bent
         values[np.arange(len(values)) != rng.choice(np.flatnonzero(values.any(axis=1)))] *= 0.1
-    return values
+    return np.asarray(values)
 
 
 def _beams(body: Body, setting: Setting, values: Array) -> None:
@@ -234,7 +234,7 @@ def _scatter(body: Body, setting: Setting, values: Array) -> None:
 
 
 def _rigid(setting: Setting, rng: np.random.Generator) -> Array:
-    return (rng.normal(size=6) * np.array([2e-3, 2e-3, 2e-3, 2e-3, 2e-3, 2e-3]))[None]
+    return np.asarray(2e-3 * rng.normal(size=(1, 6)))
 
 
 def _all_segments(size: float, spread: tuple[float, float], numbers: int = 1) -> Callable[..., Array]:

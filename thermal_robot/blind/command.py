@@ -1,0 +1,259 @@
+"""The command ``thermal-robot blind``: what is asked for, a trial, its score."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, get_args
+
+import numpy as np
+
+from thermal_robot.blind.cases import Case, Kind, RobotChoice
+from thermal_robot.errors import CampaignError, ThermalRobotError
+
+if TYPE_CHECKING:
+    from thermal_robot.blind.trial import RealCase
+
+KINDS: tuple[str, ...] = get_args(Kind)
+ALWAYS = ("single", "null")
+"""Kinds that can be asked with any one effect."""
+DATA = "THERMAL_ROBOT_DATA"
+OWN_CASES = 6
+"""How often each fault of the user's own is asked for."""
+
+Progress = Callable[[str, int, int], None]
+
+
+def add_arguments(parser: argparse.ArgumentParser) -> None:
+    """Define the options of ``thermal-robot blind``."""
+    parser.add_argument("--seed", metavar="N", type=int, help="everything is drawn from it (default: from the clock)")
+    size = parser.add_mutually_exclusive_group()
+    size.add_argument("--size", choices=("short", "full"), help="how many cases (default: short)")
+    size.add_argument(
+        "--count", metavar="KIND=N", nargs="+", action="extend", help="these only; kinds: " + " ".join(KINDS)
+    )
+    parser.add_argument("--robot", metavar="URDF", action="append", default=[], help="your robot; may be repeated")
+    parser.add_argument("--tool", metavar="LINK", action="append", default=[], help="link with the target, per --robot")
+    parser.add_argument(
+        "--effect",
+        metavar="NAME",
+        nargs="+",
+        action="extend",
+        default=[],
+        help="these faults only; without --count " + " and ".join(ALWAYS) + " cases",
+    )
+    parser.add_argument(
+        "--fault",
+        metavar="F.py:NAME",
+        nargs="+",
+        action="extend",
+        default=[],
+        help="faults of your own (docs/blind.md)",
+    )
+    parser.add_argument("--data", metavar="DIR", help=f"folder of real campaigns (default: what {DATA} names)")
+    parser.add_argument("--directory", metavar="DIR", help="the trial's folder, to continue it too (default: blind-N)")
+    parser.add_argument("--workers", metavar="N", type=int, default=os.cpu_count() or 1, help="(default: %(default)s)")
+    parser.add_argument("--json", metavar="F", help="write the score as JSON ('-' prints it instead of the text)")
+    parser.add_argument("--report", metavar="F.html", help="write a page with the score")
+    parser.add_argument("--markdown", action="store_true", help="print the tables of the README instead of the text")
+
+
+def run(options: argparse.Namespace) -> None:
+    """Run the trial that the options ask for, print its score and write what is asked for.
+
+    Raises
+    ------
+    ThermalRobotError
+        If the options make no sense, or MuJoCo is missing.
+    """
+    _require_mujoco()
+    for target in (options.json, options.report):
+        _require_folder(target)
+    if options.workers < 1:
+        raise ThermalRobotError("--workers must be at least 1")
+    seed = int(time.time()) if options.seed is None else options.seed
+    directory = Path(options.directory or f"blind-{seed}")
+    # what is printed instead of the text stands alone on stdout
+    notes = sys.stderr if options.markdown or options.json == "-" else sys.stdout
+
+    def note(text: str) -> None:
+        print(text, file=notes, flush=True)
+
+    cases = _cases(options, seed, note)
+    note(f"Seed {seed}: {len(cases)} cases in {directory}")
+    records = _records(cases, directory, seed, options.workers, note)
+    _tell(records, options)
+
+
+def _records(
+    cases: Sequence[Case | RealCase], directory: Path, seed: int, workers: int, note: Callable[[str], None]
+) -> list[dict[str, Any]]:
+    from thermal_robot.blind.trial import run_trial
+
+    def sealed(commitment: str) -> None:
+        note(f"Answers sealed before the first diagnosis: sha256 {commitment}")
+
+    try:
+        with _progress() as progress:
+            return run_trial(cases, directory, workers=workers, progress=progress, sealed=sealed)
+    except KeyboardInterrupt:
+        again = f"--seed {seed} --directory {directory}"
+        print(f"thermal-robot: stopped; the same command with {again} continues", file=sys.stderr)
+        raise SystemExit(1) from None
+
+
+def _tell(records: list[dict[str, Any]], options: argparse.Namespace) -> None:
+    """Print the score and write its files."""
+    from thermal_robot.blind.score import score
+    from thermal_robot.report.blind_markdown import blind_markdown
+    from thermal_robot.report.blind_page import blind_html
+    from thermal_robot.report.blind_text import blind_text
+
+    withdrawn = [record for record in records if "withdrawn" in record]
+    for record in withdrawn:
+        reason = f"{record['id']} ({record['kind']}) was not asked: {record['withdrawn']}"
+        print(f"thermal-robot: note: {reason}", file=sys.stderr)
+    found = score([record for record in records if record not in withdrawn]).to_dict()
+    written = json.dumps(found, indent=2, ensure_ascii=False)
+    print(written if options.json == "-" else blind_markdown(found) if options.markdown else blind_text(found))
+    if options.json and options.json != "-":
+        _write(options.json, written + "\n")
+    if options.report:
+        _write(options.report, blind_html(found, time.strftime("%Y-%m-%d %H:%M")))
+
+
+def _cases(options: argparse.Namespace, seed: int, note: Callable[[str], None]) -> tuple[Case | RealCase, ...]:
+    from thermal_robot.blind.plan import plan
+
+    counts = _counts(options)
+    most_real = counts.pop("real", None)
+    chosen = _robots(options.robot, options.tool)
+    drawn = plan(seed, counts, chosen, tuple(options.effect))
+    drawn = _with_faults(drawn, options.fault, seed, chosen)
+    if most_real == 0:
+        return drawn
+    data = options.data or os.environ.get(DATA)
+    if not data:
+        note(f"No real campaigns: neither --data nor {DATA} names a folder")
+        return drawn
+    if not Path(data).is_dir():
+        raise CampaignError(data, "there is no such folder of real campaigns")
+    from thermal_robot.blind.real import real_cases
+
+    real = real_cases(Path(data), seed, most_real)
+    if not real:
+        note(f"No real campaigns: {data} holds none that the trial knows")
+    return (*drawn, *real)
+
+
+def _with_faults(
+    cases: tuple[Case, ...], faults: Sequence[str], seed: int, robots: tuple[RobotChoice, ...]
+) -> tuple[Case, ...]:
+    """Add cases with faults of the user's own: named by the library where it has an effect of that name."""
+    if not faults:
+        return cases
+    from thermal_robot.blind.reality.own import load
+    from thermal_robot.effects import library
+
+    rng = np.random.default_rng([seed, 5])
+    added: list[Case] = []
+    for where in faults:
+        name = load(where).name
+        listed = name in library()
+        for robot in (robots * OWN_CASES)[:OWN_CASES]:
+            added.append(
+                Case(
+                    f"o{len(added):04d}",
+                    int(rng.integers(2**62)),
+                    "single" if listed else "unlisted",
+                    robot,
+                    effects=(name,) if listed else (),
+                    unlisted=None if listed else name,
+                    own=str(Path(where.rpartition(":")[0]).resolve()) + ":" + where.rpartition(":")[2],
+                )
+            )
+    return (*cases, *added)
+
+
+def _counts(options: argparse.Namespace) -> dict[str, int]:
+    """Return the number of cases by kind; ``real`` is there only where it was given."""
+    from thermal_robot.blind.plan import FULL, SHORT
+
+    if not options.count:
+        size = FULL if options.size == "full" else SHORT
+        return {kind: number for kind, number in size.items() if kind in ALWAYS or not options.effect}
+    counts = {}
+    for word in options.count:
+        kind, _, number = word.partition("=")
+        if kind not in KINDS or not number.isdecimal():
+            raise ThermalRobotError(f"--count {word}: expected KIND=N, with one of the kinds {', '.join(KINDS)}")
+        counts[kind] = int(number)
+    return counts
+
+
+def _robots(urdfs: Sequence[str], tools: Sequence[str]) -> tuple[RobotChoice, ...]:
+    from thermal_robot.blind.plan import ROBOTS, robots
+
+    if len(urdfs) != len(tools):
+        raise ThermalRobotError(f"each --robot needs its --tool: found {len(urdfs)} and {len(tools)}")
+    own = [(Path(urdf.rpartition(":")[2]).stem, urdf, tool) for urdf, tool in zip(urdfs, tools, strict=True)]
+    return robots(own or ROBOTS)
+
+
+def _require_mujoco() -> None:
+    from importlib.util import find_spec
+
+    if find_spec("mujoco") is None:
+        raise ThermalRobotError('the blind trial needs MuJoCo: pip install "thermal-robot[blind]"')
+
+
+def _require_folder(target: str | None) -> None:
+    """Refuse a file that could not be written before anything is computed."""
+    if target and target != "-" and (not Path(target).resolve().parent.is_dir() or Path(target).is_dir()):
+        raise CampaignError(target, "cannot be written", expected="a file in a folder that exists")
+
+
+def _write(target: str, text: str) -> None:
+    try:
+        Path(target).write_text(text, encoding="utf-8")
+    except OSError as error:
+        raise CampaignError(target, "cannot be written", found=error.strerror or str(error)) from None
+
+
+@contextmanager
+def _progress() -> Iterator[Progress]:
+    """Show how far a trial is: bars on a terminal, elsewhere a line for every tenth."""
+    if not sys.stderr.isatty():
+        yield _tenths()
+        return
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
+        tasks: dict[str, Any] = {}
+
+        def show(stage: str, done: int, total: int) -> None:
+            if stage not in tasks:
+                tasks[stage] = bars.add_task(stage, total=total)
+            bars.update(tasks[stage], completed=done)
+
+        yield show
+
+
+def _tenths() -> Progress:
+    told: dict[str, int] = {}
+
+    def show(stage: str, done: int, total: int) -> None:
+        tenth = 10 * done // total
+        if tenth > told.get(stage, 0):
+            told[stage] = tenth
+            print(f"{stage}: {done} of {total}", file=sys.stderr, flush=True)
+
+    return show

@@ -1,0 +1,207 @@
+"""One record judged: which questions it answers, and which of them rightly.
+
+A diagnosis that failed answers every question wrongly. Questions by kind:
+
+============= =====================================================================================================
+exact         found are the effects at work and no other, nothing unexplained, nothing named that is confounded
+first_named   the first effect of the verdict is at work
+false_alarm   something is found that is not at work; where nothing is, also: something is called unexplained
+located       the first place of an effect that was found rightly is its first true place
+among_places  ... is one of its true places
+flagged       something is called unexplained
+not_blamed    the verdict holds no effect with probability 0.9 or more that is not at work
+place         the first place of the law that was discovered, else of the remainder, is a true one
+quantity      the same of the quantity that it follows
+named         an effect that is not testable names the column that was hidden
+asks          it does, and the advice says so too
+right         removed, unlisted: flagged and nothing blamed; hidden: that, and asked for; real: what the record says
+============= =====================================================================================================
+
+An effect that is not among the truth's but leaves 0.1 noise or more is no false alarm: it is at work. Below 0.5 it is
+not asked for either.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from typing import Any
+
+Record = Mapping[str, Any]
+Marks = dict[str, tuple[bool, ...]]
+
+LAW = "discovered."
+ABSENT, PRESENT = 0.1, 0.5  # × noise: what leaves less is not there, what leaves more is
+BLAME = 0.9
+BAD = frozenset({"false_alarm"})
+"""Questions to which yes is wrong."""
+HEADLINE = {
+    **dict.fromkeys(("single", "pair", "triple", "null", "hard"), "exact"),
+    **dict.fromkeys(("removed", "hidden", "unlisted", "real"), "right"),
+}
+"""The question that decides whether a case of a kind is a miss."""
+_SILENT: dict[str, Any] = {
+    "verdict": {"effects": [], "probability": None, "unexplained": False},
+    "effects": [],
+    "unexplained": {"locations": [], "depends_on": []},
+    "next": {"advice": ""},
+}
+
+
+def failed(record: Record) -> bool:
+    """Whether there is no diagnosis."""
+    return record.get("error") is not None or record.get("said") is None
+
+
+def said(record: Record) -> Mapping[str, Any]:
+    """Return the diagnosis, or one that says nothing where it failed."""
+    return _SILENT if failed(record) else record["said"]
+
+
+def at_work(record: Record) -> tuple[str, ...]:
+    """Return the effects that are to be found."""
+    return tuple(record["truth"]["effects"])
+
+
+def found(record: Record) -> frozenset[str]:
+    """Return the effects that the diagnosis claims."""
+    return frozenset(e["name"] for e in said(record)["effects"] if e["status"] == "found")
+
+
+def ratio(record: Record, effect: str) -> float | None:
+    """Return what an effect truly leaves, over the noise; ``None`` where it is absent or its size unknown."""
+    part = record["truth"].get("parts", {}).get(effect)
+    return None if part is None or part.get("ratio") is None else float(part["ratio"])
+
+
+def first_named(record: Record) -> str | None:
+    """Return the first effect of the verdict."""
+    return next(iter(said(record)["verdict"]["effects"]), None)
+
+
+def unexplained(record: Record) -> bool:
+    """Whether the diagnosis calls something unexplained."""
+    return bool(said(record)["verdict"]["unexplained"])
+
+
+def is_absent(record: Record, effect: str) -> bool:
+    """Whether an effect is not at work, not even in the background."""
+    return effect not in at_work(record) and (ratio(record, effect) or 0.0) < ABSENT
+
+
+def marks(record: Record) -> Marks:
+    """Judge one record.
+
+    Parameters
+    ----------
+    record
+        As in :mod:`thermal_robot.blind.cases`.
+
+    Returns
+    -------
+    dict
+        Answers by question: one, or one for each effect found; a question that cannot be asked is missing.
+    """
+    answers = _ASKED[record["kind"]](record)
+    if failed(record):
+        return {name: (name in BAD,) * len(given) for name, given in answers.items()}
+    return answers
+
+
+def is_miss(record: Record) -> bool:
+    """Whether the question that matters most for this kind is answered wrongly."""
+    return not all(marks(record)[HEADLINE[record["kind"]]])
+
+
+def _known(record: Record) -> Marks:
+    """Judge a case whose causes are all in the library."""
+    wanted = set(at_work(record))
+    confounded = {e["name"] for e in said(record)["effects"] if e["status"] == "confounded"}
+    escaped = confounded & set(said(record)["verdict"]["effects"])
+    extra = {name for name in found(record) if is_absent(record, name)}
+    exact = wanted <= found(record) and not extra and not unexplained(record) and not escaped
+    if not wanted:
+        return {"exact": (exact,), "false_alarm": (bool(extra) or unexplained(record),)}
+    places = [_located(record, name) for name in at_work(record) if name in found(record)]
+    told = [p for p in places if p is not None]
+    return {
+        "exact": (exact,),
+        "first_named": (first_named(record) in wanted,),
+        "false_alarm": (bool(extra),),
+        "located": tuple(first for first, _ in told),
+        "among_places": tuple(among for _, among in told),
+    }
+
+
+def _located(record: Record, effect: str) -> tuple[bool, bool] | None:
+    """Tell whether the first place is the first true one, and one of them; ``None`` where it sits everywhere."""
+    true = [_site(p) for p in record["truth"].get("parts", {}).get(effect, {}).get("places", ())]
+    if not true:
+        return None
+    told = next(e for e in said(record)["effects"] if e["name"] == effect)["locations"]
+    first = _site(told[0]) if told else None
+    return first == true[0], first in true
+
+
+def _site(place: Mapping[str, Any]) -> tuple[str, str]:
+    return place["kind"], place["name"]
+
+
+def _unknown(record: Record) -> Marks:
+    """Judge a case whose cause is not in the library."""
+    flagged, blameless = unexplained(record), not _blamed(record)
+    truth, (place, quantity) = record["truth"], answer(record)
+    answers: Marks = {"flagged": (flagged,), "not_blamed": (blameless,), "right": (flagged and blameless,)}
+    if truth.get("places"):
+        answers["place"] = (place in [_site(p) for p in truth["places"]],)
+    if truth.get("quantities"):
+        answers["quantity"] = (quantity in truth["quantities"],)
+    return answers
+
+
+def _blamed(record: Record) -> bool:
+    probability = {e["name"]: e["probability"] or 0.0 for e in said(record)["effects"]}
+    strange = [n for n in said(record)["verdict"]["effects"] if not n.startswith(LAW) and is_absent(record, n)]
+    return any(probability.get(name, 0.0) >= BLAME for name in strange)
+
+
+def answer(record: Record) -> tuple[tuple[str, str] | None, str | None]:
+    """Return where the unknown cause enters and what it follows: a discovered law's word counts before the rest's."""
+    left = said(record)["unexplained"]
+    laws = [e for e in said(record)["effects"] if e["name"].startswith(LAW)][:1]
+    places = [_site(p) for e in (*laws, left) for p in e["locations"][:1]]
+    quantities = [e["quantity"] for e in laws if e.get("quantity")] + [d["covariate"] for d in left["depends_on"][:1]]
+    return next(iter(places), None), next(iter(quantities), None)
+
+
+def _hidden(record: Record) -> Marks:
+    """Judge a case whose cause follows a column that was taken away."""
+    missing = [e for e in said(record)["effects"] if e["status"] == "not_testable"]
+    named = {_stem(need) for e in missing for need in e["needs"]} & {_stem(n) for n in record["truth"]["needs"]}
+    further = said(record)["next"]
+    told = {_stem(need) for need in further.get("needs", ())}
+    asks = any(name in told or name in further["advice"] for name in named)
+    flagged, blameless = unexplained(record), not _blamed(record)
+    return {
+        "named": (bool(named),),
+        "asks": (asks,),
+        "flagged": (flagged,),
+        "not_blamed": (blameless,),
+        "right": (asks and flagged and blameless,),
+    }
+
+
+def _stem(column: str) -> str:
+    """``temperature`` stands for ``temperature.<link>`` too."""
+    return column.partition(".")[0]
+
+
+def _real(record: Record) -> Marks:
+    return {"right": (bool(record.get("right", False)),)}
+
+
+_ASKED: dict[str, Callable[[Record], Marks]] = {
+    **dict.fromkeys(("single", "pair", "triple", "null", "hard"), _known),
+    **dict.fromkeys(("removed", "unlisted"), _unknown),
+    "hidden": _hidden,
+    "real": _real,
+}

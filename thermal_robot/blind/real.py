@@ -1,0 +1,306 @@
+"""Real data with a cause put in or withheld: the noise, the geometry and all else are a real robot's.
+
+Every campaign of the folder is asked about untouched first (the **control**), then with one condition changed. A real
+arm has a wrong geometry and a remainder that nothing explains before anything is put in; what is right is therefore
+measured against the control on the same rows, and said here for each question. ``said`` is the diagnosis, ``fresh``
+what its model reaches on rows of the same campaign that it did not see, whose measured positions hold the noise.
+
+========================= ==================================================================================
+nothing                   ``geometric`` is in the verdict, and on fresh rows no more than 1.1 times the remainder is
+                          left that the campaign's own README reports for a full geometry
+offset, scale             ``geometric``, which contains both exactly, or the cause itself is in the verdict, and what is
+                          left on fresh rows is less than 1.1 times that of the control
+backlash                  ``backlash`` is found, its first place is the joint, its lost motion there within 30 %
+slip                      flagged as unexplained, with the joint as the first place and time or order as the first
+                          quantity; or one discovered law has both
+temperature               ``thermal_elongation`` is in the verdict and found
+hidden                    flagged as unexplained, ``thermal_elongation`` is not testable and asks for ``temperature``,
+                          and the first quantity (or a discovered law's) is time or order, which the temperature
+                          follows. The first two alone the control would pass as well
+later                     the first 70 % by time are diagnosed: on the rest the model leaves between 0.5 and 1.25 times
+                          the held-out rms that the diagnosis claims
+========================= ==================================================================================
+
+A slip, an offset or lost motion sits in one of the joints 2 .. n−2: the frames would take in that of the others.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from functools import partial
+from pathlib import Path
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.blind import real_faults as faults
+from thermal_robot.blind.real_judge import judged
+from thermal_robot.campaign import Campaign, read_campaign, write_campaign, write_table
+from thermal_robot.observations import Observations, observe
+
+Array = NDArray[np.float64]
+Fault = Literal["nothing", "offset", "scale", "backlash", "slip", "temperature", "hidden", "later"]
+Answers = dict[str, Any]
+
+REMAINDERS = {"ur5_jacobi": 0.113e-3, "wam_jacobi": 2.567e-3, "ipa_ur10_a": 0.436e-3, "ipa_ur10_b": 0.421e-3}
+"""Campaigns, with the rms distance (m) that a full geometry leaves on random held-out rows, as their READMEs say."""
+
+# how often each is asked, and of whom: the WAM's cables leave ten times what its links could grow
+_PLAN: tuple[tuple[Fault, int, tuple[str, ...]], ...] = (
+    ("offset", 2, tuple(REMAINDERS)),
+    ("scale", 1, tuple(REMAINDERS)),
+    ("backlash", 2, tuple(REMAINDERS)),
+    ("slip", 2, tuple(REMAINDERS)),
+    ("temperature", 2, ("ur5_jacobi", "ipa_ur10_a", "ipa_ur10_b")),
+    ("hidden", 2, ("ur5_jacobi", "ipa_ur10_a", "ipa_ur10_b")),
+    ("later", 2, ("ur5_jacobi", "ipa_ur10_a", "ipa_ur10_b")),
+)
+# what a fault leaves after the best frames, over the campaign's remainder: drawn between the two
+_RATIO: dict[Fault, tuple[float, float]] = {
+    "offset": (3.0, 6.0),
+    "scale": (3.0, 6.0),
+    "backlash": (1.0, 3.0),
+    "slip": (1.5, 4.0),
+}
+_ROWS = (600, 1200)
+_SPELLS = 20  # of equal length: a fifth of them is kept from the diagnosis
+_EARLY = 0.7
+
+
+@dataclass(frozen=True)
+class RealCase:
+    """A real campaign with what was done to it.
+
+    Attributes
+    ----------
+    id
+        Name of its folder: tells nothing.
+    seed
+        Of the trial: the rows of a campaign are the same in all cases of a trial.
+    draw
+        Number of the draw that settles joint and size.
+    data
+        The folder of measured campaigns.
+    campaign
+        Which of them.
+    fault
+        What is done to it.
+    control
+        ``id`` of the case with the same campaign untouched; ``None`` for that case itself.
+    kind
+        Always ``"real"``.
+    """
+
+    id: str
+    seed: int
+    draw: int
+    data: Path
+    campaign: str
+    fault: Fault
+    control: str | None
+    kind: Literal["real"] = "real"
+
+    def make(self, folder: Path) -> Answers:
+        """Write what the diagnosis sees, and return the answers.
+
+        Parameters
+        ----------
+        folder
+            Gets campaign.toml, measurements.csv, robot.urdf and, where something is to be predicted, fresh.csv.
+
+        Returns
+        -------
+        dict
+            What of the record (:mod:`thermal_robot.blind.cases`) is known before the diagnosis: ``truth`` with a
+            ``size`` (SI) in its parts, ``noise`` (what a full geometry leaves, per axis), and beside it, both (N, 3) m
+            in the measurement frame or ``None``, ``fresh_position``, measured, and ``fresh_before``, predicted by the
+            nominal robot in the frames that fit the diagnosed rows best.
+        """
+        # in the order of measurement, from here on
+        whole = _drawn_rows(read_campaign(self.data / self.campaign), self.seed, self.campaign)
+        rng = np.random.default_rng([self.seed, self.draw, 2])
+        changed, truth, asked = _FAULTS[self.fault](whole, rng, REMAINDERS[self.campaign])
+        fresh_rows = _late(whole.samples) if self.fault == "later" else _kept(whole.samples, self.seed, self.campaign)
+        if self.fault in ("slip", "hidden"):
+            fresh_rows[:] = False  # what nobody can know need not be predicted
+        given, fresh = changed.take(~fresh_rows), changed.take(fresh_rows)
+        write_campaign(given, folder)
+        answers: Answers = {
+            "robot": self.campaign,
+            "samples": given.samples,
+            "measures": given.measures,
+            "noise": REMAINDERS[self.campaign] / np.sqrt(3.0),
+            "without": [],
+            "hidden": truth["needs"],
+            "truth": truth,
+            "asked": f"{self.campaign}: {asked}",
+            "fresh_position": None,
+            "fresh_before": None,
+        }
+        if fresh.samples:
+            write_table(replace(fresh, position=None, orientation=None), folder / "fresh.csv")
+            alone = observe(fresh, faults.registered(given)).predicted_position
+            answers |= {"fresh_position": faults.measured(fresh).tolist(), "fresh_before": alone.tolist()}
+        return answers
+
+    def judge(self, record: dict[str, Any], control: dict[str, Any] | None) -> dict[str, Any]:
+        """Return the record with ``right``, and in short words ``asked`` and ``answer``.
+
+        Parameters
+        ----------
+        record
+            Of this case, with ``truth``, ``asked``, ``said`` and ``fresh``.
+        control
+            The record of the case that ``control`` names.
+        """
+        right, answer = judged(self.fault, record, control, REMAINDERS[self.campaign])
+        return {**record, "right": right, "answer": answer}
+
+
+def real_cases(data: Path, seed: int, count: int | None = None) -> tuple[RealCase, ...]:
+    """Return the cases of one trial.
+
+    Parameters
+    ----------
+    data
+        Folder of measured campaigns; those that it lacks are left out.
+    seed
+        Settles everything.
+    count
+        At most so many, controls included; about sixteen where absent.
+
+    Returns
+    -------
+    tuple of RealCase
+        Each after its control.
+    """
+    present = [name for name in REMAINDERS if (data / name / "campaign.toml").is_file()]
+    rng = np.random.default_rng([seed, 0])
+    planned: list[tuple[Fault, str]] = []
+    for fault, times, campaigns in _PLAN:
+        fit = [name for name in campaigns if name in present]
+        planned += [(fault, str(name)) for name in rng.permutation(fit)[:times]]
+    cases: list[RealCase] = []
+    controls: dict[str, str] = {}
+    for k in rng.permutation(len(planned)).tolist():
+        fault, campaign = planned[k]
+        wanted: list[tuple[Fault, str]] = [(fault, campaign)]
+        if campaign not in controls:
+            wanted.insert(0, ("nothing", campaign))
+        if count is not None and len(cases) + len(wanted) > count:
+            continue
+        for what, which in wanted:
+            number = len(cases) + 1
+            name = f"r{number:03d}"
+            cases.append(RealCase(name, seed, number, data, which, what, controls.get(which)))
+            controls.setdefault(which, name)
+    return tuple(cases)
+
+
+def _drawn_rows(campaign: Campaign, seed: int, name: str) -> Campaign:
+    """Return at most so many rows as a quick diagnosis takes: every k-th, or those of a spell."""
+    clock = campaign.covariates.get("time", campaign.covariates.get("order"))
+    rows = np.arange(campaign.samples) if clock is None else np.argsort(clock, kind="stable")
+    rng = np.random.default_rng([seed, list(REMAINDERS).index(name), 1])
+    size = int(rng.integers(*_ROWS))
+    if campaign.samples > size:
+        stride = int(rng.integers(1, campaign.samples // size + 1))
+        start = int(rng.integers(0, campaign.samples - (size - 1) * stride))
+        rows = rows[start :: max(stride, 1)][:size]
+    return campaign.take(rows)
+
+
+def _kept(samples: int, seed: int, name: str) -> NDArray[np.bool_]:
+    """(N,) True for the rows of some spells: single rows would have near-repeats among the diagnosed."""
+    rng = np.random.default_rng([seed, list(REMAINDERS).index(name), 3])
+    spell = np.arange(samples) * _SPELLS // samples
+    return np.isin(spell, rng.choice(_SPELLS, _SPELLS // 5, replace=False))
+
+
+def _late(samples: int) -> NDArray[np.bool_]:
+    return np.arange(samples) >= _EARLY * samples
+
+
+Made = tuple[Campaign, Answers, str]
+
+
+def _truth(effect: str | None = None, ratio: float = 0.0, size: float = 0.0, joint: str = "") -> Answers:
+    """Return the truth of a case: a real arm's geometry is never that of its URDF, and no part that was put in."""
+    places = [{"kind": "joint", "name": joint}] if joint else []
+    parts = {effect: {"ratio": ratio, "main": True, "places": places, "size": size}} if effect else {}
+    effects = ["geometric", *parts]
+    nothing: Answers = {key: [] for key in ("places", "quantities", "needs", "outliers")}
+    return {"effects": effects, "unlisted": None, "parts": parts, **nothing}
+
+
+def _nothing(campaign: Campaign, rng: np.random.Generator, remainder: float, asked: str = "untouched") -> Made:
+    return campaign, _truth(), asked
+
+
+def _joint_fault(campaign: Campaign, rng: np.random.Generator, remainder: float, fault: Fault) -> Made:
+    """Put an offset, lost motion or a slip into one joint; it leaves a drawn multiple of the remainder."""
+    joint = int(rng.integers(1, campaign.robot.n - 2))
+    name = campaign.robot.joint_names[joint]
+    shape = np.ones(campaign.samples)
+    share = float(rng.uniform(0.35, 0.65))
+    if fault == "backlash":
+        campaign = faults.with_approaches(campaign)
+        shape = -0.5 * campaign.covariates[f"approach.{name}"]
+    elif fault == "slip":
+        shape = (np.arange(campaign.samples) >= share * campaign.samples).astype(float)
+    seen = _seen(campaign)
+    ratio = float(rng.uniform(*_RATIO[fault]))
+    size = ratio * remainder / faults.leaves(seen, seen.joint_sensitivity[:, :3, joint] * shape[:, None])
+    if fault != "backlash":
+        size *= rng.choice([-1.0, 1.0])
+    changed = faults.with_joint_error(campaign, joint, size * shape)
+    if fault == "slip":
+        truth = _truth("slip", ratio, size, name)
+        truth |= {"effects": ["geometric"], "unlisted": "slip", "quantities": ["time", "order"]}
+        truth["places"] = truth["parts"]["slip"]["places"]
+        return changed, truth, f"{name} slips by {1e3 * size:.2g} mrad after {share:.0%} of the rows"
+    if fault == "backlash":
+        return changed, _truth("backlash", ratio, size, name), f"{1e3 * size:.2g} mrad of lost motion in {name}"
+    return changed, _truth("joint_offset", ratio, size, name), f"zero of {name} off by {1e3 * size:.2g} mrad"
+
+
+def _scale(campaign: Campaign, rng: np.random.Generator, remainder: float) -> Made:
+    seen, ratio = _seen(campaign), float(rng.uniform(*_RATIO["scale"]))
+    shift = faults.measured(campaign) @ seen.frames.base[:3, :3]
+    size = float(rng.choice([-1.0, 1.0])) * ratio * remainder / faults.leaves(seen, shift)
+    asked = f"instrument off by {1e6 * size:.0f} µm/m"
+    return faults.with_scale(campaign, size), _truth("instrument_scale", ratio, size), asked
+
+
+def _growth(campaign: Campaign, rng: np.random.Generator, remainder: float, told: bool) -> Made:
+    seen = _seen(campaign)
+    warmer = faults.warm_up(rng, campaign.samples)
+    strains = rng.uniform(1.2e-5, 2.3e-5, len(campaign.robot.segments))
+    changed = faults.with_growth(campaign, strains, warmer)
+    shift = (faults.measured(changed) - faults.measured(campaign)) @ seen.frames.base[:3, :3]
+    ratio, highest = faults.leaves(seen, shift) / remainder, float(warmer.max())
+    if told:
+        changed = faults.with_temperature(changed, warmer)
+    truth = _truth("thermal_elongation", ratio, highest)
+    if not told:
+        # how the temperature goes with time is all that the table can show of it
+        truth |= {"quantities": ["time", "order"], "needs": ["temperature"]}
+    return changed, truth, f"links grow by up to {highest:.0f} K, {'recorded' if told else 'temperature not recorded'}"
+
+
+def _seen(campaign: Campaign) -> Observations:
+    return observe(campaign, faults.registered(campaign))
+
+
+_FAULTS: dict[Fault, Callable[[Campaign, np.random.Generator, float], Made]] = {
+    "nothing": _nothing,
+    "offset": partial(_joint_fault, fault="offset"),
+    "scale": _scale,
+    "backlash": partial(_joint_fault, fault="backlash"),
+    "slip": partial(_joint_fault, fault="slip"),
+    "temperature": partial(_growth, told=True),
+    "hidden": partial(_growth, told=False),
+    "later": partial(_nothing, asked="first 70 % by time, rest predicted"),
+}

@@ -1,0 +1,279 @@
+"""A trial: campaigns are made, their answers sealed, the campaigns diagnosed, the seal opened, all of it joined."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import math
+import secrets
+import shutil
+import signal
+from collections import Counter
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor, as_completed
+from contextlib import closing
+from dataclasses import asdict
+from multiprocessing import get_context
+from pathlib import Path
+from typing import Any, Protocol
+
+from thermal_robot.blind.cases import Case
+from thermal_robot.blind.sealed import open_seal, seal
+from thermal_robot.blind.supervise import examine
+from thermal_robot.errors import ThermalRobotError
+
+PLAN, SEALED, REPLIES = "trial.json", "answers.sealed", "replies.jsonl"
+OPENED, RECORDS, CAMPAIGNS = "opened.json", "records.json", "campaigns"
+SCHEMA = "thermal-robot/trial/1"
+
+Plain = dict[str, Any]
+Make = Callable[[Case, Path], Plain]
+_FRESH = ("fresh_position", "fresh_before")  # of the answers: what they give is in the record as two numbers
+
+
+class RealCase(Protocol):
+    """A case that makes its own campaign and judges its own record; a frozen dataclass."""
+
+    @property
+    def id(self) -> str:
+        """Name of its folder."""
+
+    @property
+    def control(self) -> str | None:
+        """``id`` of the case that its record is judged against."""
+
+    def make(self, folder: Path) -> Plain:
+        """Write the campaign, return the answers."""
+
+    def judge(self, record: Plain, control: Plain | None) -> Plain:
+        """Return the record with ``right``, ``asked`` and ``answer``."""
+
+
+def run_trial(
+    cases: Sequence[Case | RealCase],
+    directory: str | Path,
+    make: Make | None = None,
+    *,
+    workers: int = 1,
+    progress: Callable[[str, int, int], None] = lambda *_: None,
+    sealed: Callable[[str], None] = lambda _: None,
+    timeout: float = 120.0,
+) -> list[Plain]:
+    """Run a trial, or go on with one that was stopped.
+
+    Campaigns are made in processes that are started anew, so a script must call this under
+    ``if __name__ == "__main__"``. A trial that is taken up again makes them all once more, which gives the same files,
+    and has only those diagnosed that have no reply yet.
+
+    Parameters
+    ----------
+    cases
+        What is asked.
+    directory
+        Is made if need be; keeps campaigns, sealed answers, replies, opened answers and records.
+    make
+        Writes the campaign of a :class:`Case` into a folder and returns the answers; must be picklable. That of
+        :mod:`thermal_robot.blind.reality` by default.
+    workers
+        How many processes make campaigns, and then diagnose them.
+    progress
+        Called with ``"campaigns"`` or ``"diagnoses"``, how many are done, and how many there are.
+    sealed
+        Called with the commitment of :func:`~thermal_robot.blind.sealed.seal` before the first diagnosis.
+    timeout
+        Seconds for one diagnosis.
+
+    Returns
+    -------
+    list of dict
+        The records, see :mod:`thermal_robot.blind.cases`, in the order of the cases. One whose fault no draw shows has
+        ``withdrawn`` and the reason instead of truth and reply.
+
+    Raises
+    ------
+    ThermalRobotError
+        If the directory holds something else, or a campaign cannot be made.
+    SealError
+        If the sealed answers were altered.
+    """
+    folder = Path(directory).resolve()
+    _take(folder, _identity(cases))
+    answers, made = _make_all(cases, folder, make, workers, progress)
+    key = secrets.token_bytes(32)
+    commitment = seal(answers, folder / SEALED, key)
+    del answers  # from here on they are in the file only
+    sealed(commitment)
+    replies = _read_replies(folder / REPLIES, made)
+    asked = [case for case in cases if made[case.id]]
+    requests = {case.id: _request(case, folder) for case in asked if case.id not in replies}
+    progress("diagnoses", len(replies), len(asked))
+    with (
+        (folder / REPLIES).open("a", encoding="utf-8") as file,
+        closing(examine(requests, folder, workers=workers, timeout=timeout)) as answered,
+    ):
+        for name, reply in answered:
+            replies[name] = reply
+            print(json.dumps({"id": name, "campaign": made[name], **reply}), file=file, flush=True)
+            progress("diagnoses", len(replies), len(asked))
+    opened = open_seal(folder / SEALED, key, commitment)
+    # with the key, whoever noted the commitment can now check it
+    _write(folder / OPENED, {"commitment": commitment, "key": key.hex(), "answers": opened})
+    records = _judged(cases, [join(case, opened[case.id], replies.get(case.id)) for case in cases])
+    _write(folder / RECORDS, records)
+    return records
+
+
+def join(case: Case | RealCase, answers: Mapping[str, Any], reply: Mapping[str, Any] | None) -> Plain:
+    """Join what was asked, what is true and what was said to a record."""
+    asked: Plain = {"id": case.id, "kind": getattr(case, "kind", "real")}
+    if isinstance(case, Case):
+        asked |= {"robot": case.robot.name, "without": list(case.without), "hidden": list(case.hidden)}
+    if reply is None:
+        return {**asked, "withdrawn": answers["withdrawn"]}
+    fresh, predicted = None, reply["predicted"]
+    if predicted is not None and answers.get("fresh_position"):
+        true = answers["fresh_position"]
+        fresh = {"rms_before": _rms(answers["fresh_before"], true), "rms_after": _rms(predicted, true)}
+    true_ones = {name: value for name, value in answers.items() if name not in _FRESH}
+    said = {"said": reply["said"], "fresh": fresh, "seconds": reply["seconds"], "error": reply["error"]}
+    return {**asked, **true_ones, **said}
+
+
+def _rms(positions: Sequence[Sequence[float]], true: Sequence[Sequence[float]]) -> float:
+    """Root mean square of the distance."""
+    return math.sqrt(sum(math.dist(p, t) ** 2 for p, t in zip(positions, true, strict=True)) / len(true))
+
+
+def _judged(cases: Sequence[Case | RealCase], records: list[Plain]) -> list[Plain]:
+    found = {record["id"]: record for record in records}
+    return [
+        record if isinstance(case, Case) else case.judge(record, found.get(case.control or ""))
+        for case, record in zip(cases, records, strict=True)
+    ]
+
+
+def _request(case: Case | RealCase, folder: Path) -> Plain:
+    return {"folder": str(folder / CAMPAIGNS / case.id), "without": list(getattr(case, "without", ())), "only": []}
+
+
+def _identity(cases: Sequence[Case | RealCase]) -> Plain:
+    """Return what tells this trial from another one: of what is drawn it says nothing."""
+    from thermal_robot import __version__
+
+    if len({case.id for case in cases}) < len(cases) or not cases:
+        raise ThermalRobotError("a trial needs cases, and each needs an id of its own")
+    drawn = json.dumps([asdict(case) for case in cases], sort_keys=True, default=str)  # type: ignore[arg-type]
+    return {
+        "schema": SCHEMA,
+        "version": __version__,
+        # a program that was changed meanwhile would be judged by some of its predecessor's replies
+        "program": _digest(Path(__file__).parents[1], "*.py"),
+        "plan": hashlib.sha256(drawn.encode()).hexdigest(),
+        "kinds": dict(Counter(getattr(case, "kind", "real") for case in cases)),
+        "robots": sorted({case.robot.name for case in cases if isinstance(case, Case)}),
+    }
+
+
+def _take(folder: Path, identity: Plain) -> None:
+    """Take possession of a directory that is empty or holds this very trial."""
+    file = folder / PLAN
+    if file.is_file():
+        try:
+            found = dict(json.loads(file.read_text(encoding="utf-8")))
+        except ValueError:
+            found = {}
+        different = [name for name, value in identity.items() if found.get(name) != value]
+        if different:
+            what = "version of the program" if {"version", "program"} & set(different) else "plan"
+            raise ThermalRobotError(f"{folder} holds a trial with another {what}; choose or empty the directory")
+        return
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+        if any(folder.iterdir()):
+            raise ThermalRobotError(f"{folder} is not empty and holds no trial; choose another directory")
+        _write(file, identity)
+    except OSError as error:
+        raise ThermalRobotError(f"{folder} cannot be written: {error.strerror}") from None
+
+
+def _make_all(
+    cases: Sequence[Case | RealCase],
+    folder: Path,
+    make: Make | None,
+    workers: int,
+    progress: Callable[[str, int, int], None],
+) -> tuple[dict[str, Plain], dict[str, str]]:
+    """Make all campaigns; return their answers, and a digest of the files of each."""
+    answers, made = {}, {}
+    pool = ProcessPoolExecutor(min(workers, len(cases)), get_context("spawn"), _quiet)
+    try:
+        tasks = {pool.submit(_make_one, case, folder / CAMPAIGNS / case.id, make): case.id for case in cases}
+        for done, task in enumerate(as_completed(tasks), 1):
+            answers[tasks[task]], made[tasks[task]] = task.result()
+            progress("campaigns", done, len(cases))
+    finally:
+        pool.shutdown(cancel_futures=True)
+    return answers, made
+
+
+def _quiet() -> None:
+    """Leave Ctrl-C to the parent, and the other cores to the other makers."""
+    from threadpoolctl import threadpool_limits
+
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    threadpool_limits(1)
+
+
+def _make_one(case: Case | RealCase, folder: Path, make: Make | None) -> tuple[Plain, str]:
+    shutil.rmtree(folder, ignore_errors=True)
+    folder.mkdir(parents=True)
+    try:
+        if not isinstance(case, Case):
+            answers = case.make(folder)
+        elif make is not None:
+            answers = make(case, folder)
+        else:
+            from thermal_robot.blind import reality
+
+            answers = reality.make(case, folder)
+    except ThermalRobotError as error:  # its own class may not survive the way to the parent
+        raise ThermalRobotError(f"the campaign of case {case.id} cannot be made: {error}") from None
+    except Exception as error:  # a mistake of the maker's: its traceback is kept
+        raise RuntimeError(f"the campaign of case {case.id} cannot be made") from error
+    return answers, "" if "withdrawn" in answers else _digest(folder)
+
+
+def _read_replies(path: Path, made: Mapping[str, str]) -> dict[str, Plain]:
+    """Read the replies that there are, and keep those to the campaigns as they are now.
+
+    Where a file was made on another machine, a campaign may differ in its last digits from what was diagnosed.
+    """
+    if not path.is_file():
+        return {}
+    whole = path.read_bytes()
+    complete = whole[: whole.rfind(b"\n") + 1]
+    if complete != whole:  # a line that was torn when the trial was stopped
+        path.write_bytes(complete)
+    try:
+        lines = [json.loads(line) for line in complete.splitlines()]
+        return {
+            line["id"]: {name: line[name] for name in ("said", "predicted", "seconds", "error")}
+            for line in lines
+            if made.get(line["id"]) == line["campaign"]
+        }
+    except (ValueError, KeyError, TypeError):
+        raise ThermalRobotError(f"{path} is damaged; delete it, and the campaigns are diagnosed again") from None
+
+
+def _digest(folder: Path, pattern: str = "*") -> str:
+    total = hashlib.sha256()
+    for file in sorted(folder.rglob(pattern)):
+        if file.is_file():
+            # the length keeps what follows from passing for a part of this file
+            content = file.read_bytes()
+            total.update(f"{file.relative_to(folder).as_posix()}\n{len(content)}\n".encode() + content)
+    return total.hexdigest()
+
+
+def _write(path: Path, value: Any) -> None:
+    path.write_text(json.dumps(value, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
