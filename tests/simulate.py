@@ -54,18 +54,39 @@ def conditions(robot, q, rng, heaviest):
     return covariates
 
 
-def draw_effect(name, nominal, rng, places=None):
+def further_conditions(robot, q, rng, moving, links):
+    """Joints that are measured in passing, at several speeds; a sensor on each link, warmed by its motor."""
+    samples = len(q)
+    covariates = {}
+    if moving:
+        speed = rng.choice([0.1, 0.3, 1.0], samples)
+        for joint in robot.joint_names:
+            covariates[f"velocity.{joint}"] = speed * rng.uniform(-0.8, 0.8, samples)
+            covariates[f"acceleration.{joint}"] = speed * rng.normal(0.0, 1.5, samples)
+    if links:
+        run = np.arange(samples) / samples
+        for link in dict.fromkeys(segment.parent_link for segment in robot.segments):
+            warm_up = rng.uniform(2.0, 10.0) * -np.expm1(-run / rng.uniform(0.1, 0.5))
+            swing = rng.uniform(0.5, 3.0) * np.sin(run * rng.uniform(2, 12) + rng.uniform(0, 6))
+            covariates[f"temperature.{link}"] = 21.0 + warm_up + swing
+    return covariates
+
+
+NEW = ("tracking_lag", "link_compliance", "thermal_bending")
+"""Effects that are at work in the background only where they are asked for: the campaigns of old seeds stay."""
+
+
+def draw_effect(name, nominal, rng, places=None, variant=0):
     """An effect with random parameters of its expected size; few joints at fault where that is how it comes."""
-    effect = library()[name]
-    variants = effect.variants(nominal)
-    effect = variants[rng.integers(len(variants))]
+    variants = library()[name].variants(nominal)
+    effect = variants[rng.integers(len(variants)) if name == "drift" else variant]
     parameters = effect.parameters(nominal)
     values = np.array([p.size for p in parameters]) * rng.normal(size=len(parameters))
-    if name in ("thermal_elongation", "joint_compliance", "backlash"):
+    if name in ("thermal_elongation", "joint_compliance", "backlash", "tracking_lag", "link_compliance"):
         values = np.abs(values)
     if name == "thermal_elongation":
         values = np.array([p.size for p in parameters]) * rng.uniform(0.6, 1.6, len(parameters))
-    if name in ("joint_offset", "joint_gain", "transmission_error", "backlash"):
+    if name in ("joint_offset", "joint_gain", "transmission_error", "backlash", "tracking_lag"):
         sites = list(dict.fromkeys(p.place for p in parameters))
         sites = sites[1:-1] if name == "joint_offset" else sites
         faulty = set(places or rng.choice(sites, rng.integers(1, 4), replace=False))
@@ -99,8 +120,14 @@ def simulate(
     heaviest=3.0,
     places=None,
     fresh=0,
+    moving=False,
+    links=False,
+    variant=0,
 ):
     """Simulate a campaign.
+
+    ``moving`` and ``links`` add columns of what joints do in passing, and of each link's temperature; ``variant``
+    chooses among the settings of an effect.
 
     Returns the campaign, its truth (a dict), and ``fresh`` further samples as a pair of a campaign without measurements
     and where the target really is, in the measurement frame (or None).
@@ -116,7 +143,11 @@ def simulate(
         q,
         np.zeros((total, 3)),
         None if turning is None else np.tile([1.0, 0, 0, 0], (total, 1)),
-        covariates=conditions(robot, q, rng, heaviest),
+        covariates={
+            **conditions(robot, q, rng, heaviest),
+            # a generator of its own: what the first one draws from here on stays as it was
+            **further_conditions(robot, q, np.random.default_rng([seed, 1]), moving, links),
+        },
         target=frames.tool[:3, 3] + rng.uniform(-0.01, 0.01, 3),
         noise_position=noise,
         noise_orientation=turning,
@@ -125,9 +156,10 @@ def simulate(
     )
     nominal = observe(campaign, frames)
     chosen, truth = [], {"effects": list(effects), "parts": {}, "noise": noise, "seed": seed}
-    others = [n for n, e in library().items() if background and n not in effects and not e.missing(nominal)]
+    old = {n: e for n, e in library().items() if n not in NEW}
+    others = [n for n, e in old.items() if background and n not in effects and not e.missing(nominal)]
     for name in [*effects, *others]:
-        effect, values = draw_effect(name, nominal, rng, places if name in effects else None)
+        effect, values = draw_effect(name, nominal, rng, *((places, variant) if name in effects else ()))
         wanted = noise * np.sqrt(3.0) * (rng.uniform(*ratio) if name in effects else background)
         left = remaining(campaign, nominal, effect, values)
         values = values * (wanted / left)

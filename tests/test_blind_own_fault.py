@@ -10,7 +10,7 @@ from thermal_robot.blind.reality import make
 from thermal_robot.blind.reality.own import load
 from thermal_robot.errors import EffectError
 
-FAULT = '''
+FAULT = """
 import numpy as np
 from thermal_robot.blind.reality import Fault
 from thermal_robot.blind.reality.faults import joints
@@ -25,7 +25,7 @@ def act(body, setting, values):
 
 MINE = Fault("two_positions", draw, act, joints, few=True)
 WRONG = 3
-'''
+"""
 
 
 @pytest.fixture

@@ -71,7 +71,7 @@ def test_a_model_needs_what_its_effects_read_and_nothing_more(rv_m2):
         (["backlash"], {f"approach.{joint}" for joint in rv_m2.joint_names}),
         (["joint_compliance"], {"payload"}),
     ):
-        _, model, fresh, _ = corrected(rv_m2, effects, seed=2)
+        _, model, fresh, _ = corrected(rv_m2, effects, seed=4)
         assert [e.name for e, _ in model.effects] == effects
         assert set(model.needs) == needs
         bare = replace(fresh, covariates={k: v for k, v in fresh.covariates.items() if k in needs})

@@ -7,11 +7,12 @@ import pytest
 from simulate import simulate
 
 from thermal_robot import diagnose
-from thermal_robot.effects import library
+from thermal_robot.effects import RANDOM, library
 from thermal_robot.estimation.register import register
 from thermal_robot.observations import observe
 
 ALONE = [name for name in library() if name not in ("base_frame", "tool_frame")]
+COLUMNS = {"tracking_lag": {"moving": True}, "thermal_bending": {"links": True}}
 NOISE = 25e-6
 on_arms = pytest.mark.parametrize("arm", ["rv_m2", "ur10", "panda"], indirect=True)
 
@@ -43,7 +44,7 @@ def diagnosed(robot, effects, seed, **how):
 @pytest.fixture(scope="module")
 def cases(arm):
     """Every effect alone on one arm."""
-    return [diagnosed(arm, [name], seed) for seed, name in enumerate(ALONE)]
+    return [diagnosed(arm, [name], seed, **COLUMNS.get(name, {})) for seed, name in enumerate(ALONE)]
 
 
 @on_arms
@@ -127,7 +128,7 @@ def test_figures_are_consistent(cases):
         assert gap.held_out.folds == 5
         assert sum(found.where.axes.values()) == pytest.approx(1.0)
         assert 0.0 <= found.probability <= 1.0 + 1e-12
-        assert {f.name for f in found.effects} == set(library())
+        assert {f.name for f in found.effects} == {*library(), *RANDOM}
         assert found.verdict == tuple(f.name for f in found.effects if f.parameters)
         assert found.unexplained.rms == 0.0 or found.unexplained.flagged
         own = found.finding(found.verdict[0])
@@ -190,7 +191,7 @@ def test_two_effects_share_the_gap_as_they_caused_it(arm):
 
 # Withheld effects -----------------------------------------------------------------------------------------
 
-PLACES = {"backlash": "joint", "transmission_error": "joint", "drift": "base"}
+CONDITIONS = {"backlash": "joint", "transmission_error": "joint", "drift": "base"}
 
 
 @pytest.mark.parametrize("arm", ["rv_m2", "ur10"], indirect=True)
@@ -203,7 +204,7 @@ def test_a_withheld_effect_is_called_unexplained_with_its_place_and_quantity(arm
         left = found.unexplained
         assert name not in {f.name for f in found.effects}
         flagged.append(left.flagged)
-        if not left.flagged or name not in PLACES:
+        if not left.flagged or name not in CONDITIONS:
             continue
         assert found.to_dict()["verdict"]["unexplained"] is True
         assert left.p_value < 1e-3
@@ -211,12 +212,12 @@ def test_a_withheld_effect_is_called_unexplained_with_its_place_and_quantity(arm
         assert left.rms > NOISE / 2
         place, quantity = left.locations[0], left.depends_on[0].covariate
         faulty = {n.rsplit(", ", 1)[1] for n in truth["parts"][name]["values"]}
-        placed.append(place.kind == PLACES[name] and (name == "drift" or place.name in faulty))
+        placed.append(place.kind == CONDITIONS[name] and (name == "drift" or place.name in faulty))
         expected = {"drift": "time", "backlash": f"approach.{place.name}", "transmission_error": place.name}
         followed.append(quantity == expected[name])
     assert sum(flagged) >= len(alone) - 1
-    assert len(placed) == len(PLACES)
-    assert sum(placed) + sum(followed) >= 2 * len(PLACES) - 1
+    assert len(placed) == len(CONDITIONS)
+    assert sum(placed) + sum(followed) >= 2 * len(CONDITIONS) - 1
 
 
 @pytest.mark.parametrize("arm", ["ur10"], indirect=True)

@@ -32,13 +32,13 @@ class JointSag(Effect):
 SAG = np.array([0.0, 3e-4, -2e-4, 0.0, 0.0])
 
 
-def with_sag(robot, seed, noise=25e-6, samples=120):
+def with_sag(robot, seed, noise=25e-6, samples=120, times=1.0):
     """A campaign of a sagging robot, measured in the root frame by an instrument that was not told so."""
     plain = simulate(robot, samples=samples, seed=seed, noise=noise)[0]
     rng = np.random.default_rng(seed)
     plain = replace(plain, covariates={**plain.covariates, "speed": rng.uniform(0.1, 1.0, samples)})
     nominal = observe(plain, Frames.declared(plain))
-    change, _ = displacement(nominal, [(JointSag(), SAG)])
+    change, _ = displacement(nominal, [(JointSag(), times * SAG)])
     real = observe(plain, Frames.declared(plain), displacement=change)
     return replace(plain, position=real.predicted_position + noise * rng.normal(size=(samples, 3)))
 
@@ -84,7 +84,8 @@ def test_without_its_covariate_ones_own_effect_is_not_testable(rv_m2):
 def test_without_ones_own_effect_its_place_and_quantity_are_named(rv_m2):
     best = []
     for seed in range(4):
-        left = diagnose(with_sag(rv_m2, seed)).unexplained
+        # what varies of it leaves 1.3 times the noise once, which other effects may take up; 2.6 times they may not
+        left = diagnose(with_sag(rv_m2, seed, times=2.0)).unexplained
         best.append(left.flagged and left.depends_on[0].covariate == "speed")
     assert sum(best) >= 3
 

@@ -1,5 +1,7 @@
 """Gravity torques against the potential energy and against arithmetic."""
 
+import xml.etree.ElementTree as ElementTree
+
 import numpy as np
 import pinocchio
 import pytest
@@ -61,3 +63,82 @@ def test_gravity_default_is_down_in_the_root_of_the_urdf(awkward, awkward_urdf, 
     )
     assert np.linalg.norm(awkward.gravity) == pytest.approx(9.81)
     np.testing.assert_allclose(from_ground.gravity, [0.0, 0.0, -9.81])
+
+
+def test_the_moment_on_a_segment_holds_its_joint(arm, configurations):
+    q = configurations(arm, 30)
+    load = {"payload": np.linspace(0.0, 10.0, 30), "payload_com": np.array([0.05, -0.02, 0.1])}
+    loads, torques = kin.segment_loads(arm, q, **load), kin.gravity_torques(arm, q, **load)
+    by_joint = {segment.name: s for s, segment in enumerate(arm.segments)}
+    for j, name in enumerate(arm.joint_names):
+        axis = arm.chain.axes[arm.chain.movable[j]]
+        part = slice(0, 3) if arm.joint_types[j] == "prismatic" else slice(3, 6)
+        np.testing.assert_allclose(loads[:, by_joint[name], part] @ axis, -torques[:, j], atol=1e-9)
+
+
+def test_what_a_segment_carries_is_what_pinocchio_says(arm, configurations):
+    """Force and moment across every placement from the links of the URDF one by one, none of them lumped."""
+    from thermal_robot.kinematics.urdf import parse_urdf
+
+    q = configurations(arm, 4)
+    loads, frames = kin.segment_loads(arm, q), kin.chain_frames(arm, q)
+    full = parse_urdf(arm.urdf, "the robot")
+    rows = whole_configurations(full, arm, q)
+    for i, row in enumerate(rows):
+        data = full.createData()
+        pinocchio.framesForwardKinematics(full, data, row)
+        root = data.oMf[full.getFrameId(arm.root_frame, pinocchio.FrameType.BODY)]
+        for s, segment in enumerate(arm.segments):
+            mass, moment = 0.0, np.zeros(3)
+            for weight, centre in links_beyond(full, data, arm.urdf, segment.name):
+                mass, moment = mass + weight, moment + weight * centre
+            centre = root.actInv(moment / mass) if mass > 0 else np.zeros(3)
+            axes, origin = frames.rotations[i, segment.index], frames.positions[i, segment.index]
+            expected = np.concatenate([mass * arm.gravity, np.cross(mass * (centre - origin), arm.gravity)])
+            expected = np.concatenate([axes.T @ expected[:3], axes.T @ expected[3:]])
+            np.testing.assert_allclose(loads[i, s], expected, atol=1e-8 * (1.0 + np.abs(expected).max()))
+
+
+def whole_configurations(full, arm, q):
+    """The chain's joints as given, every other one where it is held, as Pinocchio writes them."""
+    rows = []
+    for values in q:
+        row = pinocchio.neutral(full)
+        for j, name in enumerate(full.names[1:], start=1):
+            joint = full.joints[j]
+            low, high = full.lowerPositionLimit[joint.idx_q], full.upperPositionLimit[joint.idx_q]
+            value = min(max(0.0, low), high) if joint.nq == 1 and low < high else 0.0
+            if name in arm.joint_names:
+                value = values[arm.joint_names.index(name)]
+            if joint.nq == 2:
+                row[joint.idx_q : joint.idx_q + 2] = np.cos(value), np.sin(value)
+            elif joint.nq == 1:
+                row[joint.idx_q] = value
+        rows.append(row)
+    return rows
+
+
+def links_beyond(full, data, urdf, joint):
+    """Mass and centre in the world of every link that hangs on a URDF joint, read from the text of the URDF."""
+    tree = ElementTree.fromstring(urdf)
+    below = {}
+    for item in tree.findall("joint"):
+        below.setdefault(item.find("parent").get("link"), []).append(item.find("child").get("link"))
+        if item.get("name") == joint:
+            links = [item.find("child").get("link")]
+    inertial = {link.get("name"): link.find("inertial") for link in tree.findall("link")}
+    for link in links:
+        links += below.get(link, [])
+        if inertial[link] is not None:
+            origin = inertial[link].find("origin")
+            centre = np.zeros(3) if origin is None else np.array(origin.get("xyz", "0 0 0").split(), dtype=float)
+            place = data.oMf[full.getFrameId(link, pinocchio.FrameType.BODY)]
+            yield float(inertial[link].find("mass").get("value")), place.act(centre)
+
+
+def test_the_static_regressor_gives_the_torques(arm, configurations):
+    q = configurations(arm, 20)
+    chain = arm.chain
+    moments = np.concatenate([chain.masses[:, None], chain.masses[:, None] * chain.mass_centres], axis=1)
+    torques = np.einsum("njbm,bm->nj", kin.static_regressor(arm, q), moments)
+    np.testing.assert_allclose(torques, kin.gravity_torques(arm, q), atol=1e-9)

@@ -106,7 +106,7 @@ def test_nothing_of_a_robot_can_be_changed(rv_m2):
         rv_m2.name = "other"
     arrays = [rv_m2.gravity, rv_m2.lower, rv_m2.upper, rv_m2.segments[0].direction]
     arrays += [value for value in vars(rv_m2.chain).values() if isinstance(value, np.ndarray)]
-    assert len(arrays) == 12
+    assert len(arrays) == 14
     assert not any(array.flags.writeable for array in arrays)
 
 

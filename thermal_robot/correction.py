@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign, Settings, read_samples
 from thermal_robot.effects import Effect, library
+from thermal_robot.effects.discovered import PREFIX, Discovered
 from thermal_robot.errors import CampaignError, EffectError
 from thermal_robot.estimation.columns import displacement
 from thermal_robot.kinematics import rotation_to_quaternion
@@ -170,6 +171,8 @@ class CorrectedModel:
         known = {**library(), **{effect.name: effect for effect in effects}}
         held = []
         for entry in plain["effects"]:
+            if entry["name"].startswith(PREFIX):
+                known[entry["name"]] = Discovered()
             if entry["name"] not in known:
                 raise EffectError(f"the model holds the effect {entry['name']!r}, which is not installed here")
             arguments = {k: tuple(v) if isinstance(v, list) else v for k, v in entry["arguments"].items()}

@@ -23,6 +23,7 @@ from thermal_robot.kinematics import (
     log3,
     placement_sensitivities,
     quaternion_to_rotation,
+    segment_loads,
 )
 from thermal_robot.robot import Robot
 
@@ -123,6 +124,13 @@ class Observations:
             if values is not None:
                 holding[:, j] = values
         return holding
+
+    @cached_property
+    def segment_load(self) -> Array:
+        """(N, S, 6) force (N) and moment (N·m) of gravity on each segment's far end, in the segment's own frame."""
+        return segment_loads(
+            self.robot, self.q, payload=self.covariates.get("payload"), payload_com=self.campaign.payload_com
+        )
 
     @cached_property
     def predicted_position(self) -> Array:

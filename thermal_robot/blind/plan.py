@@ -46,7 +46,7 @@ CONDITION = {
     "thermal_elongation": ("temperature",),
     "drift": ("time",),
     "backlash": ("approach",),
-    "tracking_lag": ("velocity", "acceleration"),
+    "tracking_lag": ("velocity", "acceleration", "approach"),
 }
 """Columns that a cause cannot be seen without."""
 

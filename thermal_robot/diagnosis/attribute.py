@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
+
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
+from thermal_robot.diagnosis.discovery import is_law
 from thermal_robot.diagnosis.result import Estimate, Finding, Location, Status
+from thermal_robot.diagnosis.stand_in import StandIn
+from thermal_robot.effects.discovered import Discovered
 from thermal_robot.estimation.explain import Explanation
 from thermal_robot.estimation.fit import Fit
 from thermal_robot.estimation.linear import contained
@@ -20,13 +25,17 @@ _RIVAL = 0.2
 _ALIAS = 1e-6
 
 
-def findings(fit: Fit, shares: Shares, locations: dict[str, tuple[Location, ...]]) -> tuple[Finding, ...]:
+def findings(
+    fit: Fit, shares: Shares, locations: dict[str, tuple[Location, ...]], doubts: Mapping[str, StandIn]
+) -> tuple[Finding, ...]:
     """Return what is said of every candidate, in order of its held-out share; those not testable come last."""
     e = fit.explanation
     explained = {effect.name: b for b, (effect, _) in zip(e.best.blocks, fit.effects, strict=True)}
     rivals = _rivals(fit, explained)
     result = []
     for name in dict.fromkeys(fit.families):
+        if is_law(name) and name not in explained:
+            continue  # a law that did not last was never a candidate of anybody's
         own = [b for b, f in enumerate(fit.families) if f == name]
         status: Status = "found" if name in explained else "not_found"
         confounded = rivals.get(name, ())
@@ -35,21 +44,33 @@ def findings(fit: Fit, shares: Shares, locations: dict[str, tuple[Location, ...]
         if confounded:
             status = "confounded"
         share, interval = shares.get(name, (0.0, (0.0, 0.0)))
+        law = next(
+            (effect for effect, _ in fit.effects if effect.name == name and isinstance(effect, Discovered)), None
+        )
         result.append(
             Finding(
                 name,
                 status,
-                probability=e.probability(own),
+                probability=e.probability(own) * (doubts[name].belief if name in doubts else 1.0),
                 shrinkage=share,
                 shrinkage_ci95=interval,
                 confounded_with=confounded,
                 locations=locations.get(name, ()),
                 parameters=_estimates(fit, explained[name]) if name in explained else (),
+                quantity=law.quantity if law else None,
+                shape=law.shape if law else None,
+                describes=law.describe() if law else None,
             )
         )
-    result.sort(key=lambda f: (-(f.shrinkage or 0.0), -(f.probability or 0.0)))
     result += [Finding(name, "not_testable", needs=needs) for name, needs in fit.needs.items()]
     return tuple(result)
+
+
+def in_order(found: Sequence[Finding]) -> tuple[Finding, ...]:
+    """Sort by held-out share, then by probability; what is not testable comes last."""
+    return tuple(
+        sorted(found, key=lambda f: (f.status == "not_testable", -(f.shrinkage or 0.0), -(f.probability or 0.0)))
+    )
 
 
 def _unknown_frames(fit: Fit) -> tuple[str, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,15 +12,18 @@ from threadpoolctl import threadpool_limits
 
 from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.correction import CorrectedModel
-from thermal_robot.diagnosis.attribute import findings
+from thermal_robot.diagnosis.attribute import findings, in_order
+from thermal_robot.diagnosis.discovery import discoveries
 from thermal_robot.diagnosis.heldout import Shrinkage, held_out
 from thermal_robot.diagnosis.result import Diagnosis, Gap, Rows
-from thermal_robot.diagnosis.unexplained import examine
+from thermal_robot.diagnosis.stand_in import StandIn, stand_ins
 from thermal_robot.diagnosis.verdict import advise, sentence
 from thermal_robot.diagnosis.where import locate
 from thermal_robot.effects import Effect, choose, library
 from thermal_robot.errors import CampaignError
 from thermal_robot.estimation.fit import Fit, fit
+
+_DOUBTFUL = 0.5
 
 
 def diagnose(
@@ -61,22 +64,27 @@ def diagnose(
     if not isinstance(campaign, Campaign):
         progress("reading the campaign")
         campaign = read_campaign(campaign)
+    only, without = tuple(only), tuple(without)
     candidates = choose(only, without, effects)
     narrowed = len(candidates) < len({*library(), *(e.name for e in effects)})
     _check_priors(campaign, {e.name for e in candidates} | set(library()))
     campaign, notes = _usable(campaign)
     # matrices are small: threads that wait for each other cost several times what they bring
     with threadpool_limits(1):
-        fitted = fit(campaign, candidates, progress)
+        looked = discoveries(fit(campaign, candidates, progress), progress)
+        fitted, unexplained = looked.fit, looked.unexplained
         shrinkage = held_out(fitted, progress)
-        unexplained, floor, source = examine(fitted, progress)
     progress("places")
     shares = {name: value for name, (value, _) in shrinkage.shares.items()}
     where, locations = locate(fitted, shares)
-    found = findings(fitted, shrinkage.shares, locations)
+    doubts = stand_ins(fitted) if looked.remaining.flagged else {}
+    systematic = findings(fitted, shrinkage.shares, locations, doubts)
+    chance = [f for f in looked.chance.findings if f.name not in without and (not only or f.name in only)]
+    found = in_order((*systematic, *chance))
     order = [f.name for f in found if f.name in {e.name for e, _ in fitted.effects}]
-    gap = _gap(fitted, shrinkage, floor, source)
-    probability = _probability(fitted)
+    order += [f.name for f in chance if f.status == "found"]
+    gap = _gap(fitted, shrinkage, looked.floor, looked.source)
+    probability = min(_probability(fitted), *(d.belief for d in doubts.values()), 1.0)
     advice, separates = advise(found, unexplained)
     return Diagnosis(
         campaign=campaign.name,
@@ -92,12 +100,14 @@ def diagnose(
         unexplained=unexplained,
         verdict=tuple(order),
         probability=probability,
-        summary=sentence(gap, found, order, probability, unexplained, reach=_reach(campaign), narrowed=narrowed),
+        summary=sentence(
+            gap, found, order, probability, unexplained, looked.remaining, reach=_reach(campaign), narrowed=narrowed
+        ),
         advice=advice,
         separates=separates,
         model=_model(fitted),
         rows=_rows(fitted, shrinkage),
-        warnings=(*campaign.warnings, *notes, *_doubts(fitted, candidates if narrowed else ())),
+        warnings=(*campaign.warnings, *notes, *_doubts(fitted, candidates if narrowed else ()), *_changing(doubts)),
     )
 
 
@@ -134,6 +144,14 @@ def _doubts(fitted: Fit, considered: Sequence[Effect]) -> tuple[str, ...]:
     if considered:
         notes.append("only these effects were considered: " + ", ".join(effect.name for effect in considered))
     return tuple(notes)
+
+
+def _changing(doubts: Mapping[str, StandIn]) -> tuple[str, ...]:
+    return tuple(
+        f"the size of {name} changes with {doubt.quantity}: it may stand in for a cause that is not listed"
+        for name, doubt in doubts.items()
+        if doubt.belief < _DOUBTFUL
+    )
 
 
 def _reach(campaign: Campaign) -> float:

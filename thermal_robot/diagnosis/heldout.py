@@ -15,11 +15,12 @@ from thermal_robot.errors import EstimationError
 from thermal_robot.estimation.explain import Noise, explain
 from thermal_robot.estimation.fit import Fit, row_groups
 from thermal_robot.estimation.groups import folds
-from thermal_robot.estimation.linear import Whitening, frame_step
+from thermal_robot.estimation.linear import Linear, Whitening, frame_step
 
 Array = NDArray[np.float64]
 
 _RESAMPLES = 2000
+_EXCLUDED = 1e-3
 _SEED = 20180901  # of the bootstrap: the same campaign always gets the same interval
 
 
@@ -57,11 +58,12 @@ def held_out(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Shri
     if count < 2:
         raise EstimationError("all rows repeat one pose: nothing can be held out, and nothing told about the robot")
     noise, groups = Noise(campaign.noise_position, campaign.noise_orientation), row_groups(campaign)
+    linear, families, start = _in_question(fit)
     before, after = np.full(campaign.samples, np.nan), np.full(campaign.samples, np.nan)
     for k in range(count):
         progress(f"held out: fold {k + 1} of {count}")
         train, test = fold != k, fold == k
-        found = explain(explanation.linear, noise, rows=train, families=fit.families, groups=groups)
+        found = explain(linear, noise, rows=train, families=families, start=start, groups=groups, rarity=fit.rarity)
         plain = Whitening((train & ~found.outliers).astype(float), found.whitening.noise, 0.0)
         step = frame_step(fit.before, plain, fit.before.gap)
         left = fit.before.gap - fit.before.frames @ step
@@ -80,6 +82,19 @@ def held_out(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Shri
         _interval(np.array([_share(squares @ d) for d in draws])),
     )
     return Shrinkage(overall, before, after, _shares(fit, fold, block, draws))
+
+
+def _in_question(fit: Fit) -> tuple[Linear, tuple[str, ...], tuple[int, ...]]:
+    """Leave out effects that all rows together all but exclude: they are not chosen anew in a fold.
+
+    Returns the problem, its families, and where the search may start.
+    """
+    e = fit.explanation
+    own = {f: [b for b, g in enumerate(fit.families) if g == f] for f in fit.families}
+    likely = {f for f, blocks in own.items() if e.probability(blocks) > _EXCLUDED or set(blocks) & set(e.best.blocks)}
+    kept = [b for b, f in enumerate(fit.families) if f in likely]
+    linear = Linear(e.linear.gap, e.linear.frames, tuple(e.linear.blocks[b] for b in kept))
+    return linear, tuple(fit.families[b] for b in kept), tuple(kept.index(b) for b in e.best.blocks)
 
 
 def _sums(values: Array, block: NDArray[np.int64]) -> Array:

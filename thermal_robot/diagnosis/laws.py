@@ -5,8 +5,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.observations import Observations
-
 Array = NDArray[np.float64]
 
 _KNOTS = 5
@@ -42,15 +40,3 @@ def _natural(x: Array, knots: Array) -> list[Array]:
         return np.asarray((np.maximum(x - knots[k], 0) ** 3 - np.maximum(x - last, 0) ** 3) / (last - knots[k]))
 
     return [term(k) - term(len(knots) - 2) for k in range(len(knots) - 2)] if len(knots) > 2 else []
-
-
-def quantities(observations: Observations) -> dict[str, Array]:
-    """Return what a remainder might follow, by name, (N,) each: recorded covariates, then each joint's position."""
-    recorded = {name: np.asarray(v) for name, v in observations.covariates.items() if np.ptp(v) > 0}
-    if "time" not in recorded and "order" not in recorded:
-        recorded["order"] = np.arange(observations.campaign.samples, dtype=float)
-    sessions = observations.campaign.labels.get("session")
-    if sessions is not None and len(set(sessions.tolist())) > 1:
-        recorded["session"] = np.unique(sessions, return_inverse=True)[1].astype(float)
-    joints = {name: observations.q[:, j] for j, name in enumerate(observations.robot.joint_names)}
-    return {**recorded, **{k: v for k, v in joints.items() if np.ptp(v) > 0}}

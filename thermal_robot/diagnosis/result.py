@@ -62,6 +62,8 @@ class Finding:
         Where it sits, largest share first.
     parameters
         Its estimates; empty where it does not belong to the explanation.
+    quantity, shape, describes
+        Of a law that was discovered: what it follows, how, and a sentence about it; ``None`` otherwise.
     """
 
     name: str
@@ -73,6 +75,9 @@ class Finding:
     confounded_with: tuple[str, ...] = ()
     locations: tuple[Location, ...] = ()
     parameters: tuple[Estimate, ...] = ()
+    quantity: str | None = None
+    shape: str | None = None
+    describes: str | None = None
 
 
 @dataclass(frozen=True)

@@ -9,8 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc, fdtrc, ndtr
 
-from thermal_robot.diagnosis.laws import quantities, smooth_law
+from thermal_robot.diagnosis.laws import smooth_law
 from thermal_robot.diagnosis.result import Dependence, Location, Unexplained
+from thermal_robot.effects.quantity import quantities
 from thermal_robot.estimation.fit import Fit
 from thermal_robot.estimation.groups import NEAR, in_order
 

@@ -17,6 +17,11 @@ _PLAIN = {
     "transmission_error": "periodic transmission errors",
     "backlash": "lost motion in the joints",
     "joint_compliance": "joints that yield to load",
+    "tracking_lag": "joints that trail their command",
+    "link_compliance": "links that bend under load",
+    "thermal_bending": "links that bow with heat",
+    "encoder_resolution": "encoders that count in coarse steps",
+    "excess_repeatability": "joints that scatter more than the instrument",
     "geometric": "geometric errors of the links",
     "thermal_elongation": "thermal elongation of the links",
     "drift": "drift of the base or the instrument",
@@ -41,6 +46,7 @@ def sentence(
     explained: Sequence[str],
     probability: float,
     unexplained: Unexplained,
+    remaining: Unexplained,
     *,
     reach: float,
     narrowed: bool = False,
@@ -51,6 +57,8 @@ def sentence(
     ----------
     gap, found, explained, probability, unexplained
         Parts of the diagnosis; ``explained`` in order of share.
+    remaining
+        What is left when laws that were discovered are taken off, too.
     reach
         Size of the volume that was measured, m: a gap after correction of more than a fiftieth of it is not a robot's.
     narrowed
@@ -71,20 +79,23 @@ def sentence(
         return f"The gap of {size} is explained by {which}{_place(unexplained)}."
     by_name = {f.name: f for f in found}
     weighty = [n for n in explained if (by_name[n].shrinkage or 0.0) >= _WEIGHTY] or list(explained[:1])
-    slight = [plain(n) for n in explained if n not in weighty]
-    listed = _listed([plain(n) for n in weighty]) + (f", and, hardly to be seen, {_listed(slight)}" if slight else "")
+    words = {n: by_name[n].describes or plain(n) for n in explained}
+    slight = [words[n] for n in explained if n not in weighty]
+    listed = _listed([words[n] for n in weighty]) + (f", and, hardly to be seen, {_listed(slight)}" if slight else "")
     sure = f"{100 * probability:.0f} % sure" if probability < 0.995 else "more than 99 % sure"
     text = (
         f"The gap of {size} comes from {listed} ({sure}); correcting for {'them' if len(explained) > 1 else 'it'} "
         f"removes {100 * gap.held_out.shrinkage:.1f} % of its mean square on held-out data and leaves "
         f"{length(gap.held_out.rms_after)}"
     )
-    if not unexplained.flagged:
+    if not remaining.flagged:
         text += f", which is noise ({floor})"
-    elif gap.noise_source == "remainder" or unexplained.rms == 0.0:
-        text += ", which is more than noise" + _place(unexplained)
+    elif gap.noise_source == "remainder" or remaining.rms == 0.0:
+        text += ", which is more than noise" + _place(remaining)
     else:
-        text += f", of which {length(unexplained.rms)} is not explained" + _place(unexplained)
+        text += f", of which {length(remaining.rms)} is not explained" + _place(remaining)
+    if any(by_name[n].describes for n in explained):
+        text += "; no known effect has that shape"
     doubts = [
         f"{plain(n)} cannot be told from {' or '.join(map(plain, by_name[n].confounded_with))}"
         for n in explained

@@ -7,8 +7,9 @@ from collections import defaultdict
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.diagnosis.laws import quantities, smooth_law
+from thermal_robot.diagnosis.laws import smooth_law
 from thermal_robot.diagnosis.result import Location, Where
+from thermal_robot.effects.quantity import quantities
 from thermal_robot.estimation.fit import Fit
 
 Array = NDArray[np.float64]

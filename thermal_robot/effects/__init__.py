@@ -24,8 +24,11 @@ from thermal_robot.effects.instrument_scale import InstrumentScale
 from thermal_robot.effects.joint_compliance import JointCompliance
 from thermal_robot.effects.joint_gain import JointGain
 from thermal_robot.effects.joint_offset import JointOffset
+from thermal_robot.effects.link_compliance import LinkCompliance
+from thermal_robot.effects.thermal_bending import ThermalBending
 from thermal_robot.effects.thermal_elongation import ThermalElongation
 from thermal_robot.effects.tool_frame import ToolFrame
+from thermal_robot.effects.tracking_lag import TrackingLag
 from thermal_robot.effects.transmission_error import TransmissionError
 from thermal_robot.errors import EffectError
 
@@ -37,11 +40,17 @@ _BUILTIN: tuple[type[Effect], ...] = (
     TransmissionError,
     Backlash,
     JointCompliance,
+    TrackingLag,
     Geometric,
+    LinkCompliance,
     ThermalElongation,
+    ThermalBending,
     Drift,
     InstrumentScale,
 )
+
+RANDOM = ("encoder_resolution", "excess_repeatability")
+"""Effects that scatter: no mean follows from them, so they are told from what remains, not fitted (formats.md)."""
 
 
 def library() -> dict[str, Effect]:
@@ -92,8 +101,8 @@ def choose(
         known[effect.name] = effect
     only, without = ((names,) if isinstance(names, str) else tuple(names) for names in (only, without))
     for name in (*only, *without):
-        if name not in known:
-            near = difflib.get_close_matches(name, known, n=3, cutoff=0.3) or sorted(known)
+        if name not in known and name not in RANDOM:
+            near = difflib.get_close_matches(name, (*known, *RANDOM), n=3, cutoff=0.3) or sorted(known)
             raise EffectError(f"no effect is named {name!r}; near to it: {', '.join(near)}")
     chosen = tuple(e for name, e in known.items() if (not only or name in only) and name not in without)
     if not chosen:
@@ -102,6 +111,7 @@ def choose(
 
 
 __all__ = [
+    "RANDOM",
     "Backlash",
     "BaseFrame",
     "Drift",
@@ -111,10 +121,13 @@ __all__ = [
     "JointCompliance",
     "JointGain",
     "JointOffset",
+    "LinkCompliance",
     "Parameter",
     "Response",
+    "ThermalBending",
     "ThermalElongation",
     "ToolFrame",
+    "TrackingLag",
     "TransmissionError",
     "at_base",
     "at_instrument",

@@ -1,25 +1,44 @@
-"""Lost motion: where a joint stops depends on the side it came from."""
+"""Lost motion: where a joint stops depends on the side it came from, or on the side on which its load lies."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from thermal_robot.effects.effect import Effect, Parameter, at_joint
+from thermal_robot.effects.torque import torque_columns
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
 
+_HANGS = 0.02  # of the largest torque of any joint: what is lighter, friction holds
+
 
 @dataclass(frozen=True)
 class Backlash(Effect):
-    """Every joint stops short by half its play: q_actual = q_command − ½ b_j · approach_j.
+    """Every joint stops short by half its play: q_actual = q_command − ½ b_j · side_j; rad or m.
 
-    approach is +1 where the joint was increasing, −1 where it was decreasing, 0 where that is not known. Expected
-    size 0.5 mrad (about two minutes of arc, a worn gear of an industrial joint).
+    side is ``approach.<joint>``: +1 where the joint was increasing, −1 where it was decreasing, 0 where that is not
+    known. Where gravity outweighs friction, the joint hangs on its teeth, however it came: side is the sign of the
+    torque τ_j that holds it, wherever |τ_j| > held · max|τ_j|. A joint that never carries more than 2 % of the robot's
+    largest torque never hangs. Expected size 0.5 mrad (about two minutes of arc, a worn gear of an industrial joint).
+
+    Only poses that are reached from both sides show it. Where torque decides always, it is nearly
+    :class:`JointCompliance`, from which only a jump at zero torque tells it.
+
+    Attributes
+    ----------
+    held
+        Share of the joint's largest torque above which gravity wins; 0 where it never does.
+    largest
+        Each joint's largest torque in the campaign, N·m: a model goes by this, whatever it is asked to predict.
     """
+
+    held: float = 0.0
+    largest: tuple[float, ...] = ()
 
     name: ClassVar[str] = "backlash"
 
@@ -29,9 +48,25 @@ class Backlash(Effect):
         return () if any(observations.varies(column) for column in columns) else columns
 
     def reads(self, observations: Observations) -> tuple[str, ...]:
-        """Return the approach columns of the chain's joints that were recorded."""
+        """Return the approach columns of the chain's joints that were recorded, and what torques are read from."""
         columns = (f"approach.{joint}" for joint in observations.robot.joint_names)
-        return tuple(column for column in columns if column in observations.covariates)
+        recorded = tuple(column for column in columns if column in observations.covariates)
+        return (*recorded, *torque_columns(observations)) if self.held else recorded
+
+    def variants(self, observations: Observations) -> tuple[Effect, ...]:
+        """Friction always wins, or gravity does above 0.5, 0.7 and 0.9 of a joint's largest torque."""
+        torque = observations.torque
+        if torque is None or not np.any(np.ptp(torque, axis=0) > 1e-9):
+            return (self,)
+        largest = tuple(np.abs(torque).max(axis=0).tolist())
+        return (self, *(replace(self, held=share, largest=largest) for share in (0.5, 0.7, 0.9)))
+
+    def nearby(self, factor: float) -> tuple[Effect, ...]:
+        """Shares whose odds are larger and smaller by a factor."""
+        if not self.held:
+            return (self,)
+        odds = (self.held / (1.0 - self.held) * share for share in (1.0, factor, 1.0 / factor))
+        return (self, *(replace(self, held=o / (1.0 + o)) for o in list(odds)[1:]))
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """One lost motion a joint whose direction of approach is recorded; rad or m."""
@@ -43,8 +78,16 @@ class Backlash(Effect):
                 5e-4,
                 "joint",
                 joint,
-                (at_joint(j, -0.5 * np.asarray(covariates[f"approach.{joint}"])),),
+                (at_joint(j, -0.5 * self._side(observations, j, np.asarray(covariates[f"approach.{joint}"]))),),
             )
             for j, (joint, kind) in enumerate(zip(robot.joint_names, robot.joint_types, strict=True))
             if f"approach.{joint}" in covariates
         )
+
+    def _side(self, observations: Observations, j: int, approach: NDArray[np.float64]) -> NDArray[np.float64]:
+        """(N,) on which side of its play a joint stands."""
+        torque = observations.torque
+        if not self.held or torque is None or self.largest[j] < _HANGS * max(self.largest):
+            return approach
+        heavy = np.abs(torque[:, j]) > self.held * self.largest[j]
+        return np.where(heavy, np.sign(torque[:, j]), approach)

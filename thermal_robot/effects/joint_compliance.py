@@ -2,54 +2,126 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from thermal_robot.effects.effect import Effect, Parameter, at_joint
+from thermal_robot.effects.torque import torque_columns
+from thermal_robot.kinematics import static_regressor
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
+    from thermal_robot.robot import Robot
+
+Array = NDArray[np.float64]
 
 _WIND_UP = 1e-3
+_LEVER = 0.1  # m: how far a body's centre may lie from the next joint
+_FEW = 0.1  # of the strongest shape of any joint: weaker ones are left out
+_DRAWN = 300
 
 
 @dataclass(frozen=True)
 class JointCompliance(Effect):
     """Every joint yields to its torque: q_actual = q_command − c_j τ_j.
 
-    τ_j is the torque that holds the joint against gravity (Pinocchio's sign): from the URDF's inertias and the
-    payload, or ``torque.<joint>`` where the robot reports it. Expected size: a wind-up of 1 mrad at the largest torque
-    that the campaign puts on any joint, which is what harmonic drives are rated for.
+    τ_j (N·m) is the torque that holds the joint against gravity (Pinocchio's sign): from the URDF's inertias and the
+    payload, or ``torque.<joint>`` where the robot reports it. c_j in rad/(N·m). Expected size: a wind-up of 1 mrad at
+    the largest torque that the campaign puts on any joint, which is what harmonic drives are rated for.
 
-    A joint whose torque does not vary cannot be told from its offset.
+    Where the URDF has no masses and no torque is reported, the weights are free. Holding torques are linear in the
+    bodies' masses and first moments, so that c_j τ_j = Σ_k w_jk s_jk(q), with shapes s_jk known from the kinematics
+    alone: the principal components of the static regressor's row of joint j over the robot's range, for bodies of one
+    weight with a centre 0.1 m about the next joint (Gautier and Khalil, *Direct calculation of minimum set of
+    inertial parameters*, 1990, on why few suffice). A unit of w_jk (rad) is a unit at the largest shape of any joint.
+    A recorded payload adds its own torque with c_j.
+
+    A joint whose torque does not vary cannot be told from its offset. A free shape that goes with one joint's sine and
+    cosine alone (one joint between the base and a heavy body) is :class:`TransmissionError` of order 1 in that joint;
+    several joints with parallel axes tell the two apart.
+
+    Attributes
+    ----------
+    joints, weights
+        Joint of each of K shapes, and K·4n weights one after the other: what the shape takes of the mass and first
+        moment of each body. Empty where the torques are known.
     """
+
+    joints: tuple[int, ...] = ()
+    weights: tuple[float, ...] = ()
 
     name: ClassVar[str] = "joint_compliance"
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
-        """Return what would give torques, where neither masses, payload nor torque sensors are there."""
+        """Return what would give torques, where neither these nor the shape of gravity's vary."""
         torque = observations.torque
-        if torque is None or not np.any(np.ptp(torque, axis=0) > 1e-9):
-            return ("torque.<joint>", "payload", "masses in the URDF")
-        return ()
+        known = torque is not None and bool(np.any(np.ptp(torque, axis=0) > 1e-9))
+        if known or any(np.ptp(shape) > 1e-9 for _, shape in self._set(observations)._shapes(observations)):
+            return ()
+        return ("torque.<joint>", "payload", "masses in the URDF")
 
     def reads(self, observations: Observations) -> tuple[str, ...]:
         """Return the torques of the chain's joints that were recorded, and the payload where one was not."""
-        columns = tuple(f"torque.{joint}" for joint in observations.robot.joint_names)
-        recorded = tuple(column for column in columns if column in observations.covariates)
-        computed = ("payload",) if "payload" in observations.covariates and recorded != columns else ()
-        return (*computed, *recorded)
+        return torque_columns(observations)
+
+    def variants(self, observations: Observations) -> tuple[Effect, ...]:
+        """Torques as they are known, or free weights where they are not."""
+        return (self._set(observations),)
+
+    def _set(self, observations: Observations) -> JointCompliance:
+        robot, recorded = observations.robot, observations.covariates
+        if robot.has_masses or any(f"torque.{joint}" in recorded for joint in robot.joint_names):
+            return replace(self, joints=(), weights=())
+        few = _few_weights(robot)
+        flat = np.concatenate([*(weights for _, weights in few), np.zeros(0)])
+        return replace(self, joints=tuple(j for j, _ in few), weights=tuple(flat.tolist()))
+
+    def _shapes(self, observations: Observations) -> list[tuple[int, Array]]:
+        """Joint and (N,) values of each shape of gravity's torques."""
+        if not self.joints:
+            return []
+        regressor = _weighed(observations.robot, observations.q)
+        each = np.reshape(self.weights, (len(self.joints), -1))
+        return [(j, regressor[:, j] @ weights) for j, weights in zip(self.joints, each, strict=True)]
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
-        """One compliance a joint; rad/(N·m), or m/N for a prismatic joint."""
+        """One compliance a joint, rad/(N·m), or m/N for a prismatic joint; free weights in rad or m."""
         robot, torque = observations.robot, observations.torque
-        if torque is None:
-            return ()
-        size = _WIND_UP / max(float(np.abs(torque).max()), 1e-9)
-        units = {"prismatic": "m/N"}
-        return tuple(
-            Parameter("compliance", units.get(kind, "rad/(N·m)"), size, "joint", joint, (at_joint(j, -torque[:, j]),))
-            for j, (joint, kind) in enumerate(zip(robot.joint_names, robot.joint_types, strict=True))
-        )
+        names, kinds = robot.joint_names, robot.joint_types
+        found = []
+        for k, (j, shape) in enumerate(self._shapes(observations)):
+            unit = "m" if kinds[j] == "prismatic" else "rad"
+            label = f"yield to gravity, shape {self.joints[: k + 1].count(j)}"
+            found.append(Parameter(label, unit, _WIND_UP, "joint", names[j], (at_joint(j, -shape),)))
+        if torque is not None:
+            size = _WIND_UP / max(float(np.abs(torque).max()), 1e-9)
+            units = ["m/N" if kind == "prismatic" else "rad/(N·m)" for kind in kinds]
+            found += [
+                Parameter("compliance", units[j], size, "joint", joint, (at_joint(j, -torque[:, j]),))
+                for j, joint in enumerate(names)
+            ]
+        return tuple(found)
+
+
+def _weighed(robot: Robot, q: Array) -> Array:
+    """(N, n, 4 n): torque of each joint for a unit weight in each body, at and about the next joint."""
+    regressor = static_regressor(robot, q) * np.array([1.0, _LEVER, _LEVER, _LEVER])
+    return np.asarray(regressor.reshape(len(q), robot.n, -1))
+
+
+def _few_weights(robot: Robot) -> list[tuple[int, Array]]:
+    """Joint and (4n,) weights of each shape, over the range of the robot's joints."""
+    rng = np.random.default_rng(0)
+    lower, upper = np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi)
+    drawn = _weighed(robot, rng.uniform(lower, upper, (_DRAWN, robot.n)))
+    found = []
+    for j in range(robot.n):
+        _, strength, components = np.linalg.svd(drawn[:, j], full_matrices=False)
+        found += [(float(s), j, weights) for s, weights in zip(strength, components, strict=True)]
+    strongest = max(s for s, _, _ in found)
+    kept = [(j, weights) for s, j, weights in found if s > max(_FEW * strongest, 1e-9)]
+    largest = max((float(np.abs(drawn[:, j] @ weights).max()) for j, weights in kept), default=1.0)
+    return [(j, weights / largest) for j, weights in kept]

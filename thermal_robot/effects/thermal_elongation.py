@@ -2,51 +2,110 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from thermal_robot.effects.effect import Effect, Parameter, at_segment
+from thermal_robot.effects.lagging import History
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
+
+Array = NDArray[np.float64]
+
+_LAGS = (600.0, 1500.0, 3600.0)
 
 
 @dataclass(frozen=True)
 class ThermalElongation(Effect):
     """Every segment lengthens with its link's temperature: Δl_s = α_s l_s (T_link − T_reference).
 
-    Equation 5 of Kluz et al. (2018) with a coefficient of its own for each segment, along the virtual prismatic
-    joint of their Eqs 6-8. Expected size 1.5e-5 /K (steel 1.2e-5, aluminium 2.3e-5).
+    Equation 5 of Kluz et al. (2018) with a coefficient of its own for each segment, or a common one for all, along the
+    virtual prismatic joint of their Eqs 6-8. Expected size 1.5e-5 /K (steel 1.2e-5, aluminium 2.3e-5). Where one
+    sensor reads the air or a place on the robot, the links follow it with a time constant:
+    dT_link/dt = (T_recorded − T_link) / lag, minutes to an hour for a cast link (mass · heat capacity / surface · film
+    coefficient: 600 to 3600 s).
 
     Where the temperature rises steadily with time it resembles :class:`Drift`, but moves the tool by an amount
-    that depends on the pose; at constant temperature it is contained in :class:`Geometric`.
+    that depends on the pose; at constant temperature it is contained in :class:`Geometric`. A lag shows only where the
+    temperature turns or jumps within the campaign: of a steady rise it merely takes off a constant.
+
+    Attributes
+    ----------
+    common
+        Whether all segments have one coefficient, which few data can tell better than one each.
+    lag
+        Time constant, s; 0 for a link that has the recorded temperature.
+    times, temperatures
+        The campaign's record, s and °C, from which the link's temperature follows; kept where there is a lag, as
+        a later sample knows only its own instant.
     """
+
+    common: bool = False
+    lag: float = 0.0
+    times: tuple[float, ...] = ()
+    temperatures: tuple[float, ...] = ()
 
     name: ClassVar[str] = "thermal_elongation"
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return ``temperature`` unless a temperature that applies to a segment varies."""
-        return () if any(observations.varies(column) for column in self.reads(observations)) else ("temperature",)
+        return () if any(observations.varies(column) for column in _columns(observations)) else ("temperature",)
 
     def reads(self, observations: Observations) -> tuple[str, ...]:
-        """Return the temperatures that apply to the segments."""
-        links = dict.fromkeys(s.parent_link for s in observations.robot.segments if s.length > 1e-9)
-        own = [f"temperature.{link}" for link in links if f"temperature.{link}" in observations.covariates]
-        general = ["temperature"] if len(own) < len(links) and "temperature" in observations.covariates else []
-        return (*own, *general)
+        """Return the temperatures that apply to the segments; with a lag, the time, too."""
+        return (*_columns(observations), "time") if self.lag else _columns(observations)
+
+    def variants(self, observations: Observations) -> tuple[Effect, ...]:
+        """Return a coefficient a link, one for all, and one for all with a lag of 10, 25 and 60 minutes."""
+        plain = (replace(self, common=False), replace(self, common=True))
+        # a sensor on each link knows its temperature; where but some have one, nothing says what the rest follow
+        if not observations.varies("time") or _columns(observations) != ("temperature",):
+            return plain
+        record = History.of(observations.covariates["time"], observations.covariates["temperature"])
+        lagged = replace(self, common=True, times=record.times, temperatures=record.temperatures)
+        return (*plain, *(replace(lagged, lag=lag) for lag in _LAGS))
+
+    def nearby(self, factor: float) -> tuple[Effect, ...]:
+        """Return lags longer and shorter by a factor, and this one with a coefficient a link."""
+        if not self.lag:
+            return (self,)
+        lags = (replace(self, lag=self.lag * share) for share in (1.0, factor, 1.0 / factor))
+        return (*lags, replace(self, common=not self.common))
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
-        """One coefficient of expansion a segment; 1/K."""
-        reference = observations.campaign.reference_temperature
-        found = []
+        """One coefficient of expansion a segment, or one for all; 1/K."""
+        responses = {}
         for s, segment in enumerate(observations.robot.segments):
-            temperature = observations.temperature(segment.parent_link)
+            temperature = self._temperature(observations, segment.parent_link)
             if temperature is None or segment.length < 1e-9:
                 continue
             along = np.concatenate([segment.direction, np.zeros(3)]) * segment.length
-            twist = (temperature - reference)[:, None] * along
-            label = f"strain per kelvin of {segment.name}"
-            found.append(Parameter(label, "1/K", 1.5e-5, "link", segment.parent_link, (at_segment(s, twist),)))
-        return tuple(found)
+            twist = (temperature - observations.campaign.reference_temperature)[:, None] * along
+            responses[s] = at_segment(s, twist)
+        if self.common:
+            return (Parameter("strain per kelvin", "1/K", 1.5e-5, "link", "", tuple(responses.values())),)
+        segments = observations.robot.segments
+        return tuple(
+            Parameter(
+                f"strain per kelvin of {segments[s].name}", "1/K", 1.5e-5, "link", segments[s].parent_link, (response,)
+            )
+            for s, response in responses.items()
+        )
+
+    def _temperature(self, observations: Observations, link: str) -> Array | None:
+        recorded = observations.temperature(link)
+        if recorded is None or not self.lag:
+            return recorded
+        return History(self.times, self.temperatures).followed(self.lag, observations.covariates["time"], recorded)
+
+
+def _columns(observations: Observations) -> tuple[str, ...]:
+    """Temperatures that apply to the segments."""
+    links = dict.fromkeys(s.parent_link for s in observations.robot.segments if s.length > 1e-9)
+    own = [f"temperature.{link}" for link in links if f"temperature.{link}" in observations.covariates]
+    general = ["temperature"] if len(own) < len(links) and "temperature" in observations.covariates else []
+    return (*own, *general)

@@ -181,16 +181,18 @@ def _evidence(gram: Gram, blocks: tuple[int, ...], prior: float, start: Combinat
     size = len(used)
     values, covariance = np.zeros(size), np.zeros((size, size))
     effective, quadratic, log_det = 0.0, gram.total, 0.0
+    diagonal = np.diag_indices(size)
     determined: Array = np.zeros(len(blocks))
     for last in [*(False,) * _ITERATIONS, True]:
         if size:
             precision = matrix / variance
-            precision[np.diag_indices(size)] += 1.0 / scale[owner] ** 2
+            precision[diagonal] += 1.0 / scale[owner] ** 2
             factor, failed = dpotrf(precision, lower=1, clean=1)
             if failed:
                 raise EstimationError("the measurements do not determine anything: too few, or all alike")
             lower, _ = dpotri(factor, lower=1)
-            covariance = lower + np.tril(lower, -1).T
+            covariance = lower + lower.T  # above the diagonal it is zero
+            covariance[diagonal] *= 0.5
             values = covariance @ vector / variance
             log_det = 2.0 * np.log(np.diag(factor)).sum() + 2.0 * np.log(scale[owner]).sum()
             quadratic = gram.total - vector @ values

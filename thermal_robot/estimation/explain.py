@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -94,6 +94,7 @@ def explain(
     start: Sequence[int] = (),
     outliers: NDArray[np.bool_] | None = None,
     groups: Sequence[NDArray[np.int64]] = (),
+    rarity: Mapping[str, float] | None = None,
 ) -> Explanation:
     """Find the most probable combination of blocks together with outliers and noise.
 
@@ -112,6 +113,8 @@ def explain(
         Where the search starts: blocks and rows set aside.
     groups
         Labels (N,) of rows that belong together, several groupings: see :func:`design_effect`.
+    rarity
+        By family: what its log prior odds are less than another's, because it was picked out of many.
 
     Returns
     -------
@@ -124,7 +127,7 @@ def explain(
     aside = np.zeros(samples, dtype=bool) if outliers is None else outliers & use
     families = families or [str(k) for k in range(len(linear.blocks))]
     odds = np.log(PRIOR_PROBABILITY / (1 - PRIOR_PROBABILITY))
-    log_prior = [odds - np.log(list(families).count(f)) for f in families]
+    log_prior = [odds - np.log(list(families).count(f)) + (rarity or {}).get(f, 0.0) for f in families]
     settings = {frozenset((a, b)) for a, f in enumerate(families) for b, g in enumerate(families) if a < b and f == g}
     whitening = _first_whitening(linear, noise, use & ~aside)
     history: list[tuple[tuple[int, ...], bytes]] = []

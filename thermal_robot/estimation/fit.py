@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -50,6 +50,10 @@ class Fit:
         Name of the effect that each block of the explanation belongs to.
     needs
         Effects that cannot be tested, and what they would need.
+    settings
+        By name: the settings of each effect that were compared.
+    rarity
+        By name of a law that was discovered: what being picked out of many costs its log prior odds.
     """
 
     campaign: Campaign
@@ -60,6 +64,8 @@ class Fit:
     effects: tuple[tuple[Effect, Array], ...]
     families: tuple[str, ...]
     needs: dict[str, tuple[str, ...]]
+    settings: dict[str, tuple[Effect, ...]]
+    rarity: dict[str, float]
 
 
 def fit(campaign: Campaign, effects: Sequence[Effect], progress: Callable[[str], None] = lambda _: None) -> Fit:
@@ -98,11 +104,52 @@ def fit(campaign: Campaign, effects: Sequence[Effect], progress: Callable[[str],
         if apart.noise <= _NO_WORSE * settled.noise:
             again = _settle(apart.observations, settings, groups, progress, apart)
             settled = settled if set(again.names) & settled.containers else again
+    return _fitted(campaign, settled, needs, settings, {})
+
+
+def refit(
+    known: Fit,
+    laws: Mapping[str, tuple[Effect, ...]],
+    begin: Sequence[str],
+    rarity: Mapping[str, float],
+    progress: Callable[[str], None] = lambda _: None,
+) -> Fit:
+    """Fit again with laws that were discovered among the effects to choose from.
+
+    Parameters
+    ----------
+    known
+        The fit that left a remainder.
+    laws
+        By name: settings of each law.
+    begin
+        Names of the effects and laws with which the search starts.
+    rarity
+        By name: see :class:`Fit`.
+    progress
+        Called with a few words at each stage.
+    """
+    settings = {**known.settings, **laws}
+    whole = {**known.rarity, **rarity}
+    groups = row_groups(known.campaign)
+    settled = _settle(known.nominal, settings, groups, progress, begin=begin, rarity=whole)
+    return _fitted(known.campaign, settled, known.needs, settings, whole)
+
+
+def _fitted(
+    campaign: Campaign,
+    settled: _Settled,
+    needs: dict[str, tuple[str, ...]],
+    settings: dict[str, tuple[Effect, ...]],
+    rarity: dict[str, float],
+) -> Fit:
     explanation = settled.explanation
     nominal = observe(campaign, register(campaign, ~explanation.outliers))
     before = Linear(nominal.gap, frame_columns(nominal)[0], ())
     corrected = settled.observations if settled.held else nominal
-    return Fit(campaign, nominal, before, corrected, explanation, settled.held, settled.families, needs)
+    return Fit(
+        campaign, nominal, before, corrected, explanation, settled.held, settled.families, needs, settings, rarity
+    )
 
 
 def _require_enough(campaign: Campaign) -> None:
@@ -158,6 +205,8 @@ def _settle(
     groups: Sequence[NDArray[np.int64]],
     progress: Callable[[str], None],
     known: _Settled | None = None,
+    begin: Sequence[str] = (),
+    rarity: Mapping[str, float] | None = None,
 ) -> _Settled:
     """Choose effects, refit the choice exactly, and choose again there, until the choice stays."""
     campaign, observations, settings = start.campaign, start, dict(settings)
@@ -171,12 +220,15 @@ def _settle(
         progress("combinations of effects" if revision == 0 else f"exact fit, revision {revision}")
         candidates, families = _listed(settings)
         chosen = [candidates.index(effect) for effect, _ in held]
+        start_at = chosen if revision or not begin else [families.index(name) for name in begin]
         blocks = tuple(block(observations, c) for c in candidates)
         moved_by = (blocks[b].columns @ v for b, (_, v) in zip(chosen, held, strict=True))
         linear = Linear(
             observations.gap + sum(moved_by, np.zeros_like(observations.gap)), frame_columns(observations)[0], blocks
         )
-        explanation = explain(linear, noise, families=families, start=chosen, outliers=outliers, groups=groups)
+        explanation = explain(
+            linear, noise, families=families, start=start_at, outliers=outliers, groups=groups, rarity=rarity
+        )
         same = revision > 0 and set(explanation.best.blocks) == set(chosen)
         held = [(candidates[b], explanation.values[b][0]) for b in explanation.best.blocks]
         observations, held = _gauss_newton(campaign, observations.frames, explanation, held)

@@ -134,18 +134,27 @@ def contained(problem: Gram) -> frozenset[frozenset[int]]:
     Such a pair is never named together: the smaller is preferred where it suffices, the larger carries both otherwise.
     """
     pairs = set()
-    for small, inner in enumerate(problem.slices):
-        own = problem.matrix[inner, inner]
-        for large, outer in enumerate(problem.slices):
-            if small == large or inner.stop == inner.start or outer.stop - outer.start <= inner.stop - inner.start:
-                continue
-            cross, other = problem.matrix[inner, outer], problem.matrix[outer, outer]
-            scale = np.sqrt(np.diag(other))
-            inverse = np.linalg.pinv(other / np.outer(scale, scale), rcond=1e-10, hermitian=True)
-            left = np.trace(own) - np.trace((cross / scale) @ inverse @ (cross / scale).T)
-            if left < max(_CONTAINED * np.trace(own), 0.5):
+    matrix, slices = problem.matrix, problem.slices
+    total = [float(np.trace(matrix[s, s])) for s in slices]
+    for large, outer in enumerate(slices):
+        size = outer.stop - outer.start
+        smaller = [k for k, inner in enumerate(slices) if 0 < inner.stop - inner.start < size]
+        if not smaller:
+            continue
+        value, vector = np.linalg.eigh(_scaled(matrix[outer, outer]))
+        known = value > 1e-10 * value.max()
+        root = vector[:, known] / np.sqrt(value[known]) / np.sqrt(np.diag(matrix[outer, outer]))[:, None]
+        inside = ((matrix[:, outer] @ root) ** 2).sum(axis=1)
+        for small in smaller:
+            left = total[small] - float(inside[slices[small]].sum())
+            if left < max(_CONTAINED * total[small], 0.5):
                 pairs.add(frozenset((small, large)))
     return frozenset(pairs)
+
+
+def _scaled(matrix: Array) -> Array:
+    length = np.sqrt(np.diag(matrix))
+    return np.asarray(matrix / np.outer(length, length))
 
 
 def parameter_values(linear: Linear, problem: Gram, found: Combination) -> dict[int, tuple[Array, Array]]:

@@ -2,7 +2,7 @@
 
 from thermal_robot.kinematics.augmented import AugmentedModel, augmented_model, elongation_jacobian, growing
 from thermal_robot.kinematics.frames import ChainFrames, Displacement, chain_frames, tool_poses
-from thermal_robot.kinematics.gravity import gravity_torques
+from thermal_robot.kinematics.gravity import gravity_torques, segment_loads, static_regressor
 from thermal_robot.kinematics.jacobians import frame_jacobians, placement_sensitivities
 from thermal_robot.kinematics.lie import exp3, exp6, log3, quaternion_to_rotation, rotation_to_quaternion
 
@@ -22,5 +22,7 @@ __all__ = [
     "placement_sensitivities",
     "quaternion_to_rotation",
     "rotation_to_quaternion",
+    "segment_loads",
+    "static_regressor",
     "tool_poses",
 ]

@@ -1,4 +1,4 @@
-"""The torques that hold an arm against gravity, for a batch of configurations."""
+"""What gravity asks of an arm: torques that hold it, wrenches on its segments; for a batch of configurations."""
 
 from __future__ import annotations
 
@@ -76,6 +76,98 @@ def gravity_torques(
         else:
             torques[:, j] = -mass * (robot.gravity @ axis)
     return torques
+
+
+def segment_loads(
+    robot: Robot,
+    q: ArrayLike,
+    *,
+    payload: ArrayLike | None = None,
+    payload_com: ArrayLike = (0.0, 0.0, 0.0),
+    frames: ChainFrames | None = None,
+) -> Array:
+    """Wrench that gravity puts on the far end of each segment: the weight of everything beyond it.
+
+    Parameters
+    ----------
+    robot, q, payload, payload_com, frames
+        As for :func:`gravity_torques`.
+
+    Returns
+    -------
+    ndarray
+        (N, S, 6) force (N), then moment about the placement's origin (N·m), in the segment's own frame (behind the
+        rotation of its placement). About the axis of a revolute joint the moment is minus what holds the joint.
+
+    Raises
+    ------
+    RobotError
+        If an array has not the shape that the robot asks for.
+    """
+    frames = chain_frames(robot, q) if frames is None else frames
+    chain, rows = robot.chain, len(frames.tool_position)
+    rotations, positions = np.moveaxis(frames.rotations, 0, -1), np.moveaxis(frames.positions, 0, -1)
+    tool_rotation, tool_position = np.moveaxis(frames.tool_rotation, 0, -1), frames.tool_position.T
+    mass, com = _payload(payload, payload_com, rows)
+    moment = mass * (tool_position + np.einsum("ijn,j->in", tool_rotation, com))
+    segment_of = {int(k): s for s, k in enumerate(chain.placed)}
+    joint_of = {int(k): j for j, k in enumerate(chain.movable)}
+    gravity = robot.gravity[:, None]
+
+    loads = np.empty((rows, len(segment_of), 6))
+    for k in range(len(chain.names) - 1, -1, -1):
+        if k in joint_of:
+            j, last = joint_of[k], k + 1 == len(chain.names)
+            rotation, position = (tool_rotation, tool_position) if last else (rotations[k + 1], positions[k + 1])
+            moment = moment + chain.masses[j] * (position + chain.mass_centres[j] @ rotation)
+            mass = mass + chain.masses[j]
+        if k not in segment_of:
+            continue
+        # a frame in the midst of a body carries what is fixed behind it, but not yet the whole body
+        beyond = mass + chain.hanging[k]
+        about = moment + chain.hanging[k] * (positions[k] + chain.hanging_centres[k] @ rotations[k])
+        turned = np.cross(about - beyond * positions[k], gravity, axis=0)
+        loads[:, segment_of[k], :3] = np.einsum(
+            "imn,in->nm", rotations[k], np.broadcast_to(beyond * gravity, (3, rows))
+        )
+        loads[:, segment_of[k], 3:] = np.einsum("imn,in->nm", rotations[k], turned)
+    return loads
+
+
+def static_regressor(robot: Robot, q: ArrayLike, *, frames: ChainFrames | None = None) -> Array:
+    """Return what a kilogram, and a first moment of a kilogram-metre, in each body asks of each joint.
+
+    Holding torques are linear in the masses and first moments of the bodies (Pinocchio's ``computeStaticRegressor``):
+    τ_j = Σ_b Y_jb · (m_b, m_b c_b).
+
+    Parameters
+    ----------
+    robot, q, frames
+        As for :func:`gravity_torques`.
+
+    Returns
+    -------
+    ndarray
+        (N, n, n, 4): joint, body, then its mass and first moment (x, y, z) in the frame of the element after the
+        joint (the tool frame for the last).
+    """
+    frames = chain_frames(robot, q) if frames is None else frames
+    chain, rows = robot.chain, len(frames.tool_position)
+    regressor = np.zeros((rows, robot.n, robot.n, 4))
+    for j, k in enumerate(chain.movable):
+        axis = frames.rotations[:, k] @ chain.axes[k]
+        turn = -np.cross(robot.gravity, axis)  # −g · (axis × lever) = turn · lever
+        for b in range(j, robot.n):
+            after = chain.movable[b] + 1
+            last = after == len(chain.names)
+            rotation = frames.tool_rotation if last else frames.rotations[:, after]
+            position = frames.tool_position if last else frames.positions[:, after]
+            if chain.kinds[k] == REVOLUTE:
+                regressor[:, j, b, 0] = ((position - frames.positions[:, k]) * turn).sum(axis=1)
+                regressor[:, j, b, 1:] = np.einsum("nim,ni->nm", rotation, turn)
+            else:
+                regressor[:, j, b, 0] = -axis @ robot.gravity
+    return regressor
 
 
 def _payload(payload: ArrayLike | None, com: ArrayLike, rows: int) -> tuple[Array, Array]:

@@ -9,6 +9,7 @@ import pinocchio as pin
 from numpy.typing import NDArray
 
 from thermal_robot.errors import RobotError
+from thermal_robot.kinematics.hanging import hanging_masses
 from thermal_robot.kinematics.urdf import mimic_joints, nearest, parse_urdf
 
 Array = NDArray[np.float64]
@@ -50,6 +51,9 @@ class Chain:
     mass_centres
         (n, 3) m: centre of these masses in the frame of the element *after* the joint (the tool frame for the
         last), which is fixed to the same body.
+    hanging, hanging_centres
+        (K,) kg and (K, 3) m: the part of a body's mass that lies beyond a fixed element, and its centre in the
+        element's frame; zero for a movable joint.
     """
 
     names: tuple[str, ...]
@@ -62,6 +66,8 @@ class Chain:
     placed: NDArray[np.int64]
     masses: Array
     mass_centres: Array
+    hanging: Array
+    hanging_centres: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -140,7 +146,7 @@ def build_chain_model(
     model.gravity.linear = root_rotation @ gravity
 
     lower, upper = _limits(model, joint_types)
-    chain = _chain_arrays(full, model, elements)
+    chain = _chain_arrays(full, model, elements, held)
     _freeze(gravity, lower, upper)
     return ChainModel(model, full.frames[root].name, gravity, joint_types, lower, upper, chain)
 
@@ -173,7 +179,7 @@ def _reduced(full: pin.Model, held_joints: list[int], held: Array) -> pin.Model:
     return model
 
 
-def _chain_arrays(full: pin.Model, model: pin.Model, elements: list[int]) -> Chain:
+def _chain_arrays(full: pin.Model, model: pin.Model, elements: list[int], held: Array) -> Chain:
     frames = [full.frames[e] for e in elements]
     placements = [_placement(full, e) for e in elements]
     kinds = np.zeros(len(elements), dtype=np.int64)
@@ -196,10 +202,13 @@ def _chain_arrays(full: pin.Model, model: pin.Model, elements: list[int]) -> Cha
     long = np.linalg.norm(translations, axis=1) > SHORTEST_SEGMENT
     long[movable] = True
     placed = np.flatnonzero(long)
-    _freeze(rotations, translations, kinds, axes, movable, placed, masses, centres)
+    hanging, hanging_centres = hanging_masses(full, elements, held)
+    _freeze(rotations, translations, kinds, axes, movable, placed, masses, centres, hanging, hanging_centres)
     names = tuple(frame.name for frame in frames)
     parents = tuple(full.frames[frame.parentFrame].name for frame in frames)
-    return Chain(names, parents, rotations, translations, kinds, axes, movable, placed, masses, centres)
+    return Chain(
+        names, parents, rotations, translations, kinds, axes, movable, placed, masses, centres, hanging, hanging_centres
+    )
 
 
 def _placement(model: pin.Model, element: int) -> pin.SE3:

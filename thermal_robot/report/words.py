@@ -175,7 +175,8 @@ def sentences(diagnosis: Diagnosis) -> Iterator[str]:
         yield f"It follows {', '.join(quantities)}."
     for name in diagnosis.verdict:
         if name.startswith("discovered."):
-            yield f"{name} is the law that describes it; no known effect has that shape."
+            found = diagnosis.finding(name)
+            yield f"{name}: {found.describes or 'a law that describes it'}; no known effect has that shape."
 
 
 def one_of(items: Sequence[str]) -> str:

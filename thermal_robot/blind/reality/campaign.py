@@ -131,15 +131,15 @@ def _instrument(case: Case, wants: set[str], rng: np.random.Generator) -> Instru
 def _of_size(case: Case, gauge: Gauge, fault: Fault, noise: float, rng: np.random.Generator) -> Array:
     """Draw a fault and make it as large as the case asks.
 
-    Where the cause is not in the library, or taken from it, what counts is what no single other effect can imitate.
+    Where the cause is not in the library, taken from it, or hidden, that counts which no two other effects imitate.
     """
     wanted = noise * rng.uniform(*case.ratio)
     values = fault.draw(gauge.setting, rng)
-    if fault.name not in case.without and fault.name != case.unlisted:
+    if case.kind not in ("removed", "hidden", "unlisted"):
         return sized(gauge, fault, values, wanted, lambda moved: gauge.rms(gauge.left(moved)))
     rough = sized(gauge, fault, values, wanted, lambda moved: gauge.rms(gauge.left(moved)))
-    others = [name for name in FAULTS if name not in case.without]
-    beyond = gauge.beyond(fault, gauge.moved(fault, rough), others)
+    others = [name for name in FAULTS if name not in case.effects]
+    beyond = gauge.beyond(fault, gauge.moved(fault, rough), others, together=2)
     share = min(beyond.values(), default=wanted) / wanted
     if share < 0.15:
         raise Unseen(f"{fault.name} is what {min(beyond, key=lambda name: beyond[name])} can do as well")
@@ -196,7 +196,7 @@ def _truth(
         main = any(fault is other for other, _ in done)
         listed = where if fault.few else []
         parts[fault.name] = {"ratio": ratio, "main": main, "places": _named(listed)}
-        asked = fault.name == case.unlisted or fault.name in case.without or bool(case.hidden)
+        asked = fault.name == case.unlisted or case.kind in ("removed", "hidden")
         if main and asked:
             answers += _named([*where, *_joints_of(gauge.setting, fault, [item[1] for item in clear])])
             quantities += fault.quantities(gauge.setting, where)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass
-from itertools import product
+from itertools import combinations, product
 
 import numpy as np
 from numpy.typing import NDArray
@@ -87,12 +87,18 @@ class Gauge:
         left, size, _ = np.linalg.svd(np.column_stack(columns), full_matrices=False)
         return np.asarray(left[:, size > 1e-3 * size[0]])
 
-    def beyond(self, fault: Fault, moved: Array, others: Iterable[str]) -> dict[str, float]:
-        """Rms per axis that each other kind of fault leaves of a displacement, at its best."""
+    def beyond(self, fault: Fault, moved: Array, others: Iterable[str], together: int = 1) -> dict[str, float]:
+        """Rms per axis that other kinds of fault leave of a displacement at their best, one or several ``together``."""
         left = self.left(moved)
         known = [FAULTS[name] for name in others if name != fault.name and not FAULTS[name].random]
         bases = {other.name: self.basis(other) for other in known if testable(other, self)}
-        return {name: self.rms(left - basis @ (basis.T @ left)) for name, basis in bases.items()}
+        found = {}
+        for names in combinations(bases, min(together, len(bases))):
+            basis = bases[names[0]]
+            if len(names) > 1:
+                basis = np.linalg.qr(np.column_stack([bases[name] for name in names]))[0]
+            found[" with ".join(names)] = self.rms(left - basis @ (basis.T @ left))
+        return found
 
 
 def testable(fault: Fault, gauge: Gauge) -> bool:

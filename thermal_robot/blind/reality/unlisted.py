@@ -16,6 +16,8 @@ Draw = Callable[[Setting, np.random.Generator], Array]
 
 GRAVITY = ("gravity.x", "gravity.y", "gravity.z")
 """Gravity's direction in the tool frame: a quantity that nobody records and anybody can compute."""
+REACH = ("reach.x", "reach.y")
+"""Where the tool is, from which the moment on a pedestal follows."""
 
 
 def _one(*numbers: Callable[[Setting, int, np.random.Generator], float]) -> Draw:
@@ -181,7 +183,7 @@ UNLISTED: dict[str, Fault] = {
             lambda s, rng: np.array([[1e-4, rng.uniform(0.2, 0.6)]]),
             _pedestal,
             _base,
-            quantities=lambda s, places: [*s.world.names[:3], "payload"],
+            quantities=lambda s, places: [*s.world.names[:3], "payload", *REACH],
             fixed=((1, (0.4,)),),
         ),
         Fault(

@@ -1,0 +1,148 @@
+"""After the known effects: scatter, then what is not listed, one law after another, until noise is left."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from thermal_robot.diagnosis.random_gap import RandomGap, random_gap
+from thermal_robot.diagnosis.result import Dependence, Location, Unexplained
+from thermal_robot.diagnosis.unexplained import examine
+from thermal_robot.effects.discovered import PREFIX, Discovered
+from thermal_robot.estimation.discover import Discovery, discover
+from thermal_robot.estimation.explain import Noise, explain
+from thermal_robot.estimation.fit import Fit, refit, row_groups
+from thermal_robot.estimation.generalised import generalised
+from thermal_robot.estimation.scan import of_quantity
+
+MOST = 4
+_MANY_ROWS = 5000
+_LIKELY = 0.01
+_NEVER = -100.0  # log prior odds of an effect that only scatter had feigned
+FINER = 9
+"""Knots of a law that five did not suffice for."""
+
+
+@dataclass(frozen=True, eq=False)
+class Discoveries:
+    """A fit with the laws that were found, in the order in which they were.
+
+    Attributes
+    ----------
+    fit
+        The last one.
+    found
+        Laws that belong to its explanation.
+    unexplained
+        What the known effects leave: where it enters and what it follows as the laws say, if there are any.
+    remaining
+        What the last fit leaves.
+    floor, source
+        Noise per axis, m, and where that figure comes from.
+    chance
+        What is random in it beyond the instrument.
+    """
+
+    fit: Fit
+    found: tuple[Discovery, ...]
+    unexplained: Unexplained
+    remaining: Unexplained
+    floor: float
+    source: str
+    chance: RandomGap
+
+
+def discoveries(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Discoveries:
+    """Look for laws as long as something that is not noise is left, and each is worth its place.
+
+    Parameters
+    ----------
+    fit
+        Of the known effects.
+    progress
+        Called with a few words at each stage.
+    """
+    found: list[Discovery] = []
+    first, floor, source = examine(fit, progress)
+    chance = random_gap(fit)
+    if first.flagged and chance.explains_size:
+        return _scattered(fit, chance, progress)
+    left = first
+    most = MOST if fit.campaign.samples < _MANY_ROWS else 1
+    for _ in range(most):
+        number = 1 + max((int(d.law.name.removeprefix(PREFIX)) for d in found), default=0)
+        if not left.flagged:
+            break
+        progress(f"causes that nobody listed: scan {number}")
+        discovery = discover(fit, number)
+        if discovery is None:
+            break
+        again = next((d for d in found if _same(d.law, discovery.law)), None)
+        if again is not None:  # its shape was too simple
+            values = again.law.values(fit.corrected)
+            finer = of_quantity(again.law, np.zeros(1) if values is None else values, knots=FINER)
+            if again.law in (finer, discovery.law) or finer.shape == "levels":
+                break
+            discovery = replace(discovery, law=finer)
+        law = discovery.law
+        begin = tuple(dict.fromkeys((*discovery.beside, law.name)))
+        wider = refit(fit, {law.name: (law,)}, begin, {law.name: discovery.rarity}, progress)
+        held = {effect.name for effect, _ in wider.effects}
+        if law.name not in held:
+            break
+        fit = wider
+        known = {d.law.name: d for d in (*found, discovery)}
+        found = [d for name, d in known.items() if name in held]
+        left, floor, source = examine(fit, progress)
+    chance = random_gap(fit) if found else chance
+    return Discoveries(fit, tuple(found), _told(first, left, found), left, floor, source, chance)
+
+
+def _scattered(fit: Fit, chance: RandomGap, progress: Callable[[str], None]) -> Discoveries:
+    """Choose the systematic effects again in the covariance of the scatter, which may feign some."""
+    e, campaign = fit.explanation, fit.campaign
+    covariance = chance.scatter.covariance(fit.corrected.joint_sensitivity)
+    linear = generalised(e.linear, covariance, chance.scatter.noise)
+    noise = Noise(*(float(s) for s in chance.scatter.noise[::3]))
+    again = explain(linear, noise, families=fit.families, groups=row_groups(campaign), rarity=fit.rarity)
+    kept = tuple(dict.fromkeys(fit.families[b] for b in again.best.blocks))
+    feigned = {name: _NEVER for name in dict.fromkeys(fit.families) if name not in kept}
+    fit = refit(fit, {}, kept, feigned, progress)
+    chance = random_gap(fit)
+    covariance = chance.scatter.covariance(fit.corrected.joint_sensitivity)[:, :3, :3]
+    floor = float(np.sqrt(np.trace(covariance, axis1=1, axis2=2).mean() / 3.0))
+    left = Unexplained(not chance.explains_size, 0.0, chance.p_value)
+    if left.flagged:
+        left, _, _ = examine(fit, progress)
+    return Discoveries(fit, (), left, left, floor, "repeats", chance)
+
+
+def _same(law: Discovered, other: Discovered) -> bool:
+    return (law.kind, law.place, law.quantity) == (other.kind, other.place, other.quantity)
+
+
+def _told(first: Unexplained, left: Unexplained, found: Sequence[Discovery]) -> Unexplained:
+    """Say of what the known effects leave what the laws say of it."""
+    if not found:
+        return left
+    places: dict[tuple[str, str], float] = {}
+    followed: dict[str, float] = {}
+    for discovery in found:
+        for place, probability in discovery.places:
+            places.setdefault(place, probability)
+        for quantity, _ in discovery.quantities[:1]:
+            followed.setdefault(quantity, float(np.exp(-discovery.gain)))
+    locations = tuple(Location(kind, name, p) for (kind, name), p in places.items() if p >= _LIKELY)
+    return replace(
+        first,
+        reasons=(*first.reasons, *(f"{d.law.describe()} describes it" for d in found)),
+        locations=locations,
+        depends_on=tuple(Dependence(name, p) for name, p in followed.items()),
+    )
+
+
+def is_law(name: str) -> bool:
+    """Whether an effect's name is that of a law that was discovered."""
+    return name.startswith(PREFIX)

@@ -1,0 +1,190 @@
+"""Other ways to hold rows out: an explanation that only interpolates gives itself away where it must extrapolate.
+
+Neighbouring rows are alike in time, temperature and place, so that folds of consecutive rows flatter what follows the
+campaign's course (Roberts et al., *Ecography* 40, 2017, on blocked cross-validation). Effects, prior scales and the
+rows set aside are those of the diagnosis; frames and parameters are fitted anew without the rows held out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.campaign import Campaign
+from thermal_robot.diagnosis.verdict import length
+from thermal_robot.estimation.fit import Fit
+from thermal_robot.estimation.groups import folds, neighbourhoods
+
+Array = NDArray[np.float64]
+Labels = NDArray[np.int64]
+
+_FOLDS = 5
+_DETERMINED = 1e-9  # of the strongest direction of the frames: weaker ones are not determined
+_LEAST = 0.01  # K: a temperature that varies less does not vary
+
+
+@dataclass(frozen=True)
+class FoldScheme:
+    """How far the gap shrinks when rows are held out in one way.
+
+    Attributes
+    ----------
+    name
+        ``time``, ``session``, ``temperature``, ``region`` or ``reach``.
+    held_out
+        What is held out at a time, in plain words.
+    folds, rows
+        How many folds could be fitted, and how many rows were held out in them.
+    rms_before, rms_after
+        Rms distances of these rows, m: frames alone, and the explanation.
+    shrinkage
+        1 − (rms_after / rms_before)².
+    uncertainty
+        Standard error of rms_after, m: what chance alone makes of it.
+    """
+
+    name: str
+    held_out: str
+    folds: int
+    rows: int
+    rms_before: float
+    rms_after: float
+    shrinkage: float
+    uncertainty: float
+
+
+def worst_folds(fit: Fit) -> tuple[FoldScheme, ...]:
+    """Hold rows out by time, session, temperature and region; the least favourable scheme comes first.
+
+    Least favourable is what leaves most. Its shrinkage need not be the smallest: where rows far out are held out, the
+    gap before is larger, too.
+
+    Parameters
+    ----------
+    fit
+        With or without effects.
+
+    Returns
+    -------
+    tuple of FoldScheme
+        In order of rms_after, the largest first. A scheme is left out where the campaign has no such column, a fold
+        where the remaining rows do not determine the frames.
+    """
+    explanation = fit.explanation
+    best = explanation.best
+    blocks = [explanation.linear.blocks[b] for b in best.blocks]
+    scaled = [b.columns * (b.sizes * best.scales[k]) for b, k in zip(blocks, best.blocks, strict=True)]
+    problem = _Problem(
+        np.concatenate([explanation.linear.frames, *scaled], axis=2),
+        explanation.linear.gap,
+        explanation.linear.frames.shape[2],
+        explanation.whitening.weights / explanation.design_effect,
+        explanation.whitening.noise * best.noise,
+    )
+    kept = ~explanation.outliers
+    found = [_judged(problem, kept, *scheme) for scheme in _schemes(fit)]
+    return tuple(sorted((f for f in found if f is not None), key=lambda f: -f.rms_after))
+
+
+def least_favourable(schemes: Sequence[FoldScheme]) -> str:
+    """Say in one sentence which way of holding rows out is hardest on the explanation; empty where there is none."""
+    if not any(s.shrinkage for s in schemes):
+        return ""
+    worst, least = max(schemes, key=lambda s: s.rms_after), min(schemes, key=lambda s: s.rms_after)
+    said = f"Least favourable: held out by {worst.name} ({worst.held_out}), {_remains(worst)}"
+    if worst.rms_after - least.rms_after <= 2.0 * float(np.hypot(worst.uncertainty, least.uncertainty)):
+        return f"{said}; no other way differs by more than chance."
+    return f"{said}; by {least.name}, {_remains(least)}."
+
+
+def _remains(scheme: FoldScheme) -> str:
+    return f"{length(scheme.rms_after)} remain and {100 * scheme.shrinkage:.1f} % of the mean square goes away"
+
+
+def _schemes(fit: Fit) -> Iterator[tuple[str, str, list[NDArray[np.bool_]]]]:
+    """Yield name, words and the rows (N,) that each fold holds out."""
+    campaign = fit.campaign
+    yield "time", "blocks of consecutive rows", _each(folds(campaign)[0])
+    session = campaign.labels.get("session")
+    if session is not None and len(set(session.tolist())) > 1:
+        yield "session", "one session after the other", _each(np.unique(session, return_inverse=True)[1])
+    temperature = _temperature(campaign)
+    if temperature is not None and np.ptp(temperature) > _LEAST:
+        cold, warm = (np.quantile(temperature, share) for share in (1.0 / _FOLDS, 1.0 - 1.0 / _FOLDS))
+        yield "temperature", "the coldest fifth, and the warmest", [temperature <= cold, temperature >= warm]
+    yield "region", "neighbourhoods of joint positions", _each(neighbourhoods(campaign, _FOLDS))
+    reach = np.linalg.norm(fit.nominal.position, axis=1)
+    yield "reach", "the fifth that reaches out furthest", [reach >= np.quantile(reach, 1.0 - 1.0 / _FOLDS)]
+
+
+def _each(labels: NDArray[np.int64]) -> list[NDArray[np.bool_]]:
+    return [labels == label for label in np.unique(labels)]
+
+
+def _temperature(campaign: Campaign) -> Array | None:
+    """(N,) of the robot as a whole, or the mean of its links, °C."""
+    recorded = campaign.covariates
+    columns = ["temperature"] if "temperature" in recorded else [c for c in recorded if c.startswith("temperature.")]
+    return np.mean([recorded[c] for c in columns], axis=0) if columns else None
+
+
+class _Problem:
+    """Rows of the linear problem, fitted from sums of products alone."""
+
+    def __init__(self, design: Array, gap: Array, flat: int, weights: Array, noise: Array) -> None:
+        self.design, self.gap, self.flat = design, gap, flat
+        root = np.sqrt(weights)[:, None] / noise
+        self.whole = np.concatenate([design, gap[:, :, None]], axis=2) * root[:, :, None]
+        self.total = self._products(np.ones(len(gap), dtype=bool))
+        self.rank = self._rank(self.total)
+
+    def _products(self, rows: NDArray[np.bool_]) -> Array:
+        used = self.whole[rows].reshape(-1, self.whole.shape[2])
+        return np.asarray(used.T @ used)
+
+    def _rank(self, products: Array) -> int:
+        frames = products[: self.flat, : self.flat]
+        length = np.sqrt(np.diag(frames)) + 1e-300
+        value = np.linalg.eigvalsh(frames / np.outer(length, length)) if self.flat else np.zeros(0)
+        return int((value > _DETERMINED).sum())
+
+    def left(self, test: NDArray[np.bool_]) -> tuple[Array, Array] | None:
+        """(n,) distances of the rows held out, m: before and after; ``None`` where nothing is left to fit."""
+        train = self.total - self._products(test)
+        if self._rank(train) < self.rank or (~test).sum() < 2 or not test.any():
+            return None
+        return self._distance(train, test, self.flat), self._distance(train, test, len(train) - 1)
+
+    def _distance(self, train: Array, test: NDArray[np.bool_], columns: int) -> Array:
+        """(n,) distances that the frames and the first of the effects' columns leave."""
+        matrix = train[:columns, :columns].copy()
+        # a unit of an effect's column is one sigma of its prior; a frame has none, but for what nothing determines
+        prior = np.where(np.arange(columns) < self.flat, 1e-12 * np.diag(matrix) + 1e-300, 1.0)
+        matrix[np.diag_indices(columns)] += prior
+        length = np.sqrt(np.diag(matrix))
+        solution = np.linalg.solve(matrix / np.outer(length, length), train[:columns, -1] / length) / length
+        left = self.gap[test, :3] - self.design[test][:, :3, :columns] @ solution
+        return np.asarray(np.linalg.norm(left, axis=1))
+
+
+def _judged(
+    problem: _Problem, kept: NDArray[np.bool_], name: str, held_out: str, tests: Sequence[NDArray[np.bool_]]
+) -> FoldScheme | None:
+    judged = [pair for test in tests if (pair := problem.left(test & kept)) is not None]
+    if not judged:
+        return None
+    before, after = (np.concatenate([pair[k] for pair in judged]) for k in (0, 1))
+    whole, rest = float((before**2).mean()), float((after**2).mean())
+    return FoldScheme(
+        name,
+        held_out,
+        len(judged),
+        len(before),
+        float(np.sqrt(whole)),
+        float(np.sqrt(rest)),
+        1.0 - rest / whole if whole > 0.0 else 0.0,
+        float(np.std(after**2) / np.sqrt(len(after)) / (2.0 * np.sqrt(rest))) if rest > 0.0 else 0.0,
+    )

@@ -1,0 +1,56 @@
+"""Effects that stand in for something else: a physical constant that changes with the circumstances is none."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.diagnosis.laws import smooth_law
+from thermal_robot.effects.discovered import PREFIX
+from thermal_robot.effects.quantity import quantities
+from thermal_robot.estimation.fit import Fit
+from thermal_robot.estimation.scan import Target
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class StandIn:
+    """How far an effect is believed to be itself (0..1), and the quantity with which its size changes."""
+
+    belief: float
+    quantity: str
+
+
+def stand_ins(fit: Fit) -> dict[str, StandIn]:
+    """Ask of every known effect of the explanation whether its size stays the same.
+
+    An expansion, a scale or an eccentricity is what it is at any time, temperature and place. Where what an effect was
+    found to do, multiplied with a smooth law of some quantity, explains part of what is left, its size changes with
+    that: the effect was taken for something that it is not. The belief is 1/(1 + e^g), with g the gain in log
+    evidence of the best such law (Bayes information criterion) less the logarithm of the number that were tried.
+
+    Only asked where a remainder is left: it is that which the effect would be spoilt by.
+    """
+    e = fit.explanation
+    columns = [e.linear.blocks[b].columns for b in e.best.blocks]
+    target = Target.of(e.linear.gap, np.concatenate([e.linear.frames, *columns], axis=2))
+    laws = {name: smooth_law(values) for name, values in quantities(fit.corrected).items()}
+    known = [
+        (effect.name, block @ values)
+        for (effect, values), block in zip(fit.effects, columns, strict=True)
+        if not effect.name.startswith(PREFIX)
+    ]
+    tried = max(len(known) * len(laws), 1)
+    found = {}
+    for name, moved in known:
+        gains = {q: target.gain(moved[:, :, None] * law[:, None, :]) for q, law in laws.items() if law.shape[1]}
+        if not gains:
+            continue
+        quantity = max(gains, key=lambda q: gains[q])
+        gain = gains[quantity] - float(np.log(tried))
+        if gain > 0.0:
+            found[name] = StandIn(float(1.0 / (1.0 + np.exp(min(gain, 50.0)))), quantity)
+    return found

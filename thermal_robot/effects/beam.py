@@ -1,0 +1,35 @@
+"""A segment as a straight beam: the two axes across it, about which it bends."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+if TYPE_CHECKING:
+    from thermal_robot.robot import Robot
+
+Array = NDArray[np.float64]
+
+SHORTEST = 1e-6
+"""m; a shorter segment does not bend."""
+
+
+def beams(robot: Robot) -> tuple[int, ...]:
+    """Return the segments that are long enough to bend."""
+    return tuple(s for s, segment in enumerate(robot.segments) if segment.length > SHORTEST)
+
+
+def cross_axes(robot: Robot, s: int) -> Array:
+    """Two unit vectors (2, 3) across a segment, in its own frame.
+
+    They are right angled to the segment in the frame of its parent link, the first also to that axis of the frame which
+    lies most across the segment: the sections of links are drawn along the frames of links.
+    """
+    segment = robot.segments[s]
+    rotation = robot.chain.rotations[segment.index]
+    along = rotation @ segment.direction
+    first = np.cross(along, np.eye(3)[np.argmin(np.abs(along))])
+    first /= np.linalg.norm(first)
+    return np.asarray(np.array([first, np.cross(along, first)]) @ rotation)

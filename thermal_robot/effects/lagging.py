@@ -1,0 +1,65 @@
+"""A body that follows a recorded temperature with a time constant."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+_MOST = 500  # points of a history that are kept
+
+
+@dataclass(frozen=True)
+class History:
+    """A temperature as it was recorded, running straight between its points.
+
+    Attributes
+    ----------
+    times
+        (K,) s, increasing.
+    temperatures
+        (K,) °C.
+    """
+
+    times: tuple[float, ...]
+    temperatures: tuple[float, ...]
+
+    @classmethod
+    def of(cls, times: Array, temperatures: Array) -> History:
+        """Keep a record of rows in any order; rows of one instant count as their mean, a long one is thinned."""
+        instants, which = np.unique(times, return_inverse=True)
+        values = np.bincount(which, temperatures) / np.bincount(which)
+        kept = np.unique(np.linspace(0, len(instants) - 1, min(len(instants), _MOST)).round().astype(int))
+        return cls(tuple(instants[kept].tolist()), tuple(values[kept].tolist()))
+
+    def followed(self, lag: float, times: Array, temperatures: Array) -> Array:
+        """Return (N,) the temperature of a body that obeys dT/dt = (T_recorded − T) / lag.
+
+        It is in balance at the first point. Between two points the solution is exact:
+        T = u(t) − r·lag + (T_i − u_i + r·lag) exp(−(t − t_i)/lag), where u runs at the rate r.
+
+        Parameters
+        ----------
+        lag
+            Time constant, s.
+        times, temperatures
+            (N,) s and °C of the rows that are asked for. Beyond the record the row's own temperature is taken to have
+            held since its end; before the record the body is in balance with it.
+        """
+        t, u = np.array(self.times), np.array(self.temperatures)
+        rate = np.diff(u) / np.diff(t)
+        decay = np.exp(-np.diff(t) / lag)
+        behind = np.zeros(len(t))  # T − u
+        for k in range(len(rate)):
+            behind[k + 1] = (behind[k] + rate[k] * lag) * decay[k] - rate[k] * lag
+        i = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 1)
+        late = times >= t[-1]
+        rate = np.append(rate, 0.0)[i]
+        since = np.maximum(times - t[i], 0.0)
+        lagging = (behind[i] + rate * lag) * np.exp(-since / lag) - rate * lag
+        inside = u[i] + rate * since + lagging
+        after = temperatures + (u[-1] + behind[-1] - temperatures) * np.exp(-since / lag)
+        return np.where(times < t[0], temperatures, np.where(late, after, inside))

@@ -1,0 +1,82 @@
+"""Elastic links: every segment bends under the weight on its far end."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.effects.beam import beams, cross_axes
+from thermal_robot.effects.effect import Effect, Parameter, at_segment
+
+if TYPE_CHECKING:
+    from thermal_robot.observations import Observations
+
+Array = NDArray[np.float64]
+
+_SAG = 2e-4  # m
+_STEADY = 1e-9  # N·m²
+
+
+@dataclass(frozen=True)
+class LinkCompliance(Effect):
+    """Every segment is a cantilever, clamped at its link, that carries force F and moment M on its far end.
+
+    Euler and Bernoulli: about an axis e across the segment, with d along it, L its length and k = 1/(E I),
+
+    ====================== ========================================
+    turn of the far end    k L (M·e + ½ L (d × F)·e), about e
+    its displacement       k L² (½ M·e + ⅓ L (d × F)·e), along e × d
+    ====================== ========================================
+
+    (Timoshenko, *Strength of Materials* I, 1930, table of cantilevers.) F (N) and M (N·m) are the weight of all that
+    lies beyond: the URDF's masses and ``payload``. Two parameters a segment, 1/(N·m²), one for each axis across it.
+    Expected size: the segment that yields most in the campaign sags by 0.2 mm, some 1e-6 to 1e-5 /(N·m²) for an
+    aluminium tube of 100 mm (E I = 1e5 N·m² and more).
+
+    About the axis of the joint at its end a segment bends as that joint yields (:class:`JointCompliance`), but for the
+    part of the force: only bending across the joints' axes tells the two apart well. A load that stays the same bends
+    a link once for all, which is :class:`Geometric`. How a link bends under its own weight is not in it.
+    """
+
+    name: ClassVar[str] = "link_compliance"
+
+    def missing(self, observations: Observations) -> tuple[str, ...]:
+        """Return what would give a load, unless one that bends a segment varies."""
+        varying = any(np.ptp(turn) > _STEADY for s in beams(observations.robot) for turn, _ in _yields(observations, s))
+        return () if varying else ("payload", "masses in the URDF")
+
+    def reads(self, observations: Observations) -> tuple[str, ...]:
+        """Return the payload where it was recorded."""
+        return ("payload",) if "payload" in observations.covariates else ()
+
+    def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
+        """Return two bending compliances a segment; 1/(N·m²)."""
+        robot = observations.robot
+        bent = {s: _yields(observations, s) for s in beams(robot)}
+        most = max((float(np.abs(shift).max(initial=0.0)) for pair in bent.values() for _, shift in pair), default=0.0)
+        size = _SAG / max(most, 1e-9)
+        found = []
+        for s, pair in bent.items():
+            segment, axes = robot.segments[s], cross_axes(robot, s)
+            for k, (turn, shift) in enumerate(pair):
+                across = np.concatenate([np.cross(axes[k], segment.direction), axes[k]])
+                twist = np.column_stack([np.repeat(shift[:, None], 3, 1), np.repeat(turn[:, None], 3, 1)]) * across
+                label = f"bending compliance of {segment.name}, axis {k + 1}"
+                found.append(Parameter(label, "1/(N·m²)", size, "link", segment.parent_link, (at_segment(s, twist),)))
+        return tuple(found)
+
+
+def _yields(observations: Observations, s: int) -> tuple[tuple[Array, Array], ...]:
+    """Turn (N,) and displacement (N,) of a segment's far end about each axis, for E I = 1 N·m²."""
+    segment, load = observations.robot.segments[s], observations.segment_load[:, s]
+    length = segment.length
+    found = []
+    for axis in cross_axes(observations.robot, s):
+        moment = load[:, 3:] @ axis
+        force = load[:, :3] @ np.cross(axis, segment.direction)  # (d × F)·e = F·(e × d)
+        turn = length * (moment + length * force / 2.0)
+        found.append((turn, length**2 * (moment / 2.0 + length * force / 3.0)))
+    return tuple(found)

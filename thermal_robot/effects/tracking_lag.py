@@ -1,0 +1,80 @@
+"""Joints that are measured in passing, and follow their command late."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from thermal_robot.effects.effect import Effect, Parameter, at_joint
+
+if TYPE_CHECKING:
+    from thermal_robot.observations import Observations
+
+
+@dataclass(frozen=True)
+class TrackingLag(Effect):
+    """Every joint trails its command: q_actual = q_command − T_j q̇_j − f_j sign(q̇_j) + a_j q̈_j.
+
+    T (s) is the servo's delay, or that between the command's clock and the instrument's; f (rad or m) the error that
+    dry friction leaves in a loop without integral part; a (s²) what inertia and interpolation add: ½ T² for a pure
+    delay. Three parameters a joint, a only where ``acceleration.<joint>`` is recorded. Expected sizes 1 ms,
+    0.1 mrad (0.1 mm) and 1e-6 s² (Siciliano et al., *Robotics: Modelling, Planning and Control*, 2009, chapter 8).
+
+    Friction depends on the sign of the speed alone, as :class:`Backlash` does on that of the last move: where each
+    pose is passed in the direction of approach, backlash is exactly this f, and is preferred where it suffices. The
+    delay, which grows with speed, is only here: measure the same poses at several speeds.
+
+    Attributes
+    ----------
+    moving, accelerating
+        Joints that moved, and those that were accelerated, in the campaign; taken from the observations where absent.
+    """
+
+    moving: tuple[str, ...] | None = None
+    accelerating: tuple[str, ...] | None = None
+
+    name: ClassVar[str] = "tracking_lag"
+
+    def missing(self, observations: Observations) -> tuple[str, ...]:
+        """Return the velocity columns, unless at least one of them varies."""
+        columns = tuple(f"velocity.{joint}" for joint in observations.robot.joint_names)
+        return () if any(observations.varies(column) for column in columns) else columns
+
+    def reads(self, observations: Observations) -> tuple[str, ...]:
+        """Return the velocities and accelerations of the joints that moved."""
+        moving, accelerating = self._joints(observations)
+        return (*(f"velocity.{joint}" for joint in moving), *(f"acceleration.{joint}" for joint in accelerating))
+
+    def variants(self, observations: Observations) -> tuple[Effect, ...]:
+        """Return this effect for the joints that move: a model must not forget them where they stand still."""
+        moving, accelerating = self._joints(observations)
+        return (replace(self, moving=moving, accelerating=accelerating),)
+
+    def _joints(self, observations: Observations) -> tuple[tuple[str, ...], tuple[str, ...]]:
+        names, recorded = observations.robot.joint_names, observations.covariates
+        moving, accelerating = self.moving, self.accelerating
+        if moving is None:
+            moving = tuple(n for n in names if np.any(recorded.get(f"velocity.{n}", 0.0)))
+        if accelerating is None:
+            accelerating = tuple(n for n in moving if np.any(recorded.get(f"acceleration.{n}", 0.0)))
+        return moving, accelerating
+
+    def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
+        """Delay (s), friction (rad or m) and effect of acceleration (s²) of each joint that moves."""
+        robot, recorded = observations.robot, observations.covariates
+        moving, accelerating = self._joints(observations)
+        found = []
+        for j, (joint, kind) in enumerate(zip(robot.joint_names, robot.joint_types, strict=True)):
+            if joint not in moving:
+                continue
+            velocity = np.asarray(recorded[f"velocity.{joint}"])
+            unit = "m" if kind == "prismatic" else "rad"
+            found.append(Parameter("delay", "s", 1e-3, "joint", joint, (at_joint(j, -velocity),)))
+            found.append(Parameter("friction", unit, 1e-4, "joint", joint, (at_joint(j, -np.sign(velocity)),)))
+            if joint in accelerating:
+                acceleration = recorded[f"acceleration.{joint}"]
+                label = "effect of acceleration"
+                found.append(Parameter(label, "s²", 1e-6, "joint", joint, (at_joint(j, acceleration),)))
+        return tuple(found)

@@ -1,0 +1,191 @@
+"""Causes that nobody listed: laws of places and quantities that join the known effects in one comparison."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.effects.discovered import PREFIX, Discovered
+from thermal_robot.estimation.columns import block
+from thermal_robot.estimation.evidence import Combination, Search
+from thermal_robot.estimation.explain import PRIOR_PROBABILITY
+from thermal_robot.estimation.fit import Fit
+from thermal_robot.estimation.linear import Linear, Whitening, contained, gram
+from thermal_robot.estimation.scan import CLOCK, Scanned, Target, scan, shaped
+
+Array = NDArray[np.float64]
+
+_SHAPED = 6  # candidates of each remainder whose shape is looked at
+_COMPARED = 8  # candidates that are compared jointly with the known effects
+_IN_TIME = float(np.log(3.0))
+_LEAST = 6.0  # log evidence that a law must bring over none
+
+
+@dataclass(frozen=True, eq=False)
+class Discovery:
+    """The law that the data speak for, with its rivals.
+
+    Attributes
+    ----------
+    law
+        What it is.
+    beside
+        Names of the known effects that stay beside it.
+    rarity
+        Log prior probability lost to the number of laws that were tried.
+    gain
+        Log evidence over the best combination without a law.
+    places
+        (kind, name) with the posterior probability of each.
+    quantities
+        The same of each quantity.
+    """
+
+    law: Discovered
+    beside: tuple[str, ...]
+    rarity: float
+    gain: float
+    places: tuple[tuple[tuple[str, str], float], ...]
+    quantities: tuple[tuple[str, float], ...]
+
+
+def discover(fit: Fit, number: int) -> Discovery | None:
+    """Scan every place and quantity for a law; ``None`` where none is worth its place.
+
+    Two remainders are scanned, that of the explanation and that of the frames alone: where known effects have taken
+    part of an unlisted cause upon themselves, it shows in the second only. The best candidates then compete with the
+    known effects in one comparison, so that these can go again.
+
+    Parameters
+    ----------
+    fit
+        An explanation that leaves a remainder.
+    number
+        Of the law: it is called ``discovered.<number>``.
+    """
+    e = fit.explanation
+    held = [e.linear.blocks[b].columns for b in e.best.blocks]
+    laws_held = [
+        block_.columns
+        for block_, b in ((e.linear.blocks[b], b) for b in e.best.blocks)
+        if fit.families[b].startswith(PREFIX)
+    ]
+    after = Target.of(e.linear.gap, np.concatenate([e.linear.frames, *held], axis=2))
+    before = Target.of(e.linear.gap, np.concatenate([e.linear.frames, *laws_held], axis=2))
+    found, tried = scan(fit.corrected, [after, before])
+    candidates: list[Scanned] = []
+    for target, own in zip((after, before), found, strict=True):
+        for item in _with_joints(own):
+            best = shaped(fit.corrected, target, item.law)
+            if best.gain > 0.0:
+                candidates.append(best)
+    laws = list(dict.fromkeys(c.law for c in sorted(candidates, key=lambda c: -c.gain)))
+    # the first of each remainder, in turn
+    chosen = _in_turn([[c.law for c in _of(candidates, own)] for own in found], laws)[:_COMPARED]
+    if not chosen:
+        return None
+    return _compare(fit, [replace(law, name=f"{PREFIX}{number}") for law in chosen], tried)
+
+
+def _with_joints(own: Sequence[Scanned]) -> list[Scanned]:
+    """Return the first candidates, and beside that of a segment the joint behind it, which is simpler."""
+    first = list(own[:_SHAPED])
+    simpler = {(i.law.place, i.law.quantity) for i in first if i.law.kind == "link"}
+    return first + [i for i in own[_SHAPED:] if i.law.kind == "joint" and (i.law.place, i.law.quantity) in simpler]
+
+
+def _of(candidates: Sequence[Scanned], own: Sequence[Scanned]) -> list[Scanned]:
+    places = {(i.law.kind, i.law.place, i.law.quantity) for i in _with_joints(own)}
+    mine = [c for c in candidates if (c.law.kind, c.law.place, c.law.quantity) in places]
+    return sorted(mine, key=lambda c: -c.gain)
+
+
+def _in_turn(lists: Sequence[Sequence[Discovered]], everything: Sequence[Discovered]) -> list[Discovered]:
+    longest = max((len(own) for own in lists), default=0)
+    turns = [own[k] for k in range(longest) for own in lists if k < len(own)]
+    return list(dict.fromkeys([*turns, *everything]))
+
+
+def _compare(fit: Fit, laws: Sequence[Discovered], tried: int) -> Discovery | None:
+    """Climb over the known effects and one law at a time; what the law's presence allows to go, goes."""
+    e = fit.explanation
+    known = len(e.linear.blocks)
+    linear = Linear(e.linear.gap, e.linear.frames, (*e.linear.blocks, *(block(fit.corrected, law) for law in laws)))
+    problem = gram(linear, _all_rows(fit))
+    odds = float(np.log(PRIOR_PROBABILITY / (1 - PRIOR_PROBABILITY)))
+    rarity = -float(np.log(tried))
+    families = [*fit.families, *(law.name for law in laws)]
+    prior = [odds - np.log(families.count(f)) + fit.rarity.get(f, 0.0) for f in fit.families]
+    # a change that is one in time and in another quantity happened in time
+    prior += [odds + rarity + (_IN_TIME if law.quantity in CLOCK else 0.0) for law in laws]
+    same = {frozenset((a, b)) for a, f in enumerate(families) for b, g in enumerate(families) if a < b and f == g}
+    search = Search(problem, prior, contained(problem) | frozenset(same))
+    plain = search.evaluate(e.best.blocks)
+    best = plain
+    for k in range(known, known + len(laws)):
+        start = search.evaluate((*e.best.blocks, k), plain)
+        best = max(best, start, search.evaluate((k,), start), key=lambda c: c.log_evidence)
+    best = _climb(search, best, known)
+    inside = [k for k in best.blocks if k >= known]
+    if not inside:
+        return None
+    without = _climb(search, plain, known, barred=frozenset(range(known, known + len(laws))))
+    gain = best.log_evidence - without.log_evidence
+    if gain < _LEAST:
+        return None
+    combinations, weight = search.probabilities()
+    places: dict[tuple[str, str], float] = {}
+    followed: dict[str, float] = {}
+    for combination, w in zip(combinations, weight, strict=True):
+        for k in combination.blocks:
+            if k >= known:
+                law = laws[k - known]
+                places[where(fit, law)] = places.get(where(fit, law), 0.0) + float(w)
+                followed[law.quantity] = followed.get(law.quantity, 0.0) + float(w)
+    return Discovery(
+        laws[inside[0] - known],
+        tuple(dict.fromkeys(fit.families[b] for b in best.blocks if b < known)),
+        rarity,
+        float(gain),
+        tuple(sorted(places.items(), key=lambda item: -item[1])),
+        tuple(sorted(followed.items(), key=lambda item: -item[1])),
+    )
+
+
+def _climb(search: Search, best: Combination, known: int, barred: frozenset[int] = frozenset()) -> Combination:
+    """Add, drop, or exchange for another law, while it helps; pairs of known effects are not exchanged here."""
+    count = len(search.gram.slices)
+    while True:
+        around = [(*best.blocks, b) for b in range(count) if b not in best.blocks and b not in barred]
+        around += [tuple(b for b in best.blocks if b != out) for out in best.blocks]
+        laws = [b for b in best.blocks if b >= known]
+        around += [
+            (*(b for b in best.blocks if b != out), new) for out in laws for new in range(known, count) if new != out
+        ]
+        tried = [search.evaluate(blocks, best) for blocks in around if search.allowed(blocks)]
+        better = max(tried, key=lambda c: c.log_evidence, default=best)
+        if better.log_evidence <= best.log_evidence + 1e-9:
+            return best
+        best = better
+
+
+def _all_rows(fit: Fit) -> Whitening:
+    """Weigh every row, those set aside by how far they lie: under another explanation they may be sound."""
+    e = fit.explanation
+    stated = (fit.campaign.noise_position, fit.campaign.noise_orientation)
+    noise = e.whitening.noise.copy()
+    for part, sigma in enumerate(stated[: len(noise) // 3]):
+        if sigma is not None:
+            noise[3 * part : 3 * part + 3] = np.minimum(noise[3 * part : 3 * part + 3], 2.0 * sigma)
+    distance2 = ((e.remainder / e.whitening.noise) ** 2).sum(axis=1) / e.linear.measures
+    return Whitening(np.minimum(1.0, 9.0 / np.maximum(distance2, 1e-300)), noise, e.whitening.held)
+
+
+def where(fit: Fit, law: Discovered) -> tuple[str, str]:
+    """Return a law's place as a diagnosis names it: a segment by the link that carries it."""
+    if law.kind != "link":
+        return law.kind, law.place
+    return "link", next(s.parent_link for s in fit.campaign.robot.segments if s.name == law.place)
