@@ -16,6 +16,8 @@ from thermal_robot.diagnosis.attribute import findings, in_order
 from thermal_robot.diagnosis.discovery import discoveries
 from thermal_robot.diagnosis.heldout import Shrinkage, held_out
 from thermal_robot.diagnosis.result import Diagnosis, Gap, Rows
+from thermal_robot.diagnosis.schemes import FoldScheme, worst_folds
+from thermal_robot.diagnosis.sensitivity import sensitivity
 from thermal_robot.diagnosis.stand_in import StandIn, stand_ins
 from thermal_robot.diagnosis.verdict import advise, sentence
 from thermal_robot.diagnosis.where import locate
@@ -83,7 +85,7 @@ def diagnose(
     found = in_order((*systematic, *chance))
     order = [f.name for f in found if f.name in {e.name for e, _ in fitted.effects}]
     order += [f.name for f in chance if f.status == "found"]
-    gap = _gap(fitted, shrinkage, looked.floor, looked.source)
+    gap = _gap(fitted, shrinkage, looked.floor, looked.source, worst_folds(fitted))
     probability = min(_probability(fitted), *(d.belief for d in doubts.values()), 1.0)
     advice, separates = advise(found, unexplained)
     return Diagnosis(
@@ -108,6 +110,8 @@ def diagnose(
         model=_model(fitted),
         rows=_rows(fitted, shrinkage),
         warnings=(*campaign.warnings, *notes, *_doubts(fitted, candidates if narrowed else ()), *_changing(doubts)),
+        sensitivity=sensitivity(fitted),
+        fit=fitted,
     )
 
 
@@ -173,7 +177,7 @@ def _probability(fitted: Fit) -> float:
     return min(float(e.probabilities[same].sum()), 1.0)
 
 
-def _gap(fitted: Fit, shrinkage: Shrinkage, floor: float, source: str) -> Gap:
+def _gap(fitted: Fit, shrinkage: Shrinkage, floor: float, source: str, schemes: tuple[FoldScheme, ...]) -> Gap:
     kept = ~fitted.explanation.outliers
     before, after = fitted.nominal.gap[kept], fitted.corrected.gap[kept]
 
@@ -189,6 +193,7 @@ def _gap(fitted: Fit, shrinkage: Shrinkage, floor: float, source: str) -> Gap:
         shrinkage.overall,
         rms(before[:, 3:]) if turned else None,
         rms(after[:, 3:]) if turned else None,
+        schemes,
     )
 
 

@@ -134,7 +134,7 @@ def _told(first: Unexplained, left: Unexplained, found: Sequence[Discovery]) -> 
             places.setdefault(place, probability)
         for quantity, _ in discovery.quantities[:1]:
             followed.setdefault(quantity, float(np.exp(-discovery.gain)))
-    locations = tuple(Location(kind, name, p) for (kind, name), p in places.items() if p >= _LIKELY)
+    locations = tuple(Location(kind, name, min(p, 1.0)) for (kind, name), p in places.items() if p >= _LIKELY)
     return replace(
         first,
         reasons=(*first.reasons, *(f"{d.law.describe()} describes it" for d in found)),

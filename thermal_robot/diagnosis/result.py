@@ -6,12 +6,18 @@ import json
 from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import Any, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.correction import CorrectedModel
+
+if TYPE_CHECKING:
+    from thermal_robot.diagnosis.schemes import FoldScheme
+    from thermal_robot.diagnosis.sensitivity import Sensitivity
+    from thermal_robot.diagnosis.separate import NextSamples
+    from thermal_robot.estimation.fit import Fit
 
 Array = NDArray[np.float64]
 Status = Literal["found", "not_found", "not_testable", "confounded"]
@@ -103,6 +109,7 @@ class Gap:
     held_out: HeldOut
     orientation_before: float | None = None
     orientation_after: float | None = None
+    schemes: tuple[FoldScheme, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -238,6 +245,41 @@ class Diagnosis:
     model: CorrectedModel
     rows: Rows
     warnings: tuple[str, ...] = field(default=())
+    sensitivity: Sensitivity | None = None
+    fit: Fit | None = None
+
+    def explain(self, effect: str) -> Any:
+        """Draw what is left before and after one effect, against the quantity that drives it, place by place.
+
+        Parameters
+        ----------
+        effect
+            Name of an effect of the explanation.
+
+        Returns
+        -------
+        matplotlib.figure.Figure
+
+        Raises
+        ------
+        EffectError
+            If it does not belong to the explanation.
+        """
+        from thermal_robot.diagnosis.explained import explained
+        from thermal_robot.report import explain_figure
+
+        return explain_figure(explained(self._fitted(), effect))
+
+    def next_samples(self, count: int = 10) -> NextSamples:
+        """Choose samples that would best separate the leading explanations; ``to_table()`` makes a table of them."""
+        from thermal_robot.diagnosis.separate import next_samples
+
+        return next_samples(self._fitted(), count)
+
+    def _fitted(self) -> Fit:
+        if self.fit is None:
+            raise ValueError("this diagnosis was made without its fit")
+        return self.fit
 
     def finding(self, effect: str) -> Finding:
         """Return what is said of one effect; ``KeyError`` for a name that was not a candidate."""
@@ -267,12 +309,14 @@ class Diagnosis:
                 "noise_source": gap.noise_source,
                 "orientation": orientation,
                 "held_out": asdict(gap.held_out),
+                "schemes": [asdict(scheme) for scheme in gap.schemes],
             },
             "verdict": {
                 "effects": self.verdict,
                 "probability": self.probability,
                 "unexplained": left.flagged,
                 "summary": self.summary,
+                "if_prior_sizes": None if self.sensitivity is None else asdict(self.sensitivity),
             },
             "effects": [asdict(finding) for finding in self.effects],
             "where": asdict(self.where),
@@ -283,9 +327,12 @@ class Diagnosis:
                 "locations": [{"kind": p.kind, "name": p.name, "probability": p.share} for p in left.locations],
                 "depends_on": [asdict(d) for d in left.depends_on],
             },
-            "next": {"separates": self.separates, "advice": self.advice, "samples": []},
+            "next": {"separates": self.separates, "advice": self.advice, "samples": self._samples()},
         }
         return dict(_jsonable(plain))
+
+    def _samples(self) -> list[dict[str, Any]]:
+        return [] if self.fit is None else self.next_samples().to_list()
 
     def to_json(self, path: str | Path) -> None:
         """Write :meth:`to_dict` to a file."""

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from thermal_robot.effects.discovered import PREFIX, Discovered
 from thermal_robot.estimation.columns import block
 from thermal_robot.estimation.evidence import Combination, Search
-from thermal_robot.estimation.explain import PRIOR_PROBABILITY
+from thermal_robot.estimation.explain import PRIOR_PROBABILITY, log_priors
 from thermal_robot.estimation.fit import Fit
 from thermal_robot.estimation.linear import Linear, Whitening, contained, gram
 from thermal_robot.estimation.scan import CLOCK, Scanned, Target, scan, shaped
@@ -118,7 +118,7 @@ def _compare(fit: Fit, laws: Sequence[Discovered], tried: int) -> Discovery | No
     odds = float(np.log(PRIOR_PROBABILITY / (1 - PRIOR_PROBABILITY)))
     rarity = -float(np.log(tried))
     families = [*fit.families, *(law.name for law in laws)]
-    prior = [odds - np.log(families.count(f)) + fit.rarity.get(f, 0.0) for f in fit.families]
+    prior = log_priors(fit.families, fit.rarity)
     # a change that is one in time and in another quantity happened in time
     prior += [odds + rarity + (_IN_TIME if law.quantity in CLOCK else 0.0) for law in laws]
     same = {frozenset((a, b)) for a, f in enumerate(families) for b, g in enumerate(families) if a < b and f == g}

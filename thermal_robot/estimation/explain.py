@@ -126,8 +126,7 @@ def explain(
     use = np.ones(samples, dtype=bool) if rows is None else rows
     aside = np.zeros(samples, dtype=bool) if outliers is None else outliers & use
     families = families or [str(k) for k in range(len(linear.blocks))]
-    odds = np.log(PRIOR_PROBABILITY / (1 - PRIOR_PROBABILITY))
-    log_prior = [odds - np.log(list(families).count(f)) + (rarity or {}).get(f, 0.0) for f in families]
+    log_prior = log_priors(families, rarity or {})
     settings = {frozenset((a, b)) for a, f in enumerate(families) for b, g in enumerate(families) if a < b and f == g}
     whitening = _first_whitening(linear, noise, use & ~aside)
     history: list[tuple[tuple[int, ...], bytes]] = []
@@ -159,6 +158,12 @@ def explain(
     return Explanation(
         linear, whitening, problem, best, combinations, probabilities, values, step, remainder, aside, worth
     )
+
+
+def log_priors(families: Sequence[str], rarity: Mapping[str, float]) -> list[float]:
+    """Return the log prior odds of each block: settings of one effect share its own."""
+    odds = float(np.log(PRIOR_PROBABILITY / (1 - PRIOR_PROBABILITY)))
+    return [odds - float(np.log(list(families).count(f))) + rarity.get(f, 0.0) for f in families]
 
 
 def _remainder(linear: Linear, values: dict[int, tuple[Array, Array]]) -> Array:

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from thermal_robot.report.json_schema import schema
     from thermal_robot.report.page import fragment, html
     from thermal_robot.report.plain_text import text
+    from thermal_robot.report.plots_explain import explain_figure
     from thermal_robot.report.plots_how_far import plot_how_far
     from thermal_robot.report.plots_map import plot_map
     from thermal_robot.report.plots_overview import overview
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from thermal_robot.report.plots_which import plot_which
 
 _HOME = {
+    "explain_figure": "plots_explain",
     "fragment": "page",
     "html": "page",
     "overview": "plots_overview",
@@ -44,6 +46,7 @@ def __dir__() -> list[str]:
 
 
 __all__ = [
+    "explain_figure",
     "fragment",
     "html",
     "overview",

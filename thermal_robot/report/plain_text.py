@@ -93,6 +93,9 @@ def _how_far(diagnosis: Diagnosis) -> Iterator[str]:
         yield f"  {name:{_NAME}}{first:>{wide}} → {second:<{wide}}   {note}".rstrip()
     shrinkage = f"{units.percent(held.shrinkage)}   95 % interval {_bounds(held.shrinkage_ci95)}"
     yield f"  {'shrinkage, held out':{_NAME}}{shrinkage}"
+    for scheme in gap.schemes[:1]:
+        worst = f"{units.quantity(scheme.rms_after, 'm')} left where {scheme.held_out} is held out"
+        yield _wrap(worst, f"  {'least favourable':{_NAME}}")
     yield _wrap(noise(diagnosis, floor), f"  {'noise floor':{_NAME}}")
     yield _wrap("Shrinkage is the share of the gap's mean square that goes away.")
 
