@@ -120,3 +120,18 @@ def test_more_columns_than_the_campaign_had_change_no_prediction(ur10):
     less = {name: values for name, values in fresh.covariates.items() if name != first}
     with_more, with_less = (model.predict(f)[0] for f in (fresh, replace(fresh, covariates=less)))
     np.testing.assert_allclose(with_more, with_less, atol=0.0)
+
+
+def test_encoders_that_deny_the_commands_are_a_fault_of_the_log(rv_m2):
+    clean = simulate(rv_m2, ["drift"], seed=1)[0]
+    read = clean.q[:, 2] + 1e-4
+    spoilt = np.array(read)
+    spoilt[[10, 40, 41]] += 0.2
+    agreeing = diagnose(replace(clean, covariates={**clean.covariates, "encoder.joint_3": read}))
+    denying = diagnose(replace(clean, covariates={**clean.covariates, "encoder.joint_3": spoilt}))
+    assert not any("encoder" in warning for warning in agreeing.warnings)
+    told = next(warning for warning in denying.warnings if "encoder.joint_3" in warning)
+    assert "3 of 120 rows" in told
+    assert f"row {int(clean.rows[10])}" in told
+    assert "fault of the log" in told
+    assert denying.verdict == agreeing.verdict == ("drift",)

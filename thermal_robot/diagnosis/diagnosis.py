@@ -26,6 +26,7 @@ from thermal_robot.errors import CampaignError
 from thermal_robot.estimation.fit import Fit, fit
 
 _DOUBTFUL = 0.5
+_CONTRADICTED = 0.01  # rad or m: no servo that has settled is as far from its command
 
 
 def diagnose(
@@ -79,7 +80,7 @@ def diagnose(
     progress("places")
     shares = {name: value for name, (value, _) in shrinkage.shares.items()}
     where, locations = locate(fitted, shares)
-    doubts = stand_ins(fitted) if looked.remaining.flagged else {}
+    doubts = stand_ins(fitted) if looked.remaining.flagged or looked.found else {}
     systematic = findings(fitted, shrinkage.shares, locations, doubts)
     chance = [f for f in looked.chance.findings if f.name not in without and (not only or f.name in only)]
     found = in_order((*systematic, *chance))
@@ -126,6 +127,7 @@ def _usable(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
         # nothing says how the target is turned there
         notes.append("orientation was measured, but sim.* predicts positions only: orientation is left out")
         campaign = replace(campaign, orientation=None, noise_orientation=None)
+    notes += _contradicted(campaign)
     # a real repetition may well measure the same digits, but not in the same second and conditions
     recorded = [values[:, None] for values in campaign.covariates.values()]
     table = np.hstack([campaign.q, np.asarray(campaign.position), *recorded])
@@ -135,6 +137,27 @@ def _usable(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
         notes.append(f"{copies} rows repeat another one to the last digit: these copies are left out")
         campaign = campaign.take(first)
     return campaign, tuple(notes)
+
+
+def _contradicted(campaign: Campaign) -> list[str]:
+    """Say where the controller's own readings deny that the robot went where it was sent: a fault of the log."""
+    found = []
+    for j, name in enumerate(campaign.robot.joint_names):
+        read = campaign.covariates.get(f"encoder.{name}")
+        if read is None:
+            continue
+        away = read - campaign.q[:, j]
+        middle = float(np.median(away))
+        wrong = np.flatnonzero(np.abs(away - middle) > _CONTRADICTED)
+        if len(wrong):
+            first = int(campaign.rows[wrong[0]])
+            found.append(
+                f"encoder.{name} contradicts the commands in {len(wrong)} of {campaign.samples} rows, first in "
+                f"row {first}, by up to {np.abs(away - middle).max():.2g}: that is a fault of the log, not of the robot"
+            )
+        elif abs(middle) > _CONTRADICTED:
+            found.append(f"encoder.{name} is {middle:.3g} from the commands throughout: another zero, or another unit")
+    return found
 
 
 def _doubts(fitted: Fit, considered: Sequence[Effect]) -> tuple[str, ...]:

@@ -10,10 +10,13 @@ from numpy.typing import NDArray
 from thermal_robot.diagnosis.laws import smooth_law
 from thermal_robot.effects.discovered import PREFIX
 from thermal_robot.effects.quantity import quantities
+from thermal_robot.estimation.discover import instead
 from thermal_robot.estimation.fit import Fit
 from thermal_robot.estimation.scan import Target
 
 Array = NDArray[np.float64]
+
+_MOST = 4  # effects, of the largest share, for which a law is looked for in their place
 
 
 @dataclass(frozen=True)
@@ -32,7 +35,8 @@ def stand_ins(fit: Fit) -> dict[str, StandIn]:
     that: the effect was taken for something that it is not. The belief is 1/(1 + e^g), with g the gain in log
     evidence of the best such law (Bayes information criterion) less the logarithm of the number that were tried.
 
-    Only asked where a remainder is left: it is that which the effect would be spoilt by.
+    Where a law was discovered, or a remainder is left, an unlisted cause is at work, which may enter at several places:
+    then the best law that could take the effect's own place is weighed against it, too.
     """
     e = fit.explanation
     columns = [e.linear.blocks[b].columns for b in e.best.blocks]
@@ -47,10 +51,14 @@ def stand_ins(fit: Fit) -> dict[str, StandIn]:
     found = {}
     for name, moved in known:
         gains = {q: target.gain(moved[:, :, None] * law[:, None, :]) for q, law in laws.items() if law.shape[1]}
-        if not gains:
-            continue
-        quantity = max(gains, key=lambda q: gains[q])
-        gain = gains[quantity] - float(np.log(tried))
-        if gain > 0.0:
-            found[name] = StandIn(float(1.0 / (1.0 + np.exp(min(gain, 50.0)))), quantity)
+        if gains:
+            quantity = max(gains, key=lambda q: gains[q])
+            gain = gains[quantity] - float(np.log(tried))
+            if gain > 0.0:
+                found[name] = StandIn(float(1.0 / (1.0 + np.exp(min(gain, 50.0)))), quantity)
+    for name in [n for n, _ in known if n not in found][:_MOST]:
+        rival = instead(fit, name)
+        if rival is not None:
+            law, gain = rival
+            found[name] = StandIn(float(1.0 / (1.0 + np.exp(np.clip(gain, -50.0, 50.0)))), law.quantity)
     return found

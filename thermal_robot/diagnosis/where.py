@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 from thermal_robot.diagnosis.laws import smooth_law
 from thermal_robot.diagnosis.result import Location, Where
 from thermal_robot.effects.quantity import quantities
+from thermal_robot.estimation.columns import Block, column
 from thermal_robot.estimation.fit import Fit
+from thermal_robot.observations import Observations
 
 Array = NDArray[np.float64]
 
@@ -43,9 +45,8 @@ def locate(fit: Fit, shrinkage: dict[str, float]) -> tuple[Where, dict[str, tupl
     for b, (effect, values) in zip(e.best.blocks, fit.effects, strict=True):
         block = e.linear.blocks[b]
         power: dict[tuple[str, str], float] = {}
-        for site in dict.fromkeys((p.kind, p.place) for p in block.parameters):
-            mine = [k for k, p in enumerate(block.parameters) if (p.kind, p.place) == site]
-            moved = (block.columns[rows][:, :, mine] @ values[mine]).ravel()
+        for site, displaced in _displaced(fit.corrected, block, values).items():
+            moved = displaced[rows].ravel()
             if basis is not None:
                 moved = moved - basis @ (basis.T @ moved)
             power[site] = float((moved.reshape(len(rows), -1)[:, :3] ** 2).sum())
@@ -62,6 +63,27 @@ def locate(fit: Fit, shrinkage: dict[str, float]) -> tuple[Where, dict[str, tupl
         {name: by_kind[kind][name] for name in order[kind] if name in by_kind[kind]} for kind in ("joint", "link")
     )
     return Where(_axes(gap), joints, bodies, _covariates(fit, gap, rows)), locations
+
+
+def _displaced(observations: Observations, block: Block, values: Array) -> dict[tuple[str, str], Array]:
+    """(N, m) displacement by place; a parameter that acts on all links at once is shared out by its responses."""
+    found: dict[tuple[str, str], Array] = {}
+    segments = observations.robot.segments
+    for k, parameter in enumerate(block.parameters):
+        if parameter.place:
+            parts = [((parameter.kind, parameter.place), block.columns[:, :, k])]
+        else:
+            named = {"segment": [s.parent_link for s in segments], "joint": observations.robot.joint_names}
+            parts = [
+                (
+                    (parameter.kind, named[r.channel][r.index] if r.channel in named else r.channel),
+                    column(observations, r, block.columns.shape[1]),
+                )
+                for r in parameter.responses
+            ]
+        for site, columns in parts:
+            found[site] = found.get(site, 0.0) + columns * values[k]
+    return found
 
 
 def _axes(gap: Array) -> dict[str, float]:

@@ -19,6 +19,7 @@ from thermal_robot.estimation.scan import CLOCK, Scanned, Target, scan, shaped
 Array = NDArray[np.float64]
 
 _SHAPED = 6  # candidates of each remainder whose shape is looked at
+_INSTEAD = 3
 _COMPARED = 8  # candidates that are compared jointly with the known effects
 _IN_TIME = float(np.log(3.0))
 _LEAST = 6.0  # log evidence that a law must bring over none
@@ -153,6 +154,31 @@ def _compare(fit: Fit, laws: Sequence[Discovered], tried: int) -> Discovery | No
         tuple(sorted(places.items(), key=lambda item: -item[1])),
         tuple(sorted(followed.items(), key=lambda item: -item[1])),
     )
+
+
+def instead(fit: Fit, name: str) -> tuple[Discovered, float] | None:
+    """Return the law that could best take a known effect's place, and its gain in log evidence over that effect.
+
+    Where an unlisted cause is at work already, one more place costs a law only the choice of that place.
+    """
+    e = fit.explanation
+    rest = tuple(b for b in e.best.blocks if fit.families[b] != name)
+    columns = [e.linear.blocks[b].columns for b in rest]
+    target = Target.of(e.linear.gap, np.concatenate([e.linear.frames, *columns], axis=2))
+    found, _ = scan(fit.corrected, [target])
+    laws = [shaped(fit.corrected, target, item.law).law for item in _with_joints(found[0])[:_INSTEAD]]
+    if not laws:
+        return None
+    known = len(e.linear.blocks)
+    linear = Linear(e.linear.gap, e.linear.frames, (*e.linear.blocks, *(block(fit.corrected, law) for law in laws)))
+    problem = gram(linear, e.whitening)
+    places = fit.campaign.robot.n + len(fit.campaign.robot.segments)
+    prior = [*log_priors(fit.families, fit.rarity), *[-float(np.log(places))] * len(laws)]
+    search = Search(problem.tempered(e.design_effect), prior)
+    now = search.evaluate(e.best.blocks).log_evidence
+    gains = [search.evaluate((*rest, known + k)).log_evidence - now for k in range(len(laws))]
+    best = int(np.argmax(gains))
+    return laws[best], gains[best]
 
 
 def _climb(search: Search, best: Combination, known: int, barred: frozenset[int] = frozenset()) -> Combination:

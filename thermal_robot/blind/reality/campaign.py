@@ -196,6 +196,11 @@ def _truth(
         main = any(fault is other for other, _ in done)
         listed = where if fault.few else []
         parts[fault.name] = {"ratio": ratio, "main": main, "places": _named(listed)}
+        for other, columns in fault.also:
+            part = np.zeros_like(values)
+            part[:, list(columns)] = values[:, list(columns)]
+            ratio = gauge.rms(gauge.left(gauge.moved(fault, part))) / noise
+            parts.setdefault(other, {"ratio": ratio, "main": False, "places": _named(listed)})
         asked = fault.name == case.unlisted or case.kind in ("removed", "hidden")
         if main and asked:
             answers += _named([*where, *_joints_of(gauge.setting, fault, [item[1] for item in clear])])

@@ -40,6 +40,8 @@ class Fault:
         (setting) → names of columns, each a right answer to what it follows.
     random
         Whether it scatters anew at every visit.
+    also
+        Names of other effects that do part of it by definition, each with the columns of the values that do.
     fixed
         Columns of the values that are no size (a phase, a time constant), each with the settings that span it.
     """
@@ -52,6 +54,7 @@ class Fault:
     wants: tuple[str, ...] = ()
     quantities: Callable[[Setting, Sequence[Place]], Sequence[str]] = lambda setting, places: ()
     random: bool = False
+    also: tuple[tuple[str, tuple[int, ...]], ...] = ()
     fixed: tuple[tuple[int, tuple[float, ...]], ...] = ()
 
     def scaled(self, values: Array, factor: float) -> Array:
@@ -281,6 +284,8 @@ FAULTS: dict[str, Fault] = {
             few=True,
             wants=("moving",),
             quantities=lambda s, places: [f"velocity.{n}" for _, n in places] + [f"approach.{n}" for _, n in places],
+            # a step of dry friction against the way is what formats.md calls lost motion
+            also=(("backlash", (1,)),),
         ),
         Fault(
             "geometric",
