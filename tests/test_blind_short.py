@@ -18,12 +18,12 @@ from thermal_robot.report.blind_text import blind_text
 CHANCE = 1e-4
 """Share of sound commits that may fail by bad luck, a floor."""
 REACHED = {
-    ("single", "exact"): 0.70,
+    ("single", "exact"): 0.95,
     ("null", "exact"): 0.95,
-    ("pair", "first_named"): 0.85,
-    ("hard", "first_named"): 0.55,
+    ("pair", "exact"): 0.90,
+    ("hard", "first_named"): 0.85,
     ("unlisted", "flagged"): 0.95,
-    ("unlisted", "place"): 0.70,
+    ("unlisted", "place"): 0.85,
     ("removed", "flagged"): 0.90,
 }
 """Rates of the full trial (README), rounded down."""
