@@ -55,13 +55,11 @@ def gravity_torques(
     """
     frames = chain_frames(robot, q) if frames is None else frames
     chain, rows = robot.chain, len(frames.tool_position)
-    rotations, positions = np.moveaxis(frames.rotations, 0, -1), np.moveaxis(frames.positions, 0, -1)
-    tool_rotation, tool_position = np.moveaxis(frames.tool_rotation, 0, -1), frames.tool_position.T
-    mass, com = _payload(payload, payload_com, rows)
+    rotations, positions, tool_rotation, tool_position = _rows_last(frames)
+    # From the tool inwards: what a joint carries is what the next one carries plus its own bodies.
+    mass, moment = _at_the_tool(frames, payload, payload_com)
 
     torques = np.empty((rows, robot.n))
-    # From the tool inwards: what a joint carries is what the next one carries plus its own bodies.
-    moment = mass * (tool_position + np.einsum("ijn,j->in", tool_rotation, com))
     for j in range(robot.n - 1, -1, -1):
         k = chain.movable[j]
         last = k + 1 == len(chain.names)
@@ -106,10 +104,8 @@ def segment_loads(
     """
     frames = chain_frames(robot, q) if frames is None else frames
     chain, rows = robot.chain, len(frames.tool_position)
-    rotations, positions = np.moveaxis(frames.rotations, 0, -1), np.moveaxis(frames.positions, 0, -1)
-    tool_rotation, tool_position = np.moveaxis(frames.tool_rotation, 0, -1), frames.tool_position.T
-    mass, com = _payload(payload, payload_com, rows)
-    moment = mass * (tool_position + np.einsum("ijn,j->in", tool_rotation, com))
+    rotations, positions, tool_rotation, tool_position = _rows_last(frames)
+    mass, moment = _at_the_tool(frames, payload, payload_com)
     segment_of = {int(k): s for s, k in enumerate(chain.placed)}
     joint_of = {int(k): j for j, k in enumerate(chain.movable)}
     gravity = robot.gravity[:, None]
@@ -168,6 +164,23 @@ def static_regressor(robot: Robot, q: ArrayLike, *, frames: ChainFrames | None =
             else:
                 regressor[:, j, b, 0] = -axis @ robot.gravity
     return regressor
+
+
+def _rows_last(frames: ChainFrames) -> tuple[Array, Array, Array, Array]:
+    """Rotations and positions of the chain and of the tool with the rows last, as sums over bodies want them."""
+    return (
+        np.moveaxis(frames.rotations, 0, -1),
+        np.moveaxis(frames.positions, 0, -1),
+        np.moveaxis(frames.tool_rotation, 0, -1),
+        frames.tool_position.T,
+    )
+
+
+def _at_the_tool(frames: ChainFrames, payload: ArrayLike | None, payload_com: ArrayLike) -> tuple[Array, Array]:
+    """(N,) mass of the payload, kg, and its (3, N) first moment in the root frame, kg·m."""
+    *_, rotation, position = _rows_last(frames)
+    mass, com = _payload(payload, payload_com, position.shape[1])
+    return mass, mass * (position + np.einsum("ijn,j->in", rotation, com))
 
 
 def _payload(payload: ArrayLike | None, com: ArrayLike, rows: int) -> tuple[Array, Array]:
