@@ -101,7 +101,8 @@ def test_a_prediction_is_held_against_where_the_target_really_is(whole):
         after = rms(predicted[record["id"]], answers[record["id"]]["fresh_position"])
         assert record["fresh"]["rms_after"] == pytest.approx(after, rel=1e-9)
         assert record["fresh"]["rms_before"] == pytest.approx(5e-3)
-    assert records[0]["fresh"]["rms_after"] < 25e-6 < records[1]["fresh"]["rms_after"]
+    # where the effect is taken from the library, a law describes it less well
+    assert records[0]["fresh"]["rms_after"] < 0.7 * records[1]["fresh"]["rms_after"]
 
 
 def test_a_campaign_is_made_twice_to_the_same_byte(whole, tmp_path):

@@ -6,8 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
-from simulate import commands, random_motion
+from simulate import commands, random_motion, simulate
 
+from thermal_robot import diagnose
 from thermal_robot.campaign import Campaign, Units
 from thermal_robot.diagnosis.separate import candidates, next_samples
 from thermal_robot.effects import choose, library
@@ -279,3 +280,14 @@ def test_it_takes_no_time():
         next_samples(found)
         took.append(time.perf_counter() - start)
     assert min(took) < 0.15
+
+
+def test_with_both_frames_known_and_nothing_found_it_still_answers(rv_m2):
+    plain = simulate(rv_m2, seed=3)[0]
+    here = observe(plain, Frames.declared(plain))
+    rng = np.random.default_rng(3)
+    position = here.predicted_position + 25e-6 * rng.normal(size=(plain.samples, 3))
+    found = diagnose(replace(plain, position=position, base_known=True, tool_known=True))
+    assert found.verdict == ()
+    for row in found.to_dict()["next"]["samples"]:
+        assert set(row["joints"]) == set(rv_m2.joint_names)

@@ -28,11 +28,11 @@ SHORT = {"single": 16, "pair": 8, "triple": 2, "null": 8, "hard": 10, "removed":
 FULL = {
     "single": 200,
     "pair": 100,
-    "triple": 40,
+    "triple": 20,
     "null": 100,
     "hard": 200,
-    "removed": 60,
-    "hidden": 40,
+    "removed": 40,
+    "hidden": 24,
     "unlisted": 108,
 }
 

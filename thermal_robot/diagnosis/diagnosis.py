@@ -13,9 +13,10 @@ from threadpoolctl import threadpool_limits
 from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.diagnosis.attribute import findings, in_order
-from thermal_robot.diagnosis.discovery import discoveries
+from thermal_robot.diagnosis.discovery import Discoveries, discoveries
 from thermal_robot.diagnosis.heldout import Shrinkage, held_out
-from thermal_robot.diagnosis.result import Diagnosis, Gap, Rows
+from thermal_robot.diagnosis.random_gap import STEPS
+from thermal_robot.diagnosis.result import Diagnosis, Finding, Gap, Rows
 from thermal_robot.diagnosis.schemes import FoldScheme, worst_folds
 from thermal_robot.diagnosis.sensitivity import sensitivity
 from thermal_robot.diagnosis.stand_in import StandIn, stand_ins
@@ -26,6 +27,7 @@ from thermal_robot.errors import CampaignError
 from thermal_robot.estimation.fit import Fit, fit
 
 _DOUBTFUL = 0.5
+_SEEN = 1e-3
 _CONTRADICTED = 0.01  # rad or m: no servo that has settled is as far from its command
 
 
@@ -82,7 +84,7 @@ def diagnose(
     where, locations = locate(fitted, shares)
     doubts = stand_ins(fitted) if looked.remaining.flagged or looked.found else {}
     systematic = findings(fitted, shrinkage.shares, locations, doubts)
-    chance = [f for f in looked.chance.findings if f.name not in without and (not only or f.name in only)]
+    chance = [f for f in _scatter(looked) if f.name not in without and (not only or f.name in only)]
     found = in_order((*systematic, *chance))
     order = [f.name for f in found if f.name in {e.name for e, _ in fitted.effects}]
     order += [f.name for f in chance if f.status == "found"]
@@ -137,6 +139,30 @@ def _usable(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
         notes.append(f"{copies} rows repeat another one to the last digit: these copies are left out")
         campaign = campaign.take(first)
     return campaign, tuple(notes)
+
+
+def _scatter(looked: Discoveries) -> tuple[Finding, ...]:
+    """Return what is said of the random effects.
+
+    Where an unlisted cause is at work what differs from pose to pose may be its doing: steps of an encoder are then
+    only believed where they are seen.
+    """
+    seen = any(p < _SEEN for p in looked.chance.steps.values())
+    if seen or not looked.remaining.flagged:
+        return looked.chance.findings
+    return tuple(
+        replace(
+            f,
+            status="not_found",
+            probability=0.5 * (f.probability or 0.0),
+            locations=(),
+            parameters=(),
+            confounded_with=(),
+        )
+        if f.name == STEPS and f.status in ("found", "confounded")
+        else f
+        for f in looked.chance.findings
+    )
 
 
 def _contradicted(campaign: Campaign) -> list[str]:

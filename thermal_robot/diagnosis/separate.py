@@ -264,7 +264,7 @@ def _expected(fit: Fit, offered: Observations, leading: Sequence[Combination]) -
     index = sorted({b for combination in leading for b in combination.blocks})
     items = [e.linear.blocks[b] for b in index]
     known = np.concatenate([e.linear.frames, *(i.columns for i in items), e.linear.gap[:, :, None]], axis=2)[used]
-    whole = (known * weight[:, :, None]).reshape(-1, known.shape[2])
+    whole = (known * weight[:, :, None]).reshape(weight.size, known.shape[2])
     gram = whole.T @ whole
     # the simulator's own tool is never refitted: its columns come last and are left out
     columns = [frame_columns(offered)[0][:, :, :flat], *(block(offered, i.effect).columns for i in items)]
@@ -289,7 +289,7 @@ def _expected(fit: Fit, offered: Observations, leading: Sequence[Combination]) -
 def _root(design: Array, precision: Array) -> Array:
     """(K, m, p) root of the covariance of design · N(0, precision⁻¹)."""
     factor = np.linalg.cholesky(precision)
-    flat = design.reshape(-1, design.shape[2])
+    flat = design.reshape(design.shape[0] * design.shape[1], design.shape[2])  # there may be no column
     return np.asarray(np.linalg.solve(factor, flat.T).T.reshape(design.shape))
 
 
@@ -298,7 +298,7 @@ class _Conditional:
 
     def __init__(self, root: Array, chosen: Sequence[int]) -> None:
         measures = root.shape[1]
-        past = root[list(chosen)].reshape(-1, root.shape[2])
+        past = root[list(chosen)].reshape(len(chosen) * measures, root.shape[2])
         own = np.einsum("nap,nbp->nab", root, root) + np.eye(measures)
         self.own, self.cross, self.past = own, root @ past.T, past @ past.T + np.eye(len(past))
         self.gain = self.cross @ np.linalg.inv(self.past)

@@ -10,9 +10,8 @@ from numpy.typing import NDArray
 from thermal_robot.diagnosis.laws import smooth_law
 from thermal_robot.effects.discovered import PREFIX
 from thermal_robot.effects.quantity import quantities
-from thermal_robot.estimation.discover import instead
+from thermal_robot.estimation.discover import Thin, instead
 from thermal_robot.estimation.fit import Fit
-from thermal_robot.estimation.scan import Target
 
 Array = NDArray[np.float64]
 
@@ -38,10 +37,10 @@ def stand_ins(fit: Fit) -> dict[str, StandIn]:
     Where a law was discovered, or a remainder is left, an unlisted cause is at work, which may enter at several places:
     then the best law that could take the effect's own place is weighed against it, too.
     """
-    e = fit.explanation
-    columns = [e.linear.blocks[b].columns for b in e.best.blocks]
-    target = Target.of(e.linear.gap, np.concatenate([e.linear.frames, *columns], axis=2))
-    laws = {name: smooth_law(values) for name, values in quantities(fit.corrected).items()}
+    e, thin = fit.explanation, Thin.of(fit)
+    columns = [thin.linear.blocks[b].columns for b in e.best.blocks]
+    target = thin.target(e.best.blocks)
+    laws = {name: smooth_law(values) for name, values in quantities(thin.observations).items()}
     known = [
         (effect.name, block @ values)
         for (effect, values), block in zip(fit.effects, columns, strict=True)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,17 +12,64 @@ from thermal_robot.effects.discovered import PREFIX, Discovered
 from thermal_robot.estimation.columns import block
 from thermal_robot.estimation.evidence import Combination, Search
 from thermal_robot.estimation.explain import PRIOR_PROBABILITY, log_priors
-from thermal_robot.estimation.fit import Fit
+from thermal_robot.estimation.fit import Fit, corrected_observations
 from thermal_robot.estimation.linear import Linear, Whitening, contained, gram
 from thermal_robot.estimation.scan import CLOCK, Scanned, Target, scan, shaped
+from thermal_robot.observations import Observations
 
 Array = NDArray[np.float64]
 
 _SHAPED = 6  # candidates of each remainder whose shape is looked at
 _INSTEAD = 3
+_ENOUGH_ROWS = 1500
+_SEED = 61
 _COMPARED = 8  # candidates that are compared jointly with the known effects
 _IN_TIME = float(np.log(3.0))
 _LEAST = 6.0  # log evidence that a law must bring over none
+
+
+@dataclass(frozen=True, eq=False)
+class Thin:
+    """As many rows of a fit as a scan needs: all of them, or some drawn at random where there are very many.
+
+    Attributes
+    ----------
+    observations
+        Of the corrected model, at these rows.
+    linear
+        The problem there, whitening its weights and noise.
+    remainder
+        (M, m) what the explanation leaves.
+    """
+
+    observations: Observations
+    linear: Linear
+    whitening: Whitening
+    remainder: Array
+
+    @classmethod
+    def of(cls, fit: Fit) -> Thin:
+        """Return the rows of a fit."""
+        e = fit.explanation
+        if fit.campaign.samples <= _ENOUGH_ROWS:
+            return cls(fit.corrected, e.linear, e.whitening, e.remainder)
+        drawn = np.random.default_rng(_SEED).choice(fit.campaign.samples, _ENOUGH_ROWS, replace=False)
+        rows = np.sort(drawn)
+        return cls(
+            corrected_observations(fit.campaign.take(rows), fit.corrected.frames, fit.effects),
+            Linear(
+                e.linear.gap[rows],
+                e.linear.frames[rows],
+                tuple(replace(b, columns=b.columns[rows]) for b in e.linear.blocks),
+            ),
+            replace(e.whitening, weights=e.whitening.weights[rows]),
+            e.remainder[rows],
+        )
+
+    def target(self, blocks: Iterable[int]) -> Target:
+        """Return what is left when frames and some blocks are projected out."""
+        columns = [self.linear.blocks[b].columns for b in blocks]
+        return Target.of(self.linear.gap, np.concatenate([self.linear.frames, *columns], axis=2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,20 +114,14 @@ def discover(fit: Fit, number: int) -> Discovery | None:
     number
         Of the law: it is called ``discovered.<number>``.
     """
-    e = fit.explanation
-    held = [e.linear.blocks[b].columns for b in e.best.blocks]
-    laws_held = [
-        block_.columns
-        for block_, b in ((e.linear.blocks[b], b) for b in e.best.blocks)
-        if fit.families[b].startswith(PREFIX)
-    ]
-    after = Target.of(e.linear.gap, np.concatenate([e.linear.frames, *held], axis=2))
-    before = Target.of(e.linear.gap, np.concatenate([e.linear.frames, *laws_held], axis=2))
-    found, tried = scan(fit.corrected, [after, before])
+    e, thin = fit.explanation, Thin.of(fit)
+    after = thin.target(e.best.blocks)
+    before = thin.target(b for b in e.best.blocks if fit.families[b].startswith(PREFIX))
+    found, tried = scan(thin.observations, [after, before])
     candidates: list[Scanned] = []
     for target, own in zip((after, before), found, strict=True):
         for item in _with_joints(own):
-            best = shaped(fit.corrected, target, item.law)
+            best = shaped(thin.observations, target, item.law)
             if best.gain > 0.0:
                 candidates.append(best)
     laws = list(dict.fromkeys(c.law for c in sorted(candidates, key=lambda c: -c.gain)))
@@ -88,7 +129,7 @@ def discover(fit: Fit, number: int) -> Discovery | None:
     chosen = _in_turn([[c.law for c in _of(candidates, own)] for own in found], laws)[:_COMPARED]
     if not chosen:
         return None
-    return _compare(fit, [replace(law, name=f"{PREFIX}{number}") for law in chosen], tried)
+    return _compare(fit, thin, [replace(law, name=f"{PREFIX}{number}") for law in chosen], tried)
 
 
 def _with_joints(own: Sequence[Scanned]) -> list[Scanned]:
@@ -110,12 +151,11 @@ def _in_turn(lists: Sequence[Sequence[Discovered]], everything: Sequence[Discove
     return list(dict.fromkeys([*turns, *everything]))
 
 
-def _compare(fit: Fit, laws: Sequence[Discovered], tried: int) -> Discovery | None:
+def _compare(fit: Fit, thin: Thin, laws: Sequence[Discovered], tried: int) -> Discovery | None:
     """Climb over the known effects and one law at a time; what the law's presence allows to go, goes."""
     e = fit.explanation
     known = len(e.linear.blocks)
-    linear = Linear(e.linear.gap, e.linear.frames, (*e.linear.blocks, *(block(fit.corrected, law) for law in laws)))
-    problem = gram(linear, _all_rows(fit))
+    problem = gram(_with(thin, laws), _all_rows(fit, thin))
     odds = float(np.log(PRIOR_PROBABILITY / (1 - PRIOR_PROBABILITY)))
     rarity = -float(np.log(tried))
     families = [*fit.families, *(law.name for law in laws)]
@@ -163,15 +203,14 @@ def instead(fit: Fit, name: str) -> tuple[Discovered, float] | None:
     """
     e = fit.explanation
     rest = tuple(b for b in e.best.blocks if fit.families[b] != name)
-    columns = [e.linear.blocks[b].columns for b in rest]
-    target = Target.of(e.linear.gap, np.concatenate([e.linear.frames, *columns], axis=2))
-    found, _ = scan(fit.corrected, [target])
-    laws = [shaped(fit.corrected, target, item.law).law for item in _with_joints(found[0])[:_INSTEAD]]
+    thin = Thin.of(fit)
+    target = thin.target(rest)
+    found, _ = scan(thin.observations, [target])
+    laws = [shaped(thin.observations, target, item.law).law for item in _with_joints(found[0])[:_INSTEAD]]
     if not laws:
         return None
     known = len(e.linear.blocks)
-    linear = Linear(e.linear.gap, e.linear.frames, (*e.linear.blocks, *(block(fit.corrected, law) for law in laws)))
-    problem = gram(linear, e.whitening)
+    problem = gram(_with(thin, laws), thin.whitening)
     places = fit.campaign.robot.n + len(fit.campaign.robot.segments)
     prior = [*log_priors(fit.families, fit.rarity), *[-float(np.log(places))] * len(laws)]
     search = Search(problem.tempered(e.design_effect), prior)
@@ -198,16 +237,21 @@ def _climb(search: Search, best: Combination, known: int, barred: frozenset[int]
         best = better
 
 
-def _all_rows(fit: Fit) -> Whitening:
+def _with(thin: Thin, laws: Sequence[Discovered]) -> Linear:
+    """Return the problem with further blocks for laws."""
+    linear = thin.linear
+    return Linear(linear.gap, linear.frames, (*linear.blocks, *(block(thin.observations, law) for law in laws)))
+
+
+def _all_rows(fit: Fit, thin: Thin) -> Whitening:
     """Weigh every row, those set aside by how far they lie: under another explanation they may be sound."""
-    e = fit.explanation
     stated = (fit.campaign.noise_position, fit.campaign.noise_orientation)
-    noise = e.whitening.noise.copy()
+    noise = thin.whitening.noise.copy()
     for part, sigma in enumerate(stated[: len(noise) // 3]):
         if sigma is not None:
             noise[3 * part : 3 * part + 3] = np.minimum(noise[3 * part : 3 * part + 3], 2.0 * sigma)
-    distance2 = ((e.remainder / e.whitening.noise) ** 2).sum(axis=1) / e.linear.measures
-    return Whitening(np.minimum(1.0, 9.0 / np.maximum(distance2, 1e-300)), noise, e.whitening.held)
+    distance2 = ((thin.remainder / thin.whitening.noise) ** 2).sum(axis=1) / thin.linear.measures
+    return Whitening(np.minimum(1.0, 9.0 / np.maximum(distance2, 1e-300)), noise, thin.whitening.held)
 
 
 def where(fit: Fit, law: Discovered) -> tuple[str, str]:

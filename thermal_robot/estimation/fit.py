@@ -262,7 +262,7 @@ def _gauss_newton(
     def pairs() -> list[tuple[Effect, Array]]:
         return list(zip(effects, np.split(state, ends), strict=True)) if effects else []
 
-    observations = _corrected(campaign, frames, pairs())
+    observations = corrected_observations(campaign, frames, pairs())
     for _ in range(_STEPS):
         flat, names = frame_columns(observations)
         columns = [block(observations, effect).columns for effect in effects]
@@ -270,7 +270,7 @@ def _gauss_newton(
         step, size = _ridge_step(design, observations.gap[used].ravel() * root, state, prior)
         frames = moved(frames, step[: len(names)], names)
         state = state + step[len(names) :]
-        observations = _corrected(campaign, frames, pairs())
+        observations = corrected_observations(campaign, frames, pairs())
         if size < 1e-4:
             break
     return observations, pairs()
@@ -292,7 +292,7 @@ def _ridge_step(design: Array, gap: Array, state: Array, prior: Array) -> tuple[
     return step / length, float(np.abs(step).max(initial=0.0))
 
 
-def _corrected(campaign: Campaign, frames: Frames, pairs: Sequence[tuple[Effect, Array]]) -> Observations:
+def corrected_observations(campaign: Campaign, frames: Frames, pairs: Sequence[tuple[Effect, Array]]) -> Observations:
     """Observe with the effects at work; their responses are read from the nominal robot, as prediction reads them."""
     moved_by, instrument = displacement(observe(campaign, frames), pairs)
     return observe(campaign, frames, displacement=moved_by, instrument=instrument)

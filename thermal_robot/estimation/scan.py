@@ -22,8 +22,6 @@ _REFINEMENTS = 10
 CLOCK = ("time", "order")
 _FEW = 6
 _QUANTITIES_OF_LINKS = 6
-_ENOUGH_ROWS = 1500
-_SEED = 61
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,31 +91,24 @@ class Target:
 
     Attributes
     ----------
-    rows
-        Those that are looked at.
     white
-        (M·m,) remainder, weighted and over the noise.
+        (N·m,) remainder, weighted and over the noise.
     root
-        (M, m) what columns are multiplied with.
+        (N, m) what columns are multiplied with.
     basis
-        (M·m, r) orthonormal: the design.
+        (N·m, r) orthonormal: the design.
     """
 
-    rows: NDArray[np.int64]
     white: Array
     root: Array
     basis: Array
 
     @classmethod
-    def of(cls, gap: Array, design: Array, use: NDArray[np.bool_] | None = None) -> Target:
+    def of(cls, gap: Array, design: Array) -> Target:
         """Project a design (N, m, K) out of a gap (N, m), robustly: rows far from the rest weigh little (Cauchy)."""
-        rows = np.arange(len(gap)) if use is None else np.flatnonzero(use)
-        if len(rows) > _ENOUGH_ROWS:
-            rows = np.sort(np.random.default_rng(_SEED).choice(rows, _ENOUGH_ROWS, replace=False))
-        gap, design = gap[rows], design[rows]
         measures = gap.shape[1]
         noise = np.repeat(robust_noise(gap), 3)
-        weight = np.ones(len(rows))
+        weight = np.ones(len(gap))
         for _ in range(4):
             root = np.sqrt(weight)[:, None] / noise
             flat = (design * root[:, :, None]).reshape(root.size, design.shape[2])
@@ -127,11 +118,11 @@ class Target:
             left = white.reshape(gap.shape) / root
             noise = np.repeat(robust_noise(left), 3)
             weight = 1.0 / (1.0 + ((left / noise) ** 2).sum(axis=1) / (3.0 * measures))
-        return cls(rows, white, root, basis)
+        return cls(white, root, basis)
 
     def gain(self, columns: Array) -> float:
         """Return the gain in log evidence of (N, m, K) further columns: ½ ν ln(S₀/S₁) − ½ k ln ν."""
-        flat = (columns[self.rows] * self.root[:, :, None]).reshape(len(self.white), -1)
+        flat = (columns * self.root[:, :, None]).reshape(len(self.white), -1)
         flat = flat - self.basis @ (self.basis.T @ flat)
         flat = flat / (np.linalg.norm(flat, axis=0) + 1e-300)
         value, vector = np.linalg.eigh(flat.T @ flat)
