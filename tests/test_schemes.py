@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from simulate import demo, simulate
 
-from thermal_robot.diagnosis.schemes import least_favourable, worst_folds
+from thermal_robot.diagnosis.schemes import worst_folds
 from thermal_robot.effects import choose
 from thermal_robot.estimation.fit import fit
 
@@ -65,8 +65,6 @@ def test_schemes_come_in_order_and_say_what_they_are(warm):
                 assert s.shrinkage == pytest.approx(1.0 - (s.rms_after / s.rms_before) ** 2)
             assert (schemes["session"].folds, schemes["time"].folds, schemes["temperature"].folds) == (4, 5, 2)
             assert schemes["reach"].rows == pytest.approx(0.2 * schemes["time"].rows, abs=1)
-            said = least_favourable(tuple(schemes.values()))
-            assert said.startswith(f"Least favourable: held out by {next(iter(schemes))} ")
 
 
 def test_folds_by_time_are_those_of_the_diagnosis(rv_m2):
@@ -90,7 +88,6 @@ def test_without_an_effect_nothing_shrinks(rv_m2):
     campaign, _, _ = simulate(rv_m2, [], seed=1)
     for scheme in worst_folds(fit(campaign, choose((), (), ()))):
         assert scheme.shrinkage == pytest.approx(0.0, abs=1e-9)
-    assert least_favourable(()) == ""
 
 
 def test_it_takes_no_time():

@@ -70,6 +70,8 @@ class Observations:
         of the user's own simulator, it stands here.
     instrument
         (N, 3) displacement of the measured point that the instrument adds, measurement frame, m.
+    displaced
+        Whether anything is displaced in the chain.
     """
 
     campaign: Campaign
@@ -78,6 +80,7 @@ class Observations:
     position: Array
     rotation: Array
     instrument: Array | None = None
+    displaced: bool = False
 
     @property
     def robot(self) -> Robot:
@@ -107,6 +110,11 @@ class Observations:
         """Tell whether a covariate was recorded and takes more than one value."""
         values = self.covariates.get(column)
         return values is not None and len(values) > 0 and bool(np.ptp(values) > 0)
+
+    @cached_property
+    def commanded(self) -> ChainFrames:
+        """The chain as it was commanded, nothing displaced: what effects follow must not depend on the effects."""
+        return chain_frames(self.robot, self.q) if self.displaced else self.chain
 
     @cached_property
     def torque(self) -> Array | None:
@@ -232,4 +240,4 @@ def observe(
         if campaign.simulated_orientation is not None:
             turn = chain.tool_rotation @ nominal.tool_rotation.transpose(0, 2, 1)
             rotation = turn @ quaternion_to_rotation(campaign.simulated_orientation)
-    return Observations(campaign, frames, chain, position, rotation, instrument)
+    return Observations(campaign, frames, chain, position, rotation, instrument, displacement is not None)

@@ -10,7 +10,6 @@ from scipy.special import chdtri
 
 from thermal_robot.diagnosis.discovery import is_law
 from thermal_robot.diagnosis.result import Estimate, Finding, Location, Status
-from thermal_robot.diagnosis.stand_in import StandIn
 from thermal_robot.effects.discovered import Discovered
 from thermal_robot.estimation.explain import Explanation
 from thermal_robot.estimation.fit import Fit
@@ -26,9 +25,12 @@ _ALIAS = 1e-6
 
 
 def findings(
-    fit: Fit, shares: Shares, locations: dict[str, tuple[Location, ...]], doubts: Mapping[str, StandIn]
+    fit: Fit, shares: Shares, locations: dict[str, tuple[Location, ...]], believed: Mapping[str, float]
 ) -> tuple[Finding, ...]:
-    """Return what is said of every candidate, in order of its held-out share; those not testable come last."""
+    """Return what is said of every candidate, in order of its held-out share; those not testable come last.
+
+    ``believed`` is what the probability of an effect of the explanation is multiplied with.
+    """
     e = fit.explanation
     explained = {effect.name: b for b, (effect, _) in zip(e.best.blocks, fit.effects, strict=True)}
     rivals = _rivals(fit, explained)
@@ -51,7 +53,7 @@ def findings(
             Finding(
                 name,
                 status,
-                probability=e.probability(own) * (doubts[name].belief if name in doubts else 1.0),
+                probability=e.probability(own) * believed.get(name, 1.0),
                 shrinkage=share,
                 shrinkage_ci95=interval,
                 confounded_with=confounded,

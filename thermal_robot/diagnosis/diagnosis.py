@@ -19,7 +19,7 @@ from thermal_robot.diagnosis.random_gap import STEPS
 from thermal_robot.diagnosis.result import Diagnosis, Finding, Gap, Rows
 from thermal_robot.diagnosis.schemes import FoldScheme, worst_folds
 from thermal_robot.diagnosis.sensitivity import sensitivity
-from thermal_robot.diagnosis.stand_in import StandIn, stand_ins
+from thermal_robot.diagnosis.stand_in import StandIn, stand_ins, trust
 from thermal_robot.diagnosis.verdict import advise, sentence
 from thermal_robot.diagnosis.where import locate
 from thermal_robot.effects import Effect, choose, library
@@ -83,13 +83,15 @@ def diagnose(
     shares = {name: value for name, (value, _) in shrinkage.shares.items()}
     where, locations = locate(fitted, shares)
     doubts = stand_ins(fitted) if looked.remaining.flagged or looked.found else {}
-    systematic = findings(fitted, shrinkage.shares, locations, doubts)
+    gap = _gap(fitted, shrinkage, looked.floor, looked.source, worst_folds(fitted))
+    left = min((looked.remaining.rms / gap.rms_before) ** 2, 1.0) if looked.remaining.flagged else 0.0
+    believed = trust({e.name: shares.get(e.name, 0.0) for e, _ in fitted.effects}, doubts, left)
+    systematic = findings(fitted, shrinkage.shares, locations, believed)
     chance = [f for f in _scatter(looked) if f.name not in without and (not only or f.name in only)]
     found = in_order((*systematic, *chance))
     order = [f.name for f in found if f.name in {e.name for e, _ in fitted.effects}]
     order += [f.name for f in chance if f.status == "found"]
-    gap = _gap(fitted, shrinkage, looked.floor, looked.source, worst_folds(fitted))
-    probability = min(_probability(fitted), *(d.belief for d in doubts.values()), 1.0)
+    probability = min(_probability(fitted), *believed.values(), 1.0)
     advice, separates = advise(found, unexplained)
     return Diagnosis(
         campaign=campaign.name,

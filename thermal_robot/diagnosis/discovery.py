@@ -137,7 +137,6 @@ def _told(first: Unexplained, left: Unexplained, found: Sequence[Discovery]) -> 
     locations = tuple(Location(kind, name, min(p, 1.0)) for (kind, name), p in places.items() if p >= _LIKELY)
     return replace(
         first,
-        reasons=(*first.reasons, *(f"{d.law.describe()} describes it" for d in found)),
         locations=locations,
         depends_on=tuple(Dependence(name, p) for name, p in followed.items()),
     )

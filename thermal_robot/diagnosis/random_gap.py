@@ -14,7 +14,7 @@ from thermal_robot.diagnosis.result import Estimate, Finding, Location, Status
 from thermal_robot.effects.quantity import quantities
 from thermal_robot.estimation.explain import distance_limit
 from thermal_robot.estimation.fit import Fit
-from thermal_robot.estimation.scatter import JointScatter, Scatter, joint_errors, variance_components
+from thermal_robot.estimation.scatter import JointScatter, Scatter, enough_rows, joint_errors, variance_components
 
 Array = NDArray[np.float64]
 
@@ -25,6 +25,7 @@ _MATERIAL_SCALE = 1.15  # a stated noise is no better known
 _MATERIAL_SHARE = 0.15  # of a scatter that a smooth law must explain to make it none
 _MOST_CELLS = 2_000_000
 _REFUTED = 0.01  # p-value above which errors that could show their steps have none
+_STEPPED = 0.4  # of the height that steps of the whole scatter would have, below which it is not made of steps
 _SURE = 0.5
 _ROUNDS = 3
 _BAND = 1.35  # the step is looked for within this factor of what the scatter's size says
@@ -39,7 +40,7 @@ class RandomGap:
     findings
         ``encoder_resolution`` and ``excess_repeatability``. Neither shrinks the gap: a mean cannot take scatter away.
     explains_size
-        Whether with this scatter what remains is no larger than the noise allows; scatter that is merely confounded
+        Whether there is scatter with which what remains is no larger than the noise allows; what is merely confounded
         does not count.
     p_value
         Of the χ² test of that.
@@ -100,7 +101,9 @@ def random_gap(fit: Fit) -> RandomGap:
     m = gap.shape[1]
     given = (fit.campaign.noise_position, fit.campaign.noise_orientation)[: m // 3]
     noise = np.repeat([g or e.whitening.noise[3 * k] for k, g in enumerate(given)], 3)
-    pose, held, used = repeated_poses(fit), [bool(g) for g in given], ~e.outliers
+    pose, held = repeated_poses(fit), [bool(g) for g in given]
+    asked = np.isin(np.arange(len(gap)), enough_rows(pose, ~e.outliers)) | e.outliers
+    used = asked & ~e.outliers
     freedom = round(e.best.effective) + e.linear.frames.shape[2]
     for _ in range(_ROUNDS):
         scatter = variance_components(
@@ -113,7 +116,7 @@ def random_gap(fit: Fit) -> RandomGap:
         within = _distance2(scatter, gap, sensitivity, scatter.noise) <= distance_limit(m, len(gap))
         if 2 * within.sum() < len(within):
             break  # most rows lie beyond any scatter: robot and table do not belong together
-        used = within
+        used = within & asked
     laws, steps, kept = _judge(fit, scatter, gap[used], pose, used)
     findings = (_finding(fit, scatter, STEPS, "pose", kept), _finding(fit, scatter, WEAR, "visit", kept))
     p_value, explains = _size(scatter, kept, gap[used], sensitivity[used], noise, held, freedom)
@@ -198,8 +201,8 @@ def _judge(
             step, p, seen = _period(errors, weight, command, step)
         if p is not None:
             steps[names[c.joint]] = p
-        if len(scatter.kinds) > 1 and seen and p is not None and p > _REFUTED:
-            continue  # the same at each repeat, but no steps: no known effect
+        if seen and p is not None and p > _REFUTED:
+            continue  # what differs from pose to pose without steps is no encoder's
         doubtful = len(scatter.kinds) == 1 and (p is None or p > _LEVEL)
         kept.append(_Kept(c, float(step), doubtful))
     return laws, steps, kept
@@ -253,6 +256,8 @@ def _period(errors: Array, weight: Array, command: Array, step: float) -> tuple[
     # the first harmonic holds 6/π² of a sawtooth's power; the root of a height is normal with variance 1/2
     expected = 0.3 * float((weight * step**2 / 12.0).sum())
     seen = np.sqrt(expected) > np.sqrt(np.log(tried) - np.log(_REFUTED)) + 1.6
+    if power[best] < _STEPPED * expected:
+        p = 1.0 if seen else p  # a ripple on errors of another kind
     return (float(1.0 / frequency[best]) if p < _LEVEL else step), p, bool(seen)
 
 
@@ -312,7 +317,8 @@ def _size(
     spread = max(float((distance2**2).mean() / distance2.mean() ** 2 - 1.0), 2.0 / m)
     effective = left * (2.0 / m) / spread
     p = float(chdtrc(effective, ratio2 * effective))
-    return p, p > _LEVEL or ratio2 < _MATERIAL_SCALE**2
+    # a noise that is not stated fits whatever is left: scatter explains only where there is some
+    return p, bool(real) and (p > _LEVEL or ratio2 < _MATERIAL_SCALE**2)
 
 
 def _note(scatter: Scatter, laws: Mapping[str, str], kept: list[_Kept]) -> str:
@@ -321,4 +327,6 @@ def _note(scatter: Scatter, laws: Mapping[str, str], kept: list[_Kept]) -> str:
         return f"what looks like scatter of {joint} follows {quantity}: it is no scatter"
     if kept and all(k.doubtful for k in kept):
         return "the scatter shows no steps: repeats of each pose (column pose) would tell wear from what a pose brings"
+    if not kept and scatter.chosen("pose"):
+        return "joints err from pose to pose without steps or a law: repeats of each pose would tell wear from that"
     return scatter.note

@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign
-from thermal_robot.diagnosis.verdict import length
 from thermal_robot.estimation.fit import Fit
 from thermal_robot.estimation.groups import folds, neighbourhoods
 
@@ -87,21 +86,6 @@ def worst_folds(fit: Fit) -> tuple[FoldScheme, ...]:
     kept = ~explanation.outliers
     found = [_judged(problem, kept, *scheme) for scheme in _schemes(fit)]
     return tuple(sorted((f for f in found if f is not None), key=lambda f: -f.rms_after))
-
-
-def least_favourable(schemes: Sequence[FoldScheme]) -> str:
-    """Say in one sentence which way of holding rows out is hardest on the explanation; empty where there is none."""
-    if not any(s.shrinkage for s in schemes):
-        return ""
-    worst, least = max(schemes, key=lambda s: s.rms_after), min(schemes, key=lambda s: s.rms_after)
-    said = f"Least favourable: held out by {worst.name} ({worst.held_out}), {_remains(worst)}"
-    if worst.rms_after - least.rms_after <= 2.0 * float(np.hypot(worst.uncertainty, least.uncertainty)):
-        return f"{said}; no other way differs by more than chance."
-    return f"{said}; by {least.name}, {_remains(least)}."
-
-
-def _remains(scheme: FoldScheme) -> str:
-    return f"{length(scheme.rms_after)} remain and {100 * scheme.shrinkage:.1f} % of the mean square goes away"
 
 
 def _schemes(fit: Fit) -> Iterator[tuple[str, str, list[NDArray[np.bool_]]]]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -24,6 +25,34 @@ class StandIn:
 
     belief: float
     quantity: str
+
+
+def trust(shares: Mapping[str, float], doubts: Mapping[str, StandIn], unlisted: float) -> dict[str, float]:
+    """Return by name what the probability of each known effect is multiplied with, one half to one.
+
+    An unlisted cause casts a shadow on the effects that come near it, and the larger it is beside an effect the more of
+    that effect may be its shadow: s/(s + u), with s the effect's share of the gap and u that of what is not listed.
+    That something works on an effect, or beside it, does not say that it is not there: hence never below one half.
+
+    Parameters
+    ----------
+    shares
+        Of the gap, on rows held out, of every effect of the explanation, laws among them.
+    doubts
+        See :func:`stand_ins`.
+    unlisted
+        Share of the gap that is left; 0 where it is noise.
+    """
+    unlisted += sum(max(share, 0.0) for name, share in shares.items() if name.startswith(PREFIX))
+    result = {}
+    for name, share in shares.items():
+        if name.startswith(PREFIX):
+            continue
+        own = max(share, 0.0)
+        shadow = own / (own + unlisted) if unlisted > 0.0 else 1.0
+        changing = 0.5 * (1.0 + doubts[name].belief) if name in doubts else 1.0
+        result[name] = max(0.5, min(changing, shadow))
+    return result
 
 
 def stand_ins(fit: Fit) -> dict[str, StandIn]:

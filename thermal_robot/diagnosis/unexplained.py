@@ -14,6 +14,8 @@ from thermal_robot.diagnosis.result import Dependence, Location, Unexplained
 from thermal_robot.effects.quantity import quantities
 from thermal_robot.estimation.fit import Fit
 from thermal_robot.estimation.groups import NEAR, in_order
+from thermal_robot.estimation.scan import harmonics
+from thermal_robot.observations import Observations
 
 Array = NDArray[np.float64]
 
@@ -22,6 +24,8 @@ _MATERIAL_SCALE = 1.15  # a remainder less than this times the stated noise is n
 _MATERIAL_SHARE = 0.04  # a law that explains less of the remainder than this is not worth a name
 _FEWEST_PAIRS = 12
 _SHUFFLES = 200
+_ENOUGH_ROWS = 2000  # a law that explains a hundredth of what remains is then seen
+_SEED = 17
 _ROUNDING = 1e-9  # m: a remainder below it is rounding, whatever its structure
 
 
@@ -50,6 +54,17 @@ class Remainder:
     def scale2(self) -> float:
         """Mean square, corrected for what was fitted, in squares of the noise."""
         return float((self.white**2).sum() / self.freedom)
+
+    def some(self, count: int) -> Remainder:
+        """Return so many rows drawn at random, with what was fitted projected out of them; all if they are fewer."""
+        if len(self.rows) <= count:
+            return self
+        drawn = np.sort(np.random.default_rng(_SEED).choice(len(self.rows), count, replace=False))
+        m = self.white.shape[1]
+        basis, _ = np.linalg.qr(self.basis.reshape(len(self.rows), m, -1)[drawn].reshape(count * m, -1))
+        white = self.white[drawn].ravel()
+        white = white - basis @ (basis.T @ white)
+        return Remainder(self.rows[drawn], white.reshape(count, m), basis, max(len(white) - basis.shape[1], 1))
 
 
 def remainder(fit: Fit) -> Remainder:
@@ -227,6 +242,7 @@ def _scan(fit: Fit, left: Remainder) -> tuple[tuple[float, str], tuple[Location,
     Returns p-value and reason, places, quantities, and the share of the remainder that the best law explains.
     """
     observations, noise = fit.corrected, fit.explanation.whitening.noise
+    left = left.some(_ENOUGH_ROWS)
     m = left.white.shape[1]
     target = left.white.ravel()
     names = observations.robot.joint_names
@@ -241,7 +257,9 @@ def _scan(fit: Fit, left: Remainder) -> tuple[tuple[float, str], tuple[Location,
     rows = []
     for kind, place, sensitivity in places:
         scaled = sensitivity / noise[:, None]
-        for quantity, law in laws.items():
+        # five knots do not follow a wheel that turns more than once
+        turns = [(place, _turns(observations, place)[left.rows])] if place in laws else []
+        for quantity, law in [*laws.items(), *turns]:
             if not law.shape[1] or (law.shape[1] * scaled.shape[2]) > left.freedom // 3:
                 continue
             columns = (scaled[:, :, :, None] * law[:, None, None, :]).reshape(len(target), -1)
@@ -268,13 +286,19 @@ def _scan(fit: Fit, left: Remainder) -> tuple[tuple[float, str], tuple[Location,
         return (1.0, ""), tuple(locations[:5]), (), 0.0
     p, _, share, kind, place, quantity = material[0]
     at = {"joint": f"joint {place}", "base": "the base", "tool": "the tool"}[kind]
-    reason = f"a smooth law of {quantity} at {at} explains {share:.0%} of what remains"
+    reason = f"a law of {quantity} at {at} explains {share:.0%} of what remains"
     return (
         (min(1.0, p * tried), reason),
         tuple(locations[:5]),
         tuple(Dependence(q, p) for q, p in list(depends.items())[:5]),
         share,
     )
+
+
+def _turns(observations: Observations, joint: str) -> Array:
+    """(N, 2k) harmonics of a joint's position."""
+    angle = observations.q[:, observations.robot.joint_names.index(joint)]
+    return np.column_stack([f(k * angle) for k in harmonics(observations, joint) for f in (np.sin, np.cos)])
 
 
 def _f_test(columns: Array, left: Remainder, target: Array) -> tuple[float, float, float]:

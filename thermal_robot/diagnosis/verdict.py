@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from thermal_robot.diagnosis.result import Finding, Gap, Unexplained
+from thermal_robot.effects import RANDOM
 
 _ANOTHER_MOTION = 0.02
 _ANOTHER_TURN = 0.2  # rad
@@ -72,17 +73,23 @@ def sentence(
             f"Robot and table do not describe the same motion ({left} remain): check units, signs and order of the "
             "joints, axes of the instrument, order of the quaternion, and that all rows belong to one set-up."
         )
+    which = "none of the effects that were considered" if narrowed else "no known effect"
     if not explained:
         if not unexplained.flagged:
             return f"No gap beyond the noise: the {size} between model and robot is what noise alone leaves ({floor})."
-        which = "none of the effects that were considered" if narrowed else "no known effect"
         return f"The gap of {size} is explained by {which}{_place(unexplained)}."
     by_name = {f.name: f for f in found}
+    chance = [n for n in explained if n in RANDOM]
+    explained = [n for n in explained if n not in RANDOM]
+    sure = f"{100 * probability:.0f} % sure" if probability < 0.995 else "more than 99 % sure"
+    scatter = _listed([plain(n) for n in chance]) if chance else ""
+    if not explained:
+        left = f", of which {length(remaining.rms)} is not explained" if remaining.flagged and remaining.rms else ""
+        return f"The gap of {size} is scatter: {scatter} ({sure}){left}; no correction takes scatter away."
     weighty = [n for n in explained if (by_name[n].shrinkage or 0.0) >= _WEIGHTY] or list(explained[:1])
     words = {n: by_name[n].describes or plain(n) for n in explained}
     slight = [words[n] for n in explained if n not in weighty]
     listed = _listed([words[n] for n in weighty]) + (f", and, hardly to be seen, {_listed(slight)}" if slight else "")
-    sure = f"{100 * probability:.0f} % sure" if probability < 0.995 else "more than 99 % sure"
     text = (
         f"The gap of {size} comes from {listed} ({sure}); correcting for {'them' if len(explained) > 1 else 'it'} "
         f"removes {100 * gap.held_out.shrinkage:.1f} % of its mean square on held-out data and leaves "
@@ -94,8 +101,10 @@ def sentence(
         text += ", which is more than noise" + _place(remaining)
     else:
         text += f", of which {length(remaining.rms)} is not explained" + _place(remaining)
-    if any(by_name[n].describes for n in explained):
-        text += "; no known effect has that shape"
+    if laws := sum(bool(by_name[n].describes) for n in explained):
+        text += f"; {which} has {'that shape' if laws == 1 else 'these shapes'}"
+    if scatter:
+        text += f"; besides there is scatter, which no correction takes away: {scatter}"
     doubts = [
         f"{plain(n)} cannot be told from {' or '.join(map(plain, by_name[n].confounded_with))}"
         for n in explained

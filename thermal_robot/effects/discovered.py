@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from textwrap import fill
 from typing import TYPE_CHECKING, Literal
 
 import numpy as np
@@ -21,6 +22,7 @@ Shape = Literal[
 ]
 
 PREFIX = "discovered."
+_IN_WORDS = {"ramp": "in proportion", "drag": "its slope and its sign", "levels": "a value at each of its levels"}
 COMPONENTS = ("along x", "along y", "along z", "about x", "about y", "about z")
 
 
@@ -60,6 +62,8 @@ class Discovered(Effect):
         See above.
     origin, span
         Of the quantity in the campaign that it was found in.
+    unit
+        Of the quantity, for words; empty where it has none.
     turns
         Whether orientation was measured: without it a turn of the tool shows nothing.
     labels
@@ -74,6 +78,7 @@ class Discovered(Effect):
     marks: tuple[float, ...] = ()
     origin: float = 0.0
     span: float = 1.0
+    unit: str = ""
     turns: bool = True
     labels: tuple[str, ...] = ()
 
@@ -146,10 +151,11 @@ class Discovered(Effect):
             Of the effect.
         """
         fields = {k: v for k, v in self.arguments().items() if k != "name"}
-        lines = "\n".join(f"    {key}: Any = {value!r}" for key, value in fields.items())
+        lines = "\n".join(f"    {key}: Any = {_literal(value)}" for key, value in fields.items())
         title = "".join(part.capitalize() for part in name.split("_"))
-        found = ", ".join(f"{v:.4g}" for v in values)
-        return _SOURCE.format(title=title, name=name, lines=lines, values=found, what=self.describe())
+        found = fill(", ".join(f"{v:.4g}" for v in values), 100, initial_indent="    ", subsequent_indent="    ")
+        what = self.describe()
+        return _SOURCE.format(title=title, name=name, lines=lines, values=found, what=what[:1].upper() + what[1:])
 
     def describe(self) -> str:
         """Say in a few words where the error enters and what it follows."""
@@ -159,8 +165,12 @@ class Discovered(Effect):
         if self.shape == "constant":
             return f"a constant error at {at}"
         how = {"step": "a step", "slide": "a smooth step", "hinge": "a bend", "bump": "a bump"}.get(self.shape, "")
-        mark = f", {how} at {self.marks[0]:.4g}" if how else ""
-        return f"an error at {at} that follows {self.quantity} ({self.shape}{mark})"
+        shape = f"{how} at {self._marked(self.marks[0])}" if how else _IN_WORDS.get(self.shape, self.shape)
+        shape += f" of order {self.marks[0]:g}" if self.shape == "harmonic" else ""
+        return f"an error at {at} that follows {self.quantity} ({shape})"
+
+    def _marked(self, mark: float) -> str:
+        return f"{mark:.3g} {self.unit}".rstrip().replace("-", "−")
 
     def _responder(self, observations: Observations) -> tuple[Callable[[Array], Response], str]:
         if self.kind == "base":
@@ -170,6 +180,12 @@ class Discovered(Effect):
         segments = observations.robot.segments
         s = next(s for s, segment in enumerate(segments) if segment.name == self.place)
         return lambda twist: at_segment(s, twist), segments[s].parent_link
+
+
+def _literal(value: object) -> str:
+    if isinstance(value, tuple) and value:
+        return "(\n" + "".join(f"        {item!r},\n" for item in value) + "    )"
+    return repr(value)
 
 
 def _constant(law: Discovered, x: Array) -> tuple[Array, tuple[str, ...]]:
@@ -223,7 +239,9 @@ def _harmonic(law: Discovered, x: Array) -> tuple[Array, tuple[str, ...]]:
 
 def _levels(law: Discovered, x: Array) -> tuple[Array, tuple[str, ...]]:
     nearest = np.abs(x[:, None] - np.array(law.marks)).argmin(axis=1)
-    return np.eye(len(law.marks))[nearest], tuple(f"at {m:g}" for m in law.marks)
+    if law.labels:
+        return np.eye(len(law.marks))[nearest], tuple(f"at {law.labels[int(m)]}" for m in law.marks)
+    return np.eye(len(law.marks))[nearest], tuple(f"at {law._marked(m)}" for m in law.marks)
 
 
 def _smooth(law: Discovered, x: Array) -> tuple[Array, tuple[str, ...]]:
@@ -236,12 +254,15 @@ def _smooth(law: Discovered, x: Array) -> tuple[Array, tuple[str, ...]]:
     # beyond the outer knots a natural spline runs straight
     slope = spline(knots[[0, -1]], 1)
     beyond = np.minimum(u - knots[0], 0.0)[:, None] * slope[0] + np.maximum(u - knots[-1], 0.0)[:, None] * slope[1]
-    return inside + beyond, tuple(f"at {m:g}" for m in law.marks)
+    return inside + beyond, tuple(f"at {law._marked(m)}" for m in law.marks)
 
 
-_SOURCE = '''"""{what}: found in a campaign by thermal_robot, named by hand."""
+_SOURCE = '''"""{what}.
 
-from dataclasses import dataclass, replace
+Found in a campaign by thermal_robot, named by hand.
+"""
+
+from dataclasses import dataclass
 from typing import Any
 
 from thermal_robot.effects.discovered import Discovered
@@ -251,7 +272,9 @@ from thermal_robot.effects.discovered import Discovered
 class {title}(Discovered):
     """{what}.
 
-    In the campaign where it was found its values were {values} (SI).
+    In the campaign where it was found its values were, in SI:
+
+{values}
     """
 
     name: Any = "{name}"

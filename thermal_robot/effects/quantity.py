@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
+    from thermal_robot.robot import Robot
 
 Array = NDArray[np.float64]
 
@@ -16,6 +17,25 @@ GRAVITY = ("gravity.x", "gravity.y", "gravity.z")
 """Components of gravity's direction in the tool frame."""
 REACH = ("reach.x", "reach.y", "reach.z")
 """Where the tool frame is in the root frame, m: what leans on the base."""
+
+
+_UNITS = {
+    "time": "s",
+    "temperature": "°C",
+    "payload": "kg",
+    "torque": "N·m",
+    "velocity": "rad/s",
+    "acceleration": "rad/s²",
+    "encoder": "rad",
+    "reach": "m",
+}
+
+
+def unit(robot: Robot, name: str) -> str:
+    """Return the unit of a quantity's values; empty where it has none, or none that is known."""
+    if name in robot.joint_names:
+        return "m" if robot.joint_types[robot.joint_names.index(name)] == "prismatic" else "rad"
+    return _UNITS.get(name.split(".")[0], "")
 
 
 def quantities(observations: Observations) -> dict[str, Array]:
@@ -40,9 +60,9 @@ def quantity(observations: Observations, name: str) -> Array | None:
         return np.asarray(observations.q[:, robot.joint_names.index(name)])
     if name in GRAVITY:
         down = robot.gravity / max(float(np.linalg.norm(robot.gravity)), 1e-9)
-        return np.asarray(observations.chain.tool_rotation[:, :, GRAVITY.index(name)] @ down)
+        return np.asarray(observations.commanded.tool_rotation[:, :, GRAVITY.index(name)] @ down)
     if name in REACH:
-        return np.asarray(observations.chain.tool_position[:, REACH.index(name)])
+        return np.asarray(observations.commanded.tool_position[:, REACH.index(name)])
     if name == "order":
         return np.arange(observations.campaign.samples, dtype=float)
     labels = observations.campaign.labels.get(name)

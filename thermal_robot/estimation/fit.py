@@ -22,6 +22,9 @@ Array = NDArray[np.float64]
 
 _STEPS = 12
 _REVISIONS = 3
+_MANY_ROWS = 5000  # above, a choice is revised once: it takes seconds, and so many rows hardly change it
+_SETTLED = 1e-4  # last step of a fit, in standard deviations
+_NEAR = 2.0  # of one of many rows that is chosen anew: the step after it would be a hundredth of it
 _REFINEMENT = 1.6
 _LARGE = 0.02  # rad or m
 _NO_WORSE = 1.02
@@ -216,7 +219,9 @@ def _settle(
     if known is not None:
         held, outliers = list(known.held), known.explanation.outliers
         settings.update({effect.name: (effect,) for effect, _ in held})
-    for revision in range(_REVISIONS + 1):
+    many = campaign.samples > _MANY_ROWS
+    revisions = 1 if many else _REVISIONS
+    for revision in range(revisions + 1):
         progress("combinations of effects" if revision == 0 else f"exact fit, revision {revision}")
         candidates, families = _listed(settings)
         chosen = [candidates.index(effect) for effect, _ in held]
@@ -231,8 +236,10 @@ def _settle(
         )
         same = revision > 0 and set(explanation.best.blocks) == set(chosen)
         held = [(candidates[b], explanation.values[b][0]) for b in explanation.best.blocks]
-        observations, held = _gauss_newton(campaign, observations.frames, explanation, held)
-        if same or revision == _REVISIONS:
+        last = same or revision == revisions
+        least = _NEAR if many and not last else _SETTLED
+        observations, held = _gauss_newton(campaign, observations.frames, explanation, held, least)
+        if last:
             break
         outliers = explanation.outliers
         for effect, _ in held:
@@ -247,7 +254,11 @@ def row_groups(campaign: Campaign) -> tuple[NDArray[np.int64], ...]:
 
 
 def _gauss_newton(
-    campaign: Campaign, frames: Frames, explanation: Explanation, held: Sequence[tuple[Effect, Array]]
+    campaign: Campaign,
+    frames: Frames,
+    explanation: Explanation,
+    held: Sequence[tuple[Effect, Array]],
+    settled: float,
 ) -> tuple[Observations, list[tuple[Effect, Array]]]:
     """Refit frames and the explanation's parameters with the exact model, the priors held at their scales."""
     whitening, best = explanation.whitening, explanation.best
@@ -271,15 +282,16 @@ def _gauss_newton(
         frames = moved(frames, step[: len(names)], names)
         state = state + step[len(names) :]
         observations = corrected_observations(campaign, frames, pairs())
-        if size < 1e-4:
+        if size < settled:
             break
     return observations, pairs()
 
 
 def _ridge_step(design: Array, gap: Array, state: Array, prior: Array) -> tuple[Array, float]:
-    """Return the step that minimises |gap − design step|² + |(state + step)/prior|², and its length in noise.
+    """Return the step that minimises |gap − design step|² + |(state + step)/prior|², and what it moves, in noise.
 
-    The first columns have no prior. Directions that nothing determines are not moved.
+    The first columns have no prior. Directions that nothing determines are not moved. A step along directions that do
+    nearly the same moves little, however long it is.
     """
     flat = design.shape[1] - len(prior)
     matrix, vector = design.T @ design, design.T @ gap
@@ -289,7 +301,7 @@ def _ridge_step(design: Array, gap: Array, state: Array, prior: Array) -> tuple[
     value, basis = np.linalg.eigh(matrix / np.outer(length, length))
     seen = value > 1e-13 * value.max(initial=0.0)
     step = basis[:, seen] @ ((basis[:, seen].T @ (vector / length)) / value[seen])
-    return step / length, float(np.abs(step).max(initial=0.0))
+    return step / length, float(np.sqrt((value[seen] * (basis[:, seen].T @ step) ** 2).sum()))
 
 
 def corrected_observations(campaign: Campaign, frames: Frames, pairs: Sequence[tuple[Effect, Array]]) -> Observations:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.effects.discovered import Discovered
-from thermal_robot.effects.quantity import GRAVITY, quantities
+from thermal_robot.effects.quantity import GRAVITY, quantities, unit
 from thermal_robot.estimation.columns import block
 from thermal_robot.estimation.explain import robust_noise
 from thermal_robot.observations import Observations
@@ -17,10 +17,12 @@ from thermal_robot.observations import Observations
 Array = NDArray[np.float64]
 
 KNOTS = 5
+HARMONICS = (1.0, 2.0, 3.0)
 _REFINED = ("slide", "hinge", "bump")
 _REFINEMENTS = 10
 CLOCK = ("time", "order")
 _FEW = 6
+_NARROW = 0.2  # of an even share of the range: the least distance of two knots
 _QUANTITIES_OF_LINKS = 6
 
 
@@ -61,10 +63,19 @@ def laws(observations: Observations, kinds: Sequence[str], names: Iterable[str] 
             if kind == "link":
                 found.append(replace(plain, shape="constant", quantity="none"))
             for name in known if names is None else names:
-                found.append(
-                    of_quantity(replace(plain, quantity=name, labels=_labels(observations, name)), known[name])
-                )
+                law = replace(plain, quantity=name, unit=unit(robot, name), labels=_labels(observations, name))
+                law = of_quantity(law, known[name])
+                found.append(law)
+                if kind == "joint" and name == place and law.shape == "smooth":
+                    # five knots do not follow a wheel that turns more than once
+                    found += [replace(law, shape="harmonic", marks=(k,)) for k in harmonics(observations, place)]
     return found
+
+
+def harmonics(observations: Observations, joint: str) -> tuple[float, ...]:
+    """Return the orders that are looked for in a joint: a few a turn, and the motor's where its ratio is stated."""
+    ratio = observations.campaign.gears.get(joint)
+    return HARMONICS if ratio is None else (*HARMONICS, float(ratio))
 
 
 def _labels(observations: Observations, name: str) -> tuple[str, ...]:
@@ -79,8 +90,9 @@ def of_quantity(law: Discovered, values: Array, knots: int = KNOTS) -> Discovere
     low, high = float(values.min()), float(values.max())
     if len(levels) <= _FEW:
         return replace(law, shape="levels", marks=tuple(levels.tolist()), origin=low, span=high - low)
-    marks = np.unique(np.quantile(values, np.linspace(0.02, 0.98, knots)))
-    if len(marks) < 3:
+    marks = np.quantile(values, np.linspace(0.02, 0.98, knots))
+    if np.diff(marks).min() < _NARROW * (high - low) / knots:
+        # most values lie in one spot: a spline between knots there would be free to do anything
         marks = np.linspace(low, high, knots)
     return replace(law, shape="smooth", marks=tuple(marks.tolist()), origin=low, span=high - low)
 
@@ -162,7 +174,7 @@ def scan(observations: Observations, targets: Sequence[Target]) -> tuple[list[li
     return found, len(first) + len(second)
 
 
-def shapes(law: Discovered, values: Array, jumps: bool = True) -> list[Discovered]:
+def shapes(law: Discovered, values: Array, jumps: bool = True, orders: Sequence[float] = HARMONICS) -> list[Discovered]:
     """Return simple shapes that might do instead of a smooth law, and that law.
 
     Hinges at the quantity's quantiles, straight and quadratic laws; steps and bumps of what a robot does or what passes
@@ -183,7 +195,7 @@ def shapes(law: Discovered, values: Array, jumps: bool = True) -> list[Discovere
     if law.quantity.startswith("velocity."):
         found.append(replace(law, shape="drag", marks=()))
     if law.quantity == law.place and law.kind == "joint":
-        found += [replace(law, shape="harmonic", marks=(k,)) for k in (1.0, 2.0, 3.0)]
+        found += [replace(law, shape="harmonic", marks=(k,)) for k in orders]
     return found
 
 
@@ -191,7 +203,8 @@ def shaped(observations: Observations, target: Target, law: Discovered) -> Scann
     """Return a law in the shape that gains most."""
     values = quantities(observations).get(law.quantity)
     jumps = law.quantity in (*CLOCK, *GRAVITY, *observations.robot.joint_names)
-    candidates = [law] if values is None else shapes(law, values, jumps)
+    orders = harmonics(observations, law.place) if law.kind == "joint" else HARMONICS
+    candidates = [law] if values is None else shapes(law, values, jumps, orders)
 
     def measured(candidate: Discovered) -> Scanned:
         return Scanned(candidate, target.gain(block(observations, candidate).columns))

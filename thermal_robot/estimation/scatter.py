@@ -18,10 +18,11 @@ Array = NDArray[np.float64]
 PRIOR_PROBABILITY = 0.1  # of an effect being at work, before the data
 FEWEST_ROWS = 10  # below, nothing can be said
 FEWEST_CONTRASTS = 6  # differences of repeats below which visits and poses cannot be told apart
-_MOST_ROWS = 3000  # a standard deviation is then known to about one per cent
+_MOST_ROWS = 1500  # a standard deviation is then known to about two per cent
 _MOST_COMPONENTS = 6
 _TAILS = 4.0  # degrees of freedom of the heavy-tailed law that is tried beside the normal one
 _WORTH = 3.0  # natural logarithms by which heavy tails must fit better
+_NORMAL_ROWS = 1000  # above, the likelihood of a variance that is well seen is normal in its logarithm
 _DROP = 1.92  # of the log likelihood at the ends of a 95 % interval: half the χ² quantile of one degree of freedom
 _TRIED = 3  # candidates fitted in full at each step
 _HOPELESS = 3.0  # gain in log likelihood below which no prior odds are overcome
@@ -145,7 +146,7 @@ def variance_components(
     Returns
     -------
     Scatter
-        Without repeats u and v cannot be told apart: only ``pose`` is asked for. Above 3000 rows, whole poses drawn
+        Without repeats u and v cannot be told apart: only ``pose`` is asked for. Above 1500 rows, whole poses drawn
         at random stand for all.
 
     Raises
@@ -158,7 +159,7 @@ def variance_components(
     held = (bool(stated),) * parts if isinstance(stated, (bool, np.bool_)) else tuple(map(bool, stated))
     weights = np.ones(len(remainder)) if weights is None else np.asarray(weights, dtype=float)
     labels = np.arange(len(remainder)) if pose is None else np.unique(pose, return_inverse=True)[1].ravel()
-    kept = _kept(labels, weights > 0)
+    kept = enough_rows(labels, weights > 0)
     if len(kept) < FEWEST_ROWS:
         note = f"nothing can be said: {len(kept)} rows are fewer than {FEWEST_ROWS}"
         return Scatter((), (), {k: PRIOR_PROBABILITY for k in ("visit", "pose")}, noise, note=note)
@@ -192,8 +193,8 @@ def _checked(remainder: Array, sensitivity: Array, noise: Array) -> int:
     return int(noise.size // 3)
 
 
-def _kept(labels: NDArray[np.int64], used: NDArray[np.bool_]) -> NDArray[np.int64]:
-    """Return the used rows, or where they are many those of poses drawn at random."""
+def enough_rows(labels: NDArray[np.int64], used: NDArray[np.bool_]) -> NDArray[np.int64]:
+    """Return the numbers of the used rows, or where they are above 1500 those of whole poses drawn at random."""
     rows = np.flatnonzero(used)
     if len(rows) <= _MOST_ROWS:
         return rows
@@ -331,7 +332,9 @@ class _Search:
     def _interval(self, fitted: Fitted, order: tuple[Component, ...], place: int) -> tuple[float, float]:
         """Logarithms of the variances at which the profile likelihood has dropped; −∞ where it does not drop."""
         estimate = fitted.logs[place]
-        step = 2.0 * float(np.sqrt(fitted.spread[place, place]))
+        step = 1.96 * float(np.sqrt(fitted.spread[place, place]))
+        if len(self.rows.columns) > _NORMAL_ROWS and step < 1.0:
+            return estimate - step, estimate + step
 
         def beyond(log: float) -> float:
             start = fitted.logs.copy()

@@ -94,7 +94,8 @@ def _how_far(diagnosis: Diagnosis) -> Iterator[str]:
     shrinkage = f"{units.percent(held.shrinkage)}   95 % interval {_bounds(held.shrinkage_ci95)}"
     yield f"  {'shrinkage, held out':{_NAME}}{shrinkage}"
     for scheme in gap.schemes[:1]:
-        worst = f"{units.quantity(scheme.rms_after, 'm')} left where {scheme.held_out} is held out"
+        pair = units.together((scheme.rms_before, scheme.rms_after), "m")
+        worst = f"{pair[0]} → {pair[1]}, held out by {scheme.name}: {scheme.held_out}"
         yield _wrap(worst, f"  {'least favourable':{_NAME}}")
     yield _wrap(noise(diagnosis, floor), f"  {'noise floor':{_NAME}}")
     yield _wrap("Shrinkage is the share of the gap's mean square that goes away.")

@@ -170,13 +170,12 @@ def sentences(diagnosis: Diagnosis) -> Iterator[str]:
         likely = [p for p in left.locations if p.share >= _UNLIKELY][:3] or left.locations[:1]
         spots = [f"{units.place(p)} ({units.probability(p.share)})" for p in likely]
         yield f"It enters most probably at {one_of(spots)}."
-    if left.depends_on:
+    if left.depends_on and not any(name.startswith("discovered.") for name in diagnosis.verdict):
         quantities = [f"{d.covariate} ({units.p_value(d.p_value)})" for d in left.depends_on[:3]]
         yield f"It follows {', '.join(quantities)}."
     for name in diagnosis.verdict:
         if name.startswith("discovered."):
-            found = diagnosis.finding(name)
-            yield f"{name}: {found.describes or 'a law that describes it'}; no known effect has that shape."
+            yield f"{name} describes part of it: {diagnosis.finding(name).describes or 'a law'}."
 
 
 def one_of(items: Sequence[str]) -> str:
