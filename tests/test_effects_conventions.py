@@ -75,7 +75,7 @@ def test_a_transmission_error_is_periodic_in_the_joint_and_in_the_motor(arm):
         shape, order = re.match(r"(sine|cosine), order (\d+)", parameter.label).groups()
         j = arm.joint_names.index(parameter.place)
         q[:, j] += value * (np.sin if shape == "sine" else np.cos)(int(order) * campaign.q[:, j])
-    assert len(parameters) == 4 * arm.n + 2
+    assert len(parameters) == 4 * arm.n + 4
     np.testing.assert_allclose(tool_with(campaign, TransmissionError(), values), tool_at(arm, q), atol=1e-14)
 
 

@@ -120,6 +120,9 @@ def _scattered(fit: Fit, chance: RandomGap, progress: Callable[[str], None]) -> 
 
 
 def _same(law: Discovered, other: Discovered) -> bool:
+    """Whether two laws follow the same quantity at the same place; two orders of a wheel stand beside each other."""
+    if law.shape == other.shape == "harmonic" and law.marks != other.marks:
+        return False
     return (law.kind, law.place, law.quantity) == (other.kind, other.place, other.quantity)
 
 

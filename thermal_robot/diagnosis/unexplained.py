@@ -81,7 +81,8 @@ def remainder(fit: Fit) -> Remainder:
     # what the data see only below the noise was held by its prior: leave it out as the fit did
     seen = value > 1e-9 * value.max(initial=1.0)
     basis, _ = np.linalg.qr(flat @ vector[:, seen])
-    gap = (e.linear.gap[rows] / e.whitening.noise).ravel()
+    # of the exact model, not the linear one: where effects are large and noise is small they differ
+    gap = (fit.corrected.gap[rows] / e.whitening.noise).ravel()
     left = gap - basis @ (basis.T @ gap)
     freedom = max(len(left) - basis.shape[1], 1)
     return Remainder(rows, left.reshape(len(rows), -1), basis, freedom)

@@ -18,13 +18,13 @@ class TransmissionError(Effect):
     """Every joint deviates periodically: q_actual = q_command + Σ_k a_k sin(k q) + b_k cos(k q).
 
     An eccentric wheel or encoder disc on the joint's side gives order 1, an oval one order 2; where the campaign
-    states a gear ratio (``[gears]``), the motor's side gives the order of the ratio. Expected size 0.3 mrad, one
-    minute of arc.
+    states a gear ratio (``[gears]``), those of the motor's side give the ratio and twice that. Expected size 0.3 mrad,
+    one minute of arc.
 
     Attributes
     ----------
     harmonics
-        Orders on the joint's side.
+        Orders a turn of the wheel, on either side.
     """
 
     harmonics: tuple[int, ...] = (1, 2)
@@ -37,7 +37,7 @@ class TransmissionError(Effect):
         found = []
         for j, (joint, kind) in enumerate(zip(robot.joint_names, robot.joint_types, strict=True)):
             orders = [float(k) for k in self.harmonics] if kind != "prismatic" else []
-            orders += [float(gears[joint])] if joint in gears else []
+            orders += [k * float(gears[joint]) for k in self.harmonics] if joint in gears else []
             unit = "m" if kind == "prismatic" else "rad"
             for order in orders:
                 angle = order * observations.q[:, j]

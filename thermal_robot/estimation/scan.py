@@ -75,7 +75,7 @@ def laws(observations: Observations, kinds: Sequence[str], names: Iterable[str] 
 def harmonics(observations: Observations, joint: str) -> tuple[float, ...]:
     """Return the orders that are looked for in a joint: a few a turn, and the motor's where its ratio is stated."""
     ratio = observations.campaign.gears.get(joint)
-    return HARMONICS if ratio is None else (*HARMONICS, float(ratio))
+    return HARMONICS if ratio is None else (*HARMONICS, float(ratio), 2.0 * float(ratio))
 
 
 def _labels(observations: Observations, name: str) -> tuple[str, ...]:

@@ -1,0 +1,75 @@
+"""What is believed beside an unlisted cause: effects by their size, scatter only where there is some, laws that can be read."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from simulate import simulate
+from test_discovery import with_law
+
+from thermal_robot import diagnose
+from thermal_robot.diagnosis.random_gap import random_gap
+from thermal_robot.diagnosis.stand_in import StandIn, trust
+from thermal_robot.effects import choose
+from thermal_robot.effects.discovered import Discovered
+from thermal_robot.effects.quantity import quantities
+from thermal_robot.estimation.fit import fit
+from thermal_robot.estimation.scan import of_quantity
+from thermal_robot.kinematics import Displacement
+from thermal_robot.observations import Frames, observe
+
+
+def test_an_effect_is_believed_by_its_size_beside_what_is_not_listed():
+    shares = {"geometric": 0.6, "drift": 0.05, "discovered.1": 0.2}
+    believed = trust(shares, {}, unlisted=0.0)
+    assert believed == {"geometric": pytest.approx(0.75), "drift": 0.5}
+    assert trust(shares, {}, unlisted=0.1)["geometric"] == pytest.approx(0.6 / 0.9)
+    assert trust({"geometric": 0.6}, {}, unlisted=0.0) == {"geometric": 1.0}
+    changing = trust({"geometric": 0.6}, {"geometric": StandIn(0.0, "time")}, unlisted=0.0)
+    assert changing == {"geometric": 0.5}
+    assert trust({"geometric": -0.1}, {}, unlisted=0.0) == {"geometric": 1.0}
+
+
+def test_a_noise_that_is_not_stated_does_not_explain_a_remainder(rv_m2):
+    """Without it the variance of anything would pass as noise."""
+    data = replace(simulate(rv_m2, ["drift"], seed=4, ratio=(8.0, 9.0))[0], noise_position=None)
+    left = fit(data, choose((), ("drift", "thermal_elongation", "thermal_bending", "instrument_scale"), ()))
+    assert not random_gap(left).explains_size
+    found = diagnose(data, without=["drift"])
+    assert found.unexplained.flagged
+    assert all(f.probability < 0.9 for f in found.effects if f.name in found.verdict and not f.describes)
+    assert found.finding("discovered.1").locations[0].kind == "base"
+
+
+@pytest.mark.parametrize("ratio", [101.0, 51.0])
+def test_a_wheel_on_the_motor_is_found_where_its_effect_is_not_in_the_library(rv_m2, ratio):
+    law = Discovered(kind="joint", place="joint_2", quantity="joint_2", shape="harmonic", marks=(ratio,))
+    data, fresh, true = with_law(rv_m2, law, [0.0, 3e-4, 2e-4], seed=7)
+    found = diagnose(replace(data, gears={"joint_2": ratio}), without=["transmission_error"])
+    (own,) = [f for f in found.effects if f.describes]
+    assert (own.locations[0].name, own.quantity, own.shape) == ("joint_2", "joint_2", "harmonic")
+    assert f"of order {ratio:g}" in own.describes
+    amplitude = np.hypot(*[p.value for p in own.parameters if p.name.startswith(("sine", "cosine"))])
+    assert amplitude == pytest.approx(np.hypot(3e-4, 2e-4), rel=0.1)
+    assert np.abs(found.model.predict(fresh)[0] - true).max() < 25e-6
+
+
+def test_knots_stand_apart_where_most_values_lie_in_one_spot():
+    rng = np.random.default_rng(0)
+    values = np.concatenate([1.0 - 1e-6 * rng.random(500), rng.uniform(0.7, 1.0, 20)])
+    marks = np.array(of_quantity(Discovered(), values).marks)
+    assert np.diff(marks).min() > 0.2 * np.ptp(values) / len(marks)
+    spread = rng.uniform(-1.0, 1.0, 500)
+    np.testing.assert_allclose(
+        of_quantity(Discovered(), spread).marks, np.quantile(spread, np.linspace(0.02, 0.98, 5)), rtol=1e-12
+    )
+
+
+def test_what_a_law_follows_does_not_depend_on_the_law(rv_m2):
+    """Gravity and reach are those of the command: else a law would be evaluated elsewhere than it was fitted."""
+    data = simulate(rv_m2, samples=30, seed=2)[0]
+    moved = Displacement(joint=np.full((30, rv_m2.n), 0.05))
+    plain, bent = observe(data, Frames.declared(data)), observe(data, Frames.declared(data), displacement=moved)
+    assert np.abs(plain.position - bent.position).max() > 1e-3
+    for name, values in quantities(plain).items():
+        np.testing.assert_array_equal(quantities(bent)[name], values, err_msg=name)
