@@ -1,4 +1,4 @@
-"""What is believed beside an unlisted cause: effects by their size, scatter only where there is some, laws that can be read."""
+"""What is believed beside an unlisted cause: effects by size, scatter where there is some, laws that can be read."""
 
 from dataclasses import replace
 
