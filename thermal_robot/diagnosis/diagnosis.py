@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,22 +13,21 @@ from threadpoolctl import threadpool_limits
 from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.diagnosis.attribute import findings, in_order
+from thermal_robot.diagnosis.cautions import cautions, usable
 from thermal_robot.diagnosis.discovery import Discoveries, discoveries
 from thermal_robot.diagnosis.heldout import Shrinkage, held_out
 from thermal_robot.diagnosis.random_gap import STEPS
 from thermal_robot.diagnosis.result import Diagnosis, Finding, Gap, Rows
 from thermal_robot.diagnosis.schemes import FoldScheme, worst_folds
 from thermal_robot.diagnosis.sensitivity import sensitivity
-from thermal_robot.diagnosis.stand_in import StandIn, stand_ins, trust
+from thermal_robot.diagnosis.stand_in import stand_ins, trust
 from thermal_robot.diagnosis.verdict import advise, sentence
 from thermal_robot.diagnosis.where import locate
 from thermal_robot.effects import Effect, choose, library
 from thermal_robot.errors import CampaignError
 from thermal_robot.estimation.fit import Fit, fit
 
-_DOUBTFUL = 0.5
 _SEEN = 1e-3
-_CONTRADICTED = 0.01  # rad or m: no servo that has settled is as far from its command
 
 
 def diagnose(
@@ -73,7 +72,7 @@ def diagnose(
     candidates = choose(only, without, effects)
     narrowed = len(candidates) < len({*library(), *(e.name for e in effects)})
     _check_priors(campaign, {e.name for e in candidates} | set(library()))
-    campaign, notes = _usable(campaign)
+    campaign, notes = usable(campaign)
     # matrices are small: threads that wait for each other cost several times what they bring
     with threadpool_limits(1):
         looked = discoveries(fit(campaign, candidates, progress), progress)
@@ -114,33 +113,10 @@ def diagnose(
         separates=separates,
         model=_model(fitted),
         rows=_rows(fitted, shrinkage),
-        warnings=(*campaign.warnings, *notes, *_doubts(fitted, candidates if narrowed else ()), *_changing(doubts)),
+        warnings=(*campaign.warnings, *notes, *cautions(fitted, candidates if narrowed else (), doubts)),
         sensitivity=sensitivity(fitted),
         fit=fitted,
     )
-
-
-def _usable(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
-    """Leave out what is no measurement of its own, and say so."""
-    notes = []
-    if (
-        campaign.orientation is not None
-        and campaign.simulated_position is not None
-        and campaign.simulated_orientation is None
-    ):
-        # nothing says how the target is turned there
-        notes.append("orientation was measured, but sim.* predicts positions only: orientation is left out")
-        campaign = replace(campaign, orientation=None, noise_orientation=None)
-    notes += _contradicted(campaign)
-    # a real repetition may well measure the same digits, but not in the same second and conditions
-    recorded = [values[:, None] for values in campaign.covariates.values()]
-    table = np.hstack([campaign.q, np.asarray(campaign.position), *recorded])
-    first = np.sort(np.unique(table, axis=0, return_index=True)[1])
-    copies = campaign.samples - len(first)
-    if copies:
-        notes.append(f"{copies} rows repeat another one to the last digit: these copies are left out")
-        campaign = campaign.take(first)
-    return campaign, tuple(notes)
 
 
 def _scatter(looked: Discoveries) -> tuple[Finding, ...]:
@@ -164,48 +140,6 @@ def _scatter(looked: Discoveries) -> tuple[Finding, ...]:
         if f.name == STEPS and f.status in ("found", "confounded")
         else f
         for f in looked.chance.findings
-    )
-
-
-def _contradicted(campaign: Campaign) -> list[str]:
-    """Say where the controller's own readings deny that the robot went where it was sent: a fault of the log."""
-    found = []
-    for j, name in enumerate(campaign.robot.joint_names):
-        read = campaign.covariates.get(f"encoder.{name}")
-        if read is None:
-            continue
-        away = read - campaign.q[:, j]
-        middle = float(np.median(away))
-        wrong = np.flatnonzero(np.abs(away - middle) > _CONTRADICTED)
-        if len(wrong):
-            first = int(campaign.rows[wrong[0]])
-            found.append(
-                f"encoder.{name} contradicts the commands in {len(wrong)} of {campaign.samples} rows, first in "
-                f"row {first}, by up to {np.abs(away - middle).max():.2g}: that is a fault of the log, not of the robot"
-            )
-        elif abs(middle) > _CONTRADICTED:
-            found.append(f"encoder.{name} is {middle:.3g} from the commands throughout: another zero, or another unit")
-    return found
-
-
-def _doubts(fitted: Fit, considered: Sequence[Effect]) -> tuple[str, ...]:
-    """Return what a reader should know before he believes the diagnosis."""
-    notes = []
-    campaign, e = fitted.campaign, fitted.explanation
-    remains = float(e.whitening.noise[0] * e.best.noise)
-    if campaign.noise_position is not None and remains < 0.5 * campaign.noise_position:
-        times = campaign.noise_position / remains
-        notes.append(f"the stated noise of position is {times:.1f} times what remains: it is stated too large")
-    if considered:
-        notes.append("only these effects were considered: " + ", ".join(effect.name for effect in considered))
-    return tuple(notes)
-
-
-def _changing(doubts: Mapping[str, StandIn]) -> tuple[str, ...]:
-    return tuple(
-        f"the size of {name} changes with {doubt.quantity}: it may stand in for a cause that is not listed"
-        for name, doubt in doubts.items()
-        if doubt.belief < _DOUBTFUL
     )
 
 

@@ -136,7 +136,12 @@ def advise(found: Sequence[Finding], unexplained: Unexplained) -> tuple[str, tup
         if {"base_frame", "tool_frame"} & set(groups[0]):
             return f"A frame measured on its own, and declared known, would tell {pair}.", groups
         return f"More poses over the whole range of every joint would tell {pair}.", groups
-    missing = [f for f in found if f.status == "not_testable" and not any(n.startswith("frames.") for n in f.needs)]
+    # repeats are not recorded but made: the last advice asks for them
+    missing = [
+        f
+        for f in found
+        if f.status == "not_testable" and f.needs != ("pose",) and not any(n.startswith("frames.") for n in f.needs)
+    ]
     if unexplained.flagged and missing:
         columns = sorted({n.split(".")[0] for f in missing for n in f.needs})
         listed = ", ".join(plain(f.name) for f in missing)

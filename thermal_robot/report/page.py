@@ -8,6 +8,7 @@ from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
 from typing import TYPE_CHECKING
 
+from thermal_robot.report import units
 from thermal_robot.report.inline import svg
 from thermal_robot.report.page_tables import effects_table, numbers, outliers_table
 from thermal_robot.report.plots_how_far import plot_how_far
@@ -88,6 +89,9 @@ def _whole(diagnosis: Diagnosis, generated: str | None) -> Iterator[str]:
         "The gap is the distance between measured and predicted pose. Shrinkage is the share of its mean square that "
         f"goes away on rows that were not used for the fit ({held.scheme}, {held.folds} folds)."
     )
+    for scheme in diagnosis.gap.schemes[:1]:
+        before, after = units.together((scheme.rms_before, scheme.rms_after), "m")
+        yield _paragraph(f"Held out by {scheme.name} ({scheme.held_out}), the hardest way: {before} → {after}.")
     yield _paragraph(f"Noise alone would leave {noise_of(diagnosis)}.")
     yield _figure(plot_how_far(diagnosis), "Distribution of the gap before and after") + "</section>"
     yield "<section><h2>Which</h2>"
@@ -98,7 +102,11 @@ def _whole(diagnosis: Diagnosis, generated: str | None) -> Iterator[str]:
     yield _figure(plot_map(diagnosis), "The gap as arrows at the positions of the tool") + "</section>"
     yield "<section><h2>Unexplained</h2>"
     yield from _unexplained(diagnosis)
-    yield _figure(plot_remainder(diagnosis), "The remainder in the order of measurement") + "</section>"
+    yield _figure(plot_remainder(diagnosis), "The remainder in the order of measurement")
+    for name in diagnosis.verdict:
+        if name.startswith("discovered.") and diagnosis.fit is not None:
+            yield _figure(diagnosis.explain(name), f"{name}: the error there against what it follows")
+    yield "</section>"
     yield from _next(diagnosis)
     if diagnosis.outliers:
         yield f"<section><h2>Set aside</h2>{outliers_table(diagnosis)}</section>"

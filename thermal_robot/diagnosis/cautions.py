@@ -1,0 +1,113 @@
+"""What to leave out of a campaign, and what to know before one believes its diagnosis."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from thermal_robot.campaign import Campaign
+from thermal_robot.diagnosis.stand_in import StandIn
+from thermal_robot.effects import Effect
+from thermal_robot.estimation.fit import Fit
+
+_DOUBTFUL = 0.5
+_CANCELLING = 5.0
+_CONTRADICTED = 0.01  # rad or m: no servo that has settled is as far from its command
+
+
+def usable(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
+    """Leave out what is no measurement of its own, and say so."""
+    notes = []
+    if (
+        campaign.orientation is not None
+        and campaign.simulated_position is not None
+        and campaign.simulated_orientation is None
+    ):
+        # nothing says how the target is turned there
+        notes.append("orientation was measured, but sim.* predicts positions only: orientation is left out")
+        campaign = replace(campaign, orientation=None, noise_orientation=None)
+    notes += contradicted(campaign)
+    # a real repetition may well measure the same digits, but not in the same second and conditions
+    recorded = [values[:, None] for values in campaign.covariates.values()]
+    table = np.hstack([campaign.q, np.asarray(campaign.position), *recorded])
+    first = np.sort(np.unique(table, axis=0, return_index=True)[1])
+    copies = campaign.samples - len(first)
+    if copies:
+        notes.append(f"{copies} rows repeat another one to the last digit: these copies are left out")
+        campaign = campaign.take(first)
+    return campaign, tuple(notes)
+
+
+def contradicted(campaign: Campaign) -> list[str]:
+    """Say where the controller's own readings deny that the robot went where it was sent: a fault of the log."""
+    found = []
+    for j, name in enumerate(campaign.robot.joint_names):
+        read = campaign.covariates.get(f"encoder.{name}")
+        if read is None:
+            continue
+        away = read - campaign.q[:, j]
+        middle = float(np.median(away))
+        wrong = np.flatnonzero(np.abs(away - middle) > _CONTRADICTED)
+        if len(wrong):
+            first = int(campaign.rows[wrong[0]])
+            found.append(
+                f"encoder.{name} contradicts the commands in {len(wrong)} of {campaign.samples} rows, first in "
+                f"row {first}, by up to {np.abs(away - middle).max():.2g}: that is a fault of the log, not of the robot"
+            )
+        elif abs(middle) > _CONTRADICTED:
+            found.append(f"encoder.{name} is {middle:.3g} from the commands throughout: another zero, or another unit")
+    return found
+
+
+def cautions(fitted: Fit, considered: Sequence[Effect], doubts: Mapping[str, StandIn]) -> tuple[str, ...]:
+    """Return what a reader should know before he believes the diagnosis.
+
+    Parameters
+    ----------
+    fitted
+        The last fit.
+    considered
+        The effects that were considered, where not all were.
+    doubts
+        By name: effects whose size changes with the circumstances.
+    """
+    notes = []
+    campaign, e = fitted.campaign, fitted.explanation
+    remains = float(e.whitening.noise[0] * e.best.noise)
+    if campaign.noise_position is not None and remains < 0.5 * campaign.noise_position:
+        times = campaign.noise_position / remains
+        notes.append(f"the stated noise of position is {times:.1f} times what remains: it is stated too large")
+    for name, times in _cancelling(fitted):
+        notes.append(
+            f"parameters of {name} cancel each other: single ones do up to {times:.0f} times what all do together"
+        )
+    if considered:
+        notes.append("only these effects were considered: " + ", ".join(effect.name for effect in considered))
+    return (*notes, *_changing(doubts))
+
+
+def _cancelling(fitted: Fit) -> Iterator[tuple[str, float]]:
+    """Yield effects whose parameters stand for nothing one by one, and by how much the largest exceeds their sum.
+
+    Over part of a turn harmonics of low order are nearly alike, and what frames can do as well cancels against these.
+    """
+    e = fitted.explanation
+    frames = e.linear.frames.reshape(-1, e.linear.frames.shape[2])
+    basis = np.linalg.qr(frames / (np.linalg.norm(frames, axis=0) + 1e-300))[0]
+    for b, (effect, values) in zip(e.best.blocks, fitted.effects, strict=True):
+        moved = e.linear.blocks[b].columns.reshape(len(frames), -1) * values
+        moved = moved - basis @ (basis.T @ moved)
+        whole = float(np.linalg.norm(moved.sum(axis=1)))
+        times = float(np.linalg.norm(moved, axis=0).max(initial=0.0)) / max(whole, 1e-300)
+        if times > _CANCELLING:
+            yield effect.name, times
+
+
+def _changing(doubts: Mapping[str, StandIn]) -> tuple[str, ...]:
+    return tuple(
+        f"the size of {name} changes with {doubt.quantity}: it may stand in for a cause that is not listed"
+        for name, doubt in doubts.items()
+        if doubt.belief < _DOUBTFUL
+    )
