@@ -1,5 +1,6 @@
 """What is believed beside an unlisted cause: effects by size, scatter where there is some, laws that can be read."""
 
+import pickle
 from dataclasses import replace
 
 import numpy as np
@@ -9,10 +10,12 @@ from test_discovery import with_law
 
 from thermal_robot import diagnose
 from thermal_robot.diagnosis.random_gap import random_gap
+from thermal_robot.diagnosis.schemes import worse_elsewhere
 from thermal_robot.diagnosis.stand_in import StandIn, trust
 from thermal_robot.effects import choose
 from thermal_robot.effects.discovered import Discovered
 from thermal_robot.effects.quantity import quantities
+from thermal_robot.errors import CampaignError
 from thermal_robot.estimation.fit import fit
 from thermal_robot.estimation.scan import of_quantity
 from thermal_robot.kinematics import Displacement
@@ -52,6 +55,39 @@ def test_a_wheel_on_the_motor_is_found_where_its_effect_is_not_in_the_library(rv
     amplitude = np.hypot(*[p.value for p in own.parameters if p.name.startswith(("sine", "cosine"))])
     assert amplitude == pytest.approx(np.hypot(3e-4, 2e-4), rel=0.1)
     assert np.abs(found.model.predict(fresh)[0] - true).max() < 25e-6
+
+
+def test_rows_set_aside_one_after_the_other_are_no_gross_errors(rv_m2):
+    """A target that was knocked late leaves few rows, which look spoilt; spoilt rows do not follow each other."""
+    plain = simulate(rv_m2, samples=100, seed=5)[0]
+    rng = np.random.default_rng(5)
+    late = np.arange(100) >= 85
+    knocked = simulate(rv_m2, samples=100, seed=5)[0]
+    order = {"time": np.arange(100.0)}
+    target = np.array([0.0, 1e-3, 0.0])
+    turned = observe(plain, Frames.declared(plain)).chain.tool_rotation @ target
+    data = replace(knocked, position=knocked.position + np.where(late[:, None], turned, 0.0), covariates=order)
+    found = diagnose(data)
+    assert found.unexplained.flagged
+    assert found.finding("discovered.1").quantity == "time"
+    spoilt = np.where(np.isin(np.arange(100), rng.permutation(100)[:6])[:, None], 2e-3, 0.0)
+    scattered = diagnose(replace(plain, position=plain.position + spoilt, covariates=order))
+    assert not scattered.unexplained.flagged
+    assert len(scattered.outliers) == 6
+
+
+def test_a_wider_explanation_must_not_go_astray_elsewhere(rv_m2):
+    data = simulate(rv_m2, ["geometric"], seed=6)[0]
+    wide, narrow = fit(data, choose(("geometric",), (), ())), fit(data, choose(("instrument_scale",), (), ()))
+    assert not worse_elsewhere(narrow, wide)
+    assert not worse_elsewhere(wide, wide)
+    assert worse_elsewhere(wide, narrow)
+
+
+def test_errors_cross_processes():
+    error = CampaignError("a.csv", "no number", row=3, column="x", found="?", expected="m")
+    again = pickle.loads(pickle.dumps(error))
+    assert (type(again), str(again), again.__dict__) == (CampaignError, str(error), error.__dict__)
 
 
 def test_knots_stand_apart_where_most_values_lie_in_one_spot():

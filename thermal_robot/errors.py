@@ -2,11 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 
 class ThermalRobotError(Exception):
     """Root of the errors that are the user's to mend; the command line prints them in one line."""
+
+    def __reduce__(self) -> tuple[Callable[..., ThermalRobotError], tuple[object, ...]]:
+        # errors cross processes; their constructors take more than the message
+        return _again, (type(self), self.args, self.__dict__)
+
+
+def _again(kind: type[ThermalRobotError], args: tuple[object, ...], fields: dict[str, object]) -> ThermalRobotError:
+    error = kind.__new__(kind, *args)
+    error.args = args
+    error.__dict__.update(fields)
+    return error
 
 
 class RobotError(ThermalRobotError):

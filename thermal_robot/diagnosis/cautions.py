@@ -94,7 +94,7 @@ def _cancelling(fitted: Fit) -> Iterator[tuple[str, float]]:
     Over part of a turn harmonics of low order are nearly alike, and what frames can do as well cancels against these.
     """
     e = fitted.explanation
-    frames = e.linear.frames.reshape(-1, e.linear.frames.shape[2])
+    frames = e.linear.frames.reshape(e.linear.gap.size, e.linear.frames.shape[2])
     basis = np.linalg.qr(frames / (np.linalg.norm(frames, axis=0) + 1e-300))[0]
     for b, (effect, values) in zip(e.best.blocks, fitted.effects, strict=True):
         moved = e.linear.blocks[b].columns.reshape(len(frames), -1) * values

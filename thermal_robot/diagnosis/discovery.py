@@ -9,6 +9,7 @@ import numpy as np
 
 from thermal_robot.diagnosis.random_gap import RandomGap, random_gap
 from thermal_robot.diagnosis.result import Dependence, Location, Unexplained
+from thermal_robot.diagnosis.schemes import worse_elsewhere
 from thermal_robot.diagnosis.unexplained import examine
 from thermal_robot.effects.discovered import PREFIX, Discovered
 from thermal_robot.estimation.discover import Discovery, discover
@@ -70,6 +71,7 @@ def discoveries(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> D
     if first.flagged and chance.explains_size:
         return _scattered(fit, chance, progress)
     left = first
+    stages = [(fit, found, left, floor, source)]
     most = MOST if fit.campaign.samples < _MANY_ROWS else 1
     for _ in range(most):
         number = 1 + max((int(d.law.name.removeprefix(PREFIX)) for d in found), default=0)
@@ -96,6 +98,11 @@ def discoveries(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> D
         known = {d.law.name: d for d in (*found, discovery)}
         found = [d for name, d in known.items() if name in held]
         left, floor, source = examine(fit, progress)
+        stages.append((fit, found, left, floor, source))
+    # the first of several laws may go astray between the places that were measured, and the others set it right
+    while len(stages) > 1 and worse_elsewhere(stages[0][0], stages[-1][0]):
+        stages.pop()
+    fit, found, left, floor, source = stages[-1]
     chance = random_gap(fit) if found else chance
     return Discoveries(fit, tuple(found), _told(first, left, found), left, floor, source, chance)
 

@@ -22,6 +22,7 @@ Labels = NDArray[np.int64]
 
 _FOLDS = 5
 _DETERMINED = 1e-9  # of the strongest direction of the frames: weaker ones are not determined
+_WORSE = 1.05
 _LEAST = 0.01  # K: a temperature that varies less does not vary
 
 
@@ -72,20 +73,34 @@ def worst_folds(fit: Fit) -> tuple[FoldScheme, ...]:
         In order of rms_after, the largest first. A scheme is left out where the campaign has no such column, a fold
         where the remaining rows do not determine the frames.
     """
+    problem, kept = _problem(fit), ~fit.explanation.outliers
+    found = [_judged(problem, kept, *scheme) for scheme in _schemes(fit)]
+    return tuple(sorted((f for f in found if f is not None), key=lambda f: -f.rms_after))
+
+
+def worse_elsewhere(narrow: Fit, wider: Fit) -> bool:
+    """Tell whether a wider explanation leaves more where neighbourhoods of joint positions are held out.
+
+    It then fits what was measured by large errors that cancel there, and goes astray between.
+    """
+    kept = ~(narrow.explanation.outliers | wider.explanation.outliers)
+    tests = _each(neighbourhoods(narrow.campaign, _FOLDS))
+    left = [_judged(_problem(fit), kept, "region", "", tests) for fit in (narrow, wider)]
+    return left[0] is not None and left[1] is not None and left[1].rms_after > _WORSE * left[0].rms_after
+
+
+def _problem(fit: Fit) -> _Problem:
     explanation = fit.explanation
     best = explanation.best
     blocks = [explanation.linear.blocks[b] for b in best.blocks]
     scaled = [b.columns * (b.sizes * best.scales[k]) for b, k in zip(blocks, best.blocks, strict=True)]
-    problem = _Problem(
+    return _Problem(
         np.concatenate([explanation.linear.frames, *scaled], axis=2),
         explanation.linear.gap,
         explanation.linear.frames.shape[2],
         explanation.whitening.weights / explanation.design_effect,
         explanation.whitening.noise * best.noise,
     )
-    kept = ~explanation.outliers
-    found = [_judged(problem, kept, *scheme) for scheme in _schemes(fit)]
-    return tuple(sorted((f for f in found if f is not None), key=lambda f: -f.rms_after))
 
 
 def _schemes(fit: Fit) -> Iterator[tuple[str, str, list[NDArray[np.bool_]]]]:
@@ -131,7 +146,8 @@ class _Problem:
 
     def _rank(self, products: Array) -> int:
         frames = products[: self.flat, : self.flat]
-        length = np.sqrt(np.diag(frames)) + 1e-300
+        # a column of the rows held out alone leaves a rounding error of either sign
+        length = np.sqrt(np.maximum(np.diag(frames), 0.0)) + 1e-150
         value = np.linalg.eigvalsh(frames / np.outer(length, length)) if self.flat else np.zeros(0)
         return int((value > _DETERMINED).sum())
 

@@ -7,13 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtrc, fdtrc, ndtr
+from scipy.special import chdtrc, fdtrc, ndtr, pdtr
 
 from thermal_robot.diagnosis.laws import smooth_law
 from thermal_robot.diagnosis.result import Dependence, Location, Unexplained
 from thermal_robot.effects.quantity import quantities
 from thermal_robot.estimation.fit import Fit
-from thermal_robot.estimation.groups import NEAR, in_order
+from thermal_robot.estimation.groups import NEAR, in_a_row, in_order
 from thermal_robot.estimation.scan import harmonics
 from thermal_robot.observations import Observations
 
@@ -26,6 +26,7 @@ _FEWEST_PAIRS = 12
 _SHUFFLES = 200
 _ENOUGH_ROWS = 2000  # a law that explains a hundredth of what remains is then seen
 _SEED = 17
+_FEW_ASIDE = 0.05  # of all rows: fewer that follow each other may be one lapse of the instrument
 _ROUNDING = 1e-9  # m: a remainder below it is rounding, whatever its structure
 
 
@@ -151,7 +152,7 @@ def examine(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> tuple
     alike, likeness = _neighbours(fit, left)
     progress("remainder: places and quantities")
     law, locations, depends, share = _scan(fit, left)
-    verdicts = [_size(fit, left), _lack_of_fit(left, again), alike, law]
+    verdicts = [_size(fit, left), _lack_of_fit(left, again), alike, law, _in_a_row(fit)]
     p_value = min(1.0, len(verdicts) * min(p for p, _ in verdicts))
     reasons = tuple(reason for p, reason in verdicts if reason and len(verdicts) * p < LEVEL)
     flagged = bool(reasons) and rms > _ROUNDING
@@ -202,6 +203,19 @@ def _lack_of_fit(left: Remainder, again: Repeats | None) -> tuple[float, str]:
         return 1.0, ""
     times = np.sqrt(ratio2)
     return p, f"what remains is {times:.2g} times what {again.pairs} pairs of repeated commands differ by"
+
+
+def _in_a_row(fit: Fit) -> tuple[float, str]:
+    """Chance that so many of the rows set aside follow each other; spoilt rows do not, but those after a change do."""
+    aside = fit.explanation.outliers[in_order(fit.campaign)]
+    count, samples = int(aside.sum()), len(aside)
+    if count < _FEW_ASIDE * samples:
+        return 1.0, ""
+    follow = int((aside[1:] & aside[:-1]).sum())
+    # what chance gives has a Poisson law
+    p = 1.0 - float(pdtr(follow - 1, count * (count - 1) / samples)) if follow else 1.0
+    together = int(in_a_row(fit.campaign, fit.explanation.outliers).sum())
+    return p, f"{together} of the {count} rows that were set aside follow each other: something changed there"
 
 
 def _neighbours(fit: Fit, left: Remainder) -> tuple[tuple[float, str], float]:

@@ -13,6 +13,7 @@ from thermal_robot.estimation.columns import block
 from thermal_robot.estimation.evidence import Combination, Search
 from thermal_robot.estimation.explain import PRIOR_PROBABILITY, log_priors
 from thermal_robot.estimation.fit import Fit, corrected_observations
+from thermal_robot.estimation.groups import in_a_row
 from thermal_robot.estimation.linear import Linear, Whitening, contained, gram
 from thermal_robot.estimation.scan import CLOCK, Scanned, Target, scan, shaped
 from thermal_robot.observations import Observations
@@ -40,19 +41,22 @@ class Thin:
         The problem there, whitening its weights and noise.
     remainder
         (M, m) what the explanation leaves.
+    changed
+        (M,) rows that were set aside and follow each other.
     """
 
     observations: Observations
     linear: Linear
     whitening: Whitening
     remainder: Array
+    changed: NDArray[np.bool_]
 
     @classmethod
     def of(cls, fit: Fit) -> Thin:
         """Return the rows of a fit."""
         e = fit.explanation
         if fit.campaign.samples <= _ENOUGH_ROWS:
-            return cls(fit.corrected, e.linear, e.whitening, e.remainder)
+            return cls(fit.corrected, e.linear, e.whitening, e.remainder, in_a_row(fit.campaign, e.outliers))
         drawn = np.random.default_rng(_SEED).choice(fit.campaign.samples, _ENOUGH_ROWS, replace=False)
         rows = np.sort(drawn)
         return cls(
@@ -64,12 +68,13 @@ class Thin:
             ),
             replace(e.whitening, weights=e.whitening.weights[rows]),
             e.remainder[rows],
+            in_a_row(fit.campaign, e.outliers)[rows],
         )
 
     def target(self, blocks: Iterable[int]) -> Target:
         """Return what is left when frames and some blocks are projected out."""
         columns = [self.linear.blocks[b].columns for b in blocks]
-        return Target.of(self.linear.gap, np.concatenate([self.linear.frames, *columns], axis=2))
+        return Target.of(self.linear.gap, np.concatenate([self.linear.frames, *columns], axis=2), self.changed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,7 +256,8 @@ def _all_rows(fit: Fit, thin: Thin) -> Whitening:
         if sigma is not None:
             noise[3 * part : 3 * part + 3] = np.minimum(noise[3 * part : 3 * part + 3], 2.0 * sigma)
     distance2 = ((thin.remainder / thin.whitening.noise) ** 2).sum(axis=1) / thin.linear.measures
-    return Whitening(np.minimum(1.0, 9.0 / np.maximum(distance2, 1e-300)), noise, thin.whitening.held)
+    weights = np.where(thin.changed, 1.0, np.minimum(1.0, 9.0 / np.maximum(distance2, 1e-300)))
+    return Whitening(weights, noise, thin.whitening.held)
 
 
 def where(fit: Fit, law: Discovered) -> tuple[str, str]:

@@ -49,6 +49,18 @@ def in_order(campaign: Campaign) -> Labels:
     return np.arange(campaign.samples) if clock is None else np.argsort(clock, kind="stable")
 
 
+def in_a_row(campaign: Campaign, aside: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """(N,) which of the rows set aside follow each other: something changed there, which is no gross error."""
+    order = in_order(campaign)
+    own = aside[order]
+    beside = np.zeros_like(own)
+    beside[1:] |= own[:-1]
+    beside[:-1] |= own[1:]
+    result = np.zeros_like(own)
+    result[order] = own & beside
+    return result
+
+
 def spells(campaign: Campaign, count: int) -> Labels:
     """(N,) label of one of ``count`` uninterrupted spells of equal length."""
     labels = np.empty(campaign.samples, dtype=np.int64)

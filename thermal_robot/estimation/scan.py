@@ -116,8 +116,11 @@ class Target:
     basis: Array
 
     @classmethod
-    def of(cls, gap: Array, design: Array) -> Target:
-        """Project a design (N, m, K) out of a gap (N, m), robustly: rows far from the rest weigh little (Cauchy)."""
+    def of(cls, gap: Array, design: Array, trusted: NDArray[np.bool_] | None = None) -> Target:
+        """Project a design (N, m, K) out of a gap (N, m), robustly: rows far from the rest weigh little (Cauchy).
+
+        ``trusted`` (N,) rows weigh fully in what is left, however far they are.
+        """
         measures = gap.shape[1]
         noise = np.repeat(robust_noise(gap), 3)
         weight = np.ones(len(gap))
@@ -130,6 +133,11 @@ class Target:
             left = white.reshape(gap.shape) / root
             noise = np.repeat(robust_noise(left), 3)
             weight = 1.0 / (1.0 + ((left / noise) ** 2).sum(axis=1) / (3.0 * measures))
+        if trusted is not None and trusted.any():
+            root = np.where(trusted[:, None], 1.0 / noise, root)
+            basis = _basis((design * root[:, :, None]).reshape(root.size, design.shape[2]))
+            white = (gap * root).ravel()
+            white = white - basis @ (basis.T @ white)
         return cls(white, root, basis)
 
     def gain(self, columns: Array) -> float:
