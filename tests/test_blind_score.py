@@ -160,9 +160,10 @@ def test_calibration_counts_what_is_clearly_there_or_clearly_not():
     effects = [effect("drift", 0.6), effect("backlash", 0.2), effect("joint_gain", 0.4), effect("geometric", 0.7)]
     effects += [effect("joint_offset", 0.03), effect("tracking_lag", None, "not_testable")]
     parts = {"joint_gain": 0.3, "geometric": 0.6, "joint_offset": 0.05}
-    cases = [record("hard", said(*effects), ["drift"], parts), record("removed", said(effect("drift", 0.5)))]
+    cases = [record("faint", said(*effects), ["drift"], parts), record("removed", said(effect("drift", 0.5)))]
     found = score([*cases, crash("single", "drift")]).calibration
-    # joint_gain is neither; the removed and the failed case say nothing
+    cases.append(record("hard", said(effect("backlash", 0.5), effect("drift", 0.5)), ["drift"], {"backlash": 0.15}))
+    # joint_gain is neither; the removed, the hard and the failed case say nothing
     assert found.all.trials == 4
     assert found.doubtful.trials == 3
     assert found.doubtful.error == pytest.approx((0.4 + 0.2 + 0.3) / 3)

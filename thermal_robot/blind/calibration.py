@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from thermal_robot.blind.judged import PRESENT, Record, at_work, is_absent, ratio, said
 from thermal_robot.blind.rate import Rate
 
-KINDS = ("single", "pair", "triple", "null", "hard")
+KINDS = ("single", "pair", "triple", "null", "faint")
+"""Not the hard ones: what is not at work there is in the background, so that only true effects would count."""
 BINS = 10
 DOUBTFUL = (0.05, 0.95)
 

@@ -27,7 +27,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-Kind = Literal["single", "pair", "triple", "null", "hard", "removed", "hidden", "unlisted", "real"]
+Kind = Literal["single", "pair", "triple", "null", "hard", "faint", "removed", "hidden", "unlisted", "real"]
 
 
 @dataclass(frozen=True)

@@ -6,6 +6,7 @@ A diagnosis that failed answers every question wrongly. Questions by kind:
 exact         found are the effects at work and no other, nothing unexplained, nothing named that is confounded
 first_named   the first effect of the verdict is at work
 false_alarm   something is found that is not at work; where nothing is, also: something is called unexplained
+sound         nothing is found that is not at work, and nothing called unexplained
 located       the first place of an effect that was found rightly is its first true place
 among_places  ... is one of its true places
 flagged       something is called unexplained
@@ -36,6 +37,7 @@ BAD = frozenset({"false_alarm"})
 """Questions to which yes is wrong."""
 HEADLINE = {
     **dict.fromkeys(("single", "pair", "triple", "null", "hard"), "exact"),
+    "faint": "sound",
     **dict.fromkeys(("removed", "hidden", "unlisted", "real"), "right"),
 }
 """The question that decides whether a case of a kind is a miss."""
@@ -132,6 +134,12 @@ def _known(record: Record) -> Marks:
     }
 
 
+def _faint(record: Record) -> Marks:
+    """Judge a case whose effects may be too small to be seen: nothing else must be."""
+    extra = {name for name in found(record) if is_absent(record, name)}
+    return {"sound": (not extra and not unexplained(record),), "false_alarm": (bool(extra),)}
+
+
 def _located(record: Record, effect: str) -> tuple[bool, bool] | None:
     """Tell whether the first place is the first true one, and one of them; ``None`` where it sits everywhere."""
     true = [_site(p) for p in record["truth"].get("parts", {}).get(effect, {}).get("places", ())]
@@ -201,6 +209,7 @@ def _real(record: Record) -> Marks:
 
 _ASKED: dict[str, Callable[[Record], Marks]] = {
     **dict.fromkeys(("single", "pair", "triple", "null", "hard"), _known),
+    "faint": _faint,
     **dict.fromkeys(("removed", "unlisted"), _unknown),
     "hidden": _hidden,
     "real": _real,

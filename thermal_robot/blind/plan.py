@@ -31,11 +31,14 @@ FULL = {
     "triple": 20,
     "null": 100,
     "hard": 200,
+    "faint": 400,
     "removed": 40,
     "hidden": 24,
     "unlisted": 108,
 }
 
+CHANCE = 0.1
+"""How probable it is that an effect is at work in a faint case: what a diagnosis, too, holds of it beforehand."""
 CONTAINS = {"geometric": {"joint_offset", "instrument_scale"}}
 """What a larger effect can do exactly as well (formats.md)."""
 IMITATES = {"transmission_error": {"joint_gain"}}
@@ -49,6 +52,7 @@ CONDITION = {
     "tracking_lag": ("velocity", "acceleration", "approach"),
 }
 """Columns that a cause cannot be seen without."""
+_MOST = 3  # effects of a faint case: more want conditions that no campaign has
 
 
 def robots(chosen: Sequence[tuple[str, str, str]] = ROBOTS) -> tuple[RobotChoice, ...]:
@@ -144,6 +148,7 @@ def _turns(
     apart = [n for n in mean if n not in framed]
     # contained effects are no loss where the library keeps the container
     contained = {name for outer, inner in (*CONTAINS.items(), *IMITATES.items()) if outer in effects for name in inner}
+    faint: dict[str, Any] = {"ratio": (0.5, 1.5), "samples": (30, 90)}
     menu: list[dict[str, Any]]
     if kind == "null":
         menu = [{}]
@@ -151,6 +156,11 @@ def _turns(
         menu = [{"effects": (name,)} for name in effects]
     elif kind == "hard":
         menu = [{"effects": (name,), **hard} for name in apart]
+    elif kind == "faint":
+        while True:  # of each effect its own chance, so that probabilities have something to be held against
+            drawn = tuple(name for name in apart if rng.random() < CHANCE)
+            if len(drawn) <= _MOST and not _containing(drawn):
+                yield {"effects": drawn, **faint}
     elif kind in ("pair", "triple"):
         sets = combinations(apart, 2 if kind == "pair" else 3)
         menu = [{"effects": chosen} for chosen in sets if not _containing(chosen)]

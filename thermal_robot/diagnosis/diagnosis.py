@@ -26,6 +26,7 @@ from thermal_robot.diagnosis.where import locate
 from thermal_robot.effects import Effect, choose, library
 from thermal_robot.errors import CampaignError
 from thermal_robot.estimation.fit import Fit, fit
+from thermal_robot.estimation.groups import in_a_row
 
 _SEEN = 1e-3
 
@@ -83,8 +84,7 @@ def diagnose(
     where, locations = locate(fitted, shares)
     doubts = stand_ins(fitted) if looked.remaining.flagged or looked.found else {}
     gap = _gap(fitted, shrinkage, looked.floor, looked.source, worst_folds(fitted))
-    left = min((looked.remaining.rms / gap.rms_before) ** 2, 1.0) if looked.remaining.flagged else 0.0
-    believed = trust({e.name: shares.get(e.name, 0.0) for e, _ in fitted.effects}, doubts, left)
+    believed = trust({e.name: shares.get(e.name, 0.0) for e, _ in fitted.effects}, doubts, _left(looked, gap))
     systematic = findings(fitted, shrinkage.shares, locations, believed)
     chance = [f for f in _scatter(looked) if f.name not in without and (not only or f.name in only)]
     found = in_order((*systematic, *chance))
@@ -141,6 +141,18 @@ def _scatter(looked: Discoveries) -> tuple[Finding, ...]:
         else f
         for f in looked.chance.findings
     )
+
+
+def _left(looked: Discoveries, gap: Gap) -> float:
+    """Share of the gap's mean square that is not explained; rows that were set aside and follow each other are part."""
+    if not looked.remaining.flagged:
+        return 0.0
+    fitted = looked.fit
+    aside = fitted.explanation.outliers
+    changed = in_a_row(fitted.campaign, aside)
+    before, after = ((o.gap[:, :3] ** 2).sum(axis=1) for o in (fitted.nominal, fitted.corrected))
+    beside = float(after[changed].sum() / max(before[changed | ~aside].sum(), 1e-300))
+    return min((looked.remaining.rms / gap.rms_before) ** 2 + beside, 1.0)
 
 
 def _reach(campaign: Campaign) -> float:

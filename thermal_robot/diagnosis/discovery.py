@@ -11,6 +11,7 @@ from thermal_robot.diagnosis.random_gap import RandomGap, random_gap
 from thermal_robot.diagnosis.result import Dependence, Location, Unexplained
 from thermal_robot.diagnosis.schemes import worse_elsewhere
 from thermal_robot.diagnosis.unexplained import examine
+from thermal_robot.effects import Effect
 from thermal_robot.effects.discovered import PREFIX, Discovered
 from thermal_robot.estimation.discover import Discovery, discover
 from thermal_robot.estimation.explain import Noise, explain
@@ -68,7 +69,7 @@ def discoveries(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> D
     found: list[Discovery] = []
     first, floor, source = examine(fit, progress)
     chance = random_gap(fit)
-    if first.flagged and chance.explains_size:
+    if chance.explains_size:
         return _scattered(fit, chance, progress)
     left = first
     stages = [(fit, found, left, floor, source)]
@@ -90,9 +91,10 @@ def discoveries(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> D
             discovery = replace(discovery, law=finer)
         law = discovery.law
         begin = tuple(dict.fromkeys((*discovery.beside, law.name)))
-        wider = refit(fit, {law.name: (law,)}, begin, {law.name: discovery.rarity}, progress)
+        alone = _alone(fit, law)
+        wider = refit(fit, {law.name: (law,), **alone}, begin, {law.name: discovery.rarity}, progress)
         held = {effect.name for effect, _ in wider.effects}
-        if law.name not in held:
+        if law.name not in held and not any(effect in alone.get(effect.name, ())[-1:] for effect, _ in wider.effects):
             break
         fit = wider
         known = {d.law.name: d for d in (*found, discovery)}
@@ -123,7 +125,18 @@ def _scattered(fit: Fit, chance: RandomGap, progress: Callable[[str], None]) -> 
     left = Unexplained(not chance.explains_size, 0.0, chance.p_value)
     if left.flagged:
         left, _, _ = examine(fit, progress)
-    return Discoveries(fit, (), left, left, floor, "repeats", chance)
+    return Discoveries(fit, (), left, left, floor, "scatter", chance)
+
+
+def _alone(fit: Fit, law: Discovered) -> dict[str, tuple[Effect, ...]]:
+    """Return by name the known effects that may do in one joint alone what a law of its own position does, so set.
+
+    Chosen for all joints they pay for every sound one, and a law of the one that errs is simpler than they.
+    """
+    if law.kind != "joint" or law.quantity != law.place:
+        return {}
+    own = {name: (settings, settings[0].at(law.place)) for name, settings in fit.settings.items()}
+    return {name: (*known, single) for name, (known, single) in own.items() if single and single not in known}
 
 
 def _same(law: Discovered, other: Discovered) -> bool:

@@ -10,6 +10,7 @@ from thermal_robot.effects import RANDOM
 _ANOTHER_MOTION = 0.02
 _ANOTHER_TURN = 0.2  # rad
 _WEIGHTY = 0.01  # of the gap on held-out rows: an effect with less is named last
+_CARRIES = 1.5  # times what is left of the fitted rows: more on held-out rows is not called noise
 _PLAIN = {
     "base_frame": "a misplaced base frame",
     "tool_frame": "a misplaced tool frame",
@@ -90,13 +91,23 @@ def sentence(
     words = {n: by_name[n].describes or plain(n) for n in explained}
     slight = [words[n] for n in explained if n not in weighty]
     listed = _listed([words[n] for n in weighty]) + (f", and, hardly to be seen, {_listed(slight)}" if slight else "")
-    text = (
-        f"The gap of {size} comes from {listed} ({sure}); correcting for {'them' if len(explained) > 1 else 'it'} "
-        f"removes {100 * gap.held_out.shrinkage:.1f} % of its mean square on held-out data and leaves "
-        f"{length(gap.held_out.rms_after)}"
-    )
+    them = "them" if len(explained) > 1 else "it"
+    text = f"The gap of {size} comes from {listed} ({sure}); correcting for {them} "
+    if gap.held_out.shrinkage < 0.0:
+        text += (
+            "does not carry over to held-out data: their gap is "
+            f"{length(gap.held_out.rms_after)} with it and {length(gap.held_out.rms_before)} without"
+        )
+    else:
+        text += (
+            f"removes {100 * gap.held_out.shrinkage:.1f} % of its mean square on held-out data and leaves "
+            f"{length(gap.held_out.rms_after)}"
+        )
     if not remaining.flagged:
-        text += f", which is noise ({floor})"
+        if gap.held_out.rms_after < _CARRIES * max(gap.rms_after, gap.noise_floor):
+            text += f", which is noise ({floor})"
+        else:
+            text += f", while {length(gap.rms_after)} are left of the rows it was fitted to (noise: {floor})"
     elif gap.noise_source == "remainder" or remaining.rms == 0.0:
         text += ", which is more than noise" + _place(remaining)
     else:

@@ -146,6 +146,10 @@ class Effect(ABC):
         """Return settings near this one, by about a factor, with which estimation refines it; itself among them."""
         return (self,)
 
+    def at(self, joint: str) -> Effect | None:
+        """Return the effect in one joint alone; ``None`` where it has no such setting."""
+        return None
+
     def arguments(self) -> dict[str, Any]:
         """Return the constructor's arguments, for saving."""
         return asdict(self)

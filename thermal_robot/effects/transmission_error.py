@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -25,9 +25,13 @@ class TransmissionError(Effect):
     ----------
     harmonics
         Orders a turn of the wheel, on either side.
+    joints
+        Names of those whose gears err; empty for all. One wheel that is off needs four amplitudes, and those of a
+        dozen others that are sound would count against it.
     """
 
     harmonics: tuple[int, ...] = (1, 2)
+    joints: tuple[str, ...] = ()
 
     name: ClassVar[str] = "transmission_error"
 
@@ -36,6 +40,8 @@ class TransmissionError(Effect):
         robot, gears = observations.robot, observations.campaign.gears
         found = []
         for j, (joint, kind) in enumerate(zip(robot.joint_names, robot.joint_types, strict=True)):
+            if self.joints and joint not in self.joints:
+                continue
             orders = [float(k) for k in self.harmonics] if kind != "prismatic" else []
             orders += [k * float(gears[joint]) for k in self.harmonics] if joint in gears else []
             unit = "m" if kind == "prismatic" else "rad"
@@ -46,3 +52,7 @@ class TransmissionError(Effect):
                     Parameter(f"cosine, order {order:g}", unit, 3e-4, "joint", joint, (at_joint(j, np.cos(angle)),)),
                 ]
         return tuple(found)
+
+    def at(self, joint: str) -> TransmissionError:
+        """Return the effect of one joint's gears."""
+        return replace(self, joints=(joint,))

@@ -38,7 +38,7 @@ _HEADINGS = {
 _DARK = 0.55  # share of a row above which its number is written in the colour of the paper
 _LEAST = 1e-4  # of the gap: what is less is drawn at the edge
 _GROUPS = {
-    "known effect at work": (AFTER, "o", ("single", "pair", "triple", "null", "hard")),
+    "known effect at work": (AFTER, "o", ("single", "pair", "triple", "null", "hard", "faint")),
     "cause withheld": (THIRD, "^", ("removed", "hidden", "unlisted")),
     "real campaign": (BEFORE, "s", ("real",)),
 }

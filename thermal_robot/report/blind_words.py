@@ -13,6 +13,7 @@ KINDS = {
     "triple": "three effects",
     "null": "nothing but noise",
     "hard": "one small effect, few rows",
+    "faint": "effects by chance, hardly to be seen",
     "removed": "effect taken out of the library",
     "hidden": "condition not recorded",
     "unlisted": "cause that no library knows",
@@ -20,6 +21,7 @@ KINDS = {
 }
 QUESTIONS = {
     "exact": "exactly what is at work, nothing else",
+    "sound": "nothing named that is not at work",
     "first_named": "named first is an effect at work",
     "false_alarm": "false alarm",
     "located": "place named first is the first true one",

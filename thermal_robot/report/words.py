@@ -25,6 +25,7 @@ _UNLIKELY = 0.02  # probability of a place that is not worth naming
 _SOURCES = {
     "stated": "the instrument's noise as the campaign states it",
     "repeats": "from the differences between repeated commands",
+    "scatter": "of the instrument, and of the joints' scatter, which was found",
     "remainder": "at most: from the remainder itself, since the campaign states none and repeats no command",
 }
 
