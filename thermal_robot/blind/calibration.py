@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.blind.judged import PRESENT, Record, at_work, is_absent, ratio, said
+from thermal_robot.blind.judged import LAW, PRESENT, Record, at_work, is_absent, ratio, said
 from thermal_robot.blind.rate import Rate
 
 KINDS = ("single", "pair", "triple", "null", "faint")
@@ -45,10 +45,10 @@ class Calibration:
 
 
 def calibration(records: Sequence[Record]) -> Calibration:
-    """Compare probabilities with what is true, over every case whose causes are all in the library.
+    """Compare probabilities with what is true, over cases that are asked what is at work in them.
 
     An effect in the background, neither clearly present nor clearly absent, does not count. A discovered law counts
-    as an effect that is not at work: nothing unknown is.
+    as an effect that is not at work, where all that is at work is in the library.
     """
     pairs = [pair for record in records if record["kind"] in KINDS for pair in _pairs(record)]
     p = np.array([probability for probability, _ in pairs], dtype=float)
@@ -60,7 +60,7 @@ def calibration(records: Sequence[Record]) -> Calibration:
 def _pairs(record: Record) -> Iterator[tuple[float, bool]]:
     for effect in said(record)["effects"]:
         name, probability = effect["name"], effect["probability"]
-        if probability is None:
+        if probability is None or (name.startswith(LAW) and record["truth"].get("unlisted")):
             continue
         if name in at_work(record) or (ratio(record, name) or 0.0) >= PRESENT:
             yield float(probability), True

@@ -6,7 +6,7 @@ A diagnosis that failed answers every question wrongly. Questions by kind:
 exact         found are the effects at work and no other, nothing unexplained, nothing named that is confounded
 first_named   the first effect of the verdict is at work
 false_alarm   something is found that is not at work; where nothing is, also: something is called unexplained
-sound         nothing is found that is not at work, and nothing called unexplained
+sound         nothing is found that is not at work, and nothing called unexplained where all is in the library
 located       the first place of an effect that was found rightly is its first true place
 among_places  ... is one of its true places
 flagged       something is called unexplained
@@ -137,7 +137,8 @@ def _known(record: Record) -> Marks:
 def _faint(record: Record) -> Marks:
     """Judge a case whose effects may be too small to be seen: nothing else must be."""
     extra = {name for name in found(record) if is_absent(record, name)}
-    return {"sound": (not extra and not unexplained(record),), "false_alarm": (bool(extra),)}
+    strange = unexplained(record) and not record["truth"].get("unlisted")
+    return {"sound": (not extra and not strange,), "false_alarm": (bool(extra),)}
 
 
 def _located(record: Record, effect: str) -> tuple[bool, bool] | None:

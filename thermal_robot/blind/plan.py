@@ -31,14 +31,14 @@ FULL = {
     "triple": 20,
     "null": 100,
     "hard": 200,
-    "faint": 400,
+    "faint": 1100,
     "removed": 40,
     "hidden": 24,
     "unlisted": 108,
 }
 
 CHANCE = 0.1
-"""How probable it is that an effect is at work in a faint case: what a diagnosis, too, holds of it beforehand."""
+"""How probable each effect is in a faint case, as a diagnosis holds beforehand; an unlisted cause is as probable."""
 CONTAINS = {"geometric": {"joint_offset", "instrument_scale"}}
 """What a larger effect can do exactly as well (formats.md)."""
 IMITATES = {"transmission_error": {"joint_gain"}}
@@ -149,6 +149,7 @@ def _turns(
     # contained effects are no loss where the library keeps the container
     contained = {name for outer, inner in (*CONTAINS.items(), *IMITATES.items()) if outer in effects for name in inner}
     faint: dict[str, Any] = {"ratio": (0.5, 1.5), "samples": (30, 90)}
+    stepped = [n for n in effects if n == "encoder_resolution"]  # the other random effect wants repeats
     menu: list[dict[str, Any]]
     if kind == "null":
         menu = [{}]
@@ -158,9 +159,10 @@ def _turns(
         menu = [{"effects": (name,), **hard} for name in apart]
     elif kind == "faint":
         while True:  # of each effect its own chance, so that probabilities have something to be held against
-            drawn = tuple(name for name in apart if rng.random() < CHANCE)
+            drawn = tuple(name for name in (*apart, *stepped) if rng.random() < CHANCE)
             if len(drawn) <= _MOST and not _containing(drawn):
-                yield {"effects": drawn, **faint}
+                strange = causes[int(rng.integers(len(causes)))] if causes and rng.random() < CHANCE else None
+                yield {"effects": drawn, "unlisted": strange, **faint}
     elif kind in ("pair", "triple"):
         sets = combinations(apart, 2 if kind == "pair" else 3)
         menu = [{"effects": chosen} for chosen in sets if not _containing(chosen)]

@@ -20,7 +20,7 @@ from thermal_robot.diagnosis.random_gap import STEPS
 from thermal_robot.diagnosis.result import Diagnosis, Finding, Gap, Rows
 from thermal_robot.diagnosis.schemes import FoldScheme, worst_folds
 from thermal_robot.diagnosis.sensitivity import sensitivity
-from thermal_robot.diagnosis.stand_in import stand_ins, trust
+from thermal_robot.diagnosis.stand_in import DOUBT, stand_ins, trust
 from thermal_robot.diagnosis.verdict import advise, sentence
 from thermal_robot.diagnosis.where import locate
 from thermal_robot.effects import Effect, choose, library
@@ -132,7 +132,7 @@ def _scatter(looked: Discoveries) -> tuple[Finding, ...]:
         replace(
             f,
             status="not_found",
-            probability=0.5 * (f.probability or 0.0),
+            probability=DOUBT * (f.probability or 0.0),
             locations=(),
             parameters=(),
             confounded_with=(),

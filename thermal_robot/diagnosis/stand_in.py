@@ -16,6 +16,8 @@ from thermal_robot.estimation.fit import Fit
 
 Array = NDArray[np.float64]
 
+DOUBT = 0.75
+"""How often an effect that is found beside an unlisted cause is there (faint cases of the blind trial)."""
 _MOST = 4  # effects, of the largest share, for which a law is looked for in their place
 
 
@@ -28,11 +30,11 @@ class StandIn:
 
 
 def trust(shares: Mapping[str, float], doubts: Mapping[str, StandIn], unlisted: float) -> dict[str, float]:
-    """Return by name what the probability of each known effect is multiplied with, one half to one.
+    """Return by name what the probability of each known effect is multiplied with, at most one.
 
     An unlisted cause casts a shadow on the effects that come near it, and the larger it is beside an effect the more of
     that effect may be its shadow: s/(s + u), with s the effect's share of the gap and u that of what is not listed.
-    That something works on an effect, or beside it, does not say that it is not there: hence never below one half.
+    That something works on an effect, or beside it, does not say that it is not there: hence never below :data:`DOUBT`.
 
     Parameters
     ----------
@@ -51,7 +53,7 @@ def trust(shares: Mapping[str, float], doubts: Mapping[str, StandIn], unlisted: 
         own = max(share, 0.0)
         shadow = own / (own + unlisted) if unlisted > 0.0 else 1.0
         changing = 0.5 * (1.0 + doubts[name].belief) if name in doubts else 1.0
-        result[name] = max(0.5, min(changing, shadow))
+        result[name] = max(DOUBT, min(changing, shadow))
     return result
 
 

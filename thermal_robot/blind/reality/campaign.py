@@ -139,7 +139,7 @@ def _of_size(case: Case, gauge: Gauge, fault: Fault, noise: float, rng: np.rando
     """
     wanted = noise * rng.uniform(*case.ratio)
     values = fault.draw(gauge.setting, rng)
-    if case.kind not in ("removed", "hidden", "unlisted"):
+    if case.kind not in ("removed", "hidden") and fault.name != case.unlisted:
         return sized(gauge, fault, values, wanted, lambda moved: gauge.rms(gauge.left(moved)))
     rough = sized(gauge, fault, values, wanted, lambda moved: gauge.rms(gauge.left(moved)))
     others = [name for name in FAULTS if name not in case.effects]
