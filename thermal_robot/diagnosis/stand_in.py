@@ -16,7 +16,7 @@ from thermal_robot.estimation.fit import Fit
 
 Array = NDArray[np.float64]
 
-DOUBT = 0.75
+DOUBT = 0.85
 """How often an effect that is found beside an unlisted cause is there (faint cases of the blind trial)."""
 _MOST = 4  # effects, of the largest share, for which a law is looked for in their place
 
