@@ -18,13 +18,13 @@ from thermal_robot.report.blind_text import blind_text
 CHANCE = 1e-4
 """Share of sound commits that may fail by bad luck, a floor."""
 REACHED = {
-    ("single", "exact"): 0.95,
-    ("null", "exact"): 0.95,
-    ("pair", "exact"): 0.90,
-    ("hard", "first_named"): 0.85,
+    ("single", "exact"): 0.97,
+    ("null", "exact"): 0.98,
+    ("pair", "exact"): 0.95,
+    ("hard", "first_named"): 0.90,
     ("unlisted", "flagged"): 0.95,
-    ("unlisted", "place"): 0.85,
-    ("removed", "flagged"): 0.90,
+    ("unlisted", "place"): 0.90,
+    ("removed", "flagged"): 0.95,
 }
 """Rates of the full trial (README), rounded down."""
 
