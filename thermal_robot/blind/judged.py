@@ -119,7 +119,7 @@ def _known(record: Record) -> Marks:
     wanted = set(at_work(record))
     confounded = {e["name"] for e in said(record)["effects"] if e["status"] == "confounded"}
     escaped = confounded & set(said(record)["verdict"]["effects"])
-    extra = {name for name in found(record) if is_absent(record, name)}
+    extra = _extra(record)
     exact = wanted <= found(record) and not extra and not unexplained(record) and not escaped
     if not wanted:
         return {"exact": (exact,), "false_alarm": (bool(extra) or unexplained(record),)}
@@ -134,10 +134,17 @@ def _known(record: Record) -> Marks:
     }
 
 
+def _extra(record: Record) -> set[str]:
+    """Return what is claimed and is not at work."""
+    return {name for name in found(record) if is_absent(record, name)}
+
+
 def _faint(record: Record) -> Marks:
-    """Judge a case whose effects may be too small to be seen: nothing else must be."""
-    extra = {name for name in found(record) if is_absent(record, name)}
-    strange = unexplained(record) and not record["truth"].get("unlisted")
+    """Judge a case whose effects may be too small to be seen: nothing else must be.
+
+    A law counts as a name that is false even where an unlisted cause is at work.
+    """
+    extra, strange = _extra(record), unexplained(record) and not record["truth"].get("unlisted")
     return {"sound": (not extra and not strange,), "false_alarm": (bool(extra),)}
 
 

@@ -148,8 +148,6 @@ def _turns(
     apart = [n for n in mean if n not in framed]
     # contained effects are no loss where the library keeps the container
     contained = {name for outer, inner in (*CONTAINS.items(), *IMITATES.items()) if outer in effects for name in inner}
-    faint: dict[str, Any] = {"ratio": (0.5, 1.5), "samples": (30, 90)}
-    stepped = [n for n in effects if n == "encoder_resolution"]  # the other random effect wants repeats
     menu: list[dict[str, Any]]
     if kind == "null":
         menu = [{}]
@@ -158,11 +156,8 @@ def _turns(
     elif kind == "hard":
         menu = [{"effects": (name,), **hard} for name in apart]
     elif kind == "faint":
-        while True:  # of each effect its own chance, so that probabilities have something to be held against
-            drawn = tuple(name for name in (*apart, *stepped) if rng.random() < CHANCE)
-            if len(drawn) <= _MOST and not _containing(drawn):
-                strange = causes[int(rng.integers(len(causes)))] if causes and rng.random() < CHANCE else None
-                yield {"effects": drawn, "unlisted": strange, **faint}
+        # the other random effect wants repeats
+        yield from _by_chance([*apart, *(n for n in effects if n == "encoder_resolution")], causes, rng)
     elif kind in ("pair", "triple"):
         sets = combinations(apart, 2 if kind == "pair" else 3)
         menu = [{"effects": chosen} for chosen in sets if not _containing(chosen)]
@@ -178,6 +173,15 @@ def _turns(
     while True:
         for k in rng.permutation(len(menu)):
             yield menu[k]
+
+
+def _by_chance(effects: Sequence[str], causes: Sequence[str], rng: np.random.Generator) -> Iterator[dict[str, Any]]:
+    """Yield cases without end in which every effect has its own chance: something to hold probabilities against."""
+    while True:
+        drawn = tuple(name for name in effects if rng.random() < CHANCE)
+        if len(drawn) <= _MOST and not _containing(drawn):
+            strange = causes[int(rng.integers(len(causes)))] if causes and rng.random() < CHANCE else None
+            yield {"effects": drawn, "unlisted": strange, "ratio": (0.5, 1.5), "samples": (30, 90)}
 
 
 def _containing(chosen: Sequence[str]) -> bool:

@@ -94,7 +94,8 @@ def discoveries(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> D
         alone = _alone(fit, law)
         wider = refit(fit, {law.name: (law,), **alone}, begin, {law.name: discovery.rarity}, progress)
         held = {effect.name for effect, _ in wider.effects}
-        if law.name not in held and not any(effect in alone.get(effect.name, ())[-1:] for effect, _ in wider.effects):
+        singles = [settings[-1] for settings in alone.values()]
+        if law.name not in held and not any(effect in singles for effect, _ in wider.effects):
             break
         fit = wider
         known = {d.law.name: d for d in (*found, discovery)}
