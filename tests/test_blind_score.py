@@ -161,9 +161,10 @@ def test_calibration_counts_what_is_clearly_there_or_clearly_not():
     effects += [effect("joint_offset", 0.03), effect("tracking_lag", None, "not_testable")]
     parts = {"joint_gain": 0.3, "geometric": 0.6, "joint_offset": 0.05}
     cases = [record("faint", said(*effects), ["drift"], parts), record("removed", said(effect("drift", 0.5)))]
-    found = score([*cases, crash("single", "drift")]).calibration
     cases.append(record("hard", said(effect("backlash", 0.5), effect("drift", 0.5)), ["drift"], {"backlash": 0.15}))
-    # joint_gain is neither; the removed, the hard and the failed case say nothing
+    cases.append(record("faint", said(effect("discovered.1", 0.8), flagged=True), unlisted="cable"))
+    found = score([*cases, crash("single", "drift")]).calibration
+    # joint_gain is neither; the removed, the hard and the failed case say nothing, nor does a law of what is unlisted
     assert found.all.trials == 4
     assert found.doubtful.trials == 3
     assert found.doubtful.error == pytest.approx((0.4 + 0.2 + 0.3) / 3)
