@@ -1,0 +1,109 @@
+"""What the program says of public and simulated campaigns, written down, so that a move of code can be held against it.
+
+usage: python tests/golden/record.py [--check] [--only NAME ...]
+
+Without ``--check`` the files beside this script are written anew. With it nothing is written: every campaign is
+diagnosed again and each figure compared, to 1e-9 of its size (what BLAS may round). Needs ``THERMAL_ROBOT_DATA``.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import math
+import os
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).parent
+TOLERANCE = 1e-9
+"""Relative: BLAS rounds by about 1e-16, the fits' condition numbers reach 1e6."""
+NOTHING = 1e-11
+"""Below this a figure is rounding of nothing: p-values and shares that underflow."""
+_WORDS = ("summary", "advice", "warnings", "reasons", "describes", "name", "schema", "next", "where")
+_SMALL = ("ur5_jacobi", "wam_jacobi", "ipa_ur10_b")
+
+
+def names() -> list[str]:
+    """Return the campaigns that are held: 22 open cases, three real ones, and the demo."""
+    return [*(f"open_cases/case_{k:03d}" for k in range(22)), *_SMALL, "demo"]
+
+
+def campaign(name: str) -> Path:
+    """Return a campaign's folder; ``KeyError`` where ``THERMAL_ROBOT_DATA`` is not set."""
+    if name == "demo":
+        from thermal_robot.datasets import demo_directory
+
+        return demo_directory()
+    return Path(os.environ["THERMAL_ROBOT_DATA"]) / name
+
+
+def golden(name: str) -> Path:
+    """Return the file that holds a campaign's figures."""
+    return HERE / (name.replace("/", "_") + ".json")
+
+
+def said(name: str) -> dict[str, object]:
+    """Diagnose a campaign; return its verdict and figures, without the words."""
+    from thermal_robot import diagnose
+
+    plain = json.loads(json.dumps(diagnose(campaign(name)).to_dict()))
+    plain["effects"] = {e["name"]: e for e in plain["effects"]}
+    for effect in plain["effects"].values():
+        effect["parameters"] = {p["name"]: [p["value"], p["std"]] for p in effect["parameters"] if p["identified"]}
+        effect["locations"] = [[place["name"], place["share"]] for place in effect["locations"]]
+    return _pruned({**plain, "covariates": plain["where"]["covariates"]})
+
+
+def _pruned(plain):  # type: ignore[no-untyped-def]
+    if isinstance(plain, dict):
+        return {k: _pruned(v) for k, v in plain.items() if k not in _WORDS and v not in (None, [], {})}
+    if isinstance(plain, list):
+        return [_pruned(v) for v in plain]
+    return float(f"{plain:.12g}") if isinstance(plain, float) else plain
+
+
+def differences(old: object, new: object, tolerance: float, path: str = "") -> list[str]:
+    """Return one line for each figure or word that is not the same."""
+    if isinstance(old, dict) and isinstance(new, dict):
+        return [
+            line
+            for key in sorted({*old, *new})
+            for line in differences(old.get(key, 0.0), new.get(key, 0.0), tolerance, f"{path}/{key}")
+        ]
+    if isinstance(old, list) and isinstance(new, list) and len(old) == len(new):
+        pairs = enumerate(zip(old, new, strict=True))
+        return [line for k, (a, b) in pairs for line in differences(a, b, tolerance, f"{path}[{k}]")]
+    if isinstance(old, (int, float)) and isinstance(new, (int, float)):
+        same = math.isclose(old, new, rel_tol=tolerance, abs_tol=NOTHING)
+        return [] if same else [f"{path}: {old!r} became {new!r}"]
+    return [] if old == new else [f"{path}: {old!r} became {new!r}"]
+
+
+def main() -> int:
+    """Write or compare; the exit status is 1 where something differs."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--check", action="store_true")
+    parser.add_argument("--only", nargs="+", default=names())
+    options = parser.parse_args()
+    from concurrent.futures import ProcessPoolExecutor
+
+    changed = 0
+    with ProcessPoolExecutor(2) as pool:
+        for name, found in zip(options.only, pool.map(said, options.only), strict=True):
+            if not options.check:
+                golden(name).write_text(json.dumps(found, indent=0, ensure_ascii=False) + "\n", encoding="utf-8")
+                continue
+            old = json.loads(golden(name).read_text(encoding="utf-8"))
+            lines = differences(old, found, TOLERANCE)
+            changed += bool(lines)
+            for line in lines[:6]:
+                print(f"{name}{line}")
+            if len(lines) > 6:
+                print(f"{name}: {len(lines) - 6} more")
+    print("written" if not options.check else f"{changed} of {len(options.only)} campaigns differ")
+    return int(options.check and changed > 0)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
