@@ -14,7 +14,7 @@ import numpy as np
 
 from thermal_robot.campaign import Campaign, Units, write_campaign
 from thermal_robot.effects import library
-from thermal_robot.estimation.columns import displacement
+from thermal_robot.inference.columns import displacement
 from thermal_robot.kinematics import exp3, quaternion_to_rotation, rotation_to_quaternion, tool_poses
 from thermal_robot.observations import Frames, observe
 from thermal_robot.robot import load_robot
@@ -96,7 +96,7 @@ def draw_effect(name, nominal, rng, places=None, variant=0):
 
 def remaining(campaign, nominal, effect, values):
     """Rms distance that an effect leaves after the best rigid alignment of base and target, m."""
-    from thermal_robot.estimation.columns import block, frame_columns
+    from thermal_robot.inference.columns import block, frame_columns
 
     item = block(nominal, effect)
     moved = (item.columns @ values)[:, :3].ravel()

@@ -110,10 +110,10 @@ def _records(
 
 def _tell(records: list[dict[str, Any]], options: argparse.Namespace) -> None:
     """Print the score and write its files."""
+    from thermal_robot.blind.report.markdown import blind_markdown
+    from thermal_robot.blind.report.page import blind_html
+    from thermal_robot.blind.report.text import blind_text
     from thermal_robot.blind.score import score
-    from thermal_robot.report.blind_markdown import blind_markdown
-    from thermal_robot.report.blind_page import blind_html
-    from thermal_robot.report.blind_text import blind_text
 
     withdrawn = [record for record in records if "withdrawn" in record]
     for record in withdrawn:

@@ -1,6 +1,6 @@
 """Where, which and how far: the answer to a campaign."""
 
-from thermal_robot.diagnosis.diagnosis import diagnose
+from thermal_robot.diagnosis.diagnose import diagnose
 from thermal_robot.diagnosis.result import Diagnosis, Finding
 
 __all__ = ["Diagnosis", "Finding", "diagnose"]

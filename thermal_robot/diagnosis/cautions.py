@@ -10,7 +10,7 @@ import numpy as np
 from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis.stand_in import StandIn
 from thermal_robot.effects import Effect
-from thermal_robot.estimation.fit import Fit
+from thermal_robot.inference.fit import Fit
 
 _DOUBTFUL = 0.5
 _CANCELLING = 5.0

@@ -8,16 +8,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from thermal_robot.diagnosis.random_gap import RandomGap, random_gap
+from thermal_robot.diagnosis.remainder import examine
 from thermal_robot.diagnosis.result import Dependence, Location, Unexplained
 from thermal_robot.diagnosis.schemes import worse_elsewhere
-from thermal_robot.diagnosis.unexplained import examine
 from thermal_robot.effects import Effect
-from thermal_robot.effects.discovered import PREFIX, Discovered
-from thermal_robot.estimation.discover import Discovery, discover
-from thermal_robot.estimation.explain import Noise, explain
-from thermal_robot.estimation.fit import Fit, refit, row_groups
-from thermal_robot.estimation.generalised import generalised
-from thermal_robot.estimation.scan import of_quantity
+from thermal_robot.effects.law import PREFIX, Discovered
+from thermal_robot.inference.discover import Discovery, discover
+from thermal_robot.inference.explain import Noise, explain
+from thermal_robot.inference.fit import Fit, refit, row_groups
+from thermal_robot.inference.generalised import generalised
+from thermal_robot.inference.scan import of_quantity
 
 MOST = 4
 _MANY_ROWS = 5000

@@ -11,10 +11,10 @@ from scipy.special import chdtrc, fdtrc
 
 from thermal_robot.diagnosis.laws import smooth_law
 from thermal_robot.diagnosis.result import Estimate, Finding, Location, Status
-from thermal_robot.effects.quantity import quantities
-from thermal_robot.estimation.explain import distance_limit
-from thermal_robot.estimation.fit import Fit
-from thermal_robot.estimation.scatter import JointScatter, Scatter, enough_rows, joint_errors, variance_components
+from thermal_robot.effects.quantities import quantities
+from thermal_robot.inference.explain import distance_limit
+from thermal_robot.inference.fit import Fit
+from thermal_robot.inference.scatter import JointScatter, Scatter, enough_rows, joint_errors, variance_components
 
 Array = NDArray[np.float64]
 

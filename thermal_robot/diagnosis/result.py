@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from thermal_robot.correction import CorrectedModel
 
 if TYPE_CHECKING:
+    from thermal_robot.diagnosis.next_samples import NextSamples
     from thermal_robot.diagnosis.schemes import FoldScheme
     from thermal_robot.diagnosis.sensitivity import Sensitivity
-    from thermal_robot.diagnosis.separate import NextSamples
-    from thermal_robot.estimation.fit import Fit
+    from thermal_robot.inference.fit import Fit
 
 Array = NDArray[np.float64]
 Status = Literal["found", "not_found", "not_testable", "confounded"]
@@ -265,14 +265,14 @@ class Diagnosis:
         EffectError
             If it does not belong to the explanation.
         """
-        from thermal_robot.diagnosis.explained import explained
+        from thermal_robot.diagnosis.one_effect import explained
         from thermal_robot.report import explain_figure
 
         return explain_figure(explained(self._fitted(), effect))
 
     def next_samples(self, count: int = 10) -> NextSamples:
         """Choose samples that would best separate the leading explanations; ``to_table()`` makes a table of them."""
-        from thermal_robot.diagnosis.separate import next_samples
+        from thermal_robot.diagnosis.next_samples import next_samples
 
         return next_samples(self._fitted(), count)
 

@@ -14,8 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign
-from thermal_robot.estimation.fit import Fit
-from thermal_robot.estimation.groups import folds, neighbourhoods
+from thermal_robot.inference.fit import Fit
+from thermal_robot.inference.rows import folds, neighbourhoods
 
 Array = NDArray[np.float64]
 Labels = NDArray[np.int64]

@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from thermal_robot.estimation.evidence import Search
-from thermal_robot.estimation.explain import log_priors
-from thermal_robot.estimation.fit import Fit
+from thermal_robot.inference.evidence import Search
+from thermal_robot.inference.explain import log_priors
+from thermal_robot.inference.fit import Fit
 
 FACTOR = 3.0
 _COMPARED = 8

@@ -9,10 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.diagnosis.laws import smooth_law
-from thermal_robot.effects.discovered import PREFIX
-from thermal_robot.effects.quantity import quantities
-from thermal_robot.estimation.discover import Thin, instead
-from thermal_robot.estimation.fit import Fit
+from thermal_robot.effects.law import PREFIX
+from thermal_robot.effects.quantities import quantities
+from thermal_robot.inference.discover import Thin, instead
+from thermal_robot.inference.fit import Fit
 
 Array = NDArray[np.float64]
 

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from thermal_robot.diagnosis.laws import smooth_law
 from thermal_robot.diagnosis.result import Location, Where
-from thermal_robot.effects.quantity import quantities
-from thermal_robot.estimation.columns import Block, column
-from thermal_robot.estimation.fit import Fit
+from thermal_robot.effects.quantities import quantities
+from thermal_robot.inference.columns import Block, column
+from thermal_robot.inference.fit import Fit
 from thermal_robot.observations import Observations
 
 Array = NDArray[np.float64]

@@ -9,6 +9,7 @@ from scipy.integrate import quad
 from scipy.optimize import brentq
 from scipy.special import ndtr
 
+from thermal_robot.assembly.probability.normality import Power, normality_power, shapiro_wilk_critical
 from thermal_robot.paper import printed
 from thermal_robot.paper.entry import (
     AGREES,
@@ -22,7 +23,6 @@ from thermal_robot.paper.entry import (
     numbers,
 )
 from thermal_robot.paper.inputs import PaperInputs
-from thermal_robot.probability.normality import Power, normality_power, shapiro_wilk_critical
 
 _RATIOS = (0.5, 1.0, 3.0)
 # r at which the area under Eq 18 is taken.

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
+from thermal_robot.assembly.repeatability import joint_sigmas, tool_covariance
 from thermal_robot.paper import printed
 from thermal_robot.paper.entry import (
     AGREES,
@@ -20,7 +21,6 @@ from thermal_robot.paper.entry import (
     numbers,
 )
 from thermal_robot.paper.inputs import PaperInputs, joints, rv_m2_with_hand
-from thermal_robot.repeatability import joint_sigmas, tool_covariance
 
 Array = NDArray[np.float64]
 

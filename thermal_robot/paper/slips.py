@@ -5,15 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.assembly.probability import required_clearance
+from thermal_robot.assembly.repeatability import tool_covariance
+from thermal_robot.assembly.thermal import displacement, mean_shift_test
 from thermal_robot.kinematics import elongation_jacobian, tool_poses
 from thermal_robot.paper import printed
 from thermal_robot.paper.entry import AGREES, ERRATUM, NEGLECTED, Entry, floats, numbers
 from thermal_robot.paper.inputs import PaperInputs, joints, rv_m2_with_hand
 from thermal_robot.paper.joining import capability_at
 from thermal_robot.paper.warming import critical, median_error, random_systems
-from thermal_robot.probability import required_clearance
-from thermal_robot.repeatability import tool_covariance
-from thermal_robot.thermal import displacement, mean_shift_test
 
 Array = NDArray[np.float64]
 

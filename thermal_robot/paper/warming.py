@@ -9,6 +9,14 @@ from numpy.typing import NDArray
 from scipy.optimize import linprog
 from scipy.special import ndtri
 
+from thermal_robot.assembly.probability.tolerance import polygon_in_plane
+from thermal_robot.assembly.thermal import (
+    displacement,
+    expansion_coefficient,
+    expansion_coefficients,
+    mean_shift_test,
+    segment_names,
+)
 from thermal_robot.kinematics import elongation_jacobian
 from thermal_robot.paper import printed
 from thermal_robot.paper.entry import (
@@ -23,14 +31,6 @@ from thermal_robot.paper.entry import (
     numbers,
 )
 from thermal_robot.paper.inputs import PaperInputs, joints, rv_m2_with_hand
-from thermal_robot.probability.tolerance import polygon_in_plane
-from thermal_robot.thermal import (
-    displacement,
-    expansion_coefficient,
-    expansion_coefficients,
-    mean_shift_test,
-    segment_names,
-)
 
 Array = NDArray[np.float64]
 

@@ -1,0 +1,278 @@
+"""Joining probability against mpmath at hard points, closed forms, limits and invariances."""
+
+import mpmath as mp
+import numpy as np
+import pytest
+
+from thermal_robot.assembly.probability import UniformSpread, failing_probability, joining_probability
+
+
+def turned(angle):
+    return np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+
+
+def covariance(ratio, rho):
+    deviations = np.array([1.0, 1.0 / np.sqrt(ratio)])
+    return np.outer(deviations, deviations) * np.array([[1.0, rho], [rho, 1.0]])
+
+
+def upper(x):
+    return mp.erfc(x / mp.sqrt(2)) / 2
+
+
+def exact_disc(matrix, clearance, mean):
+    """Inside and outside, integrated over the coordinate along the *shorter* axis (the code takes the longer one)."""
+    with mp.workdps(50):
+        a, b, c = (mp.mpf(float(v)) for v in (matrix[0, 0], matrix[0, 1], matrix[1, 1]))
+        radius, m = mp.mpf(float(clearance)) / 2, [mp.mpf(float(v)) for v in mean]
+        angle = mp.atan2(2 * b, a - c) / 2
+        large = (a + c + mp.hypot(a - c, 2 * b)) / 2
+        wide, narrow = mp.sqrt(large), mp.sqrt((a * c - b * b) / large)
+        along = mp.cos(angle) * m[0] + mp.sin(angle) * m[1]
+        across = -mp.sin(angle) * m[0] + mp.cos(angle) * m[1]
+
+        def inside(t):
+            x, h = radius * mp.sin(t), radius * mp.cos(t)
+            low, high = abs(along) - h, abs(along) + h
+            return mp.npdf((x - across) / narrow) / narrow * (upper(low / wide) - upper(high / wide)) * h
+
+        def outside(t):
+            x, h = radius * mp.sin(t), radius * mp.cos(t)
+            tails = upper((h - along) / wide) + upper((h + along) / wide)
+            return mp.npdf((x - across) / narrow) / narrow * tails * h
+
+        marks = {across + k * narrow for k in range(-40, 41, 4)}
+        points = {mp.asin(x / radius) for x in marks if abs(x) < radius} | {mp.pi / 2 * k / 6 for k in range(-6, 7)}
+        points |= {side * (mp.pi / 2 - mp.mpf(4) ** -k) for k in range(1, 6) for side in (-1, 1)}
+        ends = upper((radius - across) / narrow) + upper((radius + across) / narrow)
+        kwargs = {"method": "gauss-legendre", "maxdegree": 5}
+        inner, outer = (mp.quad(f, sorted(points), **kwargs) for f in (inside, outside))
+        assert abs(inner + outer + ends - 1) < 1e-18, "the reference must be right first"
+        return inner, outer + ends
+
+
+@pytest.mark.parametrize(
+    ("ratio", "rho", "clearance", "mean"),
+    [
+        (1.0, 0.0, 4.0, (1.5, 0.3)),
+        (1.0, 0.9, 16.0, (0.0, 0.0)),
+        (3.0, 0.3, 30.0, (10.0, 0.0)),
+        (100.0, 0.0, 4.0, (1.9, -0.2)),
+        (100.0, 0.9, 20.0, (2.0, 1.0)),
+        (1e4, 0.0, 4.0, (0.0, 0.0)),
+        (1e4, 0.0, 6.0, (0.0, 2.9)),
+        (1e4, 0.3, 16.0, (0.0, 0.0)),
+        (1e4, 0.9, 3.0, (5.0, 1.0)),
+        (1e4, -0.9, 0.01, (0.1, 0.0)),
+    ],
+)
+def test_disc_agrees_with_mpmath(ratio, rho, clearance, mean):
+    matrix = covariance(ratio, rho)
+    inside, outside = exact_disc(matrix, clearance, mean)
+    assert abs(joining_probability(matrix, clearance, mean) - inside) < 1e-14
+    assert abs(failing_probability(matrix, clearance, mean) / outside - 1) < 1e-12
+
+
+def test_centred_equal_axes_have_the_closed_form_at_every_clearance():
+    clearances = np.geomspace(1e-6, 70.0, 16)
+    exponent = clearances**2 / 8.0
+    np.testing.assert_allclose(joining_probability(np.eye(2), clearances), -np.expm1(-exponent), rtol=1e-13)
+    np.testing.assert_allclose(failing_probability(np.eye(2), clearances), np.exp(-exponent), rtol=1e-12)
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.6, -0.99])
+def test_rectangle_agrees_with_mpmath(rho):
+    matrix, sides, mean = covariance(1e2, rho), np.array([3.0, 0.5]), np.array([0.4, -0.1])
+    with mp.workdps(30):
+        slope = mp.mpf(matrix[0, 1]) / mp.mpf(matrix[0, 0])
+        rest = mp.sqrt(mp.mpf(matrix[1, 1]) - slope * mp.mpf(matrix[0, 1]))
+
+        def strip(x, outside):
+            middle = mp.mpf(mean[1]) + slope * (x - mp.mpf(mean[0]))
+            low, high = (mp.mpf(-0.25) - middle) / rest, (mp.mpf(0.25) - middle) / rest
+            share = upper(-low) + upper(high) if outside else 0
+            return mp.npdf(x, mp.mpf(mean[0]), 1) * (share if outside else mp.ncdf(high) - mp.ncdf(low))
+
+        points = np.linspace(-1.5, 1.5, 31).tolist()
+        inside = mp.quad(lambda x: strip(x, False), points)
+        beyond = upper(mp.mpf(1.5) - mp.mpf(mean[0])) + upper(mp.mpf(1.5) + mp.mpf(mean[0]))
+        outside = mp.quad(lambda x: strip(x, True), points) + beyond
+    assert abs(joining_probability(matrix, sides, mean, shape="rectangle") - inside) < 1e-14
+    assert abs(failing_probability(matrix, sides, mean, shape="rectangle") / outside - 1) < 1e-12
+
+
+def test_far_corner_of_a_rectangle_is_a_product():
+    with mp.workdps(30):
+        one, two = (upper(mp.mpf(k)) - upper(mp.mpf(k) + 2) for k in (9, 15))
+    # Independent axes, the square of side 2 begins 9 and 15 standard deviations from the mean.
+    value = joining_probability(np.eye(2), 2.0, (10.0, 16.0), shape="rectangle")
+    assert abs(value / (one * two) - 1) < 1e-12
+
+
+@pytest.mark.parametrize("shape", ["circle", "rectangle"])
+def test_inside_and_outside_add_up_to_one_with_and_without_heat(shape):
+    rng = np.random.default_rng(4)
+    spreads = [None, UniformSpread.segment([1.0, 0.4]), UniformSpread.box([0.3, 2.0]), np.array([0.2, 0.5])]
+    for spread in spreads:
+        for _ in range(4):
+            root = rng.normal(size=(2, 2)) * 10.0 ** rng.uniform(-2.0, 0.5, size=2)
+            size = rng.uniform(0.5, 6.0, 2 if shape == "rectangle" else ())
+            arguments = (root @ root.T, size, rng.normal(size=2))
+            total = joining_probability(*arguments, shape=shape, thermal=spread) + failing_probability(
+                *arguments, shape=shape, thermal=spread
+            )
+            assert abs(total - 1.0) < 1e-12
+
+
+def test_turning_everything_leaves_the_disc_alone():
+    matrix, mean, end = covariance(50.0, 0.4), np.array([0.7, -1.1]), np.array([0.8, 0.3])
+    for spread_of in (lambda t: None, lambda t: UniformSpread.segment(t @ end)):
+        reference = failing_probability(matrix, 5.0, mean, thermal=spread_of(np.eye(2)))
+        for angle in (0.3, 1.0, np.pi / 2.0, 2.5):
+            turn = turned(angle)
+            value = failing_probability(turn @ matrix @ turn.T, 5.0, turn @ mean, thermal=spread_of(turn))
+            assert value == pytest.approx(reference, rel=1e-12)
+
+
+def test_unit_of_length_does_not_matter():
+    arguments = {"thermal": UniformSpread.box([7.0, 16.0])}
+    small = {"thermal": UniformSpread.box([7e-6, 16e-6])}
+    reference = failing_probability(np.diag([14.0, 18.0]) ** 2, 145.0, **arguments)
+    assert failing_probability(np.diag([14e-6, 18e-6]) ** 2, 145e-6, **small) == pytest.approx(reference, rel=1e-12)
+
+
+def test_singular_covariance_is_a_line_and_zero_a_point():
+    direction = np.array([0.6, 0.8])
+    line = np.outer(direction, direction) * 4.0
+    assert joining_probability(line, 6.0) == pytest.approx(float(mp.erf(1.5 / mp.sqrt(2))), rel=1e-14)
+    assert failing_probability(line, 60.0) == pytest.approx(float(mp.erfc(15.0 / mp.sqrt(2))), rel=1e-12)
+    # Beside the centre by 1, the chord is 2 sqrt(8) long; beside it by more than the radius there is none.
+    beside = np.array([-0.8, 0.6])
+    assert joining_probability(line, 6.0, beside) == pytest.approx(
+        float(mp.erf(mp.sqrt(8) / 2 / mp.sqrt(2))), rel=1e-12
+    )
+    assert joining_probability(line, 6.0, 3.1 * beside) == 0.0
+    nothing = np.zeros((2, 2))
+    assert (joining_probability(nothing, 2.0, (0.6, 0.7)), failing_probability(nothing, 2.0, (0.6, 0.9))) == (1.0, 1.0)
+
+
+def test_no_clearance_never_joins_and_any_clearance_always():
+    for spread in (None, UniformSpread.box([1.0, 2.0])):
+        np.testing.assert_array_equal(joining_probability(np.eye(2), [0.0, np.inf], thermal=spread), [0.0, 1.0])
+        np.testing.assert_array_equal(failing_probability(np.eye(2), [0.0, np.inf], thermal=spread), [1.0, 0.0])
+    # A rectangle without ends is a strip.
+    strip = failing_probability(np.eye(2), [np.inf, 12.0], shape="rectangle")
+    assert strip == pytest.approx(float(mp.erfc(6.0 / mp.sqrt(2))), rel=1e-12)
+
+
+def averaged(function, matrix, size, mean, generators, count=40):
+    """The thermal part by brute force: so many nodes along every generator."""
+    nodes, weights = np.polynomial.legendre.leggauss(count)
+    grids = np.stack(np.meshgrid(*[nodes] * generators.shape[1], indexing="ij"), -1).reshape(-1, generators.shape[1])
+    shares = np.prod(np.stack(np.meshgrid(*[weights / 2.0] * generators.shape[1], indexing="ij"), -1), -1).ravel()
+    return shares @ function(matrix, size, mean + grids @ generators.T)
+
+
+@pytest.mark.parametrize("rho", [0.0, 0.7])
+@pytest.mark.parametrize("mean", [(0.0, 0.0), (2.0, -1.0)])
+def test_segment_is_the_average_over_shifted_means(rho, mean):
+    matrix, end = covariance(2.0, rho), np.array([0.9, -1.3])
+    spread = UniformSpread.segment(end)
+    for function in (joining_probability, failing_probability):
+        expected = averaged(function, matrix, 7.0, np.array(mean), end[:, None])
+        assert function(matrix, 7.0, mean, thermal=spread) == pytest.approx(expected, rel=1e-12)
+
+
+def test_box_and_links_are_the_average_over_shifted_means():
+    matrix = covariance(2.0, 0.3)
+    box = averaged(failing_probability, matrix, 9.0, np.zeros(2), np.diag([0.7, 0.4]))
+    assert failing_probability(matrix, 9.0, thermal=UniformSpread.box([0.7, 0.4])) == pytest.approx(box, rel=1e-11)
+    # Three links, the third in the direction of the first.
+    columns = np.array([[0.5, 0.2, 1.0], [0.1, 0.6, 0.2]])
+    half = UniformSpread.zonotope(columns, -0.5, 0.5)
+    expected = averaged(failing_probability, matrix, 6.0, np.zeros(2), 0.5 * columns, 14)
+    assert failing_probability(matrix, 6.0, thermal=half) == pytest.approx(expected, rel=1e-11)
+
+
+def test_heat_without_a_normal_part_is_geometry():
+    nothing = np.zeros((2, 2))
+    assert joining_probability(nothing, 1.0, thermal=UniformSpread.segment([2.0, 0.0])) == pytest.approx(
+        0.25, rel=1e-13
+    )
+    # A disc of radius 1 within a box of 3 x 4: its share of the area.
+    box = UniformSpread.box([1.5, 2.0])
+    assert joining_probability(nothing, 2.0, thermal=box) == pytest.approx(np.pi / 12.0, rel=1e-11)
+    assert failing_probability(nothing, 2.0, thermal=box) == pytest.approx(1.0 - np.pi / 12.0, rel=1e-11)
+
+
+def test_a_disc_lost_in_a_wide_box_is_still_found():
+    matrix, box = 1e-6 * np.eye(2), UniformSpread.box([30.0, 20.0])
+    assert joining_probability(matrix, 0.2, thermal=box) == pytest.approx(np.pi * 0.01 / 2_400.0, rel=1e-9)
+
+
+def test_uniform_over_the_area_is_a_mixture_of_its_tiles():
+    # Two generators make a parallelogram: there both readings of a zonotope are one.
+    columns = np.array([[1.0, 0.3], [0.2, 1.4]])
+    both = [UniformSpread.zonotope(columns, -1.0, [0.5, 1.0], over=over) for over in ("links", "area")]
+    one, two = (failing_probability(np.eye(2), 6.0, thermal=spread) for spread in both)
+    assert one == pytest.approx(float(two), rel=1e-13)
+    # With five, a disc that holds only part of the polygon counts area over area.
+    wide = np.array([[1.0, 0.3, 0.7, 0.2, -0.4], [0.2, 1.4, 0.6, -0.5, 0.3]])
+    spread = UniformSpread.zonotope(wide, -1.0, 1.0, over="area")
+    area = 4.0 * sum(abs(np.linalg.det(wide[:, [i, j]])) for i in range(5) for j in range(i))
+    value = joining_probability(np.zeros((2, 2)), 1.0, thermal=spread)
+    assert value == pytest.approx(np.pi / 4.0 / area, rel=1e-9)
+
+
+@pytest.mark.parametrize("over", ["links", "area"])
+def test_spread_has_the_moments_of_its_draws(over):
+    columns = np.array([[1.0, 0.3, 0.7, 0.2], [0.2, 1.4, 0.6, -0.5]])
+    spread = UniformSpread.zonotope(columns, [-1.0, 0.0, -0.5, 0.0], [1.0, 0.7, 0.5, 2.0], over=over)
+    draws = spread.rvs(100_000, random_state=3)
+    error = np.sqrt(np.diag(spread.covariance) / 100_000)
+    assert np.all(np.abs(draws.mean(axis=0) - spread.mean) < 5.0 * error)
+    # Bounded variables: the standard error of a variance is below its own size times sqrt(2 / n).
+    np.testing.assert_allclose(np.cov(draws.T), spread.covariance, atol=5.0 * np.sqrt(2e-5) * spread.covariance.max())
+    inside = joining_probability(0.25 * np.eye(2), 3.0, -spread.mean, thermal=spread)
+    noisy = draws - spread.mean + 0.5 * np.random.default_rng(8).normal(size=draws.shape)
+    counted = np.mean(np.hypot(*noisy.T) < 1.5)
+    assert abs(counted - inside) < 5.0 * np.sqrt(inside * (1.0 - inside) / 100_000)
+
+
+def test_randomised_as_normal_adds_the_covariance():
+    matrix, spread = np.diag([14.0, 18.0]) ** 2, UniformSpread.box([7.0, 16.0])
+    expected = failing_probability(matrix + np.diag([49.0, 256.0]) / 3.0, 145.0)
+    assert failing_probability(matrix, 145.0, thermal=spread, randomised="normal") == pytest.approx(expected, rel=1e-13)
+
+
+def test_many_cases_at_once_are_the_single_ones():
+    matrices = np.stack([np.eye(2), covariance(30.0, 0.5)])
+    clearances, means = np.array([[1.0, 4.0]]).T, np.array([[0.3, 0.1], [1.0, 2.0]])
+    table = joining_probability(matrices, clearances, means)
+    assert table.shape == (2, 2)
+    for i in range(2):
+        for j in range(2):
+            single = joining_probability(matrices[j], clearances[i, 0], means[j])
+            assert table[i, j] == pytest.approx(float(single), rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("matrix", "clearance", "mean", "options"),
+    [
+        (np.diag([1.0, -1.0]), 1.0, 0.0, {}),
+        (np.array([[1.0, 2.0], [2.0, 1.0]]), 1.0, 0.0, {}),
+        (np.array([[1.0, 0.2], [0.1, 1.0]]), 1.0, 0.0, {}),
+        (np.eye(3), 1.0, 0.0, {}),
+        (np.eye(2), -1.0, 0.0, {}),
+        (np.eye(2), np.nan, 0.0, {}),
+        (np.eye(2), 1.0, (0.0, 0.0, 0.0), {}),
+        (np.eye(2), 1.0, 0.0, {"shape": "ellipse"}),
+        (np.eye(2), 1.0, 0.0, {"thermal": (1.0, 2.0, 3.0)}),
+        (np.eye(2), 1.0, 0.0, {"thermal": UniformSpread.box([1.0, 1.0, 1.0])}),
+        (np.eye(2), 1.0, 0.0, {"thermal": UniformSpread.box([1.0, 1.0]), "randomised": "gauss"}),
+        (np.eye(2), (1.0, 2.0, 3.0), 0.0, {"shape": "rectangle"}),
+    ],
+)
+def test_impossible_questions_are_refused(matrix, clearance, mean, options):
+    with pytest.raises(ValueError):  # noqa: PT011  the messages differ, the kind does not
+        joining_probability(matrix, clearance, mean, **options)

@@ -1,0 +1,86 @@
+"""The corrected model is exact, not linear: effects ten times their usual size, noise of a nanometre."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from simulate import random_motion, simulate
+
+from thermal_robot import diagnose
+from thermal_robot.effects import library
+from thermal_robot.inference.columns import displacement
+from thermal_robot.kinematics import exp3, rotation_to_quaternion
+from thermal_robot.observations import Frames, observe
+
+on_arms = pytest.mark.parametrize("arm", ["rv_m2", "ur10", "panda"], indirect=True)
+
+
+def measured(robot, sizes, seed, noise, turning=None):
+    """A campaign of a robot with normally distributed parameters of these sizes; 40 rows more, and where they are."""
+    rng = np.random.default_rng(seed)
+    plain = simulate(robot, seed=seed, noise=noise, samples=160, turning=turning)[0]
+    frames = Frames(random_motion(rng, 2.0), random_motion(rng, 0.1))
+    nominal = observe(plain, frames)
+    chosen = []
+    for name, size in sizes.items():
+        effect = library()[name]
+        chosen.append((effect, size * rng.normal(size=len(effect.parameters(nominal)))))
+    change, instrument = displacement(nominal, chosen)
+    real = observe(plain, frames, displacement=change)
+    place = real.predicted_position + (0.0 if instrument is None else instrument)
+    position = place + noise * rng.normal(size=place.shape)
+    orientation = None
+    if turning is not None:
+        spin = exp3(turning * rng.normal(size=place.shape))
+        orientation = rotation_to_quaternion(spin @ frames.base[:3, :3] @ real.rotation)
+    campaign = replace(plain, position=position, orientation=orientation)
+    fresh = replace(campaign.take(np.arange(120, 160)), position=None, orientation=None)
+    return campaign.take(np.arange(120)), fresh, place[120:]
+
+
+@on_arms
+@pytest.mark.parametrize(
+    "sizes",
+    [
+        {"joint_offset": 5e-3},
+        {"geometric": 5e-3},
+        {"joint_offset": 5e-3, "backlash": 2e-3, "thermal_elongation": 1e-4},
+    ],
+    ids="-".join,
+)
+def test_large_effects_are_corrected_to_the_nanometre(arm, sizes):
+    campaign, fresh, place = measured(arm, sizes, seed=1, noise=1e-9)
+    found = diagnose(campaign)
+    assert found.gap.rms_before > 1e-4
+    assert found.gap.rms_after < 1e-8
+    assert found.gap.held_out.rms_before > 1e-4
+    assert np.abs(found.model.predict(fresh)[0] - place).max() < 1e-7
+    assert found.outliers == ()
+    assert not found.unexplained.flagged
+
+
+def test_large_effects_are_corrected_in_poses_too(rv_m2):
+    campaign, fresh, place = measured(rv_m2, {"geometric": 5e-3}, seed=2, noise=1e-9, turning=1e-9)
+    found = diagnose(campaign)
+    assert found.gap.rms_after < 3e-9
+    assert found.gap.orientation_before > 1e-3
+    assert found.gap.orientation_after < 3e-9
+    assert np.abs(found.model.predict(fresh)[0] - place).max() < 1e-7
+
+
+@pytest.mark.parametrize("arm", ["panda"], indirect=True)
+def test_the_smaller_effect_is_named_at_ten_times_its_usual_size(arm):
+    right = [diagnose(measured(arm, {"joint_offset": 1e-2}, s, 25e-6)[0]).verdict for s in range(3)]
+    assert right.count(("joint_offset",)) >= 2
+
+
+@pytest.mark.parametrize("arm", ["ur10"], indirect=True)
+def test_an_offset_of_six_degrees_is_still_an_offset(arm):
+    right = [diagnose(measured(arm, {"joint_offset": 0.1}, s, 25e-6)[0]).verdict for s in range(3)]
+    assert right.count(("joint_offset",)) >= 2
+
+
+def test_exactness_does_not_add_effects_that_are_not_at_work(rv_m2):
+    both = {"transmission_error": 5e-3, "instrument_scale": 1e-3}
+    right = [set(diagnose(measured(rv_m2, both, s, 1e-9)[0]).verdict) == set(both) for s in range(4)]
+    assert sum(right) >= 3

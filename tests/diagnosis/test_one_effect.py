@@ -1,0 +1,170 @@
+"""The figure of one effect shows the error at its place, before and after, against what drives it."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from simulate import demo, simulate
+
+from thermal_robot.diagnosis.one_effect import Explained, explained
+from thermal_robot.effects import choose
+from thermal_robot.errors import EffectError
+from thermal_robot.inference.fit import fit
+from thermal_robot.report.plots_explain import explain_figure
+
+MRAD = 1e3
+
+
+def shown(robot, name, seed=2, **how):
+    """The figure of an effect that is alone at work, what it shows, and the truth."""
+    campaign, truth, _ = simulate(robot, [name], seed=seed, ratio=(4.0, 6.0), **how)
+    found = explained(fit(campaign, choose((name,), (), ())), name)
+    return explain_figure(found), found, truth["parts"][name]["values"], campaign
+
+
+def points(axes, label):
+    line = next(line for line in axes.get_lines() if line.get_label() == label)
+    return np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
+
+
+def mean_and_error(values):
+    return values.mean(), values.std(ddof=1) / np.sqrt(len(values))
+
+
+def test_backlash_sets_the_two_sides_apart_by_its_play(rv_m2):
+    figure, found, values, _ = shown(rv_m2, "backlash", places=["joint_3"])
+    play = values["lost motion, joint_3"] * MRAD
+    axes = figure.axes[0]
+    assert axes.get_title(loc="left").startswith("joint_3: ")
+    assert axes.get_ylabel() == "error (mrad)"
+    assert axes.get_xlabel() == "approach.joint_3"
+    assert list(axes.get_xticks()) == [-1.0, 1.0]
+    for label, expected in (("as measured", play), ("with this effect taken off", 0.0)):
+        x, y = points(axes, label)
+        low, high = mean_and_error(y[x < 0]), mean_and_error(y[x > 0])
+        assert len(x) == len(found.places[0].before)
+        assert abs(low[0] - high[0] - expected) < 3.0 * np.hypot(low[1], high[1])
+    x, law = points(axes, "fitted law")
+    assert np.nanmean(law[x < 0]) - np.nanmean(law[x > 0]) == pytest.approx(play, rel=0.1)
+
+
+def test_a_gain_is_a_slope_and_nothing_is_left_of_it(rv_m2):
+    figure, _, values, _ = shown(rv_m2, "joint_gain", places=["joint_2"])
+    axes = figure.axes[0]
+    assert axes.get_xlabel() == "position of joint_2 (rad)"
+    for label, expected in (("as measured", values["gain error, joint_2"] * MRAD), ("with this effect taken off", 0.0)):
+        x, y = points(axes, label)
+        (slope, _), covariance = np.polyfit(x, y, 1, cov=True)
+        assert abs(slope - expected) < 3.0 * np.sqrt(covariance[0, 0])
+
+
+def test_the_spread_is_that_of_the_points(rv_m2):
+    for name in ("joint_gain", "backlash", "thermal_elongation", "joint_offset"):
+        _, found, _, _ = shown(rv_m2, name)
+        place = found.places[0]
+        assert 0.85 < np.std(place.after / place.spread) < 1.15
+        assert np.std(place.before) >= 0.99 * np.std(place.after) or name == "joint_offset"
+
+
+def test_links_grow_with_temperature_as_they_were_made_to(rv_m2):
+    figure, found, values, campaign = shown(rv_m2, "thermal_elongation")
+    segments = {s.parent_link: s for s in rv_m2.segments if s.length > 0.05}
+    checked = 0
+    for place, axes in zip(found.places, figure.axes, strict=False):
+        segment = segments.get(place.name)
+        name = segment and f"strain per kelvin of {segment.name}, {place.name}"
+        alone = [s for s in rv_m2.segments if s.parent_link == place.name and s.length > 1e-9]
+        if name not in values or len(alone) != 1:
+            continue
+        warmer = place.values - campaign.reference_temperature
+        scale = 1.0 / place.spread
+        slope = (scale**2 * warmer * place.before).sum() / (scale**2 * warmer**2).sum()
+        assert slope == pytest.approx(values[name] * segment.length, rel=0.25)
+        assert place.unit == "m"
+        assert axes.get_xlabel() == "temperature (°C)"
+        checked += 1
+    assert checked >= 4
+
+
+def test_drift_and_scale_and_torque_have_their_own_axes(rv_m2):
+    for name, label in (
+        ("drift", "time (s)"),
+        ("instrument_scale", "distance from the instrument (m)"),
+        ("joint_compliance", "torque of "),
+    ):
+        figure, found, _, _ = shown(rv_m2, name)
+        assert figure.axes[0].get_xlabel().startswith(label)
+        place = found.places[0]
+        assert np.std(place.after) < 0.6 * np.sqrt(np.mean(place.before**2))
+        law = np.interp(place.values, *place.line)
+        assert np.std(place.before - law - place.after) < 0.05 * np.ptp(place.line[1])
+
+
+def test_a_scale_error_is_a_line_through_the_origin(rv_m2):
+    _, found, values, _ = shown(rv_m2, "instrument_scale")
+    place = found.places[0]
+    np.testing.assert_allclose(place.line[1] / place.line[0], next(iter(values.values())), rtol=0.1)
+
+
+def test_tracking_lag_is_drawn_against_speed(rv_m2):
+    figure, found, values, _ = shown(rv_m2, "tracking_lag", moving=True)
+    place = found.places[0]
+    assert figure.axes[0].get_xlabel() == f"velocity.{place.name} (rad/s)"
+    fast = np.abs(place.values) > 0.1
+    jump = -np.sign(place.values) * values[f"friction, {place.name}"] - values[f"delay, {place.name}"] * place.values
+    assert np.corrcoef(place.before[fast], jump[fast])[0, 1] > 0.8
+
+
+def test_where_an_effect_is_not_part_of_the_explanation_it_says_which_are(rv_m2):
+    campaign, _, _ = simulate(rv_m2, ["backlash"], seed=2)
+    with pytest.raises(EffectError, match="'drift' is not part of the explanation, which holds backlash"):
+        explained(fit(campaign, choose((), (), ())), "drift")
+
+
+def test_poses_and_simulators_are_drawn_too(rv_m2):
+    figure, found, _, _ = shown(rv_m2, "backlash", turning=3e-5)
+    assert len(figure.axes) == len(found.places)
+
+
+def test_gross_errors_are_left_out():
+    campaign = demo()[0]
+    known = fit(campaign, choose((), (), ()))
+    place = explained(known, "backlash").places[0]
+    assert len(place.before) == campaign.samples - known.explanation.outliers.sum()
+    assert known.explanation.outliers.any()
+
+
+@pytest.mark.parametrize("count", [1, 2, 3, 4, 5, 8])
+def test_no_text_meets_another_and_every_axis_has_a_unit(rv_m2, count):
+    _, found, _, _ = shown(rv_m2, "backlash", places=["joint_3"])
+    one = found.places[0]
+    many = tuple(
+        replace(one, name=f"left_arm_{k}_joint", quantity=f"approach.left_arm_{k}_joint") for k in range(count)
+    )
+    figure = explain_figure(Explained("backlash", many, 2))
+    canvas = FigureCanvasAgg(figure)
+    canvas.draw()
+    renderer = canvas.get_renderer()
+    drawn = [axes for axes in figure.axes if axes.axison]
+    assert len(drawn) == count
+    titles = [axes._left_title.get_window_extent(renderer) for axes in drawn]
+    labels = [axes.xaxis.label.get_window_extent(renderer) for axes in drawn]
+    for boxes in (titles, labels):
+        assert all(box.x0 > -1.0 and box.x1 < figure.bbox.x1 + 1.0 for box in boxes)
+        assert not any(a.overlaps(b) for k, a in enumerate(boxes) for b in boxes[:k])
+    assert drawn[0].get_ylabel() == "error (mrad)"
+    assert "2 smaller places are not shown" in figure._suptitle.get_text()
+
+
+def test_an_effect_without_a_material_place_gives_an_empty_figure():
+    figure = explain_figure(Explained("backlash", (), 0))
+    assert figure._repr_png_().startswith(b"\x89PNG")
+
+
+def test_the_report_does_not_load_the_diagnosis():
+    import thermal_robot.report.plots_explain as module
+
+    text = Path(module.__file__).read_text(encoding="utf-8")
+    assert "import pyplot" not in text

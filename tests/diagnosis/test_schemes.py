@@ -1,0 +1,100 @@
+"""Holding rows out in other ways tells an explanation that interpolates from one that is right."""
+
+import time
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from simulate import demo, simulate
+
+from thermal_robot.diagnosis.schemes import worst_folds
+from thermal_robot.effects import choose
+from thermal_robot.inference.fit import fit
+
+NOISE = 25e-6
+SEEDS = range(8)
+
+
+def in_sessions(campaign, count=4):
+    """The same campaign, said to have been measured in several sessions one after the other."""
+    labels = np.array([f"day {k * count // campaign.samples + 1}" for k in range(campaign.samples)])
+    return replace(campaign, labels={"session": labels})
+
+
+@pytest.fixture(scope="module")
+def warm(rv_m2):
+    """Campaigns of links that grow; each with its schemes under the right effect and under drift alone."""
+    found = []
+    for seed in SEEDS:
+        campaign, _, _ = simulate(rv_m2, ["thermal_elongation"], seed=seed, ratio=(4.0, 6.0))
+        campaign = in_sessions(campaign)
+        right, wrong = (fit(campaign, choose(only, (), ())) for only in ((), ("drift",)))
+        if wrong.effects:  # drift is not always worth its parameters
+            found.append([{s.name: s for s in worst_folds(f)} for f in (right, wrong)])
+    assert len(found) >= 5
+    return found
+
+
+def test_a_correction_that_interpolates_leaves_more_where_it_must_extrapolate(warm):
+    for name, factor in (("session", 1.2), ("temperature", 1.15)):
+        ratio = [wrong[name].rms_after / wrong["time"].rms_after for _, wrong in warm]
+        assert np.mean(ratio) > factor, name
+        assert np.mean(np.array(ratio) > 1.0) > 0.75, name
+
+
+def test_the_right_explanation_leaves_the_same_whatever_is_held_out(warm):
+    apart = []
+    for right, _ in warm:
+        blocked = right["time"]
+        for name, scheme in right.items():
+            if name != "time":
+                apart.append((scheme.rms_after - blocked.rms_after) / np.hypot(scheme.uncertainty, blocked.uncertainty))
+    assert np.median(np.abs(apart)) < 1.0
+    assert np.max(np.abs(apart)) < 4.0
+    for right, _ in warm:
+        assert all(0.8 < s.rms_after / (np.sqrt(3.0) * NOISE) < 1.5 for s in right.values())
+
+
+def test_schemes_come_in_order_and_say_what_they_are(warm):
+    for pair in warm:
+        for schemes in pair:
+            after = [s.rms_after for s in schemes.values()]
+            assert after == sorted(after, reverse=True)
+            assert set(schemes) == {"time", "session", "temperature", "region", "reach"}
+            for s in schemes.values():
+                assert s.shrinkage == pytest.approx(1.0 - (s.rms_after / s.rms_before) ** 2)
+            assert (schemes["session"].folds, schemes["time"].folds, schemes["temperature"].folds) == (4, 5, 2)
+            assert schemes["reach"].rows == pytest.approx(0.2 * schemes["time"].rows, abs=1)
+
+
+def test_folds_by_time_are_those_of_the_diagnosis(rv_m2):
+    from thermal_robot.diagnosis.held_out import held_out
+
+    found = fit(simulate(rv_m2, ["backlash"], seed=3)[0], choose((), (), ()))
+    blocked = next(s for s in worst_folds(found) if s.name == "time")
+    overall = held_out(found).overall
+    assert blocked.rms_before == pytest.approx(overall.rms_before, rel=0.02)
+    assert blocked.rms_after == pytest.approx(overall.rms_after, rel=0.1)
+
+
+def test_a_column_that_is_not_there_makes_no_scheme(rv_m2):
+    campaign, _, _ = simulate(rv_m2, ["joint_offset"], seed=1)
+    bare = replace(campaign, covariates={})
+    schemes = worst_folds(fit(bare, choose(("joint_offset",), (), ())))
+    assert {s.name for s in schemes} == {"time", "region", "reach"}
+
+
+def test_without_an_effect_nothing_shrinks(rv_m2):
+    campaign, _, _ = simulate(rv_m2, [], seed=1)
+    for scheme in worst_folds(fit(campaign, choose((), (), ()))):
+        assert scheme.shrinkage == pytest.approx(0.0, abs=1e-9)
+
+
+def test_it_takes_no_time():
+    found = fit(demo()[0], choose((), (), ()))
+    took = []
+    for _ in range(5):
+        start = time.perf_counter()
+        worst_folds(found)
+        took.append(time.perf_counter() - start)
+    assert min(took) < 0.05

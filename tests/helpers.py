@@ -1,0 +1,57 @@
+"""Robots without masses, commands without measurements, tools with an effect at work: what several tests use."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+from simulate import commands, simulate
+
+from thermal_robot.campaign import Campaign
+from thermal_robot.inference.columns import displacement
+from thermal_robot.kinematics import tool_poses
+from thermal_robot.observations import Frames, observe
+from thermal_robot.robot import load_robot
+
+SAMPLES = 10  # rows of a campaign that only a law is checked on
+NOISE = 25e-6  # m
+
+
+def without_masses(robot, gravity=None):
+    """The same robot from a URDF that gives no masses."""
+    bare = re.sub(r"<inertial>.*?</inertial>", "", robot.urdf, flags=re.DOTALL)
+    return load_robot(bare, robot.tool_frame, root_frame=robot.root_frame, gravity=gravity)
+
+
+def commanded(robot, covariates=None, **declared):
+    """Commands with conditions, and nothing measured."""
+    q = commands(robot, SAMPLES, np.random.default_rng(5))
+    return Campaign("commands", robot, q, covariates=covariates or {}, **declared)
+
+
+def tool_with(campaign, effect, values, frames=None):
+    """Positions that the instrument shows, measurement frame, with an effect at work."""
+    frames = frames or Frames.declared(campaign)
+    nominal = observe(campaign, frames)
+    change, instrument = displacement(nominal, [(effect, np.asarray(values, dtype=float))])
+    seen = observe(campaign, frames, displacement=change)
+    return seen.predicted_position + (0.0 if instrument is None else instrument)
+
+
+def tool_at(robot, q):
+    """Positions of the tool frame, root frame, m."""
+    return tool_poses(robot, q)[:, :3, 3]
+
+
+def with_law(robot, law, values, seed, samples=120, fresh=100):
+    """A campaign of a robot with one law at work, and further rows with where the target really is."""
+    plain = simulate(robot, samples=samples + fresh, seed=seed, noise=NOISE)[0]
+    rng = np.random.default_rng(seed)
+    plain = replace(plain, covariates={**plain.covariates, "speed": rng.uniform(0.1, 1.0, samples + fresh)})
+    frames = Frames.declared(plain)
+    moved, _ = displacement(observe(plain, frames), [(law, np.asarray(values))])
+    true = observe(plain, frames, displacement=moved).predicted_position
+    whole = replace(plain, position=true + NOISE * rng.normal(size=true.shape), priors={})
+    mine = np.sort(rng.permutation(samples + fresh)[:samples])
+    rest = np.setdiff1d(np.arange(samples + fresh), mine)
+    data = replace(whole.take(mine), rows=np.arange(2, samples + 2))
+    return data, replace(whole.take(rest), position=None), true[rest]

@@ -1,0 +1,165 @@
+"""Which effect: status, probability, parameters of every candidate."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtri
+
+from thermal_robot.diagnosis.discovery import is_law
+from thermal_robot.diagnosis.result import Estimate, Finding, Location, Status
+from thermal_robot.effects.law import Discovered
+from thermal_robot.inference.explain import Explanation
+from thermal_robot.inference.fit import Fit
+from thermal_robot.inference.problem import contained
+
+Array = NDArray[np.float64]
+Shares = dict[str, tuple[float, tuple[float, float]]]
+
+_DETERMINED = 0.5  # a parameter is identified when the data leave less than half of its prior's standard deviation
+_SURE = 0.75
+_RIVAL = 0.2
+_ALIAS = 1e-6
+
+
+def findings(
+    fit: Fit, shares: Shares, locations: dict[str, tuple[Location, ...]], believed: Mapping[str, float]
+) -> tuple[Finding, ...]:
+    """Return what is said of every candidate, in order of its held-out share; those not testable come last.
+
+    ``believed`` is what the probability of an effect of the explanation is multiplied with.
+    """
+    e = fit.explanation
+    explained = {effect.name: b for b, (effect, _) in zip(e.best.blocks, fit.effects, strict=True)}
+    rivals = _rivals(fit, explained)
+    result = []
+    for name in dict.fromkeys(fit.families):
+        if is_law(name) and name not in explained:
+            continue  # a law that did not last was never a candidate of anybody's
+        own = [b for b, f in enumerate(fit.families) if f == name]
+        status: Status = "found" if name in explained else "not_found"
+        confounded = rivals.get(name, ())
+        if not confounded and name not in explained and all(_within_frames(fit, b) for b in own):
+            confounded = _unknown_frames(fit)
+        if confounded:
+            status = "confounded"
+        share, interval = shares.get(name, (0.0, (0.0, 0.0)))
+        law = next(
+            (effect for effect, _ in fit.effects if effect.name == name and isinstance(effect, Discovered)), None
+        )
+        result.append(
+            Finding(
+                name,
+                status,
+                probability=e.probability(own) * believed.get(name, 1.0),
+                shrinkage=share,
+                shrinkage_ci95=interval,
+                confounded_with=confounded,
+                locations=locations.get(name, ()),
+                parameters=_estimates(fit, explained[name]) if name in explained else (),
+                quantity=law.quantity if law else None,
+                shape=law.shape if law else None,
+                describes=law.describe() if law else None,
+            )
+        )
+    result += [Finding(name, "not_testable", needs=needs) for name, needs in fit.needs.items()]
+    return tuple(result)
+
+
+def in_order(found: Sequence[Finding]) -> tuple[Finding, ...]:
+    """Sort by held-out share, then by probability; what is not testable comes last."""
+    return tuple(
+        sorted(found, key=lambda f: (f.status == "not_testable", -(f.shrinkage or 0.0), -(f.probability or 0.0)))
+    )
+
+
+def _unknown_frames(fit: Fit) -> tuple[str, ...]:
+    known = {"base_frame": fit.campaign.base_known, "tool_frame": "tool_frame" not in fit.needs}
+    return tuple(name for name, is_known in known.items() if not is_known)
+
+
+def _within_frames(fit: Fit, block: int) -> bool:
+    """Whether all that an effect can do is what the unknown frames can do, too."""
+    item, linear = fit.explanation.linear.blocks[block], fit.explanation.linear
+    if not linear.frames.size or not item.parameters:
+        return False
+    columns = item.columns.reshape(-1, len(item.parameters)) * item.sizes
+    flat = linear.frames.reshape(-1, linear.frames.shape[2])
+    basis = np.linalg.qr(flat / (np.linalg.norm(flat, axis=0) + 1e-300))[0]
+    left = columns - basis @ (basis.T @ columns)
+    return bool(np.linalg.norm(left) < _ALIAS * np.linalg.norm(columns))
+
+
+def _rivals(fit: Fit, explained: dict[str, int]) -> dict[str, tuple[str, ...]]:
+    """Effects of the explanation that another could take the place of, and those others.
+
+    An effect is confounded with one outside the explanation when it is itself uncertain and where it is absent that
+    other is present, or when the other is its exact alias. A larger effect that contains it is no
+    rival: the smaller is preferred where it suffices.
+    """
+    e: Explanation = fit.explanation
+    held = [{fit.families[b] for b in c.blocks} for c in e.combinations]
+    containing = contained(e.problem)
+    rivals: dict[str, set[str]] = {}
+    for name, block in explained.items():
+        absent = np.array([name not in h for h in held])
+        mass = float(e.probabilities[absent].sum())
+        for other in dict.fromkeys(fit.families):
+            if other in explained:
+                continue
+            own = [b for b, f in enumerate(fit.families) if f == other]
+            both = np.array([other in h for h in held])
+            instead = float(e.probabilities[absent & both].sum())
+            doubtful = mass >= 1.0 - _SURE and instead > max(_RIVAL, 0.8 * mass)
+            apart = not any(frozenset((block, b)) in containing for b in own)
+            if doubtful or (apart and any(_imitates(fit, block, b) for b in own)):
+                rivals.setdefault(name, set()).add(other)
+                rivals.setdefault(other, set()).add(name)
+    return {name: tuple(sorted(others)) for name, others in rivals.items()}
+
+
+def _imitates(fit: Fit, block: int, other: int) -> bool:
+    """Whether what an effect was found to do is, but for noise, exactly what another can do.
+
+    Exact aliases are the directions that both column spaces share (principal angle zero, Björck and Golub 1973).
+    Another effect that merely comes near is the evidence's affair.
+    """
+    e = fit.explanation
+    matrix, slices = e.problem.matrix, e.problem.slices
+    own, theirs = (_root(matrix[s, s]) for s in (slices[block], slices[other]))
+    if not own.size or not theirs.size:
+        return False
+    left, cosine, _ = np.linalg.svd(own.T @ matrix[slices[block], slices[other]] @ theirs, full_matrices=False)
+    shared = left[:, cosine > 1.0 - _ALIAS]
+    ends = np.cumsum([0, *(e.problem.bases[b].shape[1] for b in e.best.blocks)])
+    start = ends[e.best.blocks.index(block)]
+    moved = own.T @ matrix[slices[block], slices[block]] @ e.best.values[start : start + own.shape[0]]
+    rest = float(moved @ moved - ((shared.T @ moved) ** 2).sum())
+    noise = float(chdtri(len(moved), 0.01)) * e.best.noise**2
+    return bool(shared.shape[1]) and rest < noise < float(moved @ moved)
+
+
+def _root(gram: Array) -> Array:
+    """(D, r) matrix that makes the columns with this Gram matrix orthonormal."""
+    value, vector = np.linalg.eigh(gram)
+    seen = value > 1e-9 * value.max(initial=0.0)
+    return np.asarray(vector[:, seen] / np.sqrt(value[seen]))
+
+
+def _estimates(fit: Fit, block: int) -> tuple[Estimate, ...]:
+    e = fit.explanation
+    item = e.linear.blocks[block]
+    values = dict(zip(e.best.blocks, (v for _, v in fit.effects), strict=True))[block]
+    spread = np.sqrt(np.maximum(np.diag(e.values[block][1]), 0.0))
+    prior = item.sizes * e.best.scales[block]
+    result = []
+    for parameter, value, std, size in zip(item.parameters, values, spread, prior, strict=True):
+        known = bool(std < _DETERMINED * size)
+        result.append(
+            Estimate(
+                parameter.name, float(value) if known else None, float(std) if known else None, parameter.unit, known
+            )
+        )
+    return tuple(result)

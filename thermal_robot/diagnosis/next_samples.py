@@ -1,0 +1,355 @@
+"""What to measure next: the samples that best tell the leading explanations apart.
+
+Each leading explanation k is a linear model with a normal posterior, y = A f + Σ_b X_b θ_b + e: what it expects of
+samples S is N(μ_k, V_k), V_k = A_S Σ_k A_S' + noise. Under explanation i, samples S are expected to bring a log Bayes
+factor of i against j of
+
+    KL(i, j) = ½ [ tr V_j⁻¹ V_i + (μ_i − μ_j)' V_j⁻¹ (μ_i − μ_j) − |S| + ln |V_j| / |V_i| ]   nats
+
+(Box and Hill, *Technometrics* 9, 1967; Hill, Hunter and Wichern, *Technometrics* 10, 1968). What is maximised is that
+of the true explanation against its nearest rival, Σ_i p_i min_j KL(i, j), p being the probabilities so far. Samples are
+chosen one after the other, and are not exchanged later. Where an explanation is settled, or no sample could tell it
+apart, those are chosen that tell most of its parameters (D-optimal, the frames being unknown). Whether a pose is free
+of obstacles, and seen by the instrument, is for the reader to say.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.campaign import Campaign
+from thermal_robot.inference.columns import block, frame_columns
+from thermal_robot.inference.evidence import Combination
+from thermal_robot.inference.fit import Fit
+from thermal_robot.observations import Observations, observe
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Array = NDArray[np.float64]
+Effects = tuple[str, ...]
+
+_MOST = 4
+_LEADING = 0.01
+_RIVAL = 1e-3  # explanations that are less probable are not worth a measurement
+_SETTLED, _WORTHWHILE = 0.9, 1.0  # so probable that rivals which all samples together leave below 1 nat do not count
+_WIDE = 2.4  # rad: as far as a joint without a limit is sent
+_BEYOND = 5.0  # K outside the campaign's temperatures
+_LOOSE = 0.1  # m and rad: where the data leave a frame open, it is somewhere there
+_TIE = 1e-3
+_GIVEN = ("torque", "encoder")  # columns that answer a sample, and cannot be asked for
+
+
+@dataclass(frozen=True)
+class NextSample:
+    """One sample to measure.
+
+    Attributes
+    ----------
+    position
+        Joint positions by name, rad (m for a prismatic joint).
+    conditions
+        By column, SI: what matters to the explanations. A ``time`` is a proposal: any after the campaign will do.
+    separates
+        The explanations, each as its effects (without any: noise alone), that this sample tells apart most; a single
+        one where nothing is left to tell apart and the sample sharpens its parameters.
+    gain
+        Nats that this sample and those before it are expected to bring: the log Bayes factor of the true explanation
+        against its nearest rival; information about the parameters where there is a single one.
+    """
+
+    position: dict[str, float]
+    conditions: dict[str, float]
+    separates: tuple[Effects, ...]
+    gain: float
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values, SI, ready for JSON."""
+        return {
+            "joints": dict(self.position),
+            "conditions": dict(self.conditions),
+            "separates": [list(effects) for effects in self.separates],
+            "gain": self.gain,
+        }
+
+
+@dataclass(frozen=True, eq=False)
+class NextSamples:
+    """Samples to measure, most telling first.
+
+    Attributes
+    ----------
+    samples
+        One by one.
+    commands
+        The same as a campaign without measurements, with a value in every column; :func:`write_table` writes it.
+    """
+
+    samples: tuple[NextSample, ...]
+    commands: Campaign
+
+    def to_list(self) -> list[dict[str, Any]]:
+        """Return the list that stands in the JSON under ``next.samples``."""
+        return [sample.to_dict() for sample in self.samples]
+
+    def to_table(self) -> pd.DataFrame:
+        """Return a table in the campaign's units, with the columns of its file, ``separates`` and ``gain``."""
+        import pandas as pd
+
+        robot, units = self.commands.robot, self.commands.units
+        scale = {n: units.joint_scale(kind) for n, kind in zip(robot.joint_names, robot.joint_types, strict=True)}
+        rows = []
+        for sample in self.samples:
+            row: dict[str, Any] = {name: value / scale[name] for name, value in sample.position.items()}
+            for name, value in sample.conditions.items():
+                column, _, joint = name.partition(".")
+                row[name] = value / scale[joint] if column in ("velocity", "acceleration") else value
+            row["separates"] = " | ".join(" + ".join(effects) or "nothing" for effects in sample.separates)
+            rows.append({**row, "gain": sample.gain})
+        return pd.DataFrame(rows)
+
+
+def next_samples(fit: Fit, count: int = 10, pool: int = 400, seed: int = 0) -> NextSamples:
+    """Choose the samples to measure next.
+
+    Parameters
+    ----------
+    fit
+        What is known so far.
+    count
+        How many samples.
+    pool
+        How many candidates they are chosen from: see :func:`candidates`.
+    seed
+        Of the candidates: the same one always gives the same samples.
+
+    Returns
+    -------
+    NextSamples
+        Without samples where there is nothing to learn.
+    """
+    offered = candidates(fit, pool, seed)
+    leading, probability = _leading(fit)
+    models = _expected(fit, observe(offered, fit.corrected.frames), leading)
+    chosen, pairs, gains = _chosen(models, probability, min(count, pool))
+    if len(models) > 1 and probability[0] > _SETTLED and max(gains, default=0.0) < _WORTHWHILE:
+        chosen, pairs, gains = _chosen(models[:1], np.ones(1), min(count, pool))
+    if max(gains, default=0.0) <= 0.0:
+        chosen, pairs, gains = [], [], []  # there is nothing to learn
+    names = [_effects(fit, c) for c in leading]
+    robot, read = offered.robot, _conditions(fit, leading)
+    samples = tuple(
+        NextSample(
+            dict(zip(robot.joint_names, offered.q[row].tolist(), strict=True)),
+            {name: float(offered.covariates[name][row]) for name in read},
+            tuple(names[k] for k in pair),
+            gain,
+        )
+        for row, pair, gain in zip(chosen, pairs, gains, strict=True)
+    )
+    return NextSamples(samples, offered.take(np.array(chosen, dtype=np.int64)))
+
+
+def candidates(fit: Fit, pool: int = 400, seed: int = 0) -> Campaign:
+    """Draw samples that could be measured next: a campaign without measurements.
+
+    Joints lie anywhere between their limits or where the campaign has been (within 2.4 rad where a joint can turn once
+    round). Temperatures are those at the campaign's ends and 5 K beyond, the same end for all links; payloads are
+    those of the campaign; every joint may come from either side; times follow the campaign, for as long as it lasted.
+    What else was recorded is as in some row of the campaign; a torque as in the row with the nearest pose.
+    """
+    from scipy.spatial import cKDTree
+
+    campaign, rng = fit.campaign, np.random.default_rng(seed)
+    rows = rng.integers(campaign.samples, size=pool)
+    low, high = _range(campaign)
+    q = rng.uniform(low, high, (pool, campaign.robot.n))
+    alike = cKDTree(campaign.q / (high - low + 1e-9)).query(q / (high - low + 1e-9))[1]
+    level, late = rng.integers(4, size=pool), rng.uniform(size=pool)
+    covariates = {}
+    for name, values in campaign.covariates.items():
+        kind, first, last = name.partition(".")[0], float(values.min()), float(values.max())
+        if kind == "temperature":
+            covariates[name] = np.array([first - _BEYOND, first, last, last + _BEYOND])[level]
+        elif kind == "payload":
+            covariates[name] = rng.choice(np.unique(values) if len(np.unique(values)) < 6 else [first, last], pool)
+        elif kind == "approach":
+            covariates[name] = rng.choice([-1.0, 1.0], pool)
+        elif kind in ("time", "order"):
+            after = last + late * (last - first)
+            covariates[name] = np.ceil(after) if kind == "order" else after
+        else:
+            covariates[name] = values[alike if kind in _GIVEN else rows]
+    # orientation only says what is measured; the simulator knows nothing of new poses, and columns do not ask it
+    return replace(
+        campaign.take(rows),
+        q=q,
+        position=None,
+        orientation=None if campaign.orientation is None else np.tile([1.0, 0.0, 0.0, 0.0], (pool, 1)),
+        simulated_position=None,
+        simulated_orientation=None,
+        covariates=covariates,
+        missing={},
+        rows=np.arange(2, pool + 2),
+    )
+
+
+def _range(campaign: Campaign) -> tuple[Array, Array]:
+    robot = campaign.robot
+    turns = np.array([kind != "prismatic" for kind in robot.joint_types])
+    round_ = turns & (robot.upper - robot.lower >= 2.0 * np.pi)
+    used = campaign.q.min(axis=0), campaign.q.max(axis=0)
+    low = np.where(round_, np.maximum(robot.lower, -_WIDE), robot.lower)
+    high = np.where(round_, np.minimum(robot.upper, _WIDE), robot.upper)
+    low, high = np.where(np.isfinite(low), low, used[0]), np.where(np.isfinite(high), high, used[1])
+    return np.minimum(low, used[0]), np.maximum(high, used[1])
+
+
+def _effects(fit: Fit, combination: Combination) -> Effects:
+    return tuple(sorted(fit.families[b] for b in combination.blocks))
+
+
+def _leading(fit: Fit) -> tuple[list[Combination], Array]:
+    """Return the explanations to be told apart, each in its most probable settings, and their probabilities."""
+    e = fit.explanation
+    best: dict[Effects, Combination] = {}
+    total: dict[Effects, float] = {}
+    for combination, probability in zip(e.combinations, e.probabilities, strict=True):
+        effects = _effects(fit, combination)
+        best.setdefault(effects, combination)
+        total[effects] = total.get(effects, 0.0) + float(probability)
+    order = sorted(total, key=lambda effects: -total[effects])[:_MOST]
+    least = _LEADING if len(order) > 1 and total[order[1]] > _LEADING else _RIVAL
+    kept = [effects for k, effects in enumerate(order) if k == 0 or total[effects] > least]
+    probability = np.array([total[effects] for effects in kept])
+    return [best[effects] for effects in kept], probability / probability.sum()
+
+
+def _conditions(fit: Fit, leading: Sequence[Combination]) -> list[str]:
+    """Columns that any of the explanations reads and that can be asked for."""
+    listed = {b for combination in leading for b in combination.blocks}
+    read = {name for b in listed for name in fit.explanation.linear.blocks[b].effect.reads(fit.nominal)}
+    return [n for n in fit.campaign.covariates if n in read and n.partition(".")[0] not in _GIVEN]
+
+
+@dataclass(frozen=True, eq=False)
+class _Expected:
+    """What one explanation expects of the candidates, in units of the noise: N(mean, root root' + 1).
+
+    Attributes
+    ----------
+    mean
+        (K, m).
+    root, frames
+        (K, m, p) and (K, m, f): a root of the covariance, and of what the frames leave of it were the effects known.
+    """
+
+    mean: Array
+    root: Array
+    frames: Array
+
+
+def _expected(fit: Fit, offered: Observations, leading: Sequence[Combination]) -> list[_Expected]:
+    e = fit.explanation
+    noise = e.whitening.noise * e.best.noise
+    used = np.flatnonzero(e.whitening.weights > 0)
+    # rows that are alike are worth less, as in the explanation itself
+    weight = np.sqrt(e.whitening.weights[used] / e.design_effect)[:, None] / noise
+    flat = e.linear.frames.shape[2]
+    index = sorted({b for combination in leading for b in combination.blocks})
+    items = [e.linear.blocks[b] for b in index]
+    known = np.concatenate([e.linear.frames, *(i.columns for i in items), e.linear.gap[:, :, None]], axis=2)[used]
+    whole = (known * weight[:, :, None]).reshape(weight.size, known.shape[2])
+    gram = whole.T @ whole
+    # the simulator's own tool is never refitted: its columns come last and are left out
+    columns = [frame_columns(offered)[0][:, :, :flat], *(block(offered, i.effect).columns for i in items)]
+    asked = np.concatenate(columns, axis=2) / noise[:, None]
+    ends = np.cumsum([flat, *(len(i.sizes) for i in items)])
+    found = []
+    for combination in leading:
+        mine = [k for k, b in enumerate(index) if b in combination.blocks]
+        spans = [np.arange(flat), *(np.arange(ends[k], ends[k + 1]) for k in mine)]
+        picked = np.concatenate(spans).astype(int)
+        size = np.concatenate([np.full(flat, _LOOSE), *(items[k].sizes * combination.scales[index[k]] for k in mine)])
+        precision = gram[np.ix_(picked, picked)] * np.outer(size, size) + np.eye(len(size))
+        mean = size * np.linalg.solve(precision, gram[picked, -1] * size)
+        design = asked[:, :, picked]
+        scaled = design * size
+        found.append(
+            _Expected(design @ mean, _root(scaled, precision), _root(scaled[:, :, :flat], precision[:flat, :flat]))
+        )
+    return found
+
+
+def _root(design: Array, precision: Array) -> Array:
+    """(K, m, p) root of the covariance of design · N(0, precision⁻¹)."""
+    factor = np.linalg.cholesky(precision)
+    flat = design.reshape(design.shape[0] * design.shape[1], design.shape[2])  # there may be no column
+    return np.asarray(np.linalg.solve(factor, flat.T).T.reshape(design.shape))
+
+
+class _Conditional:
+    """What is expected of every candidate once the chosen ones are known: y_c − B y_S with covariance C."""
+
+    def __init__(self, root: Array, chosen: Sequence[int]) -> None:
+        measures = root.shape[1]
+        past = root[list(chosen)].reshape(len(chosen) * measures, root.shape[2])
+        own = np.einsum("nap,nbp->nab", root, root) + np.eye(measures)
+        self.own, self.cross, self.past = own, root @ past.T, past @ past.T + np.eye(len(past))
+        self.gain = self.cross @ np.linalg.inv(self.past)
+        self.covariance = own - self.gain @ self.cross.transpose(0, 2, 1)
+        self.log_det = np.linalg.slogdet(self.covariance)[1]
+
+
+def _further(i: _Conditional, j: _Conditional, apart: Array, chosen: Sequence[int]) -> Array:
+    """(K,) what each candidate adds to KL(i, j); ``apart`` is μ_i − μ_j."""
+    left = apart - j.gain @ apart[list(chosen)].ravel()
+    crossed = j.gain @ i.cross.transpose(0, 2, 1)
+    spread = i.own - crossed - crossed.transpose(0, 2, 1) + j.gain @ i.past @ j.gain.transpose(0, 2, 1)
+    spread = spread + left[:, :, None] * left[:, None, :]
+    trace = np.trace(np.linalg.solve(j.covariance, spread), axis1=1, axis2=2)
+    return np.asarray(0.5 * (trace - apart.shape[1] + j.log_det - i.log_det))
+
+
+def _chosen(
+    models: Sequence[_Expected], probability: Array, count: int
+) -> tuple[list[int], list[tuple[int, ...]], list[float]]:
+    """Return the rows chosen, the explanations that each tells apart most, and the gain with those before it."""
+    number = len(models)
+    itself = np.eye(number, dtype=bool)[:, :, None]
+    so_far, learnt = np.zeros((number, number)), 0.0
+    chosen: list[int] = []
+    pairs: list[tuple[int, ...]] = []
+    gains: list[float] = []
+    for _ in range(count):
+        known = [_Conditional(model.root, chosen) for model in models]
+        information = 0.5 * (known[0].log_det - _Conditional(models[0].frames, chosen).log_det)
+        added = np.zeros((number, number, len(information)))
+        for i in range(number):
+            for j in range(number):
+                if i != j:
+                    added[i, j] = _further(known[i], known[j], models[i].mean - models[j].mean, chosen)
+        reached = so_far[:, :, None] + added
+        if number > 1:
+            expected = probability @ np.where(itself, np.inf, reached).min(axis=1)
+            score = expected + _TIE * information
+        else:
+            expected = information + learnt
+            score = information.copy()
+        score[chosen] = -np.inf
+        row = int(score.argmax())
+        chosen.append(row)
+        gains.append(float(expected[row]))
+        so_far, learnt = reached[:, :, row], learnt + float(information[row])
+        if number > 1:
+            weight = np.outer(probability, probability)
+            both = weight * (added[:, :, row] + added[:, :, row].T)
+            pairs.append(tuple(sorted(int(k) for k in np.unravel_index(both.argmax(), both.shape))))
+        else:
+            pairs.append((0,))
+    return chosen, pairs, gains

@@ -1,0 +1,276 @@
+"""What one effect explains, place by place: the remainder with the effect left in, and without it.
+
+A component-plus-residual plot (Ezekiel 1924; Larsen and McCleary, *American Sociological Review* 37, 1972), in the
+place's own quantity. Row by row, with r the remainder of the whole explanation (m, rad), c what the effect does at this
+place, and D how an error of one unit there moves the target, in units of the noise,
+
+    before = D'(r + c) / D'D        after = D'r / D'D        spread = 1 / √(D'D)
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.diagnosis.where import locate
+from thermal_robot.effects import Effect, Parameter
+from thermal_robot.effects.law import Discovered
+from thermal_robot.effects.quantities import quantities
+from thermal_robot.errors import EffectError
+from thermal_robot.inference.columns import block
+from thermal_robot.inference.fit import Fit
+from thermal_robot.observations import Observations
+
+Array = NDArray[np.float64]
+
+_MATERIAL = 0.03
+_MOST = 8
+_LEVELS = 6
+_LINE, _ROUGH = 25, 0.01
+_OWN_JOINT = ("joint_gain", "transmission_error", "joint_offset", "geometric")
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """One place where an effect is at work, n rows.
+
+    Attributes
+    ----------
+    kind, name
+        ``joint`` and its name, and so on.
+    share
+        Part of what the effect does that it does here, 0..1.
+    quantity, quantity_unit
+        What drives the effect here.
+    values
+        (n,) of that quantity, SI.
+    levels
+        Whether it takes a few values only.
+    unit
+        Of the error: ``rad`` or ``m`` at the place; ``m at the tool`` where the error both shifts and turns.
+    before, after, spread
+        (n,) the error with the effect left in, without it, and one sigma of the noise in either.
+    line
+        (2, k) the fitted law: quantity and error.
+    """
+
+    kind: str
+    name: str
+    share: float
+    quantity: str
+    quantity_unit: str
+    values: Array
+    levels: bool
+    unit: str
+    before: Array
+    after: Array
+    spread: Array
+    line: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Explained:
+    """What one effect explains.
+
+    Attributes
+    ----------
+    effect
+        Its name.
+    places
+        Those with a material share, largest first.
+    left_out
+        How many more there are.
+    """
+
+    effect: str
+    places: tuple[Place, ...]
+    left_out: int
+
+
+def explained(fit: Fit, effect: str) -> Explained:
+    """Show what an effect of the explanation explains; rows that were set aside are left out.
+
+    Parameters
+    ----------
+    fit
+        The fit.
+    effect
+        Name of an effect that belongs to the explanation.
+
+    Raises
+    ------
+    EffectError
+        If it does not.
+    """
+    held = {e.name: (e, values) for e, values in fit.effects}
+    if effect not in held:
+        listed = ", ".join(held) or "no effect"
+        raise EffectError(f"{effect!r} is not part of the explanation, which holds {listed}")
+    setting, values = held[effect]
+    parameters = block(fit.corrected, setting).parameters
+    found = [p for p in locate(fit, {effect: 1.0})[1][effect] if p.share > 0.0]
+    shown = [p for p in found if p.share >= _MATERIAL][:_MOST]
+    rows = ~fit.explanation.outliers
+    places = []
+    for location in shown:
+        mine = [(p, float(v)) for p, v in zip(parameters, values, strict=True) if p.kind == location.kind]
+        mine = [(p, v) for p, v in mine if p.place == location.name]
+        places.append(_place(fit, setting, mine, location.share, rows))
+    return Explained(effect, tuple(places), len(found) - len(shown))
+
+
+def _place(
+    fit: Fit, effect: Effect, parameters: list[tuple[Parameter, float]], share: float, rows: NDArray[np.bool_]
+) -> Place:
+    observations, e = fit.corrected, fit.explanation
+    first = parameters[0][0]
+    error, moves, unit = _error(observations, parameters)
+    noise = e.whitening.noise * e.best.noise
+    direction, remainder = moves / noise, observations.gap / noise
+    length2 = np.einsum("nm,nm->n", direction, direction)
+    rows = rows & (length2 > 1e-12 * length2.max(initial=0.0))
+    after = np.einsum("nm,nm->n", direction, remainder)[rows] / length2[rows]
+    name, name_unit, values = _driver(observations, effect, parameters, error)
+    values, error = values[rows], error[rows]
+    return Place(
+        first.kind,
+        first.place or ("all links" if first.kind == "link" else first.kind),
+        share,
+        name,
+        name_unit,
+        values,
+        len(np.unique(values)) <= _LEVELS,
+        unit,
+        error + after,
+        after,
+        1.0 / np.sqrt(length2[rows]),
+        _line(values, error),
+    )
+
+
+def _error(observations: Observations, parameters: list[tuple[Parameter, float]]) -> tuple[Array, Array, str]:
+    """Return (N,) the error at a place, (N, m) how the target moves with a unit of it, and its unit.
+
+    What enters in several components keeps the proportions that it has on the whole (first singular vector).
+    """
+    measures = observations.gap.shape[1]
+    samples = len(observations.q)
+    parts: dict[tuple[str, int], Array] = {}
+    for parameter, value in parameters:
+        for response in parameter.responses:
+            moved = value * np.asarray(response.values)
+            if response.channel == "joint":
+                moved = np.broadcast_to(moved, samples)[:, None]
+            moved = np.broadcast_to(moved, (samples, moved.shape[-1]))
+            key = (response.channel, response.index)
+            parts[key] = parts.get(key, np.zeros(moved.shape)) + moved
+    maps = [_map(observations, channel, index)[:, :measures] for channel, index in parts]
+    twists = np.concatenate(list(parts.values()), axis=1)
+    moves = np.concatenate(maps, axis=2)
+    channels = {channel for channel, _ in parts}
+    if channels == {"instrument"}:
+        # it points elsewhere in every row; the sign is that of its parameter
+        length = (-1.0 if parameters[0][1] < 0.0 else 1.0) * np.linalg.norm(twists, axis=1)
+        return length, np.einsum("nmk,nk->nm", moves, twists / np.where(length == 0.0, 1.0, length)[:, None]), "m"
+    main = np.linalg.svd(twists, full_matrices=False)[2][0]
+    main = main * np.sign(main[int(np.abs(main).argmax())])
+    if channels == {"joint"} and len(parts) == 1:
+        index = next(index for _, index in parts)
+        return twists[:, 0], moves[:, :, 0], "m" if observations.robot.joint_types[index] == "prismatic" else "rad"
+    shift, turn = np.linalg.norm(main.reshape(-1, 6)[:, :3]), np.linalg.norm(main.reshape(-1, 6)[:, 3:])
+    direction = moves @ main
+    if len(parts) == 1 and min(shift, turn) < 1e-6:
+        return twists @ main, direction, "m" if shift > turn else "rad"
+    size = float(np.sqrt((direction[:, :3] ** 2).sum(axis=1).mean()))
+    return twists @ main * size, direction / max(size, 1e-300), "m at the tool"
+
+
+def _map(observations: Observations, channel: str, index: int) -> Array:
+    """(N, 6, k) twist of the target a unit of each component of a channel."""
+    if channel == "joint":
+        return observations.joint_sensitivity[:, :, index, None]
+    if channel == "segment":
+        return observations.segment_sensitivity[:, :, index, :]
+    if channel == "base":
+        return observations.base_sensitivity
+    if channel == "tool":
+        return observations.tool_sensitivity
+    full = np.zeros((len(observations.q), 6, 3))
+    full[:, :3] = observations.frames.base[:3, :3].T
+    return full
+
+
+def _driver(
+    observations: Observations, effect: Effect, parameters: list[tuple[Parameter, float]], error: Array
+) -> tuple[str, str, Array]:
+    """Return the quantity that the effect grows with at a place: its name, its unit, its (N,) values."""
+    robot, recorded = observations.robot, observations.covariates
+    place = parameters[0][0].place
+    known = quantities(observations)
+    joint = place if parameters[0][0].kind == "joint" else _joint_of(observations, place)
+    if effect.name in _OWN_JOINT and joint is not None:
+        return f"position of {joint}", _unit(observations, joint), observations.q[:, robot.joint_names.index(joint)]
+    if effect.name == "joint_compliance" and joint is not None:
+        if observations.torque is not None:
+            return f"torque of {joint}", "N·m", observations.torque[:, robot.joint_names.index(joint)]
+        # weights are not known, so that the torque is but as it was fitted: it is 1 at its largest
+        return f"fitted torque of {joint}", "relative", -error / max(float(np.abs(error).max()), 1e-300)
+    if effect.name == "link_compliance":
+        moment = observations.segment_load[:, parameters[0][0].responses[0].index, 3:]
+        axis = np.linalg.lstsq(moment, error, rcond=1e-9)[0]
+        return f"bending moment on {place}", "N·m", moment @ axis / (np.linalg.norm(axis) + 1e-300)
+    if effect.name == "thermal_bending" and f"temperature.{place}" in recorded:
+        general = recorded.get("temperature")
+        if general is None:
+            general = np.mean([v for name, v in recorded.items() if name.startswith("temperature.")], axis=0)
+        return f"{place} warmer than the robot by", "K", recorded[f"temperature.{place}"] - general
+    if effect.name == "instrument_scale":
+        return "distance from the instrument", "m", np.linalg.norm(observations.predicted_position, axis=1)
+    wanted = {
+        "backlash": f"approach.{joint}",
+        "tracking_lag": f"velocity.{joint}",
+        "thermal_elongation": f"temperature.{place}" if f"temperature.{place}" in recorded else "temperature",
+        "drift": "time" if "time" in recorded else "order",
+    }.get(effect.name, effect.quantity if isinstance(effect, Discovered) else "")
+    # of an effect that somebody else wrote nothing says what it reads: what goes with it most
+    name = wanted if wanted in known else max(known, key=lambda n: -_scatter(known[n], error))
+    return name, _unit(observations, name), known[name]
+
+
+def _joint_of(observations: Observations, link: str) -> str | None:
+    """Return the joint whose placement a link carries; ``None`` where there is none."""
+    return next((s.name for s in observations.robot.segments if s.parent_link == link and s.movable), None)
+
+
+def _scatter(values: Array, error: Array) -> float:
+    """Mean variance of an error among neighbours in a quantity."""
+    parts = np.array_split(error[np.argsort(values, kind="stable")], max(len(error) // 8, 2))
+    return float(np.mean([part.var() for part in parts if len(part)]))
+
+
+def _unit(observations: Observations, name: str) -> str:
+    robot = observations.robot
+    column, _, place = name.partition(".")
+    joint = place if column in ("velocity", "acceleration", "encoder") else name
+    prismatic = joint in robot.joint_names and robot.joint_types[robot.joint_names.index(joint)] == "prismatic"
+    lead = "m" if prismatic else "rad"
+    if name in robot.joint_names or column == "encoder":
+        return lead
+    others = {"torque": "N·m", "time": "s", "temperature": "°C", "payload": "kg", "reach": "m"}
+    return {**others, "velocity": f"{lead}/s", "acceleration": f"{lead}/s²"}.get(column, "")
+
+
+def _line(values: Array, error: Array) -> Array:
+    """(2, k) the law along its quantity: means of neighbours where it follows other quantities, too."""
+    levels = np.unique(values)
+    if len(levels) <= _LEVELS:
+        return np.array([levels, [error[values == level].mean() for level in levels]])
+    order = np.argsort(values, kind="stable")
+    x, y = values[order], error[order]
+    # a law of this quantity alone lies between its neighbours
+    between = np.interp(x[1:-1:2], x[::2], y[::2])[: len(x[1:-1:2])]
+    alone = float(np.abs(between - y[1:-1:2]).mean()) < _ROUGH * float(np.ptp(y)) + 1e-300
+    parts = np.array_split(order, min(len(order), 400) if alone else min(_LINE, max(len(order) // 10, 2)))
+    return np.array([[values[p].mean() for p in parts], [error[p].mean() for p in parts]])

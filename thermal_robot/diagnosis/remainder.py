@@ -1,0 +1,333 @@
+"""Tell noise from a remainder: where it enters, and what it follows."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtrc, fdtrc, ndtr, pdtr
+
+from thermal_robot.diagnosis.laws import smooth_law
+from thermal_robot.diagnosis.result import Dependence, Location, Unexplained
+from thermal_robot.effects.quantities import quantities
+from thermal_robot.inference.fit import Fit
+from thermal_robot.inference.rows import NEAR, in_a_row, in_order
+from thermal_robot.inference.scan import harmonics
+from thermal_robot.observations import Observations
+
+Array = NDArray[np.float64]
+
+LEVEL = 1e-3  # p-value, after counting the tests, below which a remainder is not called noise
+_MATERIAL_SCALE = 1.15  # a remainder less than this times the stated noise is not called large
+_MATERIAL_SHARE = 0.04  # a law that explains less of the remainder than this is not worth a name
+_FEWEST_PAIRS = 12
+_SHUFFLES = 200
+_ENOUGH_ROWS = 2000  # a law that explains a hundredth of what remains is then seen
+_SEED = 17
+_FEW_ASIDE = 0.05  # of all rows: fewer that follow each other may be one lapse of the instrument
+_ROUNDING = 1e-9  # m: a remainder below it is rounding, whatever its structure
+
+
+@dataclass(frozen=True, eq=False)
+class Remainder:
+    """What is left after the explanation, rows that are not outliers, whitened.
+
+    Attributes
+    ----------
+    rows
+        Their numbers, N of them.
+    white
+        (N, m) remainder over the noise that was settled on.
+    basis
+        (N·m, r) orthonormal: everything that was fitted.
+    freedom
+        N m − r.
+    """
+
+    rows: NDArray[np.int64]
+    white: Array
+    basis: Array
+    freedom: int
+
+    @property
+    def scale2(self) -> float:
+        """Mean square, corrected for what was fitted, in squares of the noise."""
+        return float((self.white**2).sum() / self.freedom)
+
+    def some(self, count: int) -> Remainder:
+        """Return so many rows drawn at random, with what was fitted projected out of them; all if they are fewer."""
+        if len(self.rows) <= count:
+            return self
+        drawn = np.sort(np.random.default_rng(_SEED).choice(len(self.rows), count, replace=False))
+        m = self.white.shape[1]
+        basis, _ = np.linalg.qr(self.basis.reshape(len(self.rows), m, -1)[drawn].reshape(count * m, -1))
+        white = self.white[drawn].ravel()
+        white = white - basis @ (basis.T @ white)
+        return Remainder(self.rows[drawn], white.reshape(count, m), basis, max(len(white) - basis.shape[1], 1))
+
+
+def remainder(fit: Fit) -> Remainder:
+    """Refit frames and explanation without priors, so that tests on what is left are exact."""
+    e = fit.explanation
+    rows = np.flatnonzero(~e.outliers)
+    columns = [e.linear.frames[rows]]
+    for b in e.best.blocks:
+        columns.append(e.linear.blocks[b].columns[rows] * e.linear.blocks[b].sizes)
+    design = np.concatenate(columns, axis=2) / e.whitening.noise[:, None]
+    flat = design.reshape(design.shape[0] * design.shape[1], design.shape[2])
+    flat = flat / (np.linalg.norm(flat, axis=0) + 1e-300)
+    value, vector = np.linalg.eigh(flat.T @ flat)
+    # what the data see only below the noise was held by its prior: leave it out as the fit did
+    seen = value > 1e-9 * value.max(initial=1.0)
+    basis, _ = np.linalg.qr(flat @ vector[:, seen])
+    # of the exact model, not the linear one: where effects are large and noise is small they differ
+    gap = (fit.corrected.gap[rows] / e.whitening.noise).ravel()
+    left = gap - basis @ (basis.T @ gap)
+    freedom = max(len(left) - basis.shape[1], 1)
+    return Remainder(rows, left.reshape(len(rows), -1), basis, freedom)
+
+
+@dataclass(frozen=True)
+class Repeats:
+    """What near-repeats say: the noise's mean square in squares of the settled noise, from how many pairs."""
+
+    pairs: int
+    scale2: float
+    position: float
+
+
+def repeats(fit: Fit, left: Remainder) -> Repeats | None:
+    """Compare each command with its nearest neighbour within :data:`NEAR`; ``None`` where too few have one."""
+    q = fit.campaign.q[left.rows]
+    distance, neighbour = _nearest(q, 1)
+    close = np.flatnonzero(distance[:, 0] < NEAR)
+    pairs = np.unique(np.sort(np.column_stack([close, neighbour[close, 0]]), axis=1), axis=0)
+    # the remainder of both: their commands may differ by a little, and their conditions by much
+    difference = left.white[pairs[:, 0]] - left.white[pairs[:, 1]]
+    if len(pairs) < _FEWEST_PAIRS:
+        return None
+    place = (difference[:, :3] * fit.explanation.whitening.noise[0]) ** 2 / 2.0
+    return Repeats(len(pairs), float((difference**2).mean() / 2.0), float(np.sqrt(place.mean())))
+
+
+def _nearest(points: Array, count: int) -> tuple[Array, NDArray[np.int64]]:
+    """Return distances and numbers (N, count) of each point's nearest others, itself left out however many coincide."""
+    from scipy.spatial import cKDTree
+
+    distance, number = cKDTree(points).query(points, k=count + 1)
+    own = number == np.arange(len(points))[:, None]
+    own[~own.any(axis=1), -1] = True  # others at the same place came first: drop the last of them
+    shape = (len(points), count)
+    return distance[~own].reshape(shape), number[~own].reshape(shape)
+
+
+def examine(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> tuple[Unexplained, float, str]:
+    """Say whether the remainder is noise.
+
+    Returns
+    -------
+    unexplained
+        With the place where it enters and the quantity that it follows.
+    floor
+        One sigma per axis that instrument and repeatability alone would leave, m.
+    source
+        Where that figure comes from: ``stated``, ``repeats`` or ``remainder``.
+    """
+    e, left = fit.explanation, remainder(fit)
+    stated, again = fit.campaign.noise_position, repeats(fit, left)
+    rms = float(
+        np.sqrt(
+            3.0 * (left.white[:, :3] ** 2).sum() * e.whitening.noise[0] ** 2 / (left.freedom * 3 / left.white.shape[1])
+        )
+    )
+    if stated is not None:
+        floor, source = stated, "stated"
+    elif again is not None:
+        floor, source = again.position, "repeats"
+    else:
+        floor, source = rms / np.sqrt(3.0), "remainder"
+    progress("remainder: size and neighbours")
+    alike, likeness = _neighbours(fit, left)
+    progress("remainder: places and quantities")
+    law, locations, depends, share = _scan(fit, left)
+    verdicts = [_size(fit, left), _lack_of_fit(left, again), alike, law, _in_a_row(fit)]
+    p_value = min(1.0, len(verdicts) * min(p for p, _ in verdicts))
+    reasons = tuple(reason for p, reason in verdicts if reason and len(verdicts) * p < LEVEL)
+    flagged = bool(reasons) and rms > _ROUNDING
+    if flagged and source == "remainder":
+        # nothing tells the noise but the remainder itself: at most what neighbours do not have in common
+        floor *= np.sqrt(1.0 - np.clip(max(likeness, share), 0.0, 1.0))
+    beyond = np.sqrt(max(rms**2 - 3.0 * floor**2, 0.0)) if flagged else 0.0
+    if flagged and source == "remainder":
+        beyond = rms  # neither a stated noise nor repeats vouch for any of it
+    unexplained = Unexplained(
+        flagged,
+        float(beyond),
+        float(p_value),
+        reasons if flagged else (),
+        locations if flagged else (),
+        depends if flagged else (),
+    )
+    return unexplained, float(floor), source
+
+
+def _size(fit: Fit, left: Remainder) -> tuple[float, str]:
+    """Chi-square of the remainder against the stated noise, its freedom reduced by the tails."""
+    noise, worst = fit.explanation.whitening.noise, (1.0, "")
+    stated = (fit.campaign.noise_position, fit.campaign.noise_orientation)
+    for part, sigma in enumerate(stated[: left.white.shape[1] // 3]):
+        if sigma is None:
+            continue
+        white = left.white[:, 3 * part : 3 * part + 3] * (noise[3 * part] / sigma)
+        freedom = left.freedom * 3.0 / left.white.shape[1]
+        ratio2 = float((white**2).sum() / freedom)
+        tails = max(float((white**4).mean() / (white**2).mean() ** 2) - 1.0, 2.0)
+        effective = freedom * 2.0 / tails
+        p = float(chdtrc(effective, ratio2 * effective))
+        what = "position" if part == 0 else "orientation"
+        if p < worst[0] and ratio2 > _MATERIAL_SCALE**2:
+            worst = (p, f"what remains in {what} is {np.sqrt(ratio2):.2g} times the stated noise")
+    return worst
+
+
+def _lack_of_fit(left: Remainder, again: Repeats | None) -> tuple[float, str]:
+    """F test of the remainder against the differences of near-repeats."""
+    if again is None:
+        return 1.0, ""
+    m = left.white.shape[1]
+    ratio2 = left.scale2 / max(again.scale2, 1e-300)
+    p = float(fdtrc(left.freedom, again.pairs * m, ratio2))
+    if ratio2 < 1.3**2:
+        return 1.0, ""
+    times = np.sqrt(ratio2)
+    return p, f"what remains is {times:.2g} times what {again.pairs} pairs of repeated commands differ by"
+
+
+def _in_a_row(fit: Fit) -> tuple[float, str]:
+    """Chance that so many of the rows set aside follow each other; spoilt rows do not, but those after a change do."""
+    aside = fit.explanation.outliers[in_order(fit.campaign)]
+    count, samples = int(aside.sum()), len(aside)
+    if count < _FEW_ASIDE * samples:
+        return 1.0, ""
+    follow = int((aside[1:] & aside[:-1]).sum())
+    # what chance gives has a Poisson law
+    p = 1.0 - float(pdtr(follow - 1, count * (count - 1) / samples)) if follow else 1.0
+    together = int(in_a_row(fit.campaign, fit.explanation.outliers).sum())
+    return p, f"{together} of the {count} rows that were set aside follow each other: something changed there"
+
+
+def _neighbours(fit: Fit, left: Remainder) -> tuple[tuple[float, str], float]:
+    """Compare the remainders of neighbours, in joint space and in order, with those of shuffled rows.
+
+    Returns p-value and reason, and the largest correlation that is not chance.
+    """
+    q = fit.campaign.q[left.rows]
+    spread = q.std(axis=0)
+    used = spread > 1e-9
+    white = left.white / np.sqrt((left.white**2).mean(axis=0) + 1e-300)
+    white = np.clip(white, -4.0, 4.0)
+    pairs = []
+    if used.any() and len(q) > 20:
+        _, near = _nearest(q[:, used] / spread[used], 3)
+        pairs.append(("joint space", np.column_stack([np.repeat(np.arange(len(q)), 3), near.ravel()])))
+    order = np.argsort(np.argsort(in_order(fit.campaign))[left.rows], kind="stable")
+    pairs.append(("the order of measurement", np.column_stack([order[:-1], order[1:]])))
+    rng = np.random.default_rng(0)
+    worst, most = (1.0, ""), 0.0
+    for where, pair in pairs:
+        statistic = float((white[pair[:, 0]] * white[pair[:, 1]]).sum(axis=1).mean())
+        chance = np.empty(_SHUFFLES if len(white) < 3000 else 40)
+        for k in range(len(chance)):
+            shuffled = white[rng.permutation(len(white))]
+            chance[k] = (shuffled[pair[:, 0]] * shuffled[pair[:, 1]]).sum(axis=1).mean()
+        p = float(2.0 * ndtr(-max(statistic - chance.mean(), 0.0) / (chance.std() + 1e-300)))
+        likeness = statistic / white.shape[1]
+        if p < LEVEL and likeness > _MATERIAL_SHARE:
+            most = max(most, likeness)
+        if p < worst[0] and likeness > _MATERIAL_SHARE:
+            worst = (p, f"what remains is alike for neighbours in {where} (correlation {likeness:.2f})")
+    return worst, most
+
+
+def _scan(fit: Fit, left: Remainder) -> tuple[tuple[float, str], tuple[Location, ...], tuple[Dependence, ...], float]:
+    """F tests of a smooth law of every quantity in every place; p-values after counting them all.
+
+    Returns p-value and reason, places, quantities, and the share of the remainder that the best law explains.
+    """
+    observations, noise = fit.corrected, fit.explanation.whitening.noise
+    left = left.some(_ENOUGH_ROWS)
+    m = left.white.shape[1]
+    target = left.white.ravel()
+    names = observations.robot.joint_names
+    places: list[tuple[str, str, Array]] = [
+        ("joint", name, observations.joint_sensitivity[left.rows, :m, j, None]) for j, name in enumerate(names)
+    ]
+    places += [
+        ("base", "base", observations.base_sensitivity[left.rows, :m, :]),
+        ("tool", "tool", observations.tool_sensitivity[left.rows, :m, :m]),
+    ]
+    laws = {name: smooth_law(values[left.rows]) for name, values in quantities(observations).items()}
+    rows = []
+    for kind, place, sensitivity in places:
+        scaled = sensitivity / noise[:, None]
+        # five knots do not follow a wheel that turns more than once
+        turns = [(place, _turns(observations, place)[left.rows])] if place in laws else []
+        for quantity, law in [*laws.items(), *turns]:
+            if not law.shape[1] or (law.shape[1] * scaled.shape[2]) > left.freedom // 3:
+                continue
+            columns = (scaled[:, :, :, None] * law[:, None, None, :]).reshape(len(target), -1)
+            p, share, gain = _f_test(columns, left, target)
+            rows.append((p, gain, share, kind, place, quantity))
+    if not rows:
+        return (1.0, ""), (), (), 0.0
+    tried = len(rows)
+    rows.sort(key=lambda r: -r[1])
+    material = [r for r in rows if r[2] > _MATERIAL_SHARE and r[0] * tried < 0.05]
+    by_place: dict[tuple[str, str], float] = {}
+    for _, gain, _, kind, place, _ in rows:
+        by_place[(kind, place)] = max(by_place.get((kind, place), -np.inf), gain)
+    gains = np.array(list(by_place.values()))
+    weight = np.exp(gains - gains.max())
+    locations = [
+        Location(kind, place, float(w)) for (kind, place), w in zip(by_place, weight / weight.sum(), strict=True)
+    ]
+    locations.sort(key=lambda place: -place.share)
+    depends: dict[str, float] = {}
+    for p, _, _, _, _, quantity in material:
+        depends.setdefault(quantity, min(1.0, p * tried))
+    if not material:
+        return (1.0, ""), tuple(locations[:5]), (), 0.0
+    p, _, share, kind, place, quantity = material[0]
+    at = {"joint": f"joint {place}", "base": "the base", "tool": "the tool"}[kind]
+    reason = f"a law of {quantity} at {at} explains {share:.0%} of what remains"
+    return (
+        (min(1.0, p * tried), reason),
+        tuple(locations[:5]),
+        tuple(Dependence(q, p) for q, p in list(depends.items())[:5]),
+        share,
+    )
+
+
+def _turns(observations: Observations, joint: str) -> Array:
+    """(N, 2k) harmonics of a joint's position."""
+    angle = observations.q[:, observations.robot.joint_names.index(joint)]
+    return np.column_stack([f(k * angle) for k in harmonics(observations, joint) for f in (np.sin, np.cos)])
+
+
+def _f_test(columns: Array, left: Remainder, target: Array) -> tuple[float, float, float]:
+    """Return p-value, adjusted share of the remainder explained, and gain in log evidence (BIC) of extra columns."""
+    columns = columns - left.basis @ (left.basis.T @ columns)
+    value, vector = np.linalg.eigh(columns.T @ columns)
+    seen = value > 1e-9 * max(value.max(initial=0.0), 1e-300)
+    k = int(seen.sum())
+    freedom = left.freedom - k
+    if not k or freedom < 5:
+        return 1.0, 0.0, -np.inf
+    projected = (vector[:, seen].T @ (columns.T @ target)) / np.sqrt(value[seen])
+    total, gained = float(target @ target), float(projected @ projected)
+    rest = max(total - gained, 1e-300)
+    p = float(fdtrc(k, freedom, (gained / k) / (rest / freedom)))
+    share = 1.0 - (rest / freedom) / (total / left.freedom)
+    return p, share, 0.5 * left.freedom * np.log(total / rest) - 0.5 * k * np.log(left.freedom)

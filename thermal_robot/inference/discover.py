@@ -1,0 +1,267 @@
+"""Causes that nobody listed: laws of places and quantities that join the known effects in one comparison."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.effects.law import PREFIX, Discovered
+from thermal_robot.inference.columns import block
+from thermal_robot.inference.evidence import Combination, Search
+from thermal_robot.inference.explain import PRIOR_PROBABILITY, log_priors
+from thermal_robot.inference.fit import Fit, corrected_observations
+from thermal_robot.inference.problem import Linear, Whitening, contained, gram
+from thermal_robot.inference.rows import in_a_row
+from thermal_robot.inference.scan import CLOCK, Scanned, Target, scan, shaped
+from thermal_robot.observations import Observations
+
+Array = NDArray[np.float64]
+
+_SHAPED = 6  # candidates of each remainder whose shape is looked at
+_INSTEAD = 3
+_ENOUGH_ROWS = 1500
+_SEED = 61
+_COMPARED = 8  # candidates that are compared jointly with the known effects
+_IN_TIME = float(np.log(3.0))
+_LEAST = 6.0  # log evidence that a law must bring over none
+
+
+@dataclass(frozen=True, eq=False)
+class Thin:
+    """As many rows of a fit as a scan needs: all of them, or some drawn at random where there are very many.
+
+    Attributes
+    ----------
+    observations
+        Of the corrected model, at these rows.
+    linear
+        The problem there, whitening its weights and noise.
+    remainder
+        (M, m) what the explanation leaves.
+    changed
+        (M,) rows that were set aside and follow each other.
+    """
+
+    observations: Observations
+    linear: Linear
+    whitening: Whitening
+    remainder: Array
+    changed: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, fit: Fit) -> Thin:
+        """Return the rows of a fit."""
+        e = fit.explanation
+        if fit.campaign.samples <= _ENOUGH_ROWS:
+            return cls(fit.corrected, e.linear, e.whitening, e.remainder, in_a_row(fit.campaign, e.outliers))
+        drawn = np.random.default_rng(_SEED).choice(fit.campaign.samples, _ENOUGH_ROWS, replace=False)
+        rows = np.sort(drawn)
+        return cls(
+            corrected_observations(fit.campaign.take(rows), fit.corrected.frames, fit.effects),
+            Linear(
+                e.linear.gap[rows],
+                e.linear.frames[rows],
+                tuple(replace(b, columns=b.columns[rows]) for b in e.linear.blocks),
+            ),
+            replace(e.whitening, weights=e.whitening.weights[rows]),
+            e.remainder[rows],
+            in_a_row(fit.campaign, e.outliers)[rows],
+        )
+
+    def target(self, blocks: Iterable[int]) -> Target:
+        """Return what is left when frames and some blocks are projected out."""
+        columns = [self.linear.blocks[b].columns for b in blocks]
+        return Target.of(self.linear.gap, np.concatenate([self.linear.frames, *columns], axis=2), self.changed)
+
+
+@dataclass(frozen=True, eq=False)
+class Discovery:
+    """The law that the data speak for, with its rivals.
+
+    Attributes
+    ----------
+    law
+        What it is.
+    beside
+        Names of the known effects that stay beside it.
+    rarity
+        Log prior probability lost to the number of laws that were tried.
+    gain
+        Log evidence over the best combination without a law.
+    places
+        (kind, name) with the posterior probability of each.
+    quantities
+        The same of each quantity.
+    """
+
+    law: Discovered
+    beside: tuple[str, ...]
+    rarity: float
+    gain: float
+    places: tuple[tuple[tuple[str, str], float], ...]
+    quantities: tuple[tuple[str, float], ...]
+
+
+def discover(fit: Fit, number: int) -> Discovery | None:
+    """Scan every place and quantity for a law; ``None`` where none is worth its place.
+
+    Two remainders are scanned, that of the explanation and that of the frames alone: where known effects have taken
+    part of an unlisted cause upon themselves, it shows in the second only. The best candidates then compete with the
+    known effects in one comparison, so that these can go again.
+
+    Parameters
+    ----------
+    fit
+        An explanation that leaves a remainder.
+    number
+        Of the law: it is called ``discovered.<number>``.
+    """
+    e, thin = fit.explanation, Thin.of(fit)
+    after = thin.target(e.best.blocks)
+    before = thin.target(b for b in e.best.blocks if fit.families[b].startswith(PREFIX))
+    found, tried = scan(thin.observations, [after, before])
+    candidates: list[Scanned] = []
+    for target, own in zip((after, before), found, strict=True):
+        for item in _with_joints(own):
+            best = shaped(thin.observations, target, item.law)
+            if best.gain > 0.0:
+                candidates.append(best)
+    laws = list(dict.fromkeys(c.law for c in sorted(candidates, key=lambda c: -c.gain)))
+    # the first of each remainder, in turn
+    chosen = _in_turn([[c.law for c in _of(candidates, own)] for own in found], laws)[:_COMPARED]
+    if not chosen:
+        return None
+    return _compare(fit, thin, [replace(law, name=f"{PREFIX}{number}") for law in chosen], tried)
+
+
+def _with_joints(own: Sequence[Scanned]) -> list[Scanned]:
+    """Return the first candidates, and beside that of a segment the joint behind it, which is simpler."""
+    first = list(own[:_SHAPED])
+    simpler = {(i.law.place, i.law.quantity) for i in first if i.law.kind == "link"}
+    return first + [i for i in own[_SHAPED:] if i.law.kind == "joint" and (i.law.place, i.law.quantity) in simpler]
+
+
+def _of(candidates: Sequence[Scanned], own: Sequence[Scanned]) -> list[Scanned]:
+    places = {(i.law.kind, i.law.place, i.law.quantity) for i in _with_joints(own)}
+    mine = [c for c in candidates if (c.law.kind, c.law.place, c.law.quantity) in places]
+    return sorted(mine, key=lambda c: -c.gain)
+
+
+def _in_turn(lists: Sequence[Sequence[Discovered]], everything: Sequence[Discovered]) -> list[Discovered]:
+    longest = max((len(own) for own in lists), default=0)
+    turns = [own[k] for k in range(longest) for own in lists if k < len(own)]
+    return list(dict.fromkeys([*turns, *everything]))
+
+
+def _compare(fit: Fit, thin: Thin, laws: Sequence[Discovered], tried: int) -> Discovery | None:
+    """Climb over the known effects and one law at a time; what the law's presence allows to go, goes."""
+    e = fit.explanation
+    known = len(e.linear.blocks)
+    problem = gram(_with(thin, laws), _all_rows(fit, thin))
+    odds = float(np.log(PRIOR_PROBABILITY / (1 - PRIOR_PROBABILITY)))
+    rarity = -float(np.log(tried))
+    families = [*fit.families, *(law.name for law in laws)]
+    prior = log_priors(fit.families, fit.rarity)
+    # a change that is one in time and in another quantity happened in time
+    prior += [odds + rarity + (_IN_TIME if law.quantity in CLOCK else 0.0) for law in laws]
+    same = {frozenset((a, b)) for a, f in enumerate(families) for b, g in enumerate(families) if a < b and f == g}
+    search = Search(problem, prior, contained(problem) | frozenset(same))
+    plain = search.evaluate(e.best.blocks)
+    best = plain
+    for k in range(known, known + len(laws)):
+        start = search.evaluate((*e.best.blocks, k), plain)
+        best = max(best, start, search.evaluate((k,), start), key=lambda c: c.log_evidence)
+    best = _climb(search, best, known)
+    inside = [k for k in best.blocks if k >= known]
+    if not inside:
+        return None
+    without = _climb(search, plain, known, barred=frozenset(range(known, known + len(laws))))
+    gain = best.log_evidence - without.log_evidence
+    if gain < _LEAST:
+        return None
+    combinations, weight = search.probabilities()
+    places: dict[tuple[str, str], float] = {}
+    followed: dict[str, float] = {}
+    for combination, w in zip(combinations, weight, strict=True):
+        for k in combination.blocks:
+            if k >= known:
+                law = laws[k - known]
+                places[where(fit, law)] = places.get(where(fit, law), 0.0) + float(w)
+                followed[law.quantity] = followed.get(law.quantity, 0.0) + float(w)
+    return Discovery(
+        laws[inside[0] - known],
+        tuple(dict.fromkeys(fit.families[b] for b in best.blocks if b < known)),
+        rarity,
+        float(gain),
+        tuple(sorted(places.items(), key=lambda item: -item[1])),
+        tuple(sorted(followed.items(), key=lambda item: -item[1])),
+    )
+
+
+def instead(fit: Fit, name: str) -> tuple[Discovered, float] | None:
+    """Return the law that could best take a known effect's place, and its gain in log evidence over that effect.
+
+    Where an unlisted cause is at work already, one more place costs a law only the choice of that place.
+    """
+    e = fit.explanation
+    rest = tuple(b for b in e.best.blocks if fit.families[b] != name)
+    thin = Thin.of(fit)
+    target = thin.target(rest)
+    found, _ = scan(thin.observations, [target])
+    laws = [shaped(thin.observations, target, item.law).law for item in _with_joints(found[0])[:_INSTEAD]]
+    if not laws:
+        return None
+    known = len(e.linear.blocks)
+    problem = gram(_with(thin, laws), thin.whitening)
+    places = fit.campaign.robot.n + len(fit.campaign.robot.segments)
+    prior = [*log_priors(fit.families, fit.rarity), *[-float(np.log(places))] * len(laws)]
+    search = Search(problem.tempered(e.design_effect), prior)
+    now = search.evaluate(e.best.blocks).log_evidence
+    gains = [search.evaluate((*rest, known + k)).log_evidence - now for k in range(len(laws))]
+    best = int(np.argmax(gains))
+    return laws[best], gains[best]
+
+
+def _climb(search: Search, best: Combination, known: int, barred: frozenset[int] = frozenset()) -> Combination:
+    """Add, drop, or exchange for another law, while it helps; pairs of known effects are not exchanged here."""
+    count = len(search.gram.slices)
+    while True:
+        around = [(*best.blocks, b) for b in range(count) if b not in best.blocks and b not in barred]
+        around += [tuple(b for b in best.blocks if b != out) for out in best.blocks]
+        laws = [b for b in best.blocks if b >= known]
+        around += [
+            (*(b for b in best.blocks if b != out), new) for out in laws for new in range(known, count) if new != out
+        ]
+        tried = [search.evaluate(blocks, best) for blocks in around if search.allowed(blocks)]
+        better = max(tried, key=lambda c: c.log_evidence, default=best)
+        if better.log_evidence <= best.log_evidence + 1e-9:
+            return best
+        best = better
+
+
+def _with(thin: Thin, laws: Sequence[Discovered]) -> Linear:
+    """Return the problem with further blocks for laws."""
+    linear = thin.linear
+    return Linear(linear.gap, linear.frames, (*linear.blocks, *(block(thin.observations, law) for law in laws)))
+
+
+def _all_rows(fit: Fit, thin: Thin) -> Whitening:
+    """Weigh every row, those set aside by how far they lie: under another explanation they may be sound."""
+    stated = (fit.campaign.noise_position, fit.campaign.noise_orientation)
+    noise = thin.whitening.noise.copy()
+    for part, sigma in enumerate(stated[: len(noise) // 3]):
+        if sigma is not None:
+            noise[3 * part : 3 * part + 3] = np.minimum(noise[3 * part : 3 * part + 3], 2.0 * sigma)
+    distance2 = ((thin.remainder / thin.whitening.noise) ** 2).sum(axis=1) / thin.linear.measures
+    weights = np.where(thin.changed, 1.0, np.minimum(1.0, 9.0 / np.maximum(distance2, 1e-300)))
+    return Whitening(weights, noise, thin.whitening.held)
+
+
+def where(fit: Fit, law: Discovered) -> tuple[str, str]:
+    """Return a law's place as a diagnosis names it: a segment by the link that carries it."""
+    if law.kind != "link":
+        return law.kind, law.place
+    return "link", next(s.parent_link for s in fit.campaign.robot.segments if s.name == law.place)

@@ -1,0 +1,237 @@
+"""From the linear problem to an explanation: effects, outliers and noise, found together until they agree."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtri
+
+from thermal_robot.inference.evidence import Combination, Gram, Search
+from thermal_robot.inference.problem import Linear, Whitening, contained, frame_step, gram, parameter_values, scores
+
+Array = NDArray[np.float64]
+
+PRIOR_PROBABILITY = 0.1  # of an effect being at work, before the data
+_GIVEN_NOISE_DOF = 20.0  # a stated noise is trusted to about 15 %
+_ROUNDS = 8
+_ROUNDING = 1e-9  # m and rad: no table and no robot is better
+_MOST_OUTLIERS = 0.25
+
+
+@dataclass(frozen=True)
+class Noise:
+    """The instrument's one-sigma per axis, m and rad; ``None`` where it is not given."""
+
+    position: float | None = None
+    orientation: float | None = None
+
+    def parts(self, measures: int) -> tuple[float | None, ...]:
+        """Return one entry for every three components."""
+        return (self.position, self.orientation)[: measures // 3]
+
+
+@dataclass(frozen=True, eq=False)
+class Explanation:
+    """What the data speak for, and how sure they are.
+
+    Attributes
+    ----------
+    linear, whitening, problem
+        The problem, with the weights and the noise that were settled on.
+    best
+        The most probable combination.
+    combinations, probabilities
+        All that were compared, most probable first.
+    values
+        Per block of the best combination: mean and covariance of its parameters.
+    frame_step
+        (f,) step of the frames that goes with it.
+    remainder
+        (N, m) gap − all of it, for all rows, used or not.
+    outliers
+        (N,) True for rows set aside.
+    design_effect
+        How many rows were taken to be worth one.
+    """
+
+    linear: Linear
+    whitening: Whitening
+    problem: Gram
+    best: Combination
+    combinations: Sequence[Combination]
+    probabilities: Array
+    values: dict[int, tuple[Array, Array]]
+    frame_step: Array
+    remainder: Array
+    outliers: NDArray[np.bool_]
+    design_effect: float
+
+    def far(self, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
+        """(N,) True for those of the given rows that lie further from this explanation than noise allows."""
+        distance2 = ((self.remainder / (self.whitening.noise * self.best.noise)) ** 2).sum(axis=1)
+        return np.asarray(rows & (distance2 > distance_limit(self.linear.measures, len(rows))))
+
+    def probability(self, blocks: Sequence[int]) -> float:
+        """Posterior probability that any of the blocks is at work."""
+        held = [bool(set(c.blocks) & set(blocks)) for c in self.combinations]
+        return min(float(self.probabilities[held].sum()), 1.0)
+
+
+def distance_limit(measures: int, rows: int) -> float:
+    """Return the squared distance, in noise, beyond which one of so many rows is a gross error."""
+    return 1.5 * float(chdtri(measures, 0.01 / max(rows, 1)))
+
+
+def explain(
+    linear: Linear,
+    noise: Noise,
+    *,
+    rows: NDArray[np.bool_] | None = None,
+    families: Sequence[str] = (),
+    start: Sequence[int] = (),
+    outliers: NDArray[np.bool_] | None = None,
+    groups: Sequence[NDArray[np.int64]] = (),
+    rarity: Mapping[str, float] | None = None,
+) -> Explanation:
+    """Find the most probable combination of blocks together with outliers and noise.
+
+    Parameters
+    ----------
+    linear
+        The problem.
+    noise
+        As the campaign states it.
+    rows
+        (N,) rows to use; all where absent. What is learnt comes from these alone.
+    families
+        Name of the effect that each block belongs to: blocks of one effect are settings that exclude each other and
+        share its prior probability.
+    start, outliers
+        Where the search starts: blocks and rows set aside.
+    groups
+        Labels (N,) of rows that belong together, several groupings: see :func:`design_effect`.
+    rarity
+        By family: what its log prior odds are less than another's, because it was picked out of many.
+
+    Returns
+    -------
+    Explanation
+        Gross errors do not bear on it: rows further than noise allows from the explanation are set aside, and rows in
+        the tail weigh less (Huber).
+    """
+    measures, samples = linear.measures, len(linear.gap)
+    use = np.ones(samples, dtype=bool) if rows is None else rows
+    aside = np.zeros(samples, dtype=bool) if outliers is None else outliers & use
+    families = families or [str(k) for k in range(len(linear.blocks))]
+    log_prior = log_priors(families, rarity or {})
+    settings = {frozenset((a, b)) for a, f in enumerate(families) for b, g in enumerate(families) if a < b and f == g}
+    whitening = _first_whitening(linear, noise, use & ~aside)
+    history: list[tuple[tuple[int, ...], bytes]] = []
+    seed = tuple(start)
+    while True:
+        problem = gram(linear, whitening)
+        search = Search(problem, log_prior, contained(problem) | settings)
+        best = search.run(seed if search.allowed(seed) else ())
+        values = parameter_values(linear, problem, best)
+        remainder = _remainder(linear, values)
+        step = frame_step(linear, whitening, remainder)
+        remainder = remainder - linear.frames @ step
+        state = (best.blocks, np.packbits(whitening.weights > 0).tobytes())
+        if state in history or len(history) >= _ROUNDS:
+            break
+        history.append(state)
+        leverage = (best.effective + linear.frames.shape[2]) / max(problem.equations + linear.frames.shape[2], 1)
+        whitening, aside = _reweigh(remainder, noise, use, min(leverage, 0.9), measures)
+        seed = best.blocks
+    worth = design_effect(linear, problem, remainder, whitening, groups)
+    if worth > 1.0:
+        search = Search(problem.tempered(worth), log_prior, contained(problem) | settings)
+        best = search.run(best.blocks)
+        values = parameter_values(linear, problem, best)
+        remainder = _remainder(linear, values)
+        step = frame_step(linear, whitening, remainder)
+        remainder = remainder - linear.frames @ step
+    combinations, probabilities = search.probabilities()
+    return Explanation(
+        linear, whitening, problem, best, combinations, probabilities, values, step, remainder, aside, worth
+    )
+
+
+def log_priors(families: Sequence[str], rarity: Mapping[str, float]) -> list[float]:
+    """Return the log prior odds of each block: settings of one effect share its own."""
+    odds = float(np.log(PRIOR_PROBABILITY / (1 - PRIOR_PROBABILITY)))
+    return [odds - float(np.log(list(families).count(f))) + rarity.get(f, 0.0) for f in families]
+
+
+def _remainder(linear: Linear, values: dict[int, tuple[Array, Array]]) -> Array:
+    moved = (linear.contribution(b, mean) for b, (mean, _) in values.items())
+    return linear.gap - sum(moved, np.zeros_like(linear.gap))
+
+
+def design_effect(
+    linear: Linear, problem: Gram, remainder: Array, whitening: Whitening, groups: Sequence[NDArray[np.int64]]
+) -> float:
+    """Return how many rows are worth one, because the remainder of rows that belong together is alike.
+
+    The variance of the columns' scores summed within groups, over what it would be if rows were independent (Kish,
+    *Survey Sampling*, 1965); the largest over the groupings, 1 where chance would give as much.
+    """
+    if not groups or not problem.slices or not problem.slices[-1].stop:
+        return 1.0
+    used = np.flatnonzero(whitening.weights > 0)
+    each = scores(linear, whitening, problem, remainder)
+    alone = (each**2).sum(axis=0) + 1e-300
+    value = np.linalg.eigvalsh(problem.matrix / np.sqrt(np.outer(np.diag(problem.matrix), np.diag(problem.matrix))))
+    independent = value.sum() ** 2 / (value**2).sum()
+    worst = 1.0
+    for labels in groups:
+        kept = labels[used]
+        together = np.stack([np.bincount(kept, column) for column in each.T], axis=1)
+        ratio = float(np.mean((together**2).sum(axis=0) / alone))
+        pairs = float((np.bincount(kept).astype(float) ** 2).sum()) / len(used) - 1.0
+        chance = np.sqrt(2.0 * max(pairs, 0.0) / (len(used) * independent))
+        worst = max(worst, ratio if ratio > 1.0 + 4.0 * chance else 1.0)
+    return worst
+
+
+def robust_noise(remainder: Array, leverage: float = 0.0) -> Array:
+    """Return one sigma per axis of each three components, from the median of their squared length."""
+    parts = remainder.reshape(len(remainder), -1, 3)
+    middle = np.median((parts**2).sum(axis=2), axis=0) / float(chdtri(3, 0.5))
+    return np.asarray(np.maximum(np.sqrt(middle / (1.0 - leverage)), _ROUNDING))
+
+
+def _settle(measured: Array, noise: Noise, measures: int) -> tuple[Array, float]:
+    """Return the noise of each component, never below what is stated, and how firmly it is held.
+
+    A remainder well above the stated noise is not noise: it then sets the scale by which effects are judged.
+    """
+    stated = noise.parts(measures)
+    sigma = np.array(
+        [m if g is None else max(g, m if m > 1.3 * g else g) for g, m in zip(stated, measured, strict=True)]
+    )
+    firm = all(g is not None and s <= g for g, s in zip(stated, sigma, strict=True))
+    return np.repeat(sigma, 3), _GIVEN_NOISE_DOF if firm else 0.0
+
+
+def _first_whitening(linear: Linear, noise: Noise, use: NDArray[np.bool_]) -> Whitening:
+    weights = use.astype(float)
+    sigma, held = _settle(robust_noise(linear.gap[use]), noise, linear.measures)
+    return Whitening(weights, sigma, held)
+
+
+def _reweigh(
+    remainder: Array, noise: Noise, use: NDArray[np.bool_], leverage: float, measures: int
+) -> tuple[Whitening, NDArray[np.bool_]]:
+    sigma, held = _settle(robust_noise(remainder[use], leverage), noise, measures)
+    distance2 = ((remainder / sigma) ** 2).sum(axis=1) / (1.0 - leverage)
+    aside = use & (distance2 > distance_limit(measures, int(use.sum())))
+    if aside.sum() > _MOST_OUTLIERS * use.sum():
+        worst = np.argsort(np.where(use, -distance2, np.inf))[: int(_MOST_OUTLIERS * use.sum())]
+        aside = np.isin(np.arange(len(use)), worst) & aside
+    bend = float(chdtri(measures, 0.01))
+    weights = np.where(use & ~aside, np.minimum(1.0, np.sqrt(bend / np.maximum(distance2, 1e-300))), 0.0)
+    return Whitening(weights, sigma, held), aside

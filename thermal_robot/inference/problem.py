@@ -1,0 +1,190 @@
+"""The linear problem that all combinations of effects share, and its Gram matrix for any rows and weights."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag
+
+from thermal_robot.inference.columns import Block
+from thermal_robot.inference.evidence import Combination, Gram
+
+Array = NDArray[np.float64]
+
+_FRAME_FLOOR = 1e-11
+_ROUNDING = 1e-12
+_INFORMATION_FLOOR = 1e-5  # a column that moves the whole gap by less than this, squared and in noise, is not seen
+_CONTAINED = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Linear:
+    """gap ≈ F f + Σ_b X_b θ_b + noise, in the root frame's axes.
+
+    Attributes
+    ----------
+    gap
+        (N, m) with the contribution of values already applied put back, so that θ is absolute.
+    frames
+        (N, m, f) columns of the unknown frames.
+    blocks
+        The effects' columns.
+    """
+
+    gap: Array
+    frames: Array
+    blocks: tuple[Block, ...]
+
+    @property
+    def measures(self) -> int:
+        """Components a row: 3 for positions, 6 for poses."""
+        return int(self.gap.shape[1])
+
+    @cached_property
+    def stack(self) -> Array:
+        """(N, m, f + P + 1) frames, all blocks' columns, gap."""
+        columns = [self.frames, *(b.columns for b in self.blocks), self.gap[:, :, None]]
+        return np.concatenate(columns, axis=2)
+
+    def contribution(self, block: int, values: Array) -> Array:
+        """(N, m) what a block's parameter values do to the gap."""
+        return np.asarray(self.blocks[block].columns @ values)
+
+
+@dataclass(frozen=True, eq=False)
+class Whitening:
+    """Weight of each row and noise of each component.
+
+    Attributes
+    ----------
+    weights
+        (N,) 0 for rows that are not used, else up to 1.
+    noise
+        (m,) one sigma: m for the first three, rad for the rest.
+    held
+        Degrees of freedom that the noise is worth as prior knowledge.
+    """
+
+    weights: Array
+    noise: Array
+    held: float
+
+
+def gram(linear: Linear, whitening: Whitening) -> Gram:
+    """Form the normal equations, project the frames out, reduce each block to what the data see of it."""
+    stack, flat = whitened(linear, whitening), linear.frames.shape[2]
+    sizes = np.concatenate([*(b.sizes for b in linear.blocks), [1.0]])
+    full = stack.T @ stack
+    cross = full[:flat, flat:] * sizes
+    length = np.sqrt(np.diag(full)[:flat]) + 1e-300
+    value, vector = np.linalg.eigh(full[:flat, :flat] / np.outer(length, length))
+    known = value > _FRAME_FLOOR
+    inverse = (vector[:, known] / value[known]) @ vector[:, known].T / np.outer(length, length)
+    projector = inverse @ cross
+    rest = full[flat:, flat:] * np.outer(sizes, sizes) - cross.T @ projector
+    rest = 0.5 * (rest + rest.T)
+    bases, slices, start, parameter = [], [], 0, 0
+    for item in linear.blocks:
+        own = slice(parameter, parameter + len(item.sizes))
+        value, vector = np.linalg.eigh(rest[own, own])
+        # what is left of an exact alias of the frames is rounding of what it was before they were projected out
+        before = float((np.diag(full)[flat:][own] * item.sizes**2).max(initial=0.0))
+        seen = value > max(_INFORMATION_FLOOR, _ROUNDING * before)
+        bases.append(vector[:, seen])
+        slices.append(slice(start, start + int(seen.sum())))
+        start, parameter = start + int(seen.sum()), own.stop
+    reduction = block_diag(*bases) if bases else np.zeros((0, 0))
+    return Gram(
+        reduction.T @ rest[:-1, :-1] @ reduction,
+        reduction.T @ rest[:-1, -1],
+        float(rest[-1, -1]),
+        tuple(slices),
+        tuple(bases),
+        (projector[:, :-1] / sizes[:-1]) if flat else np.zeros((0, len(sizes) - 1)),
+        len(stack) - int(known.sum()),
+        whitening.held,
+    )
+
+
+def whitened(linear: Linear, whitening: Whitening) -> Array:
+    """(rows·m, f + P + 1) frames, parameters and gap of the rows with weight, in units of noise."""
+    used = np.flatnonzero(whitening.weights > 0)
+    stack = linear.stack[used]
+    stack *= (np.sqrt(whitening.weights[used])[:, None] / whitening.noise)[:, :, None]
+    return stack.reshape(-1, stack.shape[2])
+
+
+def scores(linear: Linear, whitening: Whitening, problem: Gram, remainder: Array) -> Array:
+    """(rows, D) each row's part in the derivative of the misfit by the reduced columns, frames projected out."""
+    used = np.flatnonzero(whitening.weights > 0)
+    left = remainder[used] * (whitening.weights[used][:, None] / whitening.noise**2)
+    raw = np.einsum("nmk,nm->nk", linear.stack[used][:, :, :-1], left)
+    flat = linear.frames.shape[2]
+    own = raw[:, flat:] - raw[:, :flat] @ problem.projector
+    sizes = [b.sizes[:, None] * basis for b, basis in zip(linear.blocks, problem.bases, strict=True)]
+    return np.asarray(own @ block_diag(*sizes)) if sizes else np.zeros((len(used), 0))
+
+
+def contained(problem: Gram) -> frozenset[frozenset[int]]:
+    """Return the pairs of blocks of which one's columns lie, as far as the data can see, within the other's.
+
+    Such a pair is never named together: the smaller is preferred where it suffices, the larger carries both otherwise.
+    """
+    pairs = set()
+    matrix, slices = problem.matrix, problem.slices
+    total = [float(np.trace(matrix[s, s])) for s in slices]
+    for large, outer in enumerate(slices):
+        size = outer.stop - outer.start
+        smaller = [k for k, inner in enumerate(slices) if 0 < inner.stop - inner.start < size]
+        if not smaller:
+            continue
+        value, vector = np.linalg.eigh(_scaled(matrix[outer, outer]))
+        known = value > 1e-10 * value.max()
+        root = vector[:, known] / np.sqrt(value[known]) / np.sqrt(np.diag(matrix[outer, outer]))[:, None]
+        inside = ((matrix[:, outer] @ root) ** 2).sum(axis=1)
+        for small in smaller:
+            left = total[small] - float(inside[slices[small]].sum())
+            if left < max(_CONTAINED * total[small], 0.5):
+                pairs.add(frozenset((small, large)))
+    return frozenset(pairs)
+
+
+def _scaled(matrix: Array) -> Array:
+    length = np.sqrt(np.diag(matrix))
+    return np.asarray(matrix / np.outer(length, length))
+
+
+def parameter_values(linear: Linear, problem: Gram, found: Combination) -> dict[int, tuple[Array, Array]]:
+    """Return for each block of a combination the (P,) posterior mean and (P, P) covariance of its parameters, SI.
+
+    Directions that the data do not see keep their prior variance.
+    """
+    result, start = {}, 0
+    for index in found.blocks:
+        basis, sizes = problem.bases[index], linear.blocks[index].sizes
+        stop = start + basis.shape[1]
+        mean = sizes * (basis @ found.values[start:stop])
+        hidden = (np.eye(len(sizes)) - basis @ basis.T) * found.scales[index] ** 2
+        covariance = basis @ found.covariance[start:stop, start:stop] @ basis.T + hidden
+        result[index] = (mean, sizes[:, None] * covariance * sizes)
+        start = stop
+    return result
+
+
+def frame_step(linear: Linear, whitening: Whitening, remainder: Array) -> Array:
+    """(f,) step of the unknown frames that fits what is left, least squares over the rows with weight."""
+    if not linear.frames.shape[2]:
+        return np.zeros(0)
+    used = np.flatnonzero(whitening.weights > 0)
+    weight = whitening.weights[used][:, None] / whitening.noise**2
+    flat = linear.frames[used]
+    matrix = np.einsum("nmf,nm,nmg->fg", flat, weight, flat, optimize=True)
+    vector = np.einsum("nmf,nm->f", flat, weight * remainder[used])
+    length = np.sqrt(np.diag(matrix)) + 1e-300
+    value, basis = np.linalg.eigh(matrix / np.outer(length, length))
+    known = value > _FRAME_FLOOR
+    step = basis[:, known] @ ((basis[:, known].T @ (vector / length)) / value[known])
+    return np.asarray(step / length)
