@@ -21,14 +21,13 @@ from thermal_robot.diagnosis.random_gap import STEPS
 from thermal_robot.diagnosis.result import Diagnosis, told
 from thermal_robot.diagnosis.schemes import worst_folds
 from thermal_robot.diagnosis.sensitivity import sensitivity
-from thermal_robot.diagnosis.stand_in import DOUBT, stand_ins, trust
+from thermal_robot.diagnosis.stand_in import stand_ins, trust
 from thermal_robot.diagnosis.where import locate
 from thermal_robot.effects import Effect, choose, library
 from thermal_robot.errors import CampaignError
+from thermal_robot.inference import settings
 from thermal_robot.inference.fit import Fit, fit
 from thermal_robot.inference.rows import in_a_row
-
-_SEEN = 1e-3
 
 
 def diagnose(
@@ -124,14 +123,14 @@ def _scatter(looked: Discoveries) -> tuple[Finding, ...]:
     Where an unlisted cause is at work what differs from pose to pose may be its doing: steps of an encoder are then
     only believed where they are seen.
     """
-    seen = any(p < _SEEN for p in looked.chance.steps.values())
+    seen = any(p < settings.LEVEL for p in looked.chance.steps.values())
     if seen or not looked.remaining.flagged:
         return looked.chance.findings
     return tuple(
         replace(
             f,
             status="not_found",
-            probability=DOUBT * (f.probability or 0.0),
+            probability=settings.BESIDE_UNLISTED * (f.probability or 0.0),
             locations=(),
             parameters=(),
             confounded_with=(),
@@ -150,7 +149,7 @@ def _left(looked: Discoveries, gap: Gap) -> float:
     aside = fitted.explanation.outliers
     changed = in_a_row(fitted.campaign, aside)
     before, after = ((o.gap[:, :3] ** 2).sum(axis=1) for o in (fitted.nominal, fitted.corrected))
-    beside = float(after[changed].sum() / max(before[changed | ~aside].sum(), 1e-300))
+    beside = float(after[changed].sum() / max(before[changed | ~aside].sum(), settings.TINY))
     return min((looked.remaining.rms / gap.rms_before) ** 2 + beside, 1.0)
 
 
