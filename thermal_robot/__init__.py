@@ -12,7 +12,7 @@ from thermal_robot.observations import Observations, observe
 from thermal_robot.robot import Robot, load_robot
 
 told_by(report)
-__version__ = "0.1.0"
+__version__ = "0.2.0"
 
 __all__ = [
     "Campaign",
