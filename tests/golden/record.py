@@ -51,7 +51,7 @@ def said(name: str) -> dict[str, object]:
     plain["effects"] = {e["name"]: e for e in plain["effects"]}
     for effect in plain["effects"].values():
         effect["parameters"] = {p["name"]: [p["value"], p["std"]] for p in effect["parameters"] if p["identified"]}
-        effect["locations"] = [[place["name"], place["share"]] for place in effect["locations"]]
+        effect["locations"] = {place["name"]: place["share"] for place in effect["locations"]}
     return _pruned({**plain, "covariates": plain["where"]["covariates"]})
 
 

@@ -11,6 +11,7 @@ from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis.stand_in import StandIn
 from thermal_robot.effects import Effect
 from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import orthonormal, without
 from thermal_robot.inference.fit import Fit
 
 
@@ -92,10 +93,10 @@ def _cancelling(fitted: Fit) -> Iterator[tuple[str, float]]:
     """
     e = fitted.explanation
     frames = e.linear.frames.reshape(e.linear.gap.size, e.linear.frames.shape[2])
-    basis = np.linalg.qr(frames / (np.linalg.norm(frames, axis=0) + settings.TINY))[0]
+    basis = orthonormal(frames)
     for b, (effect, values) in zip(e.best.blocks, fitted.effects, strict=True):
         moved = e.linear.blocks[b].columns.reshape(len(frames), -1) * values
-        moved = moved - basis @ (basis.T @ moved)
+        moved = without(moved, basis)
         whole = float(np.linalg.norm(moved.sum(axis=1)))
         times = float(np.linalg.norm(moved, axis=0).max(initial=0.0)) / max(whole, settings.TINY)
         if times > settings.CANCELLING:

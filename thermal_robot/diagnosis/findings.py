@@ -14,6 +14,7 @@ from thermal_robot.diagnosis.parts import Estimate, Finding, Location, Status, i
 from thermal_robot.effects import RANDOM
 from thermal_robot.effects.law import Discovered
 from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import orthonormal, whitener, without
 from thermal_robot.inference.explain import Explanation
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.problem import contained
@@ -110,8 +111,7 @@ def _within_frames(fit: Fit, block: int) -> bool:
         return False
     columns = item.columns.reshape(-1, len(item.parameters)) * item.sizes
     flat = linear.frames.reshape(-1, linear.frames.shape[2])
-    basis = np.linalg.qr(flat / (np.linalg.norm(flat, axis=0) + settings.TINY))[0]
-    left = columns - basis @ (basis.T @ columns)
+    left = without(columns, orthonormal(flat))
     return bool(np.linalg.norm(left) < settings.ALIAS * np.linalg.norm(columns))
 
 
@@ -151,7 +151,7 @@ def _imitates(fit: Fit, block: int, other: int) -> bool:
     """
     e = fit.explanation
     matrix, slices = e.problem.matrix, e.problem.slices
-    own, theirs = (_root(matrix[s, s]) for s in (slices[block], slices[other]))
+    own, theirs = (whitener(matrix[s, s]) for s in (slices[block], slices[other]))
     if not own.size or not theirs.size:
         return False
     left, cosine, _ = np.linalg.svd(own.T @ matrix[slices[block], slices[other]] @ theirs, full_matrices=False)
@@ -162,13 +162,6 @@ def _imitates(fit: Fit, block: int, other: int) -> bool:
     rest = float(moved @ moved - ((shared.T @ moved) ** 2).sum())
     noise = float(chdtri(len(moved), settings.EXACT_LEVEL)) * e.best.noise**2
     return bool(shared.shape[1]) and rest < noise < float(moved @ moved)
-
-
-def _root(gram: Array) -> Array:
-    """(D, r) matrix that makes the columns with this Gram matrix orthonormal."""
-    value, vector = np.linalg.eigh(gram)
-    seen = value > settings.DESIGN_FLOOR * value.max(initial=0.0)
-    return np.asarray(vector[:, seen] / np.sqrt(value[seen]))
 
 
 def _estimates(fit: Fit, block: int) -> tuple[Estimate, ...]:

@@ -13,6 +13,7 @@ from thermal_robot.diagnosis.laws import smooth_law
 from thermal_robot.diagnosis.parts import Dependence, Location, Unexplained
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import orthonormal, whitener, without
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.rows import in_a_row, in_order
 from thermal_robot.inference.scan import harmonics
@@ -55,7 +56,7 @@ class Remainder:
         m = self.white.shape[1]
         basis, _ = np.linalg.qr(self.basis.reshape(len(self.rows), m, -1)[drawn].reshape(count * m, -1))
         white = self.white[drawn].ravel()
-        white = white - basis @ (basis.T @ white)
+        white = without(white, basis)
         return Remainder(self.rows[drawn], white.reshape(count, m), basis, max(len(white) - basis.shape[1], 1))
 
 
@@ -68,14 +69,10 @@ def remainder(fit: Fit) -> Remainder:
         columns.append(e.linear.blocks[b].columns[rows] * e.linear.blocks[b].sizes)
     design = np.concatenate(columns, axis=2) / e.whitening.noise[:, None]
     flat = design.reshape(design.shape[0] * design.shape[1], design.shape[2])
-    flat = flat / (np.linalg.norm(flat, axis=0) + settings.TINY)
-    value, vector = np.linalg.eigh(flat.T @ flat)
-    # what the data see only below the noise was held by its prior: leave it out as the fit did
-    seen = value > settings.DESIGN_FLOOR * value.max(initial=1.0)
-    basis, _ = np.linalg.qr(flat @ vector[:, seen])
+    basis = orthonormal(flat)
     # of the exact model, not the linear one: where effects are large and noise is small they differ
     gap = (fit.corrected.gap[rows] / e.whitening.noise).ravel()
-    left = gap - basis @ (basis.T @ gap)
+    left = without(gap, basis)
     freedom = max(len(left) - basis.shape[1], 1)
     return Remainder(rows, left.reshape(len(rows), -1), basis, freedom)
 
@@ -311,14 +308,13 @@ def _turns(observations: Observations, joint: str) -> Array:
 
 def _f_test(columns: Array, left: Remainder, target: Array) -> tuple[float, float, float]:
     """Return p-value, adjusted share of the remainder explained, and gain in log evidence (BIC) of extra columns."""
-    columns = columns - left.basis @ (left.basis.T @ columns)
-    value, vector = np.linalg.eigh(columns.T @ columns)
-    seen = value > settings.DESIGN_FLOOR * max(value.max(initial=0.0), settings.TINY)
-    k = int(seen.sum())
+    columns = without(columns, left.basis)
+    own = whitener(columns.T @ columns)
+    k = own.shape[1]
     freedom = left.freedom - k
     if not k or freedom < settings.FEWEST_LEFT:
         return 1.0, 0.0, -np.inf
-    projected = (vector[:, seen].T @ (columns.T @ target)) / np.sqrt(value[seen])
+    projected = own.T @ (columns.T @ target)
     total, gained = float(target @ target), float(projected @ projected)
     rest = max(total - gained, settings.TINY)
     p = float(fdtrc(k, freedom, (gained / k) / (rest / freedom)))

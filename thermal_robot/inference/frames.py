@@ -8,6 +8,7 @@ from numpy.typing import NDArray
 from thermal_robot.campaign import Campaign
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import solve
 from thermal_robot.inference.columns import frame_columns
 from thermal_robot.kinematics import exp6, quaternion_to_rotation, tool_poses
 from thermal_robot.observations import Frames, observe
@@ -134,8 +135,7 @@ def _refine(campaign: Campaign, frames: Frames, robust: bool) -> Frames:
             weight = np.sqrt(_soft(distance)) if robust else np.ones(len(distance))
             root_weight[:, part] = weight[:, None] / (np.median(distance) + 1e-15)
         design = (columns * root_weight[:, :, None]).reshape(-1, len(names))
-        length = np.linalg.norm(design, axis=0) + 1e-300
-        step = np.linalg.lstsq(design / length, (gap * root_weight).ravel(), rcond=1e-9)[0] / length
+        step = solve(design.T @ design, design.T @ (gap * root_weight).ravel())
         frames = moved(frames, step, names)
         if np.abs(step).max() < settings.REFINE_SETTLED:
             break

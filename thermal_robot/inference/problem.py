@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
 from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import solve, whitener
 from thermal_robot.inference.columns import Block
 from thermal_robot.inference.evidence import Combination, Gram
 
@@ -75,11 +76,8 @@ def gram(linear: Linear, whitening: Whitening) -> Gram:
     sizes = np.concatenate([*(b.sizes for b in linear.blocks), [1.0]])
     full = stack.T @ stack
     cross = full[:flat, flat:] * sizes
-    length = np.sqrt(np.diag(full)[:flat]) + settings.TINY
-    value, vector = np.linalg.eigh(full[:flat, :flat] / np.outer(length, length))
-    known = value > settings.FRAME_FLOOR
-    inverse = (vector[:, known] / value[known]) @ vector[:, known].T / np.outer(length, length)
-    projector = inverse @ cross
+    known = whitener(full[:flat, :flat])
+    projector = known @ (known.T @ cross)
     rest = full[flat:, flat:] * np.outer(sizes, sizes) - cross.T @ projector
     rest = 0.5 * (rest + rest.T)
     bases, slices, start, parameter = [], [], 0, 0
@@ -100,7 +98,7 @@ def gram(linear: Linear, whitening: Whitening) -> Gram:
         tuple(slices),
         tuple(bases),
         (projector[:, :-1] / sizes[:-1]) if flat else np.zeros((0, len(sizes) - 1)),
-        len(stack) - int(known.sum()),
+        len(stack) - known.shape[1],
         whitening.held,
     )
 
@@ -137,20 +135,12 @@ def contained(problem: Gram) -> frozenset[frozenset[int]]:
         smaller = [k for k, inner in enumerate(slices) if 0 < inner.stop - inner.start < size]
         if not smaller:
             continue
-        value, vector = np.linalg.eigh(_scaled(matrix[outer, outer]))
-        known = value > 1e-10 * value.max()
-        root = vector[:, known] / np.sqrt(value[known]) / np.sqrt(np.diag(matrix[outer, outer]))[:, None]
-        inside = ((matrix[:, outer] @ root) ** 2).sum(axis=1)
+        inside = ((matrix[:, outer] @ whitener(matrix[outer, outer])) ** 2).sum(axis=1)
         for small in smaller:
             left = total[small] - float(inside[slices[small]].sum())
             if left < max(settings.CONTAINED * total[small], settings.CONTAINED_LEFT):
                 pairs.add(frozenset((small, large)))
     return frozenset(pairs)
-
-
-def _scaled(matrix: Array) -> Array:
-    length = np.sqrt(np.diag(matrix))
-    return np.asarray(matrix / np.outer(length, length))
 
 
 def parameter_values(linear: Linear, problem: Gram, found: Combination) -> dict[int, tuple[Array, Array]]:
@@ -179,8 +169,4 @@ def frame_step(linear: Linear, whitening: Whitening, remainder: Array) -> Array:
     flat = linear.frames[used]
     matrix = np.einsum("nmf,nm,nmg->fg", flat, weight, flat, optimize=True)
     vector = np.einsum("nmf,nm->f", flat, weight * remainder[used])
-    length = np.sqrt(np.diag(matrix)) + settings.TINY
-    value, basis = np.linalg.eigh(matrix / np.outer(length, length))
-    known = value > settings.FRAME_FLOOR
-    step = basis[:, known] @ ((basis[:, known].T @ (vector / length)) / value[known])
-    return np.asarray(step / length)
+    return solve(matrix, vector)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from thermal_robot.effects.law import Discovered
 from thermal_robot.effects.quantities import GRAVITY, quantities, unit
 from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import orthonormal, whitener, without
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.explain import robust_noise
 from thermal_robot.observations import Observations
@@ -122,39 +123,31 @@ class Target:
         for _ in range(settings.CAUCHY_ROUNDS):
             root = np.sqrt(weight)[:, None] / noise
             flat = (design * root[:, :, None]).reshape(root.size, design.shape[2])
-            basis = _basis(flat)
+            basis = orthonormal(flat)
             white = (gap * root).ravel()
-            white = white - basis @ (basis.T @ white)
+            white = without(white, basis)
             left = white.reshape(gap.shape) / root
             noise = np.repeat(robust_noise(left), 3)
             weight = 1.0 / (1.0 + ((left / noise) ** 2).sum(axis=1) / (3.0 * measures))
         if trusted is not None and trusted.any():
             root = np.where(trusted[:, None], 1.0 / noise, root)
-            basis = _basis((design * root[:, :, None]).reshape(root.size, design.shape[2]))
+            basis = orthonormal((design * root[:, :, None]).reshape(root.size, design.shape[2]))
             white = (gap * root).ravel()
-            white = white - basis @ (basis.T @ white)
+            white = without(white, basis)
         return cls(white, root, basis)
 
     def gain(self, columns: Array) -> float:
         """Return the gain in log evidence of (N, m, K) further columns: ½ ν ln(S₀/S₁) − ½ k ln ν."""
         flat = (columns * self.root[:, :, None]).reshape(len(self.white), -1)
-        flat = flat - self.basis @ (self.basis.T @ flat)
-        flat = flat / (np.linalg.norm(flat, axis=0) + settings.TINY)
-        value, vector = np.linalg.eigh(flat.T @ flat)
-        seen = value > settings.LAW_FLOOR * max(value.max(initial=0.0), settings.TINY)
-        k, freedom = int(seen.sum()), len(self.white) - self.basis.shape[1]
+        flat = without(flat, self.basis)
+        own = whitener(flat.T @ flat, settings.LAW_FLOOR)
+        k, freedom = own.shape[1], len(self.white) - self.basis.shape[1]
         if not k or freedom - k < settings.FEWEST_LEFT:
             return -np.inf
-        projected = (vector[:, seen].T @ (flat.T @ self.white)) / np.sqrt(value[seen])
+        projected = own.T @ (flat.T @ self.white)
         total, explained = float(self.white @ self.white), float(projected @ projected)
         rest = max(total - explained, settings.TINY)
         return float(0.5 * freedom * np.log(total / rest) - 0.5 * k * np.log(freedom))
-
-
-def _basis(flat: Array) -> Array:
-    flat = flat / (np.linalg.norm(flat, axis=0) + settings.TINY)
-    value, vector = np.linalg.eigh(flat.T @ flat) if flat.shape[1] else (np.zeros(0), np.zeros((0, 0)))
-    return np.linalg.qr(flat @ vector[:, value > settings.DESIGN_FLOOR * value.max(initial=1.0)])[0]
 
 
 def scan(observations: Observations, targets: Sequence[Target]) -> tuple[list[list[Scanned]], int]:

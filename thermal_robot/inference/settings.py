@@ -117,8 +117,8 @@ DRAW_SEED, TEST_SEED, BOOTSTRAP_SEED = 61, 17, 20180901
 
 # --- the linear problem ---
 
-FRAME_FLOOR = 1e-11
-"""Of the scaled Gram matrix's eigenvalues: frames below it are not determined."""
+SEEN = 1e-10
+"""Of the largest eigenvalue of a scaled Gram matrix: a direction below it is rounding, an exact alias of others."""
 PROJECTED_FLOOR = 1e-12
 """Of a column's square before the frames were projected out: what is left below it is rounding."""
 INFORMATION_FLOOR = 1e-5
@@ -163,9 +163,8 @@ RIVALLED_EFFECTS = 4
 FEWEST_LEFT = 5
 """Equations that must be left beside a law for a test of it."""
 LAW_FLOOR = 1e-6
-"""Of the scaled Gram matrix's eigenvalues: directions of a law below it say nothing new."""
-DESIGN_FLOOR = 1e-9
-"""The same of what is projected out before."""
+"""Of the scaled Gram matrix's eigenvalues: a direction of a law below it is nearly one of those before and says nothing
+new, but would be counted as a parameter."""
 LIKELY_PLACE = 0.01
 """Probability of a place below which it is not listed."""
 WORSE_ELSEWHERE = 1.05

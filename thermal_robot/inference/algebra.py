@@ -1,0 +1,43 @@
+"""Directions that the data see: here, and only here, columns are scaled, weak directions dropped, the rest solved for.
+
+Every function scales to unit columns first, so that one floor serves metres, radians and coefficients alike.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.inference import settings
+
+Array = NDArray[np.float64]
+
+
+def whitener(gram: Array, floor: float = settings.SEEN) -> Array:
+    """Return R (D, r) with Rᵀ G R = 1: columns with the Gram matrix G (D, D), times R, are orthonormal.
+
+    Directions whose eigenvalue, of the matrix scaled to a unit diagonal, lies below ``floor`` times the largest are
+    left out: what remains of them is rounding.
+    """
+    length = np.sqrt(np.maximum(np.diag(gram), 0.0))
+    length[length == 0.0] = 1.0
+    value, vector = np.linalg.eigh(gram / np.outer(length, length))
+    seen = value > floor * value.max(initial=1.0)
+    return np.asarray(vector[:, seen] / np.sqrt(value[seen]) / length[:, None])
+
+
+def solve(matrix: Array, vector: Array) -> Array:
+    """Return the (D,) least-squares solution of normal equations; what nothing determines is zero."""
+    root = whitener(matrix)
+    return np.asarray(root @ (root.T @ vector))
+
+
+def orthonormal(columns: Array) -> Array:
+    """Return (E, r) an orthonormal basis of what (E, D) columns span."""
+    scaled = columns / (np.linalg.norm(columns, axis=0) + settings.TINY)
+    return np.linalg.qr(scaled @ whitener(scaled.T @ scaled))[0]
+
+
+def without(columns: Array, basis: Array) -> Array:
+    """Return (E, ...) columns with an orthonormal basis (E, r) projected out."""
+    return np.asarray(columns - basis @ (basis.T @ columns))
