@@ -91,6 +91,8 @@ class Robot:
         Constant arrays for the functions of :mod:`thermal_robot.kinematics`.
     model
         ``pinocchio.Model`` reduced to the movable joints.
+    urdf_links, urdf_joints
+        Names of all links and of all joints of the URDF, in the chain or not, fixed joints too.
     """
 
     name: str
@@ -106,6 +108,8 @@ class Robot:
     segments: tuple[Segment, ...]
     chain: Chain
     model: Any
+    urdf_links: tuple[str, ...]
+    urdf_joints: tuple[str, ...]
 
     @property
     def n(self) -> int:
@@ -186,6 +190,8 @@ def _build(
         segments=tuple(_segment(chain, int(k)) for k in chain.placed),
         chain=chain,
         model=built.model,
+        urdf_links=built.urdf_links,
+        urdf_joints=built.urdf_joints,
     )
 
 
