@@ -9,6 +9,7 @@ import pytest
 from campaign.files import ROWS, add, put
 
 from thermal_robot.campaign import read_campaign
+from thermal_robot.campaign.fill import fill
 
 
 @pytest.mark.parametrize(
@@ -39,3 +40,28 @@ def test_filled_once_and_said(tmp_path: Path, name: str, cells: str, filled: lis
 
 def _how(words: str) -> str:
     return f"the {words}" if words.startswith("previous") else words
+
+
+@pytest.mark.parametrize("column", ["approach.lift", "velocity.lift", "payload", "speed", "time", "humidity"])
+def test_what_is_there_stays_and_nothing_is_made_up(column: str) -> None:
+    rng = np.random.default_rng(3)
+    values = rng.uniform(1, 2, 40)
+    values[rng.permutation(40)[:15]] = np.nan
+    there = ~np.isnan(values)
+    filled, _ = fill(column, values)
+    np.testing.assert_array_equal(filled[there], values[there])
+    assert np.isfinite(filled).all()
+    inside = filled[~there]
+    assert np.all((inside == 0) | ((inside >= values[there].min()) & (inside <= values[there].max())))
+    again, _ = fill(column, filled)
+    np.testing.assert_array_equal(again, filled)
+
+
+def test_a_payload_is_held_until_it_is_changed_and_a_line_is_a_line() -> None:
+    values = np.array([np.nan, 1.0, np.nan, np.nan, 4.0, np.nan])
+    held, _ = fill("payload", values)
+    assert held.tolist() == [1, 1, 1, 1, 4, 4]
+    line, _ = fill("temperature", values)
+    assert line.tolist() == [1, 1, 2, 3, 4, 4]
+    still, _ = fill("velocity.lift", values)
+    assert still.tolist() == [0, 1, 0, 0, 4, 0]

@@ -7,10 +7,12 @@ from pathlib import Path
 import pandas as pd
 import pytest
 from campaign.files import ROWS as WHOLE
-from campaign.files import URDF, add, put
+from campaign.files import URDF, add, full, put
 from campaign.spoilt import read, refusal, renamed, require, with_column
 
 from thermal_robot.campaign import campaign_from_table, read_campaign
+from thermal_robot.campaign.recognise import recognise
+from thermal_robot.campaign.tabular import read_table
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import load_robot
 
@@ -103,3 +105,43 @@ def test_an_empty_column_counts_as_absent(tmp_path: Path) -> None:
     campaign = read_campaign(put(tmp_path / "c", add(WHOLE, temperature="_ _ nan", payload="1 1 1")))
     assert set(campaign.covariates) == {"payload"}
     assert campaign.warnings == ("column 'temperature' is empty and counts as absent",)
+
+
+# Both load with Pinocchio; neither passes a strict XML parser.
+LENIENT = ['<xacro:leftover name="x"/>', "<!-- lengths -- from the data sheet -->"]
+
+
+@pytest.mark.parametrize("text", LENIENT)
+def test_a_urdf_that_is_not_strict_xml_is_recognised(tmp_path: Path, text: str) -> None:
+    read(tmp_path, table=with_column("temperature.finger,grip", "20,0", "20,0", "21,0"))
+    (tmp_path / "robot.urdf").write_text(URDF.replace("</robot>", f"{text}\n</robot>"))
+    campaign = read_campaign(tmp_path)
+    assert "temperature.finger" in campaign.covariates
+    assert any("'temperature.finger': no length of the chain" in warning for warning in campaign.warnings)
+    assert any("'grip' is a joint outside the chain" in warning for warning in campaign.warnings)
+
+
+def test_every_column_has_one_part(tmp_path: Path) -> None:
+    full(tmp_path / "c")
+    table = read_table(tmp_path / "c" / "measurements.csv")
+    robot = load_robot(URDF, "tool")
+    columns = recognise(table, robot, measured=True)
+    assert columns.has_orientation
+    assert columns.has_simulated_position
+    assert columns.has_simulated_orientation
+    posed = {*"xyz", "qw", "qx", "qy", "qz", *(f"sim.{axis}" for axis in (*"xyz", "qw", "qx", "qy", "qz"))}
+    parts = [*robot.joint_names, *posed, *columns.covariates, *columns.extra, *columns.labels]
+    assert sorted(parts) == sorted(table.columns)
+
+
+def test_samples_ask_for_no_measured_column(tmp_path: Path) -> None:
+    full(tmp_path / "c")
+    table = read_table(tmp_path / "c" / "measurements.csv")
+    assert not recognise(table, load_robot(URDF, "tool"), measured=False).has_orientation
+
+
+def test_a_column_of_ones_own_is_no_typing_error(tmp_path: Path) -> None:
+    table = with_column("pressure,humidity,coolant,shift", "1,1,1,1", "2,2,2,2", "3,3,3,3")
+    campaign = read(tmp_path, table=table)
+    assert campaign.extra == ("note", "pressure", "humidity", "coolant", "shift")
+    assert campaign.warnings == ()

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pytest
 from campaign.files import ROWS as WHOLE
 from campaign.files import add, put
 from campaign.spoilt import ROWS, refusal, require, with_column
 
 from thermal_robot.campaign import read_campaign
+from thermal_robot.campaign.table import Table
+from thermal_robot.errors import CampaignError
 
 # table, row, column, found, words of the sentence
 REFUSED = [
@@ -67,3 +70,46 @@ def test_decimal_point_among_decimal_commas(tmp_path: Path) -> None:
 def test_empty_labels(tmp_path: Path) -> None:
     campaign = read_campaign(put(tmp_path / "c", add(WHOLE, session="a _ b")))
     assert campaign.labels["session"].tolist() == ["a", "", "b"]
+
+
+def test_numbers_and_text_of_one_column() -> None:
+    table = Table("t.csv", {"a": ["1", "", " 2e3".strip(), "−4"]}, np.arange(2, 6))
+    np.testing.assert_array_equal(table.numbers("a", gaps=True), [1.0, np.nan, 2000.0, -4.0])
+    assert table.text("a") == ["1", "", "2e3", "−4"]
+    with pytest.raises(CampaignError, match="a value is missing") as caught:
+        table.numbers("a")
+    assert (caught.value.row, caught.value.found) == (3, "an empty cell")
+
+
+@pytest.mark.parametrize("word", ["", "nan", "NaN", "NA", "n/a", "null", "None", "<NA>"])
+def test_these_words_are_empty_cells(word: str) -> None:
+    table = Table("t.csv", {"a": [word, word], "b": [word, "1"]}, np.arange(2, 4))
+    assert table.is_empty("a")
+    assert not table.is_empty("b")
+    assert np.isnan(table.numbers("b", gaps=True)).tolist() == [True, False]
+    assert table.text("b") == ["", "1"]
+    assert table.first_text("b") is None
+
+
+def test_the_first_text_of_a_column_is_found() -> None:
+    table = Table("t.csv", {"a": ["1", "", "low", "high"]}, np.arange(2, 6))
+    assert table.first_text("a") == 2
+
+
+def test_columns_that_have_a_type_are_taken_as_they_are() -> None:
+    values = np.array([1.5, np.nan, 3.0])
+    table = Table("<table>", {"a": values}, np.arange(3))
+    np.testing.assert_array_equal(table.numbers("a", gaps=True), values)
+    assert table.text("a") == ["1.5", "", "3"]
+    assert table.first_text("a") is None
+    assert not table.is_empty("a")
+
+
+def test_a_number_survives_its_text() -> None:
+    numbers = np.random.default_rng(2).normal(size=200) * 10.0 ** np.arange(-100, 100)
+    table = Table("t.csv", {"a": [repr(float(number)) for number in numbers]}, np.arange(200))
+    np.testing.assert_array_equal(table.numbers("a"), numbers)
+    comma = Table(
+        "t.csv", {"a": [repr(float(n)).replace(".", ",") for n in numbers]}, np.arange(200), decimal_comma=True
+    )
+    np.testing.assert_array_equal(comma.numbers("a"), numbers)

@@ -12,6 +12,8 @@ from campaign.files import add, put
 from campaign.spoilt import ROWS, TOML, refusal, renamed, require
 
 from thermal_robot.campaign import read_campaign
+from thermal_robot.campaign.tabular import table_from_frame
+from thermal_robot.errors import CampaignError
 
 SEMICOLONS = WHOLE.replace(",", ";").replace("1000", "1000,25")
 
@@ -144,3 +146,36 @@ def test_broken_parquet(tmp_path: Path) -> None:
     (tmp_path / "t.parquet").write_bytes(b"PAR1")
     error = refusal(tmp_path, toml=TOML.replace("measurements.csv", "t.parquet"))
     assert "cannot be read as a Parquet file" in str(error)
+
+
+def test_a_frame_keeps_its_own_rows_or_counts_them_as_a_file() -> None:
+    frame = pd.DataFrame({" a ": [1, 2], "b": ["x", None]}, index=[7, 3])
+    table = table_from_frame(frame)
+    assert list(table.columns) == ["a", "b"]
+    assert (table.rows.tolist(), table.header) == ([7, 3], None)
+    assert table.text("b") == ["x", ""]
+    as_file = table_from_frame(frame, "t.parquet", first_row=2)
+    assert (as_file.rows.tolist(), as_file.header) == ([2, 3], 1)
+    frame.index = [4, 4]  # two rows of one number cannot be told apart
+    assert table_from_frame(frame).rows.tolist() == [0, 1]
+
+
+@pytest.mark.parametrize(
+    ("frame", "words"),
+    [
+        (pd.DataFrame({"a": []}), "has a header but no rows"),
+        (pd.DataFrame([[1, 2]], columns=["a", "a "]), "duplicate column"),
+        (pd.DataFrame([[1, 2]], columns=["a", " "]), "a column has no name"),
+    ],
+)
+def test_a_frame_that_is_no_table(frame: pd.DataFrame, words: str) -> None:
+    with pytest.raises(CampaignError, match=words) as caught:
+        table_from_frame(frame)
+    assert caught.value.file == "<table>"
+
+
+def test_nullable_numbers_of_pandas_are_numbers() -> None:
+    frame = pd.DataFrame({"a": pd.array([1, None], dtype="Int64"), "b": [True, False]})
+    table = table_from_frame(frame)
+    np.testing.assert_array_equal(table.numbers("a", gaps=True), [1.0, np.nan])
+    assert table.numbers("b").tolist() == [1.0, 0.0]
