@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from campaign.files import URDF, full
 
-from thermal_robot.campaign import Campaign
+from thermal_robot.campaign import Campaign, Settings, Units
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot, load_robot
 
@@ -80,3 +80,32 @@ def test_pickles(tmp_path: Path) -> None:
 
 def test_repr_is_one_line(tmp_path: Path) -> None:
     assert repr(full(tmp_path / "c")) == "<Campaign 'c': 3 samples of pose, 4 joints, 15 covariates>"
+
+
+def test_rows_taken_twice_are_the_rows_taken_at_once(tmp_path: Path) -> None:
+    campaign = full(tmp_path / "c")
+    twice, once = campaign.take([2, 0, 1]).take([0, 1]), campaign.take([2, 0])
+    np.testing.assert_array_equal(twice.q, once.q)
+    assert twice.rows.tolist() == once.rows.tolist() == [4, 2]
+    assert twice.labels["pose"].tolist() == ["3", "1"]
+
+
+def test_settings_hold_all_that_is_not_in_the_table(tmp_path: Path) -> None:
+    settings = full(tmp_path / "c").settings
+    assert settings == Settings(
+        urdf="robot.urdf",
+        tool_frame="tool",
+        root_frame="base",
+        gravity=(0.0, 0.0, -9.81),
+        reference_temperature=22.5,
+        units=Units("deg", "mm"),
+        base_known=False,
+        tool_known=True,
+        target=(0.001, 0.002, 0.08),
+        noise_position=settings.noise_position,
+        noise_orientation=3e-5,
+        payload_com=(0.0, 0.0, 0.05),
+        priors={"joint_offset": 1e-3},
+        gears={"lift": 101.0},
+    )
+    assert settings.noise_position == pytest.approx(2e-5)

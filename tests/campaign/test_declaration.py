@@ -8,7 +8,8 @@ import pytest
 from campaign.files import put
 from campaign.spoilt import TOML, refusal, require
 
-from thermal_robot.campaign import read_campaign
+from thermal_robot.campaign import Settings, Units, read_campaign
+from thermal_robot.campaign.declaration import Declaration, check_gears, read_declaration
 from thermal_robot.errors import CampaignError
 
 # what is replaced, by what, row, column, found, words of the sentence
@@ -85,3 +86,52 @@ def test_noise_of_zero_is_not_given(tmp_path: Path) -> None:
     campaign = read_campaign(folder)
     assert campaign.noise_position is None
     assert campaign.noise_orientation is None
+
+
+BARE = """[robot]
+urdf = "{urdf}"
+tool_frame = "tool"
+[measurements]
+file = "t.csv"
+angle_unit = "deg"
+length_unit = "{unit}"
+"""
+
+
+def declared(folder: Path, text: str) -> Declaration:
+    (folder / "campaign.toml").write_text(text)
+    return read_declaration(folder)
+
+
+def test_defaults_of_a_bare_declaration(tmp_path: Path) -> None:
+    settings = declared(tmp_path, BARE.format(urdf="r.urdf", unit="mm")).settings
+    assert settings == Settings("r.urdf", "tool", units=Units("deg", "mm"))
+    assert not settings.base_known
+    assert not settings.tool_known
+    assert settings.reference_temperature == 20.0
+
+
+@pytest.mark.parametrize("reference", ["builtin:rv_m2", "example-robot-data:ur10"])
+def test_a_known_robot_is_no_path_and_a_path_is_beside_the_file(tmp_path: Path, reference: str) -> None:
+    assert declared(tmp_path, BARE.format(urdf=reference, unit="mm")).robot == reference
+    found = declared(tmp_path, BARE.format(urdf="../arm.urdf", unit="mm"))
+    assert found.robot == tmp_path / ".." / "arm.urdf"
+    assert found.table == tmp_path / "t.csv"
+
+
+@pytest.mark.parametrize(("unit", "metres"), [("m", 1.0), ("mm", 1e-3), ("um", 1e-6)])
+def test_every_length_is_in_the_declared_unit(tmp_path: Path, unit: str, metres: float) -> None:
+    more = "[frames]\ntarget = [1, 2, 3]\n[noise]\nposition = 4\norientation = 5\n[payload]\ncom = [6, 7, 8]\n"
+    settings = declared(tmp_path, BARE.format(urdf="r.urdf", unit=unit) + more).settings
+    assert settings.target == pytest.approx([metres, 2 * metres, 3 * metres], rel=1e-15)
+    assert settings.payload_com == pytest.approx([6 * metres, 7 * metres, 8 * metres], rel=1e-15)
+    assert settings.noise_position == pytest.approx(4 * metres)
+    assert settings.noise_orientation == 5.0
+
+
+def test_gears_are_of_joints_of_the_chain(tmp_path: Path) -> None:
+    found = declared(tmp_path, BARE.format(urdf="r.urdf", unit="mm") + "[gears]\nlift = 101\nshoulder = 50\n")
+    check_gears(found, ("lift", "shoulder"))
+    with pytest.raises(CampaignError, match="no such joint") as caught:
+        check_gears(found, ("lift", "elbow"))
+    assert (caught.value.row, caught.value.column) == (10, "gears.shoulder")

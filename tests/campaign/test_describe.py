@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import dataclasses
 import re
 from pathlib import Path
 
 from campaign.files import ROWS, add, full, put
 
-from thermal_robot.campaign import describe, read_campaign, read_samples
+from thermal_robot.campaign import Units, describe, read_campaign, read_samples
 
 
 def test_says_what_a_metrologist_asks(tmp_path: Path) -> None:
@@ -64,3 +65,34 @@ def test_columns_are_aligned(tmp_path: Path) -> None:
 
 def _squeezed(text: str) -> str:
     return re.sub(" +", " ", text)
+
+
+def test_every_condition_has_its_unit(tmp_path: Path) -> None:
+    block = describe(full(tmp_path / "c")).split("Conditions recorded\n")[1].split("\n\n")[0]
+    units = {tuple(line.split()[:2]): line for line in block.splitlines()}
+    for words, unit in (
+        (("velocity", "lift"), "deg/s"),
+        (("velocity", "slide"), "mm/s"),
+        (("acceleration", "roll"), "deg/s²"),
+        (("encoder", "slide"), "mm"),
+        (("torque", "lift"), "N·m"),
+    ):
+        assert f" {unit} " in units[words]
+    for name, unit in (("time", "s"), ("payload", "kg"), ("speed", "0..1"), ("temperature.beam", "°C")):
+        (line,) = (line for line in block.splitlines() if line.split()[0] == name)
+        assert f" {unit} " in line
+    assert "as given" in next(line for line in block.splitlines() if "humidity" in line)
+
+
+def test_ranges_are_those_of_the_file_in_any_unit(tmp_path: Path) -> None:
+    campaign = full(tmp_path / "c")
+    text = _squeezed(describe(dataclasses.replace(campaign, units=Units("rad", "um"))))
+    assert "slide prismatic 30000 .. 90000 0 .. 500000 um 12%" in text
+    assert "lift revolute -0.785398 .. 0.349066 -2 .. 2 rad 28%" in text
+
+
+def test_many_sessions_are_counted(tmp_path: Path) -> None:
+    rows = "".join(f"{i},20,30,40,{1000 + i},0,500,day {i:02d}\n" for i in range(12))
+    text = describe(read_campaign(put(tmp_path / "c", ROWS.split("\n")[0] + ",session\n" + rows)))
+    assert "12: day 00 (1 row)" in text
+    assert "day 07 (1 row) and 4 more" in text

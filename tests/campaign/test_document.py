@@ -8,6 +8,7 @@ import pytest
 from campaign.spoilt import TOML, refusal, require
 
 from thermal_robot.campaign import read_campaign
+from thermal_robot.campaign.document import Document
 from thermal_robot.errors import CampaignError
 
 # what is replaced, by what, row, column, found, words of the sentence
@@ -53,3 +54,50 @@ def test_campaign_toml_in_another_encoding(tmp_path: Path) -> None:
     (tmp_path / "campaign.toml").write_bytes('tool = "Gerät"'.encode("latin-1"))
     with pytest.raises(CampaignError, match=r"campaign\.toml: is not UTF-8 text"):
         read_campaign(tmp_path)
+
+
+def document(folder: Path, text: str) -> Document:
+    file = folder / "campaign.toml"
+    file.write_text(text, encoding="utf-8")
+    return Document(file)
+
+
+def test_lines_are_found_however_a_key_is_written(tmp_path: Path) -> None:
+    text = '# robot\n[ robot ]\n"urdf" = "a.urdf"\n  tool_frame="t"\n\n["gears"]\n\'elbow joint\' = 3\nelbow = 4\n'
+    found = document(tmp_path, text)
+    assert (found.row("robot"), found.row("robot", "urdf"), found.row("robot", "tool_frame")) == (2, 3, 4)
+    assert (found.row("gears"), found.row("gears", "elbow joint"), found.row("gears", "elbow")) == (6, 7, 8)
+    assert found.row("gears", "urdf") is None
+    assert found.row("noise") is None
+
+
+def test_a_section_in_one_line_is_found(tmp_path: Path) -> None:
+    found = document(tmp_path, 'noise = { position = 0.1 }\nrobot.urdf = "a.urdf"\n')
+    assert found.row("noise") == 1
+    assert found.number("noise", "position", 0.0) == 0.1
+    assert found.string("robot", "urdf") == "a.urdf"
+
+
+def test_what_is_absent_has_its_default(tmp_path: Path) -> None:
+    found = document(tmp_path, "[robot]\n")
+    assert found.string("robot", "root_frame", None) is None
+    assert found.word("frames", "base", ("unknown", "known"), "unknown") == "unknown"
+    assert found.number("robot", "reference_temperature", 20.0) == 20.0
+    assert found.size("noise", "position") == 0.0
+    assert found.vector("robot", "gravity", None) is None
+    assert found.positive("gears") == {}
+    with pytest.raises(CampaignError, match="is missing") as caught:
+        found.string("robot", "urdf")
+    assert (caught.value.row, caught.value.column) == (1, "robot.urdf")
+
+
+def test_numbers_are_floats_and_no_others_pass(tmp_path: Path) -> None:
+    found = document(tmp_path, "[robot]\ngravity = [0, 0, -9]\nreference_temperature = 21\n[gears]\na = 100\n")
+    assert found.vector("robot", "gravity", None) == (0.0, 0.0, -9.0)
+    assert type(found.number("robot", "reference_temperature", 0.0)) is float
+    assert found.positive("gears") == {"a": 100.0}
+    for wrong in ("true", "inf", "nan", '"21"'):
+        with pytest.raises(CampaignError, match="a number"):
+            document(tmp_path, f"[robot]\nreference_temperature = {wrong}\n").number(
+                "robot", "reference_temperature", 0.0
+            )

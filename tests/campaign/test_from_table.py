@@ -77,3 +77,30 @@ def test_cells_are_checked(robot: Robot) -> None:
     with pytest.raises(CampaignError) as caught:
         campaign_from_table(robot, frame, base="known", tool="known")
     assert (caught.value.row, caught.value.column, caught.value.found) == (1, "turn", "an empty cell")
+
+
+@pytest.mark.parametrize(("unit", "per_metre"), [("m", 1.0), ("mm", 1e3), ("um", 1e6)])
+def test_one_campaign_in_any_unit(robot: Robot, unit: str, per_metre: float) -> None:
+    rng = np.random.default_rng(1)
+    q = pd.DataFrame(rng.uniform(0.1, 0.4, (5, 4)), columns=list(robot.joint_names))
+    place = rng.uniform(-1, 1, (5, 3))
+    frame = q.assign(slide=q["slide"] * per_metre)
+    frame[["x", "y", "z"]] = place * per_metre
+    campaign = campaign_from_table(robot, frame, length_unit=unit, noise_position=1e-5 * per_metre)
+    np.testing.assert_allclose(campaign.q, q, rtol=1e-14)
+    np.testing.assert_allclose(campaign.position, place, rtol=1e-14)
+    assert campaign.noise_position == pytest.approx(1e-5)
+
+
+def test_samples_to_predict_need_no_position(robot: Robot) -> None:
+    frame = pd.DataFrame({name: [0.1] for name in robot.joint_names})
+    assert campaign_from_table(robot, frame, measured=False).position is None
+    with pytest.raises(CampaignError) as caught:
+        campaign_from_table(robot, frame)
+    assert caught.value.column == "x"
+
+
+def test_noise_of_zero_is_not_given(robot: Robot) -> None:
+    frame = pd.DataFrame({name: [0.1, 0.2, 0.3] for name in (*robot.joint_names, "x", "y", "z")})
+    campaign = campaign_from_table(robot, frame, noise_position=0.0, noise_orientation=0.0)
+    assert (campaign.noise_position, campaign.noise_orientation) == (None, None)

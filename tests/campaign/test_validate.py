@@ -81,3 +81,46 @@ def test_too_few_rows(tmp_path: Path, base: str, tool: str, pose: bool, needed: 
         assert error.found == "8 rows with 2 different joint configurations"
         assert error.expected == "at least 3 different configurations"
         assert "too few measurements to find the unknown base" in str(error)
+
+
+@pytest.mark.parametrize(
+    ("column", "cells"),
+    [
+        ("approach.lift", ("-1", "0", "1")),
+        ("payload", ("0", "0", "3")),
+        ("temperature", ("-273.15", "0", "30")),
+        ("temperature.beam", ("-5", "", "30")),
+    ],
+)
+def test_values_at_the_border_are_possible(tmp_path: Path, column: str, cells: tuple[str, str, str]) -> None:
+    assert column in read(tmp_path, table=with_column(column, *cells)).covariates
+
+
+def test_orientations_keep_their_direction(tmp_path: Path) -> None:
+    written = np.array([[0.95, 0.0, 0.0, 0.0], [0.5, 0.5, -0.5, 0.5], [0.0, 0.6, 0.8, 0.0]])
+    table = with_column("qw,qx,qy,qz", *(",".join(map(str, row)) for row in written))
+    found = read(tmp_path, table=table).orientation
+    np.testing.assert_allclose(np.sum(found * written, axis=1), np.linalg.norm(written, axis=1), rtol=1e-14)
+
+
+def test_gaps_and_their_warnings_stand_together(tmp_path: Path) -> None:
+    campaign = read(tmp_path, table=with_column("temperature,payload", "20,1", ",1", "22,1"))
+    assert list(campaign.missing) == ["temperature"]
+    assert campaign.missing["temperature"].tolist() == [False, True, False]
+    assert campaign.warnings == ("column 'temperature' is empty in 1 of 3 rows: interpolated between rows",)
+
+
+def test_warnings_come_in_the_order_of_the_work(tmp_path: Path) -> None:
+    table = with_column("temprature,payload", "1,1", "1,", "1,1").replace("0.5,-0.4", "0.5,-2.1").encode("utf-8")
+    warnings = read(tmp_path, table=table).warnings
+    assert [word for warning in warnings for word in ("temprature", "payload", "limits") if word in warning] == [
+        "temprature",
+        "payload",
+        "limits",
+    ]
+
+
+def test_rows_that_differ_by_rounding_are_one_configuration(tmp_path: Path) -> None:
+    rows = ["0.1,0.1,30,0.4,1000,0,500", "0.1000000000001,0.1,30,0.4,1000,0,500", "0.2,0.1,30,0.4,1000,0,500"]
+    error = refusal(tmp_path, table="\n".join(["turn,lift,slide,roll,x,y,z", *rows]) + "\n")
+    assert error.found == "3 rows with 2 different joint configurations"

@@ -70,3 +70,20 @@ def test_a_place_that_cannot_be_written(tmp_path: Path) -> None:
     (tmp_path / "taken").write_text("")
     with pytest.raises(CampaignError, match="cannot be written"):
         write_campaign(full(tmp_path / "c"), tmp_path / "taken")
+
+
+def test_a_second_copy_is_the_first_to_the_last_letter(tmp_path: Path) -> None:
+    first = write_campaign(full(tmp_path / "c"), tmp_path / "first").parent
+    second = write_campaign(read_campaign(first), tmp_path / "second").parent
+    for name in ("campaign.toml", "robot.urdf"):
+        assert (first / name).read_text() == (second / name).read_text()
+    one, two = (pd.read_csv(folder / "measurements.csv") for folder in (first, second))
+    assert list(one.columns) == list(two.columns)
+    numbers = one.select_dtypes("number").columns
+    np.testing.assert_allclose(two[numbers], one[numbers], rtol=1e-13)
+
+
+def test_predictions_keep_every_digit(tmp_path: Path) -> None:
+    positions = np.random.default_rng(4).normal(size=(50, 3))
+    write_predictions(tmp_path / "p.csv", positions, None, Units())
+    np.testing.assert_array_equal(np.loadtxt(tmp_path / "p.csv", delimiter=",", skiprows=1), positions)
