@@ -23,6 +23,9 @@ EXAMPLE_ROBOT_DATA = "example-robot-data:"
 
 _DESCRIPTION = "the robot description"
 
+_MOST_SHOWN = 12
+"""Names in one message; a humanoid has dozens of fingers."""
+
 # The table of example-robot-data sends this name to the loader of another robot (5.1 and before).
 _LOADER_BY_ITS_NAME = {"ur3": "UR3Loader"}
 
@@ -163,7 +166,8 @@ def load_robot(
     text, source = _urdf_text(urdf)
     if not tool_frame:
         leaves = leaf_links(text, source)
-        shown = ", ".join(leaves[:12]) + (f" and {len(leaves) - 12} more" if len(leaves) > 12 else "")
+        more = f" and {len(leaves) - _MOST_SHOWN} more" if len(leaves) > _MOST_SHOWN else ""
+        shown = ", ".join(leaves[:_MOST_SHOWN]) + more
         raise RobotError(
             f"no tool frame is given; the links at the ends of this robot are {shown}",
             candidates=leaves,
