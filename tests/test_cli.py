@@ -2,6 +2,7 @@
 
 import csv
 import json
+import shutil
 import subprocess
 import sys
 from dataclasses import replace
@@ -280,3 +281,14 @@ def test_the_program_itself_exits_as_it_should(folder, tmp_path):
     bad = program("diagnose", "absent", cwd=tmp_path)
     refused((bad.returncode, bad.stdout, bad.stderr), "absent")
     assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("text", ['<xacro:leftover name="x"/>', "<!-- lengths -- from the data sheet -->"])
+def test_check_takes_a_urdf_that_pinocchio_takes(run, folder, tmp_path, text):
+    copied = tmp_path / "cell"
+    shutil.copytree(folder, copied)
+    urdf = (folder / "robot.urdf").read_text(encoding="utf-8")
+    (copied / "robot.urdf").write_text(urdf.replace("</robot>", f"{text}\n</robot>"), encoding="utf-8")
+    status, out, err = run("check", copied)
+    assert (status, err) == (0, "")
+    assert out.splitlines()[1:] == run("check", folder)[1].splitlines()[1:]  # but for the folder's name
