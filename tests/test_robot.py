@@ -188,3 +188,28 @@ def test_rv_m2_is_as_its_sources_say(rv_m2):
     np.testing.assert_allclose(degrees, [[-150, 150], [-30, 100], [-120, 0], [-110, 110], [-180, 180]], atol=1e-10)
     np.testing.assert_allclose(np.rad2deg(rv_m2.model.velocityLimit), [140, 79, 140, 163, 223], rtol=1e-5)
     assert sum(inertia.mass for inertia in rv_m2.model.inertias) == pytest.approx(28.0)
+
+
+# Each loads with Pinocchio, and no strict XML parser takes it.
+LENIENT = ['<xacro:leftover name="x"/>', "<!-- lengths -- from the data sheet -->"]
+
+
+@pytest.mark.parametrize("text", LENIENT)
+def test_a_urdf_that_is_not_strict_xml_is_the_same_robot(text, rv_m2, configurations):
+    again = load_robot(rv_m2.urdf.replace("</robot>", f"{text}\n</robot>"), "tool0")
+    same_robot(rv_m2, again, configurations)
+    assert (again.urdf_links, again.urdf_joints) == (rv_m2.urdf_links, rv_m2.urdf_joints)
+
+
+def test_all_names_of_the_urdf_are_known(rv_m2):
+    assert rv_m2.urdf_links[0] == "base_link"
+    assert set(rv_m2.urdf_joints) == {*rv_m2.joint_names, "column_top", "tool_point"}
+
+
+def test_segments_are_the_paths_from_joint_to_joint(arm):
+    """Each segment's length along its direction is the translation of its placement."""
+    for segment in arm.segments:
+        k = segment.index
+        along = arm.chain.rotations[k] @ segment.direction * segment.length
+        np.testing.assert_allclose(along, arm.chain.translations[k], atol=1e-12)
+        assert segment.movable == (segment.name in arm.joint_names)

@@ -14,9 +14,10 @@ from typing import NoReturn
 from thermal_robot.errors import CampaignError, ThermalRobotError
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
-_STAGES = (
-    14  # that a diagnosis tells of: reading, frames, effects, up to three exact fits, five folds, remainder, places
-)
+_STAGES = 14
+"""Stages that a diagnosis tells of: reading, frames, effects, up to three exact fits, five folds, remainder, places."""
+_PATIENCE = 2.0
+"""s after which a terminal shows the stages: what is over sooner needs no bar."""
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -69,7 +70,19 @@ def _parser() -> argparse.ArgumentParser:
     check.add_argument("campaign", help="campaign.toml, or its folder")
     check.set_defaults(run=_check)
 
-    diagnose = commands.add_parser("diagnose", help="where the gap lies, what causes it, how far it shrinks")
+    _diagnose_arguments(commands.add_parser("diagnose", help="where the gap lies, what causes it, how far it shrinks"))
+    _predict_arguments(commands.add_parser("predict", help="the corrected model's prediction for new commands"))
+    _paper_arguments(commands.add_parser("paper", help="the paper's figures beside the computed ones"))
+
+    from thermal_robot.blind import command  # light: it loads the trial once it is run
+
+    blind = commands.add_parser("blind", help="the blind trial: effects withheld, then named")
+    command.add_arguments(blind)
+    blind.set_defaults(run=command.run)
+    return parser
+
+
+def _diagnose_arguments(diagnose: argparse.ArgumentParser) -> None:
     diagnose.add_argument("campaign", nargs="?", help="campaign.toml, or its folder")
     diagnose.add_argument("--json", metavar="F", help="write the diagnosis as JSON ('-' prints it instead of the text)")
     diagnose.add_argument("--report", metavar="F.html", help="write a page with figures")
@@ -82,24 +95,19 @@ def _parser() -> argparse.ArgumentParser:
     )
     diagnose.set_defaults(run=_diagnose)
 
-    predict = commands.add_parser("predict", help="the corrected model's prediction for new commands")
+
+def _predict_arguments(predict: argparse.ArgumentParser) -> None:
     predict.add_argument("model", help="file that `diagnose --model` wrote")
     predict.add_argument("samples", help="table with the campaign's columns and units")
     predict.add_argument("-o", "--output", metavar="F", required=True, help="table to write")
     predict.set_defaults(run=_predict)
 
-    paper = commands.add_parser("paper", help="the paper's figures beside the computed ones")
+
+def _paper_arguments(paper: argparse.ArgumentParser) -> None:
     paper.add_argument("--json", metavar="F", help="write the ledger as JSON ('-' prints it instead of the text)")
     paper.add_argument("--l5", metavar="M", type=float, help="wrist to tool point, m (default: 0.150, assumed)")
     paper.add_argument("--markdown", action="store_true", help="print the table of the README instead of the text")
     paper.set_defaults(run=_paper)
-
-    from thermal_robot.blind import command  # light: it loads the trial once it is run
-
-    blind = commands.add_parser("blind", help="the blind trial: effects withheld, then named")
-    command.add_arguments(blind)
-    blind.set_defaults(run=command.run)
-    return parser
 
 
 def _demo(options: argparse.Namespace) -> None:
@@ -205,7 +213,7 @@ def _write(target: str, write: Callable[[Path], object]) -> None:
 
 @contextmanager
 def _progress() -> Iterator[Callable[[str], None]]:
-    """Show the stages on a terminal once two seconds have passed; nothing elsewhere."""
+    """Show the stages on a terminal once it has lasted; nothing elsewhere."""
     if not sys.stderr.isatty():
         yield lambda _: None
         return
@@ -221,7 +229,7 @@ def _progress() -> Iterator[Callable[[str], None]]:
         transient=True,
     )
     task = bar.add_task("", total=_STAGES)
-    patience = threading.Timer(2.0, bar.start)
+    patience = threading.Timer(_PATIENCE, bar.start)
     patience.daemon = True
     patience.start()
     try:

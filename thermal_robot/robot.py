@@ -23,6 +23,9 @@ EXAMPLE_ROBOT_DATA = "example-robot-data:"
 
 _DESCRIPTION = "the robot description"
 
+_MOST_SHOWN = 12
+"""Names in one message; a humanoid has dozens of fingers."""
+
 # The table of example-robot-data sends this name to the loader of another robot (5.1 and before).
 _LOADER_BY_ITS_NAME = {"ur3": "UR3Loader"}
 
@@ -91,6 +94,8 @@ class Robot:
         Constant arrays for the functions of :mod:`thermal_robot.kinematics`.
     model
         ``pinocchio.Model`` reduced to the movable joints.
+    urdf_links, urdf_joints
+        Names of all links and of all joints of the URDF, in the chain or not, fixed joints too.
     """
 
     name: str
@@ -106,6 +111,8 @@ class Robot:
     segments: tuple[Segment, ...]
     chain: Chain
     model: Any
+    urdf_links: tuple[str, ...]
+    urdf_joints: tuple[str, ...]
 
     @property
     def n(self) -> int:
@@ -159,7 +166,8 @@ def load_robot(
     text, source = _urdf_text(urdf)
     if not tool_frame:
         leaves = leaf_links(text, source)
-        shown = ", ".join(leaves[:12]) + (f" and {len(leaves) - 12} more" if len(leaves) > 12 else "")
+        more = f" and {len(leaves) - _MOST_SHOWN} more" if len(leaves) > _MOST_SHOWN else ""
+        shown = ", ".join(leaves[:_MOST_SHOWN]) + more
         raise RobotError(
             f"no tool frame is given; the links at the ends of this robot are {shown}",
             candidates=leaves,
@@ -186,6 +194,8 @@ def _build(
         segments=tuple(_segment(chain, int(k)) for k in chain.placed),
         chain=chain,
         model=built.model,
+        urdf_links=built.urdf_links,
+        urdf_joints=built.urdf_joints,
     )
 
 

@@ -84,14 +84,16 @@ def test_what_a_segment_carries_is_what_pinocchio_says(arm, configurations):
     loads, frames = kin.segment_loads(arm, q), kin.chain_frames(arm, q)
     full = parse_urdf(arm.urdf, "the robot")
     rows = whole_configurations(full, arm, q)
+    behind = links_behind(arm.urdf)
+    bodies = {f.name: i for i, f in enumerate(full.frames) if f.type == pinocchio.FrameType.BODY}
     for i, row in enumerate(rows):
         data = full.createData()
         pinocchio.framesForwardKinematics(full, data, row)
         root = data.oMf[full.getFrameId(arm.root_frame, pinocchio.FrameType.BODY)]
         for s, segment in enumerate(arm.segments):
             mass, moment = 0.0, np.zeros(3)
-            for weight, centre in links_beyond(full, data, arm.urdf, segment.name):
-                mass, moment = mass + weight, moment + weight * centre
+            for link, weight, centre in behind[segment.name]:
+                mass, moment = mass + weight, moment + weight * data.oMf[bodies[link]].act(centre)
             centre = root.actInv(moment / mass) if mass > 0 else np.zeros(3)
             axes, origin = frames.rotations[i, segment.index], frames.positions[i, segment.index]
             expected = np.concatenate([mass * arm.gravity, np.cross(mass * (centre - origin), arm.gravity)])
@@ -118,22 +120,26 @@ def whole_configurations(full, arm, q):
     return rows
 
 
-def links_beyond(full, data, urdf, joint):
-    """Mass and centre in the world of every link that hangs on a URDF joint, read from the text of the URDF."""
+def links_behind(urdf):
+    """Links that hang on each URDF joint, each with its mass and centre, read from the text of the URDF."""
     tree = ElementTree.fromstring(urdf)
-    below = {}
+    below, child = {}, {}
     for item in tree.findall("joint"):
-        below.setdefault(item.find("parent").get("link"), []).append(item.find("child").get("link"))
-        if item.get("name") == joint:
-            links = [item.find("child").get("link")]
-    inertial = {link.get("name"): link.find("inertial") for link in tree.findall("link")}
-    for link in links:
-        links += below.get(link, [])
-        if inertial[link] is not None:
-            origin = inertial[link].find("origin")
+        child[item.get("name")] = item.find("child").get("link")
+        below.setdefault(item.find("parent").get("link"), []).append(child[item.get("name")])
+    masses = {}
+    for link in tree.findall("link"):
+        if (inertial := link.find("inertial")) is not None:
+            origin = inertial.find("origin")
             centre = np.zeros(3) if origin is None else np.array(origin.get("xyz", "0 0 0").split(), dtype=float)
-            place = data.oMf[full.getFrameId(link, pinocchio.FrameType.BODY)]
-            yield float(inertial[link].find("mass").get("value")), place.act(centre)
+            masses[link.get("name")] = float(inertial.find("mass").get("value")), centre
+    behind = {}
+    for joint, link in child.items():
+        links = [link]
+        for name in links:
+            links += below.get(name, [])
+        behind[joint] = [(name, *masses[name]) for name in links if name in masses]
+    return behind
 
 
 def test_the_static_regressor_gives_the_torques(arm, configurations):

@@ -8,7 +8,7 @@ from thermal_robot.errors import RobotError
 from thermal_robot.kinematics import frames as engine
 from thermal_robot.kinematics import reference
 
-ROWS = 1000
+ROWS = 200
 TOLERANCE = 1e-10
 
 
@@ -29,7 +29,7 @@ def test_frames_are_pinocchios(arm, configurations):
 
 @pytest.mark.parametrize("each_row", [True, False], ids=["a displacement for each row", "one for all"])
 def test_displaced_frames_are_pinocchios(arm, configurations, each_row):
-    rows = 300
+    rows = 100
     q = configurations(arm, rows)
     rng = np.random.default_rng(1)
 

@@ -4,7 +4,8 @@ from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.describe import describe
 from thermal_robot.campaign.from_table import campaign_from_table
 from thermal_robot.campaign.read import read_campaign, read_samples
-from thermal_robot.campaign.settings import Settings, Units
+from thermal_robot.campaign.settings import Settings
+from thermal_robot.campaign.units import Units, unit_of
 from thermal_robot.campaign.write import write_campaign, write_predictions, write_table
 
 __all__ = [
@@ -15,6 +16,7 @@ __all__ = [
     "describe",
     "read_campaign",
     "read_samples",
+    "unit_of",
     "write_campaign",
     "write_predictions",
     "write_table",

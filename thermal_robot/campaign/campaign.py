@@ -10,7 +10,8 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from thermal_robot.campaign.settings import STANDARD_TEMPERATURE, Settings, Units, as_vector
+from thermal_robot.campaign.settings import STANDARD_TEMPERATURE, Settings, as_vector
+from thermal_robot.campaign.units import Units
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot
 

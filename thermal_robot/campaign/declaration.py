@@ -8,15 +8,8 @@ from pathlib import Path
 
 from thermal_robot.campaign.document import SECTIONS, Document
 from thermal_robot.campaign.names import did_you_mean, listed
-from thermal_robot.campaign.settings import (
-    ANGLE_UNITS,
-    LENGTH_UNITS,
-    STANDARD_TEMPERATURE,
-    Settings,
-    Units,
-    Vector,
-    as_vector,
-)
+from thermal_robot.campaign.settings import STANDARD_TEMPERATURE, Settings, Vector, as_vector
+from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, Units
 from thermal_robot.errors import CampaignError
 
 FILE_NAME = "campaign.toml"

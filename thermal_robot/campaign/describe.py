@@ -10,9 +10,11 @@ from numpy.typing import NDArray
 from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.names import split_name
-from thermal_robot.campaign.validate import covariate_scale
+from thermal_robot.campaign.units import covariate_scale, unit_of
+from thermal_robot.campaign.validate import SAME_CONFIGURATION
 
-_UNIT = {"time": "s", "payload": "kg", "temperature": "°C", "torque": "N·m"}
+_MOST_SESSIONS = 8
+"""Sessions named in one line; more would not fit beside each other on a terminal."""
 
 
 def describe(campaign: Campaign) -> str:
@@ -96,7 +98,7 @@ def _covariates(campaign: Campaign) -> Iterator[Sequence[str]]:
     for column in campaign.covariates:
         quantity, place = split_name(column)
         joint = place in campaign.robot.joint_names and quantity in names.PER_JOINT and column not in campaign.extra
-        key = (quantity, _joint_unit(campaign, quantity, place)) if joint else (column, _unit(campaign, column))
+        key = (quantity if joint else column, _unit(campaign, column))
         groups.setdefault(key, []).append(column)
     for (quantity, unit), columns in groups.items():
         places = [split_name(column)[1] for column in columns]
@@ -126,7 +128,7 @@ def _not_recorded(campaign: Campaign) -> Iterator[str]:
 
 
 def _repetition(campaign: Campaign) -> Iterator[Sequence[str]]:
-    _, counts = np.unique(np.round(campaign.q, 9), axis=0, return_counts=True)
+    _, counts = np.unique(np.round(campaign.q, SAME_CONFIGURATION), axis=0, return_counts=True)
     yield "identical commands", _repeated(counts)
     if "pose" in campaign.labels:
         labels = campaign.labels["pose"]
@@ -137,8 +139,8 @@ def _repetition(campaign: Campaign) -> Iterator[Sequence[str]]:
             f"{str(name) or '(no label)'} ({count} row{'s' if count > 1 else ''})"
             for name, count in zip(sessions, counts, strict=True)
         ]
-        more = f" and {len(shown) - 8} more" if len(shown) > 8 else ""
-        yield "sessions", f"{len(shown)}: {', '.join(shown[:8])}{more}"
+        more = f" and {len(shown) - _MOST_SESSIONS} more" if len(shown) > _MOST_SESSIONS else ""
+        yield "sessions", f"{len(shown)}: {', '.join(shown[:_MOST_SESSIONS])}{more}"
     else:
         yield "sessions", "no label: taken as one run"
 
@@ -153,15 +155,7 @@ def _repeated(counts: NDArray[np.int64]) -> str:
 def _unit(campaign: Campaign, column: str) -> str:
     if column in campaign.extra:
         return "as given"
-    return "0..1" if column == "speed" else _UNIT.get(split_name(column)[0], "")
-
-
-def _joint_unit(campaign: Campaign, quantity: str, joint: str) -> str:
-    kind = campaign.robot.joint_types[campaign.robot.joint_names.index(joint)]
-    unit = campaign.units.joint_unit(kind)
-    return {"velocity": f"{unit}/s", "acceleration": f"{unit}/s²", "encoder": unit}.get(
-        quantity, _UNIT.get(quantity, "")
-    )
+    return "0..1" if column == "speed" else unit_of(column, campaign.robot, campaign.units)
 
 
 def _noise(sigma: float | None, unit: str) -> str:

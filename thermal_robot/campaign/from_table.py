@@ -9,16 +9,9 @@ import numpy as np
 
 from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.names import did_you_mean, listed
-from thermal_robot.campaign.settings import (
-    ANGLE_UNITS,
-    LENGTH_UNITS,
-    STANDARD_TEMPERATURE,
-    Settings,
-    Units,
-    Vector,
-    as_vector,
-)
+from thermal_robot.campaign.settings import STANDARD_TEMPERATURE, Settings, Vector, as_vector
 from thermal_robot.campaign.tabular import table_from_frame
+from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, Units
 from thermal_robot.campaign.validate import build_campaign
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot

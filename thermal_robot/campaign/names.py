@@ -13,18 +13,17 @@ LABELS = ("session", "pose")
 PLAIN_COVARIATES = ("time", "order", "temperature", "payload", "speed")
 PER_JOINT = ("approach", "velocity", "acceleration", "torque", "encoder")
 PER_LINK = ("temperature",)
-RESERVED = (
-    *POSITION,
-    *ORIENTATION,
-    *SIMULATED_POSITION,
-    *SIMULATED_ORIENTATION,
-    *LABELS,
-    *PLAIN_COVARIATES,
-)
+MEASURED = (*POSITION, *ORIENTATION)
+SIMULATED = (*SIMULATED_POSITION, *SIMULATED_ORIENTATION)
+RESERVED = (*MEASURED, *SIMULATED, *LABELS, *PLAIN_COVARIATES)
 """Names that mean the same in every campaign."""
 
+_LIKE = 0.5
+"""Likeness (0..1, by :mod:`difflib`) from which a name is offered for another: half of the letters stand in order. It
+decides only what a message proposes, never what is accepted, so it lies below the 0.6 of difflib itself."""
 
-def nearest(name: str, candidates: Iterable[str], count: int = 3, cutoff: float = 0.5) -> list[str]:
+
+def nearest(name: str, candidates: Iterable[str], count: int = 3, cutoff: float = _LIKE) -> list[str]:
     """Return the candidates most like ``name``, best first; upper and lower case count as equal."""
     by_lower: dict[str, str] = {}
     for candidate in candidates:
@@ -33,7 +32,7 @@ def nearest(name: str, candidates: Iterable[str], count: int = 3, cutoff: float 
     return [by_lower[lower] for lower in close]
 
 
-def did_you_mean(name: str, candidates: Iterable[str], cutoff: float = 0.5) -> str:
+def did_you_mean(name: str, candidates: Iterable[str], cutoff: float = _LIKE) -> str:
     """Return ``"; did you mean 'elbow_joint'?"``, or nothing when no candidate is like ``name``."""
     close = nearest(name, candidates, count=1, cutoff=cutoff)
     return f"; did you mean {close[0]!r}?" if close else ""

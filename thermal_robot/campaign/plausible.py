@@ -13,7 +13,31 @@ from thermal_robot.campaign.names import listed
 LIMIT_TOLERANCE = 1e-6
 """rad or m by which a command may pass a limit: the last digit of a file is not a violation."""
 SAME_COMMAND = 1e-3
-"""rad or m within which commands of one pose label count as the same."""
+"""rad or m within which commands of one pose label count as the same: a controller that reports where it stopped
+repeats a pose to better than that, and a pose of its own is farther away."""
+MOST_TURNS = 2
+"""Turns that no command in rad exceeds: wrists and cables allow at most two to either side, and 13 degrees, read as
+rad, are more."""
+LEAST_ANGLE = 2 * math.pi
+"""Degrees that some joint of a real campaign exceeds; commands in rad, read as degrees, stay within one turn's 2π."""
+FEWEST_COMMANDS = 3
+"""Rows from which small commands are a habit and not an accident."""
+FARTHEST_TARGET = 3.0
+"""Reaches of the arm within which a target sits on it: a long tool is shorter, a length read in a unit a thousand times
+too large is longer by far. The next three bounds are as coarse for the same reason."""
+WORST_INSTRUMENT = 0.01
+"""Share of the reach that is an instrument's one-sigma at most: 1 cm for an arm of 1 m, worse than a tape measure."""
+LARGEST_EXTENT = 4.0
+"""Reaches (with the target) over which measured positions extend at most: the ball that the target can reach is two
+across; the other two allow for commands outside it."""
+SMALLEST_EXTENT = 1 / 200
+"""Share of the reach over which measured positions extend at least, once enough joints move: 5 mm for an arm of 1 m."""
+MOVES = 0.5
+"""rad or m of a joint's range that carry the target visibly."""
+MOVING_JOINTS = 3
+"""Joints that may move and leave the target in place: those of a wrist about a target on its axes."""
+HOTTEST = 150.0
+"""°C that the median temperature of no robot reaches, whose grease ends at 120; 20 °C are 293 K."""
 
 
 def doubts(campaign: Campaign) -> list[str]:
@@ -35,15 +59,15 @@ def _angle_unit(campaign: Campaign) -> Iterator[str]:
     values = np.abs(campaign.q[:, turning])
     if not values.size:
         return
-    if units.angle == "rad" and values.max() > 4 * math.pi:
+    if units.angle == "rad" and values.max() > 2 * math.pi * MOST_TURNS:
         row, joint = np.unravel_index(int(values.argmax()), values.shape)
         name = np.array(robot.joint_names)[turning][joint]
         yield (
             f"joint {str(name)!r} is commanded to {campaign.q[:, turning][row, joint]:.6g} rad in row "
             f'{campaign.rows[row]}, more than two turns: is angle_unit = "deg" meant?'
         )
-    small = math.radians(2 * math.pi)
-    if units.angle == "deg" and campaign.samples >= 3 and values.max() <= small and np.ptp(values) > 0:
+    small = values.max() <= math.radians(LEAST_ANGLE)
+    if units.angle == "deg" and campaign.samples >= FEWEST_COMMANDS and small and np.ptp(values) > 0:
         yield f'no joint leaves ±{values.max() / units.angle_scale:.3g} degrees: is angle_unit = "rad" meant?'
 
 
@@ -56,16 +80,16 @@ def _length_unit(campaign: Campaign) -> Iterator[str]:
         return
     ask = f'the arm reaches {reach:.3g} m: is length_unit = "{unit}" right?'
     target = float(np.linalg.norm(campaign.target))
-    if target > 3 * reach:
+    if target > FARTHEST_TARGET * reach:
         yield f"the target lies {target:.3g} m away from {robot.tool_frame!r} and {ask}"
-    if campaign.noise_position is not None and campaign.noise_position > 0.01 * reach:
+    if campaign.noise_position is not None and campaign.noise_position > WORST_INSTRUMENT * reach:
         yield f"the noise of position is {campaign.noise_position:.3g} m and {ask}"
     if campaign.position is None:
         return
     extent = float(np.ptp(campaign.position, axis=0).max())
     # A target on the last axes stays in place while they turn, so more than three joints have to move.
-    moved = int((np.ptp(campaign.q, axis=0) > 0.5).sum())
-    if extent > 4 * (reach + target) or (extent < reach / 200 and moved > 3):
+    moved = int((np.ptp(campaign.q, axis=0) > MOVES).sum())
+    if extent > LARGEST_EXTENT * (reach + target) or (extent < SMALLEST_EXTENT * reach and moved > MOVING_JOINTS):
         yield f"the measured positions extend over {extent:.3g} m and {ask}"
 
 
@@ -113,7 +137,7 @@ def _speed(campaign: Campaign) -> Iterator[str]:
 
 def _temperature(campaign: Campaign) -> Iterator[str]:
     for name, values in campaign.covariates.items():
-        if name.split(".")[0] == "temperature" and name not in campaign.extra and np.median(values) > 150.0:
+        if name.split(".")[0] == "temperature" and name not in campaign.extra and np.median(values) > HOTTEST:
             yield f"column {name!r} has a median of {np.median(values):.4g} °C: are these kelvin?"
 
 

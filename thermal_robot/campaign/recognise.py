@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import xml.etree.ElementTree as ElementTree
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 from thermal_robot.campaign import names
@@ -11,6 +10,15 @@ from thermal_robot.campaign.names import did_you_mean, listed, nearest, split_na
 from thermal_robot.campaign.table import Table
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot
+
+_TYPING_ERROR = 0.85
+"""Likeness (0..1, by :mod:`difflib`) from which a column of the user's own is taken for a typing error of a name that
+the format defines: ``tme`` for ``time``, a letter lost in the shortest name, has 0.86; honest columns such as
+``pressure`` or ``humidity`` stay below 0.6."""
+_PERHAPS_MEANT = 0.4
+"""Likeness from which a column that is there is named beside one that is lacking: the table must be mended anyway, so a
+poor guess does less harm than none."""
+_COVARIATE, _EXTRA, _IGNORED = "covariate", "extra", "ignored"
 
 
 @dataclass(frozen=True)
@@ -57,7 +65,6 @@ def recognise(table: Table, robot: Robot, *, measured: bool) -> Columns:
     CampaignError
         A joint or a coordinate without a column, some of a quaternion's four, a name with two meanings.
     """
-    present = table.columns
     _refuse_two_meanings(table, robot)
     _require_joints(table, robot)
     if measured:
@@ -68,38 +75,23 @@ def recognise(table: Table, robot: Robot, *, measured: bool) -> Columns:
     if has_simulated_orientation and not has_simulated_position:
         _require(table, names.SIMULATED_POSITION, "a simulated orientation needs a simulated position")
 
-    taken = {*robot.joint_names, *names.POSITION, *names.ORIENTATION, *names.LABELS}
-    taken |= {*names.SIMULATED_POSITION, *names.SIMULATED_ORIENTATION}
+    taken = {*robot.joint_names, *names.MEASURED, *names.SIMULATED, *names.LABELS}
     covariates: list[str] = []
     extra: list[str] = []
     warnings: list[str] = []
-    links, joints = _urdf_names(robot)
-    for column in present:
+    for column in table.columns:
         if column in taken:
             continue
-        quantity, place = split_name(column)
-        if table.is_empty(column):
-            warnings.append(f"column {column!r} is empty and counts as absent")
-        elif column in names.PLAIN_COVARIATES:
+        part, doubts = _judge(table, column, robot)
+        warnings += doubts
+        if part == _COVARIATE:
             covariates.append(column)
-        elif place and quantity in names.PER_JOINT:
-            if place in robot.joint_names:
-                covariates.append(column)
-            else:
-                warnings.append(_ignored(column, "the chain has no joint", place, robot.joint_names))
-        elif place and quantity in names.PER_LINK:
-            if place in links:
-                covariates.append(column)
-                if place not in {segment.parent_link for segment in robot.segments}:
-                    warnings.append(f"column {column!r}: no length of the chain belongs to that link")
-            else:
-                warnings.append(_ignored(column, "the robot has no link", place, links))
-        else:
-            warnings += _judge_extra(table, column, extra, robot, joints)
+        elif part == _EXTRA:
+            extra.append(column)
     return Columns(
         tuple(covariates),
         tuple(extra),
-        tuple(label for label in names.LABELS if label in present),
+        tuple(label for label in names.LABELS if label in table.columns),
         has_orientation,
         has_simulated_position,
         has_simulated_orientation,
@@ -107,14 +99,33 @@ def recognise(table: Table, robot: Robot, *, measured: bool) -> Columns:
     )
 
 
-def _judge_extra(table: Table, column: str, extra: list[str], robot: Robot, joints: Collection[str]) -> list[str]:
-    """Keep a column that the format does not define if it is numeric; say what is doubtful about it."""
+def _judge(table: Table, column: str, robot: Robot) -> tuple[str, list[str]]:
+    """Say which part a column has that is neither a joint nor a pose nor a label, and what is doubtful about it."""
+    quantity, place = split_name(column)
+    if table.is_empty(column):
+        return _IGNORED, [f"column {column!r} is empty and counts as absent"]
+    if column in names.PLAIN_COVARIATES:
+        return _COVARIATE, []
+    if place and quantity in names.PER_JOINT:
+        if place in robot.joint_names:
+            return _COVARIATE, []
+        return _IGNORED, [_ignored(column, "the chain has no joint", place, robot.joint_names)]
+    if place and quantity in names.PER_LINK:
+        if place not in robot.urdf_links:
+            return _IGNORED, [_ignored(column, "the robot has no link", place, robot.urdf_links)]
+        if place not in {segment.parent_link for segment in robot.segments}:
+            return _COVARIATE, [f"column {column!r}: no length of the chain belongs to that link"]
+        return _COVARIATE, []
     text = table.first_text(column)
     if text is not None:
         found = table.columns[column][text]
-        return [f"column {column!r} is not numeric (row {table.rows[text]}: {found!r}) and is ignored"]
-    extra.append(column)
-    if column in joints:
+        return _IGNORED, [f"column {column!r} is not numeric (row {table.rows[text]}: {found!r}) and is ignored"]
+    return _EXTRA, _doubts_of_extra(column, robot)
+
+
+def _doubts_of_extra(column: str, robot: Robot) -> list[str]:
+    """Say what is doubtful about a numeric column that the format does not define."""
+    if column in robot.urdf_joints:
         return [f"column {column!r} is a joint outside the chain: it is kept as an extra covariate only"]
     if column in names.PER_JOINT:
         meant = f"did you mean '{column}.<joint>'?"
@@ -123,7 +134,7 @@ def _judge_extra(table: Table, column: str, extra: list[str], robot: Robot, join
         *names.RESERVED,
         *(f"{quantity}.{joint}" for quantity in names.PER_JOINT for joint in robot.joint_names),
     ]
-    meant = did_you_mean(column, known, cutoff=0.85)
+    meant = did_you_mean(column, known, cutoff=_TYPING_ERROR)
     return [f"column {column!r} is not defined by the format and is kept as an extra covariate{meant}"] if meant else []
 
 
@@ -155,7 +166,7 @@ def _require(table: Table, wanted: Sequence[str], why: str) -> None:
     spare = [column for column in table.columns if column not in wanted]
     for name in wanted:
         if name not in table.columns:
-            close = nearest(name, spare, cutoff=0.4)
+            close = nearest(name, spare, cutoff=_PERHAPS_MEANT)
             found = f"the nearest names {listed(close)}" if close else f"the columns {listed(table.columns)}"
             raise CampaignError(
                 table.file,
@@ -181,11 +192,3 @@ def _whole_group(table: Table, group: Sequence[str]) -> bool:
             expected=listed(group),
         )
     return bool(here)
-
-
-def _urdf_names(robot: Robot) -> tuple[set[str], set[str]]:
-    """Return the names of all links and of all joints of the robot, inside the chain or not."""
-    root = ElementTree.fromstring(robot.urdf)
-    links = {element.get("name", "") for element in root.findall("link")}
-    joints = {element.get("name", "") for element in root.findall("joint")}
-    return links, joints

@@ -2,71 +2,17 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
+from thermal_robot.campaign.units import SI, Units
 from thermal_robot.errors import CampaignError
 
 Vector: TypeAlias = tuple[float, float, float]
 
-ANGLE_UNITS: dict[str, float] = {"rad": 1.0, "deg": math.pi / 180.0}
-"""Radians in one of the unit."""
-LENGTH_UNITS: dict[str, float] = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
-"""Metres in one of the unit."""
-
 STANDARD_TEMPERATURE = 20.0
 """°C; ISO 1, the temperature at which lengths are specified unless somebody says otherwise."""
-
-
-@dataclass(frozen=True)
-class Units:
-    """The units of a file. SI value = value in the file × scale.
-
-    Parameters
-    ----------
-    angle
-        ``"rad"`` or ``"deg"``.
-    length
-        ``"m"``, ``"mm"`` or ``"um"``.
-
-    Raises
-    ------
-    CampaignError
-        A word that is not one of these.
-    """
-
-    angle: str = "rad"
-    length: str = "m"
-
-    def __post_init__(self) -> None:
-        for key, word, allowed in (
-            ("angle_unit", self.angle, ANGLE_UNITS),
-            ("length_unit", self.length, LENGTH_UNITS),
-        ):
-            if word not in allowed:
-                raise CampaignError(
-                    "<units>", "unknown unit", column=key, found=repr(word), expected=" or ".join(allowed)
-                )
-
-    @property
-    def angle_scale(self) -> float:
-        """Radians per angle unit."""
-        return ANGLE_UNITS[self.angle]
-
-    @property
-    def length_scale(self) -> float:
-        """Metres per length unit."""
-        return LENGTH_UNITS[self.length]
-
-    def joint_scale(self, joint_type: str) -> float:
-        """Radians, or metres for a prismatic joint, per unit of its column."""
-        return self.length_scale if joint_type == "prismatic" else self.angle_scale
-
-    def joint_unit(self, joint_type: str) -> str:
-        """Word for the unit of a joint's column."""
-        return self.length if joint_type == "prismatic" else self.angle
 
 
 @dataclass(frozen=True)
@@ -105,7 +51,7 @@ class Settings:
     root_frame: str | None = None
     gravity: Vector | None = None
     reference_temperature: float = STANDARD_TEMPERATURE
-    units: Units = Units()
+    units: Units = SI
     base_known: bool = False
     tool_known: bool = False
     target: Vector = (0.0, 0.0, 0.0)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,16 +13,23 @@ from thermal_robot.campaign.campaign import Campaign, FloatArray
 from thermal_robot.campaign.fill import fill
 from thermal_robot.campaign.names import split_name
 from thermal_robot.campaign.plausible import doubts
-from thermal_robot.campaign.recognise import recognise
-from thermal_robot.campaign.settings import Settings, Units
+from thermal_robot.campaign.recognise import Columns, recognise
+from thermal_robot.campaign.settings import Settings
 from thermal_robot.campaign.table import Table
+from thermal_robot.campaign.units import Units, covariate_scale
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot
 
 QUATERNION_TOLERANCE = 0.1
-"""A quaternion whose length differs from 1 by more is a mistake, not a rounding."""
+"""A quaternion whose length differs from 1 by more is a mistake, not a rounding: four parts that are written with one
+decimal change the length by at most 0.05 · √4."""
 MINIMUM_POSES = 3
 """Distinct configurations without which a rigid frame can turn about the line through two points."""
+ABSOLUTE_ZERO = -273.15
+"""°C."""
+SAME_CONFIGURATION = 9
+"""Decimals of a command, rad or m, to which it is compared: a nanoradian is far below what any controller resolves and
+far above what the conversion of units rounds."""
 
 
 def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str, measured: bool = True) -> Campaign:
@@ -46,30 +54,12 @@ def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str,
         Whatever cannot be used, with row and column.
     """
     columns = recognise(table, robot, measured=measured)
-    warnings = [*table.warnings, *columns.warnings]
     units = settings.units
-    q = np.column_stack(
-        [
-            table.numbers(joint) * units.joint_scale(kind)
-            for joint, kind in zip(robot.joint_names, robot.joint_types, strict=True)
-        ]
-    )
-    covariates: dict[str, FloatArray] = {}
-    missing: dict[str, NDArray[np.bool_]] = {}
-    for column in (*columns.covariates, *columns.extra):
-        values = table.numbers(column, gaps=True)
-        _check_covariate(table, column, values)
-        gaps = np.isnan(values)
-        if gaps.any():
-            values, how = fill(column, values)
-            missing[column] = gaps
-            count = int(gaps.sum())
-            warnings.append(f"column {column!r} is empty in {count} of {len(gaps)} rows: {how}")
-        covariates[column] = values * covariate_scale(column, robot, units)
+    covariates, missing, gaps = _covariates(table, columns, robot, units)
     campaign = Campaign(
         name=name,
         robot=robot,
-        q=q,
+        q=_commands(table, robot, units),
         position=_vectors(table, names.POSITION, units) if measured else None,
         orientation=_quaternions(table, names.ORIENTATION) if columns.has_orientation else None,
         covariates=covariates,
@@ -95,17 +85,35 @@ def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str,
     )
     if measured:
         _require_enough(table.file, campaign)
-    warnings += doubts(campaign)
-    object.__setattr__(campaign, "warnings", tuple(warnings))
-    return campaign
+    warnings = (*table.warnings, *columns.warnings, *gaps, *doubts(campaign))
+    return replace(campaign, warnings=warnings)
 
 
-def covariate_scale(column: str, robot: Robot, units: Units) -> float:
-    """SI value of one unit of a covariate's column; 1 where it is in SI, in °C, or as given."""
-    quantity, place = split_name(column)
-    if quantity in ("velocity", "acceleration", "encoder") and place in robot.joint_names:
-        return units.joint_scale(robot.joint_types[robot.joint_names.index(place)])
-    return 1.0
+def _commands(table: Table, robot: Robot, units: Units) -> FloatArray:
+    """(N, n) rad or m."""
+    joints = zip(robot.joint_names, robot.joint_types, strict=True)
+    commands: FloatArray = np.column_stack([table.numbers(joint) * units.joint_scale(kind) for joint, kind in joints])
+    return commands
+
+
+def _covariates(
+    table: Table, columns: Columns, robot: Robot, units: Units
+) -> tuple[dict[str, FloatArray], dict[str, NDArray[np.bool_]], list[str]]:
+    """Return the covariates in SI without gaps, where they had gaps, and how those were filled, in words."""
+    covariates: dict[str, FloatArray] = {}
+    missing: dict[str, NDArray[np.bool_]] = {}
+    warnings: list[str] = []
+    for column in (*columns.covariates, *columns.extra):
+        values = table.numbers(column, gaps=True)
+        _check_covariate(table, column, values)
+        gaps = np.isnan(values)
+        if gaps.any():
+            values, how = fill(column, values)
+            missing[column] = gaps
+            count = int(gaps.sum())
+            warnings.append(f"column {column!r} is empty in {count} of {len(gaps)} rows: {how}")
+        covariates[column] = values * covariate_scale(column, robot, units)
+    return covariates, missing, warnings
 
 
 def _check_covariate(table: Table, column: str, values: NDArray[np.float64]) -> None:
@@ -116,7 +124,7 @@ def _check_covariate(table: Table, column: str, values: NDArray[np.float64]) -> 
     elif column == "payload":
         refused, expected = values < 0, "a mass in kg that is not negative"
     elif quantity == "temperature":
-        refused, expected = values < -273.15, "°C"
+        refused, expected = values < ABSOLUTE_ZERO, "°C"
     else:
         return
     if refused.any():
@@ -165,7 +173,7 @@ def _require_enough(file: str, campaign: Campaign) -> None:
     needed = -(-(base + tool) // equations)
     if base:
         needed = max(needed, MINIMUM_POSES)
-    distinct = len(np.unique(np.round(campaign.q, 9), axis=0))
+    distinct = len(np.unique(np.round(campaign.q, SAME_CONFIGURATION), axis=0))
     if distinct < needed:
         unknown = " and ".join(word for word, count in (("base", base), ("tool", tool)) if count)
         raise CampaignError(

@@ -13,8 +13,7 @@ from numpy.typing import ArrayLike
 from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.declaration import FILE_NAME
-from thermal_robot.campaign.settings import Units
-from thermal_robot.campaign.validate import covariate_scale
+from thermal_robot.campaign.units import Units, covariate_scale
 from thermal_robot.errors import CampaignError
 
 TABLE_NAME = "measurements.csv"

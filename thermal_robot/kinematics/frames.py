@@ -23,7 +23,8 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 CHUNK = 4096
-"""Configurations worked on at a time."""
+"""Configurations worked on at a time: few enough for their arrays to stay in the cache, many enough for NumPy's calls
+to cost nothing beside them."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,9 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
+_NO_MASS = 1e-12
+"""kg; less is what rounding leaves of a body's mass once the links that are fixed to it are taken off."""
+
 
 def hanging_masses(full: pin.Model, elements: Sequence[int], held: Array) -> tuple[Array, Array]:
     """Mass that each fixed element of a chain carries, up to the chain's next movable joint.
@@ -64,7 +67,7 @@ def _links(full: pin.Model, data: pin.Data) -> list[tuple[int, float, Array]]:
         if frame.type == pin.FrameType.JOINT:
             j, body = frame.parentJoint, full.inertias[frame.parentJoint]
             mass = body.mass - joined[j]
-            if mass > 1e-12:
+            if mass > _NO_MASS:
                 centre = (body.mass * data.oMi[j].act(body.lever) - moment[j]) / mass
                 found.append((f, float(mass), np.asarray(centre)))
     return found

@@ -88,6 +88,8 @@ class ChainModel:
         (n,) limits in rad or m; infinite where there is none.
     chain
         Constant arrays for the batch functions.
+    urdf_links, urdf_joints
+        Names of all links and of all joints of the URDF, in the chain or not, fixed joints too.
     """
 
     model: pin.Model
@@ -97,6 +99,8 @@ class ChainModel:
     lower: Array
     upper: Array
     chain: Chain
+    urdf_links: tuple[str, ...]
+    urdf_joints: tuple[str, ...]
 
 
 def build_chain_model(
@@ -148,7 +152,8 @@ def build_chain_model(
     lower, upper = _limits(model, joint_types)
     chain = _chain_arrays(full, model, elements, held)
     _freeze(gravity, lower, upper)
-    return ChainModel(model, full.frames[root].name, gravity, joint_types, lower, upper, chain)
+    name = full.frames[root].name
+    return ChainModel(model, name, gravity, joint_types, lower, upper, chain, tuple(links), _joint_names(full))
 
 
 def leaf_links(urdf: str, source: str = "the robot description") -> tuple[str, ...]:
@@ -276,6 +281,12 @@ def _joint_types(model: pin.Model, elements: list[int], mimic: set[str]) -> tupl
     if not types:
         raise RobotError("the chain has no movable joint between its root frame and its tool frame")
     return tuple(types)
+
+
+def _joint_names(model: pin.Model) -> tuple[str, ...]:
+    """Names of all joints of the URDF; the frame that Pinocchio puts first is the world, and no joint."""
+    kinds = (pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT)
+    return tuple(frame.name for i, frame in enumerate(model.frames) if i > 0 and frame.type in kinds)
 
 
 def _held_configuration(model: pin.Model) -> Array:

@@ -10,7 +10,7 @@ import sys
 import tempfile
 import threading
 from collections.abc import Iterable, Iterator
-from xml.etree import ElementTree
+from xml.parsers import expat
 
 import pinocchio as pin
 
@@ -49,8 +49,7 @@ def mimic_joints(urdf: str) -> set[str]:
     By pattern and not by an XML parser: many URDF files in use have undeclared namespaces, which urdfdom
     accepts and parsers refuse.
     """
-    text = re.sub(r"<!--.*?-->", "", urdf, flags=re.DOTALL)
-    joints = re.findall(r"<joint\b([^>]*[^/])>(.*?)</joint>", text, flags=re.DOTALL)
+    joints = re.findall(r"<joint\b([^>]*[^/])>(.*?)</joint>", _without_comments(urdf), flags=re.DOTALL)
     named = ((re.search(r"\bname\s*=\s*[\"']([^\"']*)", attributes), body) for attributes, body in joints)
     return {match.group(1) for match, body in named if match and re.search(r"<mimic\b", body)}
 
@@ -65,18 +64,33 @@ def nearest(name: str, known: Iterable[str]) -> tuple[str, ...]:
 
 
 def _why_not_urdf(urdf: str, said: list[str], error: str) -> str:
-    if not urdf.strip():
+    text = _without_comments(urdf.strip())
+    if not text.strip():
         return "is empty"
-    if "<xacro:" in urdf:
+    if "<xacro:" in text:
         return "is a xacro file; expand it to URDF first (xacro robot.xacro > robot.urdf)"
     try:
-        tag = ElementTree.fromstring(urdf.strip().encode()).tag
-    except ElementTree.ParseError as problem:
+        tag = _root_tag(text)
+    except expat.ExpatError as problem:
         return f"is not XML: {problem}"
     if tag != "robot":
         return f"is XML but not a URDF: its root element is <{tag}>, expected <robot>"
     reasons = re.findall(r"Error:\s+(.*)", "".join(said))
     return f"is not a valid URDF: {reasons[0] if reasons else error}"
+
+
+def _root_tag(text: str) -> str:
+    """Name of the outermost element; whether the prefixes of names were declared is not asked, as urdfdom does not."""
+    tags: list[str] = []
+    parser = expat.ParserCreate()
+    parser.StartElementHandler = lambda tag, _: tags.append(tag)
+    parser.Parse(text.encode(), True)
+    return tags[0]
+
+
+def _without_comments(urdf: str) -> str:
+    """Blank the comments, keeping their lines: urdfdom takes ``--`` within them, which XML forbids."""
+    return re.sub(r"<!--.*?-->", lambda comment: "\n" * comment[0].count("\n"), urdf, flags=re.DOTALL)
 
 
 @contextlib.contextmanager

@@ -1,0 +1,106 @@
+"""A campaign that has every kind of column, as files: what several tests of this room read."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from thermal_robot.campaign import Campaign, read_campaign
+
+URDF = """<robot name="arm">
+  <link name="base"/><link name="column"/><link name="beam"/><link name="carriage"/><link name="hand"/>
+  <link name="tool"/><link name="finger"/>
+  <joint name="turn" type="revolute"><parent link="base"/><child link="column"/><origin xyz="0 0 0.4"/>
+    <axis xyz="0 0 1"/><limit lower="-3" upper="3" effort="1" velocity="1"/></joint>
+  <joint name="lift" type="revolute"><parent link="column"/><child link="beam"/><origin xyz="0.1 0 0"/>
+    <axis xyz="0 1 0"/><limit lower="-2" upper="2" effort="1" velocity="1"/></joint>
+  <joint name="slide" type="prismatic"><parent link="beam"/><child link="carriage"/><origin xyz="0.5 0 0"/>
+    <axis xyz="1 0 0"/><limit lower="0" upper="0.5" effort="1" velocity="1"/></joint>
+  <joint name="roll" type="continuous"><parent link="carriage"/><child link="hand"/><origin xyz="0.3 0 0"/>
+    <axis xyz="1 0 0"/></joint>
+  <joint name="mount" type="fixed"><parent link="hand"/><child link="tool"/><origin xyz="0.1 0 0"/></joint>
+  <joint name="grip" type="revolute"><parent link="hand"/><child link="finger"/><axis xyz="1 0 0"/>
+    <limit lower="0" upper="1" effort="1" velocity="1"/></joint>
+</robot>"""
+
+TOML = """
+[robot]
+urdf = "robot.urdf"
+tool_frame = "tool"
+reference_temperature = 22.5
+[measurements]
+file = "measurements.csv"
+angle_unit = "{angle}"
+length_unit = "{length}"
+[frames]
+base = "unknown"
+tool = "known"
+target = [1.0, 2, 80.0]
+[noise]
+position = 0.02
+orientation = 3e-5
+[payload]
+com = [0.0, 0.0, 50.0]
+[priors]
+joint_offset = 1e-3
+[gears]
+lift = 101
+"""
+
+ROWS = """turn,lift,slide,roll,x,y,z
+10,20,30,40,1000,0,500
+-10,15,60,400,900,100,510
+50,-45,90,-40,800,200,520
+"""
+
+
+def put(folder: Path, table: str | bytes = ROWS, *, angle: str = "deg", length: str = "mm") -> Path:
+    folder.mkdir(exist_ok=True)
+    (folder / "robot.urdf").write_text(URDF)
+    (folder / "campaign.toml").write_text(TOML.format(angle=angle, length=length))
+    (folder / "measurements.csv").write_bytes(table if isinstance(table, bytes) else table.encode())
+    return folder
+
+
+def add(table: str, **columns: str) -> str:
+    """Append columns, their cells separated by blanks, '_' for an empty one and '.' in a name for '__'."""
+    lines = table.strip().splitlines()
+    for name, cells in columns.items():
+        parts = [name.replace("__", "."), *("" if cell == "_" else cell for cell in cells.split())]
+        lines = [f"{line},{part}" for line, part in zip(lines, parts, strict=True)]
+    return "\n".join(lines) + "\n"
+
+
+def full(folder: Path) -> Campaign:
+    """A campaign that has every kind of column."""
+    table = add(
+        ROWS,
+        qw="1 0 0.6",
+        qx="0 -1 0",
+        qy="0 0 0.8",
+        qz="0 0 0",
+        time="0 1.5 3",
+        temperature="20.1 20.7 21.3",
+        temperature__beam="20 21 22",
+        payload="0 5 5",
+        approach__lift="1 -1 0",
+        approach__slide="1 1 -1",
+        velocity__lift="10 20 30",
+        velocity__slide="10 20 30",
+        acceleration__roll="1 2 3",
+        torque__lift="1.5 2.5 3.5",
+        encoder__lift="20.1 15.1 -44.9",
+        encoder__slide="30.1 60.1 90.1",
+        speed="0.1 0.5 1",
+        order="3 1 2",
+        humidity="40 41 43",
+        session="a a b",
+        pose="1 2 3",
+        sim__x="1000 900 800",
+        sim__y="0 100 200",
+        sim__z="500 510 520",
+        sim__qw="1 1 1",
+        sim__qx="0 0 0",
+        sim__qy="0 0 0",
+        sim__qz="0 0 0",
+    )
+    return read_campaign(put(folder, table))

@@ -1,0 +1,137 @@
+"""campaign.toml: what it must declare, in which words and units, and its defaults."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from campaign.files import put
+from campaign.spoilt import TOML, refusal, require
+
+from thermal_robot.campaign import Settings, Units, read_campaign
+from thermal_robot.campaign.declaration import Declaration, check_gears, read_declaration
+from thermal_robot.errors import CampaignError
+
+# what is replaced, by what, row, column, found, words of the sentence
+REFUSED = [
+    ('[robot]\nurdf = "robot.urdf"\ntool_frame = "tool"\n', "", None, "robot.urdf", None, ["under [robot]"]),
+    ('urdf = "robot.urdf"\n', "", 1, "robot.urdf", None, ["is missing", "path of the robot's URDF file"]),
+    (
+        'tool_frame = "tool"\n',
+        "",
+        1,
+        "robot.tool_frame",
+        None,
+        ["is missing", "link that carries the target"],
+    ),
+    ('file = "measurements.csv"\n', "", 5, "measurements.file", None, ["is missing", "path of the table"]),
+    ('angle_unit = "rad"\n', "", 5, "measurements.angle_unit", None, ["is missing", '"rad" or "deg"']),
+    ('length_unit = "mm"\n', "", 5, "measurements.length_unit", None, ["is missing", '"m" or "mm" or "um"']),
+    ('"mm"', '"inch"', 8, "measurements.length_unit", "'inch'", ["unknown unit", '"m" or "mm" or "um"']),
+    ('"rad"', '"radian"', 7, "measurements.angle_unit", "'radian'", ["unknown unit", '"rad" or "deg"']),
+    ('"rad"', "1", 7, "measurements.angle_unit", "1", ["unknown unit", '"rad" or "deg"']),
+    (
+        'base = "unknown"',
+        'base = "floor"',
+        11,
+        "frames.base",
+        "'floor'",
+        ["unknown word", '"unknown" or "known"'],
+    ),
+    ("0.02", "-0.02", 16, "noise.position", "-0.02", ["cannot be negative"]),
+    ("0.02", "0.02\norientation = -1", 17, "noise.orientation", "-1.0", ["cannot be negative"]),
+    ("101", "0", 22, "gears.lift", "0", ["transmission ratio must be positive"]),
+    (
+        "lift =",
+        "left =",
+        22,
+        "gears.left",
+        None,
+        ["no such joint", "did you mean 'lift'", "'turn', 'lift', 'slide'"],
+    ),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "row", "column", "found", "words"), REFUSED)
+def test_refused(
+    tmp_path: Path,
+    old: str,
+    new: str,
+    row: int | None,
+    column: str | None,
+    found: str | None,
+    words: list[str],
+) -> None:
+    assert TOML.count(old) >= 1
+    error = refusal(tmp_path, toml=TOML.replace(old, new, 1))
+    assert error.file == str(tmp_path / "campaign.toml")
+    assert error.found == found
+    require(error, row, column, found, words)
+
+
+def test_no_campaign(tmp_path: Path) -> None:
+    for path in (tmp_path, tmp_path / "campaign.toml"):
+        with pytest.raises(CampaignError) as caught:
+            read_campaign(path)
+        assert caught.value.file == str(tmp_path / "campaign.toml")
+        assert str(caught.value).endswith(
+            "there is no such file, expected campaign.toml, or the directory that holds it"
+        )
+
+
+def test_noise_of_zero_is_not_given(tmp_path: Path) -> None:
+    folder = put(tmp_path / "c")
+    file = folder / "campaign.toml"
+    file.write_text(file.read_text().replace("0.02", "0").replace("3e-5", "0.0"))
+    campaign = read_campaign(folder)
+    assert campaign.noise_position is None
+    assert campaign.noise_orientation is None
+
+
+BARE = """[robot]
+urdf = "{urdf}"
+tool_frame = "tool"
+[measurements]
+file = "t.csv"
+angle_unit = "deg"
+length_unit = "{unit}"
+"""
+
+
+def declared(folder: Path, text: str) -> Declaration:
+    (folder / "campaign.toml").write_text(text)
+    return read_declaration(folder)
+
+
+def test_defaults_of_a_bare_declaration(tmp_path: Path) -> None:
+    settings = declared(tmp_path, BARE.format(urdf="r.urdf", unit="mm")).settings
+    assert settings == Settings("r.urdf", "tool", units=Units("deg", "mm"))
+    assert not settings.base_known
+    assert not settings.tool_known
+    assert settings.reference_temperature == 20.0
+
+
+@pytest.mark.parametrize("reference", ["builtin:rv_m2", "example-robot-data:ur10"])
+def test_a_known_robot_is_no_path_and_a_path_is_beside_the_file(tmp_path: Path, reference: str) -> None:
+    assert declared(tmp_path, BARE.format(urdf=reference, unit="mm")).robot == reference
+    found = declared(tmp_path, BARE.format(urdf="../arm.urdf", unit="mm"))
+    assert found.robot == tmp_path / ".." / "arm.urdf"
+    assert found.table == tmp_path / "t.csv"
+
+
+@pytest.mark.parametrize(("unit", "metres"), [("m", 1.0), ("mm", 1e-3), ("um", 1e-6)])
+def test_every_length_is_in_the_declared_unit(tmp_path: Path, unit: str, metres: float) -> None:
+    more = "[frames]\ntarget = [1, 2, 3]\n[noise]\nposition = 4\norientation = 5\n[payload]\ncom = [6, 7, 8]\n"
+    settings = declared(tmp_path, BARE.format(urdf="r.urdf", unit=unit) + more).settings
+    assert settings.target == pytest.approx([metres, 2 * metres, 3 * metres], rel=1e-15)
+    assert settings.payload_com == pytest.approx([6 * metres, 7 * metres, 8 * metres], rel=1e-15)
+    assert settings.noise_position == pytest.approx(4 * metres)
+    assert settings.noise_orientation == 5.0
+
+
+def test_gears_are_of_joints_of_the_chain(tmp_path: Path) -> None:
+    found = declared(tmp_path, BARE.format(urdf="r.urdf", unit="mm") + "[gears]\nlift = 101\nshoulder = 50\n")
+    check_gears(found, ("lift", "shoulder"))
+    with pytest.raises(CampaignError, match="no such joint") as caught:
+        check_gears(found, ("lift", "elbow"))
+    assert (caught.value.row, caught.value.column) == (10, "gears.shoulder")

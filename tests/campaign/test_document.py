@@ -1,0 +1,103 @@
+"""TOML: syntax, unknown names and wrong kinds of value are refused with their line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+from campaign.spoilt import TOML, refusal, require
+
+from thermal_robot.campaign import read_campaign
+from thermal_robot.campaign.document import Document
+from thermal_robot.errors import CampaignError
+
+# what is replaced, by what, row, column, found, words of the sentence
+REFUSED = [
+    ("[gears]", "[gears", 21, None, None, ["not valid TOML"]),
+    ("base =", "bse =", 11, "frames.bse", None, ["unknown key", "did you mean 'base'", "base, tool, target"]),
+    ("tool_frame", "toolframe", 3, "robot.toolframe", None, ["unknown key", "did you mean 'tool_frame'"]),
+    ("position =", "positon =", 16, "noise.positon", None, ["did you mean 'position'"]),
+    ("[noise]", "[noises]", 15, "noises", None, ["unknown section", "did you mean 'noise'"]),
+    ("[robot]", 'title = "x"\n[robot]', 1, "title", None, ["unknown section or key", "sections robot"]),
+    ("[robot]", "payload = 5\n[robot]", 1, "payload", "5", ["wrong kind of value", "a section [payload]"]),
+    ('"tool"', "6", 3, "robot.tool_frame", "6", ["wrong kind of value", "as text in quotes"]),
+    ('"tool"', '" "', 3, "robot.tool_frame", "' '", ["as text in quotes"]),
+    ("80.0]", "80.0, 1]", 13, "frames.target", "[0.0, 0.0, 80.0, 1]", ["three numbers in brackets"]),
+    ("[0.0, 0.0, 80.0]", '"80"', 13, "frames.target", "'80'", ["three numbers in brackets"]),
+    ("80.0]", "nan]", 13, "frames.target", "[0.0, 0.0, nan]", ["three numbers in brackets"]),
+    ("80.0]", "true]", 13, "frames.target", "[0.0, 0.0, True]", ["three numbers in brackets"]),
+    ("0.02", '"0.02"', 16, "noise.position", "'0.02'", ["wrong kind of value", "a number"]),
+    ("1e-3", "0", 19, "priors.joint_offset", "0", ["expected size of an effect must be positive"]),
+    ("1e-3", "-1e-3", 19, "priors.joint_offset", "-0.001", ["must be positive", "a number above 0"]),
+    ("1e-3", '"small"', 19, "priors.joint_offset", "'small'", ["wrong kind of value", "a number above 0"]),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "row", "column", "found", "words"), REFUSED)
+def test_refused(
+    tmp_path: Path,
+    old: str,
+    new: str,
+    row: int | None,
+    column: str | None,
+    found: str | None,
+    words: list[str],
+) -> None:
+    assert TOML.count(old) >= 1
+    error = refusal(tmp_path, toml=TOML.replace(old, new, 1))
+    assert error.file == str(tmp_path / "campaign.toml")
+    assert error.found == found
+    require(error, row, column, found, words)
+
+
+def test_campaign_toml_in_another_encoding(tmp_path: Path) -> None:
+    (tmp_path / "campaign.toml").write_bytes('tool = "Gerät"'.encode("latin-1"))
+    with pytest.raises(CampaignError, match=r"campaign\.toml: is not UTF-8 text"):
+        read_campaign(tmp_path)
+
+
+def document(folder: Path, text: str) -> Document:
+    file = folder / "campaign.toml"
+    file.write_text(text, encoding="utf-8")
+    return Document(file)
+
+
+def test_lines_are_found_however_a_key_is_written(tmp_path: Path) -> None:
+    text = '# robot\n[ robot ]\n"urdf" = "a.urdf"\n  tool_frame="t"\n\n["gears"]\n\'elbow joint\' = 3\nelbow = 4\n'
+    found = document(tmp_path, text)
+    assert (found.row("robot"), found.row("robot", "urdf"), found.row("robot", "tool_frame")) == (2, 3, 4)
+    assert (found.row("gears"), found.row("gears", "elbow joint"), found.row("gears", "elbow")) == (6, 7, 8)
+    assert found.row("gears", "urdf") is None
+    assert found.row("noise") is None
+
+
+def test_a_section_in_one_line_is_found(tmp_path: Path) -> None:
+    found = document(tmp_path, 'noise = { position = 0.1 }\nrobot.urdf = "a.urdf"\n')
+    assert found.row("noise") == 1
+    assert found.number("noise", "position", 0.0) == 0.1
+    assert found.string("robot", "urdf") == "a.urdf"
+
+
+def test_what_is_absent_has_its_default(tmp_path: Path) -> None:
+    found = document(tmp_path, "[robot]\n")
+    assert found.string("robot", "root_frame", None) is None
+    assert found.word("frames", "base", ("unknown", "known"), "unknown") == "unknown"
+    assert found.number("robot", "reference_temperature", 20.0) == 20.0
+    assert found.size("noise", "position") == 0.0
+    assert found.vector("robot", "gravity", None) is None
+    assert found.positive("gears") == {}
+    with pytest.raises(CampaignError, match="is missing") as caught:
+        found.string("robot", "urdf")
+    assert (caught.value.row, caught.value.column) == (1, "robot.urdf")
+
+
+def test_numbers_are_floats_and_no_others_pass(tmp_path: Path) -> None:
+    found = document(tmp_path, "[robot]\ngravity = [0, 0, -9]\nreference_temperature = 21\n[gears]\na = 100\n")
+    assert found.vector("robot", "gravity", None) == (0.0, 0.0, -9.0)
+    assert type(found.number("robot", "reference_temperature", 0.0)) is float
+    assert found.positive("gears") == {"a": 100.0}
+    for wrong in ("true", "inf", "nan", '"21"'):
+        with pytest.raises(CampaignError, match="a number"):
+            document(tmp_path, f"[robot]\nreference_temperature = {wrong}\n").number(
+                "robot", "reference_temperature", 0.0
+            )

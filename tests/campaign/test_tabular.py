@@ -1,0 +1,181 @@
+"""Dialects of CSV, Parquet and data frames: the same numbers and rows; files that are no table."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from campaign.files import ROWS as WHOLE
+from campaign.files import add, put
+from campaign.spoilt import ROWS, TOML, refusal, renamed, require
+
+from thermal_robot.campaign import read_campaign
+from thermal_robot.campaign.tabular import table_from_frame
+from thermal_robot.errors import CampaignError
+
+SEMICOLONS = WHOLE.replace(",", ";").replace("1000", "1000,25")
+
+
+@pytest.mark.parametrize(
+    "data",
+    [
+        pytest.param(b"\xef\xbb\xbf" + WHOLE.encode(), id="byte-order mark"),
+        pytest.param(WHOLE.replace("\n", "\r\n").encode(), id="Windows line ends"),
+        pytest.param(WHOLE.replace("\n", "\r").encode(), id="old Mac line ends"),
+        pytest.param(WHOLE.replace(",", "\t").encode(), id="tabs"),
+        pytest.param(WHOLE.replace(",", ";").encode(), id="semicolons"),
+        pytest.param(WHOLE.replace(",", " , ").encode(), id="blanks around everything"),
+        pytest.param(WHOLE.replace("\n", ",\n").encode(), id="separator at the end of each line"),
+        pytest.param((WHOLE + "\n,,,,,,\n\n").encode(), id="empty lines at the end"),
+        pytest.param(WHOLE.replace("x", '"x"').encode(), id="quotes"),
+        pytest.param(WHOLE.replace("-", "−").encode(), id="typographic minus"),
+        pytest.param(WHOLE.encode("utf-16"), id="UTF-16"),
+    ],
+)
+def test_same_numbers(tmp_path: Path, data: bytes) -> None:
+    plain, other = read_campaign(put(tmp_path / "a")), read_campaign(put(tmp_path / "b", data))
+    np.testing.assert_array_equal(plain.q, other.q)
+    np.testing.assert_array_equal(plain.position, other.position)
+    assert other.warnings == ()
+
+
+@pytest.mark.parametrize("separator", [";", "\t"])
+def test_decimal_commas(tmp_path: Path, separator: str) -> None:
+    campaign = read_campaign(put(tmp_path / "c", SEMICOLONS.replace(";", separator)))
+    assert campaign.position[0, 0] == pytest.approx(1.00025)
+
+
+def test_labels_keep_their_commas(tmp_path: Path) -> None:
+    table = WHOLE.replace(",", ";").replace("z", "z;session", 1)
+    table = table.replace("500\n", "500.5;1,5\n").replace("510\n", "510;b\n").replace("520\n", "520;\n")
+    campaign = read_campaign(put(tmp_path / "c", table))
+    assert campaign.labels["session"].tolist() == ["1,5", "b", ""]
+    assert campaign.position[0, 2] == pytest.approx(0.5005)
+
+
+def test_rows_are_counted_as_an_editor_does(tmp_path: Path) -> None:
+    assert read_campaign(put(tmp_path / "c", WHOLE.replace("\n-10", "\n\n-10"))).rows.tolist() == [2, 4, 5]
+
+
+def test_a_label_over_two_lines_does_not_shift_the_count(tmp_path: Path) -> None:
+    table = WHOLE.replace("z\n", "z,session\n").replace("500\n", '500,"two\nlines"\n')
+    table = table.replace("510\n", "510,b\n").replace("520\n", "520,c\n")
+    assert read_campaign(put(tmp_path / "c", table)).rows.tolist() == [2, 4, 5]
+
+
+def test_windows_code_page_is_accepted_with_a_warning(tmp_path: Path) -> None:
+    campaign = read_campaign(put(tmp_path / "c", add(WHOLE, session="früh spät spät").encode("cp1252")))
+    assert campaign.labels["session"].tolist() == ["früh", "spät", "spät"]
+    assert "Windows-1252" in campaign.warnings[0]
+
+
+@pytest.mark.parametrize("ending", ["parquet", "pq"])
+def test_parquet(tmp_path: Path, ending: str) -> None:
+    pytest.importorskip("pyarrow")
+    folder = put(tmp_path / "c")
+    plain = read_campaign(folder)
+    frame = pd.read_csv(folder / "measurements.csv").set_index("turn")
+    frame.to_parquet(folder / f"measurements.{ending}")
+    file = folder / "campaign.toml"
+    file.write_text(file.read_text().replace("measurements.csv", f"measurements.{ending}"))
+    campaign = read_campaign(folder)
+    np.testing.assert_array_equal(plain.q, campaign.q)
+    assert campaign.rows.tolist() == [2, 3, 4]
+
+
+# table, row, column, found, words of the sentence
+REFUSED = [
+    ("", None, None, None, ["is empty"]),
+    ("\n \n", None, None, None, ["is empty"]),
+    (ROWS.split("\n")[0], None, None, None, ["has a header but no rows", "one row per measurement"]),
+    (renamed(note="x"), 1, "x", "it 2 times", ["duplicate column", "every column once"]),
+    (renamed(note=""), 1, None, "column 9 without one", ["a column has no name"]),
+    (ROWS.replace(",2,8", ",2"), 3, None, "8", ["wrong number of fields", "9 as in the header"]),
+    (ROWS.replace(",2,8", ",2,8,9"), 3, None, "10", ["wrong number of fields", "9 as in the header"]),
+    (ROWS.replace(",2,8", ',"2,8'), 3, None, "8", ["wrong number of fields"]),
+    (b"PK\x03\x04...", None, None, None, ["is a workbook", "saved as CSV or Parquet"]),
+    (b"PAR1...", None, None, None, ["Parquet file by its contents", "ends in .parquet"]),
+    (
+        ROWS.replace("900", "9" * 200_000),
+        3,
+        None,
+        None,
+        ["cannot be read as CSV", "field larger than field limit"],
+    ),
+]
+
+
+@pytest.mark.parametrize(("table", "row", "column", "found", "words"), REFUSED)
+def test_refused(
+    tmp_path: Path,
+    table: str | bytes,
+    row: int | None,
+    column: str | None,
+    found: str | None,
+    words: list[str],
+) -> None:
+    error = refusal(tmp_path, table=table)
+    assert error.file == str(tmp_path / "measurements.csv")
+    require(error, row, column, found, words)
+
+
+def test_no_table(tmp_path: Path) -> None:
+    error = refusal(tmp_path, toml=TOML.replace("measurements.csv", "monday.csv"))
+    assert error.file == str(tmp_path / "monday.csv")
+    assert "there is no such file" in str(error)
+    error = refusal(tmp_path, toml=TOML.replace("measurements.csv", "."))
+    assert "is a directory" in str(error)
+
+
+def test_parquet_without_pyarrow(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    (tmp_path / "t.parquet").write_bytes(b"PAR1")
+
+    def missing(*_: object, **__: object) -> None:
+        raise ImportError("pyarrow")
+
+    monkeypatch.setattr(pd, "read_parquet", missing)
+    error = refusal(tmp_path, toml=TOML.replace("measurements.csv", "t.parquet"))
+    assert error.file == str(tmp_path / "t.parquet")
+    assert 'pip install "thermal-robot[parquet]"' in str(error)
+
+
+def test_broken_parquet(tmp_path: Path) -> None:
+    pytest.importorskip("pyarrow")
+    (tmp_path / "t.parquet").write_bytes(b"PAR1")
+    error = refusal(tmp_path, toml=TOML.replace("measurements.csv", "t.parquet"))
+    assert "cannot be read as a Parquet file" in str(error)
+
+
+def test_a_frame_keeps_its_own_rows_or_counts_them_as_a_file() -> None:
+    frame = pd.DataFrame({" a ": [1, 2], "b": ["x", None]}, index=[7, 3])
+    table = table_from_frame(frame)
+    assert list(table.columns) == ["a", "b"]
+    assert (table.rows.tolist(), table.header) == ([7, 3], None)
+    assert table.text("b") == ["x", ""]
+    as_file = table_from_frame(frame, "t.parquet", first_row=2)
+    assert (as_file.rows.tolist(), as_file.header) == ([2, 3], 1)
+    frame.index = [4, 4]  # two rows of one number cannot be told apart
+    assert table_from_frame(frame).rows.tolist() == [0, 1]
+
+
+@pytest.mark.parametrize(
+    ("frame", "words"),
+    [
+        (pd.DataFrame({"a": []}), "has a header but no rows"),
+        (pd.DataFrame([[1, 2]], columns=["a", "a "]), "duplicate column"),
+        (pd.DataFrame([[1, 2]], columns=["a", " "]), "a column has no name"),
+    ],
+)
+def test_a_frame_that_is_no_table(frame: pd.DataFrame, words: str) -> None:
+    with pytest.raises(CampaignError, match=words) as caught:
+        table_from_frame(frame)
+    assert caught.value.file == "<table>"
+
+
+def test_nullable_numbers_of_pandas_are_numbers() -> None:
+    frame = pd.DataFrame({"a": pd.array([1, None], dtype="Int64"), "b": [True, False]})
+    table = table_from_frame(frame)
+    np.testing.assert_array_equal(table.numbers("a", gaps=True), [1.0, np.nan])
+    assert table.numbers("b").tolist() == [1.0, 0.0]

@@ -1,0 +1,87 @@
+"""The units of a file and of what is kept: one scale and one word for every column."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+
+import numpy as np
+import pytest
+from campaign.files import URDF, full
+
+from thermal_robot.campaign import Units, unit_of
+from thermal_robot.campaign.units import covariate_scale
+from thermal_robot.errors import CampaignError
+from thermal_robot.robot import Robot, load_robot
+
+
+@pytest.fixture(scope="module")
+def robot() -> Robot:
+    return load_robot(URDF, "tool")
+
+
+@pytest.mark.parametrize(
+    ("column", "si", "file"),
+    [
+        ("turn", "rad", "deg"),
+        ("slide", "m", "mm"),
+        ("roll", "rad", "deg"),
+        ("x", "m", "mm"),
+        ("sim.z", "m", "mm"),
+        ("qw", "", ""),
+        ("sim.qw", "", ""),
+        ("time", "s", "s"),
+        ("order", "", ""),
+        ("speed", "", ""),
+        ("temperature", "°C", "°C"),
+        ("temperature.beam", "°C", "°C"),
+        ("payload", "kg", "kg"),
+        ("approach.lift", "", ""),
+        ("approach.slide", "", ""),
+        ("velocity.lift", "rad/s", "deg/s"),
+        ("velocity.slide", "m/s", "mm/s"),
+        ("acceleration.roll", "rad/s²", "deg/s²"),
+        ("acceleration.slide", "m/s²", "mm/s²"),
+        ("encoder.turn", "rad", "deg"),
+        ("encoder.slide", "m", "mm"),
+        ("torque.lift", "N·m", "N·m"),
+        ("torque.slide", "N", "N"),
+        # not defined by the format: nobody knows
+        ("humidity", "", ""),
+        ("velocity", "", ""),
+        ("velocity.grip", "", ""),
+        ("grip", "", ""),
+        ("time.start", "", ""),
+    ],
+)
+def test_every_column_has_its_unit(robot: Robot, column: str, si: str, file: str) -> None:
+    assert unit_of(column, robot) == si
+    assert unit_of(column, robot, Units("deg", "mm")) == file
+
+
+FACTORS = {"deg": math.pi / 180, "mm": 1e-3, "um": 1e-6}
+
+
+@pytest.mark.parametrize("units", [Units("deg", "mm"), Units("rad", "um"), Units()])
+def test_the_scale_is_the_ratio_of_the_two_units(robot: Robot, tmp_path: Path, units: Units) -> None:
+    for column in full(tmp_path / "c").covariates:
+        word = unit_of(column, robot, units).partition("/")[0]
+        assert covariate_scale(column, robot, units) == pytest.approx(FACTORS.get(word, 1.0), rel=1e-15)
+
+
+def test_a_joints_scale_is_that_of_its_kind() -> None:
+    units = Units("deg", "um")
+    assert np.rad2deg(units.joint_scale("revolute")) == pytest.approx(1.0)
+    assert units.joint_scale("continuous") == units.joint_scale("revolute") == units.angle_scale
+    assert units.joint_scale("prismatic") == units.length_scale == 1e-6
+    assert [units.joint_unit(kind) for kind in ("revolute", "continuous", "prismatic")] == ["deg", "deg", "um"]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "column", "found"),
+    [(("grad", "m"), "angle_unit", "'grad'"), (("rad", "inch"), "length_unit", "'inch'")],
+)
+def test_other_words_are_refused(arguments: tuple[str, str], column: str, found: str) -> None:
+    with pytest.raises(CampaignError, match="unknown unit") as caught:
+        Units(*arguments)
+    assert (caught.value.column, caught.value.found) == (column, found)

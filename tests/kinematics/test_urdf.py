@@ -1,0 +1,86 @@
+"""URDF text to Pinocchio: what a URDF may contain, why another fails, and that nobody hears of it on the terminal."""
+
+import os
+
+import pytest
+
+from thermal_robot.errors import RobotError
+from thermal_robot.kinematics.urdf import mimic_joints, nearest, parse_urdf
+
+LIMIT = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
+
+
+def two_links(more="", limit=LIMIT):
+    return f"""<robot name="two"><link name="a"/><link name="b"/>
+<joint name="j" type="revolute"><parent link="a"/><child link="b"/><axis xyz="0 0 1"/>{limit}</joint>
+{more}</robot>"""
+
+
+# Each is taken by urdfdom, and refused by a strict XML parser.
+LENIENT = ['<xacro:leftover name="x"/>', "<!-- lengths -- from the data sheet -->", '<gazebo:plugin file="p.so"/>']
+
+
+def reason(text):
+    with pytest.raises(RobotError) as caught:
+        parse_urdf(text, "arm.urdf")
+    return str(caught.value)
+
+
+@pytest.mark.parametrize("more", ["", *LENIENT])
+def test_a_urdf_in_use_is_parsed(more):
+    model = parse_urdf(two_links(more), "arm.urdf")
+    assert (model.name, list(model.names)) == ("two", ["universe", "j"])
+
+
+@pytest.mark.parametrize("more", ["", "<!-- lengths -- from the data sheet -->", '<gazebo:plugin file="p.so"/>'])
+def test_the_reason_is_what_urdfdom_stumbled_over(more):
+    """And not what a strict parser would have: the text without a limit is wrong whatever stands behind it."""
+    assert reason(two_links(more, limit="")) == (
+        "arm.urdf is not a valid URDF: Joint [j] is of type REVOLUTE but it does not specify limits"
+    )
+
+
+def test_a_xacro_tag_in_a_comment_makes_no_xacro_file():
+    assert "does not specify limits" in reason(two_links("<!-- was <xacro:arm/> -->", limit=""))
+    assert "is a xacro file" in reason(two_links("<xacro:arm/>", limit=""))
+
+
+def test_broken_xml_is_found_in_its_line():
+    text = "<robot name='r'>\n<!-- two\nlines -->\n<link name='a'>\n</robot>"
+    assert reason(text) == "arm.urdf is not XML: mismatched tag: line 5, column 2"
+
+
+def test_nothing_but_a_comment_is_empty():
+    assert reason("<!-- to do -->") == "arm.urdf is empty"
+
+
+def test_what_a_library_prints_is_kept_off_the_terminal_and_the_streams_come_back(capfd):
+    reason(two_links(limit=""))
+    os.write(1, b"out")
+    os.write(2, b"err")
+    assert capfd.readouterr() == ("out", "err")
+
+
+@pytest.mark.parametrize(
+    ("text", "found"),
+    [
+        ('<joint name="j" type="revolute"><mimic joint="k"/></joint>', {"j"}),
+        ("<joint type='revolute' name='j'>\n<mimic joint='k' multiplier='-1'/>\n</joint>", {"j"}),
+        ('<joint name="j"></joint><joint name="k"><mimic joint="j"/></joint>', {"k"}),
+        ('<joint name="j"/><joint name="k"><mimic joint="j"/></joint>', {"k"}),
+        ('<joint name="j"><!-- <mimic joint="k"/> --></joint>', set()),
+        ('<joint name="j"><!-- -- --><mimic joint="k"/></joint>', {"j"}),
+        ('<joint_states name="j"><mimic joint="k"/></joint_states>', set()),
+        ('<joint name="j"><mimicry/></joint>', set()),
+    ],
+)
+def test_mimicking_joints_are_found_in_any_dress(text, found):
+    assert mimic_joints(f'<robot name="r">{text}</robot>') == found
+
+
+def test_the_most_similar_names_come_first():
+    known = ["base_link", "tool0", "Tool_0", "wrist", "elbow", "shoulder", "flange"]
+    assert nearest("tool_0", known)[0] == "Tool_0"
+    assert nearest("TOOL0", known)[0] == "tool0"
+    assert len(nearest("tool0", known)) == 5
+    assert nearest("tool0", ["a"]) == ("a",)

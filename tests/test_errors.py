@@ -1,0 +1,76 @@
+"""What the program raises on purpose: one root, a sentence with the place, and data that survive a journey."""
+
+import copy
+import pickle
+
+import pytest
+
+from thermal_robot import errors
+from thermal_robot.errors import CampaignError, RobotError, ThermalRobotError
+
+KINDS = [kind for kind in vars(errors).values() if isinstance(kind, type) and issubclass(kind, Exception)]
+RAISED = [
+    RobotError("no link 'tol'", name="tol", candidates=["tool", "tool0"]),
+    CampaignError("t.csv", "a value is missing", row=3, column="x", found="''", expected="a number"),
+    CampaignError("t.csv", "is empty"),
+    errors.EffectError("no effect 'drif'"),
+    errors.EstimationError("too few rows"),
+    errors.SealError("these answers were changed"),
+]
+
+
+def test_there_is_one_root():
+    assert len(KINDS) == 6
+    assert all(issubclass(kind, ThermalRobotError) for kind in KINDS)
+    assert not issubclass(ThermalRobotError, (ValueError, OSError))  # caught by nobody who means something else
+
+
+def test_every_kind_is_tried_here():
+    assert {type(error) for error in RAISED} == set(KINDS) - {ThermalRobotError}
+
+
+@pytest.mark.parametrize("again", [lambda e: pickle.loads(pickle.dumps(e)), copy.copy, copy.deepcopy])
+@pytest.mark.parametrize("error", RAISED, ids=lambda e: type(e).__name__)
+def test_an_error_crosses_processes_with_all_that_it_carries(error, again):
+    other = again(error)
+    assert type(other) is type(error)
+    assert str(other) == str(error)
+    assert vars(other) == vars(error)
+
+
+def test_a_users_own_error_crosses_too():
+    error = pickle.loads(pickle.dumps(OwnError(1.5)))
+    assert (str(error), error.size) == ("of size 1.5", 1.5)
+
+
+class OwnError(ThermalRobotError):
+    """A constructor that the message alone would not satisfy."""
+
+    def __init__(self, size):
+        super().__init__(f"of size {size}")
+        self.size = size
+
+
+@pytest.mark.parametrize(
+    ("place", "sentence"),
+    [
+        ({}, "t.csv: is odd"),
+        ({"row": 3}, "t.csv, row 3: is odd"),
+        ({"column": "x"}, "t.csv, column 'x': is odd"),
+        ({"row": 0, "column": "x"}, "t.csv, row 0, column 'x': is odd"),
+        ({"found": "7"}, "t.csv: is odd; found 7"),
+        ({"expected": "8"}, "t.csv: is odd, expected 8"),
+        ({"row": 2, "found": "", "expected": "8"}, "t.csv, row 2: is odd; found , expected 8"),
+    ],
+)
+def test_the_sentence_names_what_is_known_and_no_more(place, sentence):
+    error = CampaignError("t.csv", "is odd", **place)
+    assert str(error) == sentence
+    for name in ("row", "column", "found", "expected"):
+        assert getattr(error, name) == place.get(name)
+
+
+def test_a_robots_error_names_what_offends_and_what_would_do():
+    error = RobotError("no such link", name="tol", candidates=iter(["tool"]))
+    assert (str(error), error.name, error.candidates) == ("no such link", "tol", ("tool",))
+    assert (RobotError("odd").name, RobotError("odd").candidates) == ("", ())

@@ -1,0 +1,118 @@
+"""The units of a file, what they are in SI, and the unit in which every recorded quantity is kept."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+
+from thermal_robot.campaign.names import PER_JOINT, PER_LINK, POSITION, SIMULATED_POSITION, split_name
+from thermal_robot.errors import CampaignError
+from thermal_robot.robot import Robot
+
+ANGLE_UNITS: dict[str, float] = {"rad": 1.0, "deg": math.pi / 180.0}
+"""Radians in one of the unit."""
+LENGTH_UNITS: dict[str, float] = {"m": 1.0, "mm": 1e-3, "um": 1e-6}
+"""Metres in one of the unit."""
+
+_OF_ITS_OWN = {"time": "s", "temperature": "°C", "payload": "kg"}
+"""Quantities whose unit neither the file nor a joint chooses."""
+_OF_A_JOINT = {"velocity": "{}/s", "acceleration": "{}/s²", "encoder": "{}"}
+"""Quantities in the unit of their joint's own column."""
+
+
+@dataclass(frozen=True)
+class Units:
+    """The units of a file. SI value = value in the file × scale.
+
+    Parameters
+    ----------
+    angle
+        ``"rad"`` or ``"deg"``.
+    length
+        ``"m"``, ``"mm"`` or ``"um"``.
+
+    Raises
+    ------
+    CampaignError
+        A word that is not one of these.
+    """
+
+    angle: str = "rad"
+    length: str = "m"
+
+    def __post_init__(self) -> None:
+        for key, word, allowed in (
+            ("angle_unit", self.angle, ANGLE_UNITS),
+            ("length_unit", self.length, LENGTH_UNITS),
+        ):
+            if word not in allowed:
+                raise CampaignError(
+                    "<units>", "unknown unit", column=key, found=repr(word), expected=" or ".join(allowed)
+                )
+
+    @property
+    def angle_scale(self) -> float:
+        """Radians per angle unit."""
+        return ANGLE_UNITS[self.angle]
+
+    @property
+    def length_scale(self) -> float:
+        """Metres per length unit."""
+        return LENGTH_UNITS[self.length]
+
+    def joint_scale(self, joint_type: str) -> float:
+        """Radians, or metres for a prismatic joint, per unit of its column."""
+        return self.length_scale if joint_type == "prismatic" else self.angle_scale
+
+    def joint_unit(self, joint_type: str) -> str:
+        """Word for the unit of a joint's column."""
+        return self.length if joint_type == "prismatic" else self.angle
+
+
+SI = Units()
+"""What everything is in once it has been read."""
+
+
+def unit_of(column: str, robot: Robot, units: Units = SI) -> str:
+    """Say in which unit a column of the table is.
+
+    Parameters
+    ----------
+    column
+        Its name: a joint of the chain, ``x``, ``sim.x``, or a covariate such as ``velocity.<joint>``.
+    robot
+        The chain: joints that turn are in rad, prismatic ones in m.
+    units
+        Of the file; SI where absent, the unit of the values of a :class:`~thermal_robot.campaign.Campaign`.
+
+    Returns
+    -------
+    str
+        Empty for a number without a unit (a direction of approach, a share of the speed, an order, part of a
+        quaternion) and for a column that the format does not define.
+    """
+    if column in robot.joint_names:
+        return units.joint_unit(_joint_type(column, robot))
+    if column in (*POSITION, *SIMULATED_POSITION):
+        return units.length
+    quantity, place = split_name(column)
+    if quantity not in PER_JOINT:
+        return _OF_ITS_OWN.get(quantity if quantity in PER_LINK else column, "")
+    if place not in robot.joint_names:
+        return ""
+    kind = _joint_type(place, robot)
+    if quantity == "torque":
+        return "N" if kind == "prismatic" else "N·m"
+    return _OF_A_JOINT.get(quantity, "").format(units.joint_unit(kind))
+
+
+def covariate_scale(column: str, robot: Robot, units: Units) -> float:
+    """SI value of one unit of a covariate's column; 1 where it is in SI, in °C, or as given."""
+    quantity, place = split_name(column)
+    if quantity in _OF_A_JOINT and place in robot.joint_names:
+        return units.joint_scale(_joint_type(place, robot))
+    return 1.0
+
+
+def _joint_type(joint: str, robot: Robot) -> str:
+    return robot.joint_types[robot.joint_names.index(joint)]
