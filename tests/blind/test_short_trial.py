@@ -11,7 +11,7 @@ pytest.importorskip("mujoco", reason='the blind trial needs "thermal-robot[blind
 
 from thermal_robot.blind.plan import SHORT, plan, robots
 from thermal_robot.blind.real import real_cases
-from thermal_robot.blind.report.text import blind_text
+from thermal_robot.blind.report.text import text
 from thermal_robot.blind.score import score
 from thermal_robot.blind.trial import run_trial
 
@@ -49,7 +49,7 @@ def found(tmp_path_factory):
     records = run_trial((*cases, *real), tmp_path_factory.mktemp("trial"), workers=2, sealed=sealed.append)
     assert len(sealed) == 1
     plain = score([record for record in records if "withdrawn" not in record]).to_dict()
-    print(f"\nseed {seed}\n{blind_text(plain)}")
+    print(f"\nseed {seed}\n{text(plain)}")
     return {kind["kind"]: kind for kind in plain["kinds"]}
 
 
