@@ -36,7 +36,9 @@ def asked(monkeypatch):
             progress("diagnoses", done, 40)
         if found.get("stop"):
             raise KeyboardInterrupt
-        return [{"id": c.id} for c in cases]
+        reasons = found.get("withdrawn", {})
+        withdrawn = {name: {"kind": "null", "withdrawn": why} for name, why in reasons.items()}
+        return [{"id": c.id, **withdrawn.get(c.id, {})} for c in cases]
 
     def score(records):
         return SimpleNamespace(to_dict=lambda: {"right": len(records)})
@@ -119,6 +121,14 @@ def test_the_score_is_written_as_asked(run, tmp_path):
     assert json.loads(out) == {"right": 2}
     assert SEAL in err
     assert run("--markdown")[1] == "| 2 |\n"
+
+
+def test_cases_that_were_not_asked_are_told_and_not_scored(run, asked):
+    asked["withdrawn"] = {"c2": "no draw shows the fault"}
+    status, out, err = run("--seed", 1)
+    assert status == 0
+    assert out.endswith("1 right\n")
+    assert "thermal-robot: note: c2 (null) was not asked: no draw shows the fault" in err
 
 
 @pytest.mark.parametrize(

@@ -179,18 +179,32 @@ ELBOW = {"kind": "joint", "name": "elbow_joint"}
 SLIP = {"places": [ELBOW], "quantities": ["time", "order"]}
 
 
-def test_lost_motion_of_a_real_arm_is_named_and_measured(ur5):
-    campaign = faults.with_approaches(ur5)
+def with_lost_motion(campaign):
+    campaign = faults.with_approaches(campaign)
     side = campaign.covariates["approach.elbow_joint"]
-    campaign = faults.with_joint_error(campaign, 2, -0.5 * 1e-3 * side)
-    truth = {"parts": {"backlash": {"places": [ELBOW], "size": 1e-3}}}
-    answer = judged("backlash", {"said": diagnose(campaign).to_dict(), "truth": truth}, None, 1e-4)
+    return faults.with_joint_error(campaign, 2, -0.5 * 1e-3 * side)
+
+
+LOST = {"parts": {"backlash": {"places": [ELBOW], "size": 1e-3}}}
+
+
+def test_lost_motion_among_a_hundred_rows_of_a_real_arm_is_named_and_measured(ur5):
+    campaign = with_lost_motion(ur5.take(np.arange(100)))
+    found = diagnose(campaign, only=["geometric", "backlash"]).to_dict()
+    answer = judged("backlash", {"said": found, "truth": LOST}, None, 1e-4)
+    assert answer[0], answer[1]
+
+
+@pytest.mark.slow
+def test_lost_motion_of_a_real_arm_is_named_and_measured(ur5):
+    answer = judged("backlash", {"said": diagnose(with_lost_motion(ur5)).to_dict(), "truth": LOST}, None, 1e-4)
     assert answer[0], answer[1]
     # without anything put in there is none at that joint
     alone = diagnose(faults.with_approaches(ur5)).to_dict()
-    assert not judged("backlash", {"said": alone, "truth": truth}, None, 1e-4)[0]
+    assert not judged("backlash", {"said": alone, "truth": LOST}, None, 1e-4)[0]
 
 
+@pytest.mark.slow
 def test_a_slip_of_a_real_arm_is_placed(ur5):
     step = 1e-3 * (np.arange(300) >= 140)
     campaign = replace(faults.with_joint_error(ur5, 2, step), name="slip")

@@ -82,3 +82,24 @@ def test_judge_of_what_is_left_on_fresh_rows():
     assert right("later", said(), {}, 1.2e-4)
     assert not right("later", said(), {}, 1.3e-4)
     assert not right("later", said(), {}, 0.4e-4)
+
+
+def test_the_answer_is_told_in_short_words():
+    after = {"rms_after": 1.2e-4}
+    record = {"said": said(["geometric"]), "truth": {}, "fresh": after}
+    assert judged("nothing", record, None, 1e-4) == (False, "geometric; leaves 0.120 mm, README 0.100 mm")
+    assert judged("later", record, None, 1e-4)[1] == "geometric; claims 0.100 mm, reaches 0.120 mm"
+    assert judged("offset", record, None, 1e-4) == (False, "geometric; leaves 0.120 mm, no control")
+    assert judged("offset", record, {"fresh": after}, 1e-4)[1] == "geometric; leaves 0.120 mm, control 0.120 mm"
+    assert judged("nothing", {**record, "fresh": None}, None, 1e-4) == (False, "geometric; nothing predicted")
+    slip = judged("slip", {**record, "said": said(), "truth": SLIP}, None, 1e-4)
+    assert slip == (False, "no effect; not flagged: elbow_joint, order")
+    assert judged("backlash", {"said": lost(0.9e-3), "truth": LOST}, None, 1e-4) == (
+        True, "geometric backlash; backlash first at elbow_joint, 0.9 mrad at elbow_joint",
+    )  # fmt: skip
+
+
+def test_no_diagnosis_is_no_right_answer():
+    for fault in ("nothing", "offset", "scale", "backlash", "slip", "temperature", "hidden", "later"):
+        assert judged(fault, {"said": None, "truth": {}, "error": "late"}, None, 1e-4) == (False, "late")
+        assert judged(fault, {"said": None, "truth": {}}, None, 1e-4) == (False, "no diagnosis")
