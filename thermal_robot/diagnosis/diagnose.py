@@ -14,14 +14,14 @@ from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.diagnosis.cautions import cautions, usable
 from thermal_robot.diagnosis.discovery import Discoveries, discoveries
-from thermal_robot.diagnosis.findings import findings, in_order
+from thermal_robot.diagnosis.findings import findings, in_order, separates, titled
 from thermal_robot.diagnosis.held_out import Shrinkage, held_out
+from thermal_robot.diagnosis.parts import Finding, FoldScheme, Gap, Rows
 from thermal_robot.diagnosis.random_gap import STEPS
-from thermal_robot.diagnosis.result import Diagnosis, Finding, Gap, Rows
-from thermal_robot.diagnosis.schemes import FoldScheme, worst_folds
+from thermal_robot.diagnosis.result import Diagnosis, told
+from thermal_robot.diagnosis.schemes import worst_folds
 from thermal_robot.diagnosis.sensitivity import sensitivity
 from thermal_robot.diagnosis.stand_in import DOUBT, stand_ins, trust
-from thermal_robot.diagnosis.verdict import advise, sentence
 from thermal_robot.diagnosis.where import locate
 from thermal_robot.effects import Effect, choose, library
 from thermal_robot.errors import CampaignError
@@ -87,12 +87,11 @@ def diagnose(
     believed = trust({e.name: shares.get(e.name, 0.0) for e, _ in fitted.effects}, doubts, _left(looked, gap))
     systematic = findings(fitted, shrinkage.shares, locations, believed)
     chance = [f for f in _scatter(looked) if f.name not in without and (not only or f.name in only)]
-    found = in_order((*systematic, *chance))
+    found = in_order(titled((*systematic, *chance)))
     order = [f.name for f in found if f.name in {e.name for e, _ in fitted.effects}]
     order += [f.name for f in chance if f.status == "found"]
     probability = min(_probability(fitted), *believed.values(), 1.0)
-    advice, separates = advise(found, unexplained)
-    return Diagnosis(
+    diagnosis = Diagnosis(
         campaign=campaign.name,
         robot=campaign.robot.name,
         tool_frame=campaign.robot.tool_frame,
@@ -106,17 +105,17 @@ def diagnose(
         unexplained=unexplained,
         verdict=tuple(order),
         probability=probability,
-        summary=sentence(
-            gap, found, order, probability, unexplained, looked.remaining, reach=_reach(campaign), narrowed=narrowed
-        ),
-        advice=advice,
-        separates=separates,
+        separates=separates(found),
         model=_model(fitted),
         rows=_rows(fitted, shrinkage),
         warnings=(*campaign.warnings, *notes, *cautions(fitted, candidates if narrowed else (), doubts)),
         sensitivity=sensitivity(fitted),
         fit=fitted,
+        remaining=looked.remaining,
+        reach=_reach(campaign),
+        narrowed=narrowed,
     )
+    return told(diagnosis)
 
 
 def _scatter(looked: Discoveries) -> tuple[Finding, ...]:

@@ -7,9 +7,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from thermal_robot.diagnosis.parts import Dependence, Location, Unexplained
 from thermal_robot.diagnosis.random_gap import RandomGap, random_gap
 from thermal_robot.diagnosis.remainder import examine
-from thermal_robot.diagnosis.result import Dependence, Location, Unexplained
 from thermal_robot.diagnosis.schemes import worse_elsewhere
 from thermal_robot.effects import Effect
 from thermal_robot.effects.law import PREFIX, Discovered

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from thermal_robot.diagnosis.discovery import is_law
-from thermal_robot.diagnosis.result import Estimate, Finding, Location, Status
+from thermal_robot.diagnosis.parts import Estimate, Finding, Location, Status, is_frame
+from thermal_robot.effects import RANDOM
 from thermal_robot.effects.law import Discovered
 from thermal_robot.inference.explain import Explanation
 from thermal_robot.inference.fit import Fit
@@ -66,6 +68,31 @@ def findings(
         )
     result += [Finding(name, "not_testable", needs=needs) for name, needs in fit.needs.items()]
     return tuple(result)
+
+
+_TITLES = {
+    "base_frame": "a misplaced base frame",
+    "tool_frame": "a misplaced tool frame",
+    "joint_offset": "joint zero offsets",
+    "joint_gain": "joint gain errors",
+    "transmission_error": "periodic transmission errors",
+    "backlash": "lost motion in the joints",
+    "joint_compliance": "joints that yield to load",
+    "tracking_lag": "joints that trail their command",
+    "link_compliance": "links that bend under load",
+    "thermal_bending": "links that bow with heat",
+    "encoder_resolution": "encoders that count in coarse steps",
+    "excess_repeatability": "joints that scatter more than the instrument",
+    "geometric": "geometric errors of the links",
+    "thermal_elongation": "thermal elongation of the links",
+    "drift": "drift of the base or the instrument",
+    "instrument_scale": "a scale error of the instrument",
+}
+
+
+def titled(found: Sequence[Finding]) -> tuple[Finding, ...]:
+    """Return findings with the effects' titles."""
+    return tuple(replace(f, title=f.describes or _TITLES.get(f.name, ""), random=f.name in RANDOM) for f in found)
 
 
 def in_order(found: Sequence[Finding]) -> tuple[Finding, ...]:
@@ -163,3 +190,9 @@ def _estimates(fit: Fit, block: int) -> tuple[Estimate, ...]:
             )
         )
     return tuple(result)
+
+
+def separates(found: Sequence[Finding]) -> tuple[tuple[str, ...], ...]:
+    """Return the groups of effects that the data cannot tell apart; those with an unknown frame only if alone."""
+    groups = tuple(dict.fromkeys(tuple(sorted((f.name, *f.confounded_with))) for f in found if f.confounded_with))
+    return tuple(g for g in groups if len(groups) == 1 or not any(is_frame(found, name) for name in g))

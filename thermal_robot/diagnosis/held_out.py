@@ -10,7 +10,7 @@ from math import factorial
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.diagnosis.result import HeldOut
+from thermal_robot.diagnosis.parts import HeldOut
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference.explain import Noise, explain
 from thermal_robot.inference.fit import Fit, row_groups

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc, fdtrc, ndtr, pdtr
 
 from thermal_robot.diagnosis.laws import smooth_law
-from thermal_robot.diagnosis.result import Dependence, Location, Unexplained
+from thermal_robot.diagnosis.parts import Dependence, Location, Unexplained
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.rows import NEAR, in_a_row, in_order

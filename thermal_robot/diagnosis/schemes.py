@@ -8,12 +8,12 @@ rows set aside are those of the diagnosis; frames and parameters are fitted anew
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign
+from thermal_robot.diagnosis.parts import FoldScheme
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.rows import folds, neighbourhoods
 
@@ -24,36 +24,6 @@ _FOLDS = 5
 _DETERMINED = 1e-9  # of the strongest direction of the frames: weaker ones are not determined
 _WORSE = 1.05
 _LEAST = 0.01  # K: a temperature that varies less does not vary
-
-
-@dataclass(frozen=True)
-class FoldScheme:
-    """How far the gap shrinks when rows are held out in one way.
-
-    Attributes
-    ----------
-    name
-        ``time``, ``session``, ``temperature``, ``region`` or ``reach``.
-    held_out
-        What is held out at a time, in plain words.
-    folds, rows
-        How many folds could be fitted, and how many rows were held out in them.
-    rms_before, rms_after
-        Rms distances of these rows, m: frames alone, and the explanation.
-    shrinkage
-        1 − (rms_after / rms_before)².
-    uncertainty
-        Standard error of rms_after, m: what chance alone makes of it.
-    """
-
-    name: str
-    held_out: str
-    folds: int
-    rows: int
-    rms_before: float
-    rms_after: float
-    shrinkage: float
-    uncertainty: float
 
 
 def worst_folds(fit: Fit) -> tuple[FoldScheme, ...]:

@@ -2,24 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from thermal_robot.diagnosis.parts import Sensitivity
 from thermal_robot.inference.evidence import Search
 from thermal_robot.inference.explain import log_priors
 from thermal_robot.inference.fit import Fit
 
 FACTOR = 3.0
 _COMPARED = 8
-
-
-@dataclass(frozen=True)
-class Sensitivity:
-    """Posterior probability of the verdict's effects were every prior size a third, or three times, what is stated."""
-
-    smaller: float
-    larger: float
 
 
 def sensitivity(fit: Fit) -> Sensitivity:
