@@ -1,6 +1,7 @@
 """Which cases a trial has."""
 
 from collections import Counter
+from dataclasses import replace
 
 import pytest
 
@@ -91,6 +92,13 @@ def test_no_case_asks_what_nobody_could_answer(arms):
         assert case.background > 0.0
         assert case.heavy
         assert case.ratio[0] < 1.0
+
+
+def test_each_robot_is_as_probable_as_any_other(arms):
+    two = (arms[0], replace(arms[0], name="other"))
+    cases = plan(7, {"null": 400}, two)
+    low, high = binom.ppf([1e-5, 1 - 1e-5], 400, 0.5)
+    assert low <= sum(case.robot.name == "other" for case in cases) <= high
 
 
 @pytest.mark.parametrize(

@@ -6,11 +6,12 @@ from collections.abc import Iterable, Iterator, Mapping
 from html import escape
 from typing import Any
 
-from thermal_robot.blind.report.parts import bullets, document, drawn, paragraph, row, section, signature, table
+from thermal_robot.blind.report.parts import row, section, table
 from thermal_robot.blind.report.plots import calibration_figure, confusion_figure, shrinkage_figure
 from thermal_robot.blind.report.plots_power import power_figure
 from thermal_robot.blind.report.words import coefficients, count, facts, interval, kind, miss, needed, question
 from thermal_robot.report import units
+from thermal_robot.report.html_parts import bullets, document, figure, paragraph, signature
 
 Plain = Mapping[str, Any]
 
@@ -43,10 +44,10 @@ def _whole(score: Plain, generated: str) -> Iterator[str]:
         yield section("What was named", *_confusions(score))
     yield from _one_by_one(score)
     said = "How often effects were at work against how probable they were said to be"
-    yield section("Probabilities", drawn(calibration_figure(score), said))
-    power = drawn(power_figure(score), "Share of effects found, by size and by number of rows")
+    yield section("Probabilities", figure(calibration_figure(score), said))
+    power = figure(power_figure(score), "Share of effects found, by size and by number of rows")
     yield section("What it takes to be found", power, *_needed(score["detection"]["curve"]))
-    left = drawn(shrinkage_figure(score), "What stays of the gap: claimed, and reached on fresh samples")
+    left = figure(shrinkage_figure(score), "What stays of the gap: claimed, and reached on fresh samples")
     yield section("How far the gap shrinks", left)
     if score["real"]:
         yield section("Real campaigns", _real(score["real"]))
@@ -69,7 +70,7 @@ def _confusions(score: Plain) -> Iterator[str]:
         "Numbers are cases; the stronger the colour, the larger the share of its row; the right answer is framed."
     )
     for name in score["confusion"]:
-        yield drawn(confusion_figure(score, name), "Truth against what was named first")
+        yield figure(confusion_figure(score, name), "Truth against what was named first")
 
 
 def _one_by_one(score: Plain) -> Iterator[str]:
