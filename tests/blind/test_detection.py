@@ -86,6 +86,6 @@ def test_the_curve_does_not_depend_on_the_unit_of_the_size():
 def test_no_number_of_rows_is_told_where_more_rows_find_less():
     rng = np.random.default_rng(5)
     size, rows = np.exp(rng.uniform(-1.0, 2.0, 400)), np.exp(rng.uniform(3.0, 5.3, 400))
-    curve = logistic(size, rows, np.log(rows) + rng.logistic(0.0, 0.5, 400) < 4.0)
-    assert curve.samples < 0.0
+    curve = logistic(size, rows, np.log(size) - np.log(rows) + rng.logistic(0.0, 0.5, 400) > -3.5)
+    assert curve.samples < 0.0 < curve.ratio
     assert [needed.samples for needed in curve.needed] == [None, None]

@@ -151,6 +151,12 @@ def test_a_slip_starts_once_and_stays(tmp_path):
     assert 0.3 < start / campaign.samples < 0.7
     np.testing.assert_allclose(shift[start:, joint], -part["size"], atol=1e-12)
     assert np.abs(shift[:start]).max() < 1e-12
+    # what the frames leave of it is to be seen beside what a full geometry leaves
+    seen = observe(campaign, faults.registered(campaign))
+    slipped = np.arange(campaign.samples) >= start
+    left = faults.leaves(seen, seen.joint_sensitivity[:, :3, joint] * (part["size"] * slipped)[:, None])
+    assert left == pytest.approx(part["ratio"] * REMAINDERS["ur5_jacobi"], rel=0.1)
+    assert left > REMAINDERS["ur5_jacobi"]
     assert answers["fresh_position"] is None
     assert not (tmp_path / "fresh.csv").exists()
 

@@ -61,5 +61,7 @@ def test_the_order_of_the_records_changes_no_figure():
     one, other = score(trial()).to_dict(), score(trial()[::-1]).to_dict()
     for name in ("cases", "failed", "kinds", "by_effect", "by_robot", "removed", "unlisted", "confusion"):
         assert one[name] == other[name], name
+    for name in ("by_effect", "by_robot", "removed", "unlisted"):
+        assert list(one[name]) == sorted(one[name])
     assert one["detection"]["table"] == other["detection"]["table"]
     assert {m["id"] for m in one["misses"]} == {m["id"] for m in other["misses"]}

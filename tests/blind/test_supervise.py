@@ -75,6 +75,17 @@ def test_who_stops_asking_ends_all_examinees(trial):
     assert not [pid for _, pid in told(trial) if alive(int(pid))]
 
 
+def test_who_stops_asking_has_nobody_else_started(trial, monkeypatch):
+    started = []
+    command = supervise.command
+    monkeypatch.setattr(supervise, "command", lambda directory: started.append(directory) or command(directory))
+    replies = examine(asked(trial, "", "hang", "hang", "hang"), trial, workers=1, timeout=100.0)
+    next(replies)
+    replies.close()
+    assert len(started) == 1
+    assert {name for name, _ in told(trial)} <= {"c0", "c1"}
+
+
 def test_an_examinee_that_does_not_start_is_the_fault_of_no_campaign(trial, monkeypatch):
     monkeypatch.setattr(supervise, "command", lambda _: [sys.executable, "-c", "raise SystemExit('no such library')"])
     with pytest.raises(RuntimeError, match="does not start: the process ended with status 1: no such library"):
