@@ -2,11 +2,16 @@
 
 from __future__ import annotations
 
+import os
+import sys
+from concurrent.futures import Executor, Future
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 from simulate import simulate
 
+from thermal_robot.blind import supervise
 from thermal_robot.blind.cases import Case, RobotChoice
 from thermal_robot.campaign.write import write_campaign, write_table
 from thermal_robot.errors import CampaignError
@@ -84,3 +89,35 @@ class Real:
 def rms(a, b):
     """Root mean square of the distance, in words of its own."""
     return np.sqrt(np.mean(np.linalg.norm(np.subtract(a, b), axis=1) ** 2))
+
+
+def put_examinee(monkeypatch, folder):
+    """Let :data:`FAKE_EXAMINEE` be asked instead of the program; return the directory for a trial."""
+    script = folder / "fake.py"
+    script.write_text(FAKE_EXAMINEE)
+    monkeypatch.setattr(supervise, "command", lambda directory: [sys.executable, str(script), str(directory)])
+    return folder / "trial"
+
+
+def alive(pid):
+    """Tell whether a process still runs."""
+    try:
+        os.kill(pid, 0)
+    except ProcessLookupError:
+        return False
+    return Path(f"/proc/{pid}/stat").read_text().split()[2] != "Z" if Path("/proc").is_dir() else True
+
+
+class AtOnce(Executor):
+    """Make campaigns in this process, which saves what a new one takes to import the program."""
+
+    def __init__(self, *_):
+        pass
+
+    def submit(self, make, /, *arguments):
+        made = Future()
+        try:
+            made.set_result(make(*arguments))
+        except Exception as error:
+            made.set_exception(error)
+        return made

@@ -110,9 +110,9 @@ def _records(
 
 def _tell(records: list[dict[str, Any]], options: argparse.Namespace) -> None:
     """Print the score and write its files."""
-    from thermal_robot.blind.report.markdown import blind_markdown
-    from thermal_robot.blind.report.page import blind_html
-    from thermal_robot.blind.report.text import blind_text
+    from thermal_robot.blind.report.markdown import markdown
+    from thermal_robot.blind.report.page import html
+    from thermal_robot.blind.report.text import text
     from thermal_robot.blind.score import score
 
     withdrawn = [record for record in records if "withdrawn" in record]
@@ -121,11 +121,11 @@ def _tell(records: list[dict[str, Any]], options: argparse.Namespace) -> None:
         print(f"thermal-robot: note: {reason}", file=sys.stderr)
     found = score([record for record in records if record not in withdrawn]).to_dict()
     written = json.dumps(found, indent=2, ensure_ascii=False)
-    print(written if options.json == "-" else blind_markdown(found) if options.markdown else blind_text(found))
+    print(written if options.json == "-" else markdown(found) if options.markdown else text(found))
     if options.json and options.json != "-":
         _write(options.json, written + "\n")
     if options.report:
-        _write(options.report, blind_html(found, time.strftime("%Y-%m-%d %H:%M")))
+        _write(options.report, html(found, time.strftime("%Y-%m-%d %H:%M")))
 
 
 def _cases(options: argparse.Namespace, seed: int, note: Callable[[str], None]) -> tuple[Case | RealCase, ...]:

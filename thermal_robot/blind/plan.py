@@ -1,4 +1,4 @@
-"""Which cases a trial has: drawn from one seed, every kind of robot, effect and withholding in turn."""
+"""Which cases a trial has: drawn from one seed, every effect and withholding of a kind in turn."""
 
 from __future__ import annotations
 
@@ -93,7 +93,7 @@ def plan(
     counts
         Number of cases by kind (:data:`~thermal_robot.blind.cases.Kind` without ``real``).
     robots
-        Taken in turn.
+        Each as probable as any other in every case.
     only_effects
         Effects to ask for; all of formats.md where empty.
     unlisted

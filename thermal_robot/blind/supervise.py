@@ -10,6 +10,7 @@ import sys
 import tempfile
 import threading
 from collections.abc import Generator, Mapping, Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -158,49 +159,59 @@ def examine(
         Name and reply, as they come. An examinee that ends or is late is replaced, and the reply says so. Leaving the
         loop early ends all of them.
     """
-    todo: queue.SimpleQueue[str] = queue.SimpleQueue()
-    done: queue.SimpleQueue[tuple[str, dict[str, Any]] | Exception] = queue.SimpleQueue()
+    shared = _Shared(requests, directory, timeout)
     for name in requests:
-        todo.put(name)
-    stop = threading.Event()
-    running: list[Examinee] = []
-
-    def serve() -> None:
-        examinee: Examinee | None = None
-        try:
-            while not stop.is_set():
-                name = todo.get_nowait()
-                if examinee is None:
-                    examinee = Examinee(directory)
-                    running.append(examinee)
-                    examinee.start()
-                try:
-                    done.put((name, examinee.ask(requests[name], timeout)))
-                except Lost as why:
-                    examinee.close()
-                    running.remove(examinee)
-                    examinee = None
-                    done.put((name, no_answer(f"the diagnosis failed: {why}")))
-        except queue.Empty:
-            pass
-        except Exception as error:
-            done.put(error)
-        finally:
-            if examinee is not None:
-                examinee.close()
-
-    threads = [threading.Thread(target=serve, daemon=True) for _ in range(min(workers, len(requests)))]
+        shared.todo.put(name)
+    threads = [threading.Thread(target=shared.serve, daemon=True) for _ in range(min(workers, len(requests)))]
     for thread in threads:
         thread.start()
     try:
         for _ in requests:
-            item = done.get()
+            item = shared.done.get()
             if isinstance(item, Exception):
                 raise item
             yield item
     finally:
-        stop.set()
-        _end_all(threads, running)
+        shared.stop.set()
+        _end_all(threads, shared.running)
+
+
+@dataclass(frozen=True)
+class _Shared:
+    """What the supervisor's threads share; each of them has one examinee at a time."""
+
+    requests: Mapping[str, Mapping[str, Any]]
+    directory: Path
+    timeout: float
+    todo: queue.SimpleQueue[str] = field(default_factory=queue.SimpleQueue)
+    done: queue.SimpleQueue[tuple[str, dict[str, Any]] | Exception] = field(default_factory=queue.SimpleQueue)
+    stop: threading.Event = field(default_factory=threading.Event)
+    running: list[Examinee] = field(default_factory=list)
+
+    def serve(self) -> None:
+        """Have requests answered until there are no more, or it is told to stop."""
+        examinee: Examinee | None = None
+        try:
+            while not self.stop.is_set():
+                name = self.todo.get_nowait()
+                if examinee is None:
+                    examinee = Examinee(self.directory)
+                    self.running.append(examinee)
+                    examinee.start()
+                try:
+                    self.done.put((name, examinee.ask(self.requests[name], self.timeout)))
+                except Lost as why:
+                    examinee.close()
+                    self.running.remove(examinee)
+                    examinee = None
+                    self.done.put((name, no_answer(f"the diagnosis failed: {why}")))
+        except queue.Empty:
+            pass
+        except Exception as error:
+            self.done.put(error)
+        finally:
+            if examinee is not None:
+                examinee.close()
 
 
 def no_answer(error: str) -> dict[str, Any]:

@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from html import escape
-from importlib.metadata import PackageNotFoundError, version
-from importlib.resources import files
 from typing import TYPE_CHECKING
 
 from thermal_robot.report import units
-from thermal_robot.report.inline import svg
+from thermal_robot.report.html_parts import bullets, css, document, figure, paragraph, signature
 from thermal_robot.report.page_tables import effects_table, numbers, outliers_table
 from thermal_robot.report.plots_how_far import plot_how_far
 from thermal_robot.report.plots_map import plot_map
@@ -17,11 +15,9 @@ from thermal_robot.report.plots_overview import overview
 from thermal_robot.report.plots_remainder import plot_remainder
 from thermal_robot.report.plots_where import plot_where
 from thermal_robot.report.plots_which import plot_which
-from thermal_robot.report.words import campaign, noise_of, rows_in_words, sentences, verdict
+from thermal_robot.report.words import campaign, laws, noise_of, rows_in_words, sentences, verdict
 
 if TYPE_CHECKING:
-    from matplotlib.figure import Figure
-
     from thermal_robot.diagnosis.result import Diagnosis
 
 
@@ -41,14 +37,8 @@ def html(diagnosis: Diagnosis, generated: str | None = None) -> str:
     str
         A complete HTML document.
     """
-    name = escape(diagnosis.campaign or diagnosis.robot)
-    body = "\n".join(_whole(diagnosis, generated))
-    return (
-        f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>Diagnosis of {name}</title>\n<style>\n{_css('page.css')}{_css('page_whole.css')}</style>\n</head>\n"
-        f'<body>\n<main class="thermal-robot">\n{body}\n</main>\n</body>\n</html>\n'
-    )
+    name = diagnosis.campaign or diagnosis.robot
+    return document(f"Diagnosis of {name}", "\n".join(_whole(diagnosis, generated)))
 
 
 def fragment(diagnosis: Diagnosis) -> str:
@@ -61,20 +51,16 @@ def fragment(diagnosis: Diagnosis) -> str:
     """
     body = "\n".join(
         (
-            _paragraph(diagnosis.summary, strong=True),
+            paragraph(diagnosis.summary, strong=True),
             numbers(diagnosis),
-            _figure(overview(diagnosis, headline=False), f"Overview: {diagnosis.summary}"),
+            figure(overview(diagnosis, headline=False), f"Overview: {diagnosis.summary}"),
             effects_table(diagnosis),
             '<p class="tr-kicker">Unexplained</p>',
             *_unexplained(diagnosis),
-            *(['<p class="tr-kicker">Warnings</p>', _list(diagnosis.warnings)] if diagnosis.warnings else []),
+            *(['<p class="tr-kicker">Warnings</p>', bullets(diagnosis.warnings)] if diagnosis.warnings else []),
         )
     )
-    return f'<div class="thermal-robot">\n<style>\n{_css("page.css")}</style>\n{body}\n</div>'
-
-
-def _css(name: str) -> str:
-    return files(__package__).joinpath(name).read_text(encoding="utf-8")
+    return f'<div class="thermal-robot">\n<style>\n{css("page.css")}</style>\n{body}\n</div>'
 
 
 def _whole(diagnosis: Diagnosis, generated: str | None) -> Iterator[str]:
@@ -85,34 +71,34 @@ def _whole(diagnosis: Diagnosis, generated: str | None) -> Iterator[str]:
     yield "</header>"
     yield "<section><h2>How far</h2>"
     held = diagnosis.gap.held_out
-    yield _paragraph(
+    yield paragraph(
         "The gap is the distance between measured and predicted pose. Shrinkage is the share of its mean square that "
-        f"goes away on rows that were not used for the fit ({held.scheme}, {held.folds} folds)."
+        f"the correction removes on rows that were not used for the fit ({held.scheme}, {held.folds} folds)."
     )
     for scheme in diagnosis.gap.schemes[:1]:
         before, after = units.together((scheme.rms_before, scheme.rms_after), "m")
-        yield _paragraph(f"Held out by {scheme.name} ({scheme.held_out}), the hardest way: {before} → {after}.")
-    yield _paragraph(f"Noise alone would leave {noise_of(diagnosis)}.")
-    yield _figure(plot_how_far(diagnosis), "Distribution of the gap before and after") + "</section>"
+        yield paragraph(f"Held out by {scheme.name} ({scheme.held_out}), the least favourable way: {before} → {after}.")
+    yield paragraph(f"Noise alone would leave {noise_of(diagnosis)}.")
+    yield figure(plot_how_far(diagnosis), "Distribution of the gap before and after") + "</section>"
     yield "<section><h2>Which</h2>"
-    yield _figure(plot_which(diagnosis), "Share of the gap and probability of every effect")
+    yield figure(plot_which(diagnosis), "Share of the gap and probability of every effect")
     yield effects_table(diagnosis) + "</section>"
     yield "<section><h2>Where</h2>"
-    yield _figure(plot_where(diagnosis), "Shares of the gap along the chain, by axis and by quantity")
-    yield _figure(plot_map(diagnosis), "The gap as arrows at the positions of the tool") + "</section>"
+    yield figure(plot_where(diagnosis), "Shares of the gap along the chain, by axis and by quantity")
+    yield figure(plot_map(diagnosis), "The gap as arrows at the positions of the tool") + "</section>"
     yield "<section><h2>Unexplained</h2>"
     yield from _unexplained(diagnosis)
-    yield _figure(plot_remainder(diagnosis), "The remainder in the order of measurement")
-    for name in diagnosis.verdict:
-        if name.startswith("discovered.") and diagnosis.fit is not None:
-            yield _figure(diagnosis.explain(name), f"{name}: the error there against what it follows")
+    yield figure(plot_remainder(diagnosis), "The remainder in the order of measurement")
+    if diagnosis.fit is not None:
+        for law in laws(diagnosis):
+            yield figure(diagnosis.explain(law.name), f"{law.name}: the error there against what it follows")
     yield "</section>"
     yield from _next(diagnosis)
     if diagnosis.outliers:
         yield f"<section><h2>Set aside</h2>{outliers_table(diagnosis)}</section>"
     if diagnosis.warnings:
-        yield f"<section><h2>Warnings</h2>{_list(diagnosis.warnings)}</section>"
-    yield f"<footer>{escape(_signature(generated))}</footer>"
+        yield f"<section><h2>Warnings</h2>{bullets(diagnosis.warnings)}</section>"
+    yield f"<footer>{escape(signature(generated))}</footer>"
 
 
 def _facts(diagnosis: Diagnosis) -> str:
@@ -122,33 +108,17 @@ def _facts(diagnosis: Diagnosis) -> str:
 
 
 def _unexplained(diagnosis: Diagnosis) -> Iterator[str]:
-    said = "".join(_paragraph(s) for s in sentences(diagnosis))
+    said = "".join(paragraph(s) for s in sentences(diagnosis))
     yield f'<div class="tr-flag">{said}</div>' if diagnosis.unexplained.flagged else said
 
 
 def _next(diagnosis: Diagnosis) -> Iterator[str]:
     if not diagnosis.advice and not diagnosis.separates:
         return
-    apart = [f"would tell apart: {', '.join(group)}" for group in diagnosis.separates]
-    advice = _paragraph(diagnosis.advice) if diagnosis.advice else ""
-    yield f"<section><h2>Next</h2>{advice}{_list(apart)}</section>"
+    apart = [f"to tell apart: {', '.join(group)}" for group in diagnosis.separates]
+    advice = paragraph(diagnosis.advice) if diagnosis.advice else ""
+    yield f"<section><h2>Next</h2>{advice}{bullets(apart)}</section>"
 
 
-def _paragraph(sentence: str, strong: bool = False) -> str:
-    return f"<p><strong>{escape(sentence)}</strong></p>" if strong else f"<p>{escape(sentence)}</p>"
-
-
-def _list(items: tuple[str, ...] | list[str]) -> str:
-    return f"<ul>{''.join(f'<li>{escape(i)}</li>' for i in items)}</ul>" if items else ""
-
-
-def _figure(figure: Figure, label: str) -> str:
-    return f"<figure>{svg(figure, label)}</figure>"
-
-
-def _signature(generated: str | None) -> str:
-    try:
-        name = f"thermal-robot {version('thermal-robot')}"
-    except PackageNotFoundError:  # run from a source tree that is not installed
-        name = "thermal-robot"
-    return f"{name}, {generated}" if generated else name
+# the trial's page still asks for these by their former names
+_css, _figure, _list, _paragraph, _signature = css, figure, bullets, paragraph, signature

@@ -26,8 +26,8 @@ _UNLIKELY = 0.02  # probability of a place that is not worth naming
 _SOURCES = {
     "stated": "the instrument's noise as the campaign states it",
     "repeats": "from the differences between repeated commands",
-    "scatter": "of the instrument, and of the joints' scatter, which was found",
-    "remainder": "at most: from the remainder itself, since the campaign states none and repeats no command",
+    "scatter": "the instrument's noise and the scatter of the joints that was found",
+    "remainder": "an upper bound, from the remainder itself: the campaign states no noise and repeats no command",
 }
 
 
@@ -125,7 +125,7 @@ def noise(diagnosis: Diagnosis, floor: str) -> str:
     gap = diagnosis.gap
     parts = [floor, _SOURCES.get(gap.noise_source, gap.noise_source)]
     if gap.noise_floor > 0.0:
-        parts.append(f"the gap after is {gap.rms_after / gap.noise_floor:.2f} times that")
+        parts.append(f"the gap after correction is {gap.rms_after / gap.noise_floor:.2f} times that")
     return "; ".join(p for p in parts if p)
 
 
@@ -150,10 +150,16 @@ def needs(finding: Finding, joints: Sequence[str]) -> str:
 
 def law(finding: Finding) -> str:
     """Describe a law that was discovered in the data; empty for an effect of the library."""
-    quantity, shape = getattr(finding, "quantity", None), getattr(finding, "shape", None)
-    if not quantity:
+    if not finding.quantity:
         return ""
-    return f"a law found in the data: follows {quantity}" + (f", shape: {shape}" if shape else "")
+    return f"a law found in the data: follows {finding.quantity}" + (
+        f", shape: {finding.shape}" if finding.shape else ""
+    )
+
+
+def laws(diagnosis: Diagnosis) -> list[Finding]:
+    """Return the laws that were discovered, as far as they belong to the explanation."""
+    return [f for f in map(diagnosis.finding, diagnosis.verdict) if f.quantity is not None]
 
 
 def sentences(diagnosis: Diagnosis) -> Iterator[str]:
@@ -172,12 +178,12 @@ def sentences(diagnosis: Diagnosis) -> Iterator[str]:
         likely = [p for p in left.locations if p.share >= _UNLIKELY][:3] or left.locations[:1]
         spots = [f"{units.place(p)} ({units.probability(p.share)})" for p in likely]
         yield f"It enters most probably at {one_of(spots)}."
-    if left.depends_on and not any(name.startswith("discovered.") for name in diagnosis.verdict):
+    known_laws = laws(diagnosis)
+    if left.depends_on and not known_laws:
         quantities = [f"{d.covariate} ({units.p_value(d.p_value)})" for d in left.depends_on[:3]]
         yield f"It follows {', '.join(quantities)}."
-    for name in diagnosis.verdict:
-        if name.startswith("discovered."):
-            yield f"{name} describes part of it: {diagnosis.finding(name).describes or 'a law'}."
+    for found in known_laws:
+        yield f"{found.name} describes part of it: {found.describes or 'a law'}."
 
 
 def one_of(items: Sequence[str]) -> str:

@@ -9,7 +9,7 @@ from thermal_robot.blind.report.words import count, facts, interval, kind, quest
 from thermal_robot.report import units
 
 
-def blind_markdown(score: Mapping[str, Any]) -> str:
+def markdown(score: Mapping[str, Any]) -> str:
     """Write the table of the README.
 
     Parameters

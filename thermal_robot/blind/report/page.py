@@ -6,11 +6,12 @@ from collections.abc import Iterable, Iterator, Mapping
 from html import escape
 from typing import Any
 
+from thermal_robot.blind.report.parts import row, section, table
 from thermal_robot.blind.report.plots import calibration_figure, confusion_figure, shrinkage_figure
 from thermal_robot.blind.report.plots_power import power_figure
 from thermal_robot.blind.report.words import coefficients, count, facts, interval, kind, miss, needed, question
 from thermal_robot.report import units
-from thermal_robot.report.page import _css, _figure, _list, _paragraph, _signature
+from thermal_robot.report.html_parts import bullets, document, figure, paragraph, signature
 
 Plain = Mapping[str, Any]
 
@@ -18,7 +19,7 @@ _CARDS = ("single", "null", "removed", "unlisted")
 _ASKED = ("exact", "right", "first_named", "found", "false_alarm", "place", "quantity")
 
 
-def blind_html(score: Plain, generated: str) -> str:
+def html(score: Plain, generated: str) -> str:
     """Write a score as a page that needs nothing beside itself and prints on A4.
 
     Parameters
@@ -33,53 +34,55 @@ def blind_html(score: Plain, generated: str) -> str:
     str
         A complete HTML document.
     """
-    body = "\n".join(_whole(score, generated))
-    return (
-        f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
-        f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'
-        f"<title>Blind trial</title>\n<style>\n{_css('page.css')}{_css('page_whole.css')}</style>\n</head>\n"
-        f'<body>\n<main class="thermal-robot">\n{body}\n</main>\n</body>\n</html>\n'
-    )
+    return document("Blind trial", "\n".join(_whole(score, generated)))
 
 
 def _whole(score: Plain, generated: str) -> Iterator[str]:
+    yield _header(score)
+    yield section("How often", _kinds(score["kinds"]))
+    if score["confusion"]:
+        yield section("What was named", *_confusions(score))
+    yield from _one_by_one(score)
+    said = "How often effects were at work against how probable they were said to be"
+    yield section("Probabilities", figure(calibration_figure(score), said))
+    power = figure(power_figure(score), "Share of effects found, by size and by number of rows")
+    yield section("What it takes to be found", power, *_needed(score["detection"]["curve"]))
+    left = figure(shrinkage_figure(score), "What stays of the gap: claimed, and reached on fresh samples")
+    yield section("How far the gap shrinks", left)
+    if score["real"]:
+        yield section("Real campaigns", _real(score["real"]))
+    if score["misses"]:
+        yield section("Misses", _misses(score["misses"]))
+    yield f"<footer>{escape(signature(generated))}</footer>"
+
+
+def _header(score: Plain) -> str:
     right = score["cases"] - len(score["misses"])
     failed = f"; {score['failed']} diagnoses failed and count as wrong" if score["failed"] else ""
-    yield '<header><div class="tr-kicker">Faults that the program was not told of, named by it</div>'
-    yield f"<h1>Blind trial: {right} of {score['cases']} cases answered rightly{failed}</h1>"
-    yield _cards(score["kinds"])
-    yield f"<dl>{''.join(f'<dt>{escape(k)}</dt><dd>{escape(v)}</dd>' for k, v in facts(score))}</dl></header>"
-    yield f"<section><h2>How often</h2>{_kinds(score['kinds'])}</section>"
-    if score["confusion"]:
-        yield "<section><h2>What was named</h2>"
-        yield _paragraph(
-            "Numbers are cases; the stronger the colour, the larger the share of its row; the right answer is framed."
-        )
-        for name in score["confusion"]:
-            yield _figure(confusion_figure(score, name), "Truth against what was named first")
-        yield "</section>"
+    kicker = '<div class="tr-kicker">Faults that the program was not told of, named by it</div>'
+    heading = f"<h1>Blind trial: {right} of {score['cases']} cases answered rightly{failed}</h1>"
+    alone = "".join(f"<dt>{escape(k)}</dt><dd>{escape(v)}</dd>" for k, v in facts(score))
+    return f"<header>{kicker}\n{heading}\n{_cards(score['kinds'])}\n<dl>{alone}</dl></header>"
+
+
+def _confusions(score: Plain) -> Iterator[str]:
+    yield paragraph(
+        "Numbers are cases; the stronger the colour, the larger the share of its row; the right answer is framed."
+    )
+    for name in score["confusion"]:
+        yield figure(confusion_figure(score, name), "Truth against what was named first")
+
+
+def _one_by_one(score: Plain) -> Iterator[str]:
     groups = (
         ("By effect, where one, two or three are at work", score["by_effect"]),
         ("By robot, the same cases and those with nothing at work", score["by_robot"]),
         ("Effect taken out of the library, by effect", score["removed"]),
         ("Cause that no library knows, by cause", score["unlisted"]),
     )
-    if any(rates for _, rates in groups):
-        yield f"<section><h2>One by one</h2>{''.join(_groups(*g) for g in groups if g[1])}</section>"
-    yield "<section><h2>Probabilities</h2>"
-    yield _figure(calibration_figure(score), "How often effects were at work against how probable they were said to be")
-    yield "</section><section><h2>What it takes to be found</h2>"
-    yield _figure(power_figure(score), "Share of effects found, by size and by number of rows")
-    yield from _needed(score["detection"]["curve"])
-    yield "</section><section><h2>How far the gap shrinks</h2>"
-    yield (
-        _figure(shrinkage_figure(score), "What stays of the gap: claimed, and reached on fresh samples") + "</section>"
-    )
-    if score["real"]:
-        yield f"<section><h2>Real campaigns</h2>{_real(score['real'])}</section>"
-    if score["misses"]:
-        yield f"<section><h2>Misses</h2>{_misses(score['misses'])}</section>"
-    yield f"<footer>{escape(_signature(generated))}</footer>"
+    tables = [_groups(heading, rates) for heading, rates in groups if rates]
+    if tables:
+        yield section("One by one", *tables)
 
 
 def _cards(kinds: Iterable[Plain]) -> str:
@@ -107,19 +110,19 @@ def _kinds(kinds: Iterable[Plain]) -> str:
         for name, rate in of["rates"].items():
             asked = escape(question(name, of["kind"]))
             first = f'<span class="tr-found">{asked}</span>' if name == of["headline"] else asked
-            rows.append(_row((first, count(rate), units.percent(rate["value"]), interval(rate))))
+            rows.append(row((first, count(rate), units.percent(rate["value"]), interval(rate))))
         if of["fresh"]["count"]:
             left = of["fresh"]
             said = f"{left['median']:.2f} in the median, 90 % below {left['q90']:.2f}"
             rows.append(f"<tr><td>left on fresh samples, over the noise</td><td colspan=3 class=tr-n>{said}</td></tr>")
-    return _table(("", "cases", "share", "95 % interval"), rows)
+    return table(("", "cases", "share", "95 % interval"), rows)
 
 
 def _groups(heading: str, groups: Mapping[str, Plain]) -> str:
     first = next(iter(groups.values()))
     asked = [q for q in _ASKED if q in first]
-    rows = (_row((escape(name), *(_share(rates.get(q)) for q in asked))) for name, rates in groups.items())
-    return f'<p class="tr-kicker">{escape(heading)}</p>{_table(("", *map(question, asked)), rows)}'
+    rows = (row((escape(name), *(_share(rates.get(q)) for q in asked))) for name, rates in groups.items())
+    return f'<p class="tr-kicker">{escape(heading)}</p>{table(("", *map(question, asked)), rows)}'
 
 
 def _share(rate: Plain | None) -> str:
@@ -130,8 +133,8 @@ def _share(rate: Plain | None) -> str:
 
 def _needed(curve: Plain | None) -> Iterator[str]:
     if curve:
-        yield _paragraph(f"Fitted to all cases: chance = {coefficients(curve)}. By that, these are found in 90 %:")
-        yield _list([needed(curve, wanted) for wanted in curve["needed"]])
+        yield paragraph(f"Fitted to all cases: chance = {coefficients(curve)}. By that, these are found in 90 %:")
+        yield bullets([needed(curve, wanted) for wanted in curve["needed"]])
 
 
 def _real(cases: Iterable[Plain]) -> str:
@@ -140,7 +143,7 @@ def _real(cases: Iterable[Plain]) -> str:
         f"<td class=tr-word>{'right' if c['right'] else '<strong>wrong</strong>'}</td></tr>"
         for c in cases
     )
-    return _table(("case", "asked", "answered", ""), rows, numbers=False)
+    return table(("case", "asked", "answered", ""), rows, numbers=False)
 
 
 def _misses(misses: Iterable[Plain]) -> str:
@@ -149,15 +152,4 @@ def _misses(misses: Iterable[Plain]) -> str:
         true, said = miss(case)
         cells = (case["id"], kind(case["kind"]), case["robot"], true, said)
         rows.append(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>")
-    return _table(("case", "kind", "robot", "true", "said"), rows, numbers=False)
-
-
-def _row(cells: Iterable[str]) -> str:
-    first, *rest = cells
-    return f"<tr><td>{first}</td>{''.join(f'<td class=tr-n>{escape(cell)}</td>' for cell in rest)}</tr>"
-
-
-def _table(heads: Iterable[str], rows: Iterable[str], *, numbers: bool = True) -> str:
-    first, *rest = heads
-    shown = "".join(f"<th{' class=tr-n' if numbers else ''}>{escape(head)}</th>" for head in rest)
-    return f"<table><thead><tr><th>{escape(first)}</th>{shown}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
+    return table(("case", "kind", "robot", "true", "said"), rows, numbers=False)

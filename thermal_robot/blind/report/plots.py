@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from matplotlib.patches import Rectangle
@@ -105,64 +105,58 @@ def _cell(column: int, line: int, share: float, right: bool) -> Rectangle:
 
 
 def calibration_figure(score: Mapping[str, Any]) -> Figure:
-    """Draw how often effects were at work against how probable they were said to be, and how many there were."""
-    all_ = score["calibration"]["all"]
-    bins = [b for b in all_["bins"] if b["present"]["trials"]]
-    if not bins:
+    """Draw how often effects were at work against how probable they were said to be, and how many there were.
+
+    Returns
+    -------
+    Figure
+        Above, for each bin of probabilities, the share that was at work with its 95 % bar; below, how many there were.
+    """
+    steps = score["calibration"]["all"]["bins"]
+    if not any(b["present"]["trials"] for b in steps):
         return _empty("Probabilities", "No probability was given.")
     figure = Drawing(5.6, 6.0)
     upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3.2, 1.0))
-    upper.plot([0.0, 100.0], [0.0, 100.0], color=MUTED, linewidth=0.9, linestyle="--")
-    upper.text(
-        13.0,
-        15.5,
-        "as it should be",
-        fontsize=SMALL,
-        color=MUTED,
-        rotation=45,
-        rotation_mode="anchor",
-        transform_rotates_text=True,
-    )
-    for b in bins:
-        low, high = (100.0 * bound for bound in b["present"]["interval"])
-        upper.plot([100.0 * b["mean"]] * 2, [low, high], color=AFTER, linewidth=1.3)
-    upper.plot(
-        [100.0 * b["mean"] for b in bins],
-        [100.0 * b["present"]["value"] for b in bins],
-        linestyle="none",
-        marker="o",
-        markersize=5.5,
-        color=AFTER,
-        label="effects",
-    )
-    upper.set_ylabel("at work, 95 % bars (%)")
-    upper.set_ylim(-3.0, 103.0)
+    _frequencies(upper, steps)
     upper.text(0.02, 0.97, _error(score["calibration"]), transform=upper.transAxes, va="top", fontsize=SMALL, color=INK)
-    for b in all_["bins"]:
-        number, width = b["present"]["trials"], 100.0 * (b["high"] - b["low"])
-        lower.bar(100.0 * b["low"], number, width=width, align="edge", color=FAINT, edgecolor=MUTED, linewidth=0.8)
-        if number:
-            middle = 50.0 * (b["low"] + b["high"])
-            lower.annotate(
-                str(number),
-                (middle, number),
-                (0, 2),
-                textcoords="offset points",
-                ha="center",
-                fontsize=SMALL,
-                color=INK,
-            )
-    lower.set_yscale("log")
-    lower.set_ylim(0.7, 4.0 * max(b["present"]["trials"] for b in bins))
-    lower.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
-    lower.minorticks_off()
+    _numbers(lower, steps)
     lower.set_xlim(-2.0, 102.0)
-    lower.set_ylabel("effects")
     lower.set_xlabel("said to be probable (%)")
     for axes in (upper, lower):
         tidy(axes)
     title(upper, "Do the probabilities hold?")
     return figure
+
+
+def _frequencies(axes: Axes, steps: Sequence[Mapping[str, Any]]) -> None:
+    """Draw the share at work of each bin against the mean probability in it, beside the line of a sound scale."""
+    axes.plot([0.0, 100.0], [0.0, 100.0], color=MUTED, linewidth=0.9, linestyle="--")
+    said = axes.text(13.0, 15.5, "as it should be", fontsize=SMALL, color=MUTED)
+    said.set(rotation=45, rotation_mode="anchor", transform_rotates_text=True)
+    told = [b for b in steps if b["present"]["trials"]]
+    for b in told:
+        low, high = (100.0 * bound for bound in b["present"]["interval"])
+        axes.plot([100.0 * b["mean"]] * 2, [low, high], color=AFTER, linewidth=1.3)
+    means, shares = [100.0 * b["mean"] for b in told], [100.0 * b["present"]["value"] for b in told]
+    axes.plot(means, shares, linestyle="none", marker="o", markersize=5.5, color=AFTER, label="effects")
+    axes.set_ylabel("at work, 95 % bars (%)")
+    axes.set_ylim(-3.0, 103.0)
+
+
+def _numbers(axes: Axes, steps: Sequence[Mapping[str, Any]]) -> None:
+    """Draw how many effects each bin holds, on a logarithmic axis."""
+    for b in steps:
+        number, width = b["present"]["trials"], 100.0 * (b["high"] - b["low"])
+        axes.bar(100.0 * b["low"], number, width=width, align="edge", color=FAINT, edgecolor=MUTED, linewidth=0.8)
+        if number:
+            top = (50.0 * (b["low"] + b["high"]), number)
+            said = axes.annotate(str(number), top, (0, 2), textcoords="offset points", fontsize=SMALL, color=INK)
+            said.set_horizontalalignment("center")
+    axes.set_yscale("log")
+    axes.set_ylim(0.7, 4.0 * max(b["present"]["trials"] for b in steps))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.minorticks_off()
+    axes.set_ylabel("effects")
 
 
 def _error(calibration: Mapping[str, Any]) -> str:

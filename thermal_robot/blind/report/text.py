@@ -21,7 +21,7 @@ _TABLES = {
 Plain = Mapping[str, Any]
 
 
-def blind_text(score: Plain) -> str:
+def text(score: Plain) -> str:
     """Write a score for whoever ran the trial.
 
     Parameters

@@ -36,7 +36,9 @@ def asked(monkeypatch):
             progress("diagnoses", done, 40)
         if found.get("stop"):
             raise KeyboardInterrupt
-        return [{"id": c.id} for c in cases]
+        reasons = found.get("withdrawn", {})
+        withdrawn = {name: {"kind": "null", "withdrawn": why} for name, why in reasons.items()}
+        return [{"id": c.id, **withdrawn.get(c.id, {})} for c in cases]
 
     def score(records):
         return SimpleNamespace(to_dict=lambda: {"right": len(records)})
@@ -47,9 +49,9 @@ def asked(monkeypatch):
     fake("blind.plan", plan=plan, robots=tuple, ROBOTS=ROBOTS, SHORT=SHORT, FULL=FULL)
     fake("blind.real", real_cases=real_cases)
     fake("blind.score", score=score)
-    fake("blind.report.text", blind_text=lambda s: f"{s['right']} right")
-    fake("blind.report.page", blind_html=lambda s, generated: f"<p>{s['right']} right, {generated}</p>")
-    fake("blind.report.markdown", blind_markdown=lambda s: f"| {s['right']} |")
+    fake("blind.report.text", text=lambda s: f"{s['right']} right")
+    fake("blind.report.page", html=lambda s, generated: f"<p>{s['right']} right, {generated}</p>")
+    fake("blind.report.markdown", markdown=lambda s: f"| {s['right']} |")
     monkeypatch.setattr(trial, "run_trial", run_trial)
     monkeypatch.setattr("importlib.util.find_spec", lambda name: name)
     monkeypatch.delenv(command.DATA, raising=False)
@@ -119,6 +121,14 @@ def test_the_score_is_written_as_asked(run, tmp_path):
     assert json.loads(out) == {"right": 2}
     assert SEAL in err
     assert run("--markdown")[1] == "| 2 |\n"
+
+
+def test_cases_that_were_not_asked_are_told_and_not_scored(run, asked):
+    asked["withdrawn"] = {"c2": "no draw shows the fault"}
+    status, out, err = run("--seed", 1)
+    assert status == 0
+    assert out.endswith("1 right\n")
+    assert "thermal-robot: note: c2 (null) was not asked: no draw shows the fault" in err
 
 
 @pytest.mark.parametrize(

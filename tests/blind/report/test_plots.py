@@ -1,17 +1,11 @@
-"""What text, page and figures of a blind trial's score show."""
-
-import re
+"""What the figures of a blind trial's score show."""
 
 import numpy as np
 import pytest
 from blind_records import trial
 from matplotlib.patches import Rectangle
 
-from thermal_robot.blind.report.markdown import blind_markdown
-from thermal_robot.blind.report.page import blind_html
 from thermal_robot.blind.report.plots import calibration_figure, confusion_figure, shrinkage_figure
-from thermal_robot.blind.report.plots_power import power_figure
-from thermal_robot.blind.report.text import blind_text
 from thermal_robot.blind.score import score
 
 
@@ -50,21 +44,6 @@ def test_the_reliability_diagram_holds_the_bins(plain):
     assert [t.get_text() for t in lower.texts] == [str(int(h)) for h in heights if h]
 
 
-def test_the_power_figure_holds_rates_and_curve(plain):
-    left, right = power_figure(plain).axes
-    for axes, steps in ((left, "ratio"), (right, "samples")):
-        rates = [s["found"] for s in plain["detection"][steps] if s["found"]["trials"]]
-        points = next(line for line in axes.lines if line.get_marker() == "o")
-        assert points.get_ydata() == pytest.approx([100 * r["value"] for r in rates])
-        assert [t.get_text() for t in axes.texts if t.get_ha() == "center"] == [str(r["trials"]) for r in rates]
-        bars = [tuple(x.get_ydata()) for x in axes.lines if x.get_marker() == "None" and len(x.get_ydata()) == 2]
-        bars = [bar for bar in bars if np.ptp(bar)]
-        assert np.ravel(bars) == pytest.approx(100 * np.ravel([r["interval"] for r in rates]))
-    drawn = [line.get_ydata() for line in left.lines if len(line.get_ydata()) > 10]
-    wanted = [100 * np.array(line["chance"]) for line in plain["detection"]["curve"]["over_ratio"]]
-    assert np.array(drawn) == pytest.approx(np.array(wanted))
-
-
 def test_the_shrinkage_figure_holds_the_pairs(plain):
     axes = shrinkage_figure(plain).axes[0]
     drawn = np.vstack([line.get_xydata() for line in axes.lines if line.get_marker() not in ("None", None)])
@@ -76,22 +55,32 @@ def test_the_shrinkage_figure_holds_the_pairs(plain):
     assert names == ["known effect at work (7)", "cause withheld (3)", "real campaign (1)"]
 
 
-def test_the_page_stands_alone_and_trusts_no_name(plain):
-    page = blind_html(plain, "today")
-    assert page.count("<svg") == 6
-    assert "&lt;geometric&gt;" in page
-    assert "<geometric>" not in page
-    assert "Blind trial: 6 of 12 cases answered rightly" in page
-    assert not re.search(r'(?:href|src)="(?!#)', page)
-    assert "http" not in page
+def test_the_bars_of_the_reliability_diagram_are_the_intervals(plain):
+    upper, _ = calibration_figure(plain).axes
+    bins = [b["present"] for b in plain["calibration"]["all"]["bins"] if b["present"]["trials"]]
+    bars = [line.get_ydata() for line in upper.lines if len(set(line.get_xdata())) == 1 and len(line.get_xdata()) == 2]
+    assert np.array(bars) == pytest.approx(100.0 * np.array([b["interval"] for b in bins]))
+    ideal = next(line for line in upper.lines if line.get_linestyle() == "--")
+    assert np.array_equal(ideal.get_xdata(), ideal.get_ydata())
+    assert any("calibration error" in t.get_text() for t in upper.texts)
 
 
-def test_text_and_table_say_the_same(plain):
-    said_ = blind_text(plain)
-    assert "exactly what is at work, nothing else" in said_
-    assert re.search(r"one effect, 4 cases, 1 failed\n.*1 of 4 +25\.0 % +4\.6 to 69\.9 %", said_)
-    assert "| one effect | 4 | exactly what is at work, nothing else | 1 of 4 | 25.0 % | 4.6 to 69.9 % |" in (
-        blind_markdown(plain)
-    )
-    assert re.search(r"1 backlash +· +· +· +· +1 +1", said_)
-    assert re.search(r"a4 +single +ur3 +backlash → the diagnosis failed: late", said_)
+def test_what_vanishes_is_drawn_at_the_edge_and_growth_within_the_frame(plain):
+    pairs = [
+        {"id": "c1", "kind": "single", "claimed": 1.0, "real": 0.9},
+        {"id": "c2", "kind": "single", "claimed": 0.99, "real": -3.0},
+    ]
+    axes = shrinkage_figure({"shrinkage": {"pairs": pairs, "median_absolute_difference": 0.1}}).axes[0]
+    points = np.vstack([line.get_xydata() for line in axes.lines if line.get_marker() == "o"])
+    assert points == pytest.approx(np.array([[0.01, 10.0], [1.0, 400.0]]))
+    assert axes.get_xlim() == axes.get_ylim()
+    assert axes.get_xlim()[0] < 0.01
+    assert axes.get_ylim()[1] > 400.0
+
+
+def test_without_cases_each_figure_says_so():
+    plain = score([]).to_dict()
+    for figure in (calibration_figure(plain), confusion_figure(plain), shrinkage_figure(plain)):
+        (axes,) = figure.axes
+        assert not axes.lines
+        assert any(t.get_text().startswith("No ") for t in axes.texts)

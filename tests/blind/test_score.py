@@ -1,0 +1,67 @@
+"""The score of a blind trial, from records made by hand whose answers are known."""
+
+import json
+
+import pytest
+from blind_records import crash, record, said, trial
+
+from thermal_robot.blind.report.markdown import markdown
+from thermal_robot.blind.report.page import html
+from thermal_robot.blind.report.text import text
+from thermal_robot.blind.score import score
+
+
+def of(rates, name):
+    return rates[name].successes, rates[name].trials
+
+
+def kind(found, name):
+    return next(k for k in found.kinds if k.kind == name)
+
+
+def test_the_score_holds_each_kind():
+    found = score(trial())
+    assert (found.cases, found.failed) == (12, 1)
+    assert [k.kind for k in found.kinds] == "single pair null hard removed hidden unlisted real".split()
+    single = kind(found, "single")
+    assert (single.cases, single.failed) == (4, 1)
+    assert {q: of(single.rates, q) for q in ("exact", "first_named", "false_alarm", "located")} == {
+        "exact": (1, 4), "first_named": (1, 4), "false_alarm": (2, 4), "located": (2, 2),
+    }  # fmt: skip
+    assert of(found.by_effect["backlash"], "found") == (0, 3)
+    assert of(found.by_effect["drift"], "first_named") == (3, 4)
+    assert of(found.by_robot["ur10"], "exact") == (0, 1)
+    assert of(found.unlisted["cable"], "place") == (1, 1)
+    assert [(r.asked, r.answer, r.right) for r in found.real] == [("arm: untouched", "<geometric>", True)]
+    assert found.seconds.longest == 0.5
+    assert single.fresh.count == 3
+    assert single.fresh.median == pytest.approx(3**-0.5)
+
+
+def test_misses_can_be_looked_up():
+    misses = {m.id: m for m in score(trial()).misses}
+    assert list(misses) == ["a2", "a3", "a4", "n2", "t1", "p1"]
+    assert misses["a4"].error == "the diagnosis failed: late"
+    assert (misses["a2"].truth, misses["a2"].said, misses["a2"].probability) == (("drift",), ("backlash", "drift"), 0.9)
+    assert misses["a2"].wrong == ("exact", "first_named", "false_alarm")
+    assert misses["a3"].unexplained == "somewhere"
+
+
+@pytest.mark.parametrize("records", [[], trial(), [crash("single", "drift")], [record("null", said())]])
+def test_whatever_was_asked_can_be_written(records):
+    plain = score(records).to_dict()
+    assert json.loads(json.dumps(plain, allow_nan=False)) == plain
+    assert plain["schema"] == "thermal-robot/blind/1"
+    assert html(plain, "today").count("<html") == 1
+    assert max(map(len, text(plain).splitlines())) <= 100
+    assert markdown(plain).startswith("| case |")
+
+
+def test_the_order_of_the_records_changes_no_figure():
+    one, other = score(trial()).to_dict(), score(trial()[::-1]).to_dict()
+    for name in ("cases", "failed", "kinds", "by_effect", "by_robot", "removed", "unlisted", "confusion"):
+        assert one[name] == other[name], name
+    for name in ("by_effect", "by_robot", "removed", "unlisted"):
+        assert list(one[name]) == sorted(one[name])
+    assert one["detection"]["table"] == other["detection"]["table"]
+    assert {m["id"] for m in one["misses"]} == {m["id"] for m in other["misses"]}

@@ -1,0 +1,62 @@
+"""The pieces that every HTML page is made of: document, style, figure, paragraph, list, signature."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from html import escape
+from importlib.metadata import PackageNotFoundError, version
+from importlib.resources import files
+from typing import TYPE_CHECKING
+
+from thermal_robot.report.inline import svg
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+
+def document(title: str, body: str) -> str:
+    """Return a complete page that needs nothing beside itself and prints on A4.
+
+    Parameters
+    ----------
+    title
+        Plain text for the browser's bar.
+    body
+        HTML.
+    """
+    return (
+        f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'
+        f"<title>{escape(title)}</title>\n<style>\n{css('page.css')}{css('page_whole.css')}</style>\n</head>\n"
+        f'<body>\n<main class="thermal-robot">\n{body}\n</main>\n</body>\n</html>\n'
+    )
+
+
+def css(name: str) -> str:
+    """Return a style sheet that ships with this room: ``page.css``, or ``page_whole.css`` for whole pages."""
+    return files(__package__).joinpath(name).read_text(encoding="utf-8")
+
+
+def figure(drawn: Figure, label: str) -> str:
+    """Return a figure as HTML; ``label`` says what it shows, for those who cannot see it."""
+    return f"<figure>{svg(drawn, label)}</figure>"
+
+
+def paragraph(sentence: str, strong: bool = False) -> str:
+    """Return a sentence of plain text as a paragraph."""
+    return f"<p><strong>{escape(sentence)}</strong></p>" if strong else f"<p>{escape(sentence)}</p>"
+
+
+def bullets(items: Iterable[str]) -> str:
+    """Return lines of plain text as a list; empty where there is none."""
+    lines = "".join(f"<li>{escape(item)}</li>" for item in items)
+    return f"<ul>{lines}</ul>" if lines else ""
+
+
+def signature(generated: str | None) -> str:
+    """Say, as plain text, which program made a page, and when if that is to be told."""
+    try:
+        name = f"thermal-robot {version('thermal-robot')}"
+    except PackageNotFoundError:  # run from a source tree that is not installed
+        name = "thermal-robot"
+    return f"{name}, {generated}" if generated else name
