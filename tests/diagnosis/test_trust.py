@@ -20,8 +20,8 @@ from thermal_robot.effects.law import Discovered
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.errors import CampaignError
 from thermal_robot.inference.fit import fit
+from thermal_robot.inference.laws import of_quantity
 from thermal_robot.inference.rows import in_a_row
-from thermal_robot.inference.scan import of_quantity
 from thermal_robot.kinematics import Displacement
 from thermal_robot.observations import Frames, observe
 

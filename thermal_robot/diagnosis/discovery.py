@@ -18,7 +18,7 @@ from thermal_robot.inference.discover import Discovery, discover
 from thermal_robot.inference.explain import Noise, explain
 from thermal_robot.inference.fit import Fit, refit, row_groups
 from thermal_robot.inference.generalised import generalised
-from thermal_robot.inference.scan import of_quantity
+from thermal_robot.inference.laws import of_quantity
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,11 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc, fdtrc
 
-from thermal_robot.diagnosis.laws import smooth_law
 from thermal_robot.diagnosis.parts import Estimate, Finding, Location, Status
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference.explain import distance_limit
 from thermal_robot.inference.fit import Fit
+from thermal_robot.inference.laws import smooth_columns
 from thermal_robot.inference.scatter import JointScatter, Scatter, enough_rows, joint_errors, variance_components
 
 Array = NDArray[np.float64]
@@ -213,7 +213,7 @@ def _law(errors: Array, weight: Array, recorded: Mapping[str, Array]) -> str:
     best, follows = _LEVEL, ""
     root = np.sqrt(weight)
     for name, values in recorded.items():
-        columns = smooth_law(values) if np.ptp(values) > 1e-9 else np.zeros((len(values), 0))
+        columns = smooth_columns(values) if np.ptp(values) > 1e-9 else np.zeros((len(values), 0))
         k, freedom = columns.shape[1], len(errors) - columns.shape[1] - 1
         if not k or freedom < 5:
             continue

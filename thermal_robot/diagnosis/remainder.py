@@ -2,21 +2,21 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc, fdtrc, ndtr, pdtr
 
-from thermal_robot.diagnosis.laws import smooth_law
 from thermal_robot.diagnosis.parts import Dependence, Location, Unexplained
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference import settings
-from thermal_robot.inference.algebra import orthonormal, whitener, without
+from thermal_robot.inference.algebra import orthonormal, without
 from thermal_robot.inference.fit import Fit
+from thermal_robot.inference.laws import harmonics, smooth_columns
 from thermal_robot.inference.rows import in_a_row, in_order
-from thermal_robot.inference.scan import harmonics
+from thermal_robot.inference.target import Target, Worth
 from thermal_robot.observations import Observations
 
 Array = NDArray[np.float64]
@@ -24,24 +24,28 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Remainder:
-    """What is left after the explanation, rows that are not outliers, whitened.
+    """What is left after the explanation, of N rows that are not outliers.
 
     Attributes
     ----------
     rows
-        Their numbers, N of them.
-    white
-        (N, m) remainder over the noise that was settled on.
-    basis
-        (N·m, r) orthonormal: everything that was fitted.
-    freedom
-        N m − r.
+        Their numbers.
+    target
+        The remainder in units of the noise that was settled on, everything that was fitted projected out.
     """
 
     rows: NDArray[np.int64]
-    white: Array
-    basis: Array
-    freedom: int
+    target: Target
+
+    @property
+    def white(self) -> Array:
+        """(N, m) remainder over the noise."""
+        return self.target.white.reshape(len(self.rows), -1)
+
+    @property
+    def freedom(self) -> int:
+        """Equations less what was fitted."""
+        return self.target.freedom
 
     @property
     def scale2(self) -> float:
@@ -54,10 +58,9 @@ class Remainder:
             return self
         drawn = np.sort(np.random.default_rng(settings.TEST_SEED).choice(len(self.rows), count, replace=False))
         m = self.white.shape[1]
-        basis, _ = np.linalg.qr(self.basis.reshape(len(self.rows), m, -1)[drawn].reshape(count * m, -1))
-        white = self.white[drawn].ravel()
-        white = without(white, basis)
-        return Remainder(self.rows[drawn], white.reshape(count, m), basis, max(len(white) - basis.shape[1], 1))
+        basis, _ = np.linalg.qr(self.target.basis.reshape(len(self.rows), m, -1)[drawn].reshape(count * m, -1))
+        white = without(self.white[drawn].ravel(), basis)
+        return Remainder(self.rows[drawn], Target(white, self.target.root[drawn], basis))
 
 
 def remainder(fit: Fit) -> Remainder:
@@ -67,14 +70,12 @@ def remainder(fit: Fit) -> Remainder:
     columns = [e.linear.frames[rows]]
     for b in e.best.blocks:
         columns.append(e.linear.blocks[b].columns[rows] * e.linear.blocks[b].sizes)
-    design = np.concatenate(columns, axis=2) / e.whitening.noise[:, None]
-    flat = design.reshape(design.shape[0] * design.shape[1], design.shape[2])
-    basis = orthonormal(flat)
+    root = np.broadcast_to(1.0 / e.whitening.noise, (len(rows), len(e.whitening.noise)))
+    design = np.concatenate(columns, axis=2) * root[:, :, None]
+    basis = orthonormal(design.reshape(root.size, design.shape[2]))
     # of the exact model, not the linear one: where effects are large and noise is small they differ
-    gap = (fit.corrected.gap[rows] / e.whitening.noise).ravel()
-    left = without(gap, basis)
-    freedom = max(len(left) - basis.shape[1], 1)
-    return Remainder(rows, left.reshape(len(rows), -1), basis, freedom)
+    gap = (fit.corrected.gap[rows] * root).ravel()
+    return Remainder(rows, Target(without(gap, basis), root, basis))
 
 
 @dataclass(frozen=True)
@@ -241,82 +242,70 @@ def _neighbours(fit: Fit, left: Remainder) -> tuple[tuple[float, str], float]:
     return worst, most
 
 
+@dataclass(frozen=True)
+class _Tested:
+    """A law that was put into a place, and what it is worth there."""
+
+    kind: str
+    place: str
+    quantity: str
+    worth: Worth
+
+
 def _scan(fit: Fit, left: Remainder) -> tuple[tuple[float, str], tuple[Location, ...], tuple[Dependence, ...], float]:
     """F tests of a smooth law of every quantity in every place; p-values after counting them all.
 
     Returns p-value and reason, places, quantities, and the share of the remainder that the best law explains.
     """
-    observations, noise = fit.corrected, fit.explanation.whitening.noise
-    left = left.some(settings.ENOUGH_REMAINDER)
-    m = left.white.shape[1]
-    target = left.white.ravel()
-    names = observations.robot.joint_names
-    places: list[tuple[str, str, Array]] = [
-        ("joint", name, observations.joint_sensitivity[left.rows, :m, j, None]) for j, name in enumerate(names)
+    tested = sorted(_tests(fit.corrected, left.some(settings.ENOUGH_REMAINDER)), key=lambda t: -t.worth.gain)
+    if not tested:
+        return (1.0, ""), (), (), 0.0
+    locations = _locations(tested)[: settings.NAMED]
+    material = [
+        t
+        for t in tested
+        if t.worth.share > settings.MATERIAL_SHARE and t.worth.p_value * len(tested) < settings.LAW_LEVEL
     ]
-    places += [
-        ("base", "base", observations.base_sensitivity[left.rows, :m, :]),
-        ("tool", "tool", observations.tool_sensitivity[left.rows, :m, :m]),
-    ]
-    laws = {name: smooth_law(values[left.rows]) for name, values in quantities(observations).items()}
-    rows = []
+    if not material:
+        return (1.0, ""), locations, (), 0.0
+    depends: dict[str, float] = {}
+    for t in material:
+        depends.setdefault(t.quantity, min(1.0, t.worth.p_value * len(tested)))
+    first = material[0]
+    at = f"joint {first.place}" if first.kind == "joint" else f"the {first.place}"
+    reason = f"a law of {first.quantity} at {at} explains {first.worth.share:.0%} of what remains"
+    named = tuple(Dependence(q, p) for q, p in list(depends.items())[: settings.NAMED])
+    return (depends[first.quantity], reason), locations, named, first.worth.share
+
+
+def _tests(observations: Observations, left: Remainder) -> Iterator[_Tested]:
+    m, names = left.white.shape[1], observations.robot.joint_names
+    places = [("joint", name, observations.joint_sensitivity[left.rows, :m, j, None]) for j, name in enumerate(names)]
+    places.append(("base", "base", observations.base_sensitivity[left.rows, :m, :]))
+    places.append(("tool", "tool", observations.tool_sensitivity[left.rows, :m, :m]))
+    laws = {name: smooth_columns(values[left.rows]) for name, values in quantities(observations).items()}
     for kind, place, sensitivity in places:
-        scaled = sensitivity / noise[:, None]
         # five knots do not follow a wheel that turns more than once
         turns = [(place, _turns(observations, place)[left.rows])] if place in laws else []
         for quantity, law in [*laws.items(), *turns]:
-            if not law.shape[1] or (law.shape[1] * scaled.shape[2]) > left.freedom // 3:
+            if not law.shape[1] or (law.shape[1] * sensitivity.shape[2]) > left.freedom // 3:
                 continue
-            columns = (scaled[:, :, :, None] * law[:, None, None, :]).reshape(len(target), -1)
-            p, share, gain = _f_test(columns, left, target)
-            rows.append((p, gain, share, kind, place, quantity))
-    if not rows:
-        return (1.0, ""), (), (), 0.0
-    tried = len(rows)
-    rows.sort(key=lambda r: -r[1])
-    material = [r for r in rows if r[2] > settings.MATERIAL_SHARE and r[0] * tried < settings.LAW_LEVEL]
-    by_place: dict[tuple[str, str], float] = {}
-    for _, gain, _, kind, place, _ in rows:
-        by_place[(kind, place)] = max(by_place.get((kind, place), -np.inf), gain)
-    gains = np.array(list(by_place.values()))
+            columns = (sensitivity[:, :, :, None] * law[:, None, None, :]).reshape(len(left.rows), m, -1)
+            yield _Tested(kind, place, quantity, left.target.worth(columns))
+
+
+def _locations(tested: Sequence[_Tested]) -> tuple[Location, ...]:
+    """Return the places by the posterior probability of their best laws."""
+    best: dict[tuple[str, str], float] = {}
+    for t in tested:
+        best[(t.kind, t.place)] = max(best.get((t.kind, t.place), -np.inf), t.worth.gain)
+    gains = np.array(list(best.values()))
     weight = np.exp(gains - gains.max())
-    locations = [
-        Location(kind, place, float(w)) for (kind, place), w in zip(by_place, weight / weight.sum(), strict=True)
-    ]
-    locations.sort(key=lambda place: -place.share)
-    depends: dict[str, float] = {}
-    for p, _, _, _, _, quantity in material:
-        depends.setdefault(quantity, min(1.0, p * tried))
-    if not material:
-        return (1.0, ""), tuple(locations[:5]), (), 0.0
-    p, _, share, kind, place, quantity = material[0]
-    at = {"joint": f"joint {place}", "base": "the base", "tool": "the tool"}[kind]
-    reason = f"a law of {quantity} at {at} explains {share:.0%} of what remains"
-    return (
-        (min(1.0, p * tried), reason),
-        tuple(locations[:5]),
-        tuple(Dependence(q, p) for q, p in list(depends.items())[:5]),
-        share,
-    )
+    found = [Location(kind, place, float(w)) for (kind, place), w in zip(best, weight / weight.sum(), strict=True)]
+    return tuple(sorted(found, key=lambda place: -place.share))
 
 
 def _turns(observations: Observations, joint: str) -> Array:
     """(N, 2k) harmonics of a joint's position."""
     angle = observations.q[:, observations.robot.joint_names.index(joint)]
     return np.column_stack([f(k * angle) for k in harmonics(observations, joint) for f in (np.sin, np.cos)])
-
-
-def _f_test(columns: Array, left: Remainder, target: Array) -> tuple[float, float, float]:
-    """Return p-value, adjusted share of the remainder explained, and gain in log evidence (BIC) of extra columns."""
-    columns = without(columns, left.basis)
-    own = whitener(columns.T @ columns)
-    k = own.shape[1]
-    freedom = left.freedom - k
-    if not k or freedom < settings.FEWEST_LEFT:
-        return 1.0, 0.0, -np.inf
-    projected = own.T @ (columns.T @ target)
-    total, gained = float(target @ target), float(projected @ projected)
-    rest = max(total - gained, settings.TINY)
-    p = float(fdtrc(k, freedom, (gained / k) / (rest / freedom)))
-    share = 1.0 - (rest / freedom) / (total / left.freedom)
-    return p, share, 0.5 * left.freedom * np.log(total / rest) - 0.5 * k * np.log(left.freedom)

@@ -8,12 +8,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.diagnosis.laws import smooth_law
 from thermal_robot.effects.law import PREFIX
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference import settings
 from thermal_robot.inference.discover import Thin, instead
 from thermal_robot.inference.fit import Fit
+from thermal_robot.inference.laws import smooth_columns
 
 Array = NDArray[np.float64]
 
@@ -69,7 +69,7 @@ def stand_ins(fit: Fit) -> dict[str, StandIn]:
     e, thin = fit.explanation, Thin.of(fit)
     columns = [thin.linear.blocks[b].columns for b in e.best.blocks]
     target = thin.target(e.best.blocks)
-    laws = {name: smooth_law(values) for name, values in quantities(thin.observations).items()}
+    laws = {name: smooth_columns(values) for name, values in quantities(thin.observations).items()}
     known = [
         (effect.name, block @ values)
         for (effect, values), block in zip(fit.effects, columns, strict=True)
@@ -78,7 +78,7 @@ def stand_ins(fit: Fit) -> dict[str, StandIn]:
     tried = max(len(known) * len(laws), 1)
     found = {}
     for name, moved in known:
-        gains = {q: target.gain(moved[:, :, None] * law[:, None, :]) for q, law in laws.items() if law.shape[1]}
+        gains = {q: target.worth(moved[:, :, None] * law[:, None, :]).gain for q, law in laws.items() if law.shape[1]}
         if gains:
             quantity = max(gains, key=lambda q: gains[q])
             gain = gains[quantity] - float(np.log(tried))

@@ -7,11 +7,11 @@ from collections import defaultdict
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.diagnosis.laws import smooth_law
 from thermal_robot.diagnosis.parts import Location, Where
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference.columns import Block, column
 from thermal_robot.inference.fit import Fit
+from thermal_robot.inference.laws import smooth_columns
 from thermal_robot.observations import Observations
 
 Array = NDArray[np.float64]
@@ -97,7 +97,7 @@ def _covariates(fit: Fit, gap: Array, rows: NDArray[np.int64]) -> dict[str, floa
     total = float((centred**2).sum()) or 1.0
     shares = {}
     for name, values in quantities(fit.corrected).items():
-        law = smooth_law(values[rows])
+        law = smooth_columns(values[rows])
         k = law.shape[1]
         if not k or len(rows) - k - 1 < 3:
             continue

@@ -14,9 +14,11 @@ from thermal_robot.inference.columns import block
 from thermal_robot.inference.evidence import Combination, Search
 from thermal_robot.inference.explain import log_priors
 from thermal_robot.inference.fit import Fit, corrected_observations
+from thermal_robot.inference.laws import CLOCK
 from thermal_robot.inference.problem import Linear, Whitening, contained, gram
 from thermal_robot.inference.rows import in_a_row
-from thermal_robot.inference.scan import CLOCK, Scanned, Target, scan, shaped
+from thermal_robot.inference.scan import Scanned, scan, shaped
+from thermal_robot.inference.target import Target
 from thermal_robot.observations import Observations
 
 Array = NDArray[np.float64]

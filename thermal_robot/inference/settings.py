@@ -165,6 +165,10 @@ FEWEST_LEFT = 5
 LAW_FLOOR = 1e-6
 """Of the scaled Gram matrix's eigenvalues: a direction of a law below it is nearly one of those before and says nothing
 new, but would be counted as a parameter."""
+SPLINE_FLOOR = 1e-8
+"""Of the largest singular value: functions of a quantity below it are no functions of their own."""
+NAMED = 5
+"""Places, and quantities, that are listed of a remainder."""
 LIKELY_PLACE = 0.01
 """Probability of a place below which it is not listed."""
 WORSE_ELSEWHERE = 1.05

@@ -1,0 +1,124 @@
+"""The grammar of laws that nobody wrote down: which places, quantities and shapes are tried."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.effects.law import Discovered
+from thermal_robot.effects.quantities import quantities, unit
+from thermal_robot.inference import settings
+from thermal_robot.observations import Observations
+
+Array = NDArray[np.float64]
+
+CLOCK = ("time", "order")
+
+
+def laws(observations: Observations, kinds: Sequence[str], names: Iterable[str] | None = None) -> list[Discovered]:
+    """Return a smooth law of every quantity at every place of some kinds; at a segment also a constant one.
+
+    Parameters
+    ----------
+    observations
+        Where quantities are read from.
+    kinds
+        ``joint``, ``base``, ``tool``, ``link``.
+    names
+        Of the quantities; all where absent.
+    """
+    turns = observations.campaign.measures == "pose"
+    robot = observations.robot
+    places = {
+        "joint": robot.joint_names,
+        "base": ("base",),
+        "tool": ("tool",),
+        # before the first joint a segment is the base, behind the last one the tool
+        "link": tuple(s.name for s in robot.segments[1:] if s.movable),
+    }
+    known = quantities(observations)
+    found = []
+    for kind in kinds:
+        for place in places[kind]:
+            plain = Discovered(kind=kind, place=place, turns=turns)
+            if kind == "link":
+                found.append(replace(plain, shape="constant", quantity="none"))
+            for name in known if names is None else names:
+                law = replace(plain, quantity=name, unit=unit(robot, name), labels=_labels(observations, name))
+                law = of_quantity(law, known[name])
+                found.append(law)
+                if kind == "joint" and name == place and law.shape == "smooth":
+                    # five knots do not follow a wheel that turns more than once
+                    found += [replace(law, shape="harmonic", marks=(k,)) for k in harmonics(observations, place)]
+    return found
+
+
+def harmonics(observations: Observations, joint: str) -> tuple[float, ...]:
+    """Return the orders that are looked for in a joint: a few a turn, and the motor's where its ratio is stated."""
+    ratio = observations.campaign.gears.get(joint)
+    return settings.HARMONICS if ratio is None else (*settings.HARMONICS, float(ratio), 2.0 * float(ratio))
+
+
+def _labels(observations: Observations, name: str) -> tuple[str, ...]:
+    own = observations.campaign.labels.get(name)
+    recorded = own is not None and name not in observations.covariates
+    return tuple(np.unique(own).tolist()) if own is not None and recorded else ()
+
+
+def of_quantity(law: Discovered, values: Array, knots: int = settings.KNOTS) -> Discovered:
+    """Return the law with knots at the quantity's quantiles, or with its levels where it has few values."""
+    levels = np.unique(values)
+    low, high = float(values.min()), float(values.max())
+    if len(levels) <= settings.FEW_LEVELS:
+        return replace(law, shape="levels", marks=tuple(levels.tolist()), origin=low, span=high - low)
+    marks = np.quantile(values, np.linspace(settings.OUTER_KNOTS, 1.0 - settings.OUTER_KNOTS, knots))
+    if np.diff(marks).min() < settings.NARROW_KNOTS * (high - low) / knots:
+        # most values lie in one spot: a spline between knots there would be free to do anything
+        marks = np.linspace(low, high, knots)
+    return replace(law, shape="smooth", marks=tuple(marks.tolist()), origin=low, span=high - low)
+
+
+def shapes(
+    law: Discovered, values: Array, jumps: bool = True, orders: Sequence[float] = settings.HARMONICS
+) -> list[Discovered]:
+    """Return simple shapes that might do instead of a smooth law, and that law.
+
+    Hinges at the quantity's quantiles, straight and quadratic laws; steps and bumps of what a robot does or what passes
+    (positions, gravity, the clock), as nothing jumps at a temperature; three harmonics of a joint's position.
+    """
+    if law.shape in ("constant", "levels"):
+        return [law, replace(law, shape="ramp", marks=())] if law.shape == "levels" and len(law.marks) > 2 else [law]
+    found = [law, replace(law, shape="ramp", marks=()), replace(law, shape="quadratic", marks=())]
+    middle = np.quantile(values, np.linspace(settings.INNER_MARKS, 1.0 - settings.INNER_MARKS, settings.MARKS))
+    if jumps:
+        found += [replace(law, shape="step", marks=(float(m),)) for m in middle]
+        found += [replace(law, shape="slide", marks=(float(m), settings.SLIDE_WIDTH * law.span)) for m in middle[::2]]
+    found += [replace(law, shape="hinge", marks=(float(m), side)) for m in middle[2:-2:2] for side in (1.0, -1.0)]
+    if jumps:
+        found += [
+            replace(law, shape="bump", marks=(float(m), w * law.span))
+            for m in middle[1:-1:2]
+            for w in settings.BUMP_WIDTHS
+        ]
+    if law.quantity.startswith("velocity."):
+        found.append(replace(law, shape="drag", marks=()))
+    if law.quantity == law.place and law.kind == "joint":
+        found += [replace(law, shape="harmonic", marks=(k,)) for k in orders]
+    return found
+
+
+def smooth_columns(values: Array) -> Array:
+    """Return (N, k) columns of a smooth law of a quantity, its constant removed; of mean square one and uncorrelated.
+
+    Levels for a quantity with few values, a natural cubic spline otherwise: the space of a law of :func:`of_quantity`.
+    Empty (N, 0) where the quantity does not vary.
+    """
+    if np.ptp(values) == 0.0:
+        return np.zeros((len(values), 0))
+    functions, _ = of_quantity(Discovered(), values).functions(values)
+    u, s, _ = np.linalg.svd(functions - functions.mean(axis=0), full_matrices=False)
+    kept: Array = u[:, s > settings.SPLINE_FLOOR * s[0]] * np.sqrt(len(values))
+    return kept

@@ -1,0 +1,102 @@
+"""What is left of a gap, and what further columns would explain of it: one projection, one criterion."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import fdtrc
+
+from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import orthonormal, whitener, without
+from thermal_robot.inference.explain import robust_noise
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Worth:
+    """What further columns are worth beside what was fitted.
+
+    Attributes
+    ----------
+    p_value
+        Of an F test.
+    share
+        Of the mean square that is left, adjusted for the number of columns.
+    gain
+        In log evidence, by the Bayes information criterion: ½ ν ln(S₀/S₁) − ½ k ln ν.
+    """
+
+    p_value: float
+    share: float
+    gain: float
+
+
+NOTHING = Worth(1.0, 0.0, -np.inf)
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """A remainder to be explained: what is left of the gap after everything in ``design``.
+
+    Attributes
+    ----------
+    white
+        (N·m,) remainder, weighted and over the noise.
+    root
+        (N, m) what columns are multiplied with.
+    basis
+        (N·m, r) orthonormal: the design.
+    """
+
+    white: Array
+    root: Array
+    basis: Array
+
+    @classmethod
+    def of(cls, gap: Array, design: Array, trusted: NDArray[np.bool_] | None = None) -> Target:
+        """Project a design (N, m, K) out of a gap (N, m), robustly: rows far from the rest weigh little (Cauchy).
+
+        ``trusted`` (N,) rows weigh fully in what is left, however far they are.
+        """
+        measures = gap.shape[1]
+        noise = np.repeat(robust_noise(gap), 3)
+        weight = np.ones(len(gap))
+        for _ in range(settings.CAUCHY_ROUNDS):
+            root = np.sqrt(weight)[:, None] / noise
+            flat = (design * root[:, :, None]).reshape(root.size, design.shape[2])
+            basis = orthonormal(flat)
+            white = (gap * root).ravel()
+            white = without(white, basis)
+            left = white.reshape(gap.shape) / root
+            noise = np.repeat(robust_noise(left), 3)
+            weight = 1.0 / (1.0 + ((left / noise) ** 2).sum(axis=1) / (3.0 * measures))
+        if trusted is not None and trusted.any():
+            root = np.where(trusted[:, None], 1.0 / noise, root)
+            basis = orthonormal((design * root[:, :, None]).reshape(root.size, design.shape[2]))
+            white = (gap * root).ravel()
+            white = without(white, basis)
+        return cls(white, root, basis)
+
+    @property
+    def freedom(self) -> int:
+        """Equations less what was fitted."""
+        return max(int(len(self.white) - self.basis.shape[1]), 1)
+
+    def worth(self, columns: Array) -> Worth:
+        """Return what (N, m, K) further columns are worth; nothing where too few equations would be left."""
+        flat = without((columns * self.root[:, :, None]).reshape(len(self.white), -1), self.basis)
+        own = whitener(flat.T @ flat, settings.LAW_FLOOR)
+        k, freedom = own.shape[1], self.freedom
+        if not k or freedom - k < settings.FEWEST_LEFT:
+            return NOTHING
+        projected = own.T @ (flat.T @ self.white)
+        total, gained = float(self.white @ self.white), float(projected @ projected)
+        rest = max(total - gained, settings.TINY)
+        return Worth(
+            float(fdtrc(k, freedom - k, (gained / k) / (rest / (freedom - k)))),
+            1.0 - (rest / (freedom - k)) / (total / freedom),
+            float(0.5 * freedom * np.log(total / rest) - 0.5 * k * np.log(freedom)),
+        )
