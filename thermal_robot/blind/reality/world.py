@@ -84,6 +84,8 @@ class World:
         All its joints, fixed ones too.
     segments
         Indices into ``chain`` of placements with a length, S of them.
+    slides
+        (n,) whether a joint slides, so that its position is in m, instead of turning.
     """
 
     def __init__(self, urdf: str, tool_frame: str, payload_com: tuple[float, float, float] = (0.0, 0.0, 0.05)):
@@ -92,6 +94,7 @@ class World:
         self.chain = self.tree.chain(tool_frame)
         self.joints: tuple[Joint, ...] = tuple(j for j in self.chain if j.movable)
         self.names = tuple(j.name for j in self.joints)
+        self.slides = np.array([j.kind == "prismatic" for j in self.joints])
         self.segments = tuple(k for k, j in enumerate(self.chain) if np.linalg.norm(j.xyz) > _SHORTEST)
         self.links = tuple(self.chain[k].parent for k in self.segments)
         self.lower = np.array([j.lower for j in self.joints])
