@@ -14,7 +14,7 @@ import thermal_robot
 from thermal_robot.blind.cases import Case, RobotChoice
 from thermal_robot.blind.plan import ROBOTS, robots
 from thermal_robot.blind.reality import FAULTS, UNLISTED, World, make
-from thermal_robot.blind.reality.faults import Fault
+from thermal_robot.blind.reality.fault import Fault
 from thermal_robot.blind.reality.rigid import from_vector, rpy_matrix
 from thermal_robot.blind.reality.setting import draw_setting
 from thermal_robot.blind.reality.sizes import Gauge, place, sized

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.blind.cases import Case
-from thermal_robot.blind.reality.faults import FAULTS, Fault
+from thermal_robot.blind.reality.fault import Fault
+from thermal_robot.blind.reality.faults import FAULTS
 from thermal_robot.blind.reality.instrument import Instrument, measure, registered
 from thermal_robot.blind.reality.own import known
 from thermal_robot.blind.reality.rigid import anywhere
