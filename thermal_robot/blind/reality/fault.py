@@ -84,14 +84,27 @@ def clock(setting: Setting, places: Sequence[Place]) -> list[str]:
 
 
 def some(
-    size: float, numbers: int = 1, *, first: bool = True, last: bool = True, positive: bool = False
+    size: float,
+    numbers: int = 1,
+    *,
+    first: bool = True,
+    last: bool = True,
+    positive: bool = False,
+    turning: bool = False,
 ) -> Callable[[Setting, np.random.Generator], Array]:
-    """Draw values for one to three joints; the first and last can be left out where frames would hide them."""
+    """Draw values for one to three joints; the first and last can be left out where frames would hide them.
+
+    ``turning`` leaves out those that slide.
+    """
 
     def draw(setting: Setting, rng: np.random.Generator) -> Array:
         n = setting.world.n
         allowed = np.arange(0 if first else 1, n if last else n - 1)
-        chosen = rng.choice(allowed, rng.integers(1, 4), replace=False)
+        if turning:
+            allowed = allowed[~setting.world.slides[allowed]]
+        if not len(allowed):
+            return np.zeros((n, numbers))
+        chosen = rng.choice(allowed, min(rng.integers(1, 4), len(allowed)), replace=False)
         values = np.zeros((n, numbers))
         values[chosen] = size * rng.normal(size=(len(chosen), numbers))
         values[chosen[0]] += size * np.sign(values[chosen[0]])  # one of them is a real fault, not a draw near zero

@@ -35,11 +35,15 @@ def wheels(body: Body, setting: Setting, values: Array) -> None:
 
 
 def draw_wheels(setting: Setting, rng: np.random.Generator) -> Array:
-    """Draw how far discs are off, across and along, how oval wheels are, their phase (rad) and ratio."""
-    values = some(1e-3, 5, last=False)(setting, rng)
+    """Draw how far discs are off, across and along, how oval wheels are, their phase (rad) and ratio.
+
+    A joint that slides has no disc of its own, only its motor has: its ratio is in rad/m.
+    """
+    ratio = float(rng.choice([51.0, 80.0, 101.0])) if rng.random() < 0.2 else 1.0
+    values = some(1e-3, 5, last=False, turning=ratio == 1.0)(setting, rng)
     values[:, 2] *= rng.choice([0.0, 0.6])
     values[:, 3] = rng.uniform(0, np.pi)
-    values[:, 4] = rng.choice([51.0, 80.0, 101.0]) if rng.random() < 0.2 else 1.0
+    values[:, 4] = ratio
     return values
 
 
