@@ -104,7 +104,7 @@ def some(
             allowed = allowed[~setting.world.slides[allowed]]
         if not len(allowed):
             return np.zeros((n, numbers))
-        chosen = rng.choice(allowed, min(rng.integers(1, 4), len(allowed)), replace=False)
+        chosen = rng.choice(allowed, min(int(rng.integers(1, 4)), len(allowed)), replace=False)
         values = np.zeros((n, numbers))
         values[chosen] = size * rng.normal(size=(len(chosen), numbers))
         values[chosen[0]] += size * np.sign(values[chosen[0]])  # one of them is a real fault, not a draw near zero

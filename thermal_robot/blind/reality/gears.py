@@ -11,6 +11,19 @@ from thermal_robot.blind.reality.world import Body
 
 Array = NDArray[np.float64]
 
+# What these numbers rest on, and what of it is the trial's own choice: docs/blind.md, "What is shared".
+_GRAVITY = 9.81  # m/s²
+_SMALLEST = 1.0  # N·m (N): no gear of these arms is built for less
+_FRICTION = (0.1, 3.0)
+"""Dry friction of a gear driven backwards, as a share of what it is built to hold: about a tenth in a harmonic drive
+that is run in; above one where the gear holds by itself, as worm gears do. Evenly over the logarithm: ours."""
+_PLAYS = 0.25  # least share of rows in which the way of arrival decides
+_ALIKE = 0.2  # scatter of friction among gears of one make, of its logarithm
+_SOFT = (0.02, 0.1)  # of friction: films of grease are thin
+_DELAY = (5e-4, 8e-3)  # s: half a cycle of a controller at 1 kHz, a whole one at 125 Hz
+_DRAG = (2e-5, 2e-4)
+"""rad (m): what a loop without integral part leaves of dry friction, 1 to 10 N·m against 5e4 N·m/rad."""
+
 
 def offset(body: Body, setting: Setting, values: Array) -> None:
     """Let each joint stand elsewhere by a constant."""
@@ -29,8 +42,9 @@ def wheels(body: Body, setting: Setting, values: Array) -> None:
     """
     for j, (across, along, oval, phase, ratio) in enumerate(values):
         angle = setting.q[:, j] * ratio
-        read = np.arctan2(np.sin(angle) - across, np.cos(angle) - along)
-        body.joints[:, j] += np.angle(np.exp(1j * (read - angle)))
+        sine, cosine = np.sin(angle), np.cos(angle)
+        # the direction of the true mark from the centre that is off, seen from the mark itself
+        body.joints[:, j] += np.arctan2(along * sine - across * cosine, 1.0 - across * sine - along * cosine)
         body.joints[:, j] += np.arctan2(oval * np.sin(2 * (angle + phase)), 1.0 + oval * np.cos(2 * (angle + phase)))
 
 
@@ -48,21 +62,51 @@ def draw_wheels(setting: Setting, rng: np.random.Generator) -> Array:
 
 
 def play(body: Body, setting: Setting, values: Array) -> None:
-    """Lay teeth against the side that pushed last, unless gravity outweighs friction, on its own."""
-    heaviest = np.abs(setting.torque).max()
-    for j, (half, friction) in enumerate(values):
-        load = setting.torque[:, j]
-        hangs = friction > 0 and np.abs(load).max() > 0.02 * heaviest
-        heavy = np.abs(load) > friction * np.abs(load).max() if hangs else np.zeros(len(load), bool)
-        # friction stops a joint short of where it was sent: behind, on the way it came; a weight lets it hang down
-        body.joints[:, j] -= abs(half) * np.where(heavy, np.sign(load), setting.approach[:, j])
+    """Lay teeth on the side to which the torque through them presses.
+
+    A joint that arrived on its way s = ±1 is pushed there against dry friction F (N·m) while gravity wants the
+    torque τ: its teeth carry τ + F s. The grease between them is pressed out gradually, over a share of F. One that
+    has not moved yet, s = 0, stands in the middle of where the two ways would have left it.
+    """
+    for j, (half, friction, soft) in enumerate(values):
+        if half == 0.0:
+            continue
+        load, way = setting.torque[:, j], setting.approach[:, j]
+        up, down = (np.tanh((load + side * friction) / (soft * friction)) for side in (1.0, -1.0))
+        body.joints[:, j] -= abs(half) * (up * (1.0 + way) + down * (1.0 - way)) / 2.0
 
 
 def draw_play(setting: Setting, rng: np.random.Generator) -> Array:
-    """Draw half of each play, rad or m, and what holds it against gravity."""
-    values = some(2e-4, 2, last=False, positive=True)(setting, rng)
-    values[:, 1] = rng.choice([0.0, 0.0, rng.uniform(0.5, 0.9)]) if setting.torque.any() else 0.0
+    """Draw half of each play, rad or m; friction, N·m or N; and the share of it over which teeth change sides.
+
+    Gears of one arm are of one make and one grease: friction is one share of what each is built to hold, but for a
+    fifth. Where gravity has its way in more than three rows of four, hardly anything is left of the play but an offset
+    of the joint, that nobody can tell from one: such a share is not drawn.
+    """
+    values = some(2e-4, 3, last=False, positive=True)(setting, rng)
+    built = ratings(setting)
+    erring = values[:, 0] > 0.0
+    seldom = np.quantile(np.abs(setting.torque), _PLAYS, axis=0) / built
+    least = np.append(seldom[erring], _FRICTION[0]).max()
+    share = np.exp(rng.uniform(np.log(least), np.log(max(_FRICTION[1], least))))
+    values[:, 1] = share * built * np.exp(rng.normal(0.0, _ALIKE, len(built)))
+    values[:, 2] = rng.uniform(*_SOFT)
     return values
+
+
+def ratings(setting: Setting) -> Array:
+    """Return what each joint's gear is built to hold, (n,) N·m or N: arm and payload, stretched out level.
+
+    The arm's own weight counts half way out, the payload's at the tool; a joint that slides lifts them.
+    """
+    world, carried = setting.world, float(setting.payload.max())
+    held = []
+    for k, joint in enumerate(world.chain):
+        if joint.movable:
+            arm, out = world.tree.carried(joint.child), float(sum(np.linalg.norm(j.xyz) for j in world.chain[k + 1 :]))
+            lift = joint.kind == "prismatic"
+            held.append(_GRAVITY * (arm + carried if lift else (arm / 2.0 + carried) * out))
+    return np.maximum(held, _SMALLEST)
 
 
 def springs(body: Body, setting: Setting, values: Array) -> None:
@@ -82,15 +126,22 @@ def draw_springs(setting: Setting, rng: np.random.Generator) -> Array:
 
 
 def servo(body: Body, setting: Setting, values: Array) -> None:
-    """Follow the command with a delay, dragged by dry friction: q(t − T) and a step against the way."""
-    delay, friction = values[:, 0], values[:, 1]
-    body.joints += -setting.velocity * delay + 0.5 * setting.acceleration * delay**2 - friction * setting.approach
+    """Follow the command late, dragged by dry friction.
+
+    Of the delay T a share p is the loop's, which has a bandwidth, the rest the clock's, which is a dead time:
+    exp(−(1 − p) T s) / (1 + p T s) = 1 − T s + ((1 + p²) / 2) T² s² − …
+    """
+    delay, friction, loop = values.T
+    late = -setting.velocity * delay + setting.acceleration * (1.0 + loop**2) / 2.0 * delay**2
+    body.joints += late - friction * setting.approach
 
 
 def draw_servo(setting: Setting, rng: np.random.Generator) -> Array:
-    """Draw each joint's delay, s, and what friction leaves, rad or m."""
-    values = np.abs(some(1.0, 2, last=False)(setting, rng))
-    return np.asarray(values * np.array([1e-3, 1e-4]))
+    """Draw each joint's delay, s, what friction leaves, rad or m, and the loop's share of the delay."""
+    erring = some(1.0, last=False)(setting, rng) != 0.0
+    low, high = np.log(np.array([_DELAY, _DRAG])).T
+    values = np.exp(rng.uniform(low, high, (setting.world.n, 2)))
+    return np.column_stack([values * erring, np.full(setting.world.n, rng.uniform())])
 
 
 def ticks(body: Body, setting: Setting, values: Array) -> None:
