@@ -31,7 +31,7 @@ INSTRUMENT = Instrument(
     noise=2e-5,
     turning=3e-5,
     stated=True,
-    heavy=False,
+    tails=np.inf,
     spoilt=0.0,
 )
 
