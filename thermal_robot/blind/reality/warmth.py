@@ -13,7 +13,7 @@ Array = NDArray[np.float64]
 _PAUSE = 1.0  # s between two steps in which warmth is integrated
 _HOLDS = (2.4e6, 3.8e6)  # J/(m³ K), heat capacity by volume: aluminium 2.4e6, cast iron 3.3e6, steel 3.8e6
 _WALL = (0.004, 0.015)  # m, of a cast link
-_FILM = (7.0, 15.0)  # W/(m² K): a wall in a still room loses 7.7 (ISO 6946: 0.13 m² K/W), an arm that moves about twice that
+_FILM = (7.0, 15.0)  # W/(m² K): a wall in a still room loses 7.7 (ISO 6946: 0.13 m² K/W); twice that as it moves
 _MOTOR = (300.0, 3000.0)  # s for a motor to reach its temperature, from a wrist's to a base's
 
 
