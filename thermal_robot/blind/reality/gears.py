@@ -84,12 +84,10 @@ def draw_play(setting: Setting, rng: np.random.Generator) -> Array:
     of the joint, that nobody can tell from one: such a share is not drawn.
     """
     values = some(2e-4, 3, last=False, positive=True)(setting, rng)
-    built = ratings(setting)
-    erring = values[:, 0] > 0.0
-    seldom = np.quantile(np.abs(setting.torque), _PLAYS, axis=0) / built
-    least = np.append(seldom[erring], _FRICTION[0]).max()
-    share = np.exp(rng.uniform(np.log(least), np.log(max(_FRICTION[1], least))))
-    values[:, 1] = share * built * np.exp(rng.normal(0.0, _ALIKE, len(built)))
+    size = ratings(setting) * np.exp(rng.normal(0.0, _ALIKE, setting.world.n))
+    seldom = np.quantile(np.abs(setting.torque), _PLAYS, axis=0) / size
+    least = np.append(seldom[values[:, 0] > 0.0], _FRICTION[0]).max()
+    values[:, 1] = size * np.exp(rng.uniform(np.log(least), np.log(max(_FRICTION[1], least))))
     values[:, 2] = rng.uniform(*_SOFT)
     return values
 
