@@ -179,7 +179,7 @@ def _as_sensed(sensor: str, time: Array, air: Array, links: Array, rng: np.rando
 
 
 def _commands(world: World, count: int, rng: np.random.Generator) -> Array:
-    """Within a share of the limits, the third nearest to the first axis left out, and nothing below the floor."""
+    """(count, n) within a share of the limits; the third of the poses that is nearest to the root is left out."""
     lower, upper = np.maximum(world.lower, -_WIDEST), np.minimum(world.upper, _WIDEST)
     middle, half = (lower + upper) / 2, _SHARE * (upper - lower) / 2
     drawn = rng.uniform(middle - half, middle + half, (4 * count + 60, world.n))
