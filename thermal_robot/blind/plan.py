@@ -38,7 +38,7 @@ FULL = {
 }
 
 CHANCE = 0.07
-"""How probable each effect is in a faint case, so that of 14 one is at work on average; an unlisted cause the same."""
+"""How probable each effect of a faint case is, and an unlisted cause: of these 14 one is at work on average."""
 CONTAINS = {"geometric": {"joint_offset", "instrument_scale"}}
 """What a larger effect can do exactly as well (formats.md)."""
 IMITATES = {"transmission_error": {"joint_gain"}}
