@@ -78,7 +78,7 @@ class Case:
     background
         Ratio at which every other effect is present, 0 for none.
     heavy
-        Whether the noise has Student's law with 4 degrees of freedom.
+        Whether the noise has Student's law, with 3 to 8 degrees of freedom.
     own
         ``file.py:NAME`` of a fault of the user's own; its name is the unlisted cause, or the only effect.
     """

@@ -37,8 +37,8 @@ FULL = {
     "unlisted": 108,
 }
 
-CHANCE = 0.1
-"""How probable each effect is in a faint case, as a diagnosis holds beforehand; an unlisted cause is as probable."""
+CHANCE = 0.07
+"""How probable each effect of a faint case is, and an unlisted cause: of these 14 one is at work on average."""
 CONTAINS = {"geometric": {"joint_offset", "instrument_scale"}}
 """What a larger effect can do exactly as well (formats.md)."""
 IMITATES = {"transmission_error": {"joint_gain"}}

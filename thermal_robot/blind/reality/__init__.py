@@ -1,7 +1,12 @@
-"""A robot on springs in MuJoCo, with its faults and instrument: knows neither Pinocchio nor the effects' formulas."""
+"""A robot on springs in MuJoCo, with its faults and instrument: takes nothing from the program it puts to the test.
+
+It imports of the package only what a case is and the exception for a user's file. What it shares with the program
+nevertheless (formats.md, Newton's law of cooling, Hooke's) is listed in docs/blind.md.
+"""
 
 from thermal_robot.blind.reality.campaign import make
-from thermal_robot.blind.reality.faults import FAULTS, Fault
+from thermal_robot.blind.reality.fault import Fault
+from thermal_robot.blind.reality.faults import FAULTS
 from thermal_robot.blind.reality.unlisted import UNLISTED
 from thermal_robot.blind.reality.world import Body, World
 

@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.blind.cases import Case
-from thermal_robot.blind.reality.faults import FAULTS, Fault
+from thermal_robot.blind.reality.fault import Fault
+from thermal_robot.blind.reality.faults import FAULTS
 from thermal_robot.blind.reality.instrument import Instrument, measure, registered
 from thermal_robot.blind.reality.own import known
 from thermal_robot.blind.reality.rigid import anywhere
@@ -24,6 +25,7 @@ Array = NDArray[np.float64]
 FRESH = 100
 _PRESENT = 0.5  # × noise per axis: what leaves less, given the others, is not present
 _TRIES = 8
+_TAILS = (3.0, 8.0)  # degrees of freedom: from the fewest with a third moment to nearly Gauss' law
 _RECORDED = {"moving", "temperature", "sensor:links"}
 _NEEDS = {"thermal_elongation": "temperature", "drift": "time", "backlash": "approach", "tracking_lag": "velocity"}
 
@@ -127,7 +129,7 @@ def _instrument(case: Case, wants: set[str], rng: np.random.Generator) -> Instru
         noise=float(rng.uniform(10e-6, 30e-6)),
         turning=3e-5 if pose else None,
         stated=bool(rng.random() < 0.85),
-        heavy=case.heavy,
+        tails=float(rng.uniform(*_TAILS)) if case.heavy else np.inf,
         spoilt=float(rng.choice([0.0, 0.03, 0.1] if case.heavy else [0.0, 0.03])),
     )
 

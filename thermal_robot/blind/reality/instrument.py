@@ -13,8 +13,6 @@ from thermal_robot.blind.reality.setting import Setting
 
 Array = NDArray[np.float64]
 
-_TAILS = 4.0  # degrees of freedom of Student's law
-
 
 @dataclass(frozen=True)
 class Instrument:
@@ -32,8 +30,8 @@ class Instrument:
         One sigma per axis, m and rad; ``turning`` is ``None`` where it measures no orientation.
     stated
         Whether the file states the noise.
-    heavy
-        Whether the noise has Student's law instead of Gauss'.
+    tails
+        Degrees of freedom of Student's law that the noise has, more than 2; infinite for Gauss'.
     spoilt
         Share of rows that are grossly wrong.
     """
@@ -46,7 +44,7 @@ class Instrument:
     noise: float
     turning: float | None
     stated: bool
-    heavy: bool
+    tails: float
     spoilt: float
 
 
@@ -69,8 +67,10 @@ def measure(
 ) -> Measured:
     """Measure the rows that are given away."""
     count = len(rows)
-    unit = rng.standard_t(_TAILS, (count, 3)) / np.sqrt(_TAILS / (_TAILS - 2)) if instrument.heavy else None
-    position = seen[rows] + instrument.noise * (rng.normal(size=(count, 3)) if unit is None else unit)
+    unit = rng.normal(size=(count, 3))
+    if np.isfinite(instrument.tails):  # of the same variance
+        unit *= np.sqrt((instrument.tails - 2.0) / rng.chisquare(instrument.tails, (count, 3)))
+    position = seen[rows] + instrument.noise * unit
     wrong = np.flatnonzero(rng.uniform(size=count) < instrument.spoilt)
     position[wrong] += rng.normal(size=(len(wrong), 3)) * instrument.noise * rng.uniform(20, 200, (len(wrong), 1))
     quaternion = None

@@ -6,7 +6,8 @@ import importlib.util
 import sys
 from pathlib import Path
 
-from thermal_robot.blind.reality.faults import FAULTS, Fault
+from thermal_robot.blind.reality.fault import Fault
+from thermal_robot.blind.reality.faults import FAULTS
 from thermal_robot.blind.reality.unlisted import UNLISTED
 from thermal_robot.errors import EffectError
 

@@ -2,18 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.blind.reality.warmth import followed, hall, time_constant, warmed
 from thermal_robot.blind.reality.world import World
 
 Array = NDArray[np.float64]
 
 _WIDEST = 2.4  # rad: cables keep a real robot from its whole range
 _SHARE = 0.75
-_PAUSE = 1.0  # s between two steps in which warmth is integrated
 
 
 @dataclass
@@ -67,8 +67,8 @@ class Setting:
     session: NDArray[np.int64] | None
     speed: Array
     extra: dict[str, Array]
-    torque: Array = field(default_factory=lambda: np.zeros((0, 0)))
-    poses: Array = field(default_factory=lambda: np.zeros((0, 4, 4)))
+    torque: Array
+    poses: Array
 
     @property
     def samples(self) -> int:
@@ -105,21 +105,8 @@ def draw_setting(
     sessions
         Whether the robot is switched off for a while, once or twice.
     """
-    poses = -(-samples // repeats)
-    q = _commands(world, poses, rng)
-    label = None
-    if repeats > 1:
-        label = rng.permuted(np.repeat(np.arange(poses), repeats))[:samples]
-        q = q[label]
-    length = rng.uniform(1.5, 6.0) * 3600.0
-    steps = rng.gamma(4.0, 1.0, samples)
-    time = np.cumsum(steps) - steps[0]
-    session = None
-    if sessions:
-        breaks = np.sort(rng.choice(np.arange(samples // 5, samples - samples // 5), rng.integers(1, 3), replace=False))
-        session = np.searchsorted(breaks, np.arange(samples), side="right")
-        time = time + session * rng.uniform(0.3, 1.0) * time[-1]
-    time = np.round(time / time[-1] * length, 1)
+    q, label = _visits(world, samples, repeats, rng)
+    time, session = _clock(samples, sessions, rng)
     heaviest = _heaviest(world)
     payload = rng.choice([0.0, heaviest / 2, heaviest], samples).round(2)
     speed = rng.choice([0.1, 0.3, 0.6, 1.0], samples)
@@ -129,37 +116,70 @@ def draw_setting(
         velocity = rng.uniform(0.05, 0.8, q.shape) * rng.choice([-1.0, 1.0], q.shape) * speed[:, None]
         acceleration = rng.normal(0.0, 1.5, q.shape) * speed[:, None]
         approach = np.sign(velocity)
-    air, links = _warmth(world, time, session, rng)
+    air = hall(time, rng)
+    links = warmed(world, time, air, session, rng)
     extra = {"humidity": np.round(45.0 + np.cumsum(rng.normal(0.0, 0.6, samples)), 1)} if rng.random() < 0.5 else {}
     sensor = sensor or str(rng.choice(["robot", "links", "air"], p=[0.45, 0.4, 0.15]))
+    links = _as_sensed(sensor, time, air, links, rng)
+    poses, torque = world.poses(q, payload, world.sound(samples))
+    return Setting(
+        world=world,
+        q=q,
+        velocity=velocity,
+        acceleration=acceleration,
+        time=time,
+        approach=approach,
+        payload=payload,
+        air=air,
+        links=links,
+        sensor=sensor,
+        moving=moving,
+        pose=label,
+        session=session,
+        speed=speed,
+        extra=extra,
+        torque=torque,
+        poses=poses,
+    )
+
+
+def _visits(
+    world: World, samples: int, repeats: int, rng: np.random.Generator
+) -> tuple[Array, NDArray[np.int64] | None]:
+    """(N, n) commands in the order in which they are visited, and which pose each is where poses are repeated."""
+    poses = -(-samples // repeats)
+    q = _commands(world, poses, rng)
+    if repeats == 1:
+        return q, None
+    label = rng.permuted(np.repeat(np.arange(poses), repeats))[:samples]
+    return q[label], label
+
+
+def _clock(samples: int, sessions: bool, rng: np.random.Generator) -> tuple[Array, NDArray[np.int64] | None]:
+    """(N,) s from the first row on, and the number of each row's session where the robot rests in between."""
+    length = rng.uniform(1.5, 6.0) * 3600.0
+    steps = rng.gamma(4.0, 1.0, samples)
+    time = np.cumsum(steps) - steps[0]
+    session = None
+    if sessions:
+        breaks = np.sort(rng.choice(np.arange(samples // 5, samples - samples // 5), rng.integers(1, 3), replace=False))
+        session = np.searchsorted(breaks, np.arange(samples), side="right")
+        time = time + session * rng.uniform(0.3, 1.0) * time[-1]
+    return np.round(time / time[-1] * length, 1), session
+
+
+def _as_sensed(sensor: str, time: Array, air: Array, links: Array, rng: np.random.Generator) -> Array:
+    """(N, S) °C of links that are such that the sensor that there is says something of them."""
     if sensor == "robot":  # one casting: its links warm nearly alike, or one sensor would be of no use
         common = links.mean(axis=1, keepdims=True)
-        links = common + 0.06 * (links - common)
-    elif sensor == "air":  # nothing heats the links but the air, after which they lag
-        links = np.repeat(_lag(time, air, rng.uniform(600.0, 2400.0))[:, None], links.shape[1], axis=1)
-    setting = Setting(
-        world,
-        q,
-        velocity,
-        acceleration,
-        time,
-        approach,
-        payload,
-        air,
-        links,
-        sensor,
-        moving,
-        label,
-        session,
-        speed,
-        extra,
-    )
-    setting.poses, setting.torque = world.poses(q, payload, world.sound(samples))
-    return setting
+        return np.asarray(common + 0.06 * (links - common))
+    if sensor == "air":  # nothing heats the links but the air, after which they lag
+        return np.repeat(followed(time, air, time_constant(rng))[:, None], links.shape[1], axis=1)
+    return links
 
 
 def _commands(world: World, count: int, rng: np.random.Generator) -> Array:
-    """Within a share of the limits, the third nearest to the first axis left out, and nothing below the floor."""
+    """(count, n) within a share of the limits; the third of the poses that is nearest to the root is left out."""
     lower, upper = np.maximum(world.lower, -_WIDEST), np.minimum(world.upper, _WIDEST)
     middle, half = (lower + upper) / 2, _SHARE * (upper - lower) / 2
     drawn = rng.uniform(middle - half, middle + half, (4 * count + 60, world.n))
@@ -172,33 +192,3 @@ def _commands(world: World, count: int, rng: np.random.Generator) -> Array:
 def _heaviest(world: World) -> float:
     """Return a payload that suits the robot: 0.15 of what it weighs, between 0.5 and 8 kg."""
     return float(np.clip(0.15 * sum(world.tree.mass.values()), 0.5, 8.0))
-
-
-def _warmth(
-    world: World, time: Array, session: NDArray[np.int64] | None, rng: np.random.Generator
-) -> tuple[Array, Array]:
-    """Air that swings and rises; links that follow it with a time constant each, and are warmed by their motors."""
-    swing = rng.uniform(1.0, 4.0) * np.sin(time / time[-1] * rng.uniform(1.5, 9.0) + rng.uniform(0, 6.0))
-    air = 21.0 + swing + rng.uniform(-1.0, 5.0) * time / time[-1]
-    working = np.ones_like(time)
-    if session is not None:  # cold at the start of each session
-        for s in np.unique(session):
-            rows = session == s
-            working[rows] = 1.0 - np.exp(-(time[rows] - time[rows][0]) / 1200.0)
-    warmth = {}
-    for link in dict.fromkeys(world.links):
-        motor = rng.uniform(2.0, 10.0) * working
-        warmth[link] = _lag(time, air + motor, rng.uniform(600.0, 3600.0), start=float(air[0]))
-    return air, np.column_stack([warmth[link] for link in world.links])
-
-
-def _lag(time: Array, drive: Array, constant: float, start: float | None = None) -> Array:
-    """Integrate T' = (drive − T) / constant, between rows in steps of a second on a drive that runs straight."""
-    fine = np.arange(time[0], time[-1] + _PAUSE, _PAUSE)
-    driven = np.interp(fine, time, drive)
-    kept = np.empty_like(fine)
-    value, decay = driven[0] if start is None else start, 1.0 - np.exp(-_PAUSE / constant)
-    for i, target in enumerate(driven):
-        value += decay * (target - value)
-        kept[i] = value
-    return np.interp(time, fine, kept)

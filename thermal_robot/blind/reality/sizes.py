@@ -9,7 +9,8 @@ from itertools import combinations, product
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.blind.reality.faults import FAULTS, Fault, Place
+from thermal_robot.blind.reality.fault import Fault, Place
+from thermal_robot.blind.reality.faults import FAULTS
 from thermal_robot.blind.reality.rigid import free_columns
 from thermal_robot.blind.reality.setting import Setting
 

@@ -54,9 +54,10 @@ def write_folder(
 
 
 def conditions(setting: Setting) -> pd.DataFrame:
-    """Return commands and everything that is recorded beside the measurement, one row each."""
+    """Return commands and everything that is recorded beside the measurement, one row each: rad, mm, s, °C, kg."""
     names = setting.world.names
-    table = pd.DataFrame({name: setting.q[:, j].round(9) for j, name in enumerate(names)})
+    unit = np.where(setting.world.slides, 1e3, 1.0)  # a sliding joint's column is in mm, a turning one's in rad
+    table = pd.DataFrame({name: (setting.q[:, j] * unit[j]).round(9) for j, name in enumerate(names)})
     table["time"] = setting.time
     if setting.sensor == "robot":
         table["temperature"] = setting.links.mean(axis=1).round(3)
@@ -70,8 +71,8 @@ def conditions(setting: Setting) -> pd.DataFrame:
         table[f"approach.{name}"] = setting.approach[:, j].astype(int)
     if setting.moving:
         for j, name in enumerate(names):
-            table[f"velocity.{name}"] = setting.velocity[:, j].round(6)
-            table[f"acceleration.{name}"] = setting.acceleration[:, j].round(6)
+            table[f"velocity.{name}"] = (setting.velocity[:, j] * unit[j]).round(6)
+            table[f"acceleration.{name}"] = (setting.acceleration[:, j] * unit[j]).round(6)
     for name, values in setting.extra.items():
         table[name] = values
     if setting.session is not None:

@@ -7,7 +7,7 @@ from collections.abc import Callable, Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.blind.reality.faults import Fault, Place, clock, joints, own_position
+from thermal_robot.blind.reality.fault import Fault, Place, clock, joints, own_position
 from thermal_robot.blind.reality.setting import Setting
 from thermal_robot.blind.reality.world import Body
 

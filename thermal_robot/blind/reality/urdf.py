@@ -46,6 +46,10 @@ class Tree:
     mass: dict[str, float]
     centre: dict[str, Array]
 
+    def carried(self, link: str) -> float:
+        """Return the mass of a link and of all that hangs on it, kg."""
+        return self.mass[link] + sum(self.carried(j.child) for j in self.joints if j.parent == link)
+
     def chain(self, tool_frame: str) -> tuple[Joint, ...]:
         """Return the joints from the root to a link."""
         by_child = {j.child: j for j in self.joints}

@@ -84,6 +84,8 @@ class World:
         All its joints, fixed ones too.
     segments
         Indices into ``chain`` of placements with a length, S of them.
+    slides
+        (n,) whether a joint slides, so that its position is in m, instead of turning.
     """
 
     def __init__(self, urdf: str, tool_frame: str, payload_com: tuple[float, float, float] = (0.0, 0.0, 0.05)):
@@ -92,6 +94,7 @@ class World:
         self.chain = self.tree.chain(tool_frame)
         self.joints: tuple[Joint, ...] = tuple(j for j in self.chain if j.movable)
         self.names = tuple(j.name for j in self.joints)
+        self.slides = np.array([j.kind == "prismatic" for j in self.joints])
         self.segments = tuple(k for k, j in enumerate(self.chain) if np.linalg.norm(j.xyz) > _SHORTEST)
         self.links = tuple(self.chain[k].parent for k in self.segments)
         self.lower = np.array([j.lower for j in self.joints])
@@ -132,15 +135,12 @@ class World:
         address = [int(model.joint(name).qposadr[0]) for name in self.names]
         steps = [self._steps(model, k, bending) for k in self.segments]
         rest = model.body_pos.copy()
-        compliance = np.zeros(model.nv)
-        compliance[address] = body.springs
         nodes = self._nodes(model) if bending else np.zeros((0, 2, NODES), dtype=int)
-        lengths = np.array([np.linalg.norm(self.chain[k].xyz) for k in self.segments])
-        for s in range(len(nodes)):
-            compliance[nodes[s]] = (body.beams[s] * lengths[s] / NODES)[:, None]
-        yields = bool(np.any(compliance))
+        pieces = np.array([np.linalg.norm(self.chain[k].xyz) for k in self.segments])[: len(nodes)] / NODES
+        compliance, free = np.zeros(model.nv), np.zeros(model.nv)
+        compliance[address] = body.springs
+        compliance[nodes] = (body.beams[: len(nodes)] * pieces[:, None])[:, :, None]
         poses, torque = np.tile(np.eye(4), (len(q), 1, 1)), np.zeros((len(q), self.n))
-        bias, free = np.zeros(model.nv), np.zeros(model.nv)
         heaviness = np.nan
         each = body.placements if body.placements.ndim == 3 else None
         for i in range(len(q)):
@@ -153,24 +153,11 @@ class World:
                 model.body_pos[ids] = rest[ids] * (1.0 + body.growth[i, s])
             if each is not None:
                 self._place(model, each[i])
-            free[:] = 0.0
             free[address] = q[i] + body.joints[i]
-            for s in range(len(nodes)):
-                free[nodes[s]] = (body.bow[i, s] * lengths[s] / NODES)[:, None]
-            data.qpos[:] = free
-            for _ in range(_ROUNDS):
-                mujoco.mj_kinematics(model, data)
-                mujoco.mj_comPos(model, data)
-                mujoco.mj_rne(model, data, 0, bias)
-                settled = free - compliance * bias
-                change = float(np.abs(settled - data.qpos).max())
-                data.qpos[:] = settled
-                if not yields or change < _SETTLED:
-                    break
-            mujoco.mj_kinematics(model, data)
+            free[nodes] = (body.bow[i, : len(nodes)] * pieces[:, None])[:, :, None]
+            torque[i] = _settle(model, data, free, compliance)[address]
             poses[i, :3, :3] = data.xmat[tool].reshape(3, 3)
             poses[i, :3, 3] = data.xpos[tool]
-            torque[i] = bias[address]
         return poses, torque
 
     def _compile(self, bending: bool, placements: Array | None) -> mujoco.MjModel:
@@ -264,6 +251,23 @@ class World:
             error = from_vector(placements[k][None])[0]
             model.body_pos[body] += rotation @ error[:3, 3]
             model.body_quat[body] = quaternion(rotation @ error[:3, :3])
+
+
+def _settle(model: mujoco.MjModel, data: mujoco.MjData, free: Array, compliance: Array) -> Array:
+    """Let joints yield from where they are free until springs balance gravity; return what holds them, N·m."""
+    held, yields = np.zeros(model.nv), bool(np.any(compliance))
+    data.qpos[:] = free
+    for _ in range(_ROUNDS):
+        mujoco.mj_kinematics(model, data)
+        mujoco.mj_comPos(model, data)
+        mujoco.mj_rne(model, data, 0, held)
+        settled = free - compliance * held
+        change = float(np.abs(settled - data.qpos).max())
+        data.qpos[:] = settled
+        if not yields or change < _SETTLED:
+            break
+    mujoco.mj_kinematics(model, data)
+    return held
 
 
 def cross_axes(direction: Array) -> tuple[Array, Array]:
