@@ -10,7 +10,8 @@ from simulate import simulate
 
 from thermal_robot import EffectError, diagnose
 from thermal_robot.effects import Drift, ThermalElongation, TransmissionError, choose, library
-from thermal_robot.inference.columns import block, displacement, frame_columns
+from thermal_robot.effects.apply import displacement
+from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.frames import moved
 from thermal_robot.kinematics import exp6, rotation_to_quaternion
 from thermal_robot.observations import Frames, observe

@@ -10,8 +10,8 @@ from simulate import simulate
 
 from thermal_robot import CorrectedModel, diagnose
 from thermal_robot.effects import Backlash, JointCompliance, ThermalBending, ThermalElongation, TrackingLag
+from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.lagging import History
-from thermal_robot.inference.columns import displacement
 from thermal_robot.observations import observe
 
 NOISE = 25e-6

@@ -11,7 +11,7 @@ from simulate import simulate
 from thermal_robot import CampaignError, EffectError, diagnose
 from thermal_robot import effects as effects_module
 from thermal_robot.effects import Effect, JointOffset, Parameter, at_joint, choose, library
-from thermal_robot.inference.columns import displacement
+from thermal_robot.effects.apply import displacement
 from thermal_robot.observations import Frames, observe
 
 

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-from thermal_robot.effects.effect import Effect, Parameter, at_instrument
+import numpy as np
+
+from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, at_instrument
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -22,8 +25,13 @@ class InstrumentScale(Effect):
     """
 
     name: ClassVar[str] = "instrument_scale"
+    title: ClassVar[str] = "a scale error of the instrument"
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """One scale error; dimensionless."""
         response = at_instrument(observations.predicted_position)
         return (Parameter("scale error", "1", 1e-4, "instrument", "instrument", (response,)),)
+
+    def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
+        """Return the distance from the instrument."""
+        return "distance from the instrument", "m", np.linalg.norm(observations.predicted_position, axis=1)
