@@ -18,6 +18,7 @@ from thermal_robot.diagnosis.where import locate
 from thermal_robot.effects import Effect, Parameter
 from thermal_robot.effects.channel import by_place, sensitivity
 from thermal_robot.effects.effect import Channel, Driver
+from thermal_robot.effects.gate import driver
 from thermal_robot.effects.quantities import quantities, unit
 from thermal_robot.errors import EffectError
 from thermal_robot.inference.columns import block
@@ -26,10 +27,14 @@ from thermal_robot.observations import Observations
 
 Array = NDArray[np.float64]
 
-_MATERIAL = 0.03
-_MOST = 8
-_LEVELS = 6
-_LINE, _ROUGH = 25, 0.01
+_PURE = 1e-6  # of a unit twist, m or rad: with less of one kind it is all of the other
+_MATERIAL = 0.03  # of what the effect does: a place with less is not worth a panel
+_MOST = 8  # panels that a page can hold
+_LEVELS = 6  # values of a quantity, up to which each is a level and not a point of a curve
+_LINE = 25  # points of a law whose rows scatter about it, because it follows other quantities, too
+_ROUGH = 0.01  # of the law's range: neighbours that differ by less follow this quantity alone
+_NEIGHBOURS = 8  # rows that are taken together when asking whether an error follows a quantity
+_FINEST = 400  # points of a law that is drawn row by row
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,11 +122,11 @@ def explained(fit: Fit, effect: str) -> Explained:
     for location in shown:
         each = ((part, float(v)) for p, v in zip(parameters, values, strict=True) for part in by_place(robot, p))
         mine = [(part, v) for part, v in each if (part.kind, part.place) == (location.kind, location.name)]
-        places.append(_place(fit, setting, mine, location.share, rows))
+        places.append(_shown(fit, setting, mine, location.share, rows))
     return Explained(effect, tuple(places), len(found) - len(shown))
 
 
-def _place(
+def _shown(
     fit: Fit, effect: Effect, parameters: list[tuple[Parameter, float]], share: float, rows: NDArray[np.bool_]
 ) -> Place:
     observations, e = fit.corrected, fit.explanation
@@ -179,10 +184,11 @@ def _error(observations: Observations, parameters: list[tuple[Parameter, float]]
     if channels == {"joint"} and len(parts) == 1:
         index = next(index for _, index in parts)
         return twists[:, 0], moves[:, :, 0], "m" if observations.robot.joint_types[index] == "prismatic" else "rad"
-    shift, turn = np.linalg.norm(main.reshape(-1, 6)[:, :3]), np.linalg.norm(main.reshape(-1, 6)[:, 3:])
     direction = moves @ main
-    if len(parts) == 1 and min(shift, turn) < 1e-6:
-        return twists @ main, direction, "m" if shift > turn else "rad"
+    if len(parts) == 1:
+        shift, turn = np.linalg.norm(main[:3]), np.linalg.norm(main[3:])
+        if min(shift, turn) < _PURE:
+            return twists @ main, direction, "m" if shift > turn else "rad"
     size = float(np.sqrt((direction[:, :3] ** 2).sum(axis=1).mean()))
     return twists @ main * size, direction / max(size, 1e-300), "m at the tool"
 
@@ -191,16 +197,16 @@ def _driver(
     observations: Observations, effect: Effect, parameters: list[tuple[Parameter, float]], error: Array
 ) -> Driver:
     """Return what drives an effect at a place; of one that says nothing, the quantity that goes with it most."""
-    if driver := effect.driver(observations, [parameter for parameter, _ in parameters], error):
-        return driver
+    if known_driver := driver(effect, observations, [parameter for parameter, _ in parameters], error):
+        return known_driver
     known = quantities(observations)
-    name = max(known, key=lambda n: -_scatter(known[n], error))
+    name = max(known, key=lambda n: -_unsteady(known[n], error))
     return name, unit(observations.robot, name), known[name]
 
 
-def _scatter(values: Array, error: Array) -> float:
+def _unsteady(values: Array, error: Array) -> float:
     """Mean variance of an error among neighbours in a quantity."""
-    parts = np.array_split(error[np.argsort(values, kind="stable")], max(len(error) // 8, 2))
+    parts = np.array_split(error[np.argsort(values, kind="stable")], max(len(error) // _NEIGHBOURS, 2))
     return float(np.mean([part.var() for part in parts if len(part)]))
 
 
@@ -214,5 +220,5 @@ def _line(values: Array, error: Array) -> Array:
     # a law of this quantity alone lies between its neighbours
     between = np.interp(x[1:-1:2], x[::2], y[::2])[: len(x[1:-1:2])]
     alone = float(np.abs(between - y[1:-1:2]).mean()) < _ROUGH * float(np.ptp(y)) + 1e-300
-    parts = np.array_split(order, min(len(order), 400) if alone else min(_LINE, max(len(order) // 10, 2)))
+    parts = np.array_split(order, min(len(order), _FINEST) if alone else min(_LINE, max(len(order) // 10, 2)))
     return np.array([[values[p].mean() for p in parts], [error[p].mean() for p in parts]])

@@ -18,11 +18,13 @@ class BaseFrame(Effect):
     """The declared registration of the base is off by a constant twist in the root frame.
 
     Expected size 2 mm and 2 mrad. Only where the campaign declares ``base = "known"``: an unknown base is fitted
-    before any effect is asked for.
+    before any effect is asked for. It is a twist of the first joint's placement, too, so that :class:`Geometric`
+    contains it.
     """
 
     name: ClassVar[str] = "base_frame"
     title: ClassVar[str] = "a misplaced base frame"
+    contained_in: ClassVar[tuple[str, ...]] = ("geometric",)
     frame: ClassVar[str] = "base"
 
     def missing(self, observations: Observations) -> tuple[str, ...]:

@@ -143,7 +143,8 @@ class Effect(ABC):
     frame: ClassVar[str] = ""
     """Which of the campaign's frames it is an error of, ``base`` or ``tool``; empty for all others."""
     contained_in: ClassVar[tuple[str, ...]] = ()
-    """Names of larger effects that can do exactly what it does, but for the unknown frames, in any campaign."""
+    """Names of larger effects that can do exactly what it does, but for the unknown frames; where that holds for some
+    arms only, the class says so."""
 
     def __init_subclass__(cls, **options: Any) -> None:
         """Give a class with a name of its own, but no title, one."""

@@ -1,13 +1,14 @@
-"""The one gate through which everybody gets an effect's parameters: an answer that breaks the contract is refused."""
+"""The one gate through which everybody gets an effect's answers: one that breaks the contract is refused."""
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 
-from thermal_robot.effects.effect import Channel, Effect, Parameter, Response
+from thermal_robot.effects.effect import Array, Channel, Driver, Effect, Parameter, Response
 from thermal_robot.errors import EffectError
 
 if TYPE_CHECKING:
@@ -56,6 +57,27 @@ def checked(effect: Effect, observations: Observations) -> tuple[Parameter, ...]
             raise EffectError(f"effect {effect.name!r}, parameter {parameter.name!r}: {problem}")
         names.add(parameter.name)
     return tuple(answer)
+
+
+def driver(effect: Effect, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
+    """Return what drives an effect at a place (:meth:`Effect.driver`), once it is seen to keep the contract.
+
+    Raises
+    ------
+    EffectError
+        If it is not a name, a unit and (N,) finite values.
+    """
+    answer: Any = effect.driver(observations, parameters, error)
+    if answer is None:
+        return None
+    if isinstance(answer, tuple) and len(answer) == 3:
+        name, unit, values = answer
+        fits = isinstance(values, np.ndarray) and values.shape == error.shape and values.dtype.kind == "f"
+        if isinstance(name, str) and isinstance(unit, str) and fits and np.isfinite(values).all():
+            return name, unit, values
+    raise EffectError(
+        f"effect {effect.name!r}: driver answers {answer!r}, expected name, unit and {len(error)} finite values"
+    )
 
 
 def _wrong(parameter: Any, observations: Observations) -> str:

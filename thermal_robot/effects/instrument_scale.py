@@ -20,12 +20,13 @@ class InstrumentScale(Effect):
 
     Expected size 1e-4: a tracker whose refraction is corrected with a wrong temperature errs by 1e-6 per kelvin, a
     camera or a photogrammetric scale bar by a hundred times that. All link lengths wrong by the same share look
-    exactly
-    alike, so :class:`Geometric` contains it; with an unknown base the place of the origin does not matter.
+    exactly alike, so :class:`Geometric` contains it, unless a joint slides or the target stands off a known tool frame;
+    with an unknown base the place of the origin does not matter.
     """
 
     name: ClassVar[str] = "instrument_scale"
     title: ClassVar[str] = "a scale error of the instrument"
+    contained_in: ClassVar[tuple[str, ...]] = ("geometric",)
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """One scale error; dimensionless."""
