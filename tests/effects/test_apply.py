@@ -9,7 +9,9 @@ from helpers import SAMPLES, commanded
 from thermal_robot import EffectError
 from thermal_robot.effects import (
     BaseFrame,
+    Drift,
     Effect,
+    Geometric,
     InstrumentScale,
     JointGain,
     JointOffset,
@@ -23,7 +25,9 @@ from thermal_robot.observations import observe
 
 
 def seen(robot):
-    return observe(commanded(robot, {"temperature": np.linspace(20.0, 30.0, SAMPLES)}))
+    return observe(
+        commanded(robot, {"temperature": np.linspace(20.0, 30.0, SAMPLES), "time": np.arange(SAMPLES, dtype=float)})
+    )
 
 
 def test_no_effect_displaces_nothing(rv_m2):
@@ -36,7 +40,16 @@ def test_no_effect_displaces_nothing(rv_m2):
 
 def test_effects_add_up_in_any_order_and_are_linear_in_their_values(rv_m2):
     observations, rng = seen(rv_m2), np.random.default_rng(0)
-    kinds = (JointOffset(), JointGain(), ThermalElongation(), BaseFrame(), ToolFrame(), InstrumentScale())
+    kinds = (
+        JointOffset(),
+        JointGain(),
+        ThermalElongation(),
+        Geometric(),
+        Drift(span=9.0),
+        BaseFrame(),
+        ToolFrame(),
+        InstrumentScale(),
+    )
     held = [(e, rng.normal(size=len(e.parameters(observations)))) for e in kinds]
 
     def flat(effects):

@@ -276,12 +276,13 @@ def test_arguments_make_the_same_effect_again(rv_m2, name):
 @on_arms
 @every_effect
 def test_every_setting_passes_the_gate_and_is_drawn_against_something(arm, name):
-    observations = observe(campaign_of(arm, 1e-5, name=name))
-    for setting in settings(library()[name], observations):
-        for parameter in checked(setting, observations):
-            for part in by_place(arm, parameter):
-                found = driver(setting, observations, [part], np.linspace(-1e-3, 1e-3, 8))
-                assert found is None or found[0]
+    observations, effect = observe(campaign_of(arm, 1e-5, name=name)), library()[name]
+    for setting in settings(effect, observations):
+        parts = [part for parameter in checked(setting, observations) for part in by_place(arm, parameter)]
+        found = [driver(setting, observations, [part], np.linspace(-1e-3, 1e-3, 8)) for part in parts]
+        # a frame that is off is off everywhere: nothing drives it
+        assert any(found) == (not effect.frame)
+        assert all(what[0] for what in found if what)
 
 
 def outside(observations, name, container):
