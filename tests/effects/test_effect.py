@@ -2,6 +2,7 @@
 
 import re
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,6 +23,19 @@ def test_the_guide_in_the_docstring_is_an_effect_that_keeps_the_contract(rv_m2):
     assert [p.name for p in checked(sag, observations)] == [f"sag, {joint}" for joint in rv_m2.joint_names]
     assert sag.title == "joint sag"
     assert (sag.missing(observations), sag.reads(observations)) == ((), ("speed",))
+
+
+def test_the_page_on_effects_of_ones_own_is_true(rv_m2):
+    page = (Path(__file__).parents[2] / "docs" / "effects.md").read_text(encoding="utf-8")
+    code = re.search(r"```python\n(.*?)\ndiagnosis = ", page, re.DOTALL)[1]
+    names = {}
+    exec(code, names)
+    observations = observe(commanded(rv_m2, {"speed": np.linspace(0.1, 1.0, SAMPLES)}))
+    assert len(checked(names["SpeedSag"](), observations)) == rv_m2.n
+    table = page[page.index("| attribute |") :].split("\n\n")[0]
+    stated = set(re.findall(r"`(\w+)(?:\([\w, ]*\))?`(?=[^|]*\|[^|]*\|[^|]*\|$)", table, re.MULTILINE))
+    public = {n for n in vars(Effect) if not n.startswith("_")}
+    assert stated == public - {"name", "parameters", "arguments", "random"}
 
 
 @dataclass(frozen=True)
