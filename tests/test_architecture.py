@@ -32,10 +32,14 @@ ORDER = (
     "cli",
 )
 """Rooms from the ground up: each may import those before it."""
-FREE = {"probability": {"errors", "probability"}, "report": {"errors", "report"}}
-"""Rooms that may import less than what stands before them: one knows no robot, the other only what it is given."""
-LAZILY = {("diagnosis", "report")}
-"""Imports upward that may happen inside a function: a diagnosis that is printed asks the report to draw it."""
+FREE = {
+    "report": {"errors", "report"},
+    "assembly": {"errors", "kinematics", "robot", "assembly"},
+    "paper": {"errors", "kinematics", "robot", "assembly", "paper"},
+}
+"""Rooms that may import less than what stands before them: one draws what it is given, two need no campaign."""
+TYPES = {"report": {f"thermal_robot.diagnosis.{n}" for n in ("result", "parts", "one_effect")}}
+"""What a room may know beyond that by type alone: the report sees values, and nothing that computes them."""
 LONGEST = 400
 
 MODULES = sorted(ROOT.rglob("*.py"))
@@ -106,13 +110,15 @@ def test_imports_go_one_way(path):
         return
     assert here in ORDER, f"{here} has no place in the order of rooms"
     for target, how in imports(path):
-        if target.split(".")[0] != PACKAGE or how == "checked":
+        if target.split(".")[0] != PACKAGE:
+            continue
+        if how == "checked" and room(target) not in FREE.get(here, {room(target)}):
+            assert target in TYPES.get(here, {target}), f"{own} knows {target}"
+        if how == "checked":
             continue
         there = room(target)
         if not there:  # the package itself: its version, and only once it is loaded
             assert how == "lazy", f"{own} imports the package that imports it"
-            continue
-        if (here, there) in LAZILY and how == "lazy":
             continue
         assert ORDER.index(there) <= ORDER.index(here), f"{own} imports {target}"
         assert there in FREE.get(here, {there}), f"{own} imports {target}"
@@ -135,9 +141,18 @@ def test_an_effect_knows_observations_by_type_only():
             assert seen <= {"checked"}, path.name
 
 
-def test_no_module_imports_in_a_circle():
-    """At import time: what a module loads at its top level never leads back to it."""
-    tops = {dotted(p): {t for t, how in imports(p) if how == "top" and is_module(t) and t != PACKAGE} for p in MODULES}
+def test_probability_knows_neither_robots_nor_files():
+    own = "thermal_robot.assembly.probability"
+    for path in MODULES:
+        if dotted(path).startswith(own):
+            known = {t for t, _ in imports(path) if t.split(".")[0] == PACKAGE}
+            assert all(t.startswith(own) or room(t) == "errors" for t in known), path.name
+
+
+@pytest.mark.parametrize("kinds", [{"top"}, {"top", "lazy", "checked"}], ids=["at import", "whenever, types too"])
+def test_no_module_imports_in_a_circle(kinds):
+    """What a module loads never leads back to it; what it loads late, or knows by type, neither."""
+    tops = {dotted(p): {t for t, how in imports(p) if how in kinds and is_module(t) and t != PACKAGE} for p in MODULES}
     done, open_ = set(), []
 
     def visit(name):

@@ -9,7 +9,8 @@ from simulate import commands, simulate
 
 from thermal_robot import diagnose
 from thermal_robot.campaign import Campaign
-from thermal_robot.inference.rows import NEAR, folds, near_repeats, neighbourhoods, spells
+from thermal_robot.inference.rows import folds, near_repeats, neighbourhoods, spells
+from thermal_robot.inference.settings import NEAR
 
 on_arms = pytest.mark.parametrize("arm", ["rv_m2", "ur10", "panda"], indirect=True)
 

@@ -2,6 +2,7 @@
 
 import pickle
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -9,6 +10,8 @@ from helpers import NOISE, with_law
 from simulate import simulate
 
 from thermal_robot import diagnose
+from thermal_robot.diagnosis.diagnose import _left
+from thermal_robot.diagnosis.parts import Unexplained
 from thermal_robot.diagnosis.random_gap import random_gap
 from thermal_robot.diagnosis.schemes import worse_elsewhere
 from thermal_robot.diagnosis.stand_in import StandIn, trust
@@ -17,6 +20,7 @@ from thermal_robot.effects.law import Discovered
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.errors import CampaignError
 from thermal_robot.inference.fit import fit
+from thermal_robot.inference.rows import in_a_row
 from thermal_robot.inference.scan import of_quantity
 from thermal_robot.kinematics import Displacement
 from thermal_robot.observations import Frames, observe
@@ -140,3 +144,26 @@ def test_steps_of_an_encoder_feign_no_systematic_effect(rv_m2):
         assert found.gap.noise_source == "scatter"
         names.append(found.verdict)
     assert names.count(("encoder_resolution",)) >= 11, names
+
+
+def test_rows_set_aside_in_a_row_count_as_unexplained(rv_m2):
+    """Those of a change that the explanation cannot follow are no gross errors, which stay out of the sum."""
+    drifted = diagnose(simulate(rv_m2, ["drift"], seed=3)[0])
+    known, n = drifted.fit, drifted.samples
+    before, after = np.ones((n, 3)), np.full((n, 3), 0.1)
+    after[[4, 5, 6, 30]] = 1.0
+    aside = np.isin(np.arange(n), [4, 5, 6, 30])
+    assert in_a_row(known.campaign, aside).sum() == 3
+    looked = SimpleNamespace(
+        remaining=Unexplained(True, 0.2, 1e-9),
+        fit=SimpleNamespace(
+            campaign=known.campaign,
+            explanation=SimpleNamespace(outliers=aside),
+            nominal=SimpleNamespace(gap=before),
+            corrected=SimpleNamespace(gap=after),
+        ),
+    )
+    gap = SimpleNamespace(rms_before=1.0)
+    assert _left(looked, gap) == pytest.approx(0.2**2 + 3 / (n - 1))
+    calm = SimpleNamespace(remaining=Unexplained(False, 0.0, 1.0), fit=looked.fit)
+    assert _left(calm, gap) == 0.0

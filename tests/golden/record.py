@@ -20,7 +20,7 @@ TOLERANCE = 1e-9
 """Relative: BLAS rounds by about 1e-16, the fits' condition numbers reach 1e6."""
 NOTHING = 1e-11
 """Below this a figure is rounding of nothing: p-values and shares that underflow."""
-_WORDS = ("summary", "advice", "warnings", "reasons", "describes", "name", "schema", "next", "where")
+_WORDS = ("summary", "advice", "warnings", "reasons", "describes", "name", "schema", "next", "where", "title", "random")
 _SMALL = ("ur5_jacobi", "wam_jacobi", "ipa_ur10_b")
 
 

@@ -6,9 +6,8 @@ from functools import lru_cache
 import numpy as np
 import pytest
 
-from thermal_robot.diagnosis.result import (
+from thermal_robot.diagnosis.parts import (
     Dependence,
-    Diagnosis,
     Estimate,
     Finding,
     Gap,
@@ -18,6 +17,7 @@ from thermal_robot.diagnosis.result import (
     Unexplained,
     Where,
 )
+from thermal_robot.diagnosis.result import Diagnosis
 
 JOINTS = (
     "shoulder_pan_joint",

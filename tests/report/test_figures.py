@@ -13,7 +13,7 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.patches import Rectangle
 
 from thermal_robot import report
-from thermal_robot.diagnosis.result import Dependence, Where
+from thermal_robot.diagnosis.parts import Dependence, Where
 
 PLOTS = ("plot_how_far", "plot_which", "plot_where", "plot_remainder", "plot_map", "overview")
 LONG = tuple(f"left_arm_{part}_{k}_joint" for k, part in enumerate(("shoulder", "upper", "elbow", "wrist") * 2))[:7]

@@ -7,7 +7,7 @@ from html.parser import HTMLParser
 
 import pytest
 
-from thermal_robot.diagnosis.result import Dependence, Estimate, Finding, Location, Unexplained, Where
+from thermal_robot.diagnosis.parts import Dependence, Estimate, Finding, Location, Unexplained, Where
 from thermal_robot.report import fragment, html
 
 KINDS = ("found", "nothing", "unexplained", "confounded")

@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from thermal_robot.diagnosis.result import Estimate, Finding
+from thermal_robot.diagnosis.parts import Estimate, Finding
 from thermal_robot.report import text
 
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from thermal_robot.diagnosis.result import Estimate, Location
+from thermal_robot.diagnosis.parts import Estimate, Location
 from thermal_robot.report import units
 
 

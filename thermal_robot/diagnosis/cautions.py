@@ -10,11 +10,8 @@ import numpy as np
 from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis.stand_in import StandIn
 from thermal_robot.effects import Effect
+from thermal_robot.inference import settings
 from thermal_robot.inference.fit import Fit
-
-_DOUBTFUL = 0.5
-_CANCELLING = 5.0
-_CONTRADICTED = 0.01  # rad or m: no servo that has settled is as far from its command
 
 
 def usable(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
@@ -49,14 +46,14 @@ def contradicted(campaign: Campaign) -> list[str]:
             continue
         away = read - campaign.q[:, j]
         middle = float(np.median(away))
-        wrong = np.flatnonzero(np.abs(away - middle) > _CONTRADICTED)
+        wrong = np.flatnonzero(np.abs(away - middle) > settings.CONTRADICTED)
         if len(wrong):
             first = int(campaign.rows[wrong[0]])
             found.append(
                 f"encoder.{name} contradicts the commands in {len(wrong)} of {campaign.samples} rows, first in "
                 f"row {first}, by up to {np.abs(away - middle).max():.2g}: that is a fault of the log, not of the robot"
             )
-        elif abs(middle) > _CONTRADICTED:
+        elif abs(middle) > settings.CONTRADICTED:
             found.append(f"encoder.{name} is {middle:.3g} from the commands throughout: another zero, or another unit")
     return found
 
@@ -76,7 +73,7 @@ def cautions(fitted: Fit, considered: Sequence[Effect], doubts: Mapping[str, Sta
     notes = []
     campaign, e = fitted.campaign, fitted.explanation
     remains = float(e.whitening.noise[0] * e.best.noise)
-    if campaign.noise_position is not None and remains < 0.5 * campaign.noise_position:
+    if campaign.noise_position is not None and remains < settings.STATED_TOO_LARGE * campaign.noise_position:
         times = campaign.noise_position / remains
         notes.append(f"the stated noise of position is {times:.1f} times what remains: it is stated too large")
     for name, times in _cancelling(fitted):
@@ -95,13 +92,13 @@ def _cancelling(fitted: Fit) -> Iterator[tuple[str, float]]:
     """
     e = fitted.explanation
     frames = e.linear.frames.reshape(e.linear.gap.size, e.linear.frames.shape[2])
-    basis = np.linalg.qr(frames / (np.linalg.norm(frames, axis=0) + 1e-300))[0]
+    basis = np.linalg.qr(frames / (np.linalg.norm(frames, axis=0) + settings.TINY))[0]
     for b, (effect, values) in zip(e.best.blocks, fitted.effects, strict=True):
         moved = e.linear.blocks[b].columns.reshape(len(frames), -1) * values
         moved = moved - basis @ (basis.T @ moved)
         whole = float(np.linalg.norm(moved.sum(axis=1)))
-        times = float(np.linalg.norm(moved, axis=0).max(initial=0.0)) / max(whole, 1e-300)
-        if times > _CANCELLING:
+        times = float(np.linalg.norm(moved, axis=0).max(initial=0.0)) / max(whole, settings.TINY)
+        if times > settings.CANCELLING:
             yield effect.name, times
 
 
@@ -109,5 +106,5 @@ def _changing(doubts: Mapping[str, StandIn]) -> tuple[str, ...]:
     return tuple(
         f"the size of {name} changes with {doubt.quantity}: it may stand in for a cause that is not listed"
         for name, doubt in doubts.items()
-        if doubt.belief < _DOUBTFUL
+        if doubt.belief < settings.DOUBTFUL
     )

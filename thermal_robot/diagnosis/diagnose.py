@@ -14,21 +14,20 @@ from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.diagnosis.cautions import cautions, usable
 from thermal_robot.diagnosis.discovery import Discoveries, discoveries
-from thermal_robot.diagnosis.findings import findings, in_order
+from thermal_robot.diagnosis.findings import findings, in_order, separates, titled
 from thermal_robot.diagnosis.held_out import Shrinkage, held_out
+from thermal_robot.diagnosis.parts import Finding, FoldScheme, Gap, Rows
 from thermal_robot.diagnosis.random_gap import STEPS
-from thermal_robot.diagnosis.result import Diagnosis, Finding, Gap, Rows
-from thermal_robot.diagnosis.schemes import FoldScheme, worst_folds
+from thermal_robot.diagnosis.result import Diagnosis, told
+from thermal_robot.diagnosis.schemes import worst_folds
 from thermal_robot.diagnosis.sensitivity import sensitivity
-from thermal_robot.diagnosis.stand_in import DOUBT, stand_ins, trust
-from thermal_robot.diagnosis.verdict import advise, sentence
+from thermal_robot.diagnosis.stand_in import stand_ins, trust
 from thermal_robot.diagnosis.where import locate
 from thermal_robot.effects import Effect, choose, library
 from thermal_robot.errors import CampaignError
+from thermal_robot.inference import settings
 from thermal_robot.inference.fit import Fit, fit
 from thermal_robot.inference.rows import in_a_row
-
-_SEEN = 1e-3
 
 
 def diagnose(
@@ -87,12 +86,11 @@ def diagnose(
     believed = trust({e.name: shares.get(e.name, 0.0) for e, _ in fitted.effects}, doubts, _left(looked, gap))
     systematic = findings(fitted, shrinkage.shares, locations, believed)
     chance = [f for f in _scatter(looked) if f.name not in without and (not only or f.name in only)]
-    found = in_order((*systematic, *chance))
+    found = in_order(titled((*systematic, *chance)))
     order = [f.name for f in found if f.name in {e.name for e, _ in fitted.effects}]
     order += [f.name for f in chance if f.status == "found"]
     probability = min(_probability(fitted), *believed.values(), 1.0)
-    advice, separates = advise(found, unexplained)
-    return Diagnosis(
+    diagnosis = Diagnosis(
         campaign=campaign.name,
         robot=campaign.robot.name,
         tool_frame=campaign.robot.tool_frame,
@@ -106,17 +104,17 @@ def diagnose(
         unexplained=unexplained,
         verdict=tuple(order),
         probability=probability,
-        summary=sentence(
-            gap, found, order, probability, unexplained, looked.remaining, reach=_reach(campaign), narrowed=narrowed
-        ),
-        advice=advice,
-        separates=separates,
+        separates=separates(found),
         model=_model(fitted),
         rows=_rows(fitted, shrinkage),
         warnings=(*campaign.warnings, *notes, *cautions(fitted, candidates if narrowed else (), doubts)),
         sensitivity=sensitivity(fitted),
         fit=fitted,
+        remaining=looked.remaining,
+        reach=_reach(campaign),
+        narrowed=narrowed,
     )
+    return told(diagnosis)
 
 
 def _scatter(looked: Discoveries) -> tuple[Finding, ...]:
@@ -125,14 +123,14 @@ def _scatter(looked: Discoveries) -> tuple[Finding, ...]:
     Where an unlisted cause is at work what differs from pose to pose may be its doing: steps of an encoder are then
     only believed where they are seen.
     """
-    seen = any(p < _SEEN for p in looked.chance.steps.values())
+    seen = any(p < settings.LEVEL for p in looked.chance.steps.values())
     if seen or not looked.remaining.flagged:
         return looked.chance.findings
     return tuple(
         replace(
             f,
             status="not_found",
-            probability=DOUBT * (f.probability or 0.0),
+            probability=settings.BESIDE_UNLISTED * (f.probability or 0.0),
             locations=(),
             parameters=(),
             confounded_with=(),
@@ -151,7 +149,7 @@ def _left(looked: Discoveries, gap: Gap) -> float:
     aside = fitted.explanation.outliers
     changed = in_a_row(fitted.campaign, aside)
     before, after = ((o.gap[:, :3] ** 2).sum(axis=1) for o in (fitted.nominal, fitted.corrected))
-    beside = float(after[changed].sum() / max(before[changed | ~aside].sum(), 1e-300))
+    beside = float(after[changed].sum() / max(before[changed | ~aside].sum(), settings.TINY))
     return min((looked.remaining.rms / gap.rms_before) ** 2 + beside, 1.0)
 
 

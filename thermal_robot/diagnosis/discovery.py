@@ -7,24 +7,18 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from thermal_robot.diagnosis.parts import Dependence, Location, Unexplained
 from thermal_robot.diagnosis.random_gap import RandomGap, random_gap
 from thermal_robot.diagnosis.remainder import examine
-from thermal_robot.diagnosis.result import Dependence, Location, Unexplained
 from thermal_robot.diagnosis.schemes import worse_elsewhere
 from thermal_robot.effects import Effect
 from thermal_robot.effects.law import PREFIX, Discovered
+from thermal_robot.inference import settings
 from thermal_robot.inference.discover import Discovery, discover
 from thermal_robot.inference.explain import Noise, explain
 from thermal_robot.inference.fit import Fit, refit, row_groups
 from thermal_robot.inference.generalised import generalised
 from thermal_robot.inference.scan import of_quantity
-
-MOST = 4
-_MANY_ROWS = 5000
-_LIKELY = 0.01
-_NEVER = -100.0  # log prior odds of an effect that only scatter had feigned
-FINER = 9
-"""Knots of a law that five did not suffice for."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +67,7 @@ def discoveries(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> D
         return _scattered(fit, chance, progress)
     left = first
     stages = [(fit, found, left, floor, source)]
-    most = MOST if fit.campaign.samples < _MANY_ROWS else 1
+    most = settings.MOST_LAWS if fit.campaign.samples < settings.MANY_ROWS else 1
     for _ in range(most):
         number = 1 + max((int(d.law.name.removeprefix(PREFIX)) for d in found), default=0)
         if not left.flagged:
@@ -85,7 +79,7 @@ def discoveries(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> D
         again = next((d for d in found if _same(d.law, discovery.law)), None)
         if again is not None:  # its shape was too simple
             values = again.law.values(fit.corrected)
-            finer = of_quantity(again.law, np.zeros(1) if values is None else values, knots=FINER)
+            finer = of_quantity(again.law, np.zeros(1) if values is None else values, knots=settings.FINER_KNOTS)
             if again.law in (finer, discovery.law) or finer.shape == "levels":
                 break
             discovery = replace(discovery, law=finer)
@@ -118,7 +112,7 @@ def _scattered(fit: Fit, chance: RandomGap, progress: Callable[[str], None]) -> 
     noise = Noise(*(float(s) for s in chance.scatter.noise[::3]))
     again = explain(linear, noise, families=fit.families, groups=row_groups(campaign), rarity=fit.rarity)
     kept = tuple(dict.fromkeys(fit.families[b] for b in again.best.blocks))
-    feigned = {name: _NEVER for name in dict.fromkeys(fit.families) if name not in kept}
+    feigned = {name: settings.NEVER for name in dict.fromkeys(fit.families) if name not in kept}
     fit = refit(fit, {}, kept, feigned, progress)
     chance = random_gap(fit)
     covariance = chance.scatter.covariance(fit.corrected.joint_sensitivity)[:, :3, :3]
@@ -158,7 +152,9 @@ def _told(first: Unexplained, left: Unexplained, found: Sequence[Discovery]) -> 
             places.setdefault(place, probability)
         for quantity, _ in discovery.quantities[:1]:
             followed.setdefault(quantity, float(np.exp(-discovery.gain)))
-    locations = tuple(Location(kind, name, min(p, 1.0)) for (kind, name), p in places.items() if p >= _LIKELY)
+    locations = tuple(
+        Location(kind, name, min(p, 1.0)) for (kind, name), p in places.items() if p >= settings.LIKELY_PLACE
+    )
     return replace(
         first,
         locations=locations,

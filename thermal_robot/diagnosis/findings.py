@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from thermal_robot.diagnosis.discovery import is_law
-from thermal_robot.diagnosis.result import Estimate, Finding, Location, Status
+from thermal_robot.diagnosis.parts import Estimate, Finding, Location, Status, is_frame
+from thermal_robot.effects import RANDOM
 from thermal_robot.effects.law import Discovered
+from thermal_robot.inference import settings
 from thermal_robot.inference.explain import Explanation
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.problem import contained
 
 Array = NDArray[np.float64]
 Shares = dict[str, tuple[float, tuple[float, float]]]
-
-_DETERMINED = 0.5  # a parameter is identified when the data leave less than half of its prior's standard deviation
-_SURE = 0.75
-_RIVAL = 0.2
-_ALIAS = 1e-6
 
 
 def findings(
@@ -68,6 +66,31 @@ def findings(
     return tuple(result)
 
 
+_TITLES = {
+    "base_frame": "a misplaced base frame",
+    "tool_frame": "a misplaced tool frame",
+    "joint_offset": "joint zero offsets",
+    "joint_gain": "joint gain errors",
+    "transmission_error": "periodic transmission errors",
+    "backlash": "lost motion in the joints",
+    "joint_compliance": "joints that yield to load",
+    "tracking_lag": "joints that trail their command",
+    "link_compliance": "links that bend under load",
+    "thermal_bending": "links that bow with heat",
+    "encoder_resolution": "encoders that count in coarse steps",
+    "excess_repeatability": "joints that scatter more than the instrument",
+    "geometric": "geometric errors of the links",
+    "thermal_elongation": "thermal elongation of the links",
+    "drift": "drift of the base or the instrument",
+    "instrument_scale": "a scale error of the instrument",
+}
+
+
+def titled(found: Sequence[Finding]) -> tuple[Finding, ...]:
+    """Return findings with the effects' titles."""
+    return tuple(replace(f, title=f.describes or _TITLES.get(f.name, ""), random=f.name in RANDOM) for f in found)
+
+
 def in_order(found: Sequence[Finding]) -> tuple[Finding, ...]:
     """Sort by held-out share, then by probability; what is not testable comes last."""
     return tuple(
@@ -87,9 +110,9 @@ def _within_frames(fit: Fit, block: int) -> bool:
         return False
     columns = item.columns.reshape(-1, len(item.parameters)) * item.sizes
     flat = linear.frames.reshape(-1, linear.frames.shape[2])
-    basis = np.linalg.qr(flat / (np.linalg.norm(flat, axis=0) + 1e-300))[0]
+    basis = np.linalg.qr(flat / (np.linalg.norm(flat, axis=0) + settings.TINY))[0]
     left = columns - basis @ (basis.T @ columns)
-    return bool(np.linalg.norm(left) < _ALIAS * np.linalg.norm(columns))
+    return bool(np.linalg.norm(left) < settings.ALIAS * np.linalg.norm(columns))
 
 
 def _rivals(fit: Fit, explained: dict[str, int]) -> dict[str, tuple[str, ...]]:
@@ -112,7 +135,7 @@ def _rivals(fit: Fit, explained: dict[str, int]) -> dict[str, tuple[str, ...]]:
             own = [b for b, f in enumerate(fit.families) if f == other]
             both = np.array([other in h for h in held])
             instead = float(e.probabilities[absent & both].sum())
-            doubtful = mass >= 1.0 - _SURE and instead > max(_RIVAL, 0.8 * mass)
+            doubtful = mass >= 1.0 - settings.SURE and instead > max(settings.RIVAL, settings.RIVAL_SHARE * mass)
             apart = not any(frozenset((block, b)) in containing for b in own)
             if doubtful or (apart and any(_imitates(fit, block, b) for b in own)):
                 rivals.setdefault(name, set()).add(other)
@@ -132,19 +155,19 @@ def _imitates(fit: Fit, block: int, other: int) -> bool:
     if not own.size or not theirs.size:
         return False
     left, cosine, _ = np.linalg.svd(own.T @ matrix[slices[block], slices[other]] @ theirs, full_matrices=False)
-    shared = left[:, cosine > 1.0 - _ALIAS]
+    shared = left[:, cosine > 1.0 - settings.ALIAS]
     ends = np.cumsum([0, *(e.problem.bases[b].shape[1] for b in e.best.blocks)])
     start = ends[e.best.blocks.index(block)]
     moved = own.T @ matrix[slices[block], slices[block]] @ e.best.values[start : start + own.shape[0]]
     rest = float(moved @ moved - ((shared.T @ moved) ** 2).sum())
-    noise = float(chdtri(len(moved), 0.01)) * e.best.noise**2
+    noise = float(chdtri(len(moved), settings.EXACT_LEVEL)) * e.best.noise**2
     return bool(shared.shape[1]) and rest < noise < float(moved @ moved)
 
 
 def _root(gram: Array) -> Array:
     """(D, r) matrix that makes the columns with this Gram matrix orthonormal."""
     value, vector = np.linalg.eigh(gram)
-    seen = value > 1e-9 * value.max(initial=0.0)
+    seen = value > settings.DESIGN_FLOOR * value.max(initial=0.0)
     return np.asarray(vector[:, seen] / np.sqrt(value[seen]))
 
 
@@ -156,10 +179,16 @@ def _estimates(fit: Fit, block: int) -> tuple[Estimate, ...]:
     prior = item.sizes * e.best.scales[block]
     result = []
     for parameter, value, std, size in zip(item.parameters, values, spread, prior, strict=True):
-        known = bool(std < _DETERMINED * size)
+        known = bool(std < settings.DETERMINED * size)
         result.append(
             Estimate(
                 parameter.name, float(value) if known else None, float(std) if known else None, parameter.unit, known
             )
         )
     return tuple(result)
+
+
+def separates(found: Sequence[Finding]) -> tuple[tuple[str, ...], ...]:
+    """Return the groups of effects that the data cannot tell apart; those with an unknown frame only if alone."""
+    groups = tuple(dict.fromkeys(tuple(sorted((f.name, *f.confounded_with))) for f in found if f.confounded_with))
+    return tuple(g for g in groups if len(groups) == 1 or not any(is_frame(found, name) for name in g))

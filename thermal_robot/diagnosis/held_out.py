@@ -10,18 +10,15 @@ from math import factorial
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.diagnosis.result import HeldOut
+from thermal_robot.diagnosis.parts import HeldOut
 from thermal_robot.errors import EstimationError
+from thermal_robot.inference import settings
 from thermal_robot.inference.explain import Noise, explain
 from thermal_robot.inference.fit import Fit, row_groups
 from thermal_robot.inference.problem import Linear, Whitening, frame_step
 from thermal_robot.inference.rows import folds
 
 Array = NDArray[np.float64]
-
-_RESAMPLES = 2000
-_EXCLUDED = 1e-3
-_SEED = 20180901  # of the bootstrap: the same campaign always gets the same interval
 
 
 @dataclass(frozen=True, eq=False)
@@ -91,7 +88,9 @@ def _in_question(fit: Fit) -> tuple[Linear, tuple[str, ...], tuple[int, ...]]:
     """
     e = fit.explanation
     own = {f: [b for b, g in enumerate(fit.families) if g == f] for f in fit.families}
-    likely = {f for f, blocks in own.items() if e.probability(blocks) > _EXCLUDED or set(blocks) & set(e.best.blocks)}
+    likely = {
+        f for f, blocks in own.items() if e.probability(blocks) > settings.EXCLUDED or set(blocks) & set(e.best.blocks)
+    }
     kept = [b for b, f in enumerate(fit.families) if f in likely]
     linear = Linear(e.linear.gap, e.linear.frames, tuple(e.linear.blocks[b] for b in kept))
     return linear, tuple(fit.families[b] for b in kept), tuple(kept.index(b) for b in e.best.blocks)
@@ -106,7 +105,7 @@ def _share(squares: Array) -> float:
 
 
 def _interval(values: Array) -> tuple[float, float]:
-    low, high = np.quantile(values, [0.025, 0.975])
+    low, high = np.quantile(values, settings.INTERVAL)
     return float(low), float(high)
 
 
@@ -114,9 +113,9 @@ def _draws(block: NDArray[np.int64], kept: NDArray[np.bool_]) -> Array:
     """(R, B) how often each block is drawn in each bootstrap resample; blocks without rows are never drawn."""
     count = int(block.max()) + 1
     filled = np.flatnonzero(np.bincount(block[kept], minlength=count))
-    rng = np.random.default_rng(_SEED)
-    drawn = np.zeros((_RESAMPLES, count))
-    drawn[:, filled] = rng.multinomial(len(filled), np.full(len(filled), 1.0 / len(filled)), size=_RESAMPLES)
+    rng = np.random.default_rng(settings.BOOTSTRAP_SEED)
+    drawn = np.zeros((settings.RESAMPLES, count))
+    drawn[:, filled] = rng.multinomial(len(filled), np.full(len(filled), 1.0 / len(filled)), size=settings.RESAMPLES)
     return drawn
 
 
@@ -130,7 +129,7 @@ class _Subsets:
         used = np.flatnonzero(whitening.weights > 0)
         root = np.sqrt(whitening.weights[used])[:, None] / whitening.noise
         flat = linear.frames[used] * root[:, :, None]
-        flat = flat / (np.sqrt((flat**2).sum(axis=(0, 1))) + 1e-300)
+        flat = flat / (np.sqrt((flat**2).sum(axis=(0, 1))) + settings.TINY)
         columns = [flat]
         self.slices, start = [], flat.shape[2]
         for item, basis in zip(linear.blocks, e.problem.bases, strict=True):
@@ -170,8 +169,8 @@ class _Subsets:
     def _fit(self, train: Array, tight: Array) -> Array:
         """Return the ridge solution, negative, then 1; what a subset of effects leaves out is noise to it."""
         variance = self.variance
-        for _ in range(3):
-            ridge = np.concatenate([np.full(self.frames, 1e-9), variance * tight])
+        for _ in range(settings.FOLD_ROUNDS):
+            ridge = np.concatenate([np.full(self.frames, settings.LOOSE_FRAME), variance * tight])
             solution = np.linalg.solve(train[:-1, :-1] + np.diag(ridge), train[:-1, -1])
             signed = np.concatenate([-solution, [1.0]])
             left = self.worth * float(signed @ train @ signed) / max(self.equations, 1)
@@ -220,4 +219,4 @@ def _shares(
 def _relative(value: Array, base: tuple[float, Array], draws: Array) -> tuple[float, tuple[float, float]]:
     if base[0] <= 0:
         return 0.0, (0.0, 0.0)
-    return float(value.sum() / base[0]), _interval((draws @ value) / np.maximum(base[1], 1e-300))
+    return float(value.sum() / base[0]), _interval((draws @ value) / np.maximum(base[1], settings.TINY))

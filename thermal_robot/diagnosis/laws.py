@@ -5,10 +5,9 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from thermal_robot.inference import settings
 
-_KNOTS = 5
-_FEW = 6
+Array = NDArray[np.float64]
 
 
 def smooth_law(values: Array) -> Array:
@@ -22,11 +21,13 @@ def smooth_law(values: Array) -> Array:
     levels = np.unique(values)
     if len(levels) < 2:
         return np.zeros((len(values), 0))
-    if len(levels) <= _FEW:
+    if len(levels) <= settings.FEW_LEVELS:
         columns = (values[:, None] == levels[1:]).astype(float)
     else:
         scaled = (values - values.min()) / np.ptp(values)
-        knots = np.unique(np.quantile(scaled, np.linspace(0.02, 0.98, _KNOTS)))
+        knots = np.unique(
+            np.quantile(scaled, np.linspace(settings.OUTER_KNOTS, 1.0 - settings.OUTER_KNOTS, settings.KNOTS))
+        )
         columns = np.column_stack([scaled, *_natural(scaled, knots)])
     columns = columns - columns.mean(axis=0)
     u, s, _ = np.linalg.svd(columns, full_matrices=False)

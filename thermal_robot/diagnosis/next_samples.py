@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign
+from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.evidence import Combination
 from thermal_robot.inference.fit import Fit
@@ -34,14 +35,6 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 Effects = tuple[str, ...]
 
-_MOST = 4
-_LEADING = 0.01
-_RIVAL = 1e-3  # explanations that are less probable are not worth a measurement
-_SETTLED, _WORTHWHILE = 0.9, 1.0  # so probable that rivals which all samples together leave below 1 nat do not count
-_WIDE = 2.4  # rad: as far as a joint without a limit is sent
-_BEYOND = 5.0  # K outside the campaign's temperatures
-_LOOSE = 0.1  # m and rad: where the data leave a frame open, it is somewhere there
-_TIE = 1e-3
 _GIVEN = ("torque", "encoder")  # columns that answer a sample, and cannot be asked for
 
 
@@ -137,7 +130,7 @@ def next_samples(fit: Fit, count: int = 10, pool: int = 400, seed: int = 0) -> N
     leading, probability = _leading(fit)
     models = _expected(fit, observe(offered, fit.corrected.frames), leading)
     chosen, pairs, gains = _chosen(models, probability, min(count, pool))
-    if len(models) > 1 and probability[0] > _SETTLED and max(gains, default=0.0) < _WORTHWHILE:
+    if len(models) > 1 and probability[0] > settings.DECIDED and max(gains, default=0.0) < settings.WORTHWHILE:
         chosen, pairs, gains = _chosen(models[:1], np.ones(1), min(count, pool))
     if max(gains, default=0.0) <= 0.0:
         chosen, pairs, gains = [], [], []  # there is nothing to learn
@@ -175,9 +168,11 @@ def candidates(fit: Fit, pool: int = 400, seed: int = 0) -> Campaign:
     for name, values in campaign.covariates.items():
         kind, first, last = name.partition(".")[0], float(values.min()), float(values.max())
         if kind == "temperature":
-            covariates[name] = np.array([first - _BEYOND, first, last, last + _BEYOND])[level]
+            covariates[name] = np.array([first - settings.BEYOND, first, last, last + settings.BEYOND])[level]
         elif kind == "payload":
-            covariates[name] = rng.choice(np.unique(values) if len(np.unique(values)) < 6 else [first, last], pool)
+            covariates[name] = rng.choice(
+                np.unique(values) if len(np.unique(values)) < settings.FEW_PAYLOADS else [first, last], pool
+            )
         elif kind == "approach":
             covariates[name] = rng.choice([-1.0, 1.0], pool)
         elif kind in ("time", "order"):
@@ -204,8 +199,8 @@ def _range(campaign: Campaign) -> tuple[Array, Array]:
     turns = np.array([kind != "prismatic" for kind in robot.joint_types])
     round_ = turns & (robot.upper - robot.lower >= 2.0 * np.pi)
     used = campaign.q.min(axis=0), campaign.q.max(axis=0)
-    low = np.where(round_, np.maximum(robot.lower, -_WIDE), robot.lower)
-    high = np.where(round_, np.minimum(robot.upper, _WIDE), robot.upper)
+    low = np.where(round_, np.maximum(robot.lower, -settings.WIDE), robot.lower)
+    high = np.where(round_, np.minimum(robot.upper, settings.WIDE), robot.upper)
     low, high = np.where(np.isfinite(low), low, used[0]), np.where(np.isfinite(high), high, used[1])
     return np.minimum(low, used[0]), np.maximum(high, used[1])
 
@@ -223,8 +218,8 @@ def _leading(fit: Fit) -> tuple[list[Combination], Array]:
         effects = _effects(fit, combination)
         best.setdefault(effects, combination)
         total[effects] = total.get(effects, 0.0) + float(probability)
-    order = sorted(total, key=lambda effects: -total[effects])[:_MOST]
-    least = _LEADING if len(order) > 1 and total[order[1]] > _LEADING else _RIVAL
+    order = sorted(total, key=lambda effects: -total[effects])[: settings.MOST_LEADING]
+    least = settings.LEADING if len(order) > 1 and total[order[1]] > settings.LEADING else settings.LEAST_LEADING
     kept = [effects for k, effects in enumerate(order) if k == 0 or total[effects] > least]
     probability = np.array([total[effects] for effects in kept])
     return [best[effects] for effects in kept], probability / probability.sum()
@@ -275,7 +270,9 @@ def _expected(fit: Fit, offered: Observations, leading: Sequence[Combination]) -
         mine = [k for k, b in enumerate(index) if b in combination.blocks]
         spans = [np.arange(flat), *(np.arange(ends[k], ends[k + 1]) for k in mine)]
         picked = np.concatenate(spans).astype(int)
-        size = np.concatenate([np.full(flat, _LOOSE), *(items[k].sizes * combination.scales[index[k]] for k in mine)])
+        size = np.concatenate(
+            [np.full(flat, settings.LOOSE), *(items[k].sizes * combination.scales[index[k]] for k in mine)]
+        )
         precision = gram[np.ix_(picked, picked)] * np.outer(size, size) + np.eye(len(size))
         mean = size * np.linalg.solve(precision, gram[picked, -1] * size)
         design = asked[:, :, picked]
@@ -337,7 +334,7 @@ def _chosen(
         reached = so_far[:, :, None] + added
         if number > 1:
             expected = probability @ np.where(itself, np.inf, reached).min(axis=1)
-            score = expected + _TIE * information
+            score = expected + settings.TIE * information
         else:
             expected = information + learnt
             score = information.copy()

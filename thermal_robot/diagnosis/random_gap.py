@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc, fdtrc
 
 from thermal_robot.diagnosis.laws import smooth_law
-from thermal_robot.diagnosis.result import Estimate, Finding, Location, Status
+from thermal_robot.diagnosis.parts import Estimate, Finding, Location, Status
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference.explain import distance_limit
 from thermal_robot.inference.fit import Fit

@@ -10,24 +10,15 @@ from numpy.typing import NDArray
 from scipy.special import chdtrc, fdtrc, ndtr, pdtr
 
 from thermal_robot.diagnosis.laws import smooth_law
-from thermal_robot.diagnosis.result import Dependence, Location, Unexplained
+from thermal_robot.diagnosis.parts import Dependence, Location, Unexplained
 from thermal_robot.effects.quantities import quantities
+from thermal_robot.inference import settings
 from thermal_robot.inference.fit import Fit
-from thermal_robot.inference.rows import NEAR, in_a_row, in_order
+from thermal_robot.inference.rows import in_a_row, in_order
 from thermal_robot.inference.scan import harmonics
 from thermal_robot.observations import Observations
 
 Array = NDArray[np.float64]
-
-LEVEL = 1e-3  # p-value, after counting the tests, below which a remainder is not called noise
-_MATERIAL_SCALE = 1.15  # a remainder less than this times the stated noise is not called large
-_MATERIAL_SHARE = 0.04  # a law that explains less of the remainder than this is not worth a name
-_FEWEST_PAIRS = 12
-_SHUFFLES = 200
-_ENOUGH_ROWS = 2000  # a law that explains a hundredth of what remains is then seen
-_SEED = 17
-_FEW_ASIDE = 0.05  # of all rows: fewer that follow each other may be one lapse of the instrument
-_ROUNDING = 1e-9  # m: a remainder below it is rounding, whatever its structure
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +51,7 @@ class Remainder:
         """Return so many rows drawn at random, with what was fitted projected out of them; all if they are fewer."""
         if len(self.rows) <= count:
             return self
-        drawn = np.sort(np.random.default_rng(_SEED).choice(len(self.rows), count, replace=False))
+        drawn = np.sort(np.random.default_rng(settings.TEST_SEED).choice(len(self.rows), count, replace=False))
         m = self.white.shape[1]
         basis, _ = np.linalg.qr(self.basis.reshape(len(self.rows), m, -1)[drawn].reshape(count * m, -1))
         white = self.white[drawn].ravel()
@@ -77,10 +68,10 @@ def remainder(fit: Fit) -> Remainder:
         columns.append(e.linear.blocks[b].columns[rows] * e.linear.blocks[b].sizes)
     design = np.concatenate(columns, axis=2) / e.whitening.noise[:, None]
     flat = design.reshape(design.shape[0] * design.shape[1], design.shape[2])
-    flat = flat / (np.linalg.norm(flat, axis=0) + 1e-300)
+    flat = flat / (np.linalg.norm(flat, axis=0) + settings.TINY)
     value, vector = np.linalg.eigh(flat.T @ flat)
     # what the data see only below the noise was held by its prior: leave it out as the fit did
-    seen = value > 1e-9 * value.max(initial=1.0)
+    seen = value > settings.DESIGN_FLOOR * value.max(initial=1.0)
     basis, _ = np.linalg.qr(flat @ vector[:, seen])
     # of the exact model, not the linear one: where effects are large and noise is small they differ
     gap = (fit.corrected.gap[rows] / e.whitening.noise).ravel()
@@ -102,11 +93,11 @@ def repeats(fit: Fit, left: Remainder) -> Repeats | None:
     """Compare each command with its nearest neighbour within :data:`NEAR`; ``None`` where too few have one."""
     q = fit.campaign.q[left.rows]
     distance, neighbour = _nearest(q, 1)
-    close = np.flatnonzero(distance[:, 0] < NEAR)
+    close = np.flatnonzero(distance[:, 0] < settings.NEAR)
     pairs = np.unique(np.sort(np.column_stack([close, neighbour[close, 0]]), axis=1), axis=0)
     # the remainder of both: their commands may differ by a little, and their conditions by much
     difference = left.white[pairs[:, 0]] - left.white[pairs[:, 1]]
-    if len(pairs) < _FEWEST_PAIRS:
+    if len(pairs) < settings.FEWEST_PAIRS:
         return None
     place = (difference[:, :3] * fit.explanation.whitening.noise[0]) ** 2 / 2.0
     return Repeats(len(pairs), float((difference**2).mean() / 2.0), float(np.sqrt(place.mean())))
@@ -154,8 +145,8 @@ def examine(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> tuple
     law, locations, depends, share = _scan(fit, left)
     verdicts = [_size(fit, left), _lack_of_fit(left, again), alike, law, _in_a_row(fit)]
     p_value = min(1.0, len(verdicts) * min(p for p, _ in verdicts))
-    reasons = tuple(reason for p, reason in verdicts if reason and len(verdicts) * p < LEVEL)
-    flagged = bool(reasons) and rms > _ROUNDING
+    reasons = tuple(reason for p, reason in verdicts if reason and len(verdicts) * p < settings.LEVEL)
+    flagged = bool(reasons) and rms > settings.ROUNDING
     if flagged and source == "remainder":
         # nothing tells the noise but the remainder itself: at most what neighbours do not have in common
         floor *= np.sqrt(1.0 - np.clip(max(likeness, share), 0.0, 1.0))
@@ -187,7 +178,7 @@ def _size(fit: Fit, left: Remainder) -> tuple[float, str]:
         effective = freedom * 2.0 / tails
         p = float(chdtrc(effective, ratio2 * effective))
         what = "position" if part == 0 else "orientation"
-        if p < worst[0] and ratio2 > _MATERIAL_SCALE**2:
+        if p < worst[0] and ratio2 > settings.MATERIAL_SCALE**2:
             worst = (p, f"what remains in {what} is {np.sqrt(ratio2):.2g} times the stated noise")
     return worst
 
@@ -197,9 +188,9 @@ def _lack_of_fit(left: Remainder, again: Repeats | None) -> tuple[float, str]:
     if again is None:
         return 1.0, ""
     m = left.white.shape[1]
-    ratio2 = left.scale2 / max(again.scale2, 1e-300)
+    ratio2 = left.scale2 / max(again.scale2, settings.TINY)
     p = float(fdtrc(left.freedom, again.pairs * m, ratio2))
-    if ratio2 < 1.3**2:
+    if ratio2 < settings.MATERIAL_REPEATS**2:
         return 1.0, ""
     times = np.sqrt(ratio2)
     return p, f"what remains is {times:.2g} times what {again.pairs} pairs of repeated commands differ by"
@@ -209,7 +200,7 @@ def _in_a_row(fit: Fit) -> tuple[float, str]:
     """Chance that so many of the rows set aside follow each other; spoilt rows do not, but those after a change do."""
     aside = fit.explanation.outliers[in_order(fit.campaign)]
     count, samples = int(aside.sum()), len(aside)
-    if count < _FEW_ASIDE * samples:
+    if count < settings.FEW_ASIDE * samples:
         return 1.0, ""
     follow = int((aside[1:] & aside[:-1]).sum())
     # what chance gives has a Poisson law
@@ -225,28 +216,30 @@ def _neighbours(fit: Fit, left: Remainder) -> tuple[tuple[float, str], float]:
     """
     q = fit.campaign.q[left.rows]
     spread = q.std(axis=0)
-    used = spread > 1e-9
-    white = left.white / np.sqrt((left.white**2).mean(axis=0) + 1e-300)
-    white = np.clip(white, -4.0, 4.0)
+    used = spread > settings.ROUNDING
+    white = left.white / np.sqrt((left.white**2).mean(axis=0) + settings.TINY)
+    white = np.clip(white, -settings.CLIPPED, settings.CLIPPED)
     pairs = []
-    if used.any() and len(q) > 20:
-        _, near = _nearest(q[:, used] / spread[used], 3)
-        pairs.append(("joint space", np.column_stack([np.repeat(np.arange(len(q)), 3), near.ravel()])))
+    if used.any() and len(q) > settings.FEWEST_NEIGHBOURS:
+        _, near = _nearest(q[:, used] / spread[used], settings.NEIGHBOURS)
+        pairs.append(
+            ("joint space", np.column_stack([np.repeat(np.arange(len(q)), settings.NEIGHBOURS), near.ravel()]))
+        )
     order = np.argsort(np.argsort(in_order(fit.campaign))[left.rows], kind="stable")
     pairs.append(("the order of measurement", np.column_stack([order[:-1], order[1:]])))
     rng = np.random.default_rng(0)
     worst, most = (1.0, ""), 0.0
     for where, pair in pairs:
         statistic = float((white[pair[:, 0]] * white[pair[:, 1]]).sum(axis=1).mean())
-        chance = np.empty(_SHUFFLES if len(white) < 3000 else 40)
+        chance = np.empty(settings.SHUFFLES if len(white) < settings.SHUFFLED_ROWS else settings.FEW_SHUFFLES)
         for k in range(len(chance)):
             shuffled = white[rng.permutation(len(white))]
             chance[k] = (shuffled[pair[:, 0]] * shuffled[pair[:, 1]]).sum(axis=1).mean()
-        p = float(2.0 * ndtr(-max(statistic - chance.mean(), 0.0) / (chance.std() + 1e-300)))
+        p = float(2.0 * ndtr(-max(statistic - chance.mean(), 0.0) / (chance.std() + settings.TINY)))
         likeness = statistic / white.shape[1]
-        if p < LEVEL and likeness > _MATERIAL_SHARE:
+        if p < settings.LEVEL and likeness > settings.MATERIAL_SHARE:
             most = max(most, likeness)
-        if p < worst[0] and likeness > _MATERIAL_SHARE:
+        if p < worst[0] and likeness > settings.MATERIAL_SHARE:
             worst = (p, f"what remains is alike for neighbours in {where} (correlation {likeness:.2f})")
     return worst, most
 
@@ -257,7 +250,7 @@ def _scan(fit: Fit, left: Remainder) -> tuple[tuple[float, str], tuple[Location,
     Returns p-value and reason, places, quantities, and the share of the remainder that the best law explains.
     """
     observations, noise = fit.corrected, fit.explanation.whitening.noise
-    left = left.some(_ENOUGH_ROWS)
+    left = left.some(settings.ENOUGH_REMAINDER)
     m = left.white.shape[1]
     target = left.white.ravel()
     names = observations.robot.joint_names
@@ -284,7 +277,7 @@ def _scan(fit: Fit, left: Remainder) -> tuple[tuple[float, str], tuple[Location,
         return (1.0, ""), (), (), 0.0
     tried = len(rows)
     rows.sort(key=lambda r: -r[1])
-    material = [r for r in rows if r[2] > _MATERIAL_SHARE and r[0] * tried < 0.05]
+    material = [r for r in rows if r[2] > settings.MATERIAL_SHARE and r[0] * tried < settings.LAW_LEVEL]
     by_place: dict[tuple[str, str], float] = {}
     for _, gain, _, kind, place, _ in rows:
         by_place[(kind, place)] = max(by_place.get((kind, place), -np.inf), gain)
@@ -320,14 +313,14 @@ def _f_test(columns: Array, left: Remainder, target: Array) -> tuple[float, floa
     """Return p-value, adjusted share of the remainder explained, and gain in log evidence (BIC) of extra columns."""
     columns = columns - left.basis @ (left.basis.T @ columns)
     value, vector = np.linalg.eigh(columns.T @ columns)
-    seen = value > 1e-9 * max(value.max(initial=0.0), 1e-300)
+    seen = value > settings.DESIGN_FLOOR * max(value.max(initial=0.0), settings.TINY)
     k = int(seen.sum())
     freedom = left.freedom - k
-    if not k or freedom < 5:
+    if not k or freedom < settings.FEWEST_LEFT:
         return 1.0, 0.0, -np.inf
     projected = (vector[:, seen].T @ (columns.T @ target)) / np.sqrt(value[seen])
     total, gained = float(target @ target), float(projected @ projected)
-    rest = max(total - gained, 1e-300)
+    rest = max(total - gained, settings.TINY)
     p = float(fdtrc(k, freedom, (gained / k) / (rest / freedom)))
     share = 1.0 - (rest / freedom) / (total / left.freedom)
     return p, share, 0.5 * left.freedom * np.log(total / rest) - 0.5 * k * np.log(left.freedom)

@@ -1,199 +1,66 @@
-"""The result of a diagnosis: plain frozen values, and their JSON."""
+"""The result of a diagnosis: one frozen value, its JSON, and the port through which it is put into words and drawn.
+
+A diagnosis does not know who draws it. The package hands it a room that can (:func:`told_by`); any other that has the
+functions of :class:`Teller` serves as well.
+"""
 
 from __future__ import annotations
 
 import json
 from collections.abc import Mapping
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermal_robot.correction import CorrectedModel
+from thermal_robot.diagnosis.parts import Finding, Gap, Rows, Sensitivity, Unexplained, Where, is_frame
 
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.next_samples import NextSamples
-    from thermal_robot.diagnosis.schemes import FoldScheme
-    from thermal_robot.diagnosis.sensitivity import Sensitivity
     from thermal_robot.inference.fit import Fit
-
-Array = NDArray[np.float64]
-Status = Literal["found", "not_found", "not_testable", "confounded"]
 
 SCHEMA = "thermal-robot/diagnosis/1"
 
 
-@dataclass(frozen=True)
-class Location:
-    """A place and its share of the gap's mean square (or, for a remainder, its probability)."""
+class Teller(Protocol):
+    """Who puts a diagnosis into words and draws it."""
 
-    kind: str
-    name: str
-    share: float
+    def headline(self, diagnosis: Diagnosis) -> str:
+        """Return the verdict in one plain sentence."""
 
+    def advice(self, diagnosis: Diagnosis) -> str:
+        """Return what to measure next in one plain sentence."""
 
-@dataclass(frozen=True)
-class Estimate:
-    """A parameter: SI value with its standard deviation, both ``None`` where the data do not determine it."""
+    def text(self, diagnosis: Diagnosis) -> str:
+        """Return all of it as plain text."""
 
-    name: str
-    value: float | None
-    std: float | None
-    unit: str
-    identified: bool
+    def fragment(self, diagnosis: Diagnosis) -> str:
+        """Return all of it as HTML without a page around it."""
 
-
-@dataclass(frozen=True)
-class Finding:
-    """What the data say of one effect.
-
-    Attributes
-    ----------
-    name
-        The effect's name.
-    status
-        ``found``, ``not_found``, ``not_testable`` or ``confounded``.
-    probability
-        Posterior probability that it is at work; ``None`` where it is not testable.
-    shrinkage, shrinkage_ci95
-        Its share of the gap's mean square, on data not used for the fit: Shapley value over the explanation for an
-        effect that belongs to it; what adding it brings for another; ``None`` where it is not testable.
-    needs
-        What would make it testable.
-    confounded_with
-        Effects that the data cannot tell it from.
-    locations
-        Where it sits, largest share first.
-    parameters
-        Its estimates; empty where it does not belong to the explanation.
-    quantity, shape, describes
-        Of a law that was discovered: what it follows, how, and a sentence about it; ``None`` otherwise.
-    """
-
-    name: str
-    status: Status
-    probability: float | None = None
-    shrinkage: float | None = None
-    shrinkage_ci95: tuple[float, float] | None = None
-    needs: tuple[str, ...] = ()
-    confounded_with: tuple[str, ...] = ()
-    locations: tuple[Location, ...] = ()
-    parameters: tuple[Estimate, ...] = ()
-    quantity: str | None = None
-    shape: str | None = None
-    describes: str | None = None
+    def explain_figure(self, explained: Any) -> Any:
+        """Draw what one effect explains."""
 
 
-@dataclass(frozen=True)
-class HeldOut:
-    """How far the gap shrinks on rows that were not used for the fit: rms distances in m, shares 0..1."""
-
-    scheme: str
-    folds: int
-    rms_before: float
-    rms_after: float
-    shrinkage: float
-    shrinkage_ci95: tuple[float, float]
+_tellers: list[Teller] = []
 
 
-@dataclass(frozen=True)
-class Gap:
-    """Rms distances in m (orientation: rad) over the rows that are not outliers; ``None`` without orientation."""
-
-    rms_before: float
-    rms_after: float
-    noise_floor: float
-    noise_source: str
-    held_out: HeldOut
-    orientation_before: float | None = None
-    orientation_after: float | None = None
-    schemes: tuple[FoldScheme, ...] = ()
+def told_by(teller: Teller) -> None:
+    """Let a room put every diagnosis into words from now on."""
+    _tellers[:] = [teller]
 
 
-@dataclass(frozen=True)
-class Where:
-    """Shares 0..1 of the gap's mean square: by axis of the root frame, joint, link, and recorded quantity.
-
-    Axes sum to one. Joints and links share what the explanation explains. A quantity's share is what a smooth law of
-    it alone would explain, so these overlap.
-    """
-
-    axes: Mapping[str, float]
-    joints: Mapping[str, float]
-    links: Mapping[str, float]
-    covariates: Mapping[str, float]
+def _teller() -> Teller:
+    if not _tellers:
+        raise RuntimeError("nobody can tell a diagnosis: import thermal_robot, or call told_by")
+    return _tellers[0]
 
 
-@dataclass(frozen=True)
-class Dependence:
-    """A recorded quantity that the remainder follows, with the p-value after counting every quantity that was tried."""
-
-    covariate: str
-    p_value: float
-
-
-@dataclass(frozen=True)
-class Unexplained:
-    """What the explanation leaves beyond the noise.
-
-    Attributes
-    ----------
-    flagged
-        Whether it is larger or more structured than the noise allows.
-    rms
-        Its rms distance, m: noise subtracted where a stated noise or repeats tell it, all of it where nothing does; 0
-        where nothing is left.
-    p_value
-        Of the most telling test, after counting all of them.
-    reasons
-        Plain sentences: which test says so.
-    locations
-        Where it most probably enters.
-    depends_on
-        The quantities that it follows, most telling first.
-    """
-
-    flagged: bool
-    rms: float
-    p_value: float
-    reasons: tuple[str, ...] = ()
-    locations: tuple[Location, ...] = ()
-    depends_on: tuple[Dependence, ...] = ()
-
-
-@dataclass(frozen=True, eq=False)
-class Rows:
-    """What the figures show, one row a measurement, N rows.
-
-    Attributes
-    ----------
-    rows
-        (N,) row numbers in the file.
-    gap, remainder
-        (N, m) before and after, root frame axes: m, and rad.
-    outliers
-        (N,) True where set aside.
-    position
-        (N, 3) predicted position of the target in the root frame, m.
-    q
-        (N, n) commanded joint positions.
-    covariates
-        Recorded quantities by name, (N,).
-    held_out_before, held_out_after
-        (N,) distance in m while the row was held out; NaN where it was set aside.
-    """
-
-    rows: NDArray[np.int64]
-    gap: Array
-    remainder: Array
-    outliers: NDArray[np.bool_]
-    position: Array
-    q: Array
-    covariates: Mapping[str, Array]
-    held_out_before: Array
-    held_out_after: Array
+def told(diagnosis: Diagnosis) -> Diagnosis:
+    """Return a diagnosis with its sentences."""
+    teller = _teller()
+    return replace(diagnosis, summary=teller.headline(diagnosis), advice=teller.advice(diagnosis))
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -214,16 +81,24 @@ class Diagnosis:
         Names of the effects of the explanation, largest share first.
     probability
         Posterior probability of exactly this explanation.
-    summary
-        One plain sentence.
-    advice, separates
-        What to measure next.
+    separates
+        Groups of effects that further measurements would have to tell apart.
     model
         The corrected model.
     rows
         Measurement by measurement.
+    summary, advice
+        The verdict, and what to measure next, in one plain sentence each; see :func:`told`.
     warnings
         What a reader should know about the data.
+    remaining
+        What is left when laws that were discovered are taken off, too; where absent, ``unexplained``.
+    reach
+        Size of the volume that was measured, m.
+    narrowed
+        Whether effects were left out by request.
+    sensitivity, fit
+        How far the verdict hangs on prior sizes; the fit behind it all.
     """
 
     campaign: str
@@ -239,12 +114,15 @@ class Diagnosis:
     unexplained: Unexplained
     verdict: tuple[str, ...]
     probability: float
-    summary: str
-    advice: str
     separates: tuple[tuple[str, ...], ...]
     model: CorrectedModel
     rows: Rows
+    summary: str = ""
+    advice: str = ""
     warnings: tuple[str, ...] = field(default=())
+    remaining: Unexplained | None = None
+    reach: float = float("inf")
+    narrowed: bool = False
     sensitivity: Sensitivity | None = None
     fit: Fit | None = None
 
@@ -266,9 +144,8 @@ class Diagnosis:
             If it does not belong to the explanation.
         """
         from thermal_robot.diagnosis.one_effect import explained
-        from thermal_robot.report import explain_figure
 
-        return explain_figure(explained(self._fitted(), effect))
+        return _teller().explain_figure(explained(self._fitted(), effect))
 
     def next_samples(self, count: int = 10) -> NextSamples:
         """Choose samples that would best separate the leading explanations; ``to_table()`` makes a table of them."""
@@ -284,6 +161,15 @@ class Diagnosis:
     def finding(self, effect: str) -> Finding:
         """Return what is said of one effect; ``KeyError`` for a name that was not a candidate."""
         return {f.name: f for f in self.effects}[effect]
+
+    def title(self, effect: str) -> str:
+        """Return an effect's name in plain words."""
+        own = next((f.title for f in self.effects if f.name == effect), "")
+        return own or effect.replace("_", " ")
+
+    def is_frame(self, effect: str) -> bool:
+        """Tell whether an effect displaces a frame that is unknown."""
+        return is_frame(self.effects, effect)
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object of the format ``thermal-robot/diagnosis/1``."""
@@ -342,14 +228,10 @@ class Diagnosis:
         return f"Diagnosis({self.campaign!r}: {', '.join(self.verdict) or 'no effect'})"
 
     def __str__(self) -> str:
-        from thermal_robot.report import text
-
-        return text(self)
+        return _teller().text(self)
 
     def _repr_html_(self) -> str:
-        from thermal_robot.report import fragment
-
-        return str(fragment(self))
+        return _teller().fragment(self)
 
 
 def _jsonable(value: Any) -> Any:

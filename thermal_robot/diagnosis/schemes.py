@@ -8,52 +8,18 @@ rows set aside are those of the diagnosis; frames and parameters are fitted anew
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign
+from thermal_robot.diagnosis.parts import FoldScheme
+from thermal_robot.inference import settings
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.rows import folds, neighbourhoods
 
 Array = NDArray[np.float64]
 Labels = NDArray[np.int64]
-
-_FOLDS = 5
-_DETERMINED = 1e-9  # of the strongest direction of the frames: weaker ones are not determined
-_WORSE = 1.05
-_LEAST = 0.01  # K: a temperature that varies less does not vary
-
-
-@dataclass(frozen=True)
-class FoldScheme:
-    """How far the gap shrinks when rows are held out in one way.
-
-    Attributes
-    ----------
-    name
-        ``time``, ``session``, ``temperature``, ``region`` or ``reach``.
-    held_out
-        What is held out at a time, in plain words.
-    folds, rows
-        How many folds could be fitted, and how many rows were held out in them.
-    rms_before, rms_after
-        Rms distances of these rows, m: frames alone, and the explanation.
-    shrinkage
-        1 − (rms_after / rms_before)².
-    uncertainty
-        Standard error of rms_after, m: what chance alone makes of it.
-    """
-
-    name: str
-    held_out: str
-    folds: int
-    rows: int
-    rms_before: float
-    rms_after: float
-    shrinkage: float
-    uncertainty: float
 
 
 def worst_folds(fit: Fit) -> tuple[FoldScheme, ...]:
@@ -84,9 +50,11 @@ def worse_elsewhere(narrow: Fit, wider: Fit) -> bool:
     It then fits what was measured by large errors that cancel there, and goes astray between.
     """
     kept = ~(narrow.explanation.outliers | wider.explanation.outliers)
-    tests = _each(neighbourhoods(narrow.campaign, _FOLDS))
+    tests = _each(neighbourhoods(narrow.campaign, settings.FOLDS))
     left = [_judged(_problem(fit), kept, "region", "", tests) for fit in (narrow, wider)]
-    return left[0] is not None and left[1] is not None and left[1].rms_after > _WORSE * left[0].rms_after
+    return (
+        left[0] is not None and left[1] is not None and left[1].rms_after > settings.WORSE_ELSEWHERE * left[0].rms_after
+    )
 
 
 def _problem(fit: Fit) -> _Problem:
@@ -111,12 +79,12 @@ def _schemes(fit: Fit) -> Iterator[tuple[str, str, list[NDArray[np.bool_]]]]:
     if session is not None and len(set(session.tolist())) > 1:
         yield "session", "one session after the other", _each(np.unique(session, return_inverse=True)[1])
     temperature = _temperature(campaign)
-    if temperature is not None and np.ptp(temperature) > _LEAST:
-        cold, warm = (np.quantile(temperature, share) for share in (1.0 / _FOLDS, 1.0 - 1.0 / _FOLDS))
+    if temperature is not None and np.ptp(temperature) > settings.COLDEST:
+        cold, warm = (np.quantile(temperature, share) for share in (1.0 / settings.FOLDS, 1.0 - 1.0 / settings.FOLDS))
         yield "temperature", "the coldest fifth, and the warmest", [temperature <= cold, temperature >= warm]
-    yield "region", "neighbourhoods of joint positions", _each(neighbourhoods(campaign, _FOLDS))
+    yield "region", "neighbourhoods of joint positions", _each(neighbourhoods(campaign, settings.FOLDS))
     reach = np.linalg.norm(fit.nominal.position, axis=1)
-    yield "reach", "the fifth that reaches out furthest", [reach >= np.quantile(reach, 1.0 - 1.0 / _FOLDS)]
+    yield "reach", "the fifth that reaches out furthest", [reach >= np.quantile(reach, 1.0 - 1.0 / settings.FOLDS)]
 
 
 def _each(labels: NDArray[np.int64]) -> list[NDArray[np.bool_]]:
@@ -147,9 +115,9 @@ class _Problem:
     def _rank(self, products: Array) -> int:
         frames = products[: self.flat, : self.flat]
         # a column of the rows held out alone leaves a rounding error of either sign
-        length = np.sqrt(np.maximum(np.diag(frames), 0.0)) + 1e-150
+        length = np.sqrt(np.maximum(np.diag(frames), 0.0)) + np.sqrt(settings.TINY)
         value = np.linalg.eigvalsh(frames / np.outer(length, length)) if self.flat else np.zeros(0)
-        return int((value > _DETERMINED).sum())
+        return int((value > settings.FRAME_DETERMINED).sum())
 
     def left(self, test: NDArray[np.bool_]) -> tuple[Array, Array] | None:
         """(n,) distances of the rows held out, m: before and after; ``None`` where nothing is left to fit."""
@@ -162,7 +130,7 @@ class _Problem:
         """(n,) distances that the frames and the first of the effects' columns leave."""
         matrix = train[:columns, :columns].copy()
         # a unit of an effect's column is one sigma of its prior; a frame has none, but for what nothing determines
-        prior = np.where(np.arange(columns) < self.flat, 1e-12 * np.diag(matrix) + 1e-300, 1.0)
+        prior = np.where(np.arange(columns) < self.flat, settings.FRAME_PRIOR * np.diag(matrix) + settings.TINY, 1.0)
         matrix[np.diag_indices(columns)] += prior
         length = np.sqrt(np.diag(matrix))
         solution = np.linalg.solve(matrix / np.outer(length, length), train[:columns, -1] / length) / length

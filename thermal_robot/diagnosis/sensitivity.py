@@ -2,28 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 
+from thermal_robot.diagnosis.parts import Sensitivity
+from thermal_robot.inference import settings
 from thermal_robot.inference.evidence import Search
 from thermal_robot.inference.explain import log_priors
 from thermal_robot.inference.fit import Fit
 
-FACTOR = 3.0
-_COMPARED = 8
-
-
-@dataclass(frozen=True)
-class Sensitivity:
-    """Posterior probability of the verdict's effects were every prior size a third, or three times, what is stated."""
-
-    smaller: float
-    larger: float
-
 
 def sensitivity(fit: Fit) -> Sensitivity:
-    """Weigh the leading combinations again with all prior sizes smaller and larger by :data:`FACTOR`.
+    """Weigh the leading combinations again with all prior sizes smaller and larger by :data:`settings.PRIOR_FACTOR`.
 
     A size is itself only expected to within its spread (ln λ ~ N(0, 1.5²)) and is learnt from the data, so that little
     should hang on it; where much does, the data do not decide.
@@ -33,11 +24,11 @@ def sensitivity(fit: Fit) -> Sensitivity:
     prior = log_priors(fit.families, fit.rarity)
     chosen = {effect.name for effect, _ in fit.effects}
     found = []
-    for factor in (1.0 / FACTOR, FACTOR):
+    for factor in (1.0 / settings.PRIOR_FACTOR, settings.PRIOR_FACTOR):
         scaled = replace(problem, matrix=problem.matrix * factor**2, vector=problem.vector * factor)
         search = Search(scaled, prior)
         log, same = [], []
-        for combination in e.combinations[:_COMPARED]:
+        for combination in e.combinations[: settings.COMPARED]:
             log.append(search.evaluate(combination.blocks).log_evidence)
             same.append({fit.families[b] for b in combination.blocks} == chosen)
         weight = np.exp(np.array(log) - max(log))

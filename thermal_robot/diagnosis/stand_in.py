@@ -11,14 +11,11 @@ from numpy.typing import NDArray
 from thermal_robot.diagnosis.laws import smooth_law
 from thermal_robot.effects.law import PREFIX
 from thermal_robot.effects.quantities import quantities
+from thermal_robot.inference import settings
 from thermal_robot.inference.discover import Thin, instead
 from thermal_robot.inference.fit import Fit
 
 Array = NDArray[np.float64]
-
-DOUBT = 0.85
-"""How often an effect that is found beside an unlisted cause is there (faint cases of the blind trial)."""
-_MOST = 4  # effects, of the largest share, for which a law is looked for in their place
 
 
 @dataclass(frozen=True)
@@ -34,7 +31,8 @@ def trust(shares: Mapping[str, float], doubts: Mapping[str, StandIn], unlisted: 
 
     An unlisted cause casts a shadow on the effects that come near it, and the larger it is beside an effect the more of
     that effect may be its shadow: s/(s + u), with s the effect's share of the gap and u that of what is not listed.
-    That something works on an effect, or beside it, does not say that it is not there: hence never below :data:`DOUBT`.
+    That something works on an effect, or beside it, does not say that it is not there: hence never below
+    :data:`~thermal_robot.inference.settings.BESIDE_UNLISTED`.
 
     Parameters
     ----------
@@ -53,7 +51,7 @@ def trust(shares: Mapping[str, float], doubts: Mapping[str, StandIn], unlisted: 
         own = max(share, 0.0)
         shadow = own / (own + unlisted) if unlisted > 0.0 else 1.0
         changing = 0.5 * (1.0 + doubts[name].belief) if name in doubts else 1.0
-        result[name] = max(DOUBT, min(changing, shadow))
+        result[name] = max(settings.BESIDE_UNLISTED, min(changing, shadow))
     return result
 
 
@@ -85,10 +83,12 @@ def stand_ins(fit: Fit) -> dict[str, StandIn]:
             quantity = max(gains, key=lambda q: gains[q])
             gain = gains[quantity] - float(np.log(tried))
             if gain > 0.0:
-                found[name] = StandIn(float(1.0 / (1.0 + np.exp(min(gain, 50.0)))), quantity)
-    for name in [n for n, _ in known if n not in found][:_MOST]:
+                found[name] = StandIn(float(1.0 / (1.0 + np.exp(min(gain, settings.MOST_BELIEF)))), quantity)
+    for name in [n for n, _ in known if n not in found][: settings.RIVALLED_EFFECTS]:
         rival = instead(fit, name)
         if rival is not None:
             law, gain = rival
-            found[name] = StandIn(float(1.0 / (1.0 + np.exp(np.clip(gain, -50.0, 50.0)))), law.quantity)
+            found[name] = StandIn(
+                float(1.0 / (1.0 + np.exp(np.clip(gain, -settings.MOST_BELIEF, settings.MOST_BELIEF)))), law.quantity
+            )
     return found

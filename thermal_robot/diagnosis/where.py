@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.diagnosis.laws import smooth_law
-from thermal_robot.diagnosis.result import Location, Where
+from thermal_robot.diagnosis.parts import Location, Where
 from thermal_robot.effects.channel import by_place, column
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference.columns import Block

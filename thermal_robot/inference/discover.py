@@ -9,9 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.effects.law import PREFIX, Discovered
+from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.evidence import Combination, Search
-from thermal_robot.inference.explain import PRIOR_PROBABILITY, log_priors
+from thermal_robot.inference.explain import log_priors
 from thermal_robot.inference.fit import Fit, corrected_observations
 from thermal_robot.inference.problem import Linear, Whitening, contained, gram
 from thermal_robot.inference.rows import in_a_row
@@ -19,14 +20,6 @@ from thermal_robot.inference.scan import CLOCK, Scanned, Target, scan, shaped
 from thermal_robot.observations import Observations
 
 Array = NDArray[np.float64]
-
-_SHAPED = 6  # candidates of each remainder whose shape is looked at
-_INSTEAD = 3
-_ENOUGH_ROWS = 1500
-_SEED = 61
-_COMPARED = 8  # candidates that are compared jointly with the known effects
-_IN_TIME = float(np.log(3.0))
-_LEAST = 6.0  # log evidence that a law must bring over none
 
 
 @dataclass(frozen=True, eq=False)
@@ -55,9 +48,11 @@ class Thin:
     def of(cls, fit: Fit) -> Thin:
         """Return the rows of a fit."""
         e = fit.explanation
-        if fit.campaign.samples <= _ENOUGH_ROWS:
+        if fit.campaign.samples <= settings.ENOUGH_ROWS:
             return cls(fit.corrected, e.linear, e.whitening, e.remainder, in_a_row(fit.campaign, e.outliers))
-        drawn = np.random.default_rng(_SEED).choice(fit.campaign.samples, _ENOUGH_ROWS, replace=False)
+        drawn = np.random.default_rng(settings.DRAW_SEED).choice(
+            fit.campaign.samples, settings.ENOUGH_ROWS, replace=False
+        )
         rows = np.sort(drawn)
         return cls(
             corrected_observations(fit.campaign.take(rows), fit.corrected.frames, fit.effects),
@@ -131,7 +126,7 @@ def discover(fit: Fit, number: int) -> Discovery | None:
                 candidates.append(best)
     laws = list(dict.fromkeys(c.law for c in sorted(candidates, key=lambda c: -c.gain)))
     # the first of each remainder, in turn
-    chosen = _in_turn([[c.law for c in _of(candidates, own)] for own in found], laws)[:_COMPARED]
+    chosen = _in_turn([[c.law for c in _of(candidates, own)] for own in found], laws)[: settings.COMPARED_LAWS]
     if not chosen:
         return None
     return _compare(fit, thin, [replace(law, name=f"{PREFIX}{number}") for law in chosen], tried)
@@ -139,9 +134,11 @@ def discover(fit: Fit, number: int) -> Discovery | None:
 
 def _with_joints(own: Sequence[Scanned]) -> list[Scanned]:
     """Return the first candidates, and beside that of a segment the joint behind it, which is simpler."""
-    first = list(own[:_SHAPED])
+    first = list(own[: settings.SHAPED])
     simpler = {(i.law.place, i.law.quantity) for i in first if i.law.kind == "link"}
-    return first + [i for i in own[_SHAPED:] if i.law.kind == "joint" and (i.law.place, i.law.quantity) in simpler]
+    return first + [
+        i for i in own[settings.SHAPED :] if i.law.kind == "joint" and (i.law.place, i.law.quantity) in simpler
+    ]
 
 
 def _of(candidates: Sequence[Scanned], own: Sequence[Scanned]) -> list[Scanned]:
@@ -161,12 +158,12 @@ def _compare(fit: Fit, thin: Thin, laws: Sequence[Discovered], tried: int) -> Di
     e = fit.explanation
     known = len(e.linear.blocks)
     problem = gram(_with(thin, laws), _all_rows(fit, thin))
-    odds = float(np.log(PRIOR_PROBABILITY / (1 - PRIOR_PROBABILITY)))
+    odds = float(np.log(settings.PRIOR_PROBABILITY / (1 - settings.PRIOR_PROBABILITY)))
     rarity = -float(np.log(tried))
     families = [*fit.families, *(law.name for law in laws)]
     prior = log_priors(fit.families, fit.rarity)
     # a change that is one in time and in another quantity happened in time
-    prior += [odds + rarity + (_IN_TIME if law.quantity in CLOCK else 0.0) for law in laws]
+    prior += [odds + rarity + (settings.IN_TIME if law.quantity in CLOCK else 0.0) for law in laws]
     same = {frozenset((a, b)) for a, f in enumerate(families) for b, g in enumerate(families) if a < b and f == g}
     search = Search(problem, prior, contained(problem) | frozenset(same))
     plain = search.evaluate(e.best.blocks)
@@ -180,7 +177,7 @@ def _compare(fit: Fit, thin: Thin, laws: Sequence[Discovered], tried: int) -> Di
         return None
     without = _climb(search, plain, known, barred=frozenset(range(known, known + len(laws))))
     gain = best.log_evidence - without.log_evidence
-    if gain < _LEAST:
+    if gain < settings.LEAST_GAIN:
         return None
     combinations, weight = search.probabilities()
     places: dict[tuple[str, str], float] = {}
@@ -211,7 +208,7 @@ def instead(fit: Fit, name: str) -> tuple[Discovered, float] | None:
     thin = Thin.of(fit)
     target = thin.target(rest)
     found, _ = scan(thin.observations, [target])
-    laws = [shaped(thin.observations, target, item.law).law for item in _with_joints(found[0])[:_INSTEAD]]
+    laws = [shaped(thin.observations, target, item.law).law for item in _with_joints(found[0])[: settings.RIVAL_LAWS]]
     if not laws:
         return None
     known = len(e.linear.blocks)
@@ -237,7 +234,7 @@ def _climb(search: Search, best: Combination, known: int, barred: frozenset[int]
         ]
         tried = [search.evaluate(blocks, best) for blocks in around if search.allowed(blocks)]
         better = max(tried, key=lambda c: c.log_evidence, default=best)
-        if better.log_evidence <= best.log_evidence + 1e-9:
+        if better.log_evidence <= best.log_evidence + settings.BETTER:
             return best
         best = better
 
@@ -254,9 +251,9 @@ def _all_rows(fit: Fit, thin: Thin) -> Whitening:
     noise = thin.whitening.noise.copy()
     for part, sigma in enumerate(stated[: len(noise) // 3]):
         if sigma is not None:
-            noise[3 * part : 3 * part + 3] = np.minimum(noise[3 * part : 3 * part + 3], 2.0 * sigma)
+            noise[3 * part : 3 * part + 3] = np.minimum(noise[3 * part : 3 * part + 3], settings.STATED_REACH * sigma)
     distance2 = ((thin.remainder / thin.whitening.noise) ** 2).sum(axis=1) / thin.linear.measures
-    weights = np.where(thin.changed, 1.0, np.minimum(1.0, 9.0 / np.maximum(distance2, 1e-300)))
+    weights = np.where(thin.changed, 1.0, np.minimum(1.0, settings.FAR / np.maximum(distance2, settings.TINY)))
     return Whitening(weights, noise, thin.whitening.held)
 
 

@@ -9,16 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
+from thermal_robot.inference import settings
 from thermal_robot.inference.evidence import Combination, Gram, Search
 from thermal_robot.inference.problem import Linear, Whitening, contained, frame_step, gram, parameter_values, scores
 
 Array = NDArray[np.float64]
-
-PRIOR_PROBABILITY = 0.1  # of an effect being at work, before the data
-_GIVEN_NOISE_DOF = 20.0  # a stated noise is trusted to about 15 %
-_ROUNDS = 8
-_ROUNDING = 1e-9  # m and rad: no table and no robot is better
-_MOST_OUTLIERS = 0.25
 
 
 @dataclass(frozen=True)
@@ -82,7 +77,7 @@ class Explanation:
 
 def distance_limit(measures: int, rows: int) -> float:
     """Return the squared distance, in noise, beyond which one of so many rows is a gross error."""
-    return 1.5 * float(chdtri(measures, 0.01 / max(rows, 1)))
+    return settings.GROSS_FACTOR * float(chdtri(measures, settings.GROSS_LEVEL / max(rows, 1)))
 
 
 def explain(
@@ -127,28 +122,28 @@ def explain(
     aside = np.zeros(samples, dtype=bool) if outliers is None else outliers & use
     families = families or [str(k) for k in range(len(linear.blocks))]
     log_prior = log_priors(families, rarity or {})
-    settings = {frozenset((a, b)) for a, f in enumerate(families) for b, g in enumerate(families) if a < b and f == g}
+    rivals = {frozenset((a, b)) for a, f in enumerate(families) for b, g in enumerate(families) if a < b and f == g}
     whitening = _first_whitening(linear, noise, use & ~aside)
     history: list[tuple[tuple[int, ...], bytes]] = []
     seed = tuple(start)
     while True:
         problem = gram(linear, whitening)
-        search = Search(problem, log_prior, contained(problem) | settings)
+        search = Search(problem, log_prior, contained(problem) | rivals)
         best = search.run(seed if search.allowed(seed) else ())
         values = parameter_values(linear, problem, best)
         remainder = _remainder(linear, values)
         step = frame_step(linear, whitening, remainder)
         remainder = remainder - linear.frames @ step
         state = (best.blocks, np.packbits(whitening.weights > 0).tobytes())
-        if state in history or len(history) >= _ROUNDS:
+        if state in history or len(history) >= settings.FIRST_ROUNDS:
             break
         history.append(state)
         leverage = (best.effective + linear.frames.shape[2]) / max(problem.equations + linear.frames.shape[2], 1)
-        whitening, aside = _reweigh(remainder, noise, use, min(leverage, 0.9), measures)
+        whitening, aside = _reweigh(remainder, noise, use, min(leverage, settings.MOST_LEVERAGE), measures)
         seed = best.blocks
     worth = design_effect(linear, problem, remainder, whitening, groups)
     if worth > 1.0:
-        search = Search(problem.tempered(worth), log_prior, contained(problem) | settings)
+        search = Search(problem.tempered(worth), log_prior, contained(problem) | rivals)
         best = search.run(best.blocks)
         values = parameter_values(linear, problem, best)
         remainder = _remainder(linear, values)
@@ -162,7 +157,7 @@ def explain(
 
 def log_priors(families: Sequence[str], rarity: Mapping[str, float]) -> list[float]:
     """Return the log prior odds of each block: settings of one effect share its own."""
-    odds = float(np.log(PRIOR_PROBABILITY / (1 - PRIOR_PROBABILITY)))
+    odds = float(np.log(settings.PRIOR_PROBABILITY / (1 - settings.PRIOR_PROBABILITY)))
     return [odds - float(np.log(list(families).count(f))) + rarity.get(f, 0.0) for f in families]
 
 
@@ -183,7 +178,7 @@ def design_effect(
         return 1.0
     used = np.flatnonzero(whitening.weights > 0)
     each = scores(linear, whitening, problem, remainder)
-    alone = (each**2).sum(axis=0) + 1e-300
+    alone = (each**2).sum(axis=0) + settings.TINY
     value = np.linalg.eigvalsh(problem.matrix / np.sqrt(np.outer(np.diag(problem.matrix), np.diag(problem.matrix))))
     independent = value.sum() ** 2 / (value**2).sum()
     worst = 1.0
@@ -193,7 +188,7 @@ def design_effect(
         ratio = float(np.mean((together**2).sum(axis=0) / alone))
         pairs = float((np.bincount(kept).astype(float) ** 2).sum()) / len(used) - 1.0
         chance = np.sqrt(2.0 * max(pairs, 0.0) / (len(used) * independent))
-        worst = max(worst, ratio if ratio > 1.0 + 4.0 * chance else 1.0)
+        worst = max(worst, ratio if ratio > 1.0 + settings.DESIGN_SIGMAS * chance else 1.0)
     return worst
 
 
@@ -201,7 +196,7 @@ def robust_noise(remainder: Array, leverage: float = 0.0) -> Array:
     """Return one sigma per axis of each three components, from the median of their squared length."""
     parts = remainder.reshape(len(remainder), -1, 3)
     middle = np.median((parts**2).sum(axis=2), axis=0) / float(chdtri(3, 0.5))
-    return np.asarray(np.maximum(np.sqrt(middle / (1.0 - leverage)), _ROUNDING))
+    return np.asarray(np.maximum(np.sqrt(middle / (1.0 - leverage)), settings.ROUNDING))
 
 
 def _settle(measured: Array, noise: Noise, measures: int) -> tuple[Array, float]:
@@ -211,10 +206,13 @@ def _settle(measured: Array, noise: Noise, measures: int) -> tuple[Array, float]
     """
     stated = noise.parts(measures)
     sigma = np.array(
-        [m if g is None else max(g, m if m > 1.3 * g else g) for g, m in zip(stated, measured, strict=True)]
+        [
+            m if g is None else max(g, m if m > settings.NOISE_SLACK * g else g)
+            for g, m in zip(stated, measured, strict=True)
+        ]
     )
     firm = all(g is not None and s <= g for g, s in zip(stated, sigma, strict=True))
-    return np.repeat(sigma, 3), _GIVEN_NOISE_DOF if firm else 0.0
+    return np.repeat(sigma, 3), settings.GIVEN_NOISE_DOF if firm else 0.0
 
 
 def _first_whitening(linear: Linear, noise: Noise, use: NDArray[np.bool_]) -> Whitening:
@@ -229,9 +227,9 @@ def _reweigh(
     sigma, held = _settle(robust_noise(remainder[use], leverage), noise, measures)
     distance2 = ((remainder / sigma) ** 2).sum(axis=1) / (1.0 - leverage)
     aside = use & (distance2 > distance_limit(measures, int(use.sum())))
-    if aside.sum() > _MOST_OUTLIERS * use.sum():
-        worst = np.argsort(np.where(use, -distance2, np.inf))[: int(_MOST_OUTLIERS * use.sum())]
+    if aside.sum() > settings.MOST_OUTLIERS * use.sum():
+        worst = np.argsort(np.where(use, -distance2, np.inf))[: int(settings.MOST_OUTLIERS * use.sum())]
         aside = np.isin(np.arange(len(use)), worst) & aside
-    bend = float(chdtri(measures, 0.01))
-    weights = np.where(use & ~aside, np.minimum(1.0, np.sqrt(bend / np.maximum(distance2, 1e-300))), 0.0)
+    bend = float(chdtri(measures, settings.BEND_LEVEL))
+    weights = np.where(use & ~aside, np.minimum(1.0, np.sqrt(bend / np.maximum(distance2, settings.TINY))), 0.0)
     return Whitening(weights, sigma, held), aside

@@ -7,14 +7,12 @@ from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign
 from thermal_robot.errors import EstimationError
+from thermal_robot.inference import settings
 from thermal_robot.inference.columns import frame_columns
 from thermal_robot.kinematics import exp6, quaternion_to_rotation, tool_poses
 from thermal_robot.observations import Frames, observe
 
 Array = NDArray[np.float64]
-
-_START_ROWS = 400
-_TARGET_STARTS = np.vstack([np.zeros(3), 0.2 * np.eye(3), -0.2 * np.eye(3)])
 
 
 def align(source: Array, target: Array, weights: Array) -> Array:
@@ -62,7 +60,7 @@ def register(campaign: Campaign, keep: NDArray[np.bool_] | None = None) -> Frame
     used = np.arange(campaign.samples) if keep is None else np.flatnonzero(keep)
     if len(used) < 3:
         raise EstimationError("at least three rows are needed to fit the unknown frames")
-    sample = campaign.take(used[np.linspace(0, len(used) - 1, min(len(used), _START_ROWS)).astype(int)])
+    sample = campaign.take(used[np.linspace(0, len(used) - 1, min(len(used), settings.START_ROWS)).astype(int)])
     fits = [_alternate(sample, frames, frames.tool[:3, 3] + start) for start in _starts(campaign)]
     _, best = min(fits, key=lambda fit: fit[0])
     return _refine(campaign.take(used), best, robust=keep is None)
@@ -70,12 +68,14 @@ def register(campaign: Campaign, keep: NDArray[np.bool_] | None = None) -> Frame
 
 def _starts(campaign: Campaign) -> Array:
     fixed = campaign.tool_known or campaign.simulated_position is not None
-    return _TARGET_STARTS[:1] if fixed else _TARGET_STARTS
+    return settings.TARGET_STARTS[:1] if fixed else settings.TARGET_STARTS
 
 
 def _soft(distance: Array) -> Array:
     """Cauchy weights at the scale of the median distance: a third of the rows may be grossly wrong."""
-    return np.asarray(1.0 / (1.0 + (distance / (1.5 * np.median(distance) + 1e-12)) ** 2))
+    return np.asarray(
+        1.0 / (1.0 + (distance / (settings.CAUCHY_SCALE * np.median(distance) + settings.NO_DISTANCE)) ** 2)
+    )
 
 
 def _alternate(campaign: Campaign, declared: Frames, target: Array) -> tuple[float, Frames]:
@@ -87,7 +87,7 @@ def _alternate(campaign: Campaign, declared: Frames, target: Array) -> tuple[flo
         origin, turns = poses[:, :3, 3], poses[:, :3, :3]
     base, weights, cost = declared.base, np.ones(campaign.samples), np.inf
     place = declared.tool[:3, 3] if campaign.tool_known else target
-    for _ in range(200):
+    for _ in range(settings.START_ROUNDS):
         predicted = origin if turns is None else origin + turns @ place
         if not campaign.base_known:
             base = align(predicted, measured, weights)
@@ -99,7 +99,7 @@ def _alternate(campaign: Campaign, declared: Frames, target: Array) -> tuple[flo
         distance = np.linalg.norm(measured - predicted @ base[:3, :3].T - base[:3, 3], axis=1)
         weights = _soft(distance)
         previous, cost = cost, float(np.median(distance))
-        if abs(previous - cost) < 1e-5 * cost:
+        if abs(previous - cost) < settings.START_SETTLED * cost:
             break
     tool = declared.tool.copy()
     tool[:3, 3] = place
@@ -124,7 +124,7 @@ def moved(frames: Frames, step: Array, names: tuple[str, ...]) -> Frames:
 
 def _refine(campaign: Campaign, frames: Frames, robust: bool) -> Frames:
     """Gauss-Newton on position and orientation, each at the scale of its own median."""
-    for _ in range(60):
+    for _ in range(settings.REFINE_ROUNDS):
         observations = observe(campaign, frames)
         columns, names = frame_columns(observations)
         gap = observations.gap
@@ -137,6 +137,6 @@ def _refine(campaign: Campaign, frames: Frames, robust: bool) -> Frames:
         length = np.linalg.norm(design, axis=0) + 1e-300
         step = np.linalg.lstsq(design / length, (gap * root_weight).ravel(), rcond=1e-9)[0] / length
         frames = moved(frames, step, names)
-        if np.abs(step).max() < 1e-9:
+        if np.abs(step).max() < settings.REFINE_SETTLED:
             break
     return frames

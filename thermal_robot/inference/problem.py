@@ -9,15 +9,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
+from thermal_robot.inference import settings
 from thermal_robot.inference.columns import Block
 from thermal_robot.inference.evidence import Combination, Gram
 
 Array = NDArray[np.float64]
-
-_FRAME_FLOOR = 1e-11
-_ROUNDING = 1e-12
-_INFORMATION_FLOOR = 1e-5  # a column that moves the whole gap by less than this, squared and in noise, is not seen
-_CONTAINED = 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,9 +75,9 @@ def gram(linear: Linear, whitening: Whitening) -> Gram:
     sizes = np.concatenate([*(b.sizes for b in linear.blocks), [1.0]])
     full = stack.T @ stack
     cross = full[:flat, flat:] * sizes
-    length = np.sqrt(np.diag(full)[:flat]) + 1e-300
+    length = np.sqrt(np.diag(full)[:flat]) + settings.TINY
     value, vector = np.linalg.eigh(full[:flat, :flat] / np.outer(length, length))
-    known = value > _FRAME_FLOOR
+    known = value > settings.FRAME_FLOOR
     inverse = (vector[:, known] / value[known]) @ vector[:, known].T / np.outer(length, length)
     projector = inverse @ cross
     rest = full[flat:, flat:] * np.outer(sizes, sizes) - cross.T @ projector
@@ -92,7 +88,7 @@ def gram(linear: Linear, whitening: Whitening) -> Gram:
         value, vector = np.linalg.eigh(rest[own, own])
         # what is left of an exact alias of the frames is rounding of what it was before they were projected out
         before = float((np.diag(full)[flat:][own] * item.sizes**2).max(initial=0.0))
-        seen = value > max(_INFORMATION_FLOOR, _ROUNDING * before)
+        seen = value > max(settings.INFORMATION_FLOOR, settings.PROJECTED_FLOOR * before)
         bases.append(vector[:, seen])
         slices.append(slice(start, start + int(seen.sum())))
         start, parameter = start + int(seen.sum()), own.stop
@@ -147,7 +143,7 @@ def contained(problem: Gram) -> frozenset[frozenset[int]]:
         inside = ((matrix[:, outer] @ root) ** 2).sum(axis=1)
         for small in smaller:
             left = total[small] - float(inside[slices[small]].sum())
-            if left < max(_CONTAINED * total[small], 0.5):
+            if left < max(settings.CONTAINED * total[small], settings.CONTAINED_LEFT):
                 pairs.add(frozenset((small, large)))
     return frozenset(pairs)
 
@@ -183,8 +179,8 @@ def frame_step(linear: Linear, whitening: Whitening, remainder: Array) -> Array:
     flat = linear.frames[used]
     matrix = np.einsum("nmf,nm,nmg->fg", flat, weight, flat, optimize=True)
     vector = np.einsum("nmf,nm->f", flat, weight * remainder[used])
-    length = np.sqrt(np.diag(matrix)) + 1e-300
+    length = np.sqrt(np.diag(matrix)) + settings.TINY
     value, basis = np.linalg.eigh(matrix / np.outer(length, length))
-    known = value > _FRAME_FLOOR
+    known = value > settings.FRAME_FLOOR
     step = basis[:, known] @ ((basis[:, known].T @ (vector / length)) / value[known])
     return np.asarray(step / length)

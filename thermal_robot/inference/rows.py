@@ -6,16 +6,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign
+from thermal_robot.inference import settings
 
 Array = NDArray[np.float64]
 Labels = NDArray[np.int64]
 
-NEAR = 0.01  # rad (m for a prismatic joint): closer commands repeat a pose
-_LARGEST_SHARE = 0.1
-
 
 def near_repeats(campaign: Campaign) -> Labels:
-    """(N,) label of the cluster of commands that lie within :data:`NEAR` of each other.
+    """(N,) label of the cluster of commands that lie within :data:`settings.NEAR` of each other.
 
     Samples along a path chain into one cluster; the distance is then halved until no cluster holds more than a tenth
     of the rows, so that only closer repeats count. Rows with the same ``pose`` label always belong together.
@@ -24,13 +22,15 @@ def near_repeats(campaign: Campaign) -> Labels:
     from scipy.sparse.csgraph import connected_components
     from scipy.spatial import cKDTree
 
-    samples, radius = campaign.samples, NEAR
+    samples, radius = campaign.samples, settings.NEAR
     tree = cKDTree(campaign.q)
     while True:
         pairs = tree.query_pairs(radius, output_type="ndarray")
         graph = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(samples, samples))
         count, labels = connected_components(graph, directed=False)
-        if radius < 1e-7 or np.bincount(labels, minlength=count).max() <= max(_LARGEST_SHARE * samples, 2):
+        if radius < settings.CLOSEST or np.bincount(labels, minlength=count).max() <= max(
+            settings.LARGEST_CLUSTER * samples, 2
+        ):
             break
         radius /= 2
     stated = campaign.labels.get("pose")
@@ -86,7 +86,9 @@ def neighbourhoods(campaign: Campaign, count: int) -> Labels:
     return labels
 
 
-def folds(campaign: Campaign, count: int = 5, blocks_a_fold: int = 4) -> tuple[Labels, Labels]:
+def folds(
+    campaign: Campaign, count: int = settings.FOLDS, blocks_a_fold: int = settings.BLOCKS_A_FOLD
+) -> tuple[Labels, Labels]:
     """Assign rows to folds, in blocks of consecutive measurements, near-repeats never apart.
 
     Returns

@@ -10,20 +10,15 @@ from numpy.typing import NDArray
 
 from thermal_robot.effects.law import Discovered
 from thermal_robot.effects.quantities import GRAVITY, quantities, unit
+from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.explain import robust_noise
 from thermal_robot.observations import Observations
 
 Array = NDArray[np.float64]
 
-KNOTS = 5
-HARMONICS = (1.0, 2.0, 3.0)
 _REFINED = ("slide", "hinge", "bump")
-_REFINEMENTS = 10
 CLOCK = ("time", "order")
-_FEW = 6
-_NARROW = 0.2  # of an even share of the range: the least distance of two knots
-_QUANTITIES_OF_LINKS = 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +70,7 @@ def laws(observations: Observations, kinds: Sequence[str], names: Iterable[str] 
 def harmonics(observations: Observations, joint: str) -> tuple[float, ...]:
     """Return the orders that are looked for in a joint: a few a turn, and the motor's where its ratio is stated."""
     ratio = observations.campaign.gears.get(joint)
-    return HARMONICS if ratio is None else (*HARMONICS, float(ratio), 2.0 * float(ratio))
+    return settings.HARMONICS if ratio is None else (*settings.HARMONICS, float(ratio), 2.0 * float(ratio))
 
 
 def _labels(observations: Observations, name: str) -> tuple[str, ...]:
@@ -84,14 +79,14 @@ def _labels(observations: Observations, name: str) -> tuple[str, ...]:
     return tuple(np.unique(own).tolist()) if own is not None and recorded else ()
 
 
-def of_quantity(law: Discovered, values: Array, knots: int = KNOTS) -> Discovered:
+def of_quantity(law: Discovered, values: Array, knots: int = settings.KNOTS) -> Discovered:
     """Return the law with knots at the quantity's quantiles, or with its levels where it has few values."""
     levels = np.unique(values)
     low, high = float(values.min()), float(values.max())
-    if len(levels) <= _FEW:
+    if len(levels) <= settings.FEW_LEVELS:
         return replace(law, shape="levels", marks=tuple(levels.tolist()), origin=low, span=high - low)
-    marks = np.quantile(values, np.linspace(0.02, 0.98, knots))
-    if np.diff(marks).min() < _NARROW * (high - low) / knots:
+    marks = np.quantile(values, np.linspace(settings.OUTER_KNOTS, 1.0 - settings.OUTER_KNOTS, knots))
+    if np.diff(marks).min() < settings.NARROW_KNOTS * (high - low) / knots:
         # most values lie in one spot: a spline between knots there would be free to do anything
         marks = np.linspace(low, high, knots)
     return replace(law, shape="smooth", marks=tuple(marks.tolist()), origin=low, span=high - low)
@@ -124,7 +119,7 @@ class Target:
         measures = gap.shape[1]
         noise = np.repeat(robust_noise(gap), 3)
         weight = np.ones(len(gap))
-        for _ in range(4):
+        for _ in range(settings.CAUCHY_ROUNDS):
             root = np.sqrt(weight)[:, None] / noise
             flat = (design * root[:, :, None]).reshape(root.size, design.shape[2])
             basis = _basis(flat)
@@ -144,22 +139,22 @@ class Target:
         """Return the gain in log evidence of (N, m, K) further columns: ½ ν ln(S₀/S₁) − ½ k ln ν."""
         flat = (columns * self.root[:, :, None]).reshape(len(self.white), -1)
         flat = flat - self.basis @ (self.basis.T @ flat)
-        flat = flat / (np.linalg.norm(flat, axis=0) + 1e-300)
+        flat = flat / (np.linalg.norm(flat, axis=0) + settings.TINY)
         value, vector = np.linalg.eigh(flat.T @ flat)
-        seen = value > 1e-6 * max(value.max(initial=0.0), 1e-300)
+        seen = value > settings.LAW_FLOOR * max(value.max(initial=0.0), settings.TINY)
         k, freedom = int(seen.sum()), len(self.white) - self.basis.shape[1]
-        if not k or freedom - k < 5:
+        if not k or freedom - k < settings.FEWEST_LEFT:
             return -np.inf
         projected = (vector[:, seen].T @ (flat.T @ self.white)) / np.sqrt(value[seen])
         total, explained = float(self.white @ self.white), float(projected @ projected)
-        rest = max(total - explained, 1e-300)
+        rest = max(total - explained, settings.TINY)
         return float(0.5 * freedom * np.log(total / rest) - 0.5 * k * np.log(freedom))
 
 
 def _basis(flat: Array) -> Array:
-    flat = flat / (np.linalg.norm(flat, axis=0) + 1e-300)
+    flat = flat / (np.linalg.norm(flat, axis=0) + settings.TINY)
     value, vector = np.linalg.eigh(flat.T @ flat) if flat.shape[1] else (np.zeros(0), np.zeros((0, 0)))
-    return np.linalg.qr(flat @ vector[:, value > 1e-9 * value.max(initial=1.0)])[0]
+    return np.linalg.qr(flat @ vector[:, value > settings.DESIGN_FLOOR * value.max(initial=1.0)])[0]
 
 
 def scan(observations: Observations, targets: Sequence[Target]) -> tuple[list[list[Scanned]], int]:
@@ -174,7 +169,7 @@ def scan(observations: Observations, targets: Sequence[Target]) -> tuple[list[li
     for own in found:
         for item in own:
             telling[item.law.quantity] = max(telling.get(item.law.quantity, -np.inf), item.gain)
-    names = sorted(telling, key=lambda name: -telling[name])[:_QUANTITIES_OF_LINKS]
+    names = sorted(telling, key=lambda name: -telling[name])[: settings.LINK_QUANTITIES]
     second = laws(observations, ("link",), names)
     _measure(observations, second, targets, found)
     for own in found:
@@ -182,7 +177,9 @@ def scan(observations: Observations, targets: Sequence[Target]) -> tuple[list[li
     return found, len(first) + len(second)
 
 
-def shapes(law: Discovered, values: Array, jumps: bool = True, orders: Sequence[float] = HARMONICS) -> list[Discovered]:
+def shapes(
+    law: Discovered, values: Array, jumps: bool = True, orders: Sequence[float] = settings.HARMONICS
+) -> list[Discovered]:
     """Return simple shapes that might do instead of a smooth law, and that law.
 
     Hinges at the quantity's quantiles, straight and quadratic laws; steps and bumps of what a robot does or what passes
@@ -191,14 +188,16 @@ def shapes(law: Discovered, values: Array, jumps: bool = True, orders: Sequence[
     if law.shape in ("constant", "levels"):
         return [law, replace(law, shape="ramp", marks=())] if law.shape == "levels" and len(law.marks) > 2 else [law]
     found = [law, replace(law, shape="ramp", marks=()), replace(law, shape="quadratic", marks=())]
-    middle = np.quantile(values, np.linspace(0.06, 0.94, 23))
+    middle = np.quantile(values, np.linspace(settings.INNER_MARKS, 1.0 - settings.INNER_MARKS, settings.MARKS))
     if jumps:
         found += [replace(law, shape="step", marks=(float(m),)) for m in middle]
-        found += [replace(law, shape="slide", marks=(float(m), 0.08 * law.span)) for m in middle[::2]]
+        found += [replace(law, shape="slide", marks=(float(m), settings.SLIDE_WIDTH * law.span)) for m in middle[::2]]
     found += [replace(law, shape="hinge", marks=(float(m), side)) for m in middle[2:-2:2] for side in (1.0, -1.0)]
     if jumps:
         found += [
-            replace(law, shape="bump", marks=(float(m), w * law.span)) for m in middle[1:-1:2] for w in (0.04, 0.1)
+            replace(law, shape="bump", marks=(float(m), w * law.span))
+            for m in middle[1:-1:2]
+            for w in settings.BUMP_WIDTHS
         ]
     if law.quantity.startswith("velocity."):
         found.append(replace(law, shape="drag", marks=()))
@@ -211,7 +210,7 @@ def shaped(observations: Observations, target: Target, law: Discovered) -> Scann
     """Return a law in the shape that gains most."""
     values = quantities(observations).get(law.quantity)
     jumps = law.quantity in (*CLOCK, *GRAVITY, *observations.robot.joint_names)
-    orders = harmonics(observations, law.place) if law.kind == "joint" else HARMONICS
+    orders = harmonics(observations, law.place) if law.kind == "joint" else settings.HARMONICS
     candidates = [law] if values is None else shapes(law, values, jumps, orders)
 
     def measured(candidate: Discovered) -> Scanned:
@@ -223,12 +222,15 @@ def shaped(observations: Observations, target: Target, law: Discovered) -> Scann
 
 def _refined(best: Scanned, measured: Callable[[Discovered], Scanned]) -> Scanned:
     """Move marks and widths in ever smaller steps while that gains."""
-    step, law = 0.03, best.law
-    for _ in range(_REFINEMENTS):
+    step, law = settings.MARK_STEP, best.law
+    for _ in range(settings.MARK_ROUNDS):
         law, (mark, *width) = best.law, best.law.marks
         near = [replace(law, marks=(mark + s * step * law.span, *width)) for s in (1, -1)]
         if law.shape in ("slide", "bump"):
-            near += [replace(law, marks=(mark, width[0] * f)) for f in (1.0 + 8.0 * step, 1.0 / (1.0 + 8.0 * step))]
+            near += [
+                replace(law, marks=(mark, width[0] * f))
+                for f in (1.0 + settings.WIDTH_STEP * step, 1.0 / (1.0 + settings.WIDTH_STEP * step))
+            ]
         better = max(map(measured, near), key=lambda item: item.gain)
         if better.gain > best.gain:
             best = better

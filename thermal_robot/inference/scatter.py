@@ -11,21 +11,10 @@ from scipy.optimize import brentq
 from scipy.special import logsumexp
 
 from thermal_robot.errors import EstimationError
-from thermal_robot.inference.scatter_likelihood import Component, Fitted, Likelihood, Rows, grid, independent_rows
+from thermal_robot.inference import settings
+from thermal_robot.inference.scatter_likelihood import Component, Fitted, Likelihood, Rows, independent_rows
 
 Array = NDArray[np.float64]
-
-PRIOR_PROBABILITY = 0.1  # of an effect being at work, before the data
-FEWEST_ROWS = 10  # below, nothing can be said
-FEWEST_CONTRASTS = 6  # differences of repeats below which visits and poses cannot be told apart
-_MOST_ROWS = 1500  # a standard deviation is then known to about two per cent
-_MOST_COMPONENTS = 6
-_TAILS = 4.0  # degrees of freedom of the heavy-tailed law that is tried beside the normal one
-_WORTH = 3.0  # natural logarithms by which heavy tails must fit better
-_NORMAL_ROWS = 1000  # above, the likelihood of a variance that is well seen is normal in its logarithm
-_DROP = 1.92  # of the log likelihood at the ends of a 95 % interval: half the χ² quantile of one degree of freedom
-_TRIED = 3  # candidates fitted in full at each step
-_HOPELESS = 3.0  # gain in log likelihood below which no prior odds are overcome
 
 
 @dataclass(frozen=True)
@@ -160,19 +149,19 @@ def variance_components(
     weights = np.ones(len(remainder)) if weights is None else np.asarray(weights, dtype=float)
     labels = np.arange(len(remainder)) if pose is None else np.unique(pose, return_inverse=True)[1].ravel()
     kept = enough_rows(labels, weights > 0)
-    if len(kept) < FEWEST_ROWS:
-        note = f"nothing can be said: {len(kept)} rows are fewer than {FEWEST_ROWS}"
-        return Scatter((), (), {k: PRIOR_PROBABILITY for k in ("visit", "pose")}, noise, note=note)
+    if len(kept) < settings.FEWEST_ROWS:
+        note = f"nothing can be said: {len(kept)} rows are fewer than {settings.FEWEST_ROWS}"
+        return Scatter((), (), {k: settings.PRIOR_PROBABILITY for k in ("visit", "pose")}, noise, note=note)
     labels = labels[kept]
-    if len(kept) - len(np.unique(labels)) < FEWEST_CONTRASTS:
+    if len(kept) - len(np.unique(labels)) < settings.FEWEST_CONTRASTS:
         labels = np.arange(len(kept))
     scale = noise[:, None]
     rows = independent_rows(
         remainder[kept] / noise, sensitivity[kept, : len(noise)] / scale, labels, weights[kept], freedom
     )
     search = _Search(Likelihood(rows, held)).run()
-    heavy = Likelihood(rows, held, _TAILS)
-    if heavy.fit(search.chosen).value > search.best.value + _WORTH:
+    heavy = Likelihood(rows, held, settings.TAILS)
+    if heavy.fit(search.chosen).value > search.best.value + settings.WORTH_TAILS:
         search = _Search(heavy).run()
     notes = [] if rows.contrasts else ["without repeats, what comes anew at each visit counts as the pose's"]
     if len(kept) < int((weights > 0).sum()):
@@ -196,11 +185,11 @@ def _checked(remainder: Array, sensitivity: Array, noise: Array) -> int:
 def enough_rows(labels: NDArray[np.int64], used: NDArray[np.bool_]) -> NDArray[np.int64]:
     """Return the numbers of the used rows, or where they are above 1500 those of whole poses drawn at random."""
     rows = np.flatnonzero(used)
-    if len(rows) <= _MOST_ROWS:
+    if len(rows) <= settings.SCATTER_ROWS:
         return rows
     poses, number, count = np.unique(labels[rows], return_inverse=True, return_counts=True)
     drawn = np.random.default_rng(0).permutation(len(poses))
-    taken = drawn[np.cumsum(count[drawn]) <= _MOST_ROWS]
+    taken = drawn[np.cumsum(count[drawn]) <= settings.SCATTER_ROWS]
     return rows[np.isin(number.ravel(), taken)]
 
 
@@ -235,28 +224,30 @@ class _Search:
     def _volume(self, fitted: Fitted) -> float:
         """Logarithm of posterior over prior width of the components' logarithmic standard deviations."""
         width = 0.5 * np.sqrt(2.0 * np.pi * np.diag(fitted.spread)[self.likelihood.nuisances :])
-        return float(np.minimum(np.log(width / (0.5 * np.ptp(np.log(grid())))), 0.0).sum())
+        return float(np.minimum(np.log(width / (0.5 * np.ptp(np.log(settings.VARIANCE_GRID)))), 0.0).sum())
 
     def _prior(self, components: tuple[Component, ...]) -> float:
         """Log prior: of each kind being there at all, and of each further joint as one of n."""
         n, total = self.rows.columns.shape[2], 0.0
         for kind in self.kinds:
             joints = sum(k == kind for k, _ in components)
-            total += np.log(PRIOR_PROBABILITY if joints else 1.0 - PRIOR_PROBABILITY) - joints * np.log(n)
+            total += np.log(
+                settings.PRIOR_PROBABILITY if joints else 1.0 - settings.PRIOR_PROBABILITY
+            ) - joints * np.log(n)
         return float(total)
 
     def _candidates(self) -> tuple[Component, ...]:
-        seen = np.flatnonzero(self.rows.lever > 1e-9 * self.rows.lever.max(initial=0.0))
+        seen = np.flatnonzero(self.rows.lever > settings.LEVER_FLOOR * self.rows.lever.max(initial=0.0))
         return tuple((kind, int(j)) for kind in self.kinds for j in seen if (kind, int(j)) not in self.chosen)
 
     def run(self) -> _Search:
-        while len(self.chosen) < _MOST_COMPONENTS:
+        while len(self.chosen) < settings.MOST_COMPONENTS:
             candidates = self._candidates()
             if not candidates:
                 break
             fitted, log_posterior, _ = self._fit(self.chosen)
             gain = self.likelihood.screen(fitted, candidates).max(axis=0) - fitted.value
-            likely = [k for k in np.argsort(-gain)[:_TRIED] if gain[k] > _HOPELESS]
+            likely = [k for k in np.argsort(-gain)[: settings.FULLY_TRIED] if gain[k] > settings.HOPELESS]
             tried = [(*self.chosen, candidates[k]) for k in likely]
             if not tried:
                 break
@@ -275,7 +266,7 @@ class _Search:
         others += [m for m in moved if len(set(m)) == len(m)]
         others += [tuple(c for c in self.chosen if c[0] != kind) for kind in self.kinds]
         best = max([self.chosen, *others], key=lambda o: self._fit(o)[1])
-        better = self._fit(best)[1] > self._fit(self.chosen)[1] + 1e-6
+        better = self._fit(best)[1] > self._fit(self.chosen)[1] + settings.ALIAS
         self.chosen = best if better else self.chosen
         return better
 
@@ -283,7 +274,9 @@ class _Search:
         fitted, log_posterior, order = self._fit(self.chosen)
         none = self._fit(())
         candidates = self._candidates()
-        screened = self.likelihood.screen(fitted, candidates) if candidates else np.zeros((len(grid()), 0))
+        screened = (
+            self.likelihood.screen(fitted, candidates) if candidates else np.zeros((len(settings.VARIANCE_GRID), 0))
+        )
         factors = logsumexp(screened - fitted.value, axis=0) - np.log(len(screened))
         probability = self._probability(candidates, factors)
         components = []
@@ -332,22 +325,26 @@ class _Search:
     def _interval(self, fitted: Fitted, order: tuple[Component, ...], place: int) -> tuple[float, float]:
         """Logarithms of the variances at which the profile likelihood has dropped; −∞ where it does not drop."""
         estimate = fitted.logs[place]
-        step = 1.96 * float(np.sqrt(fitted.spread[place, place]))
-        if len(self.rows.columns) > _NORMAL_ROWS and step < 1.0:
+        step = settings.SIGMAS_95 * float(np.sqrt(fitted.spread[place, place]))
+        if len(self.rows.columns) > settings.NORMAL_ROWS and step < 1.0:
             return estimate - step, estimate + step
 
         def beyond(log: float) -> float:
             start = fitted.logs.copy()
             start[place] = log
-            return fitted.value - self.likelihood.fit(order, start, held=place).value - _DROP
+            return fitted.value - self.likelihood.fit(order, start, held=place).value - settings.DROP_95
 
         ends = []
         for sign in (-1.0, 1.0):
             inner, reach = estimate, step
-            while beyond(estimate + sign * reach) < 0.0 and reach < 12.0:
+            while beyond(estimate + sign * reach) < 0.0 and reach < settings.PROFILE_REACH:
                 inner, reach = estimate + sign * reach, 2.0 * reach
             outer = estimate + sign * reach
-            ends.append(float(brentq(beyond, inner, outer, xtol=0.02)) if beyond(outer) > 0.0 else sign * np.inf)
+            ends.append(
+                float(brentq(beyond, inner, outer, xtol=settings.PROFILE_ROOT))
+                if beyond(outer) > 0.0
+                else sign * np.inf
+            )
         return ends[0], ends[1]
 
 
@@ -357,11 +354,11 @@ def _estimate(kind: str, joint: int, ends: Array, factor: float, chosen: bool) -
 
 def _bounds(values: Array, none: float) -> tuple[float, float, float]:
     """Likeliest standard deviation and 95 % interval from the log likelihood on the grid and at zero."""
-    logs = np.log(grid())
+    logs = np.log(settings.VARIANCE_GRID)
     best = int(np.argmax(values))
     most = max(float(values[best]), none)
     estimate = float(np.exp(0.5 * logs[best])) if values[best] > none else 0.0
-    low, high = most - _DROP, len(logs) - 1
+    low, high = most - settings.DROP_95, len(logs) - 1
     above = np.flatnonzero(values > low)
     if not len(above):
         return 0.0, 0.0, float(np.exp(0.5 * logs[0]))
@@ -380,5 +377,5 @@ def joint_errors(scatter: Scatter, remainder: Array, sensitivity: Array, joint: 
     others = Scatter(scatter.kinds, tuple(apart), scatter.probability, scatter.noise)
     column = sensitivity[:, : len(scatter.noise), joint]
     weighted = np.linalg.solve(others.covariance(sensitivity), column[:, :, None])[:, :, 0]
-    known = (weighted * column).sum(axis=1) + 1e-300
+    known = (weighted * column).sum(axis=1) + settings.TINY
     return (weighted * remainder).sum(axis=1) / known, 1.0 / np.sqrt(known)

@@ -6,18 +6,14 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtrc, gammaln
+from scipy.special import gammaln
+
+from thermal_robot.inference import settings
 
 Array = NDArray[np.float64]
 Component = tuple[str, int]  # "visit" or "pose", and the number of a joint
 
-_GIVEN_NOISE_DOF = 20.0  # a stated noise is trusted to about 15 %, as where effects are chosen
-_MISTRUST = 5.0  # what it costs at most to call a stated noise wrong, in natural logarithms
-_MOST_INFLATION = 4.0  # of a mean square, for the parameters that were fitted
-_STEPS = 40
-_ROUNDING = 1e-13
-_LOWEST, _HIGHEST = -12.0, 14.0  # logarithm of a variance in squares of the noise
-_GRID = np.exp(np.linspace(np.log(1e-2), np.log(1e4), 22))
+_LOWEST, _HIGHEST = settings.LOG_VARIANCE
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,7 +66,7 @@ def independent_rows(values: Array, columns: Array, pose: NDArray[np.int64], wei
     weight = np.add.reduceat(weights, first) / count
     later, last = number > 0, number == size - 1
     place = np.repeat(np.arange(len(first)), count)
-    fitted = min(freedom / (len(first) * values.shape[1]), 1.0 - 1.0 / _MOST_INFLATION)
+    fitted = min(freedom / (len(first) * values.shape[1]), 1.0 - 1.0 / settings.MOST_INFLATION)
     stacked = np.concatenate([common[place[later]], common])
     lever = np.sqrt((common**2).mean(axis=(0, 1)))
     return Rows(
@@ -136,26 +132,26 @@ class Likelihood:
         logs = self._start(len(components)) if start is None else start.copy()
         free = np.arange(len(logs)) != held
         value, slope, information, covariance = self._at(logs, factor, counted)
-        for _ in range(_STEPS):
+        for _ in range(settings.SCATTER_STEPS):
             matrix = information[np.ix_(free, free)]
             step = np.zeros_like(logs)
-            step[free] = np.clip(np.linalg.solve(matrix, slope[free]), -2.0, 2.0)
+            step[free] = np.clip(np.linalg.solve(matrix, slope[free]), -settings.SCATTER_STEP, settings.SCATTER_STEP)
             step = np.clip(logs + step, _LOWEST, _HIGHEST) - logs
             if held is not None:
                 step[held] = 0.0
             promised = float(slope @ step)
-            if promised < 1e-3:
+            if promised < settings.SCATTER_SETTLED:
                 break
-            for _ in range(8):
+            for _ in range(settings.SCATTER_HALVINGS):
                 found = self._at(logs + step, factor, counted)
-                if found[0] >= value - 1e-9:
+                if found[0] >= value - settings.BETTER:
                     break
-                step = step / 3.0
+                step = step / settings.SCATTER_CUT
             else:
                 break
             gain, logs = found[0] - value, logs + step
             value, slope, information, covariance = found
-            if gain < 1e-3:
+            if gain < settings.SCATTER_SETTLED:
                 break
         return Fitted(logs, value, covariance, np.asarray(np.linalg.inv(information), dtype=float))
 
@@ -175,9 +171,9 @@ class Likelihood:
         length2 = multiple * (both[:, :, 1:] ** 2).sum(axis=1)
         own, w, m = (both[:, :, 0] ** 2).sum(axis=1), rows.weights, rows.values.shape[1]
         parts = len(self.stated)
-        result = np.empty((len(_GRID), len(candidates)))
+        result = np.empty((len(settings.VARIANCE_GRID), len(candidates)))
         logdet = 2.0 * np.log(np.diagonal(root, axis1=1, axis2=2)).sum(axis=1)
-        for g, variance in enumerate(_GRID):
+        for g, variance in enumerate(settings.VARIANCE_GRID):
             distance2 = own[:, None] - variance * along2 / (1.0 + variance * length2)
             scale = np.ones(len(candidates))
             for _ in range(1 if np.isinf(self.tails) else 4):
@@ -193,7 +189,7 @@ class Likelihood:
         return result
 
     def _start(self, components: int) -> Array:
-        mean2 = np.log(max(float(np.median(self.rows.values**2)) / 0.455, 1e-6))
+        mean2 = np.log(max(float(np.median(self.rows.values**2)) / settings.MEDIAN_SQUARE, settings.ALIAS))
         return np.concatenate(
             [
                 np.full(len(self.stated), np.clip(mean2, _LOWEST + 1, _HIGHEST - 4)),
@@ -227,7 +223,7 @@ class Likelihood:
         covariance = (factor * (variance @ member)) @ turned
         # a joint that scatters a million times more than the instrument must not make it singular
         size = np.trace(covariance, axis1=1, axis2=2)
-        covariance = covariance + (_ROUNDING * size)[:, None, None] * np.eye(m)
+        covariance = covariance + (settings.SCATTER_ROUNDING * size)[:, None, None] * np.eye(m)
         inverse = np.linalg.inv(covariance)
         weighted = inverse @ factor
         shared = turned @ weighted
@@ -243,7 +239,7 @@ class Likelihood:
         for k, stated in enumerate(self.stated):
             prior, tilt, bend = self._prior(logs[k], stated)
             value, slope[k], information[k, k] = value + float(prior), slope[k] + tilt, information[k, k] + bend
-        information[np.diag_indices(len(logs))] += 1e-3
+        information[np.diag_indices(len(logs))] += settings.SCATTER_RIDGE
         return value, slope, information, covariance
 
     def _prior(self, log: float | Array, stated: bool) -> tuple[Array, float, float]:
@@ -251,10 +247,14 @@ class Likelihood:
         log = np.asarray(log)
         if not stated:
             return np.zeros_like(log), 0.0, 0.0
-        held = -0.5 * _GIVEN_NOISE_DOF * (log + np.exp(-log) - 1.0)
-        if log.ndim or held < -_MISTRUST:
-            return np.maximum(held, -_MISTRUST), 0.0, 0.0
-        return held, float(-0.5 * _GIVEN_NOISE_DOF * (1.0 - np.exp(-log))), float(0.5 * _GIVEN_NOISE_DOF)
+        held = -0.5 * settings.GIVEN_NOISE_DOF * (log + np.exp(-log) - 1.0)
+        if log.ndim or held < -settings.MISTRUST:
+            return np.maximum(held, -settings.MISTRUST), 0.0, 0.0
+        return (
+            held,
+            float(-0.5 * settings.GIVEN_NOISE_DOF * (1.0 - np.exp(-log))),
+            float(0.5 * settings.GIVEN_NOISE_DOF),
+        )
 
     def _pull(self, distance2: Array, m: int) -> Array:
         if np.isinf(self.tails):
@@ -267,58 +267,3 @@ class Likelihood:
         half = 0.5 * (self.tails + m)
         constant = gammaln(half) - gammaln(0.5 * self.tails) - 0.5 * m * np.log(np.pi * (self.tails - 2.0))
         return np.asarray(constant - 0.5 * logdet - half * np.log1p(distance2 / (self.tails - 2.0)))
-
-
-def grid() -> Array:
-    """(G,) variances of a component at which :meth:`Likelihood.screen` looks, in squares of the noise.
-
-    Their logarithms are evenly spaced: what is not known of a component's size beforehand is between a tenth and a
-    hundred times the noise.
-    """
-    return _GRID.copy()
-
-
-@dataclass(frozen=True)
-class Shape:
-    """Which law a scatter follows.
-
-    Attributes
-    ----------
-    name
-        ``normal``, ``flat-normal`` (a uniform part beside the normal one), ``neither``, or ``too few`` values to say.
-    p_normal
-        Shapiro and Wilk's p-value of a normal law; NaN where there are too few.
-    p_flat
-        p-value of having no uniform part; NaN where there are too few.
-    ratio
-        Standard deviation of the uniform over that of the normal part.
-    """
-
-    name: str
-    p_normal: float
-    p_flat: float
-    ratio: float
-
-
-def normal_or_flat(errors: Array) -> Shape:
-    """Say whether errors of a joint are normal, or flat-normal as a count in steps leaves them.
-
-    Shapiro and Wilk's test, and the likelihood ratio of a flat-normal against a normal law, which is at the bound
-    of its range: half of χ² with one degree of freedom (Self and Liang 1987). Level 5 %.
-    """
-    # both load scipy.stats, which is slow, and few diagnoses ask
-    from thermal_robot.assembly.probability.flat_normal_fit import fit_maximum_likelihood, log_likelihood
-    from thermal_robot.assembly.probability.normality import normality_test
-
-    values = np.asarray(errors, dtype=float).ravel()
-    values = values[:: -(-len(values) // 5000) if len(values) else 1]
-    if len(values) < 12 or np.ptp(values) == 0.0:
-        return Shape("too few", np.nan, np.nan, np.nan)
-    p_normal = normality_test(values, alternatives=()).p_value
-    ratio, place, size = fit_maximum_likelihood(values)
-    flat = log_likelihood(values, ratio, place, size)
-    normal = log_likelihood(values, 0.0, float(values.mean()), float(values.std()))
-    gain = max(2.0 * (flat - normal), 0.0)
-    p_flat = 1.0 if gain == 0.0 else 0.5 * float(chdtrc(1.0, gain))
-    name = "flat-normal" if p_flat < 0.05 else "normal" if p_normal >= 0.05 else "neither"
-    return Shape(name, p_normal, p_flat, ratio)

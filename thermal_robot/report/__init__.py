@@ -19,8 +19,10 @@ if TYPE_CHECKING:
     from thermal_robot.report.plots_remainder import plot_remainder
     from thermal_robot.report.plots_where import plot_where
     from thermal_robot.report.plots_which import plot_which
+    from thermal_robot.report.sentence import advice, headline
 
 _HOME = {
+    "advice": "sentence",
     "explain_figure": "plots_explain",
     "fragment": "page",
     "html": "page",
@@ -31,6 +33,7 @@ _HOME = {
     "plot_where": "plots_where",
     "plot_which": "plots_which",
     "schema": "json_schema",
+    "headline": "sentence",
     "text": "plain_text",
 }
 
@@ -46,8 +49,10 @@ def __dir__() -> list[str]:
 
 
 __all__ = [
+    "advice",
     "explain_figure",
     "fragment",
+    "headline",
     "html",
     "overview",
     "plot_how_far",

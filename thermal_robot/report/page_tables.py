@@ -12,7 +12,8 @@ from thermal_robot.report import units
 from thermal_robot.report.words import STATUS, law, needs, parameters, places
 
 if TYPE_CHECKING:
-    from thermal_robot.diagnosis.result import Diagnosis, Finding
+    from thermal_robot.diagnosis.parts import Finding
+    from thermal_robot.diagnosis.result import Diagnosis
 
 _MOST_OUTLIERS = 40
 

@@ -23,7 +23,8 @@ from thermal_robot.report.words import (
 )
 
 if TYPE_CHECKING:
-    from thermal_robot.diagnosis.result import Diagnosis, Finding
+    from thermal_robot.diagnosis.parts import Finding
+    from thermal_robot.diagnosis.result import Diagnosis
 
 WIDTH = 96
 _BAR = 24

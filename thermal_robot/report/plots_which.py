@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from thermal_robot.diagnosis.result import Diagnosis, Finding
+    from thermal_robot.diagnosis.parts import Finding
+    from thermal_robot.diagnosis.result import Diagnosis
 
 _LOOK: dict[str, dict[str, Any]] = {
     "found": {"color": AFTER, "edgecolor": AFTER},

@@ -8,7 +8,7 @@ from math import floor, isfinite, log10
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from thermal_robot.diagnosis.result import Estimate, Location
+    from thermal_robot.diagnosis.parts import Estimate, Location
 
 MISSING = "–"
 

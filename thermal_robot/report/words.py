@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING
 from thermal_robot.report import units
 
 if TYPE_CHECKING:
-    from thermal_robot.diagnosis.result import Diagnosis, Estimate, Finding
+    from thermal_robot.diagnosis.parts import Estimate, Finding
+    from thermal_robot.diagnosis.result import Diagnosis
 
 STATUS = {
     "found": "found",

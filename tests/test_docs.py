@@ -1,0 +1,183 @@
+"""What README and docs say is true: links, paths and commands exist, the tutorial runs and prints what it shows."""
+
+import argparse
+import contextlib
+import importlib
+import io
+import pkgutil
+import re
+import shlex
+from pathlib import Path
+
+import numpy as np
+import pytest
+from pages import blocks, shown_lines_are_printed
+
+import thermal_robot
+from thermal_robot import cli
+
+ROOT = Path(__file__).parents[1]
+PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
+PAGES.append(ROOT / "robots" / "README.md")
+HISTORY = "CHANGELOG.md"
+"""The one page that names paths which are gone."""
+
+pages = pytest.mark.parametrize("page", PAGES, ids=[str(p.relative_to(ROOT)) for p in PAGES])
+
+
+def prose(page):
+    """The page without its fenced blocks."""
+    return re.sub(r"^```.*?^```", "", page.read_text(encoding="utf-8"), flags=re.M | re.S)
+
+
+def anchors(page):
+    """The anchors that GitHub gives to the headings of a page."""
+    titles = re.findall(r"^#+ (.+)$", prose(page), flags=re.M)
+    return {re.sub(r"[^\w\- ]", "", title.lower()).strip().replace(" ", "-") for title in titles}
+
+
+@pages
+def test_every_relative_link_leads_somewhere(page):
+    missing = []
+    for target in re.findall(r"\]\(([^)\s]+)\)", prose(page)):
+        if re.match(r"[a-z]+:", target):
+            continue
+        path, _, anchor = target.partition("#")
+        file = (page.parent / path).resolve() if path else page
+        if not file.exists() or (anchor and anchor not in anchors(file)):
+            missing.append(target)
+    assert missing == []
+
+
+def found(dotted):
+    """Whether ``thermal_robot.a.b`` is a module, or a name in one."""
+    parts = dotted.split(".")
+    for cut in range(len(parts), 0, -1):
+        try:
+            thing = importlib.import_module(".".join(parts[:cut]))
+        except ModuleNotFoundError:
+            continue
+        for name in parts[cut:]:
+            if not hasattr(thing, name):
+                return False
+            thing = getattr(thing, name)
+        return True
+    return False
+
+
+def test_a_dotted_path_is_found_or_not():
+    assert found("thermal_robot.campaign.read.read_campaign")
+    assert found("thermal_robot.Diagnosis.to_json")
+    assert not found("thermal_robot.no_such_room")
+    assert not found("thermal_robot.Diagnosis.no_such_method")
+
+
+@pages
+def test_every_dotted_path_imports(page):
+    if page.name == HISTORY:
+        return
+    named = re.findall(r"(?<![\w/])(thermal_robot(?:\.[A-Za-z_]\w*)+)(?![\w/])", page.read_text(encoding="utf-8"))
+    data = {"thermal_robot.effects"}  # also the name of an entry point group
+    assert [name for name in sorted({*named} - data) if not found(name)] == []
+
+
+def options():
+    """Options (set of strings) of every command of the program."""
+    chosen = next(a for a in cli._parser()._actions if isinstance(a, argparse._SubParsersAction))
+    return {name: {o for a in sub._actions for o in a.option_strings} for name, sub in chosen.choices.items()}
+
+
+@pages
+def test_every_command_and_option_exists(page):
+    known = options()
+    for command, rest in re.findall(r"thermal-robot ([a-z]+)\b([^`\n]*)", page.read_text(encoding="utf-8")):
+        assert command in known, f"thermal-robot {command}"
+        used = set(re.findall(r"(?<!\S)\[?(--?[a-z]\w*)", rest.split("#")[0]))
+        assert used <= known[command], f"thermal-robot {command}{rest}"
+
+
+def test_the_page_of_commands_has_every_command_and_every_option():
+    text = (ROOT / "docs" / "cli.md").read_text(encoding="utf-8")
+    for command, own in options().items():
+        part = re.search(rf"^## `thermal-robot {command}`.*?(?=^## |\Z)", text, flags=re.M | re.S)
+        assert part, command
+        missing = {o for o in own if o.startswith("--") and o not in part.group(0)} - {"--help"}
+        assert missing == set(), command
+
+
+def test_the_page_of_the_api_has_every_public_name():
+    text = (ROOT / "docs" / "api.md").read_text(encoding="utf-8")
+    assert [name for name in thermal_robot.__all__ if f"`{name}`" not in text and f"`{name}(" not in text] == []
+
+
+def test_the_map_names_every_page():
+    text = (ROOT / "docs" / "index.md").read_text(encoding="utf-8")
+    pages_of_docs = {p.name for p in (ROOT / "docs").glob("*.md")} - {"index.md"}
+    assert {name for name in pages_of_docs if f"({name})" not in text} == set()
+
+
+def test_a_line_that_is_not_printed_is_noticed():
+    shown_lines_are_printed("…\na 1.0 µm\n", "x\n  a  1.1 µm\n")
+    with pytest.raises(AssertionError, match="not printed"):
+        shown_lines_are_printed("a 1 mm", "a 1 µm")
+    with pytest.raises(AssertionError, match="other figures"):
+        shown_lines_are_printed("a 1 µm", "a 2 µm")
+
+
+@pytest.mark.slow
+def test_the_tutorial_runs_and_prints_what_it_shows(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    names, printed, checked = {}, "", 0
+    for language, text in blocks(ROOT / "docs" / "tutorial.md"):
+        if language == "csv":
+            (tmp_path / "samples.csv").write_text(text, encoding="utf-8")
+        elif language == "text":
+            shown_lines_are_printed(text, printed)
+            checked += 1
+        else:
+            out = io.StringIO()
+            with contextlib.redirect_stdout(out):
+                if language == "python":
+                    exec(compile(text, "tutorial.md", "exec"), names)
+                else:
+                    for line in text.splitlines():
+                        program, *arguments = shlex.split(line)
+                        assert program == "thermal-robot"
+                        assert cli.main(arguments) == cli.DONE
+            printed = out.getvalue()
+    assert checked >= 8
+
+
+def test_every_room_has_a_line_in_contributing():
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    rooms = [info.name for info in pkgutil.iter_modules(thermal_robot.__path__)]
+    assert [room for room in rooms if f"`{room}" not in text and f"/{room}" not in text] == []
+
+
+def test_the_number_that_contributing_follows():
+    text = (ROOT / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    campaign = thermal_robot.demo_campaign()
+    found = thermal_robot.diagnose(campaign)
+    assert found.rows.rows[67] == 69
+    assert f"−{-campaign.position[67, 0]:.6f} m" in text
+    told = re.findall(r"(?:gap of|remainder of|\|) (\d+) µm", text)
+    distance = [np.linalg.norm(part[67]) for part in (found.rows.gap, found.rows.remainder)]
+    np.testing.assert_allclose([*distance, found.rows.held_out_after[67]], [1e-6 * float(t) for t in told], atol=2e-6)
+    assert f"−{-1e3 * found.model.predict(campaign)[0][67, 0]:.3f} mm" in text
+
+
+def named_files(line):
+    """Paths that a line names, from the root; a file without a folder is of the folder named before it on the line."""
+    folder = None
+    for name in re.findall(r"`([\w/.]+)`", line):
+        if re.match(r"(thermal_robot|tests|robots|docs|notebooks)/", name):
+            folder = name if name.endswith("/") else name.rsplit("/", 1)[0] + "/"
+            yield name
+        elif folder and re.fullmatch(r"\w+\.py", name):
+            yield folder + name
+
+
+@pages
+def test_every_file_that_is_named_exists(page):
+    named = {name for line in page.read_text(encoding="utf-8").splitlines() for name in named_files(line)}
+    assert [name for name in sorted(named) if not (ROOT / name).exists()] == []

@@ -1,0 +1,234 @@
+"""The parts of a diagnosis: plain frozen values that findings hand to a report."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+Status = Literal["found", "not_found", "not_testable", "confounded"]
+
+
+@dataclass(frozen=True)
+class Location:
+    """A place and its share of the gap's mean square (or, for a remainder, its probability)."""
+
+    kind: str
+    name: str
+    share: float
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter: SI value with its standard deviation, both ``None`` where the data do not determine it."""
+
+    name: str
+    value: float | None
+    std: float | None
+    unit: str
+    identified: bool
+
+
+@dataclass(frozen=True)
+class Finding:
+    """What the data say of one effect.
+
+    Attributes
+    ----------
+    name
+        The effect's name.
+    status
+        ``found``, ``not_found``, ``not_testable`` or ``confounded``.
+    probability
+        Posterior probability that it is at work; ``None`` where it is not testable.
+    shrinkage, shrinkage_ci95
+        Its share of the gap's mean square, on data not used for the fit: Shapley value over the explanation for an
+        effect that belongs to it; what adding it brings for another; ``None`` where it is not testable.
+    needs
+        What would make it testable.
+    confounded_with
+        Effects that the data cannot tell it from.
+    locations
+        Where it sits, largest share first.
+    parameters
+        Its estimates; empty where it does not belong to the explanation.
+    quantity, shape, describes
+        Of a law that was discovered: what it follows, how, and a sentence about it; ``None`` otherwise.
+    title
+        The effect in plain words.
+    random
+        Whether it scatters, so that no correction takes it away.
+    """
+
+    name: str
+    status: Status
+    probability: float | None = None
+    shrinkage: float | None = None
+    shrinkage_ci95: tuple[float, float] | None = None
+    needs: tuple[str, ...] = ()
+    confounded_with: tuple[str, ...] = ()
+    locations: tuple[Location, ...] = ()
+    parameters: tuple[Estimate, ...] = ()
+    quantity: str | None = None
+    shape: str | None = None
+    describes: str | None = None
+    title: str = ""
+    random: bool = False
+
+
+def is_frame(found: Sequence[Finding], name: str) -> bool:
+    """Tell whether an effect displaces a frame that is unknown: that is all that can be confounded unasked."""
+    needs = next((f.needs for f in found if f.name == name), ("frames.",))
+    return any(need.startswith("frames.") for need in needs)
+
+
+@dataclass(frozen=True)
+class HeldOut:
+    """How far the gap shrinks on rows that were not used for the fit: rms distances in m, shares 0..1."""
+
+    scheme: str
+    folds: int
+    rms_before: float
+    rms_after: float
+    shrinkage: float
+    shrinkage_ci95: tuple[float, float]
+
+
+@dataclass(frozen=True)
+class FoldScheme:
+    """How far the gap shrinks when rows are held out in one way.
+
+    Attributes
+    ----------
+    name
+        ``time``, ``session``, ``temperature``, ``region`` or ``reach``.
+    held_out
+        What is held out at a time, in plain words.
+    folds, rows
+        How many folds could be fitted, and how many rows were held out in them.
+    rms_before, rms_after
+        Rms distances of these rows, m: frames alone, and the explanation.
+    shrinkage
+        1 − (rms_after / rms_before)².
+    uncertainty
+        Standard error of rms_after, m: what chance alone makes of it.
+    """
+
+    name: str
+    held_out: str
+    folds: int
+    rows: int
+    rms_before: float
+    rms_after: float
+    shrinkage: float
+    uncertainty: float
+
+
+@dataclass(frozen=True)
+class Gap:
+    """Rms distances in m (orientation: rad) over the rows that are not outliers; ``None`` without orientation."""
+
+    rms_before: float
+    rms_after: float
+    noise_floor: float
+    noise_source: str
+    held_out: HeldOut
+    orientation_before: float | None = None
+    orientation_after: float | None = None
+    schemes: tuple[FoldScheme, ...] = ()
+
+
+@dataclass(frozen=True)
+class Where:
+    """Shares 0..1 of the gap's mean square: by axis of the root frame, joint, link, and recorded quantity.
+
+    Axes sum to one. Joints and links share what the explanation explains. A quantity's share is what a smooth law of
+    it alone would explain, so these overlap.
+    """
+
+    axes: Mapping[str, float]
+    joints: Mapping[str, float]
+    links: Mapping[str, float]
+    covariates: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Dependence:
+    """A recorded quantity that the remainder follows, with the p-value after counting every quantity that was tried."""
+
+    covariate: str
+    p_value: float
+
+
+@dataclass(frozen=True)
+class Unexplained:
+    """What the explanation leaves beyond the noise.
+
+    Attributes
+    ----------
+    flagged
+        Whether it is larger or more structured than the noise allows.
+    rms
+        Its rms distance, m: noise subtracted where a stated noise or repeats tell it, all of it where nothing does; 0
+        where nothing is left.
+    p_value
+        Of the most telling test, after counting all of them.
+    reasons
+        Plain sentences: which test says so.
+    locations
+        Where it most probably enters.
+    depends_on
+        The quantities that it follows, most telling first.
+    """
+
+    flagged: bool
+    rms: float
+    p_value: float
+    reasons: tuple[str, ...] = ()
+    locations: tuple[Location, ...] = ()
+    depends_on: tuple[Dependence, ...] = ()
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """What the figures show, one row a measurement, N rows.
+
+    Attributes
+    ----------
+    rows
+        (N,) row numbers in the file.
+    gap, remainder
+        (N, m) before and after, root frame axes: m, and rad.
+    outliers
+        (N,) True where set aside.
+    position
+        (N, 3) predicted position of the target in the root frame, m.
+    q
+        (N, n) commanded joint positions.
+    covariates
+        Recorded quantities by name, (N,).
+    held_out_before, held_out_after
+        (N,) distance in m while the row was held out; NaN where it was set aside.
+    """
+
+    rows: NDArray[np.int64]
+    gap: Array
+    remainder: Array
+    outliers: NDArray[np.bool_]
+    position: Array
+    q: Array
+    covariates: Mapping[str, Array]
+    held_out_before: Array
+    held_out_after: Array
+
+
+@dataclass(frozen=True)
+class Sensitivity:
+    """Posterior probability of the verdict's effects were every prior size a third, or three times, what is stated."""
+
+    smaller: float
+    larger: float

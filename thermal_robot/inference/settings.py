@@ -1,0 +1,318 @@
+"""Every number that was chosen in the inference and the diagnosis: its value, its unit, and why that one.
+
+None of them was tuned on the cases that score the program. What is known of one effect stands in that effect's file.
+"""
+
+import numpy as np
+
+# --- what is believed before the data ---
+
+PRIOR_PROBABILITY = 0.1
+"""Of an effect being at work, random ones too: of sixteen, one or two are worth a campaign."""
+SIZE_SPREAD = 1.5
+"""Standard deviation of ln λ: an effect three times larger or smaller than stated is no surprise."""
+NEVER = -100.0
+"""Log prior odds of an effect that scatter had feigned: it is not chosen again, whatever else is."""
+GIVEN_NOISE_DOF = 20.0
+"""Degrees of freedom that a stated noise is worth: it is trusted to about 15 %, as data sheets are."""
+NOISE_SLACK = 1.3
+"""Times a stated noise: a remainder above it is no longer that noise (two sigma of those 15 %)."""
+MISTRUST = 5.0
+"""Natural logarithms that it costs at most to call a stated noise wrong: e⁵, about 1 in 150."""
+BESIDE_UNLISTED = 0.85
+"""How often an effect that is found beside an unlisted cause is there, by the blind trial's faint cases."""
+
+# --- rounding ---
+
+ROUNDING = 1e-9
+"""m and rad: no table and no robot is better."""
+ALIAS = 1e-6
+"""Share of a column's length below which what is left of it, others projected out, is rounding: an exact alias."""
+TINY = 1e-300
+"""Keeps a quotient of nothing from being infinite."""
+BETTER = 1e-9
+"""Natural logarithms: by less no explanation is better than another."""
+SAME_COMMAND = 1e-6
+"""rad or m: commands nearer than this repeat each other; controllers print fewer digits."""
+
+# --- rows: which belong together, which are set aside ---
+
+NEAR = 0.01
+"""rad, m for a prismatic joint: closer commands repeat a pose, as a tool 1 m out then stays within a centimetre."""
+CLOSEST = 1e-7
+"""rad or m: where clusters still chain together at this distance, they are the same command."""
+LARGEST_CLUSTER = 0.1
+"""Of all rows: a larger cluster is a path, not a repeated pose."""
+FOLDS = 5
+"""A fifth of the rows is held out at a time: the usual compromise between bias and variance."""
+BLOCKS_A_FOLD = 4
+"""Blocks of consecutive rows in each fold: the units of the bootstrap, twenty in all."""
+ROWS_A_GROUP = 5
+"""Rows that one spell of time or neighbourhood of poses holds in a campaign of few rows."""
+MOST_GROUPS = 60
+"""Such groups at most: a design effect is then known to a fifth."""
+DESIGN_SIGMAS = 4.0
+"""By so many standard deviations of chance rows must be alike before they count for less."""
+GROSS_LEVEL = 0.01
+"""Chance that noise alone sets any row of a campaign aside."""
+GROSS_FACTOR = 1.5
+"""Times the squared distance which that chance allows: tails of real instruments are a little heavier than normal."""
+BEND_LEVEL = 0.01
+"""Share of sound rows that weigh less than fully (Huber's bend)."""
+MOST_OUTLIERS = 0.25
+"""Of the rows: more are not gross errors but another motion."""
+CAUCHY_SCALE = 1.5
+"""Times the median distance: the scale of the weights that find the frames; a third of the rows may be wrong."""
+NO_DISTANCE = 1e-12
+"""m: added to that scale, for rows that fit exactly."""
+CAUCHY_ROUNDS = 4
+"""Rounds of weights and noise in a scan: they settle to a per cent."""
+FAR = 9.0
+"""Mean squared distance, in squares of the noise, from which a row set aside weighs less in a comparison of laws."""
+STATED_REACH = 2.0
+"""Times the stated noise: what is left may be no larger when laws are compared, so that a law finds its own error."""
+FEW_ASIDE = 0.05
+"""Of all rows: fewer that follow each other may be one lapse of the instrument."""
+
+# --- iterations, and how many rows suffice ---
+
+START_ROWS = 400
+"""Rows on which the frames' starts are compared: these frames are then known far better than any start needs."""
+START_ROUNDS, START_SETTLED = 200, 1e-5
+"""Alternations of base and tool at most, and the relative change of the median distance at which they end."""
+REFINE_ROUNDS, REFINE_SETTLED = 60, 1e-9
+"""Gauss-Newton steps of the frames at most, and the step (m, rad) at which they end."""
+TARGET_STARTS = np.vstack([np.zeros(3), 0.2 * np.eye(3), -0.2 * np.eye(3)])
+"""m: where the target may sit on the tool frame; from each the fit reaches 0.3 m."""
+SPARE_EQUATIONS = 6
+"""That must be left when the frames are fitted: one pose's worth of position and orientation."""
+EVIDENCE_STEPS, EVIDENCE_SETTLED = 40, 1e-3
+"""Newton steps of scales and noise at most, and the change of a logarithm at which they end."""
+FIRST_ROUNDS = 8
+"""Rounds of choice, outliers and noise at most: they settle after two or three."""
+MOST_LEVERAGE = 0.9
+"""Share of the equations that may be taken up by what is fitted when the noise is judged by what is left."""
+FIT_STEPS = 12
+"""Gauss-Newton steps at most: quadratic convergence needs four."""
+REVISIONS = 3
+"""Times that a choice is made again at its own exact fit."""
+MANY_ROWS = 5000
+"""Above, a choice is revised once and one law looked for: each takes seconds, and so many rows hardly change it."""
+SETTLED = 1e-4
+"""Last step of a fit, in standard deviations."""
+SETTLED_BETWEEN = 2.0
+"""The same for a fit of many rows that is chosen anew: the step after it would be a hundredth of it."""
+REFINEMENT = 1.6
+"""Factor by which a constant is first moved: neighbours of the grid stand about 2.5 apart."""
+LARGE = 0.02
+"""rad or m: products of parameters this large show beside noise of tens of micrometres."""
+NO_WORSE = 1.02
+"""Times the noise of a container's fit: an explanation without it that leaves no more is preferred."""
+ENOUGH_ROWS = 1500
+"""Of very many rows so many are scanned for laws: one that explains a hundredth of what remains is then seen."""
+ENOUGH_REMAINDER = 2000
+"""The same for the tests of what remains."""
+DRAW_SEED, TEST_SEED, BOOTSTRAP_SEED = 61, 17, 20180901
+"""Of the rows drawn for a scan, for a test, and of the bootstrap: the same campaign always gets the same answer."""
+
+# --- the linear problem ---
+
+FRAME_FLOOR = 1e-11
+"""Of the scaled Gram matrix's eigenvalues: frames below it are not determined."""
+PROJECTED_FLOOR = 1e-12
+"""Of a column's square before the frames were projected out: what is left below it is rounding."""
+INFORMATION_FLOOR = 1e-5
+"""A column that moves the whole gap by less than this, squared and in noise, is not seen."""
+CONTAINED, CONTAINED_LEFT = 1e-3, 0.5
+"""A block lies within another when the other leaves less of it than this share, or this squared length in noise."""
+
+# --- laws that nobody wrote down ---
+
+KNOTS, FINER_KNOTS = 5, 9
+"""Of a smooth law (Harrell 2001: five suffice for most), and of one for which they did not."""
+FEW_LEVELS = 6
+"""A quantity with no more values than this is one of levels."""
+OUTER_KNOTS = 0.02
+"""Quantile of the outer knots: beyond, few rows would bend the law."""
+NARROW_KNOTS = 0.2
+"""Of an even share of the range: the least distance of two knots."""
+HARMONICS = (1.0, 2.0, 3.0)
+"""Orders of a joint's own position that are always tried: eccentricity, ellipticity, three supports."""
+INNER_MARKS, MARKS = 0.06, 23
+"""Quantile of the first place where a law may step or bend, and how many such places there are."""
+SLIDE_WIDTH, BUMP_WIDTHS = 0.08, (0.04, 0.1)
+"""Of the range: widths of smooth steps and bumps from which they are refined."""
+MARK_STEP, WIDTH_STEP, MARK_ROUNDS = 0.03, 8.0, 10
+"""First shift of a mark (of the range), the relative change of a width a shift, and halvings: to 3e-5 of the range."""
+LINK_QUANTITIES = 6
+"""A segment has six components: only so many quantities that speak elsewhere are tried there."""
+SHAPED = 6
+"""Candidates of each remainder whose shape is looked at."""
+COMPARED_LAWS = 8
+"""Candidates that are compared jointly with the known effects."""
+IN_TIME = float(np.log(3.0))
+"""Log odds of the clock over another quantity that says the same: things happen in time."""
+LEAST_GAIN = 6.0
+"""Log evidence that a law must bring over none: 1 in 400."""
+MOST_LAWS = 4
+"""Laws of one campaign: a fifth no longer helps anybody to find the cause."""
+RIVAL_LAWS = 3
+"""Laws that are tried in an effect's own place."""
+RIVALLED_EFFECTS = 4
+"""Effects, of the largest share, for which a law is looked for in their place."""
+FEWEST_LEFT = 5
+"""Equations that must be left beside a law for a test of it."""
+LAW_FLOOR = 1e-6
+"""Of the scaled Gram matrix's eigenvalues: directions of a law below it say nothing new."""
+DESIGN_FLOOR = 1e-9
+"""The same of what is projected out before."""
+LIKELY_PLACE = 0.01
+"""Probability of a place below which it is not listed."""
+WORSE_ELSEWHERE = 1.05
+"""Times the rms in regions held out: laws that leave more go astray between the poses that were measured."""
+
+# --- what remains ---
+
+LEVEL = 1e-3
+"""p-value, after counting the tests, below which a remainder is not called noise."""
+LAW_LEVEL = 0.05
+"""The same for naming a quantity that it follows, once it is not noise."""
+MATERIAL_SCALE = 1.15
+"""Times the stated noise: a remainder below it is not called large, as no stated noise is better known."""
+MATERIAL_REPEATS = 1.3
+"""The same against repeats, of which there are fewer."""
+MATERIAL_SHARE = 0.04
+"""A law that explains less of the remainder than this is not worth a name."""
+FEWEST_PAIRS = 12
+"""Pairs of near-repeats below which they say nothing of the noise: it would be known to a third."""
+SHUFFLES, FEW_SHUFFLES, SHUFFLED_ROWS = 200, 40, 3000
+"""Shuffles that tell chance likeness of neighbours; fewer above so many rows, where chance is nearly normal."""
+CLIPPED = 4.0
+"""Sigmas at which rows are clipped when neighbours are compared: no two rows decide it."""
+NEIGHBOURS, FEWEST_NEIGHBOURS = 3, 20
+"""Neighbours of each row in joint space, and the rows below which there are no neighbours."""
+
+# --- scatter ---
+
+FEWEST_ROWS = 10
+"""Below, nothing can be said of scatter."""
+FEWEST_CONTRASTS = 6
+"""Differences of repeats below which visits and poses cannot be told apart."""
+SCATTER_ROWS = 1500
+"""A standard deviation is then known to about two per cent."""
+MOST_COMPONENTS = 6
+"""Joints that scatter at once."""
+TAILS, WORTH_TAILS = 4.0, 3.0
+"""Degrees of freedom of the heavy-tailed law beside the normal one, and the logarithms it must fit better by."""
+NORMAL_ROWS = 1000
+"""Above, the likelihood of a variance that is well seen is normal in its logarithm."""
+DROP_95 = 1.92
+"""Of the log likelihood at the ends of a 95 % interval: half the χ² quantile of one degree of freedom."""
+SIGMAS_95 = 1.96
+"""Standard deviations of a normal law from its middle to the ends of a 95 % interval."""
+FULLY_TRIED, HOPELESS = 3, 3.0
+"""Components fitted in full at each step, and the gain in log likelihood below which no prior odds are overcome."""
+MOST_INFLATION = 4.0
+"""Of a mean square, for the parameters that were fitted."""
+SCATTER_STEPS, SCATTER_SETTLED = 40, 1e-3
+"""Scoring steps of variances at most, and the gain in log likelihood at which they end."""
+SCATTER_ROUNDING = 1e-13
+"""Of a covariance's trace: a joint that scatters a million times more than the instrument must not make it singular."""
+LOG_VARIANCE = (-12.0, 14.0)
+"""Range of the logarithm of a variance, in squares of the noise."""
+VARIANCE_GRID = np.exp(np.linspace(np.log(1e-2), np.log(1e4), 22))
+"""Variances of a component that are compared, in squares of the noise: a tenth to a hundred times its sigma."""
+MEDIAN_SQUARE = 0.455
+"""Median of χ² with one degree of freedom: turns the median of squares into a variance."""
+SCATTER_RIDGE = 1e-3
+"""Information added to each log variance: one that nothing determines then moves by nothing."""
+SCATTER_STEP, SCATTER_HALVINGS, SCATTER_CUT = 2.0, 8, 3.0
+"""Largest step of a log variance, how often a step is cut where it does not help, and by what."""
+PROFILE_REACH, PROFILE_ROOT = 12.0, 0.02
+"""How far a profile likelihood is followed, and how finely its end is found, in logarithms of a variance."""
+LEVER_FLOOR = 1e-9
+"""Of the largest: a joint that moves the target less cannot be seen to scatter."""
+SCATTER_SURE = 0.5
+"""Probability from which scatter is named."""
+SCATTER_PASSES = 3
+"""Times that rows set aside, frames and scatter are settled together."""
+SCATTER_LAW_SHARE = 0.15
+"""Of a scatter that a smooth law must explain to make it none."""
+REFUTED = 0.01
+"""p-value above which errors that could show their steps have none."""
+STEPPED = 0.4
+"""Of the height that steps of the whole scatter would have: below, it is not made of steps."""
+BAND = 1.35
+"""The step is looked for within this factor of what the scatter's size says: its 99.9 % interval with 30 poses."""
+STEP_CELL = 0.1
+"""Of the shortest period: rounding commands to it costs 3 % of a periodogram's height."""
+MOST_CELLS = 2_000_000
+"""Cells of a periodogram: a second of time, 50 MB."""
+SAWTOOTH_POWER = 0.3
+"""Share of half a sawtooth's power in its first harmonic: 6/π² of it, halved by the periodogram's definition."""
+HEIGHT_SIGMAS = 1.6
+"""Sigmas, each √½, that the root of an expected height must stand above chance for steps to be called visible."""
+LSTSQ_FLOOR = 1e-5
+"""Relative singular value below which a direction is left as the fit has it."""
+
+# --- findings ---
+
+DETERMINED = 0.5
+"""A parameter is identified when the data leave less than half of its prior's standard deviation."""
+SURE, RIVAL, RIVAL_SHARE = 0.75, 0.2, 0.8
+"""An effect less probable than the first has rivals: those that are there with the second probability, and in the
+third share of what it is absent from."""
+EXACT_LEVEL = 0.01
+"""Chance that noise lets an exact alias look like none."""
+EXCLUDED = 1e-3
+"""Probability below which an effect is not chosen anew in a fold."""
+RESAMPLES = 2000
+"""Of the bootstrap: ends of a 95 % interval are then known to a tenth of its width."""
+INTERVAL = (0.025, 0.975)
+"""Quantiles of every interval."""
+LOOSE_FRAME = 1e-9
+"""Weight of a frame's prior in a fold, of its own column: none, but for what nothing determines."""
+FOLD_ROUNDS = 3
+"""Rounds of noise in the fit of a subset of effects: what a subset leaves out is noise to it."""
+COLDEST = 0.01
+"""K: a temperature that varies less does not vary."""
+FRAME_DETERMINED = 1e-9
+"""Of the strongest direction of the frames: weaker ones are not determined without the rows held out."""
+FRAME_PRIOR = 1e-12
+"""Of a frame's own information, added to it, so that what nothing determines stays where it is."""
+PRIOR_FACTOR, COMPARED = 3.0, 8
+"""Factor of all prior sizes, down and up, under which the verdict is weighed again, and among how many explanations."""
+DOUBTFUL = 0.5
+"""Belief below which an effect is said to stand in for something else."""
+CANCELLING = 5.0
+"""Times the sum of an effect's parts: single ones that are larger cancel each other."""
+CONTRADICTED = 0.01
+"""rad or m: no servo that has settled is as far from its command."""
+STATED_TOO_LARGE = 0.5
+"""Of the stated noise: less that remains says that it is stated too large."""
+MOST_BELIEF = 50.0
+"""Natural logarithms: beyond, a probability is 0 or 1 in double precision."""
+MATERIAL_PLACE, MOST_PLACES = 0.03, 8
+"""Of an effect's work: a place with less is not drawn; and how many are."""
+LINE_POINTS, ROUGH, DENSE_POINTS, ROWS_A_POINT = 25, 0.01, 400, 10
+"""Points of a drawn law; of its range, the roughness below which it follows one quantity alone, its points then, and
+rows that a point stands for otherwise."""
+
+# --- what to measure next ---
+
+LEADING, MOST_LEADING = 0.01, 4
+"""Probability of an explanation that is to be told apart, and how many are."""
+LEAST_LEADING = 1e-3
+"""Explanations that are less probable are not worth a measurement."""
+DECIDED, WORTHWHILE = 0.9, 1.0
+"""So probable that rivals which all samples together leave below so many nats do not count."""
+WIDE = 2.4
+"""rad: as far as a joint without a limit is sent; nearly once round."""
+BEYOND = 5.0
+"""K outside the campaign's temperatures: a hall on another day."""
+LOOSE = 0.1
+"""m and rad: where the data leave a frame open, it is somewhere there."""
+TIE = 1e-3
+"""Weight of what a sample tells of parameters beside what it tells of explanations: it only breaks ties."""
+FEW_PAYLOADS = 6
+"""A campaign with no more payloads than this is offered these; another its lightest and heaviest."""
