@@ -7,7 +7,7 @@ import numpy as np
 from simulate import commands, simulate
 
 from thermal_robot.campaign import Campaign
-from thermal_robot.inference.columns import displacement
+from thermal_robot.effects.apply import displacement
 from thermal_robot.kinematics import tool_poses
 from thermal_robot.observations import Frames, observe
 from thermal_robot.robot import load_robot

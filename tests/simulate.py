@@ -14,7 +14,7 @@ import numpy as np
 
 from thermal_robot.campaign import Campaign, Units, write_campaign
 from thermal_robot.effects import library
-from thermal_robot.inference.columns import displacement
+from thermal_robot.effects.apply import displacement
 from thermal_robot.kinematics import exp3, quaternion_to_rotation, rotation_to_quaternion, tool_poses
 from thermal_robot.observations import Frames, observe
 from thermal_robot.robot import load_robot

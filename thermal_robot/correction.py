@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign, Settings, read_samples
 from thermal_robot.effects import Effect, library
+from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.errors import CampaignError, EffectError
-from thermal_robot.inference.columns import displacement
 from thermal_robot.kinematics import rotation_to_quaternion
 from thermal_robot.observations import Frames, observe
 from thermal_robot.robot import Robot, load_robot

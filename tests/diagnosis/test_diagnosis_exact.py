@@ -8,7 +8,7 @@ from simulate import random_motion, simulate
 
 from thermal_robot import diagnose
 from thermal_robot.effects import library
-from thermal_robot.inference.columns import displacement
+from thermal_robot.effects.apply import displacement
 from thermal_robot.kinematics import exp3, rotation_to_quaternion
 from thermal_robot.observations import Frames, observe
 

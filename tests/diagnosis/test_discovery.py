@@ -11,9 +11,9 @@ from helpers import NOISE, with_law
 from simulate import simulate
 
 from thermal_robot import CorrectedModel, diagnose
+from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.law import Discovered
 from thermal_robot.effects.quantities import GRAVITY, quantities
-from thermal_robot.inference.columns import displacement
 from thermal_robot.inference.frames import register
 from thermal_robot.observations import observe
 from thermal_robot.report import schema

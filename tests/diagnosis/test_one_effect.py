@@ -1,17 +1,22 @@
 """The figure of one effect shows the error at its place, before and after, against what drives it."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers import with_law
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from simulate import demo, simulate
 
 from thermal_robot.diagnosis.one_effect import Explained, explained
-from thermal_robot.effects import choose
+from thermal_robot.effects import Effect, Parameter, at_joint, choose
+from thermal_robot.effects.apply import displacement
+from thermal_robot.effects.law import Discovered
 from thermal_robot.errors import EffectError
 from thermal_robot.inference.fit import fit
+from thermal_robot.inference.frames import register
+from thermal_robot.observations import observe
 from thermal_robot.report.plots_explain import explain_figure
 
 MRAD = 1e3
@@ -115,6 +120,60 @@ def test_tracking_lag_is_drawn_against_speed(rv_m2):
     fast = np.abs(place.values) > 0.1
     jump = -np.sign(place.values) * values[f"friction, {place.name}"] - values[f"delay, {place.name}"] * place.values
     assert np.corrcoef(place.before[fast], jump[fast])[0, 1] > 0.8
+
+
+def test_one_coefficient_for_all_links_is_drawn_link_by_link(rv_m2):
+    _, found, values, _ = shown(rv_m2, "thermal_elongation", variant=1)
+    lengths = {}
+    for segment in rv_m2.segments:
+        lengths[segment.parent_link] = lengths.get(segment.parent_link, 0.0) + segment.length
+    assert len(found.places) >= 3
+    (strain,) = values.values()
+    for place in found.places:
+        assert place.kind == "link"
+        assert (place.quantity, place.quantity_unit) == ("temperature", "°C")
+        alone = [s for s in rv_m2.segments if s.parent_link == place.name and s.length > 1e-9]
+        if len(alone) == 1:
+            slope = np.polyfit(*place.line, 1)[0]
+            assert slope == pytest.approx(strain * lengths[place.name], rel=0.2)
+    shares = [place.share for place in found.places]
+    assert shares == sorted(shares, reverse=True)
+    assert sum(shares) < 1.0 + 1e-9
+
+
+@dataclass(frozen=True)
+class Coupled(Effect):
+    """Two joints that one belt moves: an effect of somebody's own, which says nothing of what drives it."""
+
+    name = "coupled"
+
+    def parameters(self, observations):
+        stretch = np.sin(observations.q[:, 1])
+        return (Parameter("stretch", "rad", 1e-3, "joint", "joint_2", (at_joint(1, stretch), at_joint(3, -stretch))),)
+
+
+def coupled(robot):
+    campaign, _, _ = simulate(robot, samples=80, seed=2)
+    here = observe(campaign, register(campaign))
+    moved, _ = displacement(here, [(Coupled(), np.array([2e-3]))])
+    shift = observe(campaign, here.frames, displacement=moved).predicted_position - here.predicted_position
+    return fit(replace(campaign, position=campaign.position + shift), (Coupled(),))
+
+
+def test_an_effect_that_says_nothing_is_drawn_against_what_goes_with_it(rv_m2):
+    place = explained(coupled(rv_m2), "coupled").places[0]
+    assert (place.name, place.quantity, place.quantity_unit) == ("joint_2", "joint_2", "rad")
+    assert place.unit == "m at the tool"
+    assert np.std(place.after) < 0.6 * np.std(place.before)
+
+
+def test_a_law_that_was_discovered_is_drawn_against_its_quantity(rv_m2):
+    law = Discovered(kind="joint", place="joint_3", quantity="time", shape="step", marks=(3600.0,), span=7200.0)
+    data, _, _ = with_law(rv_m2, law, [0.0, 6e-4], seed=3)
+    place = explained(fit(data, (law,)), law.name).places[0]
+    assert (place.name, place.quantity, place.quantity_unit) == ("joint_3", "time", "s")
+    late = place.values > 3600.0
+    assert place.before[late].mean() - place.before[~late].mean() == pytest.approx(6e-4, rel=0.1)
 
 
 def test_where_an_effect_is_not_part_of_the_explanation_it_says_which_are(rv_m2):

@@ -16,8 +16,10 @@ from numpy.typing import NDArray
 
 from thermal_robot.diagnosis.where import locate
 from thermal_robot.effects import Effect, Parameter
-from thermal_robot.effects.law import Discovered
-from thermal_robot.effects.quantities import quantities
+from thermal_robot.effects.channel import by_place, sensitivity
+from thermal_robot.effects.effect import Channel, Driver
+from thermal_robot.effects.gate import driver
+from thermal_robot.effects.quantities import quantities, unit
 from thermal_robot.errors import EffectError
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.fit import Fit
@@ -25,11 +27,14 @@ from thermal_robot.observations import Observations
 
 Array = NDArray[np.float64]
 
-_MATERIAL = 0.03
-_MOST = 8
-_LEVELS = 6
-_LINE, _ROUGH = 25, 0.01
-_OWN_JOINT = ("joint_gain", "transmission_error", "joint_offset", "geometric")
+_PURE = 1e-6  # of a unit twist, m or rad: with less of one kind it is all of the other
+_MATERIAL = 0.03  # of what the effect does: a place with less is not worth a panel
+_MOST = 8  # panels that a page can hold
+_LEVELS = 6  # values of a quantity, up to which each is a level and not a point of a curve
+_LINE = 25  # points of a law whose rows scatter about it, because it follows other quantities, too
+_ROUGH = 0.01  # of the law's range: neighbours that differ by less follow this quantity alone
+_NEIGHBOURS = 8  # rows that are taken together when asking whether an error follows a quantity
+_FINEST = 400  # points of a law that is drawn row by row
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,16 +117,16 @@ def explained(fit: Fit, effect: str) -> Explained:
     parameters = block(fit.corrected, setting).parameters
     found = [p for p in locate(fit, {effect: 1.0})[1][effect] if p.share > 0.0]
     shown = [p for p in found if p.share >= _MATERIAL][:_MOST]
-    rows = ~fit.explanation.outliers
+    rows, robot = ~fit.explanation.outliers, fit.campaign.robot
     places = []
     for location in shown:
-        mine = [(p, float(v)) for p, v in zip(parameters, values, strict=True) if p.kind == location.kind]
-        mine = [(p, v) for p, v in mine if p.place == location.name]
-        places.append(_place(fit, setting, mine, location.share, rows))
+        each = ((part, float(v)) for p, v in zip(parameters, values, strict=True) for part in by_place(robot, p))
+        mine = [(part, v) for part, v in each if (part.kind, part.place) == (location.kind, location.name)]
+        places.append(_shown(fit, setting, mine, location.share, rows))
     return Explained(effect, tuple(places), len(found) - len(shown))
 
 
-def _place(
+def _shown(
     fit: Fit, effect: Effect, parameters: list[tuple[Parameter, float]], share: float, rows: NDArray[np.bool_]
 ) -> Place:
     observations, e = fit.corrected, fit.explanation
@@ -136,7 +141,7 @@ def _place(
     values, error = values[rows], error[rows]
     return Place(
         first.kind,
-        first.place or ("all links" if first.kind == "link" else first.kind),
+        first.place,
         share,
         name,
         name_unit,
@@ -157,7 +162,7 @@ def _error(observations: Observations, parameters: list[tuple[Parameter, float]]
     """
     measures = observations.gap.shape[1]
     samples = len(observations.q)
-    parts: dict[tuple[str, int], Array] = {}
+    parts: dict[tuple[Channel, int], Array] = {}
     for parameter, value in parameters:
         for response in parameter.responses:
             moved = value * np.asarray(response.values)
@@ -166,7 +171,7 @@ def _error(observations: Observations, parameters: list[tuple[Parameter, float]]
             moved = np.broadcast_to(moved, (samples, moved.shape[-1]))
             key = (response.channel, response.index)
             parts[key] = parts.get(key, np.zeros(moved.shape)) + moved
-    maps = [_map(observations, channel, index)[:, :measures] for channel, index in parts]
+    maps = [sensitivity(observations, channel, index)[:, :measures] for channel, index in parts]
     twists = np.concatenate(list(parts.values()), axis=1)
     moves = np.concatenate(maps, axis=2)
     channels = {channel for channel, _ in parts}
@@ -179,87 +184,30 @@ def _error(observations: Observations, parameters: list[tuple[Parameter, float]]
     if channels == {"joint"} and len(parts) == 1:
         index = next(index for _, index in parts)
         return twists[:, 0], moves[:, :, 0], "m" if observations.robot.joint_types[index] == "prismatic" else "rad"
-    shift, turn = np.linalg.norm(main.reshape(-1, 6)[:, :3]), np.linalg.norm(main.reshape(-1, 6)[:, 3:])
     direction = moves @ main
-    if len(parts) == 1 and min(shift, turn) < 1e-6:
-        return twists @ main, direction, "m" if shift > turn else "rad"
+    if len(parts) == 1:
+        shift, turn = np.linalg.norm(main[:3]), np.linalg.norm(main[3:])
+        if min(shift, turn) < _PURE:
+            return twists @ main, direction, "m" if shift > turn else "rad"
     size = float(np.sqrt((direction[:, :3] ** 2).sum(axis=1).mean()))
     return twists @ main * size, direction / max(size, 1e-300), "m at the tool"
 
 
-def _map(observations: Observations, channel: str, index: int) -> Array:
-    """(N, 6, k) twist of the target a unit of each component of a channel."""
-    if channel == "joint":
-        return observations.joint_sensitivity[:, :, index, None]
-    if channel == "segment":
-        return observations.segment_sensitivity[:, :, index, :]
-    if channel == "base":
-        return observations.base_sensitivity
-    if channel == "tool":
-        return observations.tool_sensitivity
-    full = np.zeros((len(observations.q), 6, 3))
-    full[:, :3] = observations.frames.base[:3, :3].T
-    return full
-
-
 def _driver(
     observations: Observations, effect: Effect, parameters: list[tuple[Parameter, float]], error: Array
-) -> tuple[str, str, Array]:
-    """Return the quantity that the effect grows with at a place: its name, its unit, its (N,) values."""
-    robot, recorded = observations.robot, observations.covariates
-    place = parameters[0][0].place
+) -> Driver:
+    """Return what drives an effect at a place; of one that says nothing, the quantity that goes with it most."""
+    if known_driver := driver(effect, observations, [parameter for parameter, _ in parameters], error):
+        return known_driver
     known = quantities(observations)
-    joint = place if parameters[0][0].kind == "joint" else _joint_of(observations, place)
-    if effect.name in _OWN_JOINT and joint is not None:
-        return f"position of {joint}", _unit(observations, joint), observations.q[:, robot.joint_names.index(joint)]
-    if effect.name == "joint_compliance" and joint is not None:
-        if observations.torque is not None:
-            return f"torque of {joint}", "N·m", observations.torque[:, robot.joint_names.index(joint)]
-        # weights are not known, so that the torque is but as it was fitted: it is 1 at its largest
-        return f"fitted torque of {joint}", "relative", -error / max(float(np.abs(error).max()), 1e-300)
-    if effect.name == "link_compliance":
-        moment = observations.segment_load[:, parameters[0][0].responses[0].index, 3:]
-        axis = np.linalg.lstsq(moment, error, rcond=1e-9)[0]
-        return f"bending moment on {place}", "N·m", moment @ axis / (np.linalg.norm(axis) + 1e-300)
-    if effect.name == "thermal_bending" and f"temperature.{place}" in recorded:
-        general = recorded.get("temperature")
-        if general is None:
-            general = np.mean([v for name, v in recorded.items() if name.startswith("temperature.")], axis=0)
-        return f"{place} warmer than the robot by", "K", recorded[f"temperature.{place}"] - general
-    if effect.name == "instrument_scale":
-        return "distance from the instrument", "m", np.linalg.norm(observations.predicted_position, axis=1)
-    wanted = {
-        "backlash": f"approach.{joint}",
-        "tracking_lag": f"velocity.{joint}",
-        "thermal_elongation": f"temperature.{place}" if f"temperature.{place}" in recorded else "temperature",
-        "drift": "time" if "time" in recorded else "order",
-    }.get(effect.name, effect.quantity if isinstance(effect, Discovered) else "")
-    # of an effect that somebody else wrote nothing says what it reads: what goes with it most
-    name = wanted if wanted in known else max(known, key=lambda n: -_scatter(known[n], error))
-    return name, _unit(observations, name), known[name]
+    name = max(known, key=lambda n: -_unsteady(known[n], error))
+    return name, unit(observations.robot, name), known[name]
 
 
-def _joint_of(observations: Observations, link: str) -> str | None:
-    """Return the joint whose placement a link carries; ``None`` where there is none."""
-    return next((s.name for s in observations.robot.segments if s.parent_link == link and s.movable), None)
-
-
-def _scatter(values: Array, error: Array) -> float:
+def _unsteady(values: Array, error: Array) -> float:
     """Mean variance of an error among neighbours in a quantity."""
-    parts = np.array_split(error[np.argsort(values, kind="stable")], max(len(error) // 8, 2))
+    parts = np.array_split(error[np.argsort(values, kind="stable")], max(len(error) // _NEIGHBOURS, 2))
     return float(np.mean([part.var() for part in parts if len(part)]))
-
-
-def _unit(observations: Observations, name: str) -> str:
-    robot = observations.robot
-    column, _, place = name.partition(".")
-    joint = place if column in ("velocity", "acceleration", "encoder") else name
-    prismatic = joint in robot.joint_names and robot.joint_types[robot.joint_names.index(joint)] == "prismatic"
-    lead = "m" if prismatic else "rad"
-    if name in robot.joint_names or column == "encoder":
-        return lead
-    others = {"torque": "N·m", "time": "s", "temperature": "°C", "payload": "kg", "reach": "m"}
-    return {**others, "velocity": f"{lead}/s", "acceleration": f"{lead}/s²"}.get(column, "")
 
 
 def _line(values: Array, error: Array) -> Array:
@@ -272,5 +220,5 @@ def _line(values: Array, error: Array) -> Array:
     # a law of this quantity alone lies between its neighbours
     between = np.interp(x[1:-1:2], x[::2], y[::2])[: len(x[1:-1:2])]
     alone = float(np.abs(between - y[1:-1:2]).mean()) < _ROUGH * float(np.ptp(y)) + 1e-300
-    parts = np.array_split(order, min(len(order), 400) if alone else min(_LINE, max(len(order) // 10, 2)))
+    parts = np.array_split(order, min(len(order), _FINEST) if alone else min(_LINE, max(len(order) // 10, 2)))
     return np.array([[values[p].mean() for p in parts], [error[p].mean() for p in parts]])

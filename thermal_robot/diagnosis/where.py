@@ -8,8 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.diagnosis.parts import Location, Where
+from thermal_robot.effects.channel import by_place, column
 from thermal_robot.effects.quantities import quantities
-from thermal_robot.inference.columns import Block, column
+from thermal_robot.inference.columns import Block
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.laws import smooth_columns
 from thermal_robot.observations import Observations
@@ -68,20 +69,14 @@ def locate(fit: Fit, shrinkage: dict[str, float]) -> tuple[Where, dict[str, tupl
 def _displaced(observations: Observations, block: Block, values: Array) -> dict[tuple[str, str], Array]:
     """(N, m) displacement by place; a parameter that acts on all links at once is shared out by its responses."""
     found: dict[tuple[str, str], Array] = {}
-    segments = observations.robot.segments
+    measures = block.columns.shape[1]
     for k, parameter in enumerate(block.parameters):
-        if parameter.place:
-            parts = [((parameter.kind, parameter.place), block.columns[:, :, k])]
-        else:
-            named = {"segment": [s.parent_link for s in segments], "joint": observations.robot.joint_names}
-            parts = [
-                (
-                    (parameter.kind, named[r.channel][r.index] if r.channel in named else r.channel),
-                    column(observations, r, block.columns.shape[1]),
-                )
-                for r in parameter.responses
-            ]
-        for site, columns in parts:
+        for part in by_place(observations.robot, parameter):
+            if part is parameter:
+                columns = block.columns[:, :, k]
+            else:
+                columns = sum((column(observations, r, measures) for r in part.responses), np.zeros(1))
+            site = part.kind, part.place
             found[site] = found.get(site, 0.0) + columns * values[k]
     return found
 

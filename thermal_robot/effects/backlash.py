@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from thermal_robot.effects.effect import Effect, Parameter, at_joint
+from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, at_joint
+from thermal_robot.effects.quantities import driving, unit
 from thermal_robot.effects.torque import torque_columns
 
 if TYPE_CHECKING:
@@ -41,6 +42,7 @@ class Backlash(Effect):
     largest: tuple[float, ...] = ()
 
     name: ClassVar[str] = "backlash"
+    title: ClassVar[str] = "lost motion in the joints"
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return the approach columns, unless at least one of them varies."""
@@ -74,17 +76,21 @@ class Backlash(Effect):
         return tuple(
             Parameter(
                 "lost motion",
-                "m" if kind == "prismatic" else "rad",
+                unit(robot, joint),
                 5e-4,
                 "joint",
                 joint,
                 (at_joint(j, -0.5 * self._side(observations, j, np.asarray(covariates[f"approach.{joint}"]))),),
             )
-            for j, (joint, kind) in enumerate(zip(robot.joint_names, robot.joint_types, strict=True))
+            for j, joint in enumerate(robot.joint_names)
             if f"approach.{joint}" in covariates
         )
 
-    def _side(self, observations: Observations, j: int, approach: NDArray[np.float64]) -> NDArray[np.float64]:
+    def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
+        """Return the direction in which the joint came."""
+        return driving(observations, f"approach.{parameters[0].place}")
+
+    def _side(self, observations: Observations, j: int, approach: Array) -> Array:
         """(N,) on which side of its play a joint stands."""
         torque = observations.torque
         if not self.held or torque is None or self.largest[j] < _HANGS * max(self.largest):

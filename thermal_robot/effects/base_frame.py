@@ -7,12 +7,10 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from thermal_robot.effects.effect import Effect, Parameter, at_base
+from thermal_robot.effects.effect import TWIST, Effect, Parameter, at_base
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
-
-COMPONENTS = (*(f"translation {a}" for a in "xyz"), *(f"rotation {a}" for a in "xyz"))
 
 
 @dataclass(frozen=True)
@@ -20,10 +18,14 @@ class BaseFrame(Effect):
     """The declared registration of the base is off by a constant twist in the root frame.
 
     Expected size 2 mm and 2 mrad. Only where the campaign declares ``base = "known"``: an unknown base is fitted
-    before any effect is asked for.
+    before any effect is asked for. It is a twist of the first joint's placement, too, so that :class:`Geometric`
+    contains it.
     """
 
     name: ClassVar[str] = "base_frame"
+    title: ClassVar[str] = "a misplaced base frame"
+    contained_in: ClassVar[tuple[str, ...]] = ("geometric",)
+    frame: ClassVar[str] = "base"
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return the declaration that would make the base an effect."""
@@ -32,6 +34,6 @@ class BaseFrame(Effect):
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """Return the base's twist in the root frame: m and rad."""
         return tuple(
-            Parameter(component, "m" if k < 3 else "rad", 2e-3, "base", "base", (at_base(np.eye(6)[k]),))
-            for k, component in enumerate(COMPONENTS)
+            Parameter(component, unit, 2e-3, "base", "base", (at_base(np.eye(6)[k]),))
+            for k, (component, unit) in enumerate(TWIST)
         )

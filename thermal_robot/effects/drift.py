@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from thermal_robot.effects.effect import Effect, Parameter, at_base
+from thermal_robot.effects.effect import TWIST, Array, Driver, Effect, Parameter, at_base
+from thermal_robot.effects.quantities import driving
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
-
-_COMPONENTS = (*(f"translation {a}" for a in "xyz"), *(f"rotation {a}" for a in "xyz"))
 
 
 @dataclass(frozen=True)
@@ -36,6 +36,7 @@ class Drift(Effect):
     time_constant: float = 0.0
 
     name: ClassVar[str] = "drift"
+    title: ClassVar[str] = "drift of the base or the instrument"
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return ``time`` unless time or order varies."""
@@ -68,13 +69,10 @@ class Drift(Effect):
         tau = self.time_constant
         grown = elapsed if tau == 0.0 else np.expm1(-elapsed / tau) / np.expm1(-1.0 / tau)
         return tuple(
-            Parameter(
-                component,
-                "m" if k < 3 else "rad",
-                1e-4,
-                "base",
-                "base",
-                (at_base(grown[:, None] * np.eye(6)[k]),),
-            )
-            for k, component in enumerate(_COMPONENTS)
+            Parameter(component, unit, 1e-4, "base", "base", (at_base(grown[:, None] * np.eye(6)[k]),))
+            for k, (component, unit) in enumerate(TWIST)
         )
+
+    def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
+        """Return the clock."""
+        return driving(observations, "time" if "time" in observations.covariates else "order")

@@ -21,12 +21,16 @@ A new effect is a file like this one::
                 for j, joint in enumerate(observations.robot.joint_names)
             )
 
-Register it under the entry point group ``thermal_robot.effects`` or pass it to :func:`thermal_robot.diagnose`.
+Register it under the entry point group ``thermal_robot.effects`` or pass it to :func:`thermal_robot.diagnose`. What
+others want to know of it stands in the same class, each with a default: ``title`` (in plain words), ``frame`` and
+``contained_in`` (what it cannot be told from), ``missing`` and ``reads`` (columns), ``variants``, ``nearby`` and ``at``
+(settings), ``driver`` (what it is drawn against).
 """
 
 from __future__ import annotations
 
 from abc import ABC, abstractmethod
+from collections.abc import Sequence
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
@@ -36,7 +40,13 @@ from numpy.typing import NDArray
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
 
+Array = NDArray[np.float64]
 Channel = Literal["joint", "segment", "base", "tool", "instrument"]
+Driver = tuple[str, str, Array]
+"""What drives an effect at a place: name, unit and (N,) values of a quantity."""
+
+TWIST = (*((f"translation {axis}", "m") for axis in "xyz"), *((f"rotation {axis}", "rad") for axis in "xyz"))
+"""Name and unit of each component of a twist."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,7 +67,7 @@ class Response:
 
     channel: Channel
     index: int
-    values: NDArray[np.float64]
+    values: Array
 
 
 def at_joint(index: int, values: Any) -> Response:
@@ -123,8 +133,24 @@ class Effect(ABC):
     """Base of all effects; see the module's docstring for how to write one."""
 
     name: ClassVar[str] = ""
+    """By which it is asked for and reported."""
+    title: ClassVar[str] = ""
+    """What it is in plain words, for a sentence; the name with spaces where a class states none."""
     needs: ClassVar[tuple[str, ...]] = ()
     """Covariates without which the effect is not testable."""
+    random: ClassVar[bool] = False
+    """Whether it scatters: no mean follows from it; see :class:`thermal_robot.effects.random_effect.RandomEffect`."""
+    frame: ClassVar[str] = ""
+    """Which of the campaign's frames it is an error of, ``base`` or ``tool``; empty for all others."""
+    contained_in: ClassVar[tuple[str, ...]] = ()
+    """Names of larger effects that can do exactly what it does, but for the unknown frames; where that holds for some
+    arms only, the class says so."""
+
+    def __init_subclass__(cls, **options: Any) -> None:
+        """Give a class with a name of its own, but no title, one."""
+        super().__init_subclass__(**options)
+        if "name" in vars(cls) and "title" not in vars(cls):
+            cls.title = str(cls.name).replace("_", " ")
 
     @abstractmethod
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
@@ -139,15 +165,42 @@ class Effect(ABC):
         return tuple(need for need in self.needs if need in observations.covariates)
 
     def variants(self, observations: Observations) -> tuple[Effect, ...]:
-        """Return the settings of the nonlinear arguments that estimation should compare."""
+        """Return the settings of the nonlinear arguments that estimation should compare: the coarse grid.
+
+        What a setting takes from the campaign (an origin of time, a record) is fixed here, once, so that a saved model
+        predicts other samples with it.
+        """
         return (self,)
 
     def nearby(self, factor: float) -> tuple[Effect, ...]:
-        """Return settings near this one, by about a factor, with which estimation refines it; itself among them."""
+        """Return settings near this one, itself among them: the constants that may be refined, and no others.
+
+        Estimation moves to the best of them, with factors (above 1) that become smaller. A constant that does not
+        appear here stays where :meth:`variants` put it.
+        """
         return (self,)
 
     def at(self, joint: str) -> Effect | None:
         """Return the effect in one joint alone; ``None`` where it has no such setting."""
+        return None
+
+    def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
+        """Return what drives the effect at one place, to draw it against.
+
+        Parameters
+        ----------
+        observations
+            Of the fitted model.
+        parameters
+            Those at the place, at least one.
+        error
+            (N,) what the effect does there, rad or m.
+
+        Returns
+        -------
+        Driver or None
+            ``None`` where no quantity can be named: the one that goes with the error most is then drawn.
+        """
         return None
 
     def arguments(self) -> dict[str, Any]:

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from thermal_robot.effects.effect import Effect, Parameter, at_segment
+from thermal_robot.effects.effect import TWIST, Array, Driver, Effect, Parameter, at_segment
+from thermal_robot.effects.quantities import position_of
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
-
-_AXES = ("x", "y", "z")
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,7 @@ class Geometric(Effect):
     """
 
     name: ClassVar[str] = "geometric"
+    title: ClassVar[str] = "geometric errors of the links"
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """Three translations (m) and three rotations (rad) a segment, in the placement's own frame."""
@@ -36,14 +37,14 @@ class Geometric(Effect):
         last = max(s for s, segment in enumerate(segments) if segment.movable)
         return tuple(
             Parameter(
-                f"{'translation' if k < 3 else 'rotation'} {_AXES[k % 3]} of {segment.name}",
-                "m" if k < 3 else "rad",
-                5e-4,
-                "link",
-                segment.parent_link,
-                (at_segment(s, twists[k]),),
+                f"{component} of {segment.name}", unit, 5e-4, "link", segment.parent_link, (at_segment(s, twists[k]),)
             )
             for s, segment in enumerate(segments)
             if segment.movable or s > last
-            for k in range(6)
+            for k, (component, unit) in enumerate(TWIST)
         )
+
+    def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
+        """Return the position of the joint whose placement it is."""
+        segment = observations.robot.segments[parameters[0].responses[0].index]
+        return position_of(observations, segment.name) if segment.movable else None

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from thermal_robot.effects.effect import Effect, Parameter, at_joint
+from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, at_joint
+from thermal_robot.effects.quantities import unit
 from thermal_robot.effects.torque import torque_columns
 from thermal_robot.kinematics import static_regressor
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
     from thermal_robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 _WIND_UP = 1e-3
 _LEVER = 0.1  # m: how far a body's centre may lie from the next joint
@@ -54,6 +53,7 @@ class JointCompliance(Effect):
     weights: tuple[float, ...] = ()
 
     name: ClassVar[str] = "joint_compliance"
+    title: ClassVar[str] = "joints that yield to load"
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return what would give torques, where neither these nor the shape of gravity's vary."""
@@ -90,20 +90,27 @@ class JointCompliance(Effect):
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """One compliance a joint, rad/(N·m), or m/N for a prismatic joint; free weights in rad or m."""
         robot, torque = observations.robot, observations.torque
-        names, kinds = robot.joint_names, robot.joint_types
+        names = robot.joint_names
         found = []
         for k, (j, shape) in enumerate(self._shapes(observations)):
-            unit = "m" if kinds[j] == "prismatic" else "rad"
             label = f"yield to gravity, shape {self.joints[: k + 1].count(j)}"
-            found.append(Parameter(label, unit, _WIND_UP, "joint", names[j], (at_joint(j, -shape),)))
+            found.append(Parameter(label, unit(robot, names[j]), _WIND_UP, "joint", names[j], (at_joint(j, -shape),)))
         if torque is not None:
             size = _WIND_UP / max(float(np.abs(torque).max()), 1e-9)
-            units = ["m/N" if kind == "prismatic" else "rad/(N·m)" for kind in kinds]
+            units = ["m/N" if kind == "prismatic" else "rad/(N·m)" for kind in robot.joint_types]
             found += [
                 Parameter("compliance", units[j], size, "joint", joint, (at_joint(j, -torque[:, j]),))
                 for j, joint in enumerate(names)
             ]
         return tuple(found)
+
+    def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
+        """Return the joint's torque; where masses are not known, as it was fitted, 1 at its largest."""
+        joint, robot = parameters[0].place, observations.robot
+        if observations.torque is None:
+            return f"fitted torque of {joint}", "relative", -error / max(float(np.abs(error).max()), 1e-300)
+        name = f"torque of {joint}"
+        return name, unit(robot, f"torque.{joint}"), observations.torque[:, robot.joint_names.index(joint)]
 
 
 def _weighed(robot: Robot, q: Array) -> Array:

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-from thermal_robot.effects.effect import Effect, Parameter, at_joint
+from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, at_joint
+from thermal_robot.effects.quantities import position_of
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -20,6 +22,7 @@ class JointGain(Effect):
     """
 
     name: ClassVar[str] = "joint_gain"
+    title: ClassVar[str] = "joint gain errors"
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """One gain error a joint; dimensionless."""
@@ -27,3 +30,7 @@ class JointGain(Effect):
             Parameter("gain error", "1", 5e-4, "joint", joint, (at_joint(j, observations.q[:, j]),))
             for j, joint in enumerate(observations.robot.joint_names)
         )
+
+    def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
+        """Return the joint's own position."""
+        return position_of(observations, parameters[0].place)

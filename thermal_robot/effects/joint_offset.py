@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-from thermal_robot.effects.effect import Effect, Parameter, at_joint
+from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, at_joint
+from thermal_robot.effects.quantities import position_of, unit
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -23,14 +25,18 @@ class JointOffset(Effect):
     """
 
     name: ClassVar[str] = "joint_offset"
+    title: ClassVar[str] = "joint zero offsets"
+    contained_in: ClassVar[tuple[str, ...]] = ("geometric",)
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """One offset a joint; rad or m."""
-        robot = observations.robot
+        robot, sizes = observations.robot, {"rad": 1e-3, "m": 5e-4}
+        units = [unit(robot, joint) for joint in robot.joint_names]
         return tuple(
-            Parameter("zero offset", unit, size, "joint", joint, (at_joint(j, 1.0),))
-            for j, (joint, unit, size) in enumerate(
-                (joint, "m", 5e-4) if kind == "prismatic" else (joint, "rad", 1e-3)
-                for joint, kind in zip(robot.joint_names, robot.joint_types, strict=True)
-            )
+            Parameter("zero offset", units[j], sizes[units[j]], "joint", joint, (at_joint(j, 1.0),))
+            for j, joint in enumerate(robot.joint_names)
         )
+
+    def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
+        """Return the joint's own position."""
+        return position_of(observations, parameters[0].place)

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermal_robot.effects.beam import beams, cross_axes
-from thermal_robot.effects.effect import Effect, Parameter, at_segment
+from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, at_segment
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
-
-Array = NDArray[np.float64]
 
 _SAG = 2e-4  # m
 _STEADY = 1e-9  # N·m²
@@ -42,6 +40,7 @@ class LinkCompliance(Effect):
     """
 
     name: ClassVar[str] = "link_compliance"
+    title: ClassVar[str] = "links that bend under load"
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return what would give a load, unless one that bends a segment varies."""
@@ -67,6 +66,13 @@ class LinkCompliance(Effect):
                 label = f"bending compliance of {segment.name}, axis {k + 1}"
                 found.append(Parameter(label, "1/(N·m²)", size, "link", segment.parent_link, (at_segment(s, twist),)))
         return tuple(found)
+
+    def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
+        """Return the bending moment, about the axis about which the error goes with it."""
+        moment = observations.segment_load[:, parameters[0].responses[0].index, 3:]
+        axis = np.linalg.lstsq(moment, error, rcond=1e-9)[0]
+        values = moment @ axis / (np.linalg.norm(axis) + 1e-300)
+        return f"bending moment on {parameters[0].place}", "N·m", values
 
 
 def _yields(observations: Observations, s: int) -> tuple[tuple[Array, Array], ...]:

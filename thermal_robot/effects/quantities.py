@@ -5,13 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from thermal_robot.effects.effect import Array, Driver
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
     from thermal_robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 GRAVITY = ("gravity.x", "gravity.y", "gravity.z")
 """Components of gravity's direction in the tool frame."""
@@ -23,19 +22,26 @@ _UNITS = {
     "time": "s",
     "temperature": "°C",
     "payload": "kg",
-    "torque": "N·m",
-    "velocity": "rad/s",
-    "acceleration": "rad/s²",
-    "encoder": "rad",
     "reach": "m",
 }
+_OF_JOINTS = {
+    "torque": ("N·m", "N"),
+    "velocity": ("rad/s", "m/s"),
+    "acceleration": ("rad/s²", "m/s²"),
+    "encoder": ("rad", "m"),
+}
+"""Units for a joint that turns, and for one that slides; a joint's own position has that of its encoder."""
 
 
 def unit(robot: Robot, name: str) -> str:
-    """Return the unit of a quantity's values; empty where it has none, or none that is known."""
+    """Return the unit of a quantity's values, SI; empty where it has none, or none that is known."""
+    kind, _, place = name.partition(".")
     if name in robot.joint_names:
-        return "m" if robot.joint_types[robot.joint_names.index(name)] == "prismatic" else "rad"
-    return _UNITS.get(name.split(".")[0], "")
+        kind, place = "encoder", name
+    if kind not in _OF_JOINTS:
+        return _UNITS.get(kind, "")
+    slides = place in robot.joint_names and robot.joint_types[robot.joint_names.index(place)] == "prismatic"
+    return _OF_JOINTS[kind][slides]
 
 
 def quantities(observations: Observations) -> dict[str, Array]:
@@ -69,3 +75,17 @@ def quantity(observations: Observations, name: str) -> Array | None:
     if labels is None or len(set(labels.tolist())) < 2:
         return None
     return np.unique(labels, return_inverse=True)[1].astype(float)
+
+
+def driving(observations: Observations, name: str) -> Driver | None:
+    """Return name, unit and (N,) values of a quantity that drives an effect; ``None`` where it does not vary."""
+    values = quantity(observations, name)
+    if values is None or not np.ptp(values) > 0:
+        return None
+    return name, unit(observations.robot, name), values
+
+
+def position_of(observations: Observations, joint: str) -> Driver:
+    """Return a joint's commanded position as what drives an effect: name, unit and (N,) values, rad or m."""
+    robot = observations.robot
+    return f"position of {joint}", unit(robot, joint), observations.q[:, robot.joint_names.index(joint)]

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermal_robot.effects.beam import beams, cross_axes
-from thermal_robot.effects.effect import Effect, Parameter, at_segment
+from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, at_segment
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -34,6 +34,7 @@ class ThermalBending(Effect):
     """
 
     name: ClassVar[str] = "thermal_bending"
+    title: ClassVar[str] = "links that bow with heat"
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return the links' temperatures, unless the difference of one to the robot's varies."""
@@ -64,13 +65,19 @@ class ThermalBending(Effect):
                 found.append(Parameter(label, "1/(m·K)", 1.5e-4, "link", segment.parent_link, (at_segment(s, twist),)))
         return tuple(found)
 
+    def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
+        """Return how much warmer the link is than the robot."""
+        link = parameters[0].place
+        difference = _difference(observations, link)
+        return None if difference is None else (f"{link} warmer than the robot by", "K", difference)
+
 
 def _links(observations: Observations) -> tuple[str, ...]:
     robot = observations.robot
     return tuple(dict.fromkeys(robot.segments[s].parent_link for s in beams(robot)))
 
 
-def _difference(observations: Observations, link: str) -> NDArray[np.float64] | None:
+def _difference(observations: Observations, link: str) -> Array | None:
     """(N,) how much warmer a link is than the robot, K; ``None`` where the link's temperature is not recorded."""
     recorded = observations.covariates
     own = recorded.get(f"temperature.{link}")

@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
-from thermal_robot.effects.effect import Effect, Parameter, at_segment
+from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, at_segment
 from thermal_robot.effects.lagging import History
+from thermal_robot.effects.quantities import driving
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
-
-Array = NDArray[np.float64]
 
 _LAGS = (600.0, 1500.0, 3600.0)
 
@@ -50,6 +49,7 @@ class ThermalElongation(Effect):
     temperatures: tuple[float, ...] = ()
 
     name: ClassVar[str] = "thermal_elongation"
+    title: ClassVar[str] = "thermal elongation of the links"
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return ``temperature`` unless a temperature that applies to a segment varies."""
@@ -95,6 +95,11 @@ class ThermalElongation(Effect):
             )
             for s, response in responses.items()
         )
+
+    def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
+        """Return the temperature that was recorded of the link, or of the robot."""
+        own = f"temperature.{parameters[0].place}"
+        return driving(observations, own if own in observations.covariates else "temperature")
 
     def _temperature(self, observations: Observations, link: str) -> Array | None:
         recorded = observations.temperature(link)

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from thermal_robot.effects.base_frame import COMPONENTS
-from thermal_robot.effects.effect import Effect, Parameter, at_tool
+from thermal_robot.effects.effect import TWIST, Effect, Parameter, at_tool
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -31,6 +30,8 @@ class ToolFrame(Effect):
     turns: bool | None = None
 
     name: ClassVar[str] = "tool_frame"
+    title: ClassVar[str] = "a misplaced tool frame"
+    frame: ClassVar[str] = "tool"
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return the declaration that would make the tool an effect."""
@@ -47,8 +48,7 @@ class ToolFrame(Effect):
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """Return the tool's twist in the tool frame: m, and rad where orientation is measured."""
-        components = COMPONENTS if self._turns(observations) else COMPONENTS[:3]
         return tuple(
-            Parameter(component, "m" if k < 3 else "rad", 2e-3, "tool", "tool", (at_tool(np.eye(6)[k]),))
-            for k, component in enumerate(components)
+            Parameter(component, unit, 2e-3, "tool", "tool", (at_tool(np.eye(6)[k]),))
+            for k, (component, unit) in enumerate(TWIST[: 6 if self._turns(observations) else 3])
         )

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from thermal_robot.effects.effect import Effect, Parameter, at_joint
+from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, at_joint
+from thermal_robot.effects.quantities import driving, unit
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -36,6 +38,7 @@ class TrackingLag(Effect):
     accelerating: tuple[str, ...] | None = None
 
     name: ClassVar[str] = "tracking_lag"
+    title: ClassVar[str] = "joints that trail their command"
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return the velocity columns, unless at least one of them varies."""
@@ -66,15 +69,20 @@ class TrackingLag(Effect):
         robot, recorded = observations.robot, observations.covariates
         moving, accelerating = self._joints(observations)
         found = []
-        for j, (joint, kind) in enumerate(zip(robot.joint_names, robot.joint_types, strict=True)):
+        for j, joint in enumerate(robot.joint_names):
             if joint not in moving:
                 continue
             velocity = np.asarray(recorded[f"velocity.{joint}"])
-            unit = "m" if kind == "prismatic" else "rad"
             found.append(Parameter("delay", "s", 1e-3, "joint", joint, (at_joint(j, -velocity),)))
-            found.append(Parameter("friction", unit, 1e-4, "joint", joint, (at_joint(j, -np.sign(velocity)),)))
+            found.append(
+                Parameter("friction", unit(robot, joint), 1e-4, "joint", joint, (at_joint(j, -np.sign(velocity)),))
+            )
             if joint in accelerating:
                 acceleration = recorded[f"acceleration.{joint}"]
                 label = "effect of acceleration"
                 found.append(Parameter(label, "s²", 1e-6, "joint", joint, (at_joint(j, acceleration),)))
         return tuple(found)
+
+    def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
+        """Return the joint's velocity."""
+        return driving(observations, f"velocity.{parameters[0].place}")

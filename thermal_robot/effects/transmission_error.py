@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from thermal_robot.effects.effect import Effect, Parameter, at_joint
+from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, at_joint
+from thermal_robot.effects.quantities import position_of, unit
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -34,6 +36,7 @@ class TransmissionError(Effect):
     joints: tuple[str, ...] = ()
 
     name: ClassVar[str] = "transmission_error"
+    title: ClassVar[str] = "periodic transmission errors"
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """Two amplitudes a joint and order; rad. Prismatic joints have a period only with a ratio in rad/m."""
@@ -44,14 +47,18 @@ class TransmissionError(Effect):
                 continue
             orders = [float(k) for k in self.harmonics] if kind != "prismatic" else []
             orders += [k * float(gears[joint]) for k in self.harmonics] if joint in gears else []
-            unit = "m" if kind == "prismatic" else "rad"
+            own = unit(robot, joint)
             for order in orders:
                 angle = order * observations.q[:, j]
                 found += [
-                    Parameter(f"sine, order {order:g}", unit, 3e-4, "joint", joint, (at_joint(j, np.sin(angle)),)),
-                    Parameter(f"cosine, order {order:g}", unit, 3e-4, "joint", joint, (at_joint(j, np.cos(angle)),)),
+                    Parameter(f"sine, order {order:g}", own, 3e-4, "joint", joint, (at_joint(j, np.sin(angle)),)),
+                    Parameter(f"cosine, order {order:g}", own, 3e-4, "joint", joint, (at_joint(j, np.cos(angle)),)),
                 ]
         return tuple(found)
+
+    def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
+        """Return the joint's own position."""
+        return position_of(observations, parameters[0].place)
 
     def at(self, joint: str) -> TransmissionError:
         """Return the effect of one joint's gears."""

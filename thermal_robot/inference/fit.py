@@ -10,8 +10,9 @@ from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign
 from thermal_robot.effects import Effect
+from thermal_robot.effects.apply import displacement
 from thermal_robot.errors import EstimationError
-from thermal_robot.inference.columns import block, displacement, frame_columns
+from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.explain import Explanation, Noise, explain
 from thermal_robot.inference.frames import moved, register
 from thermal_robot.inference.problem import Linear, contained

@@ -1,4 +1,4 @@
-"""An effect of the user's own: ten lines, found, saved to JSON; and names that no effect has."""
+"""The library, effects of one's own beside it, what packages install, and names that no effect has."""
 
 import json
 from dataclasses import dataclass, replace
@@ -9,9 +9,18 @@ import pytest
 from simulate import simulate
 
 from thermal_robot import CampaignError, EffectError, diagnose
-from thermal_robot import effects as effects_module
-from thermal_robot.effects import Effect, JointOffset, Parameter, at_joint, choose, library
-from thermal_robot.inference.columns import displacement
+from thermal_robot.effects import (
+    RANDOM,
+    Effect,
+    JointOffset,
+    Parameter,
+    at_joint,
+    catalogue,
+    choose,
+    library,
+    random_effects,
+)
+from thermal_robot.effects.apply import displacement
 from thermal_robot.observations import Frames, observe
 
 
@@ -81,6 +90,7 @@ def test_without_its_covariate_ones_own_effect_is_not_testable(rv_m2):
     assert (finding.status, finding.needs) == ("not_testable", ("speed",))
 
 
+@pytest.mark.slow
 def test_without_ones_own_effect_its_place_and_quantity_are_named(rv_m2):
     best = []
     for seed in range(4):
@@ -115,9 +125,14 @@ def test_what_is_no_effect_of_ones_own_is_refused():
 
 
 def installed(monkeypatch, name, thing):
-    point = SimpleNamespace(name=name, value=f"their.package:{name}", load=lambda: thing)
+    def load():
+        if isinstance(thing, Exception):
+            raise thing
+        return thing
+
+    point = SimpleNamespace(name=name, value=f"their.package:{name}", load=load)
     points = {"thermal_robot.effects": [point]}
-    monkeypatch.setattr(effects_module, "entry_points", lambda group: points[group])
+    monkeypatch.setattr(catalogue, "entry_points", lambda group: points[group])
 
 
 @pytest.mark.parametrize("thing", [JointSag, JointSag()], ids=["class", "instance"])
@@ -129,16 +144,65 @@ def test_an_installed_effect_stands_in_the_library_and_is_diagnosed(rv_m2, monke
     assert {f.name for f in found.effects} == {"joint_sag"}
 
 
-@pytest.mark.parametrize(
-    ("thing", "words"),
-    [
-        (dict, "does not give an effect"),
-        (3, "does not give an effect"),
-        (JointOffset, "gives the name 'joint_offset', which is taken"),
-        (type("Nameless", (JointSag,), {"name": ""}), "does not give an effect with a name"),
-    ],
-)
-def test_an_installed_thing_that_is_no_new_effect_is_refused_by_its_entry_point(monkeypatch, thing, words):
+class Unfinished(JointSag):
+    """Raises where it is made."""
+
+    name = "unfinished"
+
+    def __init__(self):
+        raise ValueError("no licence")
+
+
+BROKEN = {
+    "a dict": (dict, "not an effect"),
+    "a number": (3, "not an effect"),
+    "nothing": (None, "not an effect"),
+    "a name that is taken": (JointOffset, "two effects named 'joint_offset'"),
+    "the name of a random effect": (type("Wear", (JointSag,), {"name": "excess_repeatability"}), "two effects named"),
+    "a random effect": (type("Shaking", (JointSag,), {"name": "shaking", "random": True}), "'shaking' is random"),
+    "no name": (type("Nameless", (JointSag,), {"name": ""}), "not an effect with a name"),
+    "a name that is no text": (type("Numbered", (JointSag,), {"name": 7}), "not an effect with a name"),
+    "a module that is gone": (ModuleNotFoundError("No module named 'theirs'"), "No module named 'theirs'"),
+    "an exit": (AttributeError("module has no attribute 'Sag'"), "AttributeError"),
+    "a class that cannot be made": (Unfinished, "no licence"),
+}
+
+
+@pytest.mark.parametrize("case", BROKEN)
+def test_a_broken_entry_point_warns_by_name_and_is_left_out(monkeypatch, case):
+    thing, words = BROKEN[case]
+    sound = library()
     installed(monkeypatch, "theirs", thing)
-    with pytest.raises(EffectError, match=f"'theirs'.*{words}"):
-        library()
+    with pytest.warns(UserWarning, match=rf"entry point 'theirs' \(their.package:theirs\) is left out: .*{words}"):
+        assert library() == sound
+
+
+def test_a_broken_entry_point_does_not_stop_a_diagnosis(rv_m2, monkeypatch):
+    installed(monkeypatch, "theirs", ImportError("their package is broken"))
+    with pytest.warns(UserWarning, match="their package is broken"):
+        found = diagnose(simulate(rv_m2, ["joint_gain"], samples=60, seed=1, ratio=(5.0, 6.0))[0], only=["joint_gain"])
+    assert found.verdict == ("joint_gain",)
+
+
+def test_the_library_holds_what_is_fitted_and_beside_it_stands_what_scatters():
+    assert not any(effect.random for effect in library().values())
+    assert all(effect.random for effect in random_effects())
+    assert tuple(effect.name for effect in random_effects()) == RANDOM
+    assert not set(RANDOM) & set(library())
+    assert all(name == effect.name for name, effect in library().items())
+
+
+def test_random_effects_may_be_asked_for_and_are_not_fitted():
+    assert [e.name for e in choose(["drift", *RANDOM])] == ["drift"]
+    assert [e.name for e in choose(without=RANDOM)] == list(library())
+    with pytest.raises(EffectError, match="no effect is left"):
+        choose(RANDOM)
+
+
+def test_choosing_keeps_the_order_of_the_library():
+    assert [e.name for e in choose()] == list(library())
+    assert [e.name for e in choose("drift")] == ["drift"]
+    assert {e.name for e in choose(["drift", "geometric"])} == {"drift", "geometric"}
+    assert {e.name for e in choose(without=["drift"])} == set(library()) - {"drift"}
+    with pytest.raises(EffectError, match="no effect is left"):
+        choose(["drift"], ["drift"])

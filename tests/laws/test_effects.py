@@ -1,22 +1,25 @@
-"""Laws that every effect of the library keeps: its columns, its covariates, its arguments."""
+"""Laws that every effect of the library keeps on every arm: its columns, its covariates, its arguments, its words."""
 
 import json
 from dataclasses import replace
 
 import numpy as np
 import pytest
+from conftest import load_arm
 from helpers import without_masses
 from simulate import simulate
 
-from thermal_robot import EffectError, diagnose
-from thermal_robot.effects import Drift, ThermalElongation, TransmissionError, choose, library
-from thermal_robot.inference.columns import block, displacement, frame_columns
-from thermal_robot.inference.frames import moved
+from thermal_robot import diagnose
+from thermal_robot.effects import Drift, ThermalElongation, TransmissionError, library
+from thermal_robot.effects.apply import displacement
+from thermal_robot.effects.channel import by_place
+from thermal_robot.effects.gate import checked, driver
+from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.kinematics import exp6, rotation_to_quaternion
 from thermal_robot.observations import Frames, observe
+from thermal_robot.robot import load_robot
 
-EFFECTS = sorted(library())
-every_effect = pytest.mark.parametrize("name", EFFECTS)
+every_effect = pytest.mark.parametrize("name", sorted(library()))
 on_arms = pytest.mark.parametrize("arm", ["rv_m2", "ur10", "panda", "awkward-from-base"], indirect=True)
 
 
@@ -104,22 +107,6 @@ def test_columns_are_the_derivative_of_the_exact_model(arm, turning, known):
                     gaps.append(observe(campaign, frames, displacement=change, instrument=instrument).gap)
                 differences[:, :, p] = -(gaps[0] - gaps[1]) / (2.0 * h)
             assert_columns_are(item.columns, differences, f"{setting}")
-
-
-@on_arms
-@pytest.mark.parametrize("turning", [None, 1e-5], ids=["positions", "poses"])
-def test_frame_columns_are_the_derivative_of_the_exact_frames(arm, turning):
-    campaign = campaign_of(arm, turning)
-    frames = a_place(False, campaign)
-    campaign = measured_where_predicted(campaign, frames)
-    columns, names = frame_columns(observe(campaign, frames))
-    assert names == ("base",) * 6 + ("tool",) * (3 if turning is None else 6)
-    differences = np.zeros_like(columns)
-    for k in range(len(names)):
-        step = 1e-5 * np.eye(len(names))[k]
-        ahead, behind = (observe(campaign, moved(frames, s, names)).gap for s in (step, -step))
-        differences[:, :, k] = -(ahead - behind) / 2e-5
-    assert_columns_are(columns, differences, "frames")
 
 
 @on_arms
@@ -286,18 +273,61 @@ def test_arguments_make_the_same_effect_again(rv_m2, name):
         assert again == setting
 
 
-def test_a_stated_prior_sets_the_size_and_keeps_proportions(rv_m2):
-    campaign = replace(campaign_of(rv_m2), priors={"joint_offset": 4e-3, "drift": 5e-4})
-    nominal = observe(campaign)
-    np.testing.assert_allclose(block(nominal, library()["joint_offset"]).sizes, 4e-3)
-    np.testing.assert_allclose(block(nominal, library()["drift"]).sizes, 5e-4)
-    np.testing.assert_allclose(block(nominal, library()["joint_gain"]).sizes, 5e-4)
+@on_arms
+@every_effect
+def test_every_setting_passes_the_gate_and_is_drawn_against_something(arm, name):
+    observations, effect = observe(campaign_of(arm, 1e-5, name=name)), library()[name]
+    for setting in settings(effect, observations):
+        parts = [part for parameter in checked(setting, observations) for part in by_place(arm, parameter)]
+        found = [driver(setting, observations, [part], np.linspace(-1e-3, 1e-3, 8)) for part in parts]
+        # a frame that is off is off everywhere: nothing drives it
+        assert any(found) == (not effect.frame)
+        assert all(what[0] for what in found if what)
 
 
-def test_choosing_keeps_the_order_of_the_library():
-    assert [e.name for e in choose()] == list(library())
-    assert [e.name for e in choose("drift")] == ["drift"]
-    assert {e.name for e in choose(["drift", "geometric"])} == {"drift", "geometric"}
-    assert {e.name for e in choose(without=["drift"])} == set(EFFECTS) - {"drift"}
-    with pytest.raises(EffectError, match="no effect is left"):
-        choose(["drift"], ["drift"])
+def outside(observations, name, container):
+    """Share of an effect's columns that neither the unknown frames nor a larger effect can do, the worst column's."""
+
+    def flat(columns):
+        flat = columns.reshape(columns.shape[0] * columns.shape[1], columns.shape[2])
+        return flat / (np.linalg.norm(flat, axis=0) + 1e-300)
+
+    effects = library()
+    larger = [flat(frame_columns(observations)[0]), flat(block(observations, effects[container]).columns)]
+    left, strength, _ = np.linalg.svd(np.hstack(larger), full_matrices=False)
+    basis = left[:, strength > 1e-10 * strength[0]]
+    own = flat(block(observations, effects[name]).columns)
+    return float(np.linalg.norm(own - basis @ (basis.T @ own), axis=0).max())
+
+
+CONTAINED = [(name, larger) for name, effect in library().items() for larger in effect.contained_in]
+
+
+@pytest.mark.parametrize("arm", ["rv_m2", "ur10", "panda", "awkward-from-base"], indirect=True)
+@pytest.mark.parametrize("turning", [None, 1e-5], ids=["positions", "poses"])
+@pytest.mark.parametrize(("name", "larger"), CONTAINED)
+def test_what_a_larger_effect_contains_it_can_do_exactly(arm, turning, name, larger):
+    data = simulate(arm, samples=60, turning=turning, seed=1)[0]
+    scales = name == "instrument_scale" and "prismatic" in arm.joint_types
+    for known in (False, True):
+        left = outside(observe(replace(data, base_known=known, tool_known=known)), name, larger)
+        # a slide's stroke is no link length: no geometry scales it
+        assert (left > 0.01) if scales else (left < 1e-10)
+
+
+def test_those_that_contain_are_there_and_are_not_contained_themselves():
+    assert set(CONTAINED) == {(n, "geometric") for n in ("joint_offset", "base_frame", "instrument_scale")}
+    data = simulate(load_arm("rv_m2"), samples=60, seed=1)[0]
+    for name in ("joint_gain", "transmission_error", "thermal_elongation", "drift"):
+        assert outside(observe(data), name, "geometric") > 0.01
+    # a target on a link that turns is no part of that link's joint
+    on_the_wrist = load_robot("example-robot-data:ur10", "wrist_3_link")
+    known = replace(simulate(on_the_wrist, samples=60, seed=1)[0], base_known=True, tool_known=True)
+    assert outside(observe(known), "tool_frame", "geometric") > 0.01
+
+
+def test_titles_are_words_of_their_own():
+    titles = [effect.title for effect in library().values()]
+    assert all(titles)
+    assert len(set(titles)) == len(titles)
+    assert not any("_" in title or title.endswith(".") for title in titles)

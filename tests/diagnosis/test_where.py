@@ -1,0 +1,73 @@
+"""Where the gap lies: shares of axes, joints, links and quantities."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from simulate import simulate
+
+from thermal_robot.diagnosis.where import locate
+from thermal_robot.effects import choose
+from thermal_robot.inference.fit import fit
+
+
+def located(robot, name, share=1.0, **how):
+    campaign, truth, _ = simulate(robot, [name], samples=80, seed=2, ratio=(5.0, 6.0), **how)
+    fitted = fit(campaign, choose(name))
+    return (*locate(fitted, {name: share}), truth["parts"][name]["values"], fitted)
+
+
+def test_an_effect_in_one_joint_sits_there(rv_m2):
+    where, locations, _, _ = located(rv_m2, "backlash", places=["joint_3"])
+    assert locations["backlash"][0].name == "joint_3"
+    assert locations["backlash"][0].share > 0.95
+    assert max(where.joints, key=where.joints.get) == "joint_3"
+    assert where.links == {}
+
+
+def test_places_divide_an_effects_share_among_them(rv_m2):
+    for share in (1.0, 0.4):
+        where, locations, _, _ = located(rv_m2, "joint_gain", share)
+        shares = [place.share for place in locations["joint_gain"]]
+        assert sum(shares) == pytest.approx(share)
+        assert shares == sorted(shares, reverse=True)
+        assert where.joints == {
+            place.name: place.share for place in sorted(locations["joint_gain"], key=lambda p: p.name)
+        }
+    where, locations, _, _ = located(rv_m2, "joint_gain", -0.2)
+    assert {place.share for place in locations["joint_gain"]} == {0.0}
+
+
+def test_one_coefficient_for_all_links_sits_in_all_of_them(rv_m2):
+    where, locations, _, fitted = located(rv_m2, "thermal_elongation", variant=1)
+    assert fitted.effects[0][0].common
+    long = {s.parent_link for s in rv_m2.segments if s.length > 1e-9}
+    assert {(p.kind, p.name) for p in locations["thermal_elongation"]} == {("link", name) for name in long}
+    assert sum(where.links.values()) == pytest.approx(1.0)
+    assert list(where.links) == [n for n in dict.fromkeys(s.parent_link for s in rv_m2.segments) if n in long]
+
+
+def test_axes_are_shares_of_the_gaps_mean_square(rv_m2):
+    where, _, _, fitted = located(rv_m2, "joint_gain")
+    rows = fitted.nominal.gap[~fitted.explanation.outliers, :3]
+    assert sum(where.axes.values()) == pytest.approx(1.0)
+    largest = max(where.axes, key=where.axes.get)
+    assert "xyz"[int(np.sqrt((rows**2).mean(axis=0)).argmax())] == largest
+
+
+def test_the_quantity_that_an_effect_follows_explains_most_of_the_gap(rv_m2):
+    where, _, _, _ = located(rv_m2, "drift")
+    assert next(iter(where.covariates)) == "time"
+    assert all(0.0 <= share <= 1.0 for share in where.covariates.values())
+    assert list(where.covariates.values()) == sorted(where.covariates.values(), reverse=True)
+
+
+def test_rows_that_were_set_aside_count_nowhere(rv_m2):
+    campaign, _, _ = simulate(rv_m2, ["backlash"], samples=80, seed=2, ratio=(5.0, 6.0), places=["joint_3"])
+    spoilt = campaign.position.copy()
+    spoilt[11] += [0.0, 0.0, 0.05]
+    plain, dirty = (fit(replace(campaign, position=p), choose("backlash")) for p in (campaign.position, spoilt))
+    assert dirty.explanation.outliers[11]
+    clean, seen = (locate(f, {"backlash": 1.0})[0].axes for f in (plain, dirty))
+    for axis in "xyz":
+        assert seen[axis] == pytest.approx(clean[axis], abs=0.05)

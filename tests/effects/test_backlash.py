@@ -1,0 +1,82 @@
+"""Lost motion: short of where the joint was going, or where the load pushes it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers import SAMPLES, commanded, tool_at, tool_with
+
+from thermal_robot.effects import Backlash
+from thermal_robot.observations import observe
+
+
+def approached(arm, seed=6, **more):
+    """Commands with a direction of approach of every joint, (N, n) and the campaign."""
+    approach = np.random.default_rng(seed).choice([-1.0, 0.0, 1.0], (SAMPLES, arm.n))
+    columns = {f"approach.{n}": a for n, a in zip(arm.joint_names, approach.T, strict=True)}
+    return approach, commanded(arm, columns, **more)
+
+
+@pytest.mark.parametrize("arm", ["rv_m2", "ur10", "panda"], indirect=True)
+def test_lost_motion_stops_half_of_it_short_of_where_the_joint_was_going(arm):
+    approach, campaign = approached(arm)
+    lost = 2e-3 * (1.0 + np.arange(arm.n))
+    expected = tool_at(arm, campaign.q - 0.5 * lost * approach)
+    np.testing.assert_allclose(tool_with(campaign, Backlash(), lost), expected, atol=1e-14)
+
+
+def test_a_joint_without_a_recorded_approach_has_no_parameter(rv_m2):
+    _, campaign = approached(rv_m2)
+    campaign = campaign.drop_covariate("approach.joint_2")
+    places = [p.place for p in Backlash().parameters(observe(campaign))]
+    assert places == [n for n in rv_m2.joint_names if n != "joint_2"]
+    assert Backlash().missing(observe(campaign)) == ()
+    assert "approach.joint_2" not in Backlash().reads(observe(campaign))
+
+
+def test_it_is_drawn_against_the_approach_where_that_varies(rv_m2):
+    approach, campaign = approached(rv_m2)
+    observations = observe(campaign)
+    for j, parameter in enumerate(Backlash().parameters(observations)):
+        name, unit, values = Backlash().driver(observations, [parameter], approach[:, j])
+        assert (name, unit) == (f"approach.{parameter.place}", "")
+        np.testing.assert_array_equal(values, approach[:, j])
+    still = observe(replace(campaign, covariates={**campaign.covariates, "approach.joint_1": np.ones(SAMPLES)}))
+    assert Backlash().driver(still, Backlash().parameters(still)[:1], np.ones(SAMPLES)) is None
+
+
+def test_no_torque_no_play_that_hangs(rv_m2):
+    _, campaign = approached(rv_m2)
+    assert {s.held for s in Backlash().variants(observe(campaign))} == {0.0, 0.5, 0.7, 0.9}
+    floating = replace(rv_m2, gravity=np.zeros(3))
+    assert Backlash().variants(observe(replace(campaign, robot=floating))) == (Backlash(),)
+
+
+def test_shares_near_another_stay_shares():
+    held = Backlash(held=0.9, largest=(1.0,))
+    for factor in (1.05, 1.6, 20.0):
+        near = held.nearby(factor)
+        assert held in near
+        assert all(0.0 < s.held < 1.0 for s in near)
+        assert min(s.held for s in near) < 0.9 < max(s.held for s in near)
+    assert Backlash().nearby(1.6) == (Backlash(),)
+
+
+@pytest.mark.parametrize("arm", ["ur10", "rv_m2"], indirect=True)
+def test_play_that_hangs_lies_where_the_load_pushes_it(arm):
+    """A joint on a very soft spring goes with gravity; one that hangs in its play goes the same way."""
+    pytest.importorskip("mujoco")
+    from thermal_robot.blind.reality.world import World
+
+    com, payload = (0.0, 0.0, 0.05), np.tile([0.0, 2.0], SAMPLES // 2)
+    approach = {f"approach.{joint}": np.tile([1.0, -1.0], SAMPLES // 2) for joint in arm.joint_names}
+    campaign = commanded(arm, {"payload": payload, **approach}, payload_com=np.array(com))
+    effect = Backlash().variants(observe(campaign))[1]
+    world = World(arm.urdf, arm.tool_frame, com)
+    torque = world.poses(campaign.q, payload, world.sound(SAMPLES))[1]
+    for j, parameter in enumerate(effect.parameters(observe(campaign))):
+        shift = parameter.responses[0].values
+        heavy = np.abs(torque[:, j]) > 0.5 * np.abs(torque[:, j]).max()
+        heavy &= np.abs(torque[:, j]).max() > 0.02 * np.abs(torque).max()
+        np.testing.assert_array_equal(np.sign(shift[heavy]), -np.sign(torque[heavy, j]))
+        np.testing.assert_array_equal(shift[~heavy], -0.5 * approach[f"approach.{arm.joint_names[j]}"][~heavy])

@@ -1,0 +1,168 @@
+"""A law that nobody wrote down, as an effect: places, quantities, labels, words, and a file of its own."""
+
+import importlib.util
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers import SAMPLES, commanded
+
+from thermal_robot import CorrectedModel
+from thermal_robot.effects.apply import displacement
+from thermal_robot.effects.gate import checked
+from thermal_robot.effects.law import PREFIX, Discovered
+from thermal_robot.effects.shapes import SHAPES
+from thermal_robot.observations import Frames, observe
+
+TIME = np.array([0.0, 40.0, 100.0, 180.0, 300.0, 420.0, 500.0, 610.0, 700.0, 800.0])
+STEP = Discovered(kind="joint", place="joint_3", quantity="time", shape="step", marks=(350.0,), span=800.0, unit="s")
+
+
+@pytest.fixture(scope="module")
+def observations(rv_m2):
+    labels = {"session": np.array(list("aabbbccaca"))}
+    return observe(replace(commanded(rv_m2, {"time": TIME}), labels=labels))
+
+
+def test_a_step_displaces_its_joint_before_and_after(observations):
+    moved, _ = displacement(observations, [(STEP, np.array([1e-4, 5e-4]))])
+    np.testing.assert_array_equal(moved.joint[:, 2], np.where(TIME > 350.0, 5e-4, 1e-4))
+    assert not np.any(np.delete(moved.joint, 2, axis=1))
+
+
+@pytest.mark.parametrize(("kind", "place"), [("base", "base"), ("tool", "tool"), ("link", "joint_4")])
+def test_elsewhere_than_in_a_joint_it_is_a_twist(observations, rv_m2, kind, place):
+    law = replace(STEP, kind=kind, place=place)
+    parameters = checked(law, observations)
+    assert [p.unit for p in parameters] == (["m"] * 3 + ["rad"] * 3) * 2
+    values = np.zeros(12)
+    values[6 + 4] = 3e-4
+    moved, _ = displacement(observations, [(law, values)])
+    segment = next(s for s, segment in enumerate(rv_m2.segments) if segment.name == "joint_4")
+    found = {"base": moved.base, "tool": moved.tool, "link": moved.segment[:, segment]}[kind]
+    expected = np.zeros((SAMPLES, 6))
+    expected[TIME > 350.0, 4] = 3e-4
+    np.testing.assert_array_equal(found, expected)
+    link = rv_m2.segments[segment].parent_link
+    assert {(p.kind, p.place) for p in parameters} == {(kind, link if kind == "link" else kind)}
+
+
+def test_without_orientation_a_turn_of_the_tool_is_no_parameter(observations):
+    law = replace(STEP, kind="tool", place="tool", turns=False)
+    assert [p.unit for p in checked(law, observations)] == ["m"] * 6
+    # the base turns the target about itself: that shows
+    assert len(checked(replace(law, kind="base", place="base"), observations)) == 12
+
+
+def test_a_slide_that_errs_errs_by_a_length(awkward):
+    slide = next(n for n, kind in zip(awkward.joint_names, awkward.joint_types, strict=True) if kind == "prismatic")
+    law = Discovered(kind="joint", place=slide, quantity=slide, shape="ramp")
+    assert {p.unit for p in checked(law, observe(commanded(awkward)))} == {"m"}
+
+
+def test_a_session_has_a_value_each_and_an_unknown_one_that_of_the_last(observations):
+    law = Discovered(
+        place="joint_1", quantity="session", shape="levels", marks=(0.0, 1.0, 2.0), span=2.0, labels=("a", "b", "c")
+    )
+    assert [p.label for p in checked(law, observations)] == ["at a", "at b", "at c"]
+    values = np.array([1e-4, 2e-4, 3e-4])
+
+    def shifts(labels):
+        campaign = replace(observations.campaign, labels={"session": np.array(list(labels))})
+        return displacement(observe(campaign), [(law, values)])[0].joint[:, 0]
+
+    by_name = {"a": 1e-4, "b": 2e-4, "c": 3e-4}
+    np.testing.assert_array_equal(shifts("aabbbccaca"), [by_name[s] for s in "aabbbccaca"])
+    # a later campaign with other sessions, whose numbers in its own alphabet differ
+    np.testing.assert_array_equal(shifts("zzbbbzzzcc"), [by_name.get(s, 3e-4) for s in "zzbbbzzzcc"])
+
+
+def test_what_is_predicted_without_a_clock_comes_after_the_campaign(rv_m2):
+    law = Discovered(place="joint_1", quantity="order", shape="ramp", origin=0.0, span=9.0)
+    commands = commanded(rv_m2)
+    measured = observe(replace(commands, position=np.zeros((SAMPLES, 3))))
+    np.testing.assert_array_equal(law.values(measured), np.arange(10.0))
+    np.testing.assert_array_equal(law.values(observe(commands)), 9.0)
+
+
+def test_it_is_missing_and_reads_what_it_follows(observations, rv_m2):
+    bare = observe(commanded(rv_m2))
+    assert (STEP.missing(observations), STEP.missing(bare)) == ((), ("time",))
+    assert (STEP.reads(observations), STEP.reads(bare)) == (("time",), ())
+    assert STEP.parameters(bare) == ()
+    own = replace(STEP, quantity="joint_2")
+    assert (own.missing(bare), own.reads(bare)) == ((), ())
+    constant = replace(STEP, shape="constant", quantity="none", marks=())
+    assert (constant.missing(bare), constant.reads(bare)) == ((), ())
+
+
+def test_marks_that_look_alike_in_three_digits_have_names_of_their_own(rv_m2):
+    marks = (12340.0, 12341.0, 12342.5, 20000.0)
+    clock = np.linspace(12340.0, 20000.0, SAMPLES)
+    seen = observe(commanded(rv_m2, {"time": clock}))
+    for shape in ("levels", "smooth"):
+        law = Discovered(place="joint_1", quantity="time", shape=shape, marks=marks, origin=12340.0, span=7660.0)
+        assert len({p.name for p in checked(law, seen)}) == 4
+
+
+@pytest.mark.parametrize("shape", SHAPES)
+def test_it_is_described_by_place_quantity_and_shape(shape):
+    law = replace(STEP, shape=shape, marks=(-350.0, 20.0))
+    words = law.describe()
+    assert "joint joint_3" in words
+    assert ("time" in words) == (shape != "constant")
+    assert ("−350 s" in words) == bool(SHAPES[shape].mark)
+    assert "{" not in words
+
+
+@pytest.mark.parametrize(
+    ("law", "words"),
+    [
+        (STEP, "an error at joint joint_3 that follows time (a step at 350 s)"),
+        (replace(STEP, kind="base", shape="ramp"), "an error at the base that follows time (in proportion)"),
+        (replace(STEP, kind="link", shape="constant"), "a constant error at the placement of joint_3"),
+        (
+            replace(STEP, quantity="joint_3", shape="harmonic", marks=(101.0,)),
+            "an error at joint joint_3 that follows joint_3 (harmonic of order 101)",
+        ),
+        (replace(STEP, shape="smooth"), "an error at joint joint_3 that follows time (smooth)"),
+    ],
+)
+def test_its_words(law, words):
+    assert law.describe() == words
+
+
+def test_it_is_drawn_against_what_it_follows(observations):
+    name, unit, values = STEP.driver(observations, checked(STEP, observations), np.zeros(SAMPLES))
+    assert (name, unit) == ("time", "s")
+    np.testing.assert_array_equal(values, TIME)
+    constant = replace(STEP, shape="constant", quantity="none")
+    assert constant.driver(observations, checked(constant, observations), np.zeros(SAMPLES)) is None
+
+
+@pytest.mark.parametrize("shape", ["step", "smooth", "levels", "hinge"])
+def test_as_a_file_it_does_the_same_under_its_own_name(observations, tmp_path, shape):
+    marks = {"step": (350.0,), "hinge": (350.0, -1.0)}.get(shape, (0.0, 200.0, 400.0, 800.0))
+    law = replace(STEP, shape=shape, marks=marks)
+    values = 1e-4 * (1.0 + np.arange(len(checked(law, observations))))
+    (tmp_path / "slipping_belt.py").write_text(law.to_source(values, "slipping_belt"), encoding="utf-8")
+    spec = importlib.util.spec_from_file_location("slipping_belt", tmp_path / "slipping_belt.py")
+    module = importlib.util.module_from_spec(spec)
+    spec.loader.exec_module(module)
+    named = module.SlippingBelt()
+    assert (named.name, named.title) == ("slipping_belt", "slipping belt")
+    own, again = (displacement(observations, [(e, values)])[0].joint for e in (law, named))
+    np.testing.assert_array_equal(own, again)
+    assert all(f"{v:.4g}" in module.SlippingBelt.__doc__ for v in values)
+
+
+def test_a_model_keeps_it_whole(observations, tmp_path, rv_m2):
+    law = replace(STEP, name=PREFIX + "3", labels=("a", "b"))
+    campaign = observations.campaign
+    model = CorrectedModel(
+        rv_m2, campaign.settings, Frames.declared(campaign), ((law, np.array([1e-4, 5e-4])),), "position", ("time",)
+    )
+    model.save(tmp_path / "model.json")
+    again = CorrectedModel.load(tmp_path / "model.json")
+    assert again.effects[0][0] == law
+    np.testing.assert_array_equal(again.predict(campaign)[0], model.predict(campaign)[0])

@@ -1,0 +1,71 @@
+"""Links that bend under the weight on their end: against rows of hinges in MuJoCo, energy, and steel tables."""
+
+import numpy as np
+import pytest
+from bodies import bodies, displaced, mine
+from helpers import commanded, without_masses
+
+from thermal_robot.campaign import Campaign
+from thermal_robot.effects import LinkCompliance
+from thermal_robot.effects.beam import beams, cross_axes
+from thermal_robot.observations import observe
+
+
+@pytest.mark.parametrize("arm", ["ur10", "panda", "rv_m2"], indirect=True)
+def test_a_beam_of_hinges_bends_as_the_cantilever(arm):
+    campaign, world, at = bodies(arm)
+    stiffness = 1e-7 * (1.0 + np.arange(2.0 * len(at)).reshape(-1, 2))
+    for chosen in (*range(len(at)), slice(None)):
+        values = np.zeros_like(stiffness)
+        values[chosen] = stiffness[chosen]
+        body = world.sound(len(campaign.q))
+        body.beams[at] = values
+        expected = displaced(world, campaign, body)
+        found = mine(campaign, LinkCompliance(), values.ravel())
+        if np.abs(expected).max() < 1e-10:
+            assert np.abs(found).max() < 1e-9
+            continue
+        # three hinges lack a 36th of what a force on the end does
+        error = np.linalg.norm(found - expected, axis=1).max() / np.linalg.norm(expected, axis=1).max()
+        assert error < 0.03, f"segment {chosen}: {error:.3f}"
+
+
+@pytest.mark.parametrize("arm", ["ur10", "rv_m2", "awkward"], indirect=True)
+def test_a_loaded_elastic_link_sinks(arm):
+    """Whatever bends, the load's own place goes down: it pays for the work that bends the links."""
+    bare = without_masses(arm)
+    place = np.array([0.02, -0.01, 0.05])
+    campaign = commanded(bare, {"payload": np.full(10, 3.0)}, payload_com=place, target=place)
+    count = len(LinkCompliance().parameters(observe(campaign)))
+    fallen = mine(campaign, LinkCompliance(), 1e-8 * (1.0 + np.arange(count)))
+    assert (fallen @ bare.gravity > 0.0).all()
+
+
+def test_what_hangs_without_weight_does_not_bend(rv_m2):
+    assert LinkCompliance().missing(observe(commanded(rv_m2))) == ()
+    bare = without_masses(rv_m2)
+    assert LinkCompliance().missing(observe(commanded(bare))) == ("payload", "masses in the URDF")
+    loaded = commanded(bare, {"payload": np.full(10, 2.0)})
+    assert LinkCompliance().missing(observe(loaded)) == ()
+
+
+def test_the_softest_segment_sags_by_a_fifth_of_a_millimetre_at_its_expected_size(rv_m2):
+    observations = observe(Campaign("commands", rv_m2, commanded(rv_m2).q))
+    parameters = LinkCompliance().parameters(observations)
+    shifts = [p.size * np.linalg.norm(p.responses[0].values[:, :3], axis=1).max() for p in parameters]
+    assert max(shifts) == pytest.approx(2e-4)
+    assert len(parameters) == 2 * len(beams(rv_m2))
+
+
+def test_it_is_drawn_against_the_moment_that_bends_it(rv_m2):
+    observations = observe(commanded(rv_m2))
+    loads = observations.segment_load
+    for parameter in LinkCompliance().parameters(observations):
+        s = parameter.responses[0].index
+        axis = cross_axes(rv_m2, s)[int(parameter.label[-1]) - 1]
+        error = 1e-6 * loads[:, s, 3:] @ axis
+        name, unit, values = LinkCompliance().driver(observations, [parameter], error)
+        assert (name, unit) == (f"bending moment on {parameter.place}", "N·m")
+        if np.ptp(error) > 1e-9:
+            # its own unit is the moment's, about the axis that the error was made with
+            np.testing.assert_allclose(values, loads[:, s, 3:] @ axis, atol=1e-6 * np.abs(loads).max())

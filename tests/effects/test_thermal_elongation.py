@@ -1,0 +1,82 @@
+"""Links that grow with temperature, at once or with a lag."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from conftest import load_arm
+from helpers import SAMPLES, commanded, tool_at, tool_with
+from simulate import simulate
+
+from thermal_robot.effects import ThermalElongation
+from thermal_robot.effects.channel import by_place
+from thermal_robot.observations import observe
+
+on_arms = pytest.mark.parametrize("arm", ["rv_m2", "ur10", "panda"], indirect=True)
+
+
+@on_arms
+@pytest.mark.parametrize("reference", [20.0, 25.0])
+def test_an_arm_that_expands_evenly_keeps_its_shape(arm, reference):
+    temperature = np.linspace(15.0, 60.0, SAMPLES)
+    campaign = commanded(arm, {"temperature": temperature}, reference_temperature=reference)
+    alpha = 2e-5
+    expected = (1.0 + alpha * (temperature - reference))[:, None] * tool_at(arm, campaign.q)
+    for effect in (ThermalElongation(), ThermalElongation(common=True)):
+        grown = tool_with(campaign, effect, np.full(len(effect.parameters(observe(campaign))), alpha))
+        np.testing.assert_allclose(grown, expected, atol=1e-14)
+
+
+@on_arms
+def test_each_segment_follows_its_parent_links_own_temperature(arm):
+    general = np.linspace(21.0, 30.0, SAMPLES)
+    link = arm.segments[2].parent_link
+    own = general + 7.0
+    effect = ThermalElongation()
+    uniform = commanded(arm, {"temperature": general})
+    one = commanded(arm, {"temperature": general, f"temperature.{link}": own})
+    for parameter, plain in zip(effect.parameters(observe(one)), effect.parameters(observe(uniform)), strict=True):
+        ratio = parameter.responses[0].values[:, :3] @ plain.responses[0].values[0, :3]
+        ratio /= plain.responses[0].values[:, :3] @ plain.responses[0].values[0, :3]
+        expected = (own - 20.0) / (general - 20.0) if parameter.place == link else np.ones(SAMPLES)
+        np.testing.assert_allclose(ratio, expected, rtol=1e-12)
+
+
+def test_links_lag_only_behind_a_general_temperature_with_a_time():
+    data = simulate(load_arm("rv_m2"), samples=20, links=True)[0]
+    links = {k: v for k, v in data.covariates.items() if not k.startswith("temperature.")}
+    for covariates, lags in (
+        (data.covariates, {0.0}),
+        (links, {0.0, 600.0, 1500.0, 3600.0}),
+        ({k: v for k, v in links.items() if k != "time"}, {0.0}),
+    ):
+        settings = ThermalElongation().variants(observe(replace(data, covariates=covariates)))
+        assert {s.lag for s in settings} == lags
+        assert {s.reads(observe(replace(data, covariates=links))) for s in settings if s.lag} <= {
+            ("temperature", "time")
+        }
+
+
+def test_only_a_lag_may_be_refined():
+    assert ThermalElongation().nearby(1.6) == (ThermalElongation(),)
+    lagging = ThermalElongation(common=True, lag=1500.0, times=(0.0, 1.0), temperatures=(20.0, 21.0))
+    assert {(s.lag, s.common) for s in lagging.nearby(2.0)} == {
+        (1500.0, True),
+        (3000.0, True),
+        (750.0, True),
+        (1500.0, False),
+    }
+
+
+def test_it_is_drawn_against_the_links_own_temperature_or_the_robots(rv_m2):
+    general = np.linspace(21.0, 30.0, SAMPLES)
+    link = rv_m2.segments[2].parent_link
+    observations = observe(commanded(rv_m2, {"temperature": general, f"temperature.{link}": general + 7.0}))
+    for effect in (ThermalElongation(), ThermalElongation(common=True)):
+        parts = [part for p in effect.parameters(observations) for part in by_place(rv_m2, p)]
+        assert link in {part.place for part in parts}
+        for part in parts:
+            name, unit, values = effect.driver(observations, [part], np.zeros(SAMPLES))
+            own = part.place == link
+            assert (name, unit) == (f"temperature.{link}" if own else "temperature", "°C")
+            np.testing.assert_array_equal(values, general + 7.0 * own)

@@ -1,0 +1,61 @@
+"""From values to displacement: what a set of fitted effects does to the robot."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thermal_robot.effects.effect import Array, Effect
+from thermal_robot.effects.gate import checked
+from thermal_robot.kinematics import Displacement
+
+if TYPE_CHECKING:
+    from thermal_robot.observations import Observations
+
+
+def displacement(
+    observations: Observations, effects: Sequence[tuple[Effect, Array]]
+) -> tuple[Displacement, Array | None]:
+    """Return what a set of fitted values does: the displacement of the chain, and of the measured point.
+
+    Parameters
+    ----------
+    observations
+        What the responses are read from.
+    effects
+        Each effect with the (P,) values of its parameters.
+
+    Returns
+    -------
+    displacement
+        The four channels.
+    instrument
+        (N, 3) in the measurement frame, m; ``None`` where no effect acts on the instrument.
+
+    Raises
+    ------
+    EffectError
+        If an effect's parameters break the contract.
+    """
+    samples, robot = observations.campaign.samples, observations.robot
+    joint = np.zeros((samples, robot.n))
+    segment = np.zeros((samples, len(robot.segments), 6))
+    base, tool = np.zeros((samples, 6)), np.zeros((samples, 6))
+    instrument: Array | None = None
+    for effect, values in effects:
+        for parameter, value in zip(checked(effect, observations), values, strict=True):
+            for response in parameter.responses:
+                moved = value * response.values
+                if response.channel == "joint":
+                    joint[:, response.index] += moved
+                elif response.channel == "segment":
+                    segment[:, response.index] += moved
+                elif response.channel == "base":
+                    base += moved
+                elif response.channel == "tool":
+                    tool += moved
+                else:
+                    instrument = moved if instrument is None else instrument + moved
+    return Displacement(joint=joint, segment=segment, base=base, tool=tool), instrument

@@ -1,0 +1,128 @@
+"""All effects by name: the program's own, those of installed packages, and the choice among them."""
+
+from __future__ import annotations
+
+import difflib
+import warnings
+from collections.abc import Iterable
+from importlib.metadata import EntryPoint, entry_points
+
+from thermal_robot.effects.backlash import Backlash
+from thermal_robot.effects.base_frame import BaseFrame
+from thermal_robot.effects.drift import Drift
+from thermal_robot.effects.effect import Effect
+from thermal_robot.effects.encoder_resolution import EncoderResolution
+from thermal_robot.effects.excess_repeatability import ExcessRepeatability
+from thermal_robot.effects.geometric import Geometric
+from thermal_robot.effects.instrument_scale import InstrumentScale
+from thermal_robot.effects.joint_compliance import JointCompliance
+from thermal_robot.effects.joint_gain import JointGain
+from thermal_robot.effects.joint_offset import JointOffset
+from thermal_robot.effects.link_compliance import LinkCompliance
+from thermal_robot.effects.random_effect import RandomEffect
+from thermal_robot.effects.thermal_bending import ThermalBending
+from thermal_robot.effects.thermal_elongation import ThermalElongation
+from thermal_robot.effects.tool_frame import ToolFrame
+from thermal_robot.effects.tracking_lag import TrackingLag
+from thermal_robot.effects.transmission_error import TransmissionError
+from thermal_robot.errors import EffectError
+
+_SYSTEMATIC: tuple[type[Effect], ...] = (
+    BaseFrame,
+    ToolFrame,
+    JointOffset,
+    JointGain,
+    TransmissionError,
+    Backlash,
+    JointCompliance,
+    TrackingLag,
+    Geometric,
+    LinkCompliance,
+    ThermalElongation,
+    ThermalBending,
+    Drift,
+    InstrumentScale,
+)
+_RANDOM: tuple[type[RandomEffect], ...] = (EncoderResolution, ExcessRepeatability)
+
+RANDOM = tuple(kind.name for kind in _RANDOM)
+"""Names of the effects that scatter."""
+
+
+def random_effects() -> tuple[RandomEffect, ...]:
+    """Return the effects that scatter: told from what remains, not fitted."""
+    return tuple(kind() for kind in _RANDOM)
+
+
+def library() -> dict[str, Effect]:
+    """Return every effect that is fitted, by name: the program's own, then those of installed packages.
+
+    Warns
+    -----
+    UserWarning
+        If an entry point cannot be loaded, gives something that is not an effect, or a name that is already taken; it
+        is left out.
+    """
+    found: dict[str, Effect] = {kind.name: kind() for kind in _SYSTEMATIC}
+    for point in entry_points(group="thermal_robot.effects"):
+        try:
+            effect = _load(point)
+            _refuse(effect, found)
+        except Exception as error:  # another package's code may raise anything
+            reason = str(error) if isinstance(error, EffectError) else f"it raises {error!r}"
+            warnings.warn(
+                f"entry point {point.name!r} ({point.value}) is left out: {reason}", UserWarning, stacklevel=2
+            )
+            continue
+        found[effect.name] = effect
+    return found
+
+
+def _load(point: EntryPoint) -> Effect:
+    loaded = point.load()
+    effect: Effect = loaded() if isinstance(loaded, type) else loaded
+    return effect
+
+
+def _refuse(effect: Effect, known: dict[str, Effect]) -> None:
+    """Raise unless something is an effect that can stand beside those that are known."""
+    if not isinstance(effect, Effect) or not isinstance(effect.name, str) or not effect.name:
+        raise EffectError(f"{effect!r} is not an effect with a name; expected an instance of a subclass of Effect")
+    if effect.random:
+        raise EffectError(f"{effect.name!r} is random; only {' and '.join(RANDOM)} are told from scatter")
+    if effect.name in known or effect.name in RANDOM:
+        raise EffectError(f"there are two effects named {effect.name!r}")
+
+
+def choose(
+    only: str | Iterable[str] = (), without: str | Iterable[str] = (), own: Iterable[Effect] = ()
+) -> tuple[Effect, ...]:
+    """Return the effects to be fitted that a user asked for; names of random ones may be asked for, too.
+
+    Parameters
+    ----------
+    only
+        Names to keep; all where empty.
+    without
+        Names to leave out.
+    own
+        The user's own effects, beside those of the library.
+
+    Raises
+    ------
+    EffectError
+        If a name is not known, taken twice, or nothing is left; if one of ``own`` is not an effect.
+    """
+    known = library()
+    for effect in own:
+        _refuse(effect, known)
+        known[effect.name] = effect
+    only, without = ((names,) if isinstance(names, str) else tuple(names) for names in (only, without))
+    for name in (*only, *without):
+        if name not in known and name not in RANDOM:
+            near = difflib.get_close_matches(name, (*known, *RANDOM), n=3, cutoff=0.3) or sorted(known)
+            raise EffectError(f"no effect is named {name!r}; near to it: {', '.join(near)}")
+    chosen = tuple(e for name, e in known.items() if (not only or name in only) and name not in without)
+    if not chosen:
+        raise EffectError("no effect is left to consider")
+    return chosen

@@ -1,0 +1,135 @@
+"""The shapes of laws that nobody wrote down, one entry each: functions of a quantity, their names, their words.
+
+========= ======================================================= ==========================
+shape     φ_k(x), with u = (x − origin) / span                    marks
+========= ======================================================= ==========================
+constant  1
+ramp      1, u
+quadratic 1, u, u²
+step      x ≤ m, x > m                                            where it steps
+slide     ½ (1 ∓ tanh((x − m) / w))                               middle, width
+hinge     1, max(x − m, 0) / span, or on the other side           where it bends, side ±1
+bump      1, exp(−½ ((x − m) / w)²)                               middle, width
+drag      1, x / span, sign(x)                                    of a quantity with a sign
+harmonic  1, sin(k x), cos(k x)                                   order k
+levels    x = m_k                                                 the levels
+smooth    natural cubic splines that are 1 at one knot, 0 at all  the knots
+          others
+========= ======================================================= ==========================
+
+Splines: Hastie, Tibshirani and Friedman, *The Elements of Statistical Learning*, 2009, 5.2.1; beyond the outer knots
+they run straight.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from thermal_robot.effects.effect import Array
+
+Functions = Callable[[Array, tuple[float, ...], float, float], Array]
+"""(N, K) of the (N,) quantity, the marks, origin and span."""
+
+
+@dataclass(frozen=True)
+class Shape:
+    """One shape of a law.
+
+    Attributes
+    ----------
+    functions
+        The φ of the table above.
+    labels
+        A name for each; empty where each is a value at one of the marks.
+    words
+        The shape in a sentence; ``{mark}`` stands for its first mark with the quantity's unit, ``{order}`` without.
+    mark
+        What the first mark is for whoever refines it: ``sudden`` where moving it changes the functions only when it
+        passes a row, ``gradual`` where they change smoothly; empty where it is not to be moved.
+    width
+        Whether the second mark is a width, to be refined, too.
+    """
+
+    functions: Functions
+    labels: tuple[str, ...]
+    words: str
+    mark: Literal["", "sudden", "gradual"] = ""
+    width: bool = False
+
+
+def _constant(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
+    return np.ones((len(x), 1))
+
+
+def _ramp(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
+    return np.column_stack([np.ones_like(x), (x - origin) / span])
+
+
+def _quadratic(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
+    u = (x - origin) / span
+    return np.column_stack([np.ones_like(u), u, u**2])
+
+
+def _step(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
+    late = x > marks[0]
+    return np.column_stack([~late, late]).astype(float)
+
+
+def _slide(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
+    middle, width = marks
+    late = 0.5 * (1.0 + np.tanh((x - middle) / width))
+    return np.column_stack([1.0 - late, late])
+
+
+def _hinge(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
+    mark, side = marks
+    return np.column_stack([np.ones_like(x), np.maximum(side * (x - mark), 0.0) / span])
+
+
+def _bump(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
+    middle, width = marks
+    return np.column_stack([np.ones_like(x), np.exp(-0.5 * ((x - middle) / width) ** 2)])
+
+
+def _drag(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
+    return np.column_stack([np.ones_like(x), x / span, np.sign(x)])
+
+
+def _harmonic(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
+    return np.column_stack([np.ones_like(x), np.sin(marks[0] * x), np.cos(marks[0] * x)])
+
+
+def _levels(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
+    return np.asarray(np.eye(len(marks))[np.abs(x[:, None] - np.array(marks)).argmin(axis=1)])
+
+
+def _smooth(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
+    from scipy.interpolate import CubicSpline
+
+    knots = (np.array(marks) - origin) / span
+    u = (x - origin) / span
+    spline = CubicSpline(knots, np.eye(len(knots)), bc_type="natural")
+    inside = spline(np.clip(u, knots[0], knots[-1]))
+    slope = spline(knots[[0, -1]], 1)
+    beyond = np.minimum(u - knots[0], 0.0)[:, None] * slope[0] + np.maximum(u - knots[-1], 0.0)[:, None] * slope[1]
+    return np.asarray(inside + beyond)
+
+
+SHAPES: dict[str, Shape] = {
+    "constant": Shape(_constant, ("constant",), "constant"),
+    "ramp": Shape(_ramp, ("at the start", "rise over the campaign"), "in proportion"),
+    "quadratic": Shape(_quadratic, ("constant", "linear", "quadratic"), "quadratic"),
+    "step": Shape(_step, ("before", "after"), "a step at {mark}", "sudden"),
+    "slide": Shape(_slide, ("before", "after"), "a smooth step at {mark}", "gradual", width=True),
+    "hinge": Shape(_hinge, ("constant", "slope beyond, over the range"), "a bend at {mark}", "gradual"),
+    "bump": Shape(_bump, ("constant", "height"), "a bump at {mark}", "gradual", width=True),
+    "drag": Shape(_drag, ("constant", "slope over the range", "of its sign"), "its slope and its sign"),
+    "harmonic": Shape(_harmonic, ("constant", "sine", "cosine"), "harmonic of order {order:g}"),
+    "levels": Shape(_levels, (), "a value at each of its levels"),
+    "smooth": Shape(_smooth, (), "smooth"),
+}
+"""Every shape by its name."""
