@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -117,7 +117,7 @@ def random_gap(fit: Fit) -> RandomGap:
         if 2 * within.sum() < len(within):
             break  # most rows lie beyond any scatter: robot and table do not belong together
         used = within & asked
-    laws, steps, kept = _judge(fit, scatter, gap[used], pose, used)
+    laws, steps, kept = _judge(fit, scatter, gap[used], pose, used, noise)
     findings = (_finding(fit, scatter, STEPS, "pose", kept), _finding(fit, scatter, WEAR, "visit", kept))
     p_value, explains = _size(scatter, kept, gap[used], sensitivity[used], noise, held, freedom)
     return RandomGap(findings, explains, p_value, scatter, steps, laws, _note(scatter, laws, kept))
@@ -168,11 +168,13 @@ class _Mean:
         return np.bincount(self.number, self.weight).astype(float)
 
     def __call__(self, values: Array) -> Array:
-        return np.asarray(np.bincount(self.number, self.weight * values) / self.total)
+        sums = np.zeros((len(self.total), *values.shape[1:]))
+        np.add.at(sums, self.number, (self.weight * values.T).T)
+        return np.asarray((sums.T / self.total).T)
 
 
 def _judge(
-    fit: Fit, scatter: Scatter, gap: Array, pose: NDArray[np.int64], used: NDArray[np.bool_]
+    fit: Fit, scatter: Scatter, gap: Array, pose: NDArray[np.int64], used: NDArray[np.bool_], noise: Array
 ) -> tuple[dict[str, str], dict[str, float], list[_Kept]]:
     """Tell scatter from laws, and steps from scatter."""
     names, sensitivity = fit.campaign.robot.joint_names, fit.corrected.joint_sensitivity
@@ -182,16 +184,17 @@ def _judge(
     steps: dict[str, float] = {}
     kept: list[_Kept] = []
     for c in (c for c in scatter.components if c.chosen):
-        errors, spread = joint_errors(scatter, gap, sensitivity[used], c.joint)
-        weight = 1.0 / (spread**2 + c.sigma**2)
-        mean = _Mean(number, weight)
-
         if c.kind == "visit":
+            errors, spread = joint_errors(scatter, gap, sensitivity[used], c.joint)
+            weight = 1.0 / (spread**2 + c.sigma**2)
+            mean = _Mean(number, weight)
             common, counts = mean(errors)[number], np.bincount(number)[number] > 1
             errors, weight = (errors - common)[counts], weight[counts]
             law = _law(errors, weight, {name: (v - mean(v)[number])[counts] for name, v in recorded.items()})
         else:
-            errors, weight, command = mean(errors), mean.total, mean(fit.campaign.q[used, c.joint])
+            mean = _Mean(number, np.ones(len(number)))
+            errors, variance = _pose_errors(scatter, gap, sensitivity[used], mean, c.joint, noise)
+            weight, command = 1.0 / (variance + c.sigma**2), mean(fit.campaign.q[used, c.joint])
             law = _law(errors, weight, {name: mean(v) for name, v in recorded.items()})
         if law:
             laws[names[c.joint]] = law
@@ -206,6 +209,28 @@ def _judge(
         doubtful = len(scatter.kinds) == 1 and (p is None or p > _LEVEL)
         kept.append(_Kept(c, float(step), doubtful))
     return laws, steps, kept
+
+
+def _pose_errors(
+    scatter: Scatter, gap: Array, sensitivity: Array, mean: _Mean, joint: int, noise: Array
+) -> tuple[Array, Array]:
+    """(poses,) error of one joint in the mean of each pose's k visits, and its variance from everything else.
+
+    What comes anew at each visit averages out, what a pose brings does not: with N of the noise and N₀ of what visits
+    have in common from no joint, the mean has the covariance (N + J Λ_v Jᵀ)/k + N₀ + J Λ_u Jᵀ (Searle, Casella,
+    McCulloch, *Variance Components*, 1992, ch. 3).
+    """
+    gap, sensitivity, visits = mean(gap), mean(sensitivity), mean.total
+    errors, variance = np.zeros(len(visits)), np.zeros(len(visits))
+    for k in np.unique(visits):
+        own = visits == k
+        parts = [replace(c, sigma=c.sigma / np.sqrt(k)) if c.kind == "visit" else c for c in scatter.components]
+        rest = np.sqrt(scatter.noise**2 / k + (scatter.common * noise) ** 2)
+        averaged = replace(scatter, components=tuple(parts), noise=rest)
+        errors[own], spread = joint_errors(averaged, gap[own], sensitivity[own], joint)
+        anew = sum(c.sigma**2 for c in parts if c.chosen and (c.kind, c.joint) == ("visit", joint))
+        variance[own] = spread**2 + anew
+    return errors, variance
 
 
 def _law(errors: Array, weight: Array, recorded: Mapping[str, Array]) -> str:
