@@ -91,7 +91,7 @@ def _parser() -> argparse.ArgumentParser:
     paper = commands.add_parser("paper", help="the paper's figures beside the computed ones")
     paper.add_argument("--json", metavar="F", help="write the ledger as JSON ('-' prints it instead of the text)")
     paper.add_argument("--l5", metavar="M", type=float, help="wrist to tool point, m (default: 0.150, assumed)")
-    paper.add_argument("--markdown", action="store_true", help="print the table of the README instead of the text")
+    paper.add_argument("--markdown", action="store_true", help="print the table of docs/paper.md instead of the text")
     paper.set_defaults(run=_paper)
 
     from thermal_robot.blind import command  # light: it loads the trial once it is run
