@@ -112,7 +112,8 @@ def u_before_stabilisation(inputs: PaperInputs) -> Entry:
         f"{numbers(test.u, 1)} at the start",
         floats(test.u, share),
         AGREES if np.all(rejected) else PARTLY if np.any(rejected) else NOT_REPRODUCIBLE,
-        f"Means still at 0, held against Table 2: {np.sum(rejected)} of 6 components are critical. If all links lag alike, the means are rejected until less than "
+        f"Means still at 0, held against Table 2: {np.sum(rejected)} of 6 components are critical. If all links lag "
+        "alike, the means are rejected until less than "
         f"{' and '.join(numbers(100 * s, 0) for s in np.min(share, axis=1))} % (rows 1 and 2) of the rise is "
         f"missing{never}. The paper prints neither times nor time constants.",
     )
