@@ -4,7 +4,6 @@ import numpy as np
 import pytest
 
 from thermal_robot.assembly.probability import FlatNormal, UniformSpread, flat_normal_nd, joining_probability
-from thermal_robot.assembly.probability.links import link_nodes, planar_link_nodes
 
 COVARIANCE = np.array([[1.0, 0.4], [0.4, 0.5]])
 COLUMNS = np.array([[0.5, 0.2, 1.0, -0.3], [0.1, 0.6, 0.2, 0.4]])
@@ -85,18 +84,6 @@ def test_one_coordinate_of_a_box_probability_is_the_flat_normal():
     for bound in (-3.0, 0.0, 0.7):
         value = law.box_probability([-np.inf, -np.inf], [bound, np.inf])
         assert value == pytest.approx(float(line.cdf(bound)), rel=1e-12)
-
-
-@pytest.mark.parametrize("count", [2, 3, 4])
-def test_planar_nodes_keep_every_moment_of_the_sum(count):
-    columns = COLUMNS[:, :count]
-    few, few_weights = planar_link_nodes(np.eye(2), columns)
-    all_nodes, all_weights = link_nodes(np.eye(2), columns)
-    assert np.sum(few_weights) == pytest.approx(1.0, rel=1e-13)
-    for i in range(6):
-        for j in range(6):
-            powers = [(s[:, 0] ** i * s[:, 1] ** j) @ w for s, w in ((few, few_weights), (all_nodes, all_weights))]
-            assert powers[0] == pytest.approx(powers[1], rel=1e-11, abs=1e-13)
 
 
 def test_what_has_no_density_is_refused():

@@ -224,21 +224,6 @@ def test_uniform_over_the_area_is_a_mixture_of_its_tiles():
     assert value == pytest.approx(np.pi / 4.0 / area, rel=1e-9)
 
 
-@pytest.mark.parametrize("over", ["links", "area"])
-def test_spread_has_the_moments_of_its_draws(over):
-    columns = np.array([[1.0, 0.3, 0.7, 0.2], [0.2, 1.4, 0.6, -0.5]])
-    spread = UniformSpread.zonotope(columns, [-1.0, 0.0, -0.5, 0.0], [1.0, 0.7, 0.5, 2.0], over=over)
-    draws = spread.rvs(100_000, random_state=3)
-    error = np.sqrt(np.diag(spread.covariance) / 100_000)
-    assert np.all(np.abs(draws.mean(axis=0) - spread.mean) < 5.0 * error)
-    # Bounded variables: the standard error of a variance is below its own size times sqrt(2 / n).
-    np.testing.assert_allclose(np.cov(draws.T), spread.covariance, atol=5.0 * np.sqrt(2e-5) * spread.covariance.max())
-    inside = joining_probability(0.25 * np.eye(2), 3.0, -spread.mean, thermal=spread)
-    noisy = draws - spread.mean + 0.5 * np.random.default_rng(8).normal(size=draws.shape)
-    counted = np.mean(np.hypot(*noisy.T) < 1.5)
-    assert abs(counted - inside) < 5.0 * np.sqrt(inside * (1.0 - inside) / 100_000)
-
-
 def test_randomised_as_normal_adds_the_covariance():
     matrix, spread = np.diag([14.0, 18.0]) ** 2, UniformSpread.box([7.0, 16.0])
     expected = failing_probability(matrix + np.diag([49.0, 256.0]) / 3.0, 145.0)
