@@ -1,12 +1,10 @@
-"""The flat-normal distribution against mpmath, its limits, its quantiles and its fit."""
+"""The flat-normal distribution: its limits, quantiles, moments and draws, and Eqs 18 and 20."""
 
 import numpy as np
 import pytest
 from scipy import stats
 
 from thermal_robot.assembly.probability import FlatNormal, eq18_printed_area, flat_normal
-
-RATIOS = [1e-8, 1e-3, 0.05, 0.3, 0.58, 1.0, 1.7, 3.0, 1e3, 1e6]
 
 
 def test_no_uniform_part_is_normal_and_no_normal_part_is_uniform():

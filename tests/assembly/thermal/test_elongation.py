@@ -1,25 +1,13 @@
-"""Temperature to elongation to displacement: Eqs 5–11, Table 2 and the strain of the paper, and laws of every arm."""
+"""Temperature to elongation: Eq 5, the strain of the paper, and names of segments and links."""
 
 import numpy as np
 import pytest
 
-from thermal_robot import kinematics as kin
-from thermal_robot.assembly.thermal import (
-    displacement,
-    elongation,
-    expansion_coefficient,
-    expansion_coefficients,
-    segment_names,
-)
+from thermal_robot.assembly.thermal import elongation, expansion_coefficient, expansion_coefficients, segment_names
+from thermal_robot.assembly.thermal.elongation import columns_of, lengths, per_segment
 from thermal_robot.errors import RobotError
 
-# Table 2, row 1 with its own q3, and row 2; Δl of the paper's section 3.
-Q = np.array([[0.5235, 0.8726, -1.3965, -1.0471, 0.0], [1.3963, 0.3839, -1.2217, -0.7330, 0.0]])
-PAPER = 1e-6 * np.array([14, 5, 9, 7, 8])
-
-
-def lengths(robot):
-    return np.array([robot.segments[s].length for s in kin.growing(robot)])
+PAPER = 1e-6 * np.array([14, 5, 9, 7, 8])  # m, Δl of the paper's section 3
 
 
 def test_strain_behind_the_papers_elongations(rv_m2):
@@ -59,16 +47,42 @@ def test_elongation_is_equation_5_in_every_form(rv_m2):
     np.testing.assert_allclose(over_time[1], expected, rtol=1e-13)
 
 
+def test_twice_the_rise_is_twice_the_elongation_and_no_rise_none(arm):
+    coefficients = np.random.default_rng(3).uniform(1e-5, 3e-5, len(segment_names(arm)))
+    grown = [elongation(arm, 20.0 + rise, coefficients=coefficients) for rise in (0.0, 1.0, 2.0, -2.0)]
+    np.testing.assert_array_equal(grown[0], 0.0)
+    np.testing.assert_allclose(grown[2], 2.0 * grown[1], rtol=1e-12)
+    np.testing.assert_array_equal(grown[3], -grown[2])
+
+
+def test_names_lengths_and_columns_belong_together(arm):
+    names = segment_names(arm)
+    assert len(set(names)) == len(names) == len(lengths(arm))
+    assert np.all(lengths(arm) > 0.0)
+    for column, name in enumerate(names):
+        assert columns_of(arm, name) == (column,)
+        only = per_segment(arm, dict.fromkeys(names, 0.0) | {name: 1.0}, "value")
+        np.testing.assert_array_equal(only, np.eye(len(names))[column])
+    by_length = {segment.name: segment.length for segment in arm.segments}
+    np.testing.assert_array_equal(lengths(arm), [by_length[name] for name in names])
+
+
+def test_least_squares_weigh_long_segments_more(rv_m2):
+    # Two states that disagree: the common coefficient lies between them, nearer to the one with the larger rise.
+    grown = np.stack([2e-5 * lengths(rv_m2), 1e-5 * lengths(rv_m2) * 3.0])
+    found = expansion_coefficient(rv_m2, grown, np.array([[1.0], [3.0]]) * np.ones(5))
+    assert found == pytest.approx((2e-5 * 1.0 + 1e-5 * 9.0) / 10.0, rel=1e-12)
+
+
 @pytest.mark.parametrize(
     ("call", "words"),
     [
         (lambda r: elongation(r, {"column": 20.0}, coefficients=1e-5), "no temperature is given for joint_2, joint_3"),
         (lambda r: elongation(r, 20.0, coefficients={"elbow": 1e-5}), "'elbow' is no segment .* column_top, column"),
         (lambda r: elongation(r, 20.0, coefficients=[1e-5] * 4), r"shape \(4,\) does not fit the 5 segments"),
-        (lambda r: displacement(r, Q, np.zeros((3, 5))), r"\(3, 5\) do not fit 2 configurations"),
-        (lambda r: displacement(r, Q, np.zeros((1, 2, 5))), r"\(1, 2, 5\) do not fit"),
         (lambda r: expansion_coefficient(r, PAPER, 3.0, segments=["wrist"]), "'wrist' is no segment with a length"),
-        (lambda r: displacement(r, Q[:, :4], PAPER), r"expected \(N, 5\)"),
+        (lambda r: per_segment(r, {"column": 1.0, "hand": 2.0}, "mass"), "no mass is given for joint_2, joint_3"),
+        (lambda r: columns_of(r, "joint_5"), "'joint_5' is no segment with a length"),
     ],
 )
 def test_what_does_not_fit_is_said(rv_m2, call, words):
