@@ -65,14 +65,20 @@ def test_segment_in_space_is_flat_normal_along_it_and_normal_across():
 
 def test_zonotope_in_space_has_the_moments_of_its_draws_and_a_density_of_area_one():
     columns = np.array([[0.5, 0.2, 1.0, -0.3], [0.1, 0.6, 0.2, 0.4], [0.3, 0.0, 0.1, 0.9]])
+    nodes, weights = np.polynomial.hermite_e.hermegauss(14)
+    # What lies opposite has the same density, so that half of the space counts twice.
+    half = nodes > 0.0
+    units = np.stack(np.meshgrid(nodes[half], nodes, nodes, indexing="ij"), -1).reshape(-1, 3)
+    shares = 2.0 * np.einsum("i,j,k->ijk", weights[half], weights, weights).ravel() * np.exp(0.5 * np.sum(units**2, 1))
     for over in ("links", "area"):
         law = flat_normal_nd(np.diag([0.5, 0.8, 0.6]), UniformSpread.zonotope(columns, -1.0, 1.0, over=over))
-        nodes, weights = np.polynomial.legendre.leggauss(20)
-        scale = 5.5 * np.sqrt(np.diag(law.covariance))
-        points = np.stack(np.meshgrid(nodes, nodes, nodes, indexing="ij"), -1).reshape(-1, 3) * scale
-        mass = np.einsum("i,j,k->ijk", weights, weights, weights).ravel() * np.prod(scale) * law.pdf(points)
-        assert mass.sum() == pytest.approx(1.0, abs=1e-5)
-        np.testing.assert_allclose((points.T * mass) @ points, law.covariance, atol=1e-4)
+        root = np.linalg.cholesky(law.covariance)
+        points = units @ root.T
+        density = law.pdf(points)
+        np.testing.assert_allclose(law.pdf(-points[::100]), density[::100], rtol=1e-10)
+        mass = shares * density * np.linalg.det(root)
+        assert mass.sum() == pytest.approx(1.0, abs=1e-6)
+        np.testing.assert_allclose((points.T * mass) @ points, law.covariance, atol=1e-5)
         draws = law.rvs(50_000, random_state=2)
         limit = 5.0 * np.sqrt(2.0 / 50_000) * law.covariance.max()
         np.testing.assert_allclose(np.cov(draws.T), law.covariance, atol=limit)
