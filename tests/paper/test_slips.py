@@ -51,7 +51,7 @@ def test_two_values_of_q3_are_a_chord_about_the_elbow():
     for l5 in (0.15, 0.08):
         lever = np.sqrt(0.2**2 + l5**2 + 2.0 * 0.2 * l5 * np.cos(PaperInputs().poses[0][3]))
         found = computed(PaperInputs(l5=l5, pose_sets=50))["q3 of row 1"].values[0]
-        assert found == pytest.approx(2.0 * lever * np.sin(0.5 * 0.0003), rel=1e-7)
+        assert found == pytest.approx(2.0 * lever * np.sin(0.5 * 0.0003), rel=1e-7, abs=0.0)
 
 
 def test_kinematic_correlation_is_that_of_joints_that_err():
