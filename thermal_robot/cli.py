@@ -106,7 +106,7 @@ def _predict_arguments(predict: argparse.ArgumentParser) -> None:
 def _paper_arguments(paper: argparse.ArgumentParser) -> None:
     paper.add_argument("--json", metavar="F", help="write the ledger as JSON ('-' prints it instead of the text)")
     paper.add_argument("--l5", metavar="M", type=float, help="wrist to tool point, m (default: 0.150, assumed)")
-    paper.add_argument("--markdown", action="store_true", help="print the table of the README instead of the text")
+    paper.add_argument("--markdown", action="store_true", help="print the table of docs/paper.md instead of the text")
     paper.set_defaults(run=_paper)
 
 

@@ -19,7 +19,7 @@ NOT_PRINTED = "not printed"
 VERDICTS = {
     AGREES: "the printed figures are the computed ones, rounded, or lie within what the inputs' rounding leaves open",
     TRUNCATED: "the printed figures are the computed ones with the further digits cut off",
-    PARTLY: "the claim holds in a part of the range for which it is made",
+    PARTLY: "the claim holds in a part of the cases for which it is made",
     ERRATUM: "what the paper itself prints determines the figure, and it is another",
     NOT_REPRODUCIBLE: "no model or data in the paper lead to the figure",
     ONLY_BOUNDED: "what is printed leaves a range open that reaches zero",

@@ -17,6 +17,9 @@ Three = tuple[float, float, float]
 Four = tuple[float, float, float, float]
 Five = tuple[float, float, float, float, float]
 
+_SHORTEST, _LONGEST = 1e-3, 1e3
+# m, of l5: far beyond any hand on either side, and well within what squares and inverses of lengths bear.
+
 
 @dataclass(frozen=True)
 class PaperInputs:
@@ -40,7 +43,8 @@ class PaperInputs:
     experimental_sigma
         Table 1, standard deviations x y z in rows 1 and 2, m.
     static_displacements, sample_means
-        Table 2, displacement of the tool and mean of the sample, x y z in rows 1 and 2, m.
+        Table 2, displacement of the tool, which the paper says was measured, and mean of the sample, x y z in rows 1
+        and 2, m.
     n
         Size of each sample.
     n_simulated
@@ -65,7 +69,7 @@ class PaperInputs:
     Raises
     ------
     RobotError
-        If ``l5`` is not a positive finite number.
+        If ``l5`` is not a positive finite number, or shorter than 1 mm or longer than 1 km.
     """
 
     l5: float = 0.150
@@ -92,6 +96,8 @@ class PaperInputs:
     def __post_init__(self) -> None:
         if not 0.0 < self.l5 < np.inf:
             raise RobotError(f"l5 must be a positive number of metres, got {self.l5}", name="rv_m2")
+        if not _SHORTEST <= self.l5 <= _LONGEST:
+            raise RobotError(f"l5 must be from {_SHORTEST:g} to {_LONGEST:g} m long, got {self.l5}", name="rv_m2")
 
 
 @lru_cache(maxsize=8)

@@ -59,7 +59,7 @@ class Ledger:
         return tables.text(self.entries, self.counts)
 
     def markdown(self) -> str:
-        """Write the ledger as a table in Markdown, for the README."""
+        """Write the ledger as a table in Markdown, for docs/paper.md."""
         return tables.markdown(self.entries, self.counts)
 
     def to_dict(self) -> dict[str, Any]:

@@ -22,7 +22,7 @@ def upper(x):
 
 def exact_disc(matrix, clearance, mean):
     """Inside and outside, integrated over the coordinate along the *shorter* axis (the code takes the longer one)."""
-    with mp.workdps(50):
+    with mp.workdps(34):
         a, b, c = (mp.mpf(float(v)) for v in (matrix[0, 0], matrix[0, 1], matrix[1, 1]))
         radius, m = mp.mpf(float(clearance)) / 2, [mp.mpf(float(v)) for v in mean]
         angle = mp.atan2(2 * b, a - c) / 2
@@ -94,9 +94,10 @@ def test_rectangle_agrees_with_mpmath(rho):
             return mp.npdf(x, mp.mpf(mean[0]), 1) * (share if outside else mp.ncdf(high) - mp.ncdf(low))
 
         points = np.linspace(-1.5, 1.5, 31).tolist()
-        inside = mp.quad(lambda x: strip(x, False), points)
+        inside = mp.quad(lambda x: strip(x, False), points, method="gauss-legendre")
         beyond = upper(mp.mpf(1.5) - mp.mpf(mean[0])) + upper(mp.mpf(1.5) + mp.mpf(mean[0]))
-        outside = mp.quad(lambda x: strip(x, True), points) + beyond
+        outside = mp.quad(lambda x: strip(x, True), points, method="gauss-legendre") + beyond
+        assert abs(inside + outside - 1) < 1e-18, "the reference must be right first"
     assert abs(joining_probability(matrix, sides, mean, shape="rectangle") - inside) < 1e-14
     assert abs(failing_probability(matrix, sides, mean, shape="rectangle") / outside - 1) < 1e-12
 
@@ -222,21 +223,6 @@ def test_uniform_over_the_area_is_a_mixture_of_its_tiles():
     area = 4.0 * sum(abs(np.linalg.det(wide[:, [i, j]])) for i in range(5) for j in range(i))
     value = joining_probability(np.zeros((2, 2)), 1.0, thermal=spread)
     assert value == pytest.approx(np.pi / 4.0 / area, rel=1e-9)
-
-
-@pytest.mark.parametrize("over", ["links", "area"])
-def test_spread_has_the_moments_of_its_draws(over):
-    columns = np.array([[1.0, 0.3, 0.7, 0.2], [0.2, 1.4, 0.6, -0.5]])
-    spread = UniformSpread.zonotope(columns, [-1.0, 0.0, -0.5, 0.0], [1.0, 0.7, 0.5, 2.0], over=over)
-    draws = spread.rvs(100_000, random_state=3)
-    error = np.sqrt(np.diag(spread.covariance) / 100_000)
-    assert np.all(np.abs(draws.mean(axis=0) - spread.mean) < 5.0 * error)
-    # Bounded variables: the standard error of a variance is below its own size times sqrt(2 / n).
-    np.testing.assert_allclose(np.cov(draws.T), spread.covariance, atol=5.0 * np.sqrt(2e-5) * spread.covariance.max())
-    inside = joining_probability(0.25 * np.eye(2), 3.0, -spread.mean, thermal=spread)
-    noisy = draws - spread.mean + 0.5 * np.random.default_rng(8).normal(size=draws.shape)
-    counted = np.mean(np.hypot(*noisy.T) < 1.5)
-    assert abs(counted - inside) < 5.0 * np.sqrt(inside * (1.0 - inside) / 100_000)
 
 
 def test_randomised_as_normal_adds_the_covariance():

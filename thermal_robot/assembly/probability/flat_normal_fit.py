@@ -11,9 +11,12 @@ from thermal_robot.errors import EstimationError
 
 Array = npt.NDArray[np.float64]
 Estimate = tuple[float, float, float]
+Held = tuple[float | None, float | None, float | None]
 
 _ROOT_3 = np.sqrt(3.0)
 _STARTS = (0.5, 1.0, 1.5, 3.0, 10.0)  # of r, beside the moments' one: the likelihood may have more than one peak
+_BOUNDS = ((-2.0, 2.0), (-2.0, 2.0), (0.0, np.pi / 2.0 - 1e-4))
+# Of mean and logarithm of the size, in the sample's own standard deviations, and of arctan r.
 
 
 def _checked(sample: Array) -> Array:
@@ -69,44 +72,50 @@ def fit_maximum_likelihood(
         None if scale is None else float(np.log(scale / width)),
         None if ratio is None else float(np.arctan(ratio)),
     )
-    free = [k for k in range(3) if held[k] is None]
-
-    def complete(point: Array) -> tuple[float, float, float]:
-        full = [0.0 if h is None else h for h in held]
-        for k, value in zip(free, point, strict=True):
-            full[k] = float(value)
-        return full[0], full[1], full[2]
-
-    def loss(point: Array) -> float:
-        place, size, angle = complete(point)
-        value = -log_likelihood(scaled, float(np.tan(angle)), place, float(np.exp(size))) / scaled.size
-        return value if np.isfinite(value) else 1e6
-
-    limits = ((-2.0, 2.0), (-2.0, 2.0), (0.0, np.pi / 2.0 - 1e-4))
-    candidates: list[tuple[float, tuple[float, float, float]]] = []
-    if free:
-        for start in {min(fit_moments(scaled)[0], 20.0), *_STARTS} if 2 in free else {1.0}:
-            first = np.array([(0.0, 0.0, np.arctan(start))[k] for k in free])
-            found = minimize(loss, first, method="L-BFGS-B", bounds=[limits[k] for k in free], options={"ftol": 1e-13})
-            polished = minimize(
-                loss,
-                found.x,
-                method="Nelder-Mead",
-                bounds=[limits[k] for k in free],
-                options={"xatol": 1e-9, "fatol": 1e-13, "maxiter": 400},
-            )
-            place, size, angle = complete(polished.x)
-            candidates.append((float(polished.fun), (float(np.tan(angle)), place, float(np.exp(size)))))
+    candidates = _between_limits(scaled, held)
     for limit in (0.0, np.inf):
         if ratio is None or ratio == limit:
             place, size = _limit(scaled, limit, held[0], held[1])
             candidates.append((-log_likelihood(scaled, limit, place, size) / scaled.size, (limit, place, size)))
-    if not free and not candidates:
-        place, size, angle = complete(np.array([]))
-        candidates.append((0.0, (float(np.tan(angle)), place, float(np.exp(size)))))
+    if not candidates:
+        candidates.append((0.0, _estimate(_completed(held, np.array([])))))
     # A limit wins a tie: the simpler law.
     best = min(candidates, key=lambda item: (round(item[0], 11), item[1][0] not in (0.0, np.inf)))[1]
     return best[0], centre + width * best[1], width * best[2]
+
+
+def _between_limits(scaled: Array, held: Held) -> list[tuple[float, Estimate]]:
+    """Smallest losses, and where they are, from several starts; none where all three parameters are held."""
+    free = [k for k in range(3) if held[k] is None]
+    if not free:
+        return []
+
+    def loss(point: Array) -> float:
+        ratio, place, size = _estimate(_completed(held, point))
+        value = -log_likelihood(scaled, ratio, place, size) / scaled.size
+        return value if np.isfinite(value) else 1e6
+
+    bounds = [_BOUNDS[k] for k in free]
+    found = []
+    for start in {min(fit_moments(scaled)[0], 20.0), *_STARTS} if 2 in free else {1.0}:
+        first = np.array([(0.0, 0.0, np.arctan(start))[k] for k in free])
+        rough = minimize(loss, first, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-13})
+        options = {"xatol": 1e-9, "fatol": 1e-13, "maxiter": 400}
+        polished = minimize(loss, rough.x, method="Nelder-Mead", bounds=bounds, options=options)
+        found.append((float(polished.fun), _estimate(_completed(held, polished.x))))
+    return found
+
+
+def _completed(held: Held, point: Array) -> tuple[float, float, float]:
+    """Mean, logarithm of the size and angle: what is held, and the point's coordinates for the rest."""
+    rest = iter(point)
+    place, size, angle = (float(next(rest)) if value is None else value for value in held)
+    return place, size, angle
+
+
+def _estimate(point: tuple[float, float, float]) -> Estimate:
+    place, size, angle = point
+    return float(np.tan(angle)), place, float(np.exp(size))
 
 
 def _limit(scaled: Array, limit: float, loc: float | None, log_scale: float | None) -> tuple[float, float]:

@@ -41,10 +41,11 @@ def link_nodes(covariance: Array, generators: Array) -> tuple[Array, Array]:
         When the normal part is too narrow along the generators for a sum of reasonable length.
     """
     reach = _REACH if generators.shape[1] == 1 else _REACH_MANY
-    rules = [_rule(length, reach) for length in generator_lengths(covariance, generators)]
-    total = int(np.prod([len(rule[0]) for rule in rules], dtype=float))
-    if total > _LARGEST:
-        raise ValueError(_too_narrow(len(rules) + 1))
+    lengths = generator_lengths(covariance, generators)
+    # Counted before any node is made: next to a vanishing normal part there would be 1e12 of them.
+    if np.prod([panels * count for panels, count in (_rule_size(v, reach) for v in lengths)], dtype=float) > _LARGEST:
+        raise ValueError(_too_narrow(len(lengths) + 1))
+    rules = [_rule(length, reach) for length in lengths]
     units = np.array(list(product(*(rule[0] for rule in rules)))).reshape(-1, len(rules))
     weights = np.array([np.prod(w) for w in product(*(rule[1] for rule in rules))])
     return units @ generators.T, weights
@@ -119,11 +120,16 @@ def generator_lengths(covariance: Array, generators: Array) -> list[float]:
 
 def _rule(length: float, reach: float) -> tuple[Array, Array]:
     """Composite rule on [-1, 1] for functions that grow like ``exp(reach * length * u)``."""
-    panels = max(1, int(np.ceil(length * (reach + length) / 12.0)))
-    rate = length / panels * (reach + length)
-    points, weights = np.polynomial.legendre.leggauss(_node_count(rate))
+    panels, count = _rule_size(length, reach)
+    points, weights = np.polynomial.legendre.leggauss(count)
     centres = (2.0 * np.arange(panels) + 1.0) / panels - 1.0
     return (centres[:, None] + points / panels).ravel(), np.tile(weights / (2.0 * panels), panels)
+
+
+def _rule_size(length: float, reach: float) -> tuple[int, int]:
+    """Panels of that rule, and points on each."""
+    panels = max(1, int(np.ceil(length * (reach + length) / 12.0)))
+    return panels, _node_count(length / panels * (reach + length))
 
 
 def _node_count(rate: float) -> int:

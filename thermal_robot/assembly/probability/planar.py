@@ -62,6 +62,7 @@ class Principal:
         scale = float(np.max(np.abs(covariance)))
         if scale == 0.0:
             return cls(0.0, 0.0, np.array([1.0, 0.0]))
+        scale = float(np.ldexp(1.0, np.frexp(scale)[1]))  # a power of two: to divide by it rounds nothing
         a, b, c = (float(v) / scale for v in (covariance[0, 0], covariance[0, 1], covariance[1, 1]))
         large = 0.5 * (a + c + float(np.hypot(a - c, 2.0 * b)))
         small = max(_difference_of_products(a, c, b, b), 0.0) / large

@@ -1,8 +1,9 @@
 """The verdict follows from what is printed and what is computed."""
 
+import numpy as np
 import pytest
 
-from thermal_robot.paper.entry import Printed, judge, numbers, rounds_to, truncates_to
+from thermal_robot.paper.entry import VERDICTS, Printed, floats, judge, numbers, rounds_to, truncates_to
 
 FIGURE = Printed("1.33", (1.33,), 0.01)
 MINUS = Printed("−0.4", (-0.4,), 0.1)
@@ -52,3 +53,19 @@ def test_the_rounding_of_the_inputs_leaves_a_range():
 def test_numbers_are_written_with_a_true_minus():
     assert numbers([[1e-6, -2e-6], [0.0, 3e-6]], 1, factor=1e6) == "1.0 −2.0 / 0.0 3.0"
     assert numbers(-0.5, 2) == "−0.50"
+
+
+def test_half_of_a_last_digit_counts_as_rounding_on_either_side():
+    # 0.145 and 1.005 have no exact binary fraction; decimal arithmetic rounds them either way.
+    for shown, computed in ((0.14, 0.145), (0.15, 0.145), (1.0, 1.005), (1.01, 1.005)):
+        assert rounds_to(Printed("", (shown,), 0.01), computed)
+
+
+def test_verdicts_are_those_that_are_explained():
+    for computed in (1.33, 1.338, 1.5):
+        assert judge(FIGURE, computed, otherwise="not reproducible") in VERDICTS
+
+
+def test_numbers_of_any_shape_become_one_tuple():
+    assert floats(1, [2.5, 3], np.array([[4, 5], [6, np.inf]])) == (1.0, 2.5, 3.0, 4.0, 5.0, 6.0, np.inf)
+    assert floats() == ()
