@@ -181,7 +181,7 @@ def test_rows_set_aside_stand_in_a_table(case, written):
 def test_many_rows_set_aside_are_cut_off(case, make_rows):
     aside = tuple(range(2, 102))
     page = html(replace(case("found"), outliers=aside, rows=make_rows(300, aside=aside)))
-    assert "and 60 more, which stand in the JSON" in page
+    assert "and 60 more, listed in the JSON" in page
 
 
 def test_a_notebook_shows_the_fragment(case, written):

@@ -88,7 +88,7 @@ def test_of_many_parameters_the_most_significant_are_told(case):
     shown = lines[start + 1 : start + 7]
     assert shown[0].split("  ")[-1] == "0.420 ± 0.010 mrad"
     assert [float(line.split("  ")[-1].split()[0]) for line in shown] == [0.42, 0.36, 0.35, 0.3, 0.3, 0.28]
-    assert lines[start + 7].strip() == "and 29 more, which stand in the JSON"
+    assert lines[start + 7].strip() == "and 29 more, listed in the JSON"
 
 
 def test_an_undetermined_parameter_is_never_a_number(case):
@@ -139,5 +139,5 @@ def test_what_is_unexplained_is_told_with_reasons_place_and_quantity(case):
 def test_advice_and_warnings_are_told(case):
     written = text(case("found"))
     assert case("found").advice in written
-    assert "would tell apart: thermal_elongation, drift" in written
+    assert "to tell apart: thermal_elongation, drift" in written
     assert case("found").warnings[0] in written

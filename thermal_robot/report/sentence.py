@@ -14,7 +14,8 @@ _ANOTHER_TURN = 0.2  # rad: the same of orientation; no joint errs by eleven deg
 _WEIGHTY = 0.01  # of the gap on held-out rows: an effect with less is named last
 _CARRIES = 1.5  # times what is left of the fitted rows: more on held-out rows is not called noise
 _SURE = 0.995  # a probability above it would be rounded to 100 %, which is never claimed
-_MILLIMETRE = 1e-3  # m: below, a length is read in µm
+# m: from which length on it is read times so much in which unit; what rounds to 1 mm is never written as 1e+03 µm
+_LENGTHS = ((0.9995, 1.0, "m"), (0.9995e-3, 1e3, "mm"), (0.0, 1e6, "µm"))
 
 
 def headline(diagnosis: Diagnosis) -> str:
@@ -99,8 +100,8 @@ def _rest(diagnosis: Diagnosis, remaining: Unexplained) -> str:
 
 def length(metres: float) -> str:
     """Return a length in the unit that a metrologist would use."""
-    scaled, unit = (metres * 1e3, "mm") if metres >= _MILLIMETRE else (metres * 1e6, "µm")
-    return f"{scaled:.3g} {unit}"
+    factor, unit = next((f, u) for least, f, u in _LENGTHS if metres >= least)
+    return f"{metres * factor:.3g} {unit}"
 
 
 def _listed(names: Sequence[str]) -> str:
