@@ -58,9 +58,7 @@ def outside(figure, said):
     """Those of the texts that leave the figure."""
     edge = figure.bbox
     return [
-        text
-        for text, box in said
-        if box.x0 < -1.0 or box.y0 < -1.0 or box.x1 > edge.x1 + 1.0 or box.y1 > edge.y1 + 1.0
+        text for text, box in said if box.x0 < -1.0 or box.y0 < -1.0 or box.x1 > edge.x1 + 1.0 or box.y1 > edge.y1 + 1.0
     ]
 
 

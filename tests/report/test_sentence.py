@@ -56,7 +56,9 @@ def test_titles_take_the_place_of_names(case):
     assert "comes from thermal elongation of the links (" in headline(replace(base, effects=(named,)))
 
 
-@pytest.mark.parametrize(("probability", "words"), [(0.9999, "more than 99 % sure"), (0.994, "99 % sure"), (0.5, "50 %")])
+@pytest.mark.parametrize(
+    ("probability", "words"), [(0.9999, "more than 99 % sure"), (0.994, "99 % sure"), (0.5, "50 %")]
+)
 def test_certainty_is_never_claimed(case, probability, words):
     text = headline(replace(case("found"), probability=probability))
     assert f"({words}" in text
@@ -154,7 +156,9 @@ def test_advice_separates_what_is_confounded_first(case):
     frame = Finding("base_frame", "not_testable", needs=('frames.base = "known"',))
     base = case("confounded")
     declared = replace(base, effects=(*base.effects[:2], frame, *base.effects[3:]))
-    assert advice(declared) == "A frame measured on its own, and declared known, would tell joint offset from base frame."
+    assert (
+        advice(declared) == "A frame measured on its own, and declared known, would tell joint offset from base frame."
+    )
 
 
 def test_advice_names_columns_that_can_be_recorded(case):
