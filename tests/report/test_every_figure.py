@@ -33,8 +33,8 @@ def test_every_axis_that_shows_lengths_or_shares_names_its_unit(plot, diagnosis)
         assert label.endswith(("(µm)", "(mm)", "(mrad)", "(%)", "(m)", "(s)")) or label in without, label
 
 
-def test_it_shows_itself_in_a_notebook(plot, case):
-    assert plot(case("confounded"))._repr_png_().startswith(b"\x89PNG")
+def test_it_shows_itself_in_a_notebook(plot_of_rows, case):
+    assert plot_of_rows(case("confounded"))._repr_png_().startswith(b"\x89PNG")
 
 
 def test_no_text_leaves_the_figure_or_meets_another(plot, case):

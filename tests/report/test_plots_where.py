@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import pytest
-from report.looking import bars, tick_labels, written
+from report.looking import bars, tick_labels
 
 from thermal_robot.diagnosis.parts import Where
 from thermal_robot.report import plot_where
