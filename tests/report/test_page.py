@@ -148,7 +148,7 @@ def test_an_undetermined_parameter_is_never_a_number(write, case):
 def test_the_unexplained_is_flagged(write, written):
     page = written(write, "unexplained")
     assert 'class="tr-flag"' in page
-    assert "It enters most probably at joint elbow_joint (72.0 %)" in Reader(page).words
+    assert "It enters most probably at elbow_joint (72.0 %)" in Reader(page).words
     assert 'class="tr-flag"' not in written(write, "found")
 
 

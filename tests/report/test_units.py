@@ -87,6 +87,9 @@ def test_shares_p_values_and_places():
         "p < 1e-12",
     ]
     assert units.place(Location("joint", "hand", 0.1)) == "joint hand"
+    assert units.place(Location("joint", "elbow_joint", 0.1)) == "elbow_joint"
+    assert units.place(Location("link", "elbow_joint", 0.1)) == "link elbow_joint"
+    assert units.place(Location("instrument", "", 0.1)) == "instrument"
     assert units.place(Location("base", "base", 0.1)) == "base"
     assert units.recorded_unit("temperature.upper_arm_link") == "°C"
     assert units.recorded_unit("humidity") == ""
