@@ -36,7 +36,9 @@ def test_the_map_is_seen_from_where_it_is_broadest(case):
     above = diagnosis.rows.position * np.array([1.0, 0.6, 3.0])
     for position, view in ((flat, "the side"), (above, "above")):
         moved = replace(diagnosis, rows=replace(diagnosis.rows, position=position))
-        assert overview(moved).axes[3]._left_title.get_text() == f"The gap, seen from {view}"
+        map_ = overview(moved).axes[3]
+        assert map_._left_title.get_text() == f"The gap, seen from {view}"
+        assert map_.get_ylabel().startswith("z" if view == "the side" else "y")
 
 
 def test_many_effects_make_the_figure_higher(case):

@@ -33,6 +33,7 @@ def test_which_puts_the_found_before_the_rest(case):
 def test_the_probability_stands_beside_its_effect(case):
     (axes,) = plot_which(case("confounded")).axes
     names = tick_labels(axes)
+    assert all(t.get_position()[0] > 1.0 for t in axes.texts if t.get_text().endswith(" %"))  # of the panel's width
     beside = {round(t.get_position()[1]): t.get_text() for t in axes.texts if t.get_text().endswith(" %")}
     assert {names[k]: said for k, said in beside.items()} == {
         "geometric": "> 99.9 %",
