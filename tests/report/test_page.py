@@ -114,8 +114,9 @@ def test_every_name_is_escaped(write, case):
     assert UGLY in re.sub(r"\s+", " ", unescape(page))
 
 
-def test_equal_diagnoses_give_equal_pages(written, case):
-    assert written(html, "found") == html(case("found"))
+@pytest.mark.usefixtures("no_drawing")
+def test_equal_diagnoses_give_equal_pages(case):
+    assert html(case("found")) == html(case("found"))
 
 
 def test_it_says_what_the_diagnosis_says(write, written, case):
