@@ -5,7 +5,9 @@ from functools import lru_cache
 
 import numpy as np
 import pytest
+from simulate import simulate
 
+from thermal_robot import diagnose
 from thermal_robot.diagnosis.parts import (
     Dependence,
     Estimate,
@@ -249,6 +251,26 @@ def confounded():
     )
 
 
+def with_law():
+    """A law found in the data, beside an effect of the library; what is left of it counts as unexplained."""
+    base = unexplained()
+    law = Finding(
+        "discovered.1",
+        "found",
+        0.997,
+        0.08,
+        (0.05, 0.1),
+        locations=(Location("joint", "elbow_joint", 0.08),),
+        parameters=(Estimate("step at 4000 s", 1.3e-4, 6e-6, "rad", True),),
+        quantity="time",
+        shape="step",
+        describes="an error at joint elbow_joint that follows time (step)",
+        title="an error at joint elbow_joint that follows time (step)",
+    )
+    first, *rest = base.effects
+    return replace(base, effects=(first, law, *rest), verdict=("thermal_elongation", "discovered.1"))
+
+
 CASES = {"found": found, "nothing": nothing, "unexplained": unexplained, "confounded": confounded}
 
 
@@ -262,6 +284,18 @@ def diagnosis(request):
 def case():
     """Make the diagnosis of a kind."""
     return lambda kind: CASES[kind]()
+
+
+@pytest.fixture
+def law_case():
+    """Make the diagnosis that holds a law."""
+    return with_law
+
+
+@pytest.fixture(scope="session")
+def drifted(rv_m2):
+    """A real diagnosis: the base has drifted."""
+    return diagnose(simulate(rv_m2, ["drift"], seed=3)[0])
 
 
 @pytest.fixture

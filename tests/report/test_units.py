@@ -1,7 +1,9 @@
 """Numbers in the unit that a metrologist would choose."""
 
 import math
+import re
 
+import numpy as np
 import pytest
 
 from thermal_robot.diagnosis.parts import Estimate, Location
@@ -85,6 +87,58 @@ def test_shares_p_values_and_places():
         "p < 1e-12",
     ]
     assert units.place(Location("joint", "hand", 0.1)) == "joint hand"
+    assert units.place(Location("joint", "elbow_joint", 0.1)) == "elbow_joint"
+    assert units.place(Location("link", "elbow_joint", 0.1)) == "link elbow_joint"
+    assert units.place(Location("instrument", "", 0.1)) == "instrument"
     assert units.place(Location("base", "base", 0.1)) == "base"
     assert units.recorded_unit("temperature.upper_arm_link") == "°C"
     assert units.recorded_unit("humidity") == ""
+
+
+SI = {"µm": 1e-6, "mm": 1e-3, "m": 1.0, "µrad": 1e-6, "mrad": 1e-3, "rad": 1.0, "ms": 1e-3, "µs": 1e-6, "s": 1.0}
+
+
+def read_back(written):
+    """The SI value that a reader takes from ``412 µm``."""
+    number, unit = written.replace("−", "-").split(" ")
+    return float(number) * SI[unit]
+
+
+@pytest.mark.parametrize("unit", ["m", "rad", "s"])
+def test_what_is_written_is_what_was_meant(unit):
+    rng = np.random.default_rng(4)
+    for value in rng.choice([-1.0, 1.0], 400) * 10.0 ** rng.uniform(-9.0, 2.0, 400):
+        written = units.quantity(value, unit)
+        assert read_back(written) == pytest.approx(value, rel=6e-3), written
+        digits = re.sub(r"e.*|[^\d]", "", written.split(" ")[0]).lstrip("0")
+        assert len(digits) == (4 if unit == "m" and 1.0 <= abs(value) < 9.99 else 3), written  # 1186 mm
+
+
+def test_values_that_are_compared_keep_their_order_as_they_are_read():
+    rng = np.random.default_rng(5)
+    for _ in range(100):
+        values = np.sort(10.0 ** rng.uniform(-6.0, -2.0, 3))
+        read = [read_back(w) for w in units.together(values, "m")]
+        assert read == sorted(read)
+        assert read[2] == pytest.approx(values[2], rel=6e-3)
+        assert read[0] == pytest.approx(values[0], rel=0.06, abs=6e-8)
+
+
+def test_a_standard_deviation_is_never_written_as_nothing():
+    rng = np.random.default_rng(6)
+    for value, std in zip(10.0 ** rng.uniform(-6.0, -2.0, 200), 10.0 ** rng.uniform(-7.0, -4.0, 200), strict=True):
+        written = units.estimate(Estimate("a", value, std, "m", True))
+        number, deviation = re.fullmatch(r"([\d.]+) ± ([\d.]+) (µm|mm|m)", written).groups()[:2]
+        assert float(number) > 0.0
+        assert (float(deviation) > 0.0) is bool(std > 5e-6 * value), written
+
+
+@pytest.mark.parametrize(("value", "digits", "written"), [(0.0, 3, "0"), (1e7, 2, "1.0e+07"), (-0.25, 2, "−0.25")])
+def test_a_number_has_an_exponent_only_far_from_one(value, digits, written):
+    assert units.number(value, digits) == written
+
+
+@pytest.mark.parametrize("value", [math.inf, -math.inf, math.nan])
+def test_what_is_no_number_is_not_written_as_one(value):
+    assert units.number(value) == units.percent(value) == units.MISSING
+    assert units.p_value(value) == "p unknown"

@@ -94,7 +94,7 @@ def _known(finding: Finding) -> Iterator[str]:
     if known.shown:
         yield f"<table><tbody>{''.join(_row(r) for r in known.shown)}</tbody></table>"
     if known.more:
-        yield _line(f"and {known.more} more, which stand in the JSON")
+        yield _line(f"and {known.more} more, listed in the JSON")
     if known.undetermined:
         yield _line(f"not determined by these data: {known.undetermined}")
 
@@ -125,5 +125,5 @@ def outliers_table(diagnosis: Diagnosis) -> str:
         values = "".join(f"<td class=tr-n>{units.number(float(v) * best.factor)}</td>" for v in cells)
         body.append(f"<tr><td class=tr-n>{int(rows.rows[i])}</td>{values}</tr>")
     more = len(chosen) - len(body)
-    rest = f"<p class=tr-muted>and {more} more, which stand in the JSON</p>" if more > 0 else ""
+    rest = f"<p class=tr-muted>and {more} more, listed in the JSON</p>" if more > 0 else ""
     return f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(body)}</tbody></table>{rest}"

@@ -99,7 +99,7 @@ def _how_far(diagnosis: Diagnosis) -> Iterator[str]:
         worst = f"{pair[0]} → {pair[1]}, held out by {scheme.name}: {scheme.held_out}"
         yield _wrap(worst, f"  {'least favourable':{_NAME}}")
     yield _wrap(noise(diagnosis, floor), f"  {'noise floor':{_NAME}}")
-    yield _wrap("Shrinkage is the share of the gap's mean square that goes away.")
+    yield _wrap("Shrinkage is the share of the gap's mean square that the correction removes.")
 
 
 def _bounds(bounds: tuple[float, float] | None) -> str:
@@ -143,7 +143,7 @@ def _at_length(finding: Finding, wide: int) -> Iterator[str]:
     for name, value in known.shown:
         yield f"{inner}{name:{column}}  {value}"
     if known.more:
-        yield f"{inner}and {known.more} more, which stand in the JSON"
+        yield f"{inner}and {known.more} more, listed in the JSON"
     if known.undetermined:
         yield _wrap(f"not determined by these data: {known.undetermined}", inner, hang=2)
 
@@ -151,7 +151,7 @@ def _at_length(finding: Finding, wide: int) -> Iterator[str]:
 def _in_short(finding: Finding, wide: int, joints: Sequence[str]) -> str:
     if finding.status == "not_testable":
         return _wrap(f"needs {needs(finding, joints)}", f"    {finding.name:{wide}}{'':13}   ")
-    told = f"; not to be told from {', '.join(finding.confounded_with)}" if finding.confounded_with else ""
+    told = f"; cannot be told apart from {', '.join(finding.confounded_with)}" if finding.confounded_with else ""
     line = f"    {finding.name:{wide}}{units.probability(finding.probability):>13}   {_share(finding)}"
     return _wrap(told, line) if told else line
 
@@ -190,4 +190,4 @@ def _next(diagnosis: Diagnosis) -> Iterator[str]:
     if diagnosis.advice:
         yield _wrap(diagnosis.advice)
     for group in diagnosis.separates:
-        yield _wrap(f"would tell apart: {', '.join(group)}", "  - ")
+        yield _wrap(f"to tell apart: {', '.join(group)}", "  - ")

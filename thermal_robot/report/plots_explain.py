@@ -116,22 +116,36 @@ def _limits(explained: Explained) -> dict[str, tuple[float, float]]:
     return limits
 
 
+def _step(place: Place) -> float:
+    """Return how far the few values of a quantity lie apart; 0 where it has many."""
+    if not place.levels:
+        return 0.0
+    step = float(np.diff(np.unique(place.values)).min(initial=np.inf))
+    return step if np.isfinite(step) else 1.0
+
+
+def _law(place: Place, step: float) -> tuple[Array, Array]:
+    """Return the fitted law as a line, in pieces of its own at each of few values."""
+    along, law = place.line
+    if not place.levels:
+        return along, law
+    half = 0.34 * step
+    pieces = np.column_stack([along - half, along + half, np.full(len(along), np.nan)])
+    return pieces.ravel(), np.repeat(law, 3)
+
+
 def _draw(axes: Axes, place: Place, factor: float) -> None:
     rows = np.flatnonzero(_seen(place))
     rows = rows[thinned(len(rows), _POINTS)]
     many = len(rows) > _MANY
-    values = place.values[rows]
-    jitter = np.zeros(len(rows))
-    step = float(np.diff(np.unique(place.values)).min(initial=np.inf)) if place.levels else 0.0
-    step = step if np.isfinite(step) else 1.0
-    if place.levels:
-        jitter = np.random.default_rng(0).uniform(-0.5, 0.5, len(rows)) * 0.7 * _APART * step
+    step = _step(place)
+    beside = np.random.default_rng(0).uniform(-0.5, 0.5, len(rows)) * 0.7 * _APART * step
     for error, colour, label, side in (
         (place.before, MUTED, "as measured", -1.0),
         (place.after, AFTER, "with this effect taken off", 1.0),
     ):
         axes.plot(
-            values + jitter + (side * 0.6 * _APART * step if place.levels else 0.0),
+            place.values[rows] + beside + side * 0.6 * _APART * step,
             error[rows] * factor,
             linestyle="none",
             marker="o",
@@ -143,15 +157,10 @@ def _draw(axes: Axes, place: Place, factor: float) -> None:
             label=label,
         )
     axes.axhline(0.0, color=MUTED, linewidth=0.7)
-    along, law = place.line[0], place.line[1] * factor
-    if place.levels:
-        half = 0.34 * step
-        along = np.column_stack([along - half, along + half, np.full(len(along), np.nan)]).ravel()
-        law = np.repeat(law, 3)
-        axes.xaxis.set_major_locator(FixedLocator(np.unique(place.values).tolist()))
-    else:
-        axes.xaxis.set_major_locator(MaxNLocator(5, steps=_STEPS))
-    axes.plot(along, law, color=BEFORE, linewidth=2.0, label="fitted law")
+    along, law = _law(place, step)
+    axes.plot(along, law * factor, color=BEFORE, linewidth=2.0, label="fitted law")
+    levels = FixedLocator(np.unique(place.values).tolist())
+    axes.xaxis.set_major_locator(levels if place.levels else MaxNLocator(5, steps=_STEPS))
     axes.yaxis.set_major_locator(MaxNLocator(5, steps=_STEPS))
     axes.margins(x=0.04)
     unit = f" ({place.quantity_unit})" if place.quantity_unit else ""

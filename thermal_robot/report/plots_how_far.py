@@ -29,6 +29,10 @@ if TYPE_CHECKING:
     from thermal_robot.diagnosis.result import Diagnosis
 
 
+_BELOW_KEY = 0.77  # of a panel's height for the bars; the key stands above
+_ROOM = 1.08  # beside the outermost bins, as a factor
+
+
 def plot_how_far(diagnosis: Diagnosis) -> Figure:
     """Draw how many rows have which distance |gap|: before, after, and after while the row was held out.
 
@@ -87,11 +91,7 @@ def _draw(axes: Axes, before: Array, after: Array, held_out: Array, said: list[s
     if not everything.size:
         note(axes, "There is no gap to be drawn.")
         return
-    # a few rows that happen to fit perfectly must not stretch the axis over decades
-    low, high = float(np.quantile(everything, 0.01)) / 1.6, float(everything.max()) * 1.25
-    if floor > 0.0:
-        low, high = min(low, floor / 1.3), max(high, floor * 1.3)
-    bins = np.geomspace(low, high, int(np.clip(2.2 * np.sqrt(len(before)), 14, 60)))
+    bins = _bins(everything, len(before), floor)
     before, after, held_out = (np.clip(v, bins[0], bins[-1]) for v in (before, after, held_out))
     # the outline before is the broader one, so that it is seen where the one after covers it
     _shape(axes, before, bins, BEFORE, f"before: rms {said[0]}", width=3.0, fill=0.5)
@@ -99,18 +99,13 @@ def _draw(axes: Axes, before: Array, after: Array, held_out: Array, said: list[s
     if held_out.size:
         _shape(axes, held_out, bins, THIRD, f"after, on rows held out: rms {said[2]}", style=(0, (4, 2)))
     if floor > 0.0:
-        axes.plot(
-            [floor, floor],
-            [0.0, 0.76],
-            transform=axes.get_xaxis_transform(),
-            color=INK,
-            linewidth=1.2,
-            linestyle=":",
-            label=f"noise floor: rms {said[3]}",
-        )
-    log_axis(axes, low, high)
+        label = f"noise floor: rms {said[3]}"
+        along = axes.get_xaxis_transform()
+        axes.plot([floor] * 2, [0.0, _BELOW_KEY], transform=along, color=INK, linewidth=1.2, linestyle=":", label=label)
+    # room beside the outermost bins, so that none looks cut off
+    log_axis(axes, float(bins[0]) / _ROOM, float(bins[-1]) * _ROOM)
     axes.set_ylabel("rows")
-    axes.set_ylim(0.0, axes.get_ylim()[1] * 1.3)
+    axes.set_ylim(0.0, axes.get_ylim()[1] / _BELOW_KEY)
     axes.locator_params(axis="y", integer=True, nbins=5)
     axes.legend(
         loc="upper left",
@@ -123,6 +118,15 @@ def _draw(axes: Axes, before: Array, after: Array, held_out: Array, said: list[s
         handlelength=1.6,
     )
     tidy(axes)
+
+
+def _bins(values: Array, rows: int, floor: float) -> Array:
+    """Return edges of bins that are equally wide on a logarithmic axis and hold the noise floor, too."""
+    # a few rows that happen to fit perfectly must not stretch the axis over decades
+    low, high = float(np.quantile(values, 0.01)) / 1.6, float(values.max()) * 1.25
+    if floor > 0.0:
+        low, high = min(low, floor / 1.3), max(high, floor * 1.3)
+    return np.geomspace(low, high, int(np.clip(2.2 * np.sqrt(rows), 14, 60)))
 
 
 def _shape(

@@ -33,6 +33,7 @@ if TYPE_CHECKING:
 _MIDDLES = 60
 _LEVELS = 12
 _FEW_CROSSES = 25
+_EDGE = 0.88  # of a panel's height: a cross that is held there stays whole
 
 
 def plot_remainder(diagnosis: Diagnosis) -> Figure:
@@ -115,7 +116,7 @@ def _draw(axes: Axes, along: Array, values: Array, aside: NDArray[np.bool_], lim
     axes.plot(where, middle, color=AFTER, linewidth=1.8, label="running median")
     axes.plot(
         along[marked],
-        np.clip(values[marked], -0.94 * limit, 0.94 * limit),
+        np.clip(values[marked], -_EDGE * limit, _EDGE * limit),
         linestyle="none",
         marker="x",
         markersize=6.0 if few else 3.0,

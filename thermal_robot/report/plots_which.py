@@ -76,7 +76,7 @@ def draw_which(axes: Axes, diagnosis: Diagnosis, *, brief: bool = False) -> None
     axes.set_ylim(len(ordered) - 0.4, -1.3)
     axes.set_xlim(100.0 * max(low, _FURTHEST_BELOW_ZERO) - 1.0, 100.0 * min(high, _FURTHEST) + 2.0)
     axes.axvline(0.0, color=MUTED, linewidth=0.8)
-    axes.set_xlabel("share of the gap's mean square, rows held out, 95 % bars (%)")
+    axes.set_xlabel("share of the gap's mean square on rows held out, 95 % interval (%)")
     tidy(axes, grid="x")
     axes.tick_params(axis="y", length=0)
     for label, finding in zip(axes.get_yticklabels(), ordered, strict=True):

@@ -14,7 +14,8 @@ _ANOTHER_TURN = 0.2  # rad: the same of orientation; no joint errs by eleven deg
 _WEIGHTY = 0.01  # of the gap on held-out rows: an effect with less is named last
 _CARRIES = 1.5  # times what is left of the fitted rows: more on held-out rows is not called noise
 _SURE = 0.995  # a probability above it would be rounded to 100 %, which is never claimed
-_MILLIMETRE = 1e-3  # m: below, a length is read in µm
+# m: from which length on it is read times so much in which unit; what rounds to 1 mm is never written as 1e+03 µm
+_LENGTHS = ((0.9995, 1.0, "m"), (0.9995e-3, 1e3, "mm"), (0.0, 1e6, "µm"))
 
 
 def headline(diagnosis: Diagnosis) -> str:
@@ -36,15 +37,15 @@ def headline(diagnosis: Diagnosis) -> str:
     sure = f"{100 * probability:.0f} % sure" if probability < _SURE else "more than 99 % sure"
     if not causes:
         rest = f", of which {length(remaining.rms)} is not explained" if remaining.flagged and remaining.rms else ""
-        return f"The gap of {size} is scatter: {_listed(chance)} ({sure}){rest}; no correction takes scatter away."
+        return f"The gap of {size} is scatter: {_listed(chance)} ({sure}){rest}; no correction removes scatter."
     text = f"The gap of {size} comes from {_causes(diagnosis, causes)} ({sure}); correcting for "
     text += ("them " if len(causes) > 1 else "it ") + _how_far(diagnosis) + _rest(diagnosis, remaining)
     if laws := sum(f.quantity is not None for f in causes):
         text += f"; {which} has {'that shape' if laws == 1 else 'these shapes'}"
     if chance:
-        text += f"; besides there is scatter, which no correction takes away: {_listed(chance)}"
+        text += f"; there is also scatter, which no correction removes: {_listed(chance)}"
     doubts = [
-        f"{diagnosis.title(f.name)} cannot be told from {' or '.join(map(diagnosis.title, f.confounded_with))}"
+        f"{diagnosis.title(f.name)} cannot be told apart from {' or '.join(map(diagnosis.title, f.confounded_with))}"
         for f in causes
         if f.confounded_with
     ]
@@ -71,7 +72,7 @@ def _causes(diagnosis: Diagnosis, causes: Sequence[Finding]) -> str:
     weighty = [f for f in causes if (f.shrinkage or 0.0) >= _WEIGHTY] or list(causes[:1])
     slight = [diagnosis.title(f.name) for f in causes if f not in weighty]
     first = _listed([diagnosis.title(f.name) for f in weighty])
-    return first + (f", and, hardly to be seen, {_listed(slight)}" if slight else "")
+    return first + (f", and, barely visible, {_listed(slight)}" if slight else "")
 
 
 def _how_far(diagnosis: Diagnosis) -> str:
@@ -91,7 +92,7 @@ def _rest(diagnosis: Diagnosis, remaining: Unexplained) -> str:
     if not remaining.flagged:
         if gap.held_out.rms_after < _CARRIES * max(gap.rms_after, gap.noise_floor):
             return f", which is noise ({floor})"
-        return f", while {length(gap.rms_after)} are left of the rows it was fitted to (noise: {floor})"
+        return f", while {length(gap.rms_after)} is left on the rows it was fitted to (noise: {floor})"
     if gap.noise_source == "remainder" or remaining.rms == 0.0:
         return ", which is more than noise" + _place(remaining)
     return f", of which {length(remaining.rms)} is not explained" + _place(remaining)
@@ -99,8 +100,8 @@ def _rest(diagnosis: Diagnosis, remaining: Unexplained) -> str:
 
 def length(metres: float) -> str:
     """Return a length in the unit that a metrologist would use."""
-    scaled, unit = (metres * 1e3, "mm") if metres >= _MILLIMETRE else (metres * 1e6, "µm")
-    return f"{scaled:.3g} {unit}"
+    factor, unit = next((f, u) for least, f, u in _LENGTHS if metres >= least)
+    return f"{metres * factor:.3g} {unit}"
 
 
 def _listed(names: Sequence[str]) -> str:
@@ -130,10 +131,11 @@ def advice(diagnosis: Diagnosis) -> str:
         for f in diagnosis.effects
         if f.status == "not_testable" and f.needs != ("pose",) and not diagnosis.is_frame(f.name)
     ]
-    if diagnosis.unexplained.flagged and missing:
-        columns = sorted({n.split(".")[0] for f in missing for n in f.needs})
-        listed = ", ".join(diagnosis.title(f.name) for f in missing)
-        return f"Record {', '.join(columns)}: {listed} could not be tested, and a remainder is unexplained."
+    # what is no column, such as masses in the URDF, cannot be recorded
+    columns = sorted({n.split(".")[0] for f in missing for n in f.needs if " " not in n})
+    if diagnosis.unexplained.flagged and columns:
+        untested = _listed([diagnosis.title(f.name) for f in missing])
+        return f"Record {_listed(columns)}: {untested} could not be tested, and a remainder is unexplained."
     if diagnosis.unexplained.flagged:
-        return "Repeat a few poses, in another order and on another day: it tells what is repeatable in the remainder."
+        return "Repeat a few poses in another order and on another day: this shows how much of the remainder repeats."
     return "Nothing: the data determine the explanation."

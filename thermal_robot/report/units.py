@@ -154,8 +154,8 @@ def p_value(value: float) -> str:
 
 
 def place(location: Location) -> str:
-    """Write a place with its kind, since a link and a joint may share a name."""
-    if location.kind in ("", location.name) or not location.name:
+    """Write a place with its kind, since a link and a joint may share a name; ``elbow_joint`` says it already."""
+    if not location.name or location.kind in location.name:
         return location.name or location.kind
     return f"{location.kind} {location.name}"
 

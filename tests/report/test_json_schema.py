@@ -142,3 +142,58 @@ def test_held_out_shares_may_be_negative(validator, case):
     plain["effects"][0].update(shrinkage=1.05, shrinkage_ci95=[0.9, 1.2])  # what another loses, this one gains
     plain["effects"][1].update(shrinkage=-2.0, shrinkage_ci95=[-3.0, -1.0])
     validator.validate(plain)
+
+
+def keys(plain):
+    """Names of all keys, wherever they stand, as paths without the numbers of lists."""
+    if isinstance(plain, dict):
+        return {(k, *rest) for k, v in plain.items() for rest in ((), *keys(v))}
+    return set().union(*map(keys, plain)) if isinstance(plain, list) else set()
+
+
+def declared(whole, part):
+    """Paths of all properties that a schema declares."""
+    part = whole["$defs"][part["$ref"].rsplit("/", 1)[1]] if "$ref" in part else part
+    found = {(k, *rest) for k, v in part.get("properties", {}).items() for rest in ((), *declared(whole, v))}
+    return found | (declared(whole, part["items"]) if isinstance(part.get("items"), dict) else set())
+
+
+def test_a_real_diagnosis_is_valid_and_writes_all_that_is_declared(validator, drifted, case):
+    real = json.loads(json.dumps(drifted.to_dict(), allow_nan=False))
+    validator.validate(real)
+    assert real["next"]["samples"]
+    by_hand = keys(json.loads(json.dumps(case("confounded").to_dict())))
+    remainder = keys(json.loads(json.dumps(case("unexplained").to_dict())))
+    assert declared(schema(), schema()) - keys(real) - by_hand - remainder == set()
+
+
+def test_a_diagnosis_with_a_law_is_valid(validator, law_case):
+    plain = json.loads(json.dumps(law_case().to_dict()))
+    validator.validate(plain)
+    law = next(e for e in plain["effects"] if e["name"] == "discovered.1")
+    assert (law["quantity"], law["shape"]) == ("time", "step")
+
+
+BROKEN_SAMPLES = {
+    "a joint that is no number": lambda s: s["joints"].update(joint_1="far"),
+    "no conditions": lambda s: s.pop("conditions"),
+    "explanations that are words": lambda s: s.update(separates=["drift"]),
+    "a gain that is missing": lambda s: s.pop("gain"),
+    "an unknown key": lambda s: s.update(cost=1.0),
+}
+
+
+@pytest.mark.parametrize("breakage", list(BROKEN_SAMPLES))
+def test_a_sample_that_cannot_be_measured_is_rejected(validator, case, breakage):
+    plain = case("found").to_dict()
+    sample = {"joints": {"joint_1": 0.3}, "conditions": {"payload": 1.0}, "separates": [["drift"], []], "gain": 0.7}
+    plain["next"]["samples"] = [sample]
+    assert validator.is_valid(plain)
+    BROKEN_SAMPLES[breakage](sample)
+    assert not validator.is_valid(plain)
+
+
+def test_a_noise_of_unknown_source_is_rejected(validator, case):
+    plain = case("found").to_dict()
+    plain["gap"]["noise_source"] = "guessed"
+    assert not validator.is_valid(plain)

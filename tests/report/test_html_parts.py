@@ -1,0 +1,58 @@
+"""The pieces of a page: text is escaped, nothing is drawn of nothing."""
+
+from importlib.metadata import PackageNotFoundError
+
+import pytest
+
+from thermal_robot.report import html_parts
+from thermal_robot.report.drawing import Drawing
+from thermal_robot.report.html_parts import bullets, css, document, figure, paragraph, signature
+
+UGLY = "<script>&\"'"
+SAFE = "&lt;script&gt;&amp;&quot;&#x27;"
+
+
+def test_text_is_escaped_wherever_it_stands():
+    for piece in (paragraph(UGLY), paragraph(UGLY, strong=True), bullets([UGLY]), document(UGLY, "")):
+        assert SAFE in piece
+        assert "<script" not in piece
+
+
+def test_a_list_of_nothing_is_nothing():
+    assert bullets(()) == ""
+    assert bullets(iter(["one", "two"])) == "<ul><li>one</li><li>two</li></ul>"
+
+
+def test_a_document_holds_its_title_its_style_and_its_body():
+    page = document("A title", "<p>text</p>")
+    assert page.startswith("<!DOCTYPE html>")
+    assert "<title>A title</title>" in page
+    assert css("page.css") in page
+    assert css("page_whole.css") in page
+    assert page.index("</style>") < page.index("<p>text</p>") < page.index("</main>")
+
+
+def test_a_figure_says_what_it_shows():
+    drawn = figure(Drawing(1.0, 1.0), "a bend")
+    assert drawn.startswith("<figure><svg")
+    assert drawn.endswith("</svg></figure>")
+    assert 'aria-label="a bend"' in drawn
+
+
+def test_the_signature_names_program_version_and_date():
+    assert signature("1 May").startswith("thermal-robot ")
+    assert signature("1 May") == f"{signature(None)}, 1 May"
+    assert signature("") == signature(None)
+
+
+def test_a_source_tree_that_is_not_installed_signs_without_a_version(monkeypatch):
+    def absent(name):
+        raise PackageNotFoundError(name)
+
+    monkeypatch.setattr(html_parts, "version", absent)
+    assert signature("1 May") == "thermal-robot, 1 May"
+
+
+def test_a_style_sheet_that_does_not_exist_is_an_error():
+    with pytest.raises(FileNotFoundError):
+        css("nothing.css")

@@ -1,0 +1,100 @@
+"""The remainder: every row at its place, the noise as a band, what was set aside as crosses."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from report.looking import line, lines_of
+
+from thermal_robot.diagnosis.parts import Dependence
+from thermal_robot.report import plot_remainder
+
+
+def test_remainder_is_drawn_against_what_it_follows(case):
+    figure = plot_remainder(case("unexplained"))
+    assert len(figure.axes) == 6
+    assert {axes.get_xlabel() for axes in figure.axes} == {"", "row in the file", "time (s)"}
+    assert [axes.get_ylabel() for axes in figure.axes[::2]] == ["x (µm)", "y (µm)", "z (µm)"]
+    points, median, crosses, _ = lines_of(figure.axes[2])
+    assert len(points.get_xdata()) == 118
+    assert list(crosses.get_xdata()) == [17, 80]
+    assert np.all(np.abs(crosses.get_ydata()) < figure.axes[2].get_ylim()[1])
+    steps = median.get_ydata()
+    assert steps[0] == pytest.approx(40.0, abs=15.0)
+    assert steps[-1] == pytest.approx(-90.0, abs=15.0)
+
+
+@pytest.mark.parametrize("name", ["elbow_joint", "order"])
+def test_remainder_finds_joints_and_the_order_of_rows(case, name):
+    left = replace(case("unexplained").unexplained, depends_on=(Dependence(name, 1e-4),))
+    figure = plot_remainder(replace(case("unexplained"), unexplained=left))
+    assert len(figure.axes) == 6
+
+
+def test_remainder_does_without_a_quantity_that_is_not_recorded(case):
+    left = replace(case("unexplained").unexplained, depends_on=(Dependence("session", 1e-4),))
+    assert len(plot_remainder(replace(case("unexplained"), unexplained=left)).axes) == 3
+
+
+def test_remainder_leaves_out_rows_without_the_quantity(case):
+    diagnosis = case("unexplained")
+    time_ = np.where(np.arange(120) % 3 == 0, np.nan, diagnosis.rows.covariates["time"])
+    diagnosis = replace(diagnosis, rows=replace(diagnosis.rows, covariates={"time": time_}))
+    points = lines_of(plot_remainder(diagnosis).axes[1])[0]
+    assert len(points.get_xdata()) == int((np.isfinite(time_) & ~diagnosis.rows.outliers).sum())
+
+
+def test_points_are_the_remainder_of_the_rows_that_count(case):
+    diagnosis = case("found")
+    figure = plot_remainder(diagnosis)
+    used = ~diagnosis.rows.outliers
+    assert len(figure.axes) == 3
+    for k, axes in enumerate(figure.axes):
+        where, values = line(axes, "remainder")
+        assert np.array_equal(where, diagnosis.rows.rows[used])
+        assert np.allclose(values, 1e6 * diagnosis.rows.remainder[used, k])
+        low, high = axes.get_ylim()
+        assert low == -high
+        assert np.all(np.abs(values) < high)
+
+
+def test_the_band_holds_so_much_of_noise_as_two_sigma_must(case, make_rows):
+    diagnosis = replace(case("nothing"), rows=make_rows(2000, before=1e-9, after=2.6e-5))
+    for axes in plot_remainder(diagnosis).axes:
+        (low, high) = axes.patches[0].get_y(), axes.patches[0].get_y() + axes.patches[0].get_height()
+        _, values = line(axes, "remainder")
+        assert high == -low
+        assert np.mean(np.abs(values) < high) == pytest.approx(0.9545, abs=0.015)
+
+
+def test_crosses_stay_whole_at_the_edge_and_true_inside(case):
+    diagnosis = case("found")
+    remainder = diagnosis.rows.remainder.copy()
+    row = int(np.flatnonzero(diagnosis.rows.outliers)[0])
+    remainder[row] = (1e-5, -1.0, 1.0)
+    x, y, z = plot_remainder(replace(diagnosis, rows=replace(diagnosis.rows, remainder=remainder))).axes
+    assert line(x, "set aside")[1, 0] == pytest.approx(10.0)
+    for axes, side in ((y, -1.0), (z, 1.0)):
+        at = line(axes, "set aside")[1, 0]
+        assert 0.8 < side * at / axes.get_ylim()[1] < 0.92
+
+
+def test_the_median_of_few_levels_stands_at_each(case):
+    base = case("unexplained")
+    payload = np.repeat([0.0, 2.5, 5.0], 40)
+    remainder = np.repeat([1e-5, -2e-5, 3e-5], 40)[:, None] * np.ones(3)
+    diagnosis = replace(
+        base,
+        rows=replace(base.rows, remainder=remainder, covariates={"payload": payload}),
+        unexplained=replace(base.unexplained, depends_on=(Dependence("payload", 1e-6),)),
+    )
+    axes = plot_remainder(diagnosis).axes[1]
+    np.testing.assert_allclose(line(axes, "running median"), [[0.0, 2.5, 5.0], [10.0, -20.0, 30.0]])
+
+
+def test_joint_positions_are_those_commanded(case):
+    base = case("unexplained")
+    left = replace(base.unexplained, depends_on=(Dependence("elbow_joint", 1e-4),))
+    diagnosis = replace(base, unexplained=left)
+    where, _ = line(plot_remainder(diagnosis).axes[1], "remainder")
+    assert np.array_equal(where, diagnosis.rows.q[~diagnosis.rows.outliers, 2])
