@@ -23,7 +23,7 @@ from thermal_robot.diagnosis.schemes import worst_folds
 from thermal_robot.diagnosis.sensitivity import sensitivity
 from thermal_robot.diagnosis.stand_in import stand_ins, trust
 from thermal_robot.diagnosis.where import locate
-from thermal_robot.effects import Effect, choose, library
+from thermal_robot.effects import Effect, choose, library, random_effects
 from thermal_robot.errors import CampaignError
 from thermal_robot.inference import settings
 from thermal_robot.inference.fit import Fit, fit
@@ -86,7 +86,7 @@ def diagnose(
     believed = trust({e.name: shares.get(e.name, 0.0) for e, _ in fitted.effects}, doubts, _left(looked, gap))
     systematic = findings(fitted, shrinkage.shares, locations, believed)
     chance = [f for f in _scatter(looked) if f.name not in without and (not only or f.name in only)]
-    found = in_order(titled((*systematic, *chance)))
+    found = in_order(titled((*systematic, *chance), (*candidates, *random_effects())))
     order = [f.name for f in found if f.name in {e.name for e, _ in fitted.effects}]
     order += [f.name for f in chance if f.status == "found"]
     probability = min(_probability(fitted), *believed.values(), 1.0)

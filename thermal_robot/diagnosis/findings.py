@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -11,7 +11,7 @@ from scipy.special import chdtri
 
 from thermal_robot.diagnosis.discovery import is_law
 from thermal_robot.diagnosis.parts import Estimate, Finding, Location, Status, is_frame
-from thermal_robot.effects import RANDOM
+from thermal_robot.effects import Effect, library
 from thermal_robot.effects.law import Discovered
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import orthonormal, whitener, without
@@ -67,29 +67,15 @@ def findings(
     return tuple(result)
 
 
-_TITLES = {
-    "base_frame": "a misplaced base frame",
-    "tool_frame": "a misplaced tool frame",
-    "joint_offset": "joint zero offsets",
-    "joint_gain": "joint gain errors",
-    "transmission_error": "periodic transmission errors",
-    "backlash": "lost motion in the joints",
-    "joint_compliance": "joints that yield to load",
-    "tracking_lag": "joints that trail their command",
-    "link_compliance": "links that bend under load",
-    "thermal_bending": "links that bow with heat",
-    "encoder_resolution": "encoders that count in coarse steps",
-    "excess_repeatability": "joints that scatter more than the instrument",
-    "geometric": "geometric errors of the links",
-    "thermal_elongation": "thermal elongation of the links",
-    "drift": "drift of the base or the instrument",
-    "instrument_scale": "a scale error of the instrument",
-}
-
-
-def titled(found: Sequence[Finding]) -> tuple[Finding, ...]:
-    """Return findings with the effects' titles."""
-    return tuple(replace(f, title=f.describes or _TITLES.get(f.name, ""), random=f.name in RANDOM) for f in found)
+def titled(found: Sequence[Finding], effects: Iterable[Effect]) -> tuple[Finding, ...]:
+    """Return findings with the titles of effects, and laws with what they describe."""
+    known = {effect.name: effect for effect in effects}
+    return tuple(
+        replace(f, title=known[f.name].title, random=known[f.name].random)
+        if f.name in known
+        else replace(f, title=f.describes or "")
+        for f in found
+    )
 
 
 def in_order(found: Sequence[Finding]) -> tuple[Finding, ...]:
@@ -100,8 +86,9 @@ def in_order(found: Sequence[Finding]) -> tuple[Finding, ...]:
 
 
 def _unknown_frames(fit: Fit) -> tuple[str, ...]:
-    known = {"base_frame": fit.campaign.base_known, "tool_frame": "tool_frame" not in fit.needs}
-    return tuple(name for name, is_known in known.items() if not is_known)
+    """Return the effects of the library that displace a frame which is fitted anyway."""
+    frames = [effect for effect in library().values() if effect.frame]
+    return tuple(effect.name for effect in frames if effect.missing(fit.nominal))
 
 
 def _within_frames(fit: Fit, block: int) -> bool:
