@@ -10,9 +10,9 @@ from helpers import NOISE, with_law
 from simulate import simulate
 
 from thermal_robot import diagnose
-from thermal_robot.diagnosis.diagnose import _left
+from thermal_robot.diagnosis.answer import _left
 from thermal_robot.diagnosis.parts import Unexplained
-from thermal_robot.diagnosis.random_gap import random_gap
+from thermal_robot.diagnosis.remainder import Examined
 from thermal_robot.diagnosis.schemes import worse_elsewhere
 from thermal_robot.diagnosis.stand_in import StandIn, trust
 from thermal_robot.effects import choose
@@ -21,6 +21,7 @@ from thermal_robot.effects.quantities import quantities
 from thermal_robot.errors import CampaignError
 from thermal_robot.inference.fit import fit
 from thermal_robot.inference.laws import of_quantity
+from thermal_robot.inference.random_gap import random_gap
 from thermal_robot.inference.rows import in_a_row
 from thermal_robot.kinematics import Displacement
 from thermal_robot.observations import Frames, observe
@@ -155,7 +156,7 @@ def test_rows_set_aside_in_a_row_count_as_unexplained(rv_m2):
     aside = np.isin(np.arange(n), [4, 5, 6, 30])
     assert in_a_row(known.campaign, aside).sum() == 3
     looked = SimpleNamespace(
-        remaining=Unexplained(True, 0.2, 1e-9),
+        left=Examined(Unexplained(True, 0.2, 1e-9), 1.0, "stated"),
         fit=SimpleNamespace(
             campaign=known.campaign,
             explanation=SimpleNamespace(outliers=aside),
@@ -165,5 +166,5 @@ def test_rows_set_aside_in_a_row_count_as_unexplained(rv_m2):
     )
     gap = SimpleNamespace(rms_before=1.0)
     assert _left(looked, gap) == pytest.approx(0.2**2 + 3 / (n - 1))
-    calm = SimpleNamespace(remaining=Unexplained(False, 0.0, 1.0), fit=looked.fit)
+    calm = SimpleNamespace(left=Examined(Unexplained(False, 0.0, 1.0), 1.0, "stated"), fit=looked.fit)
     assert _left(calm, gap) == 0.0

@@ -13,9 +13,9 @@ from thermal_robot import diagnose
 from thermal_robot.effects import Effect, Parameter, at_joint, choose
 from thermal_robot.inference.columns import Block, block, frame_columns
 from thermal_robot.inference.evidence import Search
-from thermal_robot.inference.explain import design_effect
 from thermal_robot.inference.frames import register
 from thermal_robot.inference.problem import Linear, Whitening, contained, gram, parameter_values
+from thermal_robot.inference.robust import design_effect
 from thermal_robot.observations import observe
 
 SPREAD = 1.5  # of ln λ: effects of three times the stated size are no surprise

@@ -192,26 +192,29 @@ def test_robots_with_hidden_scatter(tmp_path):
     from thermal_robot.blind.plan import plan, robots
     from thermal_robot.blind.reality import make
     from thermal_robot.campaign import read_campaign
-    from thermal_robot.diagnosis.random_gap import STEPS, WEAR, random_gap
-    from thermal_robot.effects import choose
+    from thermal_robot.diagnosis.random_findings import random_findings
+    from thermal_robot.effects import RANDOM, choose
     from thermal_robot.inference.fit import fit
+    from thermal_robot.inference.random_gap import random_gap
 
-    asked = [("random", {"single": 6}, (STEPS, WEAR)), ("other", {"single": 3}, ("joint_offset", "drift", "geometric"))]
+    asked = [("random", {"single": 6}, RANDOM), ("other", {"single": 3}, ("joint_offset", "drift", "geometric"))]
     asked.append(("null", {"null": 3}, ()))
     right, first, false = 0, 0, 0
     for name, counts, only in asked:
         for case in plan(11, counts, robots(), only_effects=only):
             folder = tmp_path / f"{name}-{case.id}"
             truth = make(case, folder)["truth"]
-            answer = random_gap(fit(read_campaign(folder), choose()))
+            known = fit(read_campaign(folder), choose())
+            answer = random_gap(known)
+            findings = random_findings(known, answer)
             assert answer.explains_size == (name == "random")
-            seen = {f.name: f for f in answer.findings if f.status == "found"}
+            seen = {f.name: f for f in findings if f.status == "found"}
             if name == "random":
                 (effect,) = case.effects
                 right += set(seen) == {effect}
                 places = [place["name"] for place in truth["parts"][effect]["places"]]
                 first += effect in seen and seen[effect].locations[0].name in places
-                assert answer.findings[1].status == ("not_testable" if effect == STEPS else "found")
+                assert findings[1].status == ("not_testable" if effect == RANDOM[0] else "found")
             else:
                 false += bool(seen)
     assert right >= 5

@@ -9,10 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
-from thermal_robot.diagnosis.discovery import is_law
 from thermal_robot.diagnosis.parts import Estimate, Finding, Location, Status, is_frame
 from thermal_robot.effects import Effect, library
-from thermal_robot.effects.law import Discovered
+from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import orthonormal, whitener, without
 from thermal_robot.inference.explain import Explanation
@@ -35,7 +34,7 @@ def findings(
     rivals = _rivals(fit, explained)
     result = []
     for name in dict.fromkeys(fit.families):
-        if is_law(name) and name not in explained:
+        if name.startswith(PREFIX) and name not in explained:
             continue  # a law that did not last was never a candidate of anybody's
         own = [b for b, f in enumerate(fit.families) if f == name]
         status: Status = "found" if name in explained else "not_found"

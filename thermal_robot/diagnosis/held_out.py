@@ -13,9 +13,10 @@ from numpy.typing import NDArray
 from thermal_robot.diagnosis.parts import HeldOut
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
-from thermal_robot.inference.explain import Noise, explain
+from thermal_robot.inference.explain import explain
 from thermal_robot.inference.fit import Fit, row_groups
 from thermal_robot.inference.problem import Linear, Whitening, frame_step
+from thermal_robot.inference.robust import Noise
 from thermal_robot.inference.rows import folds
 
 Array = NDArray[np.float64]

@@ -9,11 +9,10 @@ place, and D how an error of one unit there moves the target, in units of the no
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.diagnosis.parts import Explained, Place
 from thermal_robot.diagnosis.where import locate
 from thermal_robot.effects import Effect, Parameter
 from thermal_robot.effects.channel import by_place, sensitivity
@@ -35,63 +34,6 @@ _LINE = 25  # points of a law whose rows scatter about it, because it follows ot
 _ROUGH = 0.01  # of the law's range: neighbours that differ by less follow this quantity alone
 _NEIGHBOURS = 8  # rows that are taken together when asking whether an error follows a quantity
 _FINEST = 400  # points of a law that is drawn row by row
-
-
-@dataclass(frozen=True, eq=False)
-class Place:
-    """One place where an effect is at work, n rows.
-
-    Attributes
-    ----------
-    kind, name
-        ``joint`` and its name, and so on.
-    share
-        Part of what the effect does that it does here, 0..1.
-    quantity, quantity_unit
-        What drives the effect here.
-    values
-        (n,) of that quantity, SI.
-    levels
-        Whether it takes a few values only.
-    unit
-        Of the error: ``rad`` or ``m`` at the place; ``m at the tool`` where the error both shifts and turns.
-    before, after, spread
-        (n,) the error with the effect left in, without it, and one sigma of the noise in either.
-    line
-        (2, k) the fitted law: quantity and error.
-    """
-
-    kind: str
-    name: str
-    share: float
-    quantity: str
-    quantity_unit: str
-    values: Array
-    levels: bool
-    unit: str
-    before: Array
-    after: Array
-    spread: Array
-    line: Array
-
-
-@dataclass(frozen=True, eq=False)
-class Explained:
-    """What one effect explains.
-
-    Attributes
-    ----------
-    effect
-        Its name.
-    places
-        Those with a material share, largest first.
-    left_out
-        How many more there are.
-    """
-
-    effect: str
-    places: tuple[Place, ...]
-    left_out: int
 
 
 def explained(fit: Fit, effect: str) -> Explained:

@@ -232,3 +232,60 @@ class Sensitivity:
 
     smaller: float
     larger: float
+
+
+@dataclass(frozen=True, eq=False)
+class Place:
+    """One place where an effect is at work, n rows.
+
+    Attributes
+    ----------
+    kind, name
+        ``joint`` and its name, and so on.
+    share
+        Part of what the effect does that it does here, 0..1.
+    quantity, quantity_unit
+        What drives the effect here.
+    values
+        (n,) of that quantity, SI.
+    levels
+        Whether it takes a few values only.
+    unit
+        Of the error: ``rad`` or ``m`` at the place; ``m at the tool`` where the error both shifts and turns.
+    before, after, spread
+        (n,) the error with the effect left in, without it, and one sigma of the noise in either.
+    line
+        (2, k) the fitted law: quantity and error.
+    """
+
+    kind: str
+    name: str
+    share: float
+    quantity: str
+    quantity_unit: str
+    values: Array
+    levels: bool
+    unit: str
+    before: Array
+    after: Array
+    spread: Array
+    line: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Explained:
+    """What one effect explains.
+
+    Attributes
+    ----------
+    effect
+        Its name.
+    places
+        Those with a material share, largest first.
+    left_out
+        How many more there are.
+    """
+
+    effect: str
+    places: tuple[Place, ...]
+    left_out: int

@@ -112,18 +112,27 @@ def _nearest(points: Array, count: int) -> tuple[Array, NDArray[np.int64]]:
     return distance[~own].reshape(shape), number[~own].reshape(shape)
 
 
-def examine(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> tuple[Unexplained, float, str]:
-    """Say whether the remainder is noise.
+@dataclass(frozen=True)
+class Examined:
+    """Whether a remainder is noise.
 
-    Returns
-    -------
+    Attributes
+    ----------
     unexplained
         With the place where it enters and the quantity that it follows.
     floor
         One sigma per axis that instrument and repeatability alone would leave, m.
     source
-        Where that figure comes from: ``stated``, ``repeats`` or ``remainder``.
+        Where that figure comes from: ``stated``, ``repeats``, ``scatter`` or ``remainder``.
     """
+
+    unexplained: Unexplained
+    floor: float
+    source: str
+
+
+def examine(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Examined:
+    """Say whether the remainder is noise: by its size, its repeats, its neighbours, and what it follows."""
     e, left = fit.explanation, remainder(fit)
     stated, again = fit.campaign.noise_position, repeats(fit, left)
     rms = float(
@@ -141,7 +150,7 @@ def examine(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> tuple
     alike, likeness = _neighbours(fit, left)
     progress("remainder: places and quantities")
     law, locations, depends, share = _scan(fit, left)
-    verdicts = [_size(fit, left), _lack_of_fit(left, again), alike, law, _in_a_row(fit)]
+    verdicts = [_too_large(fit, left), _lack_of_fit(left, again), alike, law, _in_a_row(fit)]
     p_value = min(1.0, len(verdicts) * min(p for p, _ in verdicts))
     reasons = tuple(reason for p, reason in verdicts if reason and len(verdicts) * p < settings.LEVEL)
     flagged = bool(reasons) and rms > settings.ROUNDING
@@ -159,10 +168,10 @@ def examine(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> tuple
         locations if flagged else (),
         depends if flagged else (),
     )
-    return unexplained, float(floor), source
+    return Examined(unexplained, float(floor), source)
 
 
-def _size(fit: Fit, left: Remainder) -> tuple[float, str]:
+def _too_large(fit: Fit, left: Remainder) -> tuple[float, str]:
     """Chi-square of the remainder against the stated noise, its freedom reduced by the tails."""
     noise, worst = fit.explanation.whitening.noise, (1.0, "")
     stated = (fit.campaign.noise_position, fit.campaign.noise_orientation)

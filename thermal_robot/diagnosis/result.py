@@ -173,30 +173,19 @@ class Diagnosis:
 
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object of the format ``thermal-robot/diagnosis/1``."""
-        gap, left = self.gap, self.unexplained
-        orientation = None
-        if gap.orientation_before is not None:
-            orientation = {"rms_before": gap.orientation_before, "rms_after": gap.orientation_after}
+        left = self.unexplained
         plain: dict[str, Any] = {
             "schema": SCHEMA,
-            "campaign": {
-                "name": self.campaign,
-                "robot": self.robot,
-                "tool_frame": self.tool_frame,
-                "samples": self.samples,
-                "measures": self.measures,
-                "outliers": self.outliers,
-                "warnings": self.warnings,
-            },
-            "gap": {
-                "rms_before": gap.rms_before,
-                "rms_after": gap.rms_after,
-                "noise_floor": gap.noise_floor,
-                "noise_source": gap.noise_source,
-                "orientation": orientation,
-                "held_out": asdict(gap.held_out),
-                "schemes": [asdict(scheme) for scheme in gap.schemes],
-            },
+            "campaign": dict(
+                name=self.campaign,
+                robot=self.robot,
+                tool_frame=self.tool_frame,
+                samples=self.samples,
+                measures=self.measures,
+                outliers=self.outliers,
+                warnings=self.warnings,
+            ),
+            "gap": _gap(self.gap),
             "verdict": {
                 "effects": self.verdict,
                 "probability": self.probability,
@@ -232,6 +221,21 @@ class Diagnosis:
 
     def _repr_html_(self) -> str:
         return _teller().fragment(self)
+
+
+def _gap(gap: Gap) -> dict[str, Any]:
+    orientation = None
+    if gap.orientation_before is not None:
+        orientation = {"rms_before": gap.orientation_before, "rms_after": gap.orientation_after}
+    return {
+        "rms_before": gap.rms_before,
+        "rms_after": gap.rms_after,
+        "noise_floor": gap.noise_floor,
+        "noise_source": gap.noise_source,
+        "orientation": orientation,
+        "held_out": asdict(gap.held_out),
+        "schemes": [asdict(scheme) for scheme in gap.schemes],
+    }
 
 
 def _jsonable(value: Any) -> Any:

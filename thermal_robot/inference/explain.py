@@ -7,25 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtri
 
 from thermal_robot.inference import settings
 from thermal_robot.inference.evidence import Combination, Gram, Search
-from thermal_robot.inference.problem import Linear, Whitening, contained, frame_step, gram, parameter_values, scores
+from thermal_robot.inference.problem import Linear, Whitening, contained, frame_step, gram, parameter_values
+from thermal_robot.inference.robust import Noise, design_effect, distance_limit, first_whitening, reweigh
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True)
-class Noise:
-    """The instrument's one-sigma per axis, m and rad; ``None`` where it is not given."""
-
-    position: float | None = None
-    orientation: float | None = None
-
-    def parts(self, measures: int) -> tuple[float | None, ...]:
-        """Return one entry for every three components."""
-        return (self.position, self.orientation)[: measures // 3]
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,11 +63,6 @@ class Explanation:
         return min(float(self.probabilities[held].sum()), 1.0)
 
 
-def distance_limit(measures: int, rows: int) -> float:
-    """Return the squared distance, in noise, beyond which one of so many rows is a gross error."""
-    return settings.GROSS_FACTOR * float(chdtri(measures, settings.GROSS_LEVEL / max(rows, 1)))
-
-
 def explain(
     linear: Linear,
     noise: Noise,
@@ -123,7 +106,7 @@ def explain(
     families = families or [str(k) for k in range(len(linear.blocks))]
     log_prior = log_priors(families, rarity or {})
     rivals = {frozenset((a, b)) for a, f in enumerate(families) for b, g in enumerate(families) if a < b and f == g}
-    whitening = _first_whitening(linear, noise, use & ~aside)
+    whitening = first_whitening(linear, noise, use & ~aside)
     history: list[tuple[tuple[int, ...], bytes]] = []
     seed = tuple(start)
     while True:
@@ -139,7 +122,7 @@ def explain(
             break
         history.append(state)
         leverage = (best.effective + linear.frames.shape[2]) / max(problem.equations + linear.frames.shape[2], 1)
-        whitening, aside = _reweigh(remainder, noise, use, min(leverage, settings.MOST_LEVERAGE), measures)
+        whitening, aside = reweigh(remainder, noise, use, min(leverage, settings.MOST_LEVERAGE), measures)
         seed = best.blocks
     worth = design_effect(linear, problem, remainder, whitening, groups)
     if worth > 1.0:
@@ -164,72 +147,3 @@ def log_priors(families: Sequence[str], rarity: Mapping[str, float]) -> list[flo
 def _remainder(linear: Linear, values: dict[int, tuple[Array, Array]]) -> Array:
     moved = (linear.contribution(b, mean) for b, (mean, _) in values.items())
     return linear.gap - sum(moved, np.zeros_like(linear.gap))
-
-
-def design_effect(
-    linear: Linear, problem: Gram, remainder: Array, whitening: Whitening, groups: Sequence[NDArray[np.int64]]
-) -> float:
-    """Return how many rows are worth one, because the remainder of rows that belong together is alike.
-
-    The variance of the columns' scores summed within groups, over what it would be if rows were independent (Kish,
-    *Survey Sampling*, 1965); the largest over the groupings, 1 where chance would give as much.
-    """
-    if not groups or not problem.slices or not problem.slices[-1].stop:
-        return 1.0
-    used = np.flatnonzero(whitening.weights > 0)
-    each = scores(linear, whitening, problem, remainder)
-    alone = (each**2).sum(axis=0) + settings.TINY
-    value = np.linalg.eigvalsh(problem.matrix / np.sqrt(np.outer(np.diag(problem.matrix), np.diag(problem.matrix))))
-    independent = value.sum() ** 2 / (value**2).sum()
-    worst = 1.0
-    for labels in groups:
-        kept = labels[used]
-        together = np.stack([np.bincount(kept, column) for column in each.T], axis=1)
-        ratio = float(np.mean((together**2).sum(axis=0) / alone))
-        pairs = float((np.bincount(kept).astype(float) ** 2).sum()) / len(used) - 1.0
-        chance = np.sqrt(2.0 * max(pairs, 0.0) / (len(used) * independent))
-        worst = max(worst, ratio if ratio > 1.0 + settings.DESIGN_SIGMAS * chance else 1.0)
-    return worst
-
-
-def robust_noise(remainder: Array, leverage: float = 0.0) -> Array:
-    """Return one sigma per axis of each three components, from the median of their squared length."""
-    parts = remainder.reshape(len(remainder), -1, 3)
-    middle = np.median((parts**2).sum(axis=2), axis=0) / float(chdtri(3, 0.5))
-    return np.asarray(np.maximum(np.sqrt(middle / (1.0 - leverage)), settings.ROUNDING))
-
-
-def _settle(measured: Array, noise: Noise, measures: int) -> tuple[Array, float]:
-    """Return the noise of each component, never below what is stated, and how firmly it is held.
-
-    A remainder well above the stated noise is not noise: it then sets the scale by which effects are judged.
-    """
-    stated = noise.parts(measures)
-    sigma = np.array(
-        [
-            m if g is None else max(g, m if m > settings.NOISE_SLACK * g else g)
-            for g, m in zip(stated, measured, strict=True)
-        ]
-    )
-    firm = all(g is not None and s <= g for g, s in zip(stated, sigma, strict=True))
-    return np.repeat(sigma, 3), settings.GIVEN_NOISE_DOF if firm else 0.0
-
-
-def _first_whitening(linear: Linear, noise: Noise, use: NDArray[np.bool_]) -> Whitening:
-    weights = use.astype(float)
-    sigma, held = _settle(robust_noise(linear.gap[use]), noise, linear.measures)
-    return Whitening(weights, sigma, held)
-
-
-def _reweigh(
-    remainder: Array, noise: Noise, use: NDArray[np.bool_], leverage: float, measures: int
-) -> tuple[Whitening, NDArray[np.bool_]]:
-    sigma, held = _settle(robust_noise(remainder[use], leverage), noise, measures)
-    distance2 = ((remainder / sigma) ** 2).sum(axis=1) / (1.0 - leverage)
-    aside = use & (distance2 > distance_limit(measures, int(use.sum())))
-    if aside.sum() > settings.MOST_OUTLIERS * use.sum():
-        worst = np.argsort(np.where(use, -distance2, np.inf))[: int(settings.MOST_OUTLIERS * use.sum())]
-        aside = np.isin(np.arange(len(use)), worst) & aside
-    bend = float(chdtri(measures, settings.BEND_LEVEL))
-    weights = np.where(use & ~aside, np.minimum(1.0, np.sqrt(bend / np.maximum(distance2, settings.TINY))), 0.0)
-    return Whitening(weights, sigma, held), aside

@@ -13,9 +13,10 @@ from thermal_robot.effects import Effect
 from thermal_robot.effects.apply import displacement
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference.columns import block, frame_columns
-from thermal_robot.inference.explain import Explanation, Noise, explain
+from thermal_robot.inference.explain import Explanation, explain
 from thermal_robot.inference.frames import moved, register
 from thermal_robot.inference.problem import Linear, contained
+from thermal_robot.inference.robust import Noise
 from thermal_robot.inference.rows import neighbourhoods, spells
 from thermal_robot.observations import Frames, Observations, observe
 

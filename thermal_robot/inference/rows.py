@@ -112,3 +112,18 @@ def folds(
     block = np.minimum(ahead * blocks // campaign.samples, blocks - 1).astype(np.int64)[cluster]
     block = np.unique(block, return_inverse=True)[1].astype(np.int64)
     return block % count, block
+
+
+def repeated_poses(campaign: Campaign) -> NDArray[np.int64]:
+    """(N,) number of the commanded pose of each row: the same ``pose`` label, or without that column the same command.
+
+    A row whose label is empty stands alone.
+    """
+    label = campaign.labels.get("pose")
+    if label is None:
+        same = np.round(campaign.q / settings.SAME_COMMAND).astype(np.int64)
+        return np.asarray(np.unique(same, axis=0, return_inverse=True)[1]).ravel()
+    number = np.unique(label, return_inverse=True)[1].ravel()
+    empty = label == ""
+    number[empty] = number.max() + 1 + np.arange(int(empty.sum()))
+    return np.asarray(number)

@@ -251,12 +251,12 @@ STEP_CELL = 0.1
 """Of the shortest period: rounding commands to it costs 3 % of a periodogram's height."""
 MOST_CELLS = 2_000_000
 """Cells of a periodogram: a second of time, 50 MB."""
+FLAT = 12.0
+"""Square of a step over the variance of the errors that rounding to it makes: those of an even distribution."""
 SAWTOOTH_POWER = 0.3
 """Share of half a sawtooth's power in its first harmonic: 6/π² of it, halved by the periodogram's definition."""
 HEIGHT_SIGMAS = 1.6
 """Sigmas, each √½, that the root of an expected height must stand above chance for steps to be called visible."""
-LSTSQ_FLOOR = 1e-5
-"""Relative singular value below which a direction is left as the fit has it."""
 
 # --- findings ---
 

@@ -10,7 +10,7 @@ from scipy.special import fdtrc
 
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import orthonormal, whitener, without
-from thermal_robot.inference.explain import robust_noise
+from thermal_robot.inference.robust import robust_noise
 
 Array = NDArray[np.float64]
 

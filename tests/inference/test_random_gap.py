@@ -8,9 +8,10 @@ from conftest import load_arm
 from simulate import simulate
 
 from thermal_robot import diagnose
-from thermal_robot.diagnosis.random_gap import _Mean, _pose_errors, random_gap
+from thermal_robot.diagnosis.random_findings import random_findings
 from thermal_robot.effects import choose
 from thermal_robot.inference.fit import fit
+from thermal_robot.inference.random_gap import _Mean, _pose_errors, random_gap
 from thermal_robot.inference.scatter import JointScatter, Scatter
 from thermal_robot.kinematics import Displacement, frame_jacobians
 from thermal_robot.observations import Frames, observe
@@ -44,16 +45,17 @@ def visited(name, seed, repeats, poses, size, joint=1, stepped=True):
 
 
 def gap_of(data):
-    """Random gap beside a systematic effect that is not at work."""
-    return random_gap(fit(data, choose(("joint_offset",), (), ())))
+    """Random gap beside a systematic effect that is not at work, and what is said of it."""
+    known = fit(data, choose(("joint_offset",), (), ()))
+    seen = random_gap(known)
+    return seen, random_findings(known, seen)
 
 
 @pytest.mark.parametrize(("repeats", "poses"), REPEATED)
 def test_steps_of_an_encoder_are_found_where_poses_repeat(repeats, poses):
     for seed, name in enumerate(["rv_m2", "ur10"]):
         data, step = visited(name, seed, repeats, poses, (2.0, 4.0)[seed])
-        seen = gap_of(data)
-        steps, wear = seen.findings
+        seen, (steps, wear) = gap_of(data)
         assert (steps.status, wear.status) == ("found", "not_found")
         assert [place.name for place in steps.locations] == [data.robot.joint_names[1]]
         # the standard deviation of so few flat errors is known to about 10 %
@@ -63,14 +65,14 @@ def test_steps_of_an_encoder_are_found_where_poses_repeat(repeats, poses):
 
 def test_a_step_that_many_poses_show_is_measured_by_its_period():
     data, step = visited("rv_m2", 3, 2, 150, 3.0)
-    steps = gap_of(data).findings[0]
+    _, (steps, _) = gap_of(data)
     assert steps.parameters[0].value == pytest.approx(step, rel=1e-3)
 
 
 def test_errors_of_a_pose_that_follow_no_steps_are_no_encoder():
     for seed, name in enumerate(["rv_m2", "ur10"]):
-        seen = gap_of(visited(name, seed, 3, 160, 3.0, stepped=False)[0])
-        assert seen.findings[0].status == "not_found"
+        seen, (steps, _) = gap_of(visited(name, seed, 3, 160, 3.0, stepped=False)[0])
+        assert steps.status == "not_found"
         assert not seen.explains_size
         assert seen.steps == {load_arm(name).joint_names[1]: 1.0}
 

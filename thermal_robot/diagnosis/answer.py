@@ -1,0 +1,187 @@
+"""What is said of the last explanation: every part of a diagnosis from its fit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.correction import CorrectedModel
+from thermal_robot.diagnosis.cautions import cautions
+from thermal_robot.diagnosis.findings import findings, in_order, separates, titled
+from thermal_robot.diagnosis.held_out import Shrinkage
+from thermal_robot.diagnosis.parts import Gap, Rows, Unexplained
+from thermal_robot.diagnosis.random_findings import random_findings
+from thermal_robot.diagnosis.remainder import Examined
+from thermal_robot.diagnosis.result import Diagnosis
+from thermal_robot.diagnosis.schemes import worst_folds
+from thermal_robot.diagnosis.sensitivity import sensitivity
+from thermal_robot.diagnosis.stand_in import stand_ins, trust
+from thermal_robot.diagnosis.where import locate
+from thermal_robot.effects import Effect, random_effects
+from thermal_robot.inference import settings
+from thermal_robot.inference.discover import Discovery
+from thermal_robot.inference.fit import Fit
+from thermal_robot.inference.random_gap import RandomGap
+from thermal_robot.inference.rows import in_a_row
+
+
+@dataclass(frozen=True, eq=False)
+class Conclusion:
+    """The last explanation, and what it leaves.
+
+    Attributes
+    ----------
+    fit
+        Known effects and laws.
+    laws
+        Those that were discovered and belong to it.
+    unexplained
+        What the known effects leave: where it enters and what it follows as the laws say, if there are any.
+    left
+        What the explanation leaves.
+    chance
+        What is random in that beyond the instrument.
+    """
+
+    fit: Fit
+    laws: tuple[Discovery, ...]
+    unexplained: Unexplained
+    left: Examined
+    chance: RandomGap
+
+
+def answer(
+    last: Conclusion,
+    shrinkage: Shrinkage,
+    candidates: Sequence[Effect],
+    *,
+    asked: Callable[[str], bool],
+    narrowed: bool,
+    notes: Sequence[str],
+) -> Diagnosis:
+    """Put a diagnosis together.
+
+    Parameters
+    ----------
+    last
+        The last explanation.
+    shrinkage
+        What held-out rows say.
+    candidates
+        Effects that were considered.
+    asked
+        Whether an effect of this name was asked for, random ones too.
+    narrowed
+        Whether effects were left out by request.
+    notes
+        What was left out of the campaign.
+    """
+    fit, campaign, remaining = last.fit, last.fit.campaign, last.left.unexplained
+    shares = {name: value for name, (value, _) in shrinkage.shares.items()}
+    where, locations = locate(fit, shares)
+    doubts = stand_ins(fit) if remaining.flagged or last.laws else {}
+    gap = _gap(last, shrinkage)
+    held = [effect.name for effect, _ in fit.effects]
+    believed = trust({name: shares.get(name, 0.0) for name in held}, doubts, _left(last, gap))
+    systematic = findings(fit, shrinkage.shares, locations, believed)
+    chance = [f for f in random_findings(fit, last.chance, beside_unlisted=remaining.flagged) if asked(f.name)]
+    found = in_order(titled((*systematic, *chance), (*candidates, *random_effects())))
+    return Diagnosis(
+        campaign=campaign.name,
+        robot=campaign.robot.name,
+        tool_frame=campaign.robot.tool_frame,
+        samples=campaign.samples,
+        measures=campaign.measures,
+        joint_names=campaign.robot.joint_names,
+        outliers=tuple(campaign.rows[fit.explanation.outliers].tolist()),
+        gap=gap,
+        effects=found,
+        where=where,
+        unexplained=last.unexplained,
+        verdict=(*(f.name for f in found if f.name in held), *(f.name for f in chance if f.status == "found")),
+        probability=min(_probability(fit), *believed.values(), 1.0),
+        separates=separates(found),
+        model=_model(fit),
+        rows=_rows(fit, shrinkage),
+        warnings=(*campaign.warnings, *notes, *cautions(fit, candidates if narrowed else (), doubts)),
+        sensitivity=sensitivity(fit),
+        fit=fit,
+        remaining=remaining,
+        # the diagonal of the volume that was measured
+        reach=float(np.linalg.norm(np.ptp(np.asarray(campaign.position), axis=0))),
+        narrowed=narrowed,
+    )
+
+
+def _left(last: Conclusion, gap: Gap) -> float:
+    """Share of the gap's mean square that is not explained; rows that were set aside and follow each other are part."""
+    remaining, fit = last.left.unexplained, last.fit
+    if not remaining.flagged:
+        return 0.0
+    aside = fit.explanation.outliers
+    changed = in_a_row(fit.campaign, aside)
+    before, after = ((o.gap[:, :3] ** 2).sum(axis=1) for o in (fit.nominal, fit.corrected))
+    beside = float(after[changed].sum() / max(before[changed | ~aside].sum(), settings.TINY))
+    return min((remaining.rms / gap.rms_before) ** 2 + beside, 1.0)
+
+
+def _probability(fit: Fit) -> float:
+    """Posterior probability of exactly these effects, whatever the settings of their nonlinear arguments."""
+    e, chosen = fit.explanation, {effect.name for effect, _ in fit.effects}
+    same = [{fit.families[b] for b in c.blocks} == chosen for c in e.combinations]
+    return min(float(e.probabilities[same].sum()), 1.0)
+
+
+def _gap(last: Conclusion, shrinkage: Shrinkage) -> Gap:
+    fit = last.fit
+    kept = ~fit.explanation.outliers
+    before, after = fit.nominal.gap[kept], fit.corrected.gap[kept]
+
+    def rms(rows: NDArray[np.float64]) -> float:
+        return float(np.sqrt((rows**2).sum(axis=1).mean()))
+
+    turned = before.shape[1] == 6
+    return Gap(
+        rms(before[:, :3]),
+        rms(after[:, :3]),
+        float(np.sqrt(3.0) * last.left.floor),
+        last.left.source,
+        shrinkage.overall,
+        rms(before[:, 3:]) if turned else None,
+        rms(after[:, 3:]) if turned else None,
+        worst_folds(fit),
+    )
+
+
+def _model(fit: Fit) -> CorrectedModel:
+    campaign = fit.campaign
+    needs = [column for effect, _ in fit.effects for column in effect.reads(fit.nominal)]
+    clock = campaign.covariates.get("order")
+    return CorrectedModel(
+        robot=campaign.robot,
+        settings=campaign.settings,
+        frames=fit.corrected.frames,
+        effects=fit.effects,
+        measures=campaign.measures,
+        needs=tuple(dict.fromkeys(needs)),
+        simulated=campaign.simulated_position is not None,
+        last_order=None if clock is None else (float(clock.min()), float(clock.max())),
+    )
+
+
+def _rows(fit: Fit, shrinkage: Shrinkage) -> Rows:
+    campaign = fit.campaign
+    return Rows(
+        rows=campaign.rows,
+        gap=fit.nominal.gap,
+        remainder=fit.corrected.gap,
+        outliers=fit.explanation.outliers,
+        position=fit.nominal.position,
+        q=campaign.q,
+        covariates=campaign.covariates,
+        held_out_before=shrinkage.before,
+        held_out_after=shrinkage.after,
+    )

@@ -1,0 +1,46 @@
+"""Where joints scatter: the systematic effects chosen again in the covariance of that scatter, which may feign some."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from thermal_robot.diagnosis.answer import Conclusion
+from thermal_robot.diagnosis.parts import Unexplained
+from thermal_robot.diagnosis.remainder import Examined, examine
+from thermal_robot.inference import settings
+from thermal_robot.inference.explain import explain
+from thermal_robot.inference.fit import Fit, refit, row_groups
+from thermal_robot.inference.generalised import generalised
+from thermal_robot.inference.random_gap import RandomGap, random_gap
+from thermal_robot.inference.robust import Noise
+
+
+def beside_scatter(fit: Fit, chance: RandomGap, progress: Callable[[str], None]) -> Conclusion:
+    """Choose the systematic effects again beside a scatter that explains what remains.
+
+    Parameters
+    ----------
+    fit
+        Chosen as if the instrument alone scattered.
+    chance
+        The scatter.
+    progress
+        Called with a few words at each stage.
+    """
+    e, campaign = fit.explanation, fit.campaign
+    covariance = chance.scatter.covariance(fit.corrected.joint_sensitivity)
+    linear = generalised(e.linear, covariance, chance.scatter.noise)
+    noise = Noise(*(float(s) for s in chance.scatter.noise[::3]))
+    again = explain(linear, noise, families=fit.families, groups=row_groups(campaign), rarity=fit.rarity)
+    kept = tuple(dict.fromkeys(fit.families[b] for b in again.best.blocks))
+    feigned = {name: settings.NEVER for name in dict.fromkeys(fit.families) if name not in kept}
+    fit = refit(fit, {}, kept, feigned, progress)
+    chance = random_gap(fit)
+    covariance = chance.scatter.covariance(fit.corrected.joint_sensitivity)[:, :3, :3]
+    floor = float(np.sqrt(np.trace(covariance, axis1=1, axis2=2).mean() / 3.0))
+    left = Unexplained(not chance.explains_size, 0.0, chance.p_value)
+    if left.flagged:
+        left = examine(fit, progress).unexplained
+    return Conclusion(fit, (), left, Examined(left, floor, "scatter"), chance)

@@ -1,0 +1,88 @@
+"""What is said of the effects that scatter."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from thermal_robot.diagnosis.parts import Estimate, Finding, Location, Status
+from thermal_robot.effects import random_effects
+from thermal_robot.effects.quantities import unit
+from thermal_robot.effects.random_effect import RandomEffect
+from thermal_robot.inference import settings
+from thermal_robot.inference.fit import Fit
+from thermal_robot.inference.random_gap import Kept, RandomGap
+
+
+def random_findings(fit: Fit, chance: RandomGap, *, beside_unlisted: bool = False) -> tuple[Finding, ...]:
+    """Return what is said of every effect that scatters; none shrinks the gap, as a mean cannot take scatter away.
+
+    Without repeats the two kinds of scatter are one: what a pose brings is found where its steps are seen, otherwise
+    confounded with what comes anew at each visit, which is then not testable.
+
+    Parameters
+    ----------
+    fit
+        Frames and systematic effects.
+    chance
+        What is random in what they leave.
+    beside_unlisted
+        Whether an unlisted cause is at work: what differs from pose to pose may then be its doing, and is only
+        believed where its steps are seen.
+    """
+    found = tuple(_finding(fit, chance, effect) for effect in random_effects())
+    seen = any(p < settings.LEVEL for p in chance.steps.values())
+    if seen or not beside_unlisted:
+        return found
+    return tuple(_doubted(f) if f.confounded_with or _is_of_poses(f) else f for f in found)
+
+
+def _is_of_poses(finding: Finding) -> bool:
+    components = {effect.name: effect.component for effect in random_effects()}
+    return finding.status == "found" and components[finding.name] == "pose"
+
+
+def _doubted(finding: Finding) -> Finding:
+    return replace(
+        finding,
+        status="not_found",
+        probability=settings.BESIDE_UNLISTED * (finding.probability or 0.0),
+        locations=(),
+        parameters=(),
+        confounded_with=(),
+    )
+
+
+def _finding(fit: Fit, chance: RandomGap, effect: RandomEffect) -> Finding:
+    scatter, kind = chance.scatter, effect.component
+    if effect.needs and kind not in scatter.kinds:
+        return Finding(effect.name, "not_testable", needs=effect.needs)
+    own, probability = [k for k in chance.kept if k.component.kind == kind], scatter.probability.get(kind, 0.0)
+    if probability < settings.SCATTER_SURE or not own:
+        # what follows a law, or has no steps, is not this effect
+        refuted = probability >= settings.SCATTER_SURE and scatter.chosen(kind)
+        return Finding(effect.name, "not_found", 0.0 if refuted else probability, 0.0, (0.0, 0.0))
+    names, lever = fit.campaign.robot.joint_names, fit.corrected.joint_sensitivity[:, :3]
+    moved = np.array([k.component.sigma**2 * (lever[:, :, k.component.joint] ** 2).mean() for k in own])
+    order = np.argsort(-moved)
+    doubtful = all(k.doubtful for k in own)
+    status: Status = "confounded" if doubtful else "found"
+    others = tuple(e.name for e in random_effects() if e.component not in scatter.kinds)
+    return Finding(
+        effect.name,
+        status,
+        probability,
+        0.0,
+        (0.0, 0.0),
+        confounded_with=others if doubtful else (),
+        locations=tuple(Location("joint", names[own[k].component.joint], float(moved[k] / moved.sum())) for k in order),
+        parameters=tuple(_estimate(fit, own[k], effect) for k in order),
+    )
+
+
+def _estimate(fit: Fit, kept: Kept, effect: RandomEffect) -> Estimate:
+    c, joint = kept.component, fit.campaign.robot.joint_names[kept.component.joint]
+    width = effect.factor * (c.upper - c.lower) / (2.0 * settings.SIGMAS_95)
+    value = kept.step if c.kind == "pose" else effect.factor * c.sigma
+    return Estimate(f"{effect.label}, {joint}", value, width, unit(fit.campaign.robot, joint), True)

@@ -1,0 +1,102 @@
+"""Causes that nobody listed: one more law beside an explanation, and what laws say of what the known effects leave."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from thermal_robot.diagnosis.parts import Dependence, Location, Unexplained
+from thermal_robot.diagnosis.remainder import Examined, examine
+from thermal_robot.effects import Effect
+from thermal_robot.effects.law import PREFIX, Discovered
+from thermal_robot.inference import settings
+from thermal_robot.inference.discover import Discovery, discover
+from thermal_robot.inference.fit import Fit, refit
+from thermal_robot.inference.laws import of_quantity
+
+
+@dataclass(frozen=True, eq=False)
+class Stage:
+    """An explanation on the way to the last one.
+
+    Attributes
+    ----------
+    fit
+        Known effects and laws.
+    laws
+        What was discovered and belongs to it, in the order in which it was found.
+    left
+        What it leaves.
+    """
+
+    fit: Fit
+    laws: tuple[Discovery, ...]
+    left: Examined
+
+
+def one_more_law(stage: Stage, progress: Callable[[str], None]) -> Stage | None:
+    """Return the explanation with one more law, or a finer one in place of its own; ``None`` where none is worth it."""
+    fit, found = stage.fit, stage.laws
+    number = 1 + max((int(d.law.name.removeprefix(PREFIX)) for d in found), default=0)
+    progress(f"causes that nobody listed: scan {number}")
+    discovery = discover(fit, number)
+    if discovery is None:
+        return None
+    again = next((d for d in found if _same(d.law, discovery.law)), None)
+    if again is not None:  # its shape was too simple
+        values = again.law.values(fit.corrected)
+        finer = of_quantity(again.law, np.zeros(1) if values is None else values, knots=settings.FINER_KNOTS)
+        if again.law in (finer, discovery.law) or finer.shape == "levels":
+            return None
+        discovery = replace(discovery, law=finer)
+    law = discovery.law
+    begin = tuple(dict.fromkeys((*discovery.beside, law.name)))
+    alone = _alone(fit, law)
+    wider = refit(fit, {law.name: (law,), **alone}, begin, {law.name: discovery.rarity}, progress)
+    held = {effect.name for effect, _ in wider.effects}
+    singles = [variants[-1] for variants in alone.values()]
+    if law.name not in held and not any(effect in singles for effect, _ in wider.effects):
+        return None
+    known = {d.law.name: d for d in (*found, discovery)}
+    return Stage(wider, tuple(d for name, d in known.items() if name in held), examine(wider, progress))
+
+
+def _alone(fit: Fit, law: Discovered) -> dict[str, tuple[Effect, ...]]:
+    """Return by name the known effects that may do in one joint alone what a law of its own position does, so set.
+
+    Chosen for all joints they pay for every sound one, and a law of the one that errs is simpler than they.
+    """
+    if law.kind != "joint" or law.quantity != law.place:
+        return {}
+    own = {name: (settings, settings[0].at(law.place)) for name, settings in fit.settings.items()}
+    return {name: (*known, single) for name, (known, single) in own.items() if single and single not in known}
+
+
+def _same(law: Discovered, other: Discovered) -> bool:
+    """Whether two laws follow the same quantity at the same place; two orders of a wheel stand beside each other."""
+    if law.shape == other.shape == "harmonic" and law.marks != other.marks:
+        return False
+    return (law.kind, law.place, law.quantity) == (other.kind, other.place, other.quantity)
+
+
+def as_laws_say(first: Unexplained, left: Unexplained, found: Sequence[Discovery]) -> Unexplained:
+    """Say of what the known effects leave what the laws say of it."""
+    if not found:
+        return left
+    places: dict[tuple[str, str], float] = {}
+    followed: dict[str, float] = {}
+    for discovery in found:
+        for place, probability in discovery.places:
+            places.setdefault(place, probability)
+        for quantity, _ in discovery.quantities[:1]:
+            followed.setdefault(quantity, float(np.exp(-discovery.gain)))
+    locations = tuple(
+        Location(kind, name, min(p, 1.0)) for (kind, name), p in places.items() if p >= settings.LIKELY_PLACE
+    )
+    return replace(
+        first,
+        locations=locations,
+        depends_on=tuple(Dependence(name, p) for name, p in followed.items()),
+    )

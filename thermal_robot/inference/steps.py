@@ -1,0 +1,89 @@
+"""What errors of a joint follow: a smooth law of some quantity, or the steps of an encoder."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import without
+from thermal_robot.inference.laws import smooth_columns
+from thermal_robot.inference.target import Target
+
+Array = NDArray[np.float64]
+
+
+def followed(errors: Array, weight: Array, recorded: Mapping[str, Array]) -> str:
+    """Name the quantity that errors follow smoothly, or nothing: F tests, counted.
+
+    Parameters
+    ----------
+    errors, weight
+        (K,) errors, and one over the variance of each.
+    recorded
+        (K,) values of each quantity, by name.
+    """
+    best, follows = settings.LEVEL, ""
+    root = np.sqrt(weight)
+    constant = (root / np.linalg.norm(root))[:, None]
+    target = Target(without(errors * root, constant), root[:, None], constant)
+    for name, values in recorded.items():
+        columns = smooth_columns(values) if np.ptp(values) > settings.ROUNDING else np.zeros((len(values), 0))
+        worth = target.worth(columns[:, None, :])
+        p = worth.p_value * len(recorded)
+        if p < best and worth.share > settings.SCATTER_LAW_SHARE:
+            best, follows = p, name
+    return follows
+
+
+@dataclass(frozen=True)
+class Steps:
+    """What a periodogram says of steps.
+
+    Attributes
+    ----------
+    step
+        With which errors repeat, rad or m; the one that their size says where none is seen.
+    p_value
+        Of there being none; ``None`` where there are too many periods to search.
+    visible
+        Whether steps would have been seen.
+    """
+
+    step: float
+    p_value: float | None
+    visible: bool
+
+
+def period(errors: Array, weight: Array, command: Array, step: float) -> Steps:
+    """Look for the step with which errors repeat along the command, near the one that their size says.
+
+    Periodogram over all steps near the one that the scatter's size says (Scargle 1982): at a frequency that is not
+    the error's its height is exponential. ``None`` where there are too many to search.
+    """
+    from scipy.fft import next_fast_len, rfft
+
+    highest = settings.BAND / step
+    cell = settings.STEP_CELL / highest  # rounding the command to it costs 3 % of the height
+    place = np.round((command - command.min()) / cell).astype(np.int64)
+    if place.max() > settings.MOST_CELLS:
+        return Steps(step, None, False)
+    size = weight * (errors - float(weight @ errors / weight.sum()))
+    length = int(next_fast_len(2 * int(place.max()) + 2, real=True))
+    frequency = np.arange(length // 2 + 1) / (length * cell)
+    power = np.abs(rfft(np.bincount(place, size, length))) ** 2 / float((size**2).sum())
+    near = (frequency > highest / settings.BAND**2) & (frequency < highest)
+    if not near.any():
+        return Steps(step, None, False)
+    best = int(np.argmax(np.where(near, power, -1.0)))
+    tried = int(near.sum())
+    p = float(-np.expm1(tried * np.log1p(-np.exp(-power[best]))))
+    # the first harmonic holds 6/π² of a sawtooth's power; the root of a height is normal with variance 1/2
+    expected = settings.SAWTOOTH_POWER * float((weight * step**2 / settings.FLAT).sum())
+    seen = np.sqrt(expected) > np.sqrt(np.log(tried) - np.log(settings.REFUTED)) + settings.HEIGHT_SIGMAS
+    if power[best] < settings.STEPPED * expected:
+        p = 1.0 if seen else p  # a ripple on errors of another kind
+    return Steps(float(1.0 / frequency[best]) if p < settings.LEVEL else step, p, bool(seen))
