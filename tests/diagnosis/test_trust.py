@@ -11,8 +11,8 @@ from simulate import simulate
 
 from thermal_robot import diagnose
 from thermal_robot.diagnosis.answer import _left
+from thermal_robot.diagnosis.examine import Examined
 from thermal_robot.diagnosis.parts import Unexplained
-from thermal_robot.diagnosis.remainder import Examined
 from thermal_robot.diagnosis.schemes import worse_elsewhere
 from thermal_robot.diagnosis.stand_in import StandIn, trust
 from thermal_robot.effects import choose

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.diagnosis.cautions import cautions
+from thermal_robot.diagnosis.examine import Examined
 from thermal_robot.diagnosis.findings import findings, in_order, separates, titled
 from thermal_robot.diagnosis.held_out import Shrinkage
 from thermal_robot.diagnosis.parts import Gap, Rows, Unexplained
 from thermal_robot.diagnosis.random_findings import random_findings
-from thermal_robot.diagnosis.remainder import Examined
 from thermal_robot.diagnosis.result import Diagnosis
 from thermal_robot.diagnosis.schemes import worst_folds
 from thermal_robot.diagnosis.sensitivity import sensitivity

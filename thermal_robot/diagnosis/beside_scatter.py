@@ -7,8 +7,8 @@ from collections.abc import Callable
 import numpy as np
 
 from thermal_robot.diagnosis.answer import Conclusion
+from thermal_robot.diagnosis.examine import Examined, examine
 from thermal_robot.diagnosis.parts import Unexplained
-from thermal_robot.diagnosis.remainder import Examined, examine
 from thermal_robot.inference import settings
 from thermal_robot.inference.explain import explain
 from thermal_robot.inference.fit import Fit, refit, row_groups

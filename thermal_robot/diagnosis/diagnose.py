@@ -11,8 +11,8 @@ from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.diagnosis.answer import Conclusion, answer
 from thermal_robot.diagnosis.beside_scatter import beside_scatter
 from thermal_robot.diagnosis.cautions import usable
+from thermal_robot.diagnosis.examine import examine
 from thermal_robot.diagnosis.held_out import held_out
-from thermal_robot.diagnosis.remainder import examine
 from thermal_robot.diagnosis.result import Diagnosis, told
 from thermal_robot.diagnosis.schemes import worse_elsewhere
 from thermal_robot.diagnosis.unlisted import Stage, as_laws_say, one_more_law

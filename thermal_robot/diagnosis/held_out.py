@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from thermal_robot.diagnosis.parts import HeldOut
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import ridge
 from thermal_robot.inference.explain import explain
 from thermal_robot.inference.fit import Fit, row_groups
 from thermal_robot.inference.problem import Linear, Whitening, frame_step
@@ -130,7 +131,6 @@ class _Subsets:
         used = np.flatnonzero(whitening.weights > 0)
         root = np.sqrt(whitening.weights[used])[:, None] / whitening.noise
         flat = linear.frames[used] * root[:, :, None]
-        flat = flat / (np.sqrt((flat**2).sum(axis=(0, 1))) + settings.TINY)
         columns = [flat]
         self.slices, start = [], flat.shape[2]
         for item, basis in zip(linear.blocks, e.problem.bases, strict=True):
@@ -171,9 +171,7 @@ class _Subsets:
         """Return the ridge solution, negative, then 1; what a subset of effects leaves out is noise to it."""
         variance = self.variance
         for _ in range(settings.FOLD_ROUNDS):
-            ridge = np.concatenate([np.full(self.frames, settings.LOOSE_FRAME), variance * tight])
-            solution = np.linalg.solve(train[:-1, :-1] + np.diag(ridge), train[:-1, -1])
-            signed = np.concatenate([-solution, [1.0]])
+            signed = np.concatenate([-ridge(train, self.frames, variance * tight), [1.0]])
             left = self.worth * float(signed @ train @ signed) / max(self.equations, 1)
             variance = max(left, self.variance)
         return signed

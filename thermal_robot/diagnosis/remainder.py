@@ -1,23 +1,16 @@
-"""Tell noise from a remainder: where it enters, and what it follows."""
+"""What an explanation leaves, whitened, and what near-repeats say of it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import chdtrc, fdtrc, ndtr, pdtr
 
-from thermal_robot.diagnosis.parts import Dependence, Location, Unexplained
-from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import orthonormal, without
 from thermal_robot.inference.fit import Fit
-from thermal_robot.inference.laws import harmonics, smooth_columns
-from thermal_robot.inference.rows import in_a_row, in_order
-from thermal_robot.inference.target import Target, Worth
-from thermal_robot.observations import Observations
+from thermal_robot.inference.target import Target
 
 Array = NDArray[np.float64]
 
@@ -90,7 +83,7 @@ class Repeats:
 def repeats(fit: Fit, left: Remainder) -> Repeats | None:
     """Compare each command with its nearest neighbour within :data:`NEAR`; ``None`` where too few have one."""
     q = fit.campaign.q[left.rows]
-    distance, neighbour = _nearest(q, 1)
+    distance, neighbour = nearest(q, 1)
     close = np.flatnonzero(distance[:, 0] < settings.NEAR)
     pairs = np.unique(np.sort(np.column_stack([close, neighbour[close, 0]]), axis=1), axis=0)
     # the remainder of both: their commands may differ by a little, and their conditions by much
@@ -101,7 +94,7 @@ def repeats(fit: Fit, left: Remainder) -> Repeats | None:
     return Repeats(len(pairs), float((difference**2).mean() / 2.0), float(np.sqrt(place.mean())))
 
 
-def _nearest(points: Array, count: int) -> tuple[Array, NDArray[np.int64]]:
+def nearest(points: Array, count: int) -> tuple[Array, NDArray[np.int64]]:
     """Return distances and numbers (N, count) of each point's nearest others, itself left out however many coincide."""
     from scipy.spatial import cKDTree
 
@@ -110,211 +103,3 @@ def _nearest(points: Array, count: int) -> tuple[Array, NDArray[np.int64]]:
     own[~own.any(axis=1), -1] = True  # others at the same place came first: drop the last of them
     shape = (len(points), count)
     return distance[~own].reshape(shape), number[~own].reshape(shape)
-
-
-@dataclass(frozen=True)
-class Examined:
-    """Whether a remainder is noise.
-
-    Attributes
-    ----------
-    unexplained
-        With the place where it enters and the quantity that it follows.
-    floor
-        One sigma per axis that instrument and repeatability alone would leave, m.
-    source
-        Where that figure comes from: ``stated``, ``repeats``, ``scatter`` or ``remainder``.
-    """
-
-    unexplained: Unexplained
-    floor: float
-    source: str
-
-
-def examine(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Examined:
-    """Say whether the remainder is noise: by its size, its repeats, its neighbours, and what it follows."""
-    e, left = fit.explanation, remainder(fit)
-    stated, again = fit.campaign.noise_position, repeats(fit, left)
-    rms = float(
-        np.sqrt(
-            3.0 * (left.white[:, :3] ** 2).sum() * e.whitening.noise[0] ** 2 / (left.freedom * 3 / left.white.shape[1])
-        )
-    )
-    if stated is not None:
-        floor, source = stated, "stated"
-    elif again is not None:
-        floor, source = again.position, "repeats"
-    else:
-        floor, source = rms / np.sqrt(3.0), "remainder"
-    progress("remainder: size and neighbours")
-    alike, likeness = _neighbours(fit, left)
-    progress("remainder: places and quantities")
-    law, locations, depends, share = _scan(fit, left)
-    verdicts = [_too_large(fit, left), _lack_of_fit(left, again), alike, law, _in_a_row(fit)]
-    p_value = min(1.0, len(verdicts) * min(p for p, _ in verdicts))
-    reasons = tuple(reason for p, reason in verdicts if reason and len(verdicts) * p < settings.LEVEL)
-    flagged = bool(reasons) and rms > settings.ROUNDING
-    if flagged and source == "remainder":
-        # nothing tells the noise but the remainder itself: at most what neighbours do not have in common
-        floor *= np.sqrt(1.0 - np.clip(max(likeness, share), 0.0, 1.0))
-    beyond = np.sqrt(max(rms**2 - 3.0 * floor**2, 0.0)) if flagged else 0.0
-    if flagged and source == "remainder":
-        beyond = rms  # neither a stated noise nor repeats vouch for any of it
-    unexplained = Unexplained(
-        flagged,
-        float(beyond),
-        float(p_value),
-        reasons if flagged else (),
-        locations if flagged else (),
-        depends if flagged else (),
-    )
-    return Examined(unexplained, float(floor), source)
-
-
-def _too_large(fit: Fit, left: Remainder) -> tuple[float, str]:
-    """Chi-square of the remainder against the stated noise, its freedom reduced by the tails."""
-    noise, worst = fit.explanation.whitening.noise, (1.0, "")
-    stated = (fit.campaign.noise_position, fit.campaign.noise_orientation)
-    for part, sigma in enumerate(stated[: left.white.shape[1] // 3]):
-        if sigma is None:
-            continue
-        white = left.white[:, 3 * part : 3 * part + 3] * (noise[3 * part] / sigma)
-        freedom = left.freedom * 3.0 / left.white.shape[1]
-        ratio2 = float((white**2).sum() / freedom)
-        tails = max(float((white**4).mean() / (white**2).mean() ** 2) - 1.0, 2.0)
-        effective = freedom * 2.0 / tails
-        p = float(chdtrc(effective, ratio2 * effective))
-        what = "position" if part == 0 else "orientation"
-        if p < worst[0] and ratio2 > settings.MATERIAL_SCALE**2:
-            worst = (p, f"what remains in {what} is {np.sqrt(ratio2):.2g} times the stated noise")
-    return worst
-
-
-def _lack_of_fit(left: Remainder, again: Repeats | None) -> tuple[float, str]:
-    """F test of the remainder against the differences of near-repeats."""
-    if again is None:
-        return 1.0, ""
-    m = left.white.shape[1]
-    ratio2 = left.scale2 / max(again.scale2, settings.TINY)
-    p = float(fdtrc(left.freedom, again.pairs * m, ratio2))
-    if ratio2 < settings.MATERIAL_REPEATS**2:
-        return 1.0, ""
-    times = np.sqrt(ratio2)
-    return p, f"what remains is {times:.2g} times what {again.pairs} pairs of repeated commands differ by"
-
-
-def _in_a_row(fit: Fit) -> tuple[float, str]:
-    """Chance that so many of the rows set aside follow each other; spoilt rows do not, but those after a change do."""
-    aside = fit.explanation.outliers[in_order(fit.campaign)]
-    count, samples = int(aside.sum()), len(aside)
-    if count < settings.FEW_ASIDE * samples:
-        return 1.0, ""
-    follow = int((aside[1:] & aside[:-1]).sum())
-    # what chance gives has a Poisson law
-    p = 1.0 - float(pdtr(follow - 1, count * (count - 1) / samples)) if follow else 1.0
-    together = int(in_a_row(fit.campaign, fit.explanation.outliers).sum())
-    return p, f"{together} of the {count} rows that were set aside follow each other: something changed there"
-
-
-def _neighbours(fit: Fit, left: Remainder) -> tuple[tuple[float, str], float]:
-    """Compare the remainders of neighbours, in joint space and in order, with those of shuffled rows.
-
-    Returns p-value and reason, and the largest correlation that is not chance.
-    """
-    q = fit.campaign.q[left.rows]
-    spread = q.std(axis=0)
-    used = spread > settings.ROUNDING
-    white = left.white / np.sqrt((left.white**2).mean(axis=0) + settings.TINY)
-    white = np.clip(white, -settings.CLIPPED, settings.CLIPPED)
-    pairs = []
-    if used.any() and len(q) > settings.FEWEST_NEIGHBOURS:
-        _, near = _nearest(q[:, used] / spread[used], settings.NEIGHBOURS)
-        pairs.append(
-            ("joint space", np.column_stack([np.repeat(np.arange(len(q)), settings.NEIGHBOURS), near.ravel()]))
-        )
-    order = np.argsort(np.argsort(in_order(fit.campaign))[left.rows], kind="stable")
-    pairs.append(("the order of measurement", np.column_stack([order[:-1], order[1:]])))
-    rng = np.random.default_rng(0)
-    worst, most = (1.0, ""), 0.0
-    for where, pair in pairs:
-        statistic = float((white[pair[:, 0]] * white[pair[:, 1]]).sum(axis=1).mean())
-        chance = np.empty(settings.SHUFFLES if len(white) < settings.SHUFFLED_ROWS else settings.FEW_SHUFFLES)
-        for k in range(len(chance)):
-            shuffled = white[rng.permutation(len(white))]
-            chance[k] = (shuffled[pair[:, 0]] * shuffled[pair[:, 1]]).sum(axis=1).mean()
-        p = float(2.0 * ndtr(-max(statistic - chance.mean(), 0.0) / (chance.std() + settings.TINY)))
-        likeness = statistic / white.shape[1]
-        if p < settings.LEVEL and likeness > settings.MATERIAL_SHARE:
-            most = max(most, likeness)
-        if p < worst[0] and likeness > settings.MATERIAL_SHARE:
-            worst = (p, f"what remains is alike for neighbours in {where} (correlation {likeness:.2f})")
-    return worst, most
-
-
-@dataclass(frozen=True)
-class _Tested:
-    """A law that was put into a place, and what it is worth there."""
-
-    kind: str
-    place: str
-    quantity: str
-    worth: Worth
-
-
-def _scan(fit: Fit, left: Remainder) -> tuple[tuple[float, str], tuple[Location, ...], tuple[Dependence, ...], float]:
-    """F tests of a smooth law of every quantity in every place; p-values after counting them all.
-
-    Returns p-value and reason, places, quantities, and the share of the remainder that the best law explains.
-    """
-    tested = sorted(_tests(fit.corrected, left.some(settings.ENOUGH_REMAINDER)), key=lambda t: -t.worth.gain)
-    if not tested:
-        return (1.0, ""), (), (), 0.0
-    locations = _locations(tested)[: settings.NAMED]
-    material = [
-        t
-        for t in tested
-        if t.worth.share > settings.MATERIAL_SHARE and t.worth.p_value * len(tested) < settings.LAW_LEVEL
-    ]
-    if not material:
-        return (1.0, ""), locations, (), 0.0
-    depends: dict[str, float] = {}
-    for t in material:
-        depends.setdefault(t.quantity, min(1.0, t.worth.p_value * len(tested)))
-    first = material[0]
-    at = f"joint {first.place}" if first.kind == "joint" else f"the {first.place}"
-    reason = f"a law of {first.quantity} at {at} explains {first.worth.share:.0%} of what remains"
-    named = tuple(Dependence(q, p) for q, p in list(depends.items())[: settings.NAMED])
-    return (depends[first.quantity], reason), locations, named, first.worth.share
-
-
-def _tests(observations: Observations, left: Remainder) -> Iterator[_Tested]:
-    m, names = left.white.shape[1], observations.robot.joint_names
-    places = [("joint", name, observations.joint_sensitivity[left.rows, :m, j, None]) for j, name in enumerate(names)]
-    places.append(("base", "base", observations.base_sensitivity[left.rows, :m, :]))
-    places.append(("tool", "tool", observations.tool_sensitivity[left.rows, :m, :m]))
-    laws = {name: smooth_columns(values[left.rows]) for name, values in quantities(observations).items()}
-    for kind, place, sensitivity in places:
-        # five knots do not follow a wheel that turns more than once
-        turns = [(place, _turns(observations, place)[left.rows])] if place in laws else []
-        for quantity, law in [*laws.items(), *turns]:
-            if not law.shape[1] or (law.shape[1] * sensitivity.shape[2]) > left.freedom // 3:
-                continue
-            columns = (sensitivity[:, :, :, None] * law[:, None, None, :]).reshape(len(left.rows), m, -1)
-            yield _Tested(kind, place, quantity, left.target.worth(columns))
-
-
-def _locations(tested: Sequence[_Tested]) -> tuple[Location, ...]:
-    """Return the places by the posterior probability of their best laws."""
-    best: dict[tuple[str, str], float] = {}
-    for t in tested:
-        best[(t.kind, t.place)] = max(best.get((t.kind, t.place), -np.inf), t.worth.gain)
-    gains = np.array(list(best.values()))
-    weight = np.exp(gains - gains.max())
-    found = [Location(kind, place, float(w)) for (kind, place), w in zip(best, weight / weight.sum(), strict=True)]
-    return tuple(sorted(found, key=lambda place: -place.share))
-
-
-def _turns(observations: Observations, joint: str) -> Array:
-    """(N, 2k) harmonics of a joint's position."""
-    angle = observations.q[:, observations.robot.joint_names.index(joint)]
-    return np.column_stack([f(k * angle) for k in harmonics(observations, joint) for f in (np.sin, np.cos)])

@@ -15,6 +15,7 @@ from numpy.typing import NDArray
 from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis.parts import FoldScheme
 from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import ridge
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.rows import folds, neighbourhoods
 
@@ -128,12 +129,9 @@ class _Problem:
 
     def _distance(self, train: Array, test: NDArray[np.bool_], columns: int) -> Array:
         """(n,) distances that the frames and the first of the effects' columns leave."""
-        matrix = train[:columns, :columns].copy()
-        # a unit of an effect's column is one sigma of its prior; a frame has none, but for what nothing determines
-        prior = np.where(np.arange(columns) < self.flat, settings.FRAME_PRIOR * np.diag(matrix) + settings.TINY, 1.0)
-        matrix[np.diag_indices(columns)] += prior
-        length = np.sqrt(np.diag(matrix))
-        solution = np.linalg.solve(matrix / np.outer(length, length), train[:columns, -1] / length) / length
+        picked = np.concatenate([np.arange(columns), [-1]])
+        # a unit of an effect's column is one sigma of its prior
+        solution = ridge(train[np.ix_(picked, picked)], self.flat, np.ones(columns - self.flat))
         left = self.gap[test, :3] - self.design[test][:, :3, :columns] @ solution
         return np.asarray(np.linalg.norm(left, axis=1))
 

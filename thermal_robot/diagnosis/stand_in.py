@@ -11,9 +11,10 @@ from numpy.typing import NDArray
 from thermal_robot.effects.law import PREFIX
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference import settings
-from thermal_robot.inference.discover import Thin, instead
+from thermal_robot.inference.discover import instead
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.laws import smooth_columns
+from thermal_robot.inference.thin import Thin
 
 Array = NDArray[np.float64]
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from thermal_robot.diagnosis.examine import Examined, examine
 from thermal_robot.diagnosis.parts import Dependence, Location, Unexplained
-from thermal_robot.diagnosis.remainder import Examined, examine
 from thermal_robot.effects import Effect
 from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.inference import settings

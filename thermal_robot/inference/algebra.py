@@ -41,3 +41,22 @@ def orthonormal(columns: Array) -> Array:
 def without(columns: Array, basis: Array) -> Array:
     """Return (E, ...) columns with an orthonormal basis (E, r) projected out."""
     return np.asarray(columns - basis @ (basis.T @ columns))
+
+
+def ridge(products: Array, flat: int, prior: Array) -> Array:
+    """Return the (K,) solution of a fit from its sums of products alone.
+
+    Parameters
+    ----------
+    products
+        (K + 1, K + 1) products of K columns and the values, summed over the rows.
+    flat
+        How many columns come first that have no prior; what nothing determines stays where it is.
+    prior
+        (K − flat,) one over the prior variance of each other column, in the units of ``products``.
+    """
+    matrix = products[:-1, :-1].copy()
+    own = np.diag(matrix)[:flat]
+    matrix[np.diag_indices(len(matrix))] += np.concatenate([settings.FRAME_PRIOR * own + settings.TINY, prior])
+    length = np.sqrt(np.diag(matrix))
+    return np.asarray(np.linalg.solve(matrix / np.outer(length, length), products[:-1, -1] / length) / length)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,66 +12,14 @@ from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.evidence import Combination, Search
-from thermal_robot.inference.explain import log_priors
-from thermal_robot.inference.fit import Fit, corrected_observations
+from thermal_robot.inference.explain import log_odds, log_priors, settings_of_one
+from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.laws import CLOCK
 from thermal_robot.inference.problem import Linear, Whitening, contained, gram
-from thermal_robot.inference.rows import in_a_row
 from thermal_robot.inference.scan import Scanned, scan, shaped
-from thermal_robot.inference.target import Target
-from thermal_robot.observations import Observations
+from thermal_robot.inference.thin import Thin
 
 Array = NDArray[np.float64]
-
-
-@dataclass(frozen=True, eq=False)
-class Thin:
-    """As many rows of a fit as a scan needs: all of them, or some drawn at random where there are very many.
-
-    Attributes
-    ----------
-    observations
-        Of the corrected model, at these rows.
-    linear
-        The problem there, whitening its weights and noise.
-    remainder
-        (M, m) what the explanation leaves.
-    changed
-        (M,) rows that were set aside and follow each other.
-    """
-
-    observations: Observations
-    linear: Linear
-    whitening: Whitening
-    remainder: Array
-    changed: NDArray[np.bool_]
-
-    @classmethod
-    def of(cls, fit: Fit) -> Thin:
-        """Return the rows of a fit."""
-        e = fit.explanation
-        if fit.campaign.samples <= settings.ENOUGH_ROWS:
-            return cls(fit.corrected, e.linear, e.whitening, e.remainder, in_a_row(fit.campaign, e.outliers))
-        drawn = np.random.default_rng(settings.DRAW_SEED).choice(
-            fit.campaign.samples, settings.ENOUGH_ROWS, replace=False
-        )
-        rows = np.sort(drawn)
-        return cls(
-            corrected_observations(fit.campaign.take(rows), fit.corrected.frames, fit.effects),
-            Linear(
-                e.linear.gap[rows],
-                e.linear.frames[rows],
-                tuple(replace(b, columns=b.columns[rows]) for b in e.linear.blocks),
-            ),
-            replace(e.whitening, weights=e.whitening.weights[rows]),
-            e.remainder[rows],
-            in_a_row(fit.campaign, e.outliers)[rows],
-        )
-
-    def target(self, blocks: Iterable[int]) -> Target:
-        """Return what is left when frames and some blocks are projected out."""
-        columns = [self.linear.blocks[b].columns for b in blocks]
-        return Target.of(self.linear.gap, np.concatenate([self.linear.frames, *columns], axis=2), self.changed)
 
 
 @dataclass(frozen=True, eq=False)
@@ -160,14 +108,12 @@ def _compare(fit: Fit, thin: Thin, laws: Sequence[Discovered], tried: int) -> Di
     e = fit.explanation
     known = len(e.linear.blocks)
     problem = gram(_with(thin, laws), _all_rows(fit, thin))
-    odds = float(np.log(settings.PRIOR_PROBABILITY / (1 - settings.PRIOR_PROBABILITY)))
     rarity = -float(np.log(tried))
     families = [*fit.families, *(law.name for law in laws)]
     prior = log_priors(fit.families, fit.rarity)
     # a change that is one in time and in another quantity happened in time
-    prior += [odds + rarity + (settings.IN_TIME if law.quantity in CLOCK else 0.0) for law in laws]
-    same = {frozenset((a, b)) for a, f in enumerate(families) for b, g in enumerate(families) if a < b and f == g}
-    search = Search(problem, prior, contained(problem) | frozenset(same))
+    prior += [log_odds() + rarity + (settings.IN_TIME if law.quantity in CLOCK else 0.0) for law in laws]
+    search = Search(problem, prior, contained(problem) | settings_of_one(families))
     plain = search.evaluate(e.best.blocks)
     best = plain
     for k in range(known, known + len(laws)):
@@ -181,20 +127,30 @@ def _compare(fit: Fit, thin: Thin, laws: Sequence[Discovered], tried: int) -> Di
     gain = best.log_evidence - without.log_evidence
     if gain < settings.LEAST_GAIN:
         return None
-    combinations, weight = search.probabilities()
-    places: dict[tuple[str, str], float] = {}
-    followed: dict[str, float] = {}
-    for combination, w in zip(combinations, weight, strict=True):
-        for k in combination.blocks:
-            if k >= known:
-                law = laws[k - known]
-                places[where(fit, law)] = places.get(where(fit, law), 0.0) + float(w)
-                followed[law.quantity] = followed.get(law.quantity, 0.0) + float(w)
+    places, followed = _pooled(fit, search, laws)
     return Discovery(
         laws[inside[0] - known],
         tuple(dict.fromkeys(fit.families[b] for b in best.blocks if b < known)),
         rarity,
         float(gain),
+        places,
+        followed,
+    )
+
+
+def _pooled(
+    fit: Fit, search: Search, laws: Sequence[Discovered]
+) -> tuple[tuple[tuple[tuple[str, str], float], ...], tuple[tuple[str, float], ...]]:
+    """Return the places and the quantities of laws with their posterior probabilities, most probable first."""
+    known = len(fit.explanation.linear.blocks)
+    places: dict[tuple[str, str], float] = {}
+    followed: dict[str, float] = {}
+    for combination, w in zip(*search.probabilities(), strict=True):
+        for law in (laws[k - known] for k in combination.blocks if k >= known):
+            place = where(fit, law)
+            places[place] = places.get(place, 0.0) + float(w)
+            followed[law.quantity] = followed.get(law.quantity, 0.0) + float(w)
+    return (
         tuple(sorted(places.items(), key=lambda item: -item[1])),
         tuple(sorted(followed.items(), key=lambda item: -item[1])),
     )

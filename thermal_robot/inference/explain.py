@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -105,7 +106,7 @@ def explain(
     aside = np.zeros(samples, dtype=bool) if outliers is None else outliers & use
     families = families or [str(k) for k in range(len(linear.blocks))]
     log_prior = log_priors(families, rarity or {})
-    rivals = {frozenset((a, b)) for a, f in enumerate(families) for b, g in enumerate(families) if a < b and f == g}
+    rivals = settings_of_one(families)
     whitening = first_whitening(linear, noise, use & ~aside)
     history: list[tuple[tuple[int, ...], bytes]] = []
     seed = tuple(start)
@@ -132,16 +133,24 @@ def explain(
         remainder = _remainder(linear, values)
         step = frame_step(linear, whitening, remainder)
         remainder = remainder - linear.frames @ step
-    combinations, probabilities = search.probabilities()
-    return Explanation(
-        linear, whitening, problem, best, combinations, probabilities, values, step, remainder, aside, worth
-    )
+    compared, probabilities = search.probabilities()
+    return Explanation(linear, whitening, problem, best, compared, probabilities, values, step, remainder, aside, worth)
+
+
+def log_odds() -> float:
+    """Return the log prior odds of one effect."""
+    return float(np.log(settings.PRIOR_PROBABILITY / (1.0 - settings.PRIOR_PROBABILITY)))
+
+
+def settings_of_one(families: Sequence[str]) -> frozenset[frozenset[int]]:
+    """Return the pairs of blocks that are settings of one effect: they exclude each other."""
+    pairs = combinations(range(len(families)), 2)
+    return frozenset(frozenset((a, b)) for a, b in pairs if families[a] == families[b])
 
 
 def log_priors(families: Sequence[str], rarity: Mapping[str, float]) -> list[float]:
     """Return the log prior odds of each block: settings of one effect share its own."""
-    odds = float(np.log(settings.PRIOR_PROBABILITY / (1 - settings.PRIOR_PROBABILITY)))
-    return [odds - float(np.log(list(families).count(f))) + rarity.get(f, 0.0) for f in families]
+    return [log_odds() - float(np.log(list(families).count(f))) + rarity.get(f, 0.0) for f in families]
 
 
 def _remainder(linear: Linear, values: dict[int, tuple[Array, Array]]) -> Array:

@@ -273,8 +273,6 @@ RESAMPLES = 2000
 """Of the bootstrap: ends of a 95 % interval are then known to a tenth of its width."""
 INTERVAL = (0.025, 0.975)
 """Quantiles of every interval."""
-LOOSE_FRAME = 1e-9
-"""Weight of a frame's prior in a fold, of its own column: none, but for what nothing determines."""
 FOLD_ROUNDS = 3
 """Rounds of noise in the fit of a subset of effects: what a subset leaves out is noise to it."""
 COLDEST = 0.01

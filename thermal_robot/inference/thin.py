@@ -1,0 +1,68 @@
+"""As many rows of a fit as a scan for laws needs."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.inference import settings
+from thermal_robot.inference.fit import Fit, corrected_observations
+from thermal_robot.inference.problem import Linear, Whitening
+from thermal_robot.inference.rows import in_a_row
+from thermal_robot.inference.target import Target
+from thermal_robot.observations import Observations
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Thin:
+    """As many rows of a fit as a scan needs: all of them, or some drawn at random where there are very many.
+
+    Attributes
+    ----------
+    observations
+        Of the corrected model, at these rows.
+    linear
+        The problem there, whitening its weights and noise.
+    remainder
+        (M, m) what the explanation leaves.
+    changed
+        (M,) rows that were set aside and follow each other.
+    """
+
+    observations: Observations
+    linear: Linear
+    whitening: Whitening
+    remainder: Array
+    changed: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, fit: Fit) -> Thin:
+        """Return the rows of a fit."""
+        e = fit.explanation
+        if fit.campaign.samples <= settings.ENOUGH_ROWS:
+            return cls(fit.corrected, e.linear, e.whitening, e.remainder, in_a_row(fit.campaign, e.outliers))
+        drawn = np.random.default_rng(settings.DRAW_SEED).choice(
+            fit.campaign.samples, settings.ENOUGH_ROWS, replace=False
+        )
+        rows = np.sort(drawn)
+        return cls(
+            corrected_observations(fit.campaign.take(rows), fit.corrected.frames, fit.effects),
+            Linear(
+                e.linear.gap[rows],
+                e.linear.frames[rows],
+                tuple(replace(b, columns=b.columns[rows]) for b in e.linear.blocks),
+            ),
+            replace(e.whitening, weights=e.whitening.weights[rows]),
+            e.remainder[rows],
+            in_a_row(fit.campaign, e.outliers)[rows],
+        )
+
+    def target(self, blocks: Iterable[int]) -> Target:
+        """Return what is left when frames and some blocks are projected out."""
+        columns = [self.linear.blocks[b].columns for b in blocks]
+        return Target.of(self.linear.gap, np.concatenate([self.linear.frames, *columns], axis=2), self.changed)
