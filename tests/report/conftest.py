@@ -264,8 +264,8 @@ def with_law():
         parameters=(Estimate("step at 4000 s", 1.3e-4, 6e-6, "rad", True),),
         quantity="time",
         shape="step",
-        describes="an error at joint elbow_joint that follows time (step)",
-        title="an error at joint elbow_joint that follows time (step)",
+        describes="an error at elbow_joint that follows time (step)",
+        title="an error at elbow_joint that follows time (step)",
     )
     first, *rest = base.effects
     return replace(base, effects=(first, law, *rest), verdict=("thermal_elongation", "discovered.1"))

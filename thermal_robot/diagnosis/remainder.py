@@ -272,7 +272,8 @@ def _scan(fit: Fit, left: Remainder) -> tuple[tuple[float, str], tuple[Location,
     for t in material:
         depends.setdefault(t.quantity, min(1.0, t.worth.p_value * len(tested)))
     first = material[0]
-    at = f"joint {first.place}" if first.kind == "joint" else f"the {first.place}"
+    joint = first.place if "joint" in first.place else f"joint {first.place}"
+    at = joint if first.kind == "joint" else f"the {first.place}"
     reason = f"a law of {first.quantity} at {at} explains {first.worth.share:.0%} of what remains"
     named = tuple(Dependence(q, p) for q, p in list(depends.items())[: settings.NAMED])
     return (depends[first.quantity], reason), locations, named, first.worth.share

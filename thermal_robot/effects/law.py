@@ -162,9 +162,8 @@ class Discovered(Effect):
 
     def describe(self) -> str:
         """Say in a few words where the error enters and what it follows."""
-        at = {"joint": f"joint {self.place}", "link": f"the placement of {self.place}"}.get(
-            self.kind, f"the {self.kind}"
-        )
+        joint = self.place if "joint" in self.place else f"joint {self.place}"
+        at = {"joint": joint, "link": f"the placement of {self.place}"}.get(self.kind, f"the {self.kind}")
         if self.shape == "constant":
             return f"a constant error at {at}"
         mark = self.marks[0] if self.marks else 0.0
