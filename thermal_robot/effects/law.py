@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from thermal_robot.effects.effect import (
+    TWIST,
     Array,
     Driver,
     Effect,
@@ -124,7 +125,7 @@ class Discovered(Effect):
         for function, label in zip(functions.T, labels, strict=True):
             for c, component in enumerate(components):
                 twist = function[:, None] * np.eye(6)[c]
-                own = "m" if c < 3 else "rad"
+                own = TWIST[c][1]
                 found.append(Parameter(f"{component}, {label}", own, 1e-4, self.kind, where, (respond(twist),)))
         return tuple(found)
 
