@@ -71,6 +71,7 @@ def rows(samples=120, before=4e-4, after=2.5e-5, *, aside=(), pose=False, joints
         covariates={"time": time, "temperature": temperature},
         held_out_before=np.linalg.norm(gap[:, :3], axis=1) * hidden,
         held_out_after=1.06 * np.linalg.norm(remainder[:, :3], axis=1) * hidden,
+        units={"time": "s", "temperature": "°C", **dict.fromkeys(joints, "rad")},
     )
 
 

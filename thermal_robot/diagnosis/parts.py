@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -213,6 +213,8 @@ class Rows:
         Recorded quantities by name, (N,).
     held_out_before, held_out_after
         (N,) distance in m while the row was held out; NaN where it was set aside.
+    units
+        SI unit of every covariate and of every joint's position, by name; empty where it has none.
     """
 
     rows: NDArray[np.int64]
@@ -224,6 +226,7 @@ class Rows:
     covariates: Mapping[str, Array]
     held_out_before: Array
     held_out_after: Array
+    units: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)

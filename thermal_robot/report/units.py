@@ -20,18 +20,6 @@ _LADDERS: dict[str, tuple[tuple[float, float, str], ...]] = {
     "1": ((1e-2, 1e2, "%"), (0.0, 1e6, "ppm")),
     "1/K": ((0.0, 1e6, "µm/(m·K)"),),
 }
-_OF_QUANTITY = {
-    "time": "s",
-    "temperature": "°C",
-    "payload": "kg",
-    "torque": "N·m",
-    "speed": "share of the maximum",
-    "velocity": "rad/s",
-    "acceleration": "rad/s²",
-    "encoder": "rad",
-    "approach": "−1, 0, 1",
-    "order": "number",
-}
 
 
 @dataclass(frozen=True)
@@ -158,8 +146,3 @@ def place(location: Location) -> str:
     if not location.name or location.kind in location.name:
         return location.name or location.kind
     return f"{location.kind} {location.name}"
-
-
-def recorded_unit(column: str) -> str:
-    """Return the unit of a recorded quantity; empty for one that is kept as it came."""
-    return _OF_QUANTITY.get(column.partition(".")[0], "")
