@@ -55,6 +55,16 @@ def test_backlash_sets_the_two_sides_apart_by_its_play(rv_m2):
     assert np.nanmean(law[x < 0]) - np.nanmean(law[x > 0]) == pytest.approx(play, rel=0.1)
 
 
+@pytest.mark.parametrize(
+    ("joint", "unit", "drawn"), [("slide", "m", ("µm", "mm")), ("turret", "rad", ("µrad", "mrad"))]
+)
+def test_the_error_of_a_joint_is_a_length_where_it_slides_and_else_an_angle(awkward, joint, unit, drawn):
+    figure, found, _, _ = shown(awkward, "backlash", places=[joint])
+    first = found.places[0]
+    assert (first.name, first.unit) == (joint, unit)
+    assert figure.axes[0].get_ylabel() in [f"error ({word})" for word in drawn]
+
+
 def test_a_gain_is_a_slope_and_nothing_is_left_of_it(rv_m2):
     figure, _, values, _ = shown(rv_m2, "joint_gain", places=["joint_2"])
     axes = figure.axes[0]

@@ -109,7 +109,8 @@ def test_marks_that_look_alike_in_three_digits_have_names_of_their_own(rv_m2):
 def test_it_is_described_by_place_quantity_and_shape(shape):
     law = replace(STEP, shape=shape, marks=(-350.0, 20.0))
     words = law.describe()
-    assert "joint joint_3" in words
+    assert "at joint_3" in words
+    assert "joint joint_3" not in words
     assert ("time" in words) == (shape != "constant")
     assert ("−350 s" in words) == bool(SHAPES[shape].mark)
     assert "{" not in words
@@ -118,14 +119,16 @@ def test_it_is_described_by_place_quantity_and_shape(shape):
 @pytest.mark.parametrize(
     ("law", "words"),
     [
-        (STEP, "an error at joint joint_3 that follows time (a step at 350 s)"),
+        (STEP, "an error at joint_3 that follows time (a step at 350 s)"),
+        (replace(STEP, place="elbow"), "an error at joint elbow that follows time (a step at 350 s)"),
+        (replace(STEP, place="elbow", shape="constant"), "a constant error at joint elbow"),
         (replace(STEP, kind="base", shape="ramp"), "an error at the base that follows time (in proportion)"),
         (replace(STEP, kind="link", shape="constant"), "a constant error at the placement of joint_3"),
         (
             replace(STEP, quantity="joint_3", shape="harmonic", marks=(101.0,)),
-            "an error at joint joint_3 that follows joint_3 (harmonic of order 101)",
+            "an error at joint_3 that follows joint_3 (harmonic of order 101)",
         ),
-        (replace(STEP, shape="smooth"), "an error at joint joint_3 that follows time (smooth)"),
+        (replace(STEP, shape="smooth"), "an error at joint_3 that follows time (smooth)"),
     ],
 )
 def test_its_words(law, words):

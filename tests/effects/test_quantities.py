@@ -27,6 +27,10 @@ def test_a_quantity_of_a_joint_has_the_unit_of_how_the_joint_moves(awkward, name
         assert unit(awkward, name.format(joint)) == (sliding if kind == "prismatic" else turning)
 
 
+def test_what_no_joint_of_the_chain_records_has_no_known_unit(awkward):
+    assert {unit(awkward, name) for name in ("velocity.nobody", "torque", "time.start", "reach.w")} == {""}
+
+
 def test_other_quantities_have_the_unit_of_their_column(rv_m2):
     expected = {"time": "s", "temperature": "°C", "temperature.hand": "°C", "payload": "kg", "reach.x": "m"}
     assert {name: unit(rv_m2, name) for name in expected} == expected

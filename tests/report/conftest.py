@@ -71,6 +71,7 @@ def rows(samples=120, before=4e-4, after=2.5e-5, *, aside=(), pose=False, joints
         covariates={"time": time, "temperature": temperature},
         held_out_before=np.linalg.norm(gap[:, :3], axis=1) * hidden,
         held_out_after=1.06 * np.linalg.norm(remainder[:, :3], axis=1) * hidden,
+        units={"time": "s", "temperature": "°C", **dict.fromkeys(joints, "rad")},
     )
 
 
@@ -264,8 +265,8 @@ def with_law():
         parameters=(Estimate("step at 4000 s", 1.3e-4, 6e-6, "rad", True),),
         quantity="time",
         shape="step",
-        describes="an error at joint elbow_joint that follows time (step)",
-        title="an error at joint elbow_joint that follows time (step)",
+        describes="an error at elbow_joint that follows time (step)",
+        title="an error at elbow_joint that follows time (step)",
     )
     first, *rest = base.effects
     return replace(base, effects=(first, law, *rest), verdict=("thermal_elongation", "discovered.1"))

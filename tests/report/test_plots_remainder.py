@@ -5,7 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from report.looking import line, lines_of
+from simulate import simulate
 
+from thermal_robot import diagnose
 from thermal_robot.diagnosis.parts import Dependence
 from thermal_robot.report import plot_remainder
 
@@ -98,3 +100,49 @@ def test_joint_positions_are_those_commanded(case):
     diagnosis = replace(base, unexplained=left)
     where, _ = line(plot_remainder(diagnosis).axes[1], "remainder")
     assert np.array_equal(where, diagnosis.rows.q[~diagnosis.rows.outliers, 2])
+
+
+def label_of(case, name, values=None):
+    """What the axis of a quantity bears that the remainder follows; a joint's own position without values."""
+    base = case("unexplained")
+    joints = {"slide": "m", "hand": "rad"}
+    known = {"velocity.slide": "m/s", "velocity.hand": "rad/s", "temperature.hand": "°C", "torque.slide": "N", **joints}
+    covariates = {} if values is None else {name: values}
+    diagnosis = replace(
+        base,
+        joint_names=tuple(joints),
+        rows=replace(base.rows, q=base.rows.q[:, :2], covariates=covariates, units=known),
+        unexplained=replace(base.unexplained, depends_on=(Dependence(name, 1e-6),)),
+    )
+    return plot_remainder(diagnosis).axes[5].get_xlabel()
+
+
+@pytest.mark.parametrize(
+    ("name", "label"),
+    [
+        ("velocity.slide", "velocity.slide (m/s)"),
+        ("velocity.hand", "velocity.hand (rad/s)"),
+        ("torque.slide", "torque.slide (N)"),
+        ("temperature.hand", "temperature.hand (°C)"),
+        ("approach.slide", "approach.slide (−1, 0, 1)"),
+        ("speed", "speed (share of the maximum)"),
+        ("order", "order (number)"),
+        ("humidity", "humidity"),
+    ],
+)
+def test_an_axis_bears_the_unit_of_what_was_recorded(case, name, label):
+    assert label_of(case, name, np.linspace(0.0, 1.0, 120)) == label
+
+
+def test_a_joint_that_slides_is_drawn_in_metres_and_one_that_turns_in_radians(case):
+    assert [label_of(case, joint) for joint in ("slide", "hand")] == ["slide (m)", "hand (rad)"]
+
+
+def test_a_diagnosis_knows_the_unit_of_a_joint_that_slides(awkward):
+    found = diagnose(simulate(awkward, ["drift"], seed=3, moving=True)[0], only=["drift"])
+    for joint, kind in zip(awkward.joint_names, awkward.joint_types, strict=True):
+        length = "m" if kind == "prismatic" else "rad"
+        left = replace(found.unexplained, depends_on=(Dependence(f"velocity.{joint}", 1e-6),))
+        assert plot_remainder(replace(found, unexplained=left)).axes[5].get_xlabel() == f"velocity.{joint} ({length}/s)"
+        assert found.rows.units[joint] == length
+    assert {*found.rows.covariates, *found.joint_names} == set(found.rows.units)

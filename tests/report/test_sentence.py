@@ -89,7 +89,7 @@ def test_a_base_or_a_tool_is_named_by_its_kind(case):
 
 def test_a_law_is_no_known_effect(law_case):
     text = headline(law_case())
-    assert "thermal elongation and an error at joint elbow_joint that follows time (step)" in text
+    assert "thermal elongation and an error at elbow_joint that follows time (step)" in text
     assert "correcting for them removes" in text
     assert "no known effect has that shape" in text
     assert "that shape" not in headline(replace(law_case(), verdict=("thermal_elongation",)))

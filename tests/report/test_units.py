@@ -86,13 +86,11 @@ def test_shares_p_values_and_places():
         "p = 3e-9",
         "p < 1e-12",
     ]
-    assert units.place(Location("joint", "hand", 0.1)) == "joint hand"
-    assert units.place(Location("joint", "elbow_joint", 0.1)) == "elbow_joint"
-    assert units.place(Location("link", "elbow_joint", 0.1)) == "link elbow_joint"
-    assert units.place(Location("instrument", "", 0.1)) == "instrument"
-    assert units.place(Location("base", "base", 0.1)) == "base"
-    assert units.recorded_unit("temperature.upper_arm_link") == "°C"
-    assert units.recorded_unit("humidity") == ""
+    assert Location("joint", "hand", 0.1).words == "joint hand"
+    assert Location("joint", "elbow_joint", 0.1).words == "elbow_joint"
+    assert Location("link", "elbow_joint", 0.1).words == "link elbow_joint"
+    assert Location("instrument", "", 0.1).words == "instrument"
+    assert Location("base", "base", 0.1).words == "base"
 
 
 SI = {"µm": 1e-6, "mm": 1e-3, "m": 1.0, "µrad": 1e-6, "mrad": 1e-3, "rad": 1.0, "ms": 1e-3, "µs": 1e-6, "s": 1.0}

@@ -149,7 +149,7 @@ def test_a_law_may_bear_any_name_and_an_effect_may_bear_its(law_case):
     diagnosis = replace(base, effects=(alike, renamed), verdict=("discovered.thermal", "step_in_time"))
     assert [f.name for f in laws(diagnosis)] == ["step_in_time"]
     said = list(sentences(diagnosis))
-    assert said[-1] == "step_in_time describes part of it: an error at joint elbow_joint that follows time (step)."
+    assert said[-1] == "step_in_time describes part of it: an error at elbow_joint that follows time (step)."
 
 
 def test_nothing_left_is_said_with_its_chance(case):
@@ -168,7 +168,7 @@ def test_what_is_left_is_told_in_whole_sentences(case):
 def test_what_a_law_follows_is_not_said_twice(law_case):
     said = " ".join(sentences(law_case()))
     assert "It follows" not in said
-    assert "discovered.1 describes part of it: an error at joint elbow_joint" in said
+    assert "discovered.1 describes part of it: an error at elbow_joint" in said
 
 
 def test_without_a_known_noise_a_remainder_is_not_beyond_it(case):

@@ -21,6 +21,7 @@ from thermal_robot.diagnosis.sensitivity import sensitivity
 from thermal_robot.diagnosis.stand_in import stand_ins, trust
 from thermal_robot.diagnosis.where import locate
 from thermal_robot.effects import Effect, random_effects
+from thermal_robot.effects.quantities import unit
 from thermal_robot.inference import settings
 from thermal_robot.inference.discover import Discovery
 from thermal_robot.inference.fit import Fit
@@ -184,4 +185,5 @@ def _rows(fit: Fit, shrinkage: Shrinkage) -> Rows:
         covariates=campaign.covariates,
         held_out_before=shrinkage.before,
         held_out_after=shrinkage.after,
+        units={name: unit(campaign.robot, name) for name in (*campaign.covariates, *campaign.robot.joint_names)},
     )

@@ -11,6 +11,7 @@ from scipy.special import chdtrc, fdtrc, ndtr, pdtr
 
 from thermal_robot.diagnosis.parts import Dependence, Location, Unexplained
 from thermal_robot.diagnosis.remainder import Remainder, Repeats, nearest, remainder, repeats
+from thermal_robot.effects.effect import in_words
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference import settings
 from thermal_robot.inference.fit import Fit
@@ -191,7 +192,7 @@ def _scan(fit: Fit, left: Remainder) -> tuple[tuple[float, str], tuple[Location,
     for t in material:
         depends.setdefault(t.quantity, min(1.0, t.worth.p_value * len(tested)))
     first = material[0]
-    at = f"joint {first.place}" if first.kind == "joint" else f"the {first.place}"
+    at = in_words("joint", first.place) if first.kind == "joint" else f"the {first.place}"
     reason = f"a law of {first.quantity} at {at} explains {first.worth.share:.0%} of what remains"
     named = tuple(Dependence(q, p) for q, p in list(depends.items())[: settings.NAMED])
     return (depends[first.quantity], reason), locations, named, first.worth.share

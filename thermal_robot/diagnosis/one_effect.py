@@ -124,8 +124,8 @@ def _error(observations: Observations, parameters: list[tuple[Parameter, float]]
     main = np.linalg.svd(twists, full_matrices=False)[2][0]
     main = main * np.sign(main[int(np.abs(main).argmax())])
     if channels == {"joint"} and len(parts) == 1:
-        index = next(index for _, index in parts)
-        return twists[:, 0], moves[:, :, 0], "m" if observations.robot.joint_types[index] == "prismatic" else "rad"
+        robot, index = observations.robot, next(index for _, index in parts)
+        return twists[:, 0], moves[:, :, 0], unit(robot, robot.joint_names[index])
     direction = moves @ main
     if len(parts) == 1:
         shift, turn = np.linalg.norm(main[:3]), np.linalg.norm(main[3:])

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
 from numpy.typing import NDArray
+
+from thermal_robot.effects.effect import in_words
 
 Array = NDArray[np.float64]
 Status = Literal["found", "not_found", "not_testable", "confounded"]
@@ -20,6 +22,11 @@ class Location:
     kind: str
     name: str
     share: float
+
+    @property
+    def words(self) -> str:
+        """The place with its kind, unless its name says it already."""
+        return in_words(self.kind, self.name)
 
 
 @dataclass(frozen=True)
@@ -213,6 +220,8 @@ class Rows:
         Recorded quantities by name, (N,).
     held_out_before, held_out_after
         (N,) distance in m while the row was held out; NaN where it was set aside.
+    units
+        SI unit of every covariate and of every joint's position, by name; empty where it has none.
     """
 
     rows: NDArray[np.int64]
@@ -224,6 +233,7 @@ class Rows:
     covariates: Mapping[str, Array]
     held_out_before: Array
     held_out_after: Array
+    units: Mapping[str, str] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
@@ -270,6 +280,11 @@ class Place:
     after: Array
     spread: Array
     line: Array
+
+    @property
+    def words(self) -> str:
+        """The place with its kind, unless its name says it already."""
+        return in_words(self.kind, self.name)
 
 
 @dataclass(frozen=True, eq=False)

@@ -206,3 +206,8 @@ class Effect(ABC):
     def arguments(self) -> dict[str, Any]:
         """Return the constructor's arguments, for saving."""
         return asdict(self)
+
+
+def in_words(kind: str, place: str) -> str:
+    """Name a place with its kind, as a link and a joint may share a name; ``elbow_joint`` says it already."""
+    return (place or kind) if not place or kind in place else f"{kind} {place}"

@@ -97,9 +97,9 @@ class JointCompliance(Effect):
             found.append(Parameter(label, unit(robot, names[j]), _WIND_UP, "joint", names[j], (at_joint(j, -shape),)))
         if torque is not None:
             size = _WIND_UP / max(float(np.abs(torque).max()), 1e-9)
-            units = ["m/N" if kind == "prismatic" else "rad/(N·m)" for kind in robot.joint_types]
+            units = {"rad": "rad/(N·m)", "m": "m/N"}
             found += [
-                Parameter("compliance", units[j], size, "joint", joint, (at_joint(j, -torque[:, j]),))
+                Parameter("compliance", units[unit(robot, joint)], size, "joint", joint, (at_joint(j, -torque[:, j]),))
                 for j, joint in enumerate(names)
             ]
         return tuple(found)

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from thermal_robot.effects.effect import (
+    TWIST,
     Array,
     Driver,
     Effect,
@@ -19,6 +20,7 @@ from thermal_robot.effects.effect import (
     at_joint,
     at_segment,
     at_tool,
+    in_words,
 )
 from thermal_robot.effects.quantities import driving, quantity, unit
 from thermal_robot.effects.shapes import SHAPES
@@ -124,7 +126,7 @@ class Discovered(Effect):
         for function, label in zip(functions.T, labels, strict=True):
             for c, component in enumerate(components):
                 twist = function[:, None] * np.eye(6)[c]
-                own = "m" if c < 3 else "rad"
+                own = TWIST[c][1]
                 found.append(Parameter(f"{component}, {label}", own, 1e-4, self.kind, where, (respond(twist),)))
         return tuple(found)
 
@@ -162,7 +164,7 @@ class Discovered(Effect):
 
     def describe(self) -> str:
         """Say in a few words where the error enters and what it follows."""
-        at = {"joint": f"joint {self.place}", "link": f"the placement of {self.place}"}.get(
+        at = {"joint": in_words("joint", self.place), "link": f"the placement of {self.place}"}.get(
             self.kind, f"the {self.kind}"
         )
         if self.shape == "constant":

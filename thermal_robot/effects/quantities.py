@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from thermal_robot.campaign.units import SI, unit_of
 from thermal_robot.effects.effect import Array, Driver
 
 if TYPE_CHECKING:
@@ -18,30 +19,9 @@ REACH = ("reach.x", "reach.y", "reach.z")
 """Where the tool frame is in the root frame, m: what leans on the base."""
 
 
-_UNITS = {
-    "time": "s",
-    "temperature": "°C",
-    "payload": "kg",
-    "reach": "m",
-}
-_OF_JOINTS = {
-    "torque": ("N·m", "N"),
-    "velocity": ("rad/s", "m/s"),
-    "acceleration": ("rad/s²", "m/s²"),
-    "encoder": ("rad", "m"),
-}
-"""Units for a joint that turns, and for one that slides; a joint's own position has that of its encoder."""
-
-
 def unit(robot: Robot, name: str) -> str:
     """Return the unit of a quantity's values, SI; empty where it has none, or none that is known."""
-    kind, _, place = name.partition(".")
-    if name in robot.joint_names:
-        kind, place = "encoder", name
-    if kind not in _OF_JOINTS:
-        return _UNITS.get(kind, "")
-    slides = place in robot.joint_names and robot.joint_types[robot.joint_names.index(place)] == "prismatic"
-    return _OF_JOINTS[kind][slides]
+    return unit_of(name, robot) or (SI.length if name in REACH else "")
 
 
 def quantities(observations: Observations) -> dict[str, Array]:

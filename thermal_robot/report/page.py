@@ -118,7 +118,3 @@ def _next(diagnosis: Diagnosis) -> Iterator[str]:
     apart = [f"to tell apart: {', '.join(group)}" for group in diagnosis.separates]
     advice = paragraph(diagnosis.advice) if diagnosis.advice else ""
     yield f"<section><h2>Next</h2>{advice}{bullets(apart)}</section>"
-
-
-# the trial's page still asks for these by their former names
-_css, _figure, _list, _paragraph, _signature = css, figure, bullets, paragraph, signature

@@ -92,8 +92,7 @@ def _si(place: Place) -> str:
 
 
 def _heading(place: Place) -> str:
-    where = place.name if place.kind in place.name else f"{place.kind} {place.name}"
-    return plain(f"{where}: {100.0 * place.share:.0f} %")
+    return plain(f"{place.words}: {100.0 * place.share:.0f} %")
 
 
 def _seen(place: Place) -> Array:

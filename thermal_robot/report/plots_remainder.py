@@ -28,12 +28,15 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
+    from thermal_robot.diagnosis.parts import Rows
     from thermal_robot.diagnosis.result import Diagnosis
 
 _MIDDLES = 60
 _LEVELS = 12
 _FEW_CROSSES = 25
 _EDGE = 0.88  # of a panel's height: a cross that is held there stays whole
+_WITHOUT_UNIT = {"speed": "share of the maximum", "approach": "−1, 0, 1", "order": "number"}
+"""What stands in a unit's place on the axis of a quantity that has none."""
 
 
 def plot_remainder(diagnosis: Diagnosis) -> Figure:
@@ -77,13 +80,18 @@ def _followed(diagnosis: Diagnosis) -> tuple[str, Array] | None:
         return None
     name, rows = diagnosis.unexplained.depends_on[0].covariate, diagnosis.rows
     if name in rows.covariates:
-        unit = units.recorded_unit(name)
-        return (f"{name} ({unit})" if unit else name), np.asarray(rows.covariates[name], dtype=float)
+        return _labelled(name, rows), np.asarray(rows.covariates[name], dtype=float)
     if name == "order":  # not recorded: the rows as they stand in the file
         return "order of the rows", np.arange(len(rows.rows), dtype=float)
     if name in diagnosis.joint_names:
-        return f"{name} (rad or m)", rows.q[:, diagnosis.joint_names.index(name)]
+        return _labelled(name, rows), rows.q[:, diagnosis.joint_names.index(name)]
     return None
+
+
+def _labelled(name: str, rows: Rows) -> str:
+    """Return a quantity's name with its unit, as an axis bears it."""
+    unit = rows.units.get(name) or _WITHOUT_UNIT.get(name.partition(".")[0], "")
+    return f"{name} ({unit})" if unit else name
 
 
 def _extent(diagnosis: Diagnosis) -> tuple[units.Scale, float]:

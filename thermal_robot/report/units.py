@@ -8,7 +8,7 @@ from math import floor, isfinite, log10
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from thermal_robot.diagnosis.parts import Estimate, Location
+    from thermal_robot.diagnosis.parts import Estimate
 
 MISSING = "–"
 
@@ -19,18 +19,6 @@ _LADDERS: dict[str, tuple[tuple[float, float, str], ...]] = {
     "s": ((1e0, 1.0, "s"), (1e-3, 1e3, "ms"), (0.0, 1e6, "µs")),
     "1": ((1e-2, 1e2, "%"), (0.0, 1e6, "ppm")),
     "1/K": ((0.0, 1e6, "µm/(m·K)"),),
-}
-_OF_QUANTITY = {
-    "time": "s",
-    "temperature": "°C",
-    "payload": "kg",
-    "torque": "N·m",
-    "speed": "share of the maximum",
-    "velocity": "rad/s",
-    "acceleration": "rad/s²",
-    "encoder": "rad",
-    "approach": "−1, 0, 1",
-    "order": "number",
 }
 
 
@@ -151,15 +139,3 @@ def p_value(value: float) -> str:
         mantissa, exponent = f"{value:.0e}".split("e")
         return f"p = {mantissa}e{int(exponent)}"
     return f"p = {value:.2g}"
-
-
-def place(location: Location) -> str:
-    """Write a place with its kind, since a link and a joint may share a name; ``elbow_joint`` says it already."""
-    if not location.name or location.kind in location.name:
-        return location.name or location.kind
-    return f"{location.kind} {location.name}"
-
-
-def recorded_unit(column: str) -> str:
-    """Return the unit of a recorded quantity; empty for one that is kept as it came."""
-    return _OF_QUANTITY.get(column.partition(".")[0], "")

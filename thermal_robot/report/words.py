@@ -98,7 +98,7 @@ def rows_in_words(rows: Sequence[int], most: int = 10) -> str:
 def places(finding: Finding, most: int = 4) -> str:
     """Say where an effect sits, its largest shares first; empty where that is not known."""
     shown = [p for p in finding.locations if p.share >= _NEGLIGIBLE][:most] or list(finding.locations[:1])
-    said = ", ".join(f"{units.place(p)} {units.percent(p.share)}" for p in shown)
+    said = ", ".join(f"{p.words} {units.percent(p.share)}" for p in shown)
     rest = finding.locations[len(shown) :]
     if not rest:
         return said
@@ -176,7 +176,7 @@ def sentences(diagnosis: Diagnosis) -> Iterator[str]:
         yield f"{reason[:1].upper()}{reason[1:].rstrip('.')}."
     if left.locations:
         likely = [p for p in left.locations if p.share >= _UNLIKELY][:3] or left.locations[:1]
-        spots = [f"{units.place(p)} ({units.probability(p.share)})" for p in likely]
+        spots = [f"{p.words} ({units.probability(p.share)})" for p in likely]
         yield f"It enters most probably at {one_of(spots)}."
     known_laws = laws(diagnosis)
     if left.depends_on and not known_laws:
