@@ -15,6 +15,7 @@ from thermal_robot.inference.columns import block, displacement, frame_columns
 from thermal_robot.inference.explain import Explanation, Noise, explain
 from thermal_robot.inference.frames import moved, register
 from thermal_robot.inference.problem import Linear, contained
+from thermal_robot.inference.refine import refined
 from thermal_robot.inference.rows import neighbourhoods, spells
 from thermal_robot.observations import Frames, Observations, observe
 
@@ -211,7 +212,7 @@ def _settle(
     begin: Sequence[str] = (),
     rarity: Mapping[str, float] | None = None,
 ) -> _Settled:
-    """Choose effects, refit the choice exactly, and choose again there, until the choice stays."""
+    """Choose effects, refine their constants, refit exactly, and choose again there, until the choice stays."""
     campaign, observations, settings = start.campaign, start, dict(settings)
     noise = Noise(campaign.noise_position, campaign.noise_orientation)
     held: list[tuple[Effect, Array]] = []
@@ -234,16 +235,18 @@ def _settle(
         explanation = explain(
             linear, noise, families=families, start=start_at, outliers=outliers, groups=groups, rarity=rarity
         )
-        same = revision > 0 and set(explanation.best.blocks) == set(chosen)
+        factor = _REFINEMENT ** (1 / 2**revision)
         held = [(candidates[b], explanation.values[b][0]) for b in explanation.best.blocks]
-        last = same or revision == revisions
+        finer = refined(explanation, observations, factor) if revision < revisions else held
+        stays = [e for e, _ in finer] == [e for e, _ in held] and set(explanation.best.blocks) == set(chosen)
+        held, last = finer, revision == revisions or (revision > 0 and stays)
         least = _NEAR if many and not last else _SETTLED
         observations, held = _gauss_newton(campaign, observations.frames, explanation, held, least)
         if last:
             break
         outliers = explanation.outliers
         for effect, _ in held:
-            settings[effect.name] = effect.nearby(_REFINEMENT ** (1 / 2**revision))
+            settings[effect.name] = effect.nearby(factor)
     return _Settled(observations, explanation, tuple(held), families)
 
 
