@@ -1,6 +1,5 @@
 """Which laws are tried: their places, quantities, knots and shapes."""
 
-
 import numpy as np
 
 from thermal_robot.effects.law import Discovered

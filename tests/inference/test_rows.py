@@ -10,8 +10,11 @@ from simulate import commands
 from thermal_robot.campaign import Campaign
 from thermal_robot.inference.rows import (
     folds,
+    in_a_row,
+    in_order,
     near_repeats,
     neighbourhoods,
+    repeated_poses,
     spells,
 )
 from thermal_robot.inference.settings import NEAR
@@ -90,3 +93,78 @@ def test_spells_and_neighbourhoods_share_the_rows_out_evenly(rv_m2):
     assert np.ptp(np.bincount(boxes)) <= 1
     inside = np.mean([campaign.q[boxes == b].var(axis=0).sum() for b in range(16)])
     assert inside < 0.7 * campaign.q.var(axis=0).sum()
+
+
+def clocked(robot, **columns):
+    """Twelve rows whose clock runs otherwise than the file."""
+    q = commands(robot, 12, np.random.default_rng(5))
+    return Campaign("clocked", robot, q, covariates={k: np.asarray(v, dtype=float) for k, v in columns.items()})
+
+
+def test_rows_follow_each_other_by_the_clock_and_without_one_as_in_the_file(rv_m2):
+    backwards = np.arange(12.0)[::-1]
+    np.testing.assert_array_equal(in_order(clocked(rv_m2)), np.arange(12))
+    np.testing.assert_array_equal(in_order(clocked(rv_m2, time=backwards)), np.arange(12)[::-1])
+    np.testing.assert_array_equal(in_order(clocked(rv_m2, order=backwards)), np.arange(12)[::-1])
+    # the time is the better clock; rows of one time stay as they are
+    both = clocked(rv_m2, time=np.arange(12.0) // 3, order=backwards)
+    np.testing.assert_array_equal(in_order(both), np.arange(12))
+
+
+def test_of_rows_set_aside_those_with_a_neighbour_in_time_stand_in_a_row(rv_m2):
+    time = np.array([0, 6, 1, 7, 2, 8, 3, 9, 4, 10, 5, 11])
+    aside = np.isin(np.arange(12), [0, 1, 2, 9, 10])
+    # measured one after the other: rows 0, 2 at 0 and 1; rows 10, 1 at 5 and 6; row 9, at 10, is alone
+    own = in_a_row(clocked(rv_m2, time=time), aside)
+    np.testing.assert_array_equal(np.flatnonzero(own), [0, 1, 2, 10])
+    # as they stand in the file: 0, 1, 2 and 9, 10
+    np.testing.assert_array_equal(in_a_row(clocked(rv_m2), aside), aside)
+    for few in ([], [3], [3, 5, 7]):
+        assert not in_a_row(clocked(rv_m2), np.isin(np.arange(12), few)).any()
+    # the first row does not follow the last
+    assert not in_a_row(clocked(rv_m2), np.isin(np.arange(12), [0, 11])).any()
+
+
+@on_arms
+def test_repeated_poses_are_those_of_one_command_or_label(arm):
+    campaign, number = repeated(arm)
+    np.testing.assert_array_equal(same(repeated_poses(campaign)), same(number))
+    # what a controller's rounding leaves is one command; a tenth of a milliradian is another
+    nearly = replace(campaign, q=np.round(campaign.q, 5) + 1e-8)
+    np.testing.assert_array_equal(same(repeated_poses(nearly)), same(number))
+    apart = replace(campaign, q=campaign.q + 1e-4 * np.arange(120)[:, None])
+    assert len(set(repeated_poses(apart))) == 120
+    # the label counts where there is one, an empty one stands alone
+    label = np.array([f"p{k % 20}" for k in range(120)])
+    label[:4] = ""
+    told = repeated_poses(replace(apart, labels={"pose": label}))
+    assert len(set(told)) == 20 + 4
+    for name in set(label) - {""}:
+        assert len(set(told[label == name])) == 1
+
+
+def same(labels):
+    """(N, N) which rows share a label."""
+    return labels[:, None] == labels[None, :]
+
+
+def test_few_rows_make_few_folds_and_boxes(rv_m2):
+    q = commands(rv_m2, 3, np.random.default_rng(6))
+    fold, block = folds(Campaign("three", rv_m2, q))
+    assert sorted(fold) == sorted(block) == [0, 1, 2]
+    assert sorted(neighbourhoods(Campaign("three", rv_m2, q), 8)) == [0, 1, 2]
+    alone = Campaign("one", rv_m2, q[[0, 0, 0]])
+    assert set(folds(alone)[0]) == {0}
+
+
+def test_neighbourhoods_are_boxes_of_joint_space(rv_m2):
+    """Two of them are kept apart by one joint at least; the joint that varies most is split first."""
+    q = np.random.default_rng(7).uniform(-1.0, 1.0, (256, 5)) * [0.1, 1.0, 0.3, 0.1, 0.1]
+    campaign = Campaign("boxes", rv_m2, q)
+    half = neighbourhoods(campaign, 2)
+    assert max(q[half == half[q[:, 1].argmin()], 1]) < min(q[half == half[q[:, 1].argmax()], 1])
+    boxes = neighbourhoods(campaign, 16)
+    low = np.array([q[boxes == b].min(axis=0) for b in range(16)])
+    high = np.array([q[boxes == b].max(axis=0) for b in range(16)])
+    apart = (low[:, None] > high[None, :]) | (high[:, None] < low[None, :])
+    assert (apart.any(axis=2) | np.eye(16, dtype=bool)).all()
