@@ -20,7 +20,6 @@ from thermal_robot.effects.law import Discovered
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.errors import CampaignError
 from thermal_robot.inference.fit import fit
-from thermal_robot.inference.laws import of_quantity
 from thermal_robot.inference.random_gap import random_gap
 from thermal_robot.inference.rows import in_a_row
 from thermal_robot.kinematics import Displacement
@@ -93,17 +92,6 @@ def test_errors_cross_processes():
     error = CampaignError("a.csv", "no number", row=3, column="x", found="?", expected="m")
     again = pickle.loads(pickle.dumps(error))
     assert (type(again), str(again), again.__dict__) == (CampaignError, str(error), error.__dict__)
-
-
-def test_knots_stand_apart_where_most_values_lie_in_one_spot():
-    rng = np.random.default_rng(0)
-    values = np.concatenate([1.0 - 1e-6 * rng.random(500), rng.uniform(0.7, 1.0, 20)])
-    marks = np.array(of_quantity(Discovered(), values).marks)
-    assert np.diff(marks).min() > 0.2 * np.ptp(values) / len(marks)
-    spread = rng.uniform(-1.0, 1.0, 500)
-    np.testing.assert_allclose(
-        of_quantity(Discovered(), spread).marks, np.quantile(spread, np.linspace(0.02, 0.98, 5)), rtol=1e-12
-    )
 
 
 def test_what_a_law_follows_does_not_depend_on_the_law(rv_m2):
