@@ -6,10 +6,10 @@ import numpy as np
 from conftest import load_arm
 from simulate import remaining, simulate
 
+from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.drift import Drift
 from thermal_robot.effects.lagging import History
 from thermal_robot.effects.thermal_elongation import ThermalElongation
-from thermal_robot.inference.columns import displacement
 from thermal_robot.observations import Frames, observe
 
 NOISE = 25e-6  # m

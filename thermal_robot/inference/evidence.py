@@ -258,7 +258,7 @@ def _log_volume(owner: NDArray[np.int64], scale: Array, values: Array, covarianc
     that s follows λ, and what is not parabolic: both within about 0.1 for blocks that are well seen.
     """
     each = np.eye(len(scale))[:, owner] / scale[:, None] ** 2
-    bend = -(each @ (covariance * (4.0 * np.outer(values, values) + 2.0 * covariance)) @ each.T)
+    bend = -2.0 * (each @ (covariance * (2.0 * np.outer(values, values) + covariance)) @ each.T)
     spread2 = settings.SIZE_SPREAD**2
     bend[np.diag_indices(len(scale))] += 2.0 * (each @ (values**2 + np.diag(covariance))) + 1.0 / spread2
     peak = np.linalg.eigvalsh(bend) * spread2

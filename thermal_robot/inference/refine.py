@@ -42,14 +42,14 @@ def refined(explanation: Explanation, observations: Observations, factor: float)
     values = [explanation.values[b][0] for b in explanation.best.blocks]
     for place, item in enumerate(blocks):
         if len(item.effect.nearby(factor)) > 1:
-            blocks[place] = _climb(explanation, observations, blocks, place, factor)
+            blocks[place] = _moved(explanation, observations, blocks, place, factor)
             if blocks[place] is not item:
                 linear, problem, found = _evaluated(explanation, blocks)
                 values = [mean for mean, _ in parameter_values(linear, problem, found).values()]
     return [(item.effect, mean) for item, mean in zip(blocks, values, strict=True)]
 
 
-def _climb(
+def _moved(
     explanation: Explanation, observations: Observations, blocks: Sequence[Block], place: int, factor: float
 ) -> Block:
     """Return the block at one place with the setting of its effect that nothing nearby betters."""
