@@ -81,6 +81,15 @@ def test_an_offset_of_six_degrees_is_still_an_offset(arm):
 
 
 def test_exactness_does_not_add_effects_that_are_not_at_work(rv_m2):
+    """At 10 nm, a thousandth of a laser tracker's noise.
+
+    At 1 nm the choice is made by rounding, not by the data. The evidence comes from a Gram matrix, as the sum of
+    squares of the gap less what an explanation takes of it. Here the gap is 0.7 to 2.1 mm per axis: at 1 nm that sum is
+    2e14 to 2e15 squares of the noise, of which double precision knows the last 0.04 to 0.35 nat. Solving for the
+    parameters makes that 0.1 to 0.9 nat with effects as large as expected (against a singular value decomposition of
+    the columns themselves), and several 1e4 nats with scales fitted to columns that are nearly alike, such as gains
+    and eccentricities over part of a turn. At 10 nm all of it is a hundred times less.
+    """
     both = {"transmission_error": 5e-3, "instrument_scale": 1e-3}
-    right = [set(diagnose(measured(rv_m2, both, s, 1e-9)[0]).verdict) == set(both) for s in range(4)]
-    assert sum(right) >= 3
+    right = [set(diagnose(measured(rv_m2, both, s, 1e-8)[0]).verdict) == set(both) for s in range(4)]
+    assert right == [True] * 4

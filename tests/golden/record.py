@@ -3,7 +3,8 @@
 usage: python tests/golden/record.py [--check] [--only NAME ...]
 
 Without ``--check`` the files beside this script are written anew. With it nothing is written: every campaign is
-diagnosed again and each figure compared, to 1e-9 of its size (what BLAS may round). Needs ``THERMAL_ROBOT_DATA``.
+diagnosed again and each figure compared, to 1e-9 of its size (what BLAS may round). Needs ``THERMAL_ROBOT_DATA``, the
+demo excepted. The test beside it compares to 1e-6, as other machines round otherwise.
 """
 
 from __future__ import annotations
@@ -97,10 +98,10 @@ def main() -> int:
             old = json.loads(golden(name).read_text(encoding="utf-8"))
             lines = differences(old, found, TOLERANCE)
             changed += bool(lines)
-            for line in lines[:6]:
+            for line in lines[:2]:
                 print(f"{name}{line}")
-            if len(lines) > 6:
-                print(f"{name}: {len(lines) - 6} more")
+            if len(lines) > 2:
+                print(f"{name}: {len(lines) - 2} more")
     print("written" if not options.check else f"{changed} of {len(options.only)} campaigns differ")
     return int(options.check and changed > 0)
 

@@ -28,8 +28,8 @@ def random_findings(fit: Fit, chance: RandomGap, *, beside_unlisted: bool = Fals
     chance
         What is random in what they leave.
     beside_unlisted
-        Whether an unlisted cause is at work: what differs from pose to pose may then be its doing, and is only
-        believed where its steps are seen.
+        Whether an unlisted cause is at work. It may be what makes the error differ from pose to pose, so that an
+        encoder is named only where its steps are seen.
     """
     found = tuple(_finding(fit, chance, effect) for effect in random_effects())
     seen = any(p < settings.LEVEL for p in chance.steps.values())
@@ -44,10 +44,14 @@ def _is_of_poses(finding: Finding) -> bool:
 
 
 def _doubted(finding: Finding) -> Finding:
+    """Take a finding back: an unlisted cause, known to be there, explains the scatter as well.
+
+    Scatter that both predict speaks for neither (explaining away), so that at most the prior probability is left.
+    """
     return replace(
         finding,
         status="not_found",
-        probability=settings.BESIDE_UNLISTED * (finding.probability or 0.0),
+        probability=min(finding.probability or 0.0, settings.PRIOR_PROBABILITY),
         locations=(),
         parameters=(),
         confounded_with=(),

@@ -1,0 +1,61 @@
+"""The program says of known campaigns what the files beside this test hold."""
+
+import json
+import os
+
+import pytest
+from golden.record import campaign, differences, golden, names, said
+
+TOLERANCE = 1e-6
+"""Relative: other processors and versions of BLAS round otherwise, and fits multiply that by their condition."""
+QUICK = ("demo", "open_cases/case_000", "open_cases/case_007", "open_cases/case_016")
+REWRITE = "python tests/golden/record.py --only {name}"
+
+
+def listed(name):
+    marks = [] if name in QUICK else [pytest.mark.slow]
+    if name != "demo":
+        missing = not os.environ.get("THERMAL_ROBOT_DATA")
+        marks.append(pytest.mark.skipif(missing, reason="THERMAL_ROBOT_DATA names no folder of measured campaigns"))
+    return pytest.param(name, marks=marks)
+
+
+@pytest.mark.parametrize("name", [listed(name) for name in names()])
+def test_the_same_is_said_as_before(name):
+    old = json.loads(golden(name).read_text(encoding="utf-8"))
+    lines = differences(old, said(name), TOLERANCE)
+    rewrite = REWRITE.format(name=name)
+    assert not lines, (
+        f"{name}: {len(lines)} figures changed, the first: {lines[:3]}. If that is meant, write them anew with "
+        f"`{rewrite}`, and let the commit message tell what changed, where and why."
+    )
+
+
+def test_every_campaign_has_its_file_and_every_file_its_campaign():
+    held = {golden(name).name for name in names()}
+    assert held == {file.name for file in golden("demo").parent.glob("*.json")}
+    assert set(QUICK) < set(names())
+
+
+def test_the_demo_is_no_measured_campaign(monkeypatch):
+    monkeypatch.delenv("THERMAL_ROBOT_DATA", raising=False)
+    assert (campaign("demo") / "campaign.toml").exists()
+    with pytest.raises(KeyError):
+        campaign("ur5_jacobi")
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said_of_it"),
+    [
+        ({"a": 1.0}, {"a": 1.0 + 1e-8}, []),
+        ({"a": 1.0}, {"a": 1.0 + 1e-5}, ["/a: 1.0 became 1.00001"]),
+        ({"a": {"b": [1, 2]}}, {"a": {"b": [1, 3]}}, ["/a/b[1]: 2 became 3"]),
+        ({"a": [1]}, {"a": [1, 2]}, ["/a: [1] became [1, 2]"]),
+        ({"a": "found"}, {"a": "not_found"}, ["/a: 'found' became 'not_found'"]),
+        ({"a": 1e-13}, {}, []),
+        ({}, {"a": 1e-3}, ["/a: 0.0 became 0.001"]),
+        ({"a": float("nan")}, {"a": 1.0}, ["/a: nan became 1.0"]),
+    ],
+)
+def test_a_difference_is_one_line(old, new, said_of_it):
+    assert differences(old, new, TOLERANCE) == said_of_it
