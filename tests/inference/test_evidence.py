@@ -5,7 +5,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from inference.problems import small_problem
+from inference.problems import columns_of, small_problem
 from scipy.linalg import null_space
 from scipy.special import logsumexp
 from scipy.stats import multivariate_normal
@@ -193,3 +193,21 @@ def test_a_column_of_noise_lowers_the_evidence_on_average():
         gained += [search.evaluate((1, b)).log_evidence - search.evaluate((1,)).log_evidence for b in (0, 2)]
     assert np.mean(gained) < -1.0
     assert np.mean(np.array(gained) > 0.0) < 0.15
+
+
+@pytest.mark.xfail(strict=True, raises=ValueError, reason="the scale of a block without columns is lost on the way")
+@pytest.mark.parametrize("present", [(), (1,)])
+def test_a_block_of_which_the_data_see_nothing_changes_nothing_but_the_odds(present):
+    """An effect that the unknown frames take up whole, alone and beside others."""
+    linear, whitening = small_problem(5, present=present)
+    alias = columns_of(linear.frames @ [[1.0, 2.0], [-3.0, 0.5]])
+    linear = replace(linear, blocks=(*linear.blocks, alias, alias))
+    search = Search(gram(linear, whitening), (-1.0, -2.0, -0.5, -0.7, -0.7))
+    for beside in ((), (1,), (0, 2)):
+        plain = search.evaluate(beside)
+        for more, odds in (((3,), -0.7), ((3, 4), -1.4)):
+            found = search.evaluate((*beside, *more), search.evaluate((1,)))
+            assert found.log_evidence == pytest.approx(plain.log_evidence + odds, abs=1e-5)
+            assert found.noise == pytest.approx(plain.noise, rel=1e-3)
+            np.testing.assert_allclose(found.values, plain.values, rtol=1e-2)
+    assert set(search.run().blocks) <= {0, 1, 2}

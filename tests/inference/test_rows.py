@@ -15,6 +15,7 @@ from thermal_robot.inference.rows import (
     near_repeats,
     neighbourhoods,
     repeated_poses,
+    row_groups,
     spells,
 )
 from thermal_robot.inference.settings import NEAR
@@ -168,3 +169,11 @@ def test_neighbourhoods_are_boxes_of_joint_space(rv_m2):
     high = np.array([q[boxes == b].max(axis=0) for b in range(16)])
     apart = (low[:, None] > high[None, :]) | (high[:, None] < low[None, :])
     assert (apart.any(axis=2) | np.eye(16, dtype=bool)).all()
+
+
+@pytest.mark.parametrize(("samples", "count"), [(7, 2), (100, 20), (2000, 60)])
+def test_groups_in_which_remainders_may_be_alike_hold_a_few_rows_each(rv_m2, samples, count):
+    q = np.random.default_rng(8).uniform(-1.0, 1.0, (samples, 5))
+    groups = row_groups(Campaign("groups", rv_m2, q))
+    assert [len(set(labels)) for labels in groups] == [count, count]
+    assert all(np.ptp(np.bincount(labels)) <= samples / count for labels in groups)
