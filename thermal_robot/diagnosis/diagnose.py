@@ -83,10 +83,11 @@ def diagnose(
 
 
 def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
-    """Look for what the known effects leave, as long as it is not noise.
+    """Look for what the known effects leave.
 
-    Scatter that explains its size ends the search: the effects are then chosen again beside it. Otherwise one law after
-    another joins the explanation, while each is worth its place and rows of regions held out do not get worse.
+    Scatter is asked first: where joints scatter, and that explains the size of what remains, the effects are chosen
+    again beside it, and that is the end. Otherwise, as long as what remains is not noise, one law after another joins
+    the explanation, while each is worth its place and rows of regions held out do not get worse.
     """
     stages = [Stage(known, (), examine(known, progress))]
     chance = random_gap(known)

@@ -69,6 +69,7 @@ def findings(
 def titled(found: Sequence[Finding], effects: Iterable[Effect]) -> tuple[Finding, ...]:
     """Return findings with the titles of effects, and laws with what they describe."""
     known = {effect.name: effect for effect in effects}
+    found = [replace(f, probability=settings.MOST_SAID) if _unsaid(f) else f for f in found]
     return tuple(
         replace(f, title=known[f.name].title, random=known[f.name].random)
         if f.name in known
@@ -77,7 +78,12 @@ def titled(found: Sequence[Finding], effects: Iterable[Effect]) -> tuple[Finding
     )
 
 
-def in_order(found: Sequence[Finding]) -> tuple[Finding, ...]:
+def _unsaid(finding: Finding) -> bool:
+    """Whether an effect is not found although it is more likely there than not, in one place or another."""
+    return finding.status == "not_found" and (finding.probability or 0.0) > settings.MOST_SAID
+
+
+def by_share(found: Sequence[Finding]) -> tuple[Finding, ...]:
     """Sort by held-out share, then by probability; what is not testable comes last."""
     return tuple(
         sorted(found, key=lambda f: (f.status == "not_testable", -(f.shrinkage or 0.0), -(f.probability or 0.0)))

@@ -88,7 +88,7 @@ class Finding:
 
 
 def is_frame(found: Sequence[Finding], name: str) -> bool:
-    """Tell whether an effect displaces a frame that is unknown: that is all that can be confounded unasked."""
+    """Tell whether an effect displaces a frame that is unknown; such an effect may be confounded and no candidate."""
     needs = next((f.needs for f in found if f.name == name), ("frames.",))
     return any(need.startswith("frames.") for need in needs)
 
@@ -165,7 +165,16 @@ class Where:
 
 @dataclass(frozen=True)
 class Dependence:
-    """A recorded quantity that the remainder follows, with the p-value after counting every quantity that was tried."""
+    """A recorded quantity that the remainder follows.
+
+    Attributes
+    ----------
+    covariate
+        Its name.
+    p_value
+        Of an F test, after counting every quantity that was tried; where a discovered law follows it, exp(−gain), the
+        odds that the data give against that law.
+    """
 
     covariate: str
     p_value: float

@@ -81,7 +81,7 @@ class Repeats:
 
 
 def repeats(fit: Fit, left: Remainder) -> Repeats | None:
-    """Compare each command with its nearest neighbour within :data:`NEAR`; ``None`` where too few have one."""
+    """Compare each command with its nearest neighbour, if near (``settings.NEAR``); ``None`` where too few have one."""
     q = fit.campaign.q[left.rows]
     distance, neighbour = nearest(q, 1)
     close = np.flatnonzero(distance[:, 0] < settings.NEAR)

@@ -13,7 +13,7 @@ from thermal_robot.inference.explain import log_priors
 from thermal_robot.inference.fit import Fit
 
 
-def sensitivity(fit: Fit) -> Sensitivity:
+def prior_sensitivity(fit: Fit) -> Sensitivity:
     """Weigh the leading combinations again with all prior sizes smaller and larger by :data:`settings.PRIOR_FACTOR`.
 
     A size is itself only expected to within its spread (ln λ ~ N(0, 1.5²)) and is learnt from the data, so that little

@@ -1,4 +1,4 @@
-"""Effects that stand in for something else: a physical constant that changes with the circumstances is none."""
+"""Effects that may stand in for an unlisted cause: a physical constant does not vary with time or place."""
 
 from __future__ import annotations
 
@@ -30,8 +30,8 @@ class StandIn:
 def trust(shares: Mapping[str, float], doubts: Mapping[str, StandIn], unlisted: float) -> dict[str, float]:
     """Return by name what the probability of each known effect is multiplied with, at most one.
 
-    An unlisted cause casts a shadow on the effects that come near it, and the larger it is beside an effect the more of
-    that effect may be its shadow: s/(s + u), with s the effect's share of the gap and u that of what is not listed.
+    An unlisted cause can be absorbed in part by a listed effect, the more the larger it is beside that effect. With the
+    effect's share s of the gap and the share u of what is not listed, the effect is believed by s/(s + u).
     That something works on an effect, or beside it, does not say that it is not there: hence never below
     :data:`~thermal_robot.inference.settings.BESIDE_UNLISTED`.
 

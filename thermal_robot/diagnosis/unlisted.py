@@ -64,13 +64,14 @@ def one_more_law(stage: Stage, progress: Callable[[str], None]) -> Stage | None:
 
 
 def _alone(fit: Fit, law: Discovered) -> dict[str, tuple[Effect, ...]]:
-    """Return by name the known effects that may do in one joint alone what a law of its own position does, so set.
+    """Return, by name, the settings of known effects to choose among, with one in this joint alone.
 
-    Chosen for all joints they pay for every sound one, and a law of the one that errs is simpler than they.
+    With parameters in every joint an effect is penalised for the sound joints, too, and a law of the one joint that
+    errs would always be preferred.
     """
     if law.kind != "joint" or law.quantity != law.place:
         return {}
-    own = {name: (settings, settings[0].at(law.place)) for name, settings in fit.variants.items()}
+    own = {name: (variants, variants[0].at(law.place)) for name, variants in fit.variants.items()}
     return {name: (*known, single) for name, (known, single) in own.items() if single and single not in known}
 
 
@@ -82,7 +83,7 @@ def _same(law: Discovered, other: Discovered) -> bool:
 
 
 def as_laws_say(first: Unexplained, left: Unexplained, found: Sequence[Discovery]) -> Unexplained:
-    """Say of what the known effects leave what the laws say of it."""
+    """Describe the remainder of the known effects by the places and quantities of the discovered laws."""
     if not found:
         return left
     places: dict[tuple[str, str], float] = {}

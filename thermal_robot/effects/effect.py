@@ -3,7 +3,7 @@
 An effect is a frozen dataclass that names its parameters and gives, for each, the *unit response*: what a
 parameter of one unit does in the channels, read from the observations. It calls no kinematics, fits nothing and
 holds no fitted value. Constructor arguments carry what is nonlinear (a time constant, an origin of time, an order);
-:meth:`Effect.variants` proposes values for them, and estimation chooses.
+:meth:`Effect.variants` proposes values for them, and inference chooses.
 
 A new effect is a file like this one::
 
@@ -165,7 +165,7 @@ class Effect(ABC):
         return tuple(need for need in self.needs if need in observations.covariates)
 
     def variants(self, observations: Observations) -> tuple[Effect, ...]:
-        """Return the settings of the nonlinear arguments that estimation should compare: the coarse grid.
+        """Return the settings of the nonlinear arguments that inference should compare: the coarse grid.
 
         What a setting takes from the campaign (an origin of time, a record) is fixed here, once, so that a saved model
         predicts other samples with it.

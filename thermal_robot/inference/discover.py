@@ -104,7 +104,7 @@ def _in_turn(lists: Sequence[Sequence[Discovered]], everything: Sequence[Discove
 
 
 def _compare(fit: Fit, thin: Thin, laws: Sequence[Discovered], tried: int) -> Discovery | None:
-    """Climb over the known effects and one law at a time; what the law's presence allows to go, goes."""
+    """Search over known effects and one law at a time; effects that are no longer needed beside the law are dropped."""
     e = fit.explanation
     known = len(e.linear.blocks)
     problem = gram(_with(thin, laws), _all_rows(fit, thin))

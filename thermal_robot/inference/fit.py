@@ -1,4 +1,4 @@
-"""The whole estimation: frames, then effects jointly, then the exact model of the explanation by Gauss-Newton."""
+"""The whole fit: frames, then effects jointly, then the exact model of the explanation by Gauss-Newton."""
 
 from __future__ import annotations
 

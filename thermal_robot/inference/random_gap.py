@@ -65,9 +65,10 @@ class RandomGap:
 def random_gap(fit: Fit) -> RandomGap:
     """Say which joints scatter beyond the instrument, anew at each visit or once a pose.
 
-    What a systematic effect leaves may look like scatter of a joint. Errors of a joint that follow a smooth law of a
-    recorded quantity are none. Those of an encoder are a sawtooth of the command with a period of √12 of their
-    standard deviation. Where repeats do not tell pose from visit, that period does: without it scatter may be wear.
+    What a systematic effect leaves may look like scatter of a joint. If a joint's errors follow a smooth law of a
+    recorded quantity, they are no scatter. Errors of an encoder are a sawtooth of the command with the period √12 σ.
+    Without repeats only that period separates an encoder's steps from wear; where it is not seen, the component is
+    marked doubtful.
 
     Parameters
     ----------

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.effects.law import Discovered
 from thermal_robot.effects.quantities import GRAVITY, quantities
+from thermal_robot.effects.shapes import SHAPES
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.laws import CLOCK, harmonics, laws, shapes
@@ -17,8 +18,6 @@ from thermal_robot.inference.target import Target
 from thermal_robot.observations import Observations
 
 Array = NDArray[np.float64]
-
-_REFINED = ("slide", "hinge", "bump")
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,7 +59,7 @@ def shaped(observations: Observations, target: Target, law: Discovered) -> Scann
         return Scanned(candidate, target.worth(block(observations, candidate).columns).gain)
 
     best = max(map(measured, candidates), key=lambda item: item.gain)
-    return best if best.law.shape not in _REFINED else _refined(best, measured)
+    return best if SHAPES[best.law.shape].mark != "gradual" else _refined(best, measured)
 
 
 def _refined(best: Scanned, measured: Callable[[Discovered], Scanned]) -> Scanned:
@@ -69,7 +68,7 @@ def _refined(best: Scanned, measured: Callable[[Discovered], Scanned]) -> Scanne
     for _ in range(settings.MARK_ROUNDS):
         law, (mark, *width) = best.law, best.law.marks
         near = [replace(law, marks=(mark + s * step * law.span, *width)) for s in (1, -1)]
-        if law.shape in ("slide", "bump"):
+        if SHAPES[law.shape].width:
             near += [
                 replace(law, marks=(mark, width[0] * f))
                 for f in (1.0 + settings.WIDTH_STEP * step, 1.0 / (1.0 + settings.WIDTH_STEP * step))

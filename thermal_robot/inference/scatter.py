@@ -12,7 +12,7 @@ from scipy.special import logsumexp
 
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
-from thermal_robot.inference.scatter_likelihood import Component, Fitted, Likelihood, Rows, independent_rows
+from thermal_robot.inference.scatter_likelihood import Component, Fitted, IndependentRows, Likelihood, independent_rows
 
 Array = NDArray[np.float64]
 
@@ -202,7 +202,7 @@ class _Search:
     fits: dict[frozenset[Component], tuple[Fitted, float, tuple[Component, ...]]] = field(default_factory=dict)
 
     @property
-    def rows(self) -> Rows:
+    def rows(self) -> IndependentRows:
         return self.likelihood.rows
 
     @property

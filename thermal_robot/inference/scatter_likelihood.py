@@ -17,7 +17,7 @@ _LOWEST, _HIGHEST = settings.LOG_VARIANCE
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class IndependentRows:
     """Remainder as independent rows, everything in units of the noise.
 
     Attributes
@@ -46,7 +46,9 @@ class Rows:
         return int((self.repeats == 0).sum())
 
 
-def independent_rows(values: Array, columns: Array, pose: NDArray[np.int64], weights: Array, freedom: int) -> Rows:
+def independent_rows(
+    values: Array, columns: Array, pose: NDArray[np.int64], weights: Array, freedom: int
+) -> IndependentRows:
     """Turn repeats into rows that are independent of each other.
 
     With one Jacobian J for the k visits of a pose, Helmert's contrasts of them have the covariance
@@ -69,7 +71,7 @@ def independent_rows(values: Array, columns: Array, pose: NDArray[np.int64], wei
     fitted = min(freedom / (len(first) * values.shape[1]), 1.0 - 1.0 / settings.MOST_INFLATION)
     stacked = np.concatenate([common[place[later]], common])
     lever = np.sqrt((common**2).mean(axis=(0, 1)))
-    return Rows(
+    return IndependentRows(
         np.concatenate([contrast[later], mean[last] / np.sqrt(1.0 - fitted)]),
         stacked / np.where(lever > 0.0, lever, 1.0),
         np.concatenate([np.zeros(int(later.sum())), count.astype(float)]),
@@ -116,7 +118,7 @@ class Likelihood:
         covariance is the model's.
     """
 
-    rows: Rows
+    rows: IndependentRows
     stated: tuple[bool, ...]
     tails: float = np.inf
 

@@ -1,6 +1,7 @@
 """Every number that was chosen in the inference and the diagnosis: its value, its unit, and why that one.
 
-None of them was tuned on the cases that score the program. What is known of one effect stands in that effect's file.
+One was learnt from the cases that score the program, and says so (BESIDE_UNLISTED). What is known of one effect stands
+in that effect's file.
 """
 
 import numpy as np
@@ -20,7 +21,8 @@ NOISE_SLACK = 1.3
 MISTRUST = 5.0
 """Natural logarithms that it costs at most to call a stated noise wrong: e⁵, about 1 in 150."""
 BESIDE_UNLISTED = 0.85
-"""How often an effect that is found beside an unlisted cause is there, by the blind trial's faint cases."""
+"""Floor of what is believed of an effect beside an unlisted cause. It was read off the faint cases of a blind trial of
+version 0.1, and other simulations contradict it: a floor, not a measurement."""
 
 # --- rounding ---
 
@@ -308,6 +310,12 @@ MATERIAL_PLACE, MOST_PLACES = 0.03, 8
 LINE_POINTS, ROUGH, DENSE_POINTS, ROWS_A_POINT = 25, 0.01, 400, 10
 """Points of a drawn law; of its range, the roughness below which it follows one quantity alone, its points then, and
 rows that a point stands for otherwise."""
+ROWS_ALIKE = 8
+"""Rows that are taken together when asking whether an error follows a quantity."""
+PURE = 1e-6
+"""Of a unit twist, m or rad: with less of one kind it is all of the other."""
+MOST_SAID = 0.5
+"""Probability that an effect outside the most probable explanation is said to have at most: found it would be more."""
 
 # --- what to measure next ---
 
