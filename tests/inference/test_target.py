@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.stats import f as f_law
 from scipy.stats import kstest
 
 from thermal_robot.inference.target import NOTHING, Target
@@ -74,6 +75,16 @@ def test_the_gain_is_the_difference_of_the_bayes_information_criterion():
         assert n == 3 * ROWS - DESIGN
         falls = (n * np.log(before / n)) - (n * np.log(after / n) + FURTHER * np.log(n))
         assert own.worth(further).gain == pytest.approx(0.5 * falls, rel=1e-6, abs=1e-9)
+
+
+def test_the_p_value_is_that_of_the_f_test_of_two_nested_fits():
+    rng = np.random.default_rng(9)
+    for rows in (6, ROWS):
+        gap, design, further = drawn(rng, rows)
+        before, after = squares(gap, design), squares(gap, np.concatenate([design, further], axis=2))
+        left = 3 * rows - DESIGN - FURTHER
+        expected = f_law.sf((before - after) / FURTHER / (after / left), FURTHER, left)
+        assert plain(gap, design).worth(further).p_value == pytest.approx(expected, rel=1e-6)
 
 
 def test_the_share_is_that_of_what_is_left():
