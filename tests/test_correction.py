@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from conftest import load_arm
 from simulate import simulate
 
 from thermal_robot import CampaignError, CorrectedModel, EffectError, diagnose, read_samples
@@ -224,3 +225,13 @@ def test_a_tracker_elsewhere_sees_the_same_model_elsewhere(hall):
     there = replace(model, frames=replace(model.frames, base=turn @ model.frames.base))
     expected = model.predict(fresh)[0] @ turn[:3, :3].T + turn[:3, 3]
     np.testing.assert_allclose(there.predict(fresh)[0], expected, rtol=0, atol=1e-12)
+
+
+def test_more_columns_than_the_campaign_had_change_no_prediction():
+    campaign, _, (fresh, _) = simulate(load_arm("ur10"), ["backlash"], samples=100, seed=5, fresh=20)
+    first = f"approach.{campaign.robot.joint_names[0]}"
+    kept = {name: values for name, values in campaign.covariates.items() if name != first}
+    model = diagnose(replace(campaign, covariates=kept)).model
+    less = {name: values for name, values in fresh.covariates.items() if name != first}
+    with_more, with_less = (model.predict(f)[0] for f in (fresh, replace(fresh, covariates=less)))
+    np.testing.assert_allclose(with_more, with_less, atol=0.0)

@@ -11,6 +11,10 @@ import numpy as np
 import pytest
 
 from thermal_robot import CorrectedModel, diagnose
+from thermal_robot.campaign import read_campaign
+from thermal_robot.diagnosis.held_out import held_out
+from thermal_robot.effects import choose
+from thermal_robot.inference.fit import fit
 
 DATA = os.environ.get("THERMAL_ROBOT_DATA")
 pytestmark = pytest.mark.skipif(not DATA, reason="THERMAL_ROBOT_DATA names no folder of measured campaigns")
@@ -39,6 +43,17 @@ def shrinks(found):
     return held_out.shrinkage
 
 
+@pytest.mark.parametrize(("name", "least"), [("ur5_jacobi", 0.95), ("ipa_ur10_b", 0.5)])
+def test_geometry_shrinks_the_gap_of_real_arms(name, least):
+    """Its fit alone, beside two rivals; the slow tests below ask for the whole diagnosis."""
+    found = fit(read_campaign(FOLDER / name), choose(("geometric", "joint_offset", "joint_gain"), (), ()))
+    assert "geometric" in {effect.name for effect, _ in found.effects}
+    overall = held_out(found).overall
+    assert overall.rms_after < overall.rms_before
+    assert least < overall.shrinkage < 1.0
+
+
+@pytest.mark.slow
 def test_ur5_is_calibrated_to_a_tenth_of_a_millimetre(tmp_path):
     found = diagnose(FOLDER / "ur5_jacobi")
     assert found.verdict[0] == "geometric"
@@ -58,6 +73,7 @@ def test_wam_keeps_a_millimetre_that_nothing_explains():
     assert found.unexplained.locations
 
 
+@pytest.mark.slow
 def test_ipa_ur10_b_is_geometric_first():
     found = diagnose(FOLDER / "ipa_ur10_b")
     assert found.finding("geometric").status == "found"
@@ -78,6 +94,7 @@ def ipa_ur10_a(tmp_path_factory):
     return json.loads(file.read_text(encoding="utf-8")), peak
 
 
+@pytest.mark.slow
 def test_ipa_ur10_a_is_geometric_and_more(ipa_ur10_a):
     found, _ = ipa_ur10_a
     assert found["campaign"]["samples"] == 11911
@@ -87,6 +104,7 @@ def test_ipa_ur10_a_is_geometric_and_more(ipa_ur10_a):
     assert found["unexplained"]["rms"] > 0.0
 
 
+@pytest.mark.slow
 def test_eleven_thousand_poses_take_two_gigabytes_at_most(ipa_ur10_a):
     peak = ipa_ur10_a[1]
     print(f"ipa_ur10_a: {peak / 2**30:.2f} GiB")

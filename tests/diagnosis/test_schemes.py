@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from simulate import demo, simulate
 
-from thermal_robot.diagnosis.schemes import worst_folds
+from thermal_robot.diagnosis.schemes import worse_elsewhere, worst_folds
 from thermal_robot.effects import choose
 from thermal_robot.inference.fit import fit
 
@@ -88,6 +88,14 @@ def test_without_an_effect_nothing_shrinks(rv_m2):
     campaign, _, _ = simulate(rv_m2, [], seed=1)
     for scheme in worst_folds(fit(campaign, choose((), (), ()))):
         assert scheme.shrinkage == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_wider_explanation_must_not_go_astray_elsewhere(rv_m2):
+    data = simulate(rv_m2, ["geometric"], seed=6)[0]
+    wide, narrow = fit(data, choose(("geometric",), (), ())), fit(data, choose(("instrument_scale",), (), ()))
+    assert not worse_elsewhere(narrow, wide)
+    assert not worse_elsewhere(wide, wide)
+    assert worse_elsewhere(wide, narrow)
 
 
 def test_it_takes_no_time():

@@ -12,7 +12,7 @@ from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.evidence import Search
 from thermal_robot.inference.explain import explain
 from thermal_robot.inference.frames import moved, register
-from thermal_robot.inference.gauss_newton import corrected_observations, gauss_newton
+from thermal_robot.inference.gauss_newton import _ridge_step, corrected_observations, gauss_newton
 from thermal_robot.inference.problem import Linear, gram, parameter_values
 from thermal_robot.inference.robust import Noise
 from thermal_robot.observations import observe
@@ -143,3 +143,23 @@ def test_without_effects_the_corrected_model_is_the_nominal_one(rv_m2):
     taken = sum(block(plain, e).columns @ v for e, v in zip(effects, values, strict=True))
     gap = corrected_observations(campaign, frames, list(zip(effects, values, strict=True))).gap
     np.testing.assert_allclose(plain.gap - gap, taken, rtol=0, atol=1e-5 * np.abs(taken).max())
+
+
+def test_a_step_minimises_misfit_and_prior_together():
+    rng = np.random.default_rng(0)
+    design, gap = rng.normal(size=(40, 7)), rng.normal(size=40)
+    state, prior = rng.normal(size=4), rng.uniform(0.1, 2.0, 4)
+    step, size = _ridge_step(design, gap, state, prior)
+    rows = np.vstack([design, np.hstack([np.zeros((4, 3)), np.diag(1.0 / prior)])])
+    wanted = np.linalg.lstsq(rows, np.concatenate([gap, -state / prior]), rcond=None)[0]
+    np.testing.assert_allclose(step, wanted, rtol=1e-9)
+    # what it moves, in noise: the length of the step as rows see it
+    assert size == pytest.approx(np.linalg.norm(rows @ step), rel=1e-9)
+
+
+def test_directions_that_nothing_determines_are_not_moved():
+    rng = np.random.default_rng(1)
+    column = rng.normal(size=(30, 1))
+    step, _ = _ridge_step(np.hstack([column, -column]), rng.normal(size=30), np.zeros(0), np.zeros(0))
+    assert step[0] == pytest.approx(-step[1], rel=1e-9)
+    assert abs(step.sum()) < 1e-9 * abs(step[0])

@@ -10,6 +10,7 @@ from thermal_robot.effects import choose
 from thermal_robot.inference.frames import register
 from thermal_robot.inference.gauss_newton import corrected_observations
 from thermal_robot.inference.rows import row_groups
+from thermal_robot.inference.settings import NEVER
 from thermal_robot.inference.settle import settle
 from thermal_robot.observations import observe
 
@@ -84,3 +85,9 @@ def test_nothing_is_held_in_noise(rv_m2):
     assert found.held == ()
     assert found.containers == set()
     assert not found.second_order
+
+
+def test_what_never_is_chosen_is_not_chosen_however_much_it_explains(gained):
+    campaign, _, _ = gained
+    found, _ = settled(campaign, ("joint_gain", "drift"), rarity={"joint_gain": NEVER})
+    assert "joint_gain" not in found.names

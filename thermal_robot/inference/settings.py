@@ -11,8 +11,8 @@ PRIOR_PROBABILITY = 0.1
 """Of an effect being at work, random ones too: of sixteen, one or two are worth a campaign."""
 SIZE_SPREAD = 1.5
 """Standard deviation of ln λ: an effect three times larger or smaller than stated is no surprise."""
-NEVER = -100.0
-"""Log prior odds of an effect that scatter had feigned: it is not chosen again, whatever else is."""
+NEVER = -1e9
+"""Log prior odds of an effect that scatter had feigned: more than any data can outweigh."""
 GIVEN_NOISE_DOF = 20.0
 """Degrees of freedom that a stated noise is worth: it is trusted to about 15 %, as data sheets are."""
 NOISE_SLACK = 1.3
