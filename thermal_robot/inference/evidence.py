@@ -195,7 +195,7 @@ class _Posterior:
         """Solve (G/s² + Λ⁻¹) θ = b/s²."""
         size = len(vector)
         if not size:
-            return cls(np.zeros(0), np.zeros((0, 0)), 0.0, np.zeros(0), np.zeros(0))
+            return cls(np.zeros(0), np.zeros((0, 0)), 0.0, np.zeros(len(scale)), np.zeros(len(scale)))
         diagonal = np.diag_indices(size)
         precision = matrix / variance
         precision[diagonal] += 1.0 / scale[owner] ** 2

@@ -1,4 +1,4 @@
-"""Unknown frames, fitted exactly before anything else: the tracker may stand anywhere, turned by any angle."""
+"""Unknown frames, fitted exactly before any effect: the tracker may stand anywhere, turned by any angle."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Places × quantities: which law, entering where, a remainder speaks for."""
+"""Scan of places and quantities: which law, entering where, explains a remainder best."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Scanned:
-    """One candidate: the law, and what log evidence it gains over noise by the Bayes information criterion."""
+    """One candidate: the law, and the log evidence that it gains over noise (Bayes information criterion)."""
 
     law: Discovered
     gain: float
@@ -31,7 +31,7 @@ class Scanned:
 def scan(observations: Observations, targets: Sequence[Target]) -> tuple[list[list[Scanned]], int]:
     """Return, for every target, all candidates, best first; and how many were tried.
 
-    Segments have six components, so that only the quantities that speak elsewhere are tried there.
+    A law at a segment has six components, so that only the quantities that gain most elsewhere are tried there.
     """
     found: list[list[Scanned]] = [[] for _ in targets]
     first = laws(observations, ("joint", "base", "tool"))
@@ -49,7 +49,7 @@ def scan(observations: Observations, targets: Sequence[Target]) -> tuple[list[li
 
 
 def shaped(observations: Observations, target: Target, law: Discovered) -> Scanned:
-    """Return a law in the shape that gains most."""
+    """Return a law in the shape that gains most log evidence."""
     values = quantities(observations).get(law.quantity)
     jumps = law.quantity in (*CLOCK, *GRAVITY, *observations.robot.joint_names)
     orders = harmonics(observations, law.place) if law.kind == "joint" else settings.HARMONICS

@@ -49,11 +49,11 @@ class IndependentRows:
 def independent_rows(
     values: Array, columns: Array, pose: NDArray[np.int64], weights: Array, freedom: int
 ) -> IndependentRows:
-    """Turn repeats into rows that are independent of each other.
+    """Turn the visits of each pose into independent rows: contrasts among them, and their mean.
 
     With one Jacobian J for the k visits of a pose, Helmert's contrasts of them have the covariance
     Σ + J Λ_v Jᵀ, and √k times their mean has Σ + J (Λ_v + k Λ_u) Jᵀ (Searle, Casella, McCulloch, *Variance
-    Components*, 1992, ch. 3). Parameters that were fitted shrink the means; these are enlarged again.
+    Components*, 1992, ch. 3). Parameters that were fitted have shrunk the means; these are enlarged again.
     """
     order = np.argsort(pose, kind="stable")
     _, first, count = np.unique(pose[order], return_index=True, return_counts=True)
