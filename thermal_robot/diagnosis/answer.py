@@ -20,7 +20,7 @@ from thermal_robot.diagnosis.schemes import worst_folds
 from thermal_robot.diagnosis.sensitivity import prior_sensitivity
 from thermal_robot.diagnosis.stand_in import stand_ins, trust
 from thermal_robot.diagnosis.where import locate
-from thermal_robot.effects import Effect, random_effects
+from thermal_robot.effects import Effect, gate, random_effects
 from thermal_robot.effects.quantities import unit
 from thermal_robot.inference import settings
 from thermal_robot.inference.discover import Discovery
@@ -159,7 +159,7 @@ def _gap(last: Conclusion, shrinkage: Shrinkage) -> Gap:
 
 def _model(fit: Fit) -> CorrectedModel:
     campaign = fit.campaign
-    needs = [column for effect, _ in fit.effects for column in effect.reads(fit.nominal)]
+    needs = [column for effect, _ in fit.effects for column in gate.reads(effect, fit.nominal)]
     clock = campaign.covariates.get("order")
     return CorrectedModel(
         robot=campaign.robot,

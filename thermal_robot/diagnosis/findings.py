@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from thermal_robot.diagnosis.parts import Estimate, Finding, Location, Status, is_frame
-from thermal_robot.effects import Effect, library
+from thermal_robot.effects import Effect, gate, library
 from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import orthonormal, whitener, without
@@ -93,7 +93,7 @@ def by_share(found: Sequence[Finding]) -> tuple[Finding, ...]:
 def _unknown_frames(fit: Fit) -> tuple[str, ...]:
     """Return the effects of the library that displace a frame which is fitted anyway."""
     frames = [effect for effect in library().values() if effect.frame]
-    return tuple(effect.name for effect in frames if effect.missing(fit.nominal))
+    return tuple(effect.name for effect in frames if gate.missing(effect, fit.nominal))
 
 
 def _within_frames(fit: Fit, block: int) -> bool:

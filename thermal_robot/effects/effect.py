@@ -25,6 +25,9 @@ Register it under the entry point group ``thermal_robot.effects`` or pass it to 
 others want to know of it stands in the same class, each with a default: ``title`` (in plain words), ``frame`` and
 ``contained_in`` (what it cannot be told from), ``missing`` and ``reads`` (columns), ``variants``, ``nearby`` and ``at``
 (settings), ``driver`` (what it is drawn against).
+
+Nobody asks an effect directly: :mod:`thermal_robot.effects.gate` does, checks the answer, and names the effect where it
+breaks the contract or raises.
 """
 
 from __future__ import annotations
@@ -110,7 +113,8 @@ class Parameter:
     kind
         ``joint``, ``link``, ``base``, ``tool`` or ``instrument``: the kind of place it sits in.
     place
-        The joint's or link's URDF name.
+        The joint's or link's URDF name; ``base``, ``tool`` or ``instrument`` (or a link) for these kinds; empty for all
+        that the responses act on.
     responses
         What one unit does in the channels.
     """
