@@ -40,7 +40,11 @@ def test_the_parts_agree_with_each_other(hall):
     assert set(hall.verdict) == {"thermal_elongation", "backlash"}
     assert hall.verdict == tuple(f.name for f in hall.effects if f.status == "found")
     assert sum(hall.where.axes.values()) == pytest.approx(1.0)
-    assert 0.0 < hall.probability <= min(hall.finding(name).probability for name in hall.verdict) + 1e-9
+    # exactly these: each of them, and none of the others
+    inside = [hall.finding(name).probability for name in hall.verdict]
+    outside = [f.probability for f in hall.effects if f.status == "not_found" and not f.random]
+    assert 1.0 - sum(1.0 - p for p in inside) - sum(outside) <= hall.probability + 1e-9
+    assert hall.probability <= min(*inside, 1.0 - max(outside)) + 1e-9
     assert hall.outliers == tuple(hall.rows.rows[hall.rows.outliers])
     assert set(hall.model.needs) == {"temperature", *(f"approach.{j}" for j in hall.joint_names)}
     assert {s.name for s in hall.gap.schemes} >= {"time", "region", "reach"}

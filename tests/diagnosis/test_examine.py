@@ -79,6 +79,8 @@ def test_places_share_one_probability(rv_m2):
     shares = [place.share for place in said.locations]
     assert shares == sorted(shares, reverse=True)
     assert 0.9 < sum(shares) <= 1.0 + 1e-12
+    # as large as the noise: not subtracted, it would be 1.8 of it
+    assert said.rms == pytest.approx(1.5 * np.sqrt(3.0) * NOISE, rel=0.12)
 
 
 def test_what_is_explained_is_not_left(rv_m2):

@@ -105,7 +105,7 @@ def test_titles_are_those_of_the_effects(offsets):
 def test_the_largest_share_comes_first_and_what_is_not_testable_last():
     found = [
         Finding("d", "not_testable"),
-        Finding("c", "not_found", 0.1, 0.0),
+        Finding("c", "not_found", 0.1, -0.01),
         Finding("a", "found", 1.0, 0.2),
         Finding("b", "not_found", 0.4, 0.0),
         Finding("e", "found", 1.0, 0.7),

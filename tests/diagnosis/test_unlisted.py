@@ -11,10 +11,14 @@ from helpers import NOISE, with_law
 from simulate import simulate
 
 from thermal_robot import CorrectedModel, diagnose
+from thermal_robot.diagnosis.examine import examine
+from thermal_robot.diagnosis.parts import Unexplained
+from thermal_robot.diagnosis.unlisted import Stage, as_laws_say, one_more_law
 from thermal_robot.effects import choose
 from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.law import Discovered
 from thermal_robot.effects.quantities import GRAVITY, quantities
+from thermal_robot.inference import settings
 from thermal_robot.inference.fit import fit
 from thermal_robot.inference.frames import register
 from thermal_robot.inference.random_gap import random_gap
@@ -186,3 +190,37 @@ def test_one_eccentric_wheel_is_no_unlisted_cause(rv_m2):
         names.append(found.verdict)
     # where the parabola is lost in the noise a zero and a gain say the same with fewer numbers
     assert names.count(("transmission_error",)) >= 6, names
+
+
+def test_noise_is_not_worth_a_law(rv_m2):
+    known = fit(simulate(rv_m2, seed=2, noise=NOISE)[0], choose(("backlash",), (), ()))
+    heard = []
+    assert one_more_law(Stage(known, (), examine(known)), heard.append) is None
+    assert heard == ["causes that nobody listed: scan 1"]
+
+
+def test_a_law_joins_the_explanation_and_takes_its_remainder(rv_m2):
+    law, values = CASES["step"]
+    known = fit(with_law(rv_m2, law, values, seed=3)[0], choose(("joint_offset",), (), ()))
+    before = Stage(known, (), examine(known))
+    assert before.left.unexplained.flagged
+    after = one_more_law(before, lambda _: None)
+    (discovery,) = after.laws
+    assert (discovery.law.place, discovery.law.quantity) == (law.place, law.quantity)
+    assert discovery.law.name in {effect.name for effect, _ in after.fit.effects}
+    assert not after.left.unexplained.flagged
+    said = as_laws_say(before.left.unexplained, after.left.unexplained, after.laws)
+    assert (said.rms, said.p_value, said.reasons) == (
+        before.left.unexplained.rms,
+        before.left.unexplained.p_value,
+        before.left.unexplained.reasons,
+    )
+    assert (said.locations[0].kind, said.locations[0].name) == (law.kind, law.place)
+    assert [d.covariate for d in said.depends_on] == [law.quantity]
+    assert all(0.0 <= d.p_value <= 1.0 for d in said.depends_on)
+    assert all(settings.LIKELY_PLACE <= place.share <= 1.0 for place in said.locations)
+
+
+def test_without_laws_it_is_said_what_is_left():
+    first, left = Unexplained(True, 2e-4, 1e-9), Unexplained(True, 1e-4, 1e-6)
+    assert as_laws_say(first, left, ()) is left
