@@ -83,10 +83,10 @@ def diagnose(
 
 
 def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
-    """Look for what the known effects leave, as long as it is not noise.
+    """Explain the residual of the known effects, until what is left is noise.
 
-    Scatter that explains its size ends the search: the effects are then chosen again beside it. Otherwise one law after
-    another joins the explanation, while each is worth its place and rows of regions held out do not get worse.
+    Where scatter of the joints accounts for the residual, the effects are chosen again beside it. Otherwise laws are
+    added one by one. Laws are taken back if they make held-out regions of joint space worse.
     """
     stages = [Stage(known, (), examine(known, progress))]
     chance = random_gap(known)
