@@ -81,7 +81,7 @@ class Repeats:
 
 
 def repeats(fit: Fit, left: Remainder) -> Repeats | None:
-    """Estimate the noise from pairs of nearest commands within ``settings.NEAR``; ``None`` if there are too few pairs."""
+    """Estimate the noise from pairs of nearest commands within ``settings.NEAR``; ``None`` with too few pairs."""
     q = fit.campaign.q[left.rows]
     distance, neighbour = nearest(q, 1)
     close = np.flatnonzero(distance[:, 0] < settings.NEAR)

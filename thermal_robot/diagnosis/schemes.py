@@ -121,7 +121,7 @@ class _Problem:
         return int((value > settings.FRAME_DETERMINED).sum())
 
     def left(self, test: NDArray[np.bool_]) -> tuple[Array, Array] | None:
-        """(n,) distances of the held-out rows, m, before and after; ``None`` if the others do not determine the frames."""
+        """(n,) distances of the held-out rows, m: before, after; ``None`` if the others do not determine the frames."""
         train = self.total - self._products(test)
         if self._rank(train) < self.rank or (~test).sum() < 2 or not test.any():
             return None
