@@ -11,10 +11,11 @@ from thermal_robot.diagnosis.examine import Examined, examine
 from thermal_robot.diagnosis.parts import Unexplained
 from thermal_robot.inference import settings
 from thermal_robot.inference.explain import explain
-from thermal_robot.inference.fit import Fit, refit, row_groups
+from thermal_robot.inference.fit import Fit, refit
 from thermal_robot.inference.generalised import generalised
 from thermal_robot.inference.random_gap import RandomGap, random_gap
 from thermal_robot.inference.robust import Noise
+from thermal_robot.inference.rows import row_groups
 
 
 def beside_scatter(fit: Fit, chance: RandomGap, progress: Callable[[str], None]) -> Conclusion:

@@ -15,10 +15,10 @@ from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import ridge
 from thermal_robot.inference.explain import explain
-from thermal_robot.inference.fit import Fit, row_groups
+from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.problem import Linear, Whitening, frame_step
 from thermal_robot.inference.robust import Noise
-from thermal_robot.inference.rows import folds
+from thermal_robot.inference.rows import folds, row_groups
 
 Array = NDArray[np.float64]
 

@@ -186,7 +186,7 @@ class Diagnosis:
                 outliers=self.outliers,
                 warnings=self.warnings,
             ),
-            "gap": _gap(self.gap),
+            "gap": _gap_as_json(self.gap),
             "verdict": {
                 "effects": self.verdict,
                 "probability": self.probability,
@@ -224,7 +224,7 @@ class Diagnosis:
         return _teller().fragment(self)
 
 
-def _gap(gap: Gap) -> dict[str, Any]:
+def _gap_as_json(gap: Gap) -> dict[str, Any]:
     orientation = None
     if gap.orientation_before is not None:
         orientation = {"rms_before": gap.orientation_before, "rms_after": gap.orientation_after}

@@ -75,7 +75,7 @@ def _alone(fit: Fit, law: Discovered) -> dict[str, tuple[Effect, ...]]:
     """
     if law.kind != "joint" or law.quantity != law.place:
         return {}
-    own = {name: (settings, settings[0].at(law.place)) for name, settings in fit.settings.items()}
+    own = {name: (settings, settings[0].at(law.place)) for name, settings in fit.variants.items()}
     return {name: (*known, single) for name, (known, single) in own.items() if single and single not in known}
 
 

@@ -20,12 +20,9 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotrf, dpotri
 
 from thermal_robot.errors import EstimationError
+from thermal_robot.inference import settings
 
 Array = NDArray[np.float64]
-
-_SIZE_SPREAD = 1.5  # ln λ ~ N(0, 1.5²): an effect three times larger or smaller than stated is no surprise
-_ITERATIONS = 40
-_FLATTEST = 0.5  # curvature of a peak over ln λ, that of the prior being 1: flatter, a parabola is up to 0.9 nat off
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +148,7 @@ class Search:
         while True:
             around = [self.evaluate(n, best) for n in self._neighbours(best.blocks) if not barred & set(n)]
             better = max(around, key=lambda c: c.log_evidence, default=best)
-            if better.log_evidence <= best.log_evidence + 1e-9:
+            if better.log_evidence <= best.log_evidence + settings.BETTER:
                 return best
             best = better
 
@@ -170,6 +167,57 @@ class Search:
         return order, weight / weight.sum()
 
 
+@dataclass(eq=False)
+class _Posterior:
+    """Parameters of one combination at given scales and noise.
+
+    Attributes
+    ----------
+    values, covariance
+        Posterior mean and covariance.
+    log_det
+        log|I + Λ G/s²|.
+    fitted, determined
+        Per block: |θ|²/λ², and how many of its columns the data determine.
+    """
+
+    values: Array
+    covariance: Array
+    log_det: float
+    fitted: Array
+    determined: Array
+
+    @classmethod
+    def at(cls, matrix: Array, vector: Array, owner: NDArray[np.int64], scale: Array, variance: float) -> _Posterior:
+        """Solve (G/s² + Λ⁻¹) θ = b/s²."""
+        size = len(vector)
+        if not size:
+            return cls(np.zeros(0), np.zeros((0, 0)), 0.0, np.zeros(0), np.zeros(0))
+        diagonal = np.diag_indices(size)
+        precision = matrix / variance
+        precision[diagonal] += 1.0 / scale[owner] ** 2
+        factor, failed = dpotrf(precision, lower=1, clean=1)
+        if failed:
+            raise EstimationError("the measurements do not determine anything: too few, or all alike")
+        lower, _ = dpotri(factor, lower=1)
+        covariance = lower + lower.T  # above the diagonal it is zero
+        covariance[diagonal] *= 0.5
+        values = covariance @ vector / variance
+        well = 1.0 - np.diag(covariance) / scale[owner] ** 2
+        return cls(
+            values,
+            covariance,
+            float(2.0 * np.log(np.diag(factor)).sum() + 2.0 * np.log(scale[owner]).sum()),
+            np.bincount(owner, values**2, len(scale)) / scale**2,
+            np.bincount(owner, well, len(scale)).astype(float),
+        )
+
+    def step(self, log_scale: Array) -> Array:
+        """Return the Newton step of ln λ, its curvature held positive."""
+        slope = self.fitted - self.determined - log_scale / settings.SIZE_SPREAD**2
+        return np.clip(slope / (self.fitted + self.determined + 1.0 / settings.SIZE_SPREAD**2), -1.0, 1.0)
+
+
 def _evidence(gram: Gram, blocks: tuple[int, ...], prior: float, start: Combination | None) -> Combination:
     spans = [np.arange(gram.slices[b].start, gram.slices[b].stop) for b in blocks]
     used = np.concatenate([*spans, np.zeros(0, dtype=int)])
@@ -177,50 +225,28 @@ def _evidence(gram: Gram, blocks: tuple[int, ...], prior: float, start: Combinat
     matrix, vector = gram.matrix[np.ix_(used, used)], gram.vector[used]
     scale = np.array([start.scales.get(b, 1.0) if start else 1.0 for b in blocks])
     equations, held = gram.equations, gram.noise_dof
-    variance = start.noise**2 if start else max((held + gram.total) / (held + equations), 1e-12)
-    size = len(used)
-    values, covariance = np.zeros(size), np.zeros((size, size))
-    effective, quadratic, log_det = 0.0, gram.total, 0.0
-    diagonal = np.diag_indices(size)
-    for last in [*(False,) * _ITERATIONS, True]:
-        if size:
-            precision = matrix / variance
-            precision[diagonal] += 1.0 / scale[owner] ** 2
-            factor, failed = dpotrf(precision, lower=1, clean=1)
-            if failed:
-                raise EstimationError("the measurements do not determine anything: too few, or all alike")
-            lower, _ = dpotri(factor, lower=1)
-            covariance = lower + lower.T  # above the diagonal it is zero
-            covariance[diagonal] *= 0.5
-            values = covariance @ vector / variance
-            log_det = 2.0 * np.log(np.diag(factor)).sum() + 2.0 * np.log(scale[owner]).sum()
-            quadratic = gram.total - vector @ values
-            well = 1.0 - np.diag(covariance) / scale[owner] ** 2
-            effective = float(well.sum())
-            fitted = np.bincount(owner, values**2, len(blocks)) / scale**2
-            determined = np.bincount(owner, well, len(blocks))
-            log_scale = np.log(scale)
-            slope = fitted - determined - log_scale / _SIZE_SPREAD**2
-            step = np.clip(slope / (fitted + determined + 1.0 / _SIZE_SPREAD**2), -1.0, 1.0)
-        residual = gram.total - 2 * vector @ values + values @ matrix @ values if size else gram.total
-        target = max((held + max(residual, 0.0)) / max(held + equations - effective, 1.0), 1e-12)
-        moved = abs(np.log(target / variance))
-        if size:
-            moved = max(moved, float(np.abs(step).max()))
-        if last or moved < 1e-3:
+    least = settings.LEAST_VARIANCE
+    variance = start.noise**2 if start else max((held + gram.total) / (held + equations), least)
+    for last in [*(False,) * settings.EVIDENCE_STEPS, True]:
+        found = _Posterior.at(matrix, vector, owner, scale, variance)
+        effective = float(found.determined.sum())
+        step = found.step(np.log(scale))
+        residual = gram.total - 2 * vector @ found.values + found.values @ matrix @ found.values
+        target = max((held + max(residual, 0.0)) / max(held + equations - effective, 1.0), least)
+        moved = max(abs(np.log(target / variance)), float(np.abs(step).max(initial=0.0)))
+        if last or moved < settings.EVIDENCE_SETTLED:
             break
-        variance = target
-        if size:
-            scale = np.exp(log_scale + step)
+        variance, scale = target, scale * np.exp(step)
+    quadratic = gram.total - vector @ found.values
     log_evidence = (
-        -0.5 * ((equations + held) * np.log(variance) + held / variance + log_det + quadratic / variance)
-        - 0.5 * float(((np.log(scale) / _SIZE_SPREAD) ** 2).sum())
-        + _log_volume(owner, scale, values, covariance)
+        -0.5 * ((equations + held) * np.log(variance) + held / variance + found.log_det + quadratic / variance)
+        - 0.5 * float(((np.log(scale) / settings.SIZE_SPREAD) ** 2).sum())
+        + _log_volume(owner, scale, found.values, found.covariance)
         + prior
     )
     scales = dict(zip(blocks, scale.tolist(), strict=True))
     return Combination(
-        blocks, float(log_evidence), float(np.sqrt(variance)), scales, values, covariance, float(effective)
+        blocks, float(log_evidence), float(np.sqrt(variance)), scales, found.values, found.covariance, effective
     )
 
 
@@ -232,7 +258,8 @@ def _log_volume(owner: NDArray[np.int64], scale: Array, values: Array, covarianc
     that s follows λ, and what is not parabolic: both within about 0.1 for blocks that are well seen.
     """
     each = np.eye(len(scale))[:, owner] / scale[:, None] ** 2
-    bend = -(each @ (covariance * (4.0 * np.outer(values, values) + 2.0 * covariance)) @ each.T)
-    bend[np.diag_indices(len(scale))] += 2.0 * (each @ (values**2 + np.diag(covariance))) + 1.0 / _SIZE_SPREAD**2
-    peak = np.linalg.eigvalsh(bend) * _SIZE_SPREAD**2
-    return -0.5 * float(np.log(np.maximum(peak, _FLATTEST)).sum())
+    bend = -2.0 * (each @ (covariance * (2.0 * np.outer(values, values) + covariance)) @ each.T)
+    spread2 = settings.SIZE_SPREAD**2
+    bend[np.diag_indices(len(scale))] += 2.0 * (each @ (values**2 + np.diag(covariance))) + 1.0 / spread2
+    peak = np.linalg.eigvalsh(bend) * spread2
+    return -0.5 * float(np.log(np.maximum(peak, settings.FLATTEST_PEAK)).sum())

@@ -162,7 +162,8 @@ def _judge(
             mean = _Mean(number, weight)
             common, counts = mean(errors)[number], np.bincount(number)[number] > 1
             errors, weight = (errors - common)[counts], weight[counts]
-            law = followed(errors, weight, {name: (v - mean(v)[number])[counts] for name, v in recorded.items()})
+            within = {name: (v - mean(v)[number])[counts] for name, v in recorded.items()}
+            law = followed(errors, weight, within, number[counts])
         else:
             mean = _Mean(number, np.ones(len(number)))
             errors, variance = _pose_errors(scatter, gap, sensitivity[used], mean, c.joint, noise)

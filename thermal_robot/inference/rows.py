@@ -127,3 +127,9 @@ def repeated_poses(campaign: Campaign) -> NDArray[np.int64]:
     empty = label == ""
     number[empty] = number.max() + 1 + np.arange(int(empty.sum()))
     return np.asarray(number)
+
+
+def row_groups(campaign: Campaign) -> tuple[NDArray[np.int64], ...]:
+    """Return the groupings within which a remainder may be alike: spells of time and neighbourhoods of poses."""
+    count = min(max(campaign.samples // settings.ROWS_A_GROUP, 2), settings.MOST_GROUPS)
+    return spells(campaign, count), neighbourhoods(campaign, count)

@@ -11,8 +11,8 @@ PRIOR_PROBABILITY = 0.1
 """Of an effect being at work, random ones too: of sixteen, one or two are worth a campaign."""
 SIZE_SPREAD = 1.5
 """Standard deviation of ln λ: an effect three times larger or smaller than stated is no surprise."""
-NEVER = -100.0
-"""Log prior odds of an effect that scatter had feigned: it is not chosen again, whatever else is."""
+NEVER = -1e9
+"""Log prior odds of an effect that scatter had feigned: more than any data can outweigh."""
 GIVEN_NOISE_DOF = 20.0
 """Degrees of freedom that a stated noise is worth: it is trusted to about 15 %, as data sheets are."""
 NOISE_SLACK = 1.3
@@ -86,8 +86,11 @@ TARGET_STARTS = np.vstack([np.zeros(3), 0.2 * np.eye(3), -0.2 * np.eye(3)])
 """m: where the target may sit on the tool frame; from each the fit reaches 0.3 m."""
 SPARE_EQUATIONS = 6
 """That must be left when the frames are fitted: one pose's worth of position and orientation."""
-EVIDENCE_STEPS, EVIDENCE_SETTLED = 40, 1e-3
-"""Newton steps of scales and noise at most, and the change of a logarithm at which they end."""
+EVIDENCE_STEPS, EVIDENCE_SETTLED, LEAST_VARIANCE = 40, 1e-3, 1e-12
+"""Newton steps of scales and noise at most, the change of a logarithm at which they end, and the smallest variance, in
+squares of the noise: what fits better is rounding."""
+FLATTEST_PEAK = 0.5
+"""Curvature of a peak over ln λ, that of the prior being 1: of a flatter one a parabola is up to 0.9 nat off."""
 FIRST_ROUNDS = 8
 """Rounds of choice, outliers and noise at most: they settle after two or three."""
 MOST_LEVERAGE = 0.9
@@ -104,6 +107,11 @@ SETTLED_BETWEEN = 2.0
 """The same for a fit of many rows that is chosen anew: the step after it would be a hundredth of it."""
 REFINEMENT = 1.6
 """Factor by which a constant is first moved: neighbours of the grid stand about 2.5 apart."""
+REFINED_GAIN, REFINED_TRIES = 0.1, 16
+"""Natural logarithms that a move of a constant must gain, and may miss in the end, a tenth of what is worth mentioning;
+and how often its neighbours are tried: a factor of 1.6 is then halved to 1.0001."""
+REFINED_FLAT = 8.0 * REFINED_GAIN
+"""Natural logarithms lost on both sides, below which the vertex of their parabola is no more than that higher."""
 LARGE = 0.02
 """rad or m: products of parameters this large show beside noise of tens of micrometres."""
 NO_WORSE = 1.02
@@ -119,6 +127,8 @@ DRAW_SEED, TEST_SEED, BOOTSTRAP_SEED = 61, 17, 20180901
 
 SEEN = 1e-10
 """Of the largest eigenvalue of a scaled Gram matrix: a direction below it is rounding, an exact alias of others."""
+STEP_FLOOR = 1e-13
+"""The same of a Gauss-Newton step, where priors determine what the data do not."""
 PROJECTED_FLOOR = 1e-12
 """Of a column's square before the frames were projected out: what is left below it is rounding."""
 INFORMATION_FLOOR = 1e-5

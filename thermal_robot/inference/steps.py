@@ -16,7 +16,7 @@ from thermal_robot.inference.target import Target
 Array = NDArray[np.float64]
 
 
-def followed(errors: Array, weight: Array, recorded: Mapping[str, Array]) -> str:
+def followed(errors: Array, weight: Array, recorded: Mapping[str, Array], pose: NDArray[np.int64] | None = None) -> str:
     """Name the quantity that errors follow smoothly, or nothing: F tests, counted.
 
     Parameters
@@ -25,11 +25,15 @@ def followed(errors: Array, weight: Array, recorded: Mapping[str, Array]) -> str
         (K,) errors, and one over the variance of each.
     recorded
         (K,) values of each quantity, by name.
+    pose
+        (K,) number of each row's pose, where errors are those within a pose: the mean of each was taken out of them.
     """
     best, follows = settings.LEVEL, ""
     root = np.sqrt(weight)
-    constant = (root / np.linalg.norm(root))[:, None]
-    target = Target(without(errors * root, constant), root[:, None], constant)
+    number = np.zeros(len(errors), dtype=np.int64) if pose is None else np.unique(pose, return_inverse=True)[1]
+    means = np.eye(int(number.max()) + 1)[number] * root[:, None]
+    means = means / np.linalg.norm(means, axis=0)
+    target = Target(without(errors * root, means), root[:, None], means)
     for name, values in recorded.items():
         columns = smooth_columns(values) if np.ptp(values) > settings.ROUNDING else np.zeros((len(values), 0))
         worth = target.worth(columns[:, None, :])

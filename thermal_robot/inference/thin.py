@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.inference import settings
-from thermal_robot.inference.fit import Fit, corrected_observations
+from thermal_robot.inference.fit import Fit
+from thermal_robot.inference.gauss_newton import corrected_observations
 from thermal_robot.inference.problem import Linear, Whitening
 from thermal_robot.inference.rows import in_a_row
 from thermal_robot.inference.target import Target

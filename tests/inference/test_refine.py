@@ -1,0 +1,67 @@
+"""Constants end where the evidence does: no setting of a fine grid is better by more than is asked for."""
+
+import numpy as np
+import pytest
+from simulate import simulate
+from time_constants import DRIFT, LAG, campaign
+
+from thermal_robot.effects import choose
+from thermal_robot.inference.columns import block, frame_columns
+from thermal_robot.inference.evidence import Search
+from thermal_robot.inference.explain import Noise, explain
+from thermal_robot.inference.frames import register
+from thermal_robot.inference.problem import Linear, gram
+from thermal_robot.inference.refine import refined
+from thermal_robot.observations import observe
+
+
+def explained(data, names):
+    """The observations, and the explanation by these effects in one setting each."""
+    seen = observe(data, register(data))
+    variants = [effect.variants(seen) for effect in choose(names, (), ())]
+    settings = [own[-1] for own in variants]
+    linear = Linear(seen.gap, frame_columns(seen)[0], tuple(block(seen, s) for s in settings))
+    return seen, explain(linear, Noise(data.noise_position), start=range(len(settings)))
+
+
+def evidence(explanation, seen, effect):
+    """Log evidence of one effect alone."""
+    linear = Linear(explanation.linear.gap, explanation.linear.frames, (block(seen, effect),))
+    return Search(gram(linear, explanation.whitening), [0.0]).evaluate((0,)).log_evidence
+
+
+@pytest.mark.parametrize(("kind", "constant", "attribute"), [(LAG, 900.0, "lag"), (DRIFT, 0.15, "time_constant")])
+@pytest.mark.parametrize("ratio", [3.0, 30.0])
+def test_no_constant_of_a_fine_grid_is_much_better(kind, constant, attribute, ratio):
+    for seed in range(3):
+        seen, explanation = explained(campaign("panda", seed, kind, constant, ratio), (kind,))
+        ((effect, values),) = refined(explanation, seen, 1.6)
+        own, found = evidence(explanation, seen, effect), getattr(effect, attribute)
+        assert len(values) == len(explanation.linear.blocks[0].sizes)
+        grid = found * np.exp(np.linspace(-1.0, 1.0, 401))
+        settings = [type(effect)(**{**effect.arguments(), attribute: float(c)}) for c in grid]
+        assert max(evidence(explanation, seen, s) for s in settings) < own + 0.15
+
+
+def test_effects_without_a_constant_stay_as_they_were(rv_m2):
+    data = simulate(rv_m2, ["joint_offset", "joint_gain"], seed=3)[0]
+    seen, explanation = explained(data, ("joint_offset", "joint_gain"))
+    for b, (effect, values) in zip(explanation.best.blocks, refined(explanation, seen, 1.6), strict=True):
+        assert effect is explanation.linear.blocks[b].effect
+        np.testing.assert_array_equal(values, explanation.values[b][0])
+
+
+def test_constants_of_several_effects_are_moved_together(rv_m2):
+    """Values belong to the constants that were found: the remainder they leave is smaller than before."""
+    data = campaign("rv_m2", 2, DRIFT, 0.2, 20.0)
+    seen, explanation = explained(data, (DRIFT, LAG))
+    after = refined(explanation, seen, 1.6)
+    assert len(after) == len(explanation.best.blocks)
+
+    def left(pairs):
+        gap = explanation.linear.gap - sum(block(seen, e).columns @ v for e, v in pairs)
+        flat = explanation.linear.frames.reshape(gap.size, -1)
+        return np.linalg.norm(gap.ravel() - flat @ np.linalg.lstsq(flat, gap.ravel(), rcond=None)[0])
+
+    before = [(explanation.linear.blocks[b].effect, explanation.values[b][0]) for b in explanation.best.blocks]
+    assert left(after) < 0.7 * left(before)

@@ -1,0 +1,179 @@
+"""Which rows belong together: repeats of a pose, neighbours in joint space, spells of time, folds."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.distance import cdist
+from simulate import commands
+
+from thermal_robot.campaign import Campaign
+from thermal_robot.inference.rows import (
+    folds,
+    in_a_row,
+    in_order,
+    near_repeats,
+    neighbourhoods,
+    repeated_poses,
+    row_groups,
+    spells,
+)
+from thermal_robot.inference.settings import NEAR
+
+on_arms = pytest.mark.parametrize("arm", ["rv_m2", "ur10", "panda"], indirect=True)
+
+
+def repeated(robot, poses=30, repeats=4, jitter=0.0, seed=0):
+    """Every pose several times, in random order, each time a little elsewhere."""
+    rng = np.random.default_rng(seed)
+    number = rng.permutation(np.repeat(np.arange(poses), repeats))
+    q = commands(robot, poses, rng)[number]
+    nudge = rng.normal(size=q.shape)
+    q = q + jitter * nudge / np.linalg.norm(nudge, axis=1, keepdims=True)
+    return Campaign("repeated", robot, q), number
+
+
+@on_arms
+@pytest.mark.parametrize("jitter", [0.0, 0.45 * NEAR])
+def test_repeats_of_a_pose_are_never_on_both_sides(arm, jitter):
+    for seed in range(3):
+        campaign, number = repeated(arm, jitter=jitter, seed=seed)
+        for rows in (campaign, replace(campaign, covariates={"time": np.arange(120.0)[::-1]})):
+            fold, block = folds(rows)
+            for pose in range(30):
+                assert len(set(fold[number == pose])) == 1
+                assert len(set(block[number == pose])) == 1
+            near = cdist(rows.q, rows.q) < NEAR
+            assert (fold[:, None] == fold[None, :])[near].all()
+
+
+def test_rows_that_share_a_label_belong_together_however_far_apart(rv_m2):
+    q = commands(rv_m2, 60, np.random.default_rng(1))
+    label = np.array([f"p{k % 20}" for k in range(60)])
+    label[::7] = ""
+    campaign = Campaign("labelled", rv_m2, q, labels={"pose": label})
+    cluster = near_repeats(campaign)
+    for name in set(label) - {""}:
+        assert len(set(cluster[label == name])) == 1
+    assert len(set(cluster)) == len(set(label) - {""}) + np.sum(label == "")
+
+
+def test_a_path_is_not_one_single_repeat(rv_m2):
+    """Samples along a path lie within a hair of each other from end to end: they still make five folds."""
+    along = np.linspace(0.0, 1.0, 500)[:, None]
+    ends = commands(rv_m2, 2, np.random.default_rng(2))
+    path = Campaign("path", rv_m2, ends[0] + along * (ends[1] - ends[0]))
+    assert np.linalg.norm(np.diff(path.q, axis=0), axis=1).max() < NEAR
+    fold, block = folds(path)
+    assert np.bincount(fold, minlength=5).min() >= 50
+    assert len(set(block)) >= 10
+
+
+@pytest.mark.parametrize("samples", [20, 47, 120, 1000])
+def test_blocks_are_consecutive_in_time_and_of_one_fold(rv_m2, samples):
+    rng = np.random.default_rng(3)
+    q = rng.uniform(-1.5, 1.5, (samples, 5))
+    time = rng.permutation(samples).astype(float)
+    fold, block = folds(Campaign("long", rv_m2, q, covariates={"time": time}))
+    order = block[np.argsort(time)]
+    assert set(fold) == set(range(5))
+    assert (np.diff(order) >= 0).all()
+    assert len(set(block)) == 20
+    assert all(len(set(fold[block == b])) == 1 for b in set(block))
+    assert np.ptp(np.bincount(fold)) <= 5
+
+
+def test_spells_and_neighbourhoods_share_the_rows_out_evenly(rv_m2):
+    rng = np.random.default_rng(4)
+    time = rng.permutation(200).astype(float)
+    campaign = Campaign("rows", rv_m2, rng.uniform(-1, 1, (200, 5)), covariates={"time": time})
+    label = spells(campaign, 10)
+    assert (np.bincount(label) == 20).all()
+    assert (np.diff(label[np.argsort(time)]) >= 0).all()
+    boxes = neighbourhoods(campaign, 16)
+    assert np.ptp(np.bincount(boxes)) <= 1
+    inside = np.mean([campaign.q[boxes == b].var(axis=0).sum() for b in range(16)])
+    assert inside < 0.7 * campaign.q.var(axis=0).sum()
+
+
+def clocked(robot, **columns):
+    """Twelve rows whose clock runs otherwise than the file."""
+    q = commands(robot, 12, np.random.default_rng(5))
+    return Campaign("clocked", robot, q, covariates={k: np.asarray(v, dtype=float) for k, v in columns.items()})
+
+
+def test_rows_follow_each_other_by_the_clock_and_without_one_as_in_the_file(rv_m2):
+    backwards = np.arange(12.0)[::-1]
+    np.testing.assert_array_equal(in_order(clocked(rv_m2)), np.arange(12))
+    np.testing.assert_array_equal(in_order(clocked(rv_m2, time=backwards)), np.arange(12)[::-1])
+    np.testing.assert_array_equal(in_order(clocked(rv_m2, order=backwards)), np.arange(12)[::-1])
+    # the time is the better clock; rows of one time stay as they are
+    both = clocked(rv_m2, time=np.arange(12.0) // 3, order=backwards)
+    np.testing.assert_array_equal(in_order(both), np.arange(12))
+
+
+def test_of_rows_set_aside_those_with_a_neighbour_in_time_stand_in_a_row(rv_m2):
+    time = np.array([0, 6, 1, 7, 2, 8, 3, 9, 4, 10, 5, 11])
+    aside = np.isin(np.arange(12), [0, 1, 2, 9, 10])
+    # measured one after the other: rows 0, 2 at 0 and 1; rows 10, 1 at 5 and 6; row 9, at 10, is alone
+    own = in_a_row(clocked(rv_m2, time=time), aside)
+    np.testing.assert_array_equal(np.flatnonzero(own), [0, 1, 2, 10])
+    # as they stand in the file: 0, 1, 2 and 9, 10
+    np.testing.assert_array_equal(in_a_row(clocked(rv_m2), aside), aside)
+    for few in ([], [3], [3, 5, 7]):
+        assert not in_a_row(clocked(rv_m2), np.isin(np.arange(12), few)).any()
+    # the first row does not follow the last
+    assert not in_a_row(clocked(rv_m2), np.isin(np.arange(12), [0, 11])).any()
+
+
+@on_arms
+def test_repeated_poses_are_those_of_one_command_or_label(arm):
+    campaign, number = repeated(arm)
+    np.testing.assert_array_equal(same(repeated_poses(campaign)), same(number))
+    # what a controller's rounding leaves is one command; a tenth of a milliradian is another
+    nearly = replace(campaign, q=np.round(campaign.q, 5) + 1e-8)
+    np.testing.assert_array_equal(same(repeated_poses(nearly)), same(number))
+    apart = replace(campaign, q=campaign.q + 1e-4 * np.arange(120)[:, None])
+    assert len(set(repeated_poses(apart))) == 120
+    # the label counts where there is one, an empty one stands alone
+    label = np.array([f"p{k % 20}" for k in range(120)])
+    label[:4] = ""
+    told = repeated_poses(replace(apart, labels={"pose": label}))
+    assert len(set(told)) == 20 + 4
+    for name in set(label) - {""}:
+        assert len(set(told[label == name])) == 1
+
+
+def same(labels):
+    """(N, N) which rows share a label."""
+    return labels[:, None] == labels[None, :]
+
+
+def test_few_rows_make_few_folds_and_boxes(rv_m2):
+    q = commands(rv_m2, 3, np.random.default_rng(6))
+    fold, block = folds(Campaign("three", rv_m2, q))
+    assert sorted(fold) == sorted(block) == [0, 1, 2]
+    assert sorted(neighbourhoods(Campaign("three", rv_m2, q), 8)) == [0, 1, 2]
+    alone = Campaign("one", rv_m2, q[[0, 0, 0]])
+    assert set(folds(alone)[0]) == {0}
+
+
+def test_neighbourhoods_are_boxes_of_joint_space(rv_m2):
+    """Two of them are kept apart by one joint at least; the joint that varies most is split first."""
+    q = np.random.default_rng(7).uniform(-1.0, 1.0, (256, 5)) * [0.1, 1.0, 0.3, 0.1, 0.1]
+    campaign = Campaign("boxes", rv_m2, q)
+    half = neighbourhoods(campaign, 2)
+    assert max(q[half == half[q[:, 1].argmin()], 1]) < min(q[half == half[q[:, 1].argmax()], 1])
+    boxes = neighbourhoods(campaign, 16)
+    low = np.array([q[boxes == b].min(axis=0) for b in range(16)])
+    high = np.array([q[boxes == b].max(axis=0) for b in range(16)])
+    apart = (low[:, None] > high[None, :]) | (high[:, None] < low[None, :])
+    assert (apart.any(axis=2) | np.eye(16, dtype=bool)).all()
+
+
+@pytest.mark.parametrize(("samples", "count"), [(7, 2), (100, 20), (2000, 60)])
+def test_groups_in_which_remainders_may_be_alike_hold_a_few_rows_each(rv_m2, samples, count):
+    q = np.random.default_rng(8).uniform(-1.0, 1.0, (samples, 5))
+    groups = row_groups(Campaign("groups", rv_m2, q))
+    assert [len(set(labels)) for labels in groups] == [count, count]
+    assert all(np.ptp(np.bincount(labels)) <= samples / count for labels in groups)

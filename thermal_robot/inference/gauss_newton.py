@@ -1,0 +1,94 @@
+"""The exact model of an explanation: Gauss-Newton over frames and parameters, the priors held at their scales."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.campaign import Campaign
+from thermal_robot.effects import Effect
+from thermal_robot.effects.apply import displacement
+from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import whitener
+from thermal_robot.inference.columns import block, frame_columns
+from thermal_robot.inference.explain import Explanation
+from thermal_robot.inference.frames import moved
+from thermal_robot.observations import Frames, Observations, observe
+
+Array = NDArray[np.float64]
+
+
+def gauss_newton(
+    campaign: Campaign,
+    frames: Frames,
+    explanation: Explanation,
+    held: Sequence[tuple[Effect, Array]],
+    settled: float,
+) -> tuple[Observations, list[tuple[Effect, Array]]]:
+    """Refit frames and the explanation's parameters with the exact model, the priors held at their scales.
+
+    Parameters
+    ----------
+    campaign, frames
+        The data, and where the frames are so far.
+    explanation
+        Weights, noise and prior scales.
+    held
+        Its effects with their (P,) values so far.
+    settled
+        Step at which it ends, in standard deviations.
+
+    Returns
+    -------
+    observations
+        Of the corrected model.
+    held
+        The effects with their values.
+    """
+    whitening, best = explanation.whitening, explanation.best
+    effects = [effect for effect, _ in held]
+    sizes = [explanation.linear.blocks[b].sizes * best.scales[b] for b in best.blocks]
+    ends = np.cumsum([len(size) for size in sizes])[:-1]
+    prior = np.concatenate([*sizes, np.zeros(0)])
+    state = np.concatenate([*(values for _, values in held), np.zeros(0)])
+    used = np.flatnonzero(whitening.weights > 0)
+    root = (np.sqrt(whitening.weights[used])[:, None] / (whitening.noise * best.noise)).ravel()
+
+    def pairs() -> list[tuple[Effect, Array]]:
+        return list(zip(effects, np.split(state, ends), strict=True)) if effects else []
+
+    observations = corrected_observations(campaign, frames, pairs())
+    for _ in range(settings.FIT_STEPS):
+        flat, names = frame_columns(observations)
+        columns = [block(observations, effect).columns for effect in effects]
+        design = np.concatenate([flat, *columns], axis=2)[used].reshape(len(root), -1) * root[:, None]
+        step, size = _ridge_step(design, observations.gap[used].ravel() * root, state, prior)
+        frames = moved(frames, step[: len(names)], names)
+        state = state + step[len(names) :]
+        observations = corrected_observations(campaign, frames, pairs())
+        if size < settled:
+            break
+    return observations, pairs()
+
+
+def _ridge_step(design: Array, gap: Array, state: Array, prior: Array) -> tuple[Array, float]:
+    """Return the step that minimises |gap − design step|² + |(state + step)/prior|², and what it moves, in noise.
+
+    The first columns have no prior. Directions that nothing determines are not moved. A step along directions that do
+    nearly the same moves little, however long it is.
+    """
+    flat = design.shape[1] - len(prior)
+    matrix, vector = design.T @ design, design.T @ gap
+    matrix[np.arange(flat, len(matrix)), np.arange(flat, len(matrix))] += 1.0 / prior**2
+    vector[flat:] -= state / prior**2
+    root = whitener(matrix, settings.STEP_FLOOR)
+    along = root.T @ vector
+    return np.asarray(root @ along), float(np.linalg.norm(along))
+
+
+def corrected_observations(campaign: Campaign, frames: Frames, pairs: Sequence[tuple[Effect, Array]]) -> Observations:
+    """Observe with the effects at work; their responses are read from the nominal robot, as prediction reads them."""
+    moved_by, instrument = displacement(observe(campaign, frames), pairs)
+    return observe(campaign, frames, displacement=moved_by, instrument=instrument)

@@ -1,0 +1,137 @@
+"""One explanation at its own exact fit: choose effects, refit them, and choose again there, until the choice stays."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.effects import Effect
+from thermal_robot.effects.apply import displacement
+from thermal_robot.inference import settings
+from thermal_robot.inference.columns import block, frame_columns
+from thermal_robot.inference.explain import Explanation, explain
+from thermal_robot.inference.gauss_newton import gauss_newton
+from thermal_robot.inference.problem import Linear, contained
+from thermal_robot.inference.refine import refined
+from thermal_robot.inference.robust import Noise
+from thermal_robot.observations import Observations
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """An explanation and the exact model at which it was found.
+
+    Attributes
+    ----------
+    observations
+        Of the corrected model.
+    explanation
+        Linearised there.
+    held
+        Its effects with their (P,) values.
+    families
+        Name of the effect that each block belongs to.
+    """
+
+    observations: Observations
+    explanation: Explanation
+    held: tuple[tuple[Effect, Array], ...]
+    families: tuple[str, ...]
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Names of its effects."""
+        return tuple(effect.name for effect, _ in self.held)
+
+    @property
+    def noise(self) -> float:
+        """What remains per axis, m."""
+        return float(self.explanation.whitening.noise[0] * self.explanation.best.noise)
+
+    @property
+    def containers(self) -> set[str]:
+        """Effects of the explanation that contain others."""
+        slices, pairs = self.explanation.problem.slices, contained(self.explanation.problem)
+        larger = {max(pair, key=lambda b: slices[b].stop - slices[b].start) for pair in pairs}
+        return {self.families[b] for b in larger} & set(self.names)
+
+    @property
+    def second_order(self) -> bool:
+        """Whether a container holds so much that products of its parameters show."""
+        moved_by, _ = displacement(self.observations, [h for h in self.held if h[0].name in self.containers])
+        return bool(np.abs(np.asarray(moved_by.segment)).max(initial=0.0) > settings.LARGE)
+
+
+def settle(
+    start: Observations,
+    variants: dict[str, tuple[Effect, ...]],
+    groups: Sequence[NDArray[np.int64]],
+    progress: Callable[[str], None],
+    known: Settled | None = None,
+    begin: Sequence[str] = (),
+    rarity: Mapping[str, float] | None = None,
+) -> Settled:
+    """Choose effects, refine their constants, refit exactly, and choose again there, until the choice stays.
+
+    Parameters
+    ----------
+    start
+        Where the first choice is linearised.
+    variants
+        By name: settings of each effect among which to choose.
+    groups
+        Groupings of rows: see :func:`~thermal_robot.inference.robust.design_effect`.
+    progress
+        Called with a few words at each stage.
+    known
+        An explanation from which to start, with its outliers.
+    begin
+        Names of effects with which the search starts, where none is known.
+    rarity
+        By name: log prior odds lost to having been picked out of many.
+    """
+    campaign, observations, variants = start.campaign, start, dict(variants)
+    noise = Noise(campaign.noise_position, campaign.noise_orientation)
+    held: list[tuple[Effect, Array]] = []
+    outliers = None
+    if known is not None:
+        held, outliers = list(known.held), known.explanation.outliers
+        variants.update({effect.name: (effect,) for effect, _ in held})
+    many = campaign.samples > settings.MANY_ROWS
+    revisions = 1 if many else settings.REVISIONS
+    for revision in range(revisions + 1):
+        progress("combinations of effects" if revision == 0 else f"exact fit, revision {revision}")
+        candidates, families = _listed(variants)
+        chosen = [candidates.index(effect) for effect, _ in held]
+        start_at = chosen if revision or not begin else [families.index(name) for name in begin]
+        blocks = tuple(block(observations, c) for c in candidates)
+        moved_by = (blocks[b].columns @ v for b, (_, v) in zip(chosen, held, strict=True))
+        linear = Linear(
+            observations.gap + sum(moved_by, np.zeros_like(observations.gap)), frame_columns(observations)[0], blocks
+        )
+        explanation = explain(
+            linear, noise, families=families, start=start_at, outliers=outliers, groups=groups, rarity=rarity
+        )
+        factor = settings.REFINEMENT ** (1 / 2**revision)
+        held = [(candidates[b], explanation.values[b][0]) for b in explanation.best.blocks]
+        finer = refined(explanation, observations, factor) if revision < revisions else held
+        stays = [e for e, _ in finer] == [e for e, _ in held] and set(explanation.best.blocks) == set(chosen)
+        held, last = finer, revision == revisions or (revision > 0 and stays)
+        least = settings.SETTLED_BETWEEN if many and not last else settings.SETTLED
+        observations, held = gauss_newton(campaign, observations.frames, explanation, held, least)
+        if last:
+            break
+        outliers = explanation.outliers
+        for effect, _ in held:
+            variants[effect.name] = effect.nearby(factor)
+    return Settled(observations, explanation, tuple(held), families)
+
+
+def _listed(variants: dict[str, tuple[Effect, ...]]) -> tuple[list[Effect], tuple[str, ...]]:
+    listed = [setting for own in variants.values() for setting in own]
+    return listed, tuple(setting.name for setting in listed)
