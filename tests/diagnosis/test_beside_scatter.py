@@ -18,6 +18,7 @@ from thermal_robot.observations import Frames, observe
 NOISE, SIGMA = 20e-6, 4e-4  # m, rad
 
 
+@pytest.mark.slow
 def test_steps_of_an_encoder_feign_no_systematic_effect(rv_m2):
     step, names = 1.5e-3, []
     for seed in range(12):

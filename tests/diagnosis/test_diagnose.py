@@ -17,7 +17,8 @@ from thermal_robot.observations import observe
 ALONE = [name for name in library() if name not in ("base_frame", "tool_frame")]
 COLUMNS = {"tracking_lag": {"moving": True}, "thermal_bending": {"links": True}}
 NOISE = 25e-6
-on_arms = pytest.mark.parametrize("arm", ["rv_m2", "ur10", "panda"], indirect=True)
+SLOW_PANDA = pytest.param("panda", marks=pytest.mark.slow)
+on_arms = pytest.mark.parametrize("arm", ["rv_m2", "ur10", SLOW_PANDA], indirect=True)
 
 
 @dataclass(frozen=True)
@@ -197,7 +198,7 @@ def test_two_effects_share_the_gap_as_they_caused_it(arm):
 CONDITIONS = {"backlash": "joint", "transmission_error": "joint", "drift": "base"}
 
 
-@pytest.mark.parametrize("arm", ["rv_m2", "ur10"], indirect=True)
+@pytest.mark.parametrize("arm", ["rv_m2", pytest.param("ur10", marks=pytest.mark.slow)], indirect=True)
 def test_a_withheld_effect_is_called_unexplained_with_its_place_and_quantity(arm):
     alone = ["transmission_error", "backlash", "joint_compliance", "geometric", "thermal_elongation", "drift"]
     flagged, placed, followed = [], [], []
