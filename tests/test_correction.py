@@ -21,7 +21,7 @@ MIXTURES = {
     "hand": ["joint_compliance", "instrument_scale"],
     "morning": ["drift", "transmission_error"],
 }
-on_arms = pytest.mark.parametrize("arm", ["ur10", "panda"], indirect=True)
+on_arms = pytest.mark.parametrize("arm", ["ur10", pytest.param("panda", marks=pytest.mark.slow)], indirect=True)
 
 
 def corrected(robot, effects, seed=1, turning=None):

@@ -1,4 +1,4 @@
-"""The corrected model: nominal robot, frames, and the effects that were found; saved, loaded, used to predict."""
+"""The corrected model: nominal robot, frames and effects; it predicts, and is saved and loaded as JSON."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SCHEMA = "thermal-robot/model/1"
 
 @dataclass(frozen=True, eq=False)
 class CorrectedModel:
-    """What predicts where the target is: frames, and each effect with its values.
+    """Nominal robot, fitted frames, and effects with their parameter values; predicts where the target is.
 
     Attributes
     ----------
@@ -36,11 +36,11 @@ class CorrectedModel:
     frames
         Fitted base and tool.
     effects
-        Each effect of the explanation with the (P,) values of its parameters, SI.
+        Each effect of the fit with the (P,) values of its parameters, SI.
     measures
         ``position`` or ``pose``.
     needs
-        Columns that samples to predict must have beside the joints.
+        Columns that samples must have, besides the joints.
     simulated
         Whether the nominal prediction is that of the user's own simulator (``sim.*``).
     last_order
@@ -62,7 +62,7 @@ class CorrectedModel:
         Parameters
         ----------
         samples
-            Commands and conditions; measurements, if any, are not looked at.
+            Commands and conditions; measurements, if any, are ignored.
 
         Returns
         -------
@@ -74,7 +74,7 @@ class CorrectedModel:
         Raises
         ------
         CampaignError
-            If a column that the model needs is missing or has an empty cell; names it.
+            If a column that the model needs is missing or has an empty cell; the error names it.
         """
         self._require(samples)
         # the model reads just what it was fitted to, whatever else a table holds
@@ -89,7 +89,10 @@ class CorrectedModel:
         return position, rotation_to_quaternion(self.frames.base[:3, :3] @ corrected.rotation)
 
     def counts_anew(self, samples: Campaign) -> bool:
-        """Tell whether the model needs ``order``, and that of the samples only counts their own file's rows."""
+        """Tell whether the ``order`` of the samples merely numbers the rows of their own file.
+
+        It does if it starts where the campaign's did, has no gaps, and ends earlier. False if the model needs none.
+        """
         order = samples.covariates.get("order")
         if order is None or self.last_order is None or "order" not in self.needs:
             return False
@@ -97,10 +100,10 @@ class CorrectedModel:
         return len(order) < last - first and np.array_equal(order, first + np.arange(len(order)))
 
     def _in_sequence(self, samples: Campaign) -> Campaign:
-        """Put samples whose ``order`` counts anew after the end of the campaign.
+        """Give samples whose ``order`` counts anew the last order of the campaign.
 
-        An order that starts again where the campaign's did, without gaps, and ends before it, does not say when in the
-        campaign a sample would be measured; what has settled by its end is then taken as settled.
+        Such an order does not say when a sample would be measured. Effects that settle over the campaign are then taken
+        as settled.
         """
         if self.last_order is None or not self.counts_anew(samples):
             return samples
@@ -156,12 +159,12 @@ class CorrectedModel:
 
     @classmethod
     def from_dict(cls, plain: dict[str, Any], effects: Sequence[Effect] = ()) -> CorrectedModel:
-        """Return the model that :meth:`to_dict` described; ``effects`` are those of your own that it may hold.
+        """Return the model that :meth:`to_dict` wrote; ``effects`` are your own effects that it may hold.
 
         Raises
         ------
         EffectError
-            If it holds an effect that is not installed here.
+            If it holds an effect that is not installed.
         """
         robot = load_robot(
             plain["robot"]["urdf"],
@@ -196,7 +199,7 @@ class CorrectedModel:
 
     @classmethod
     def load(cls, path: str | Path, effects: Sequence[Effect] = ()) -> CorrectedModel:
-        """Read a file that :meth:`save` wrote; ``effects`` are those of your own that it may hold.
+        """Read a file that :meth:`save` wrote; ``effects`` are your own effects that it may hold.
 
         Raises
         ------

@@ -34,3 +34,53 @@ def test_rows_set_aside_in_a_row_count_as_unexplained(rv_m2):
     assert _left(looked, gap) == pytest.approx(0.2**2 + 3 / (n - 1))
     calm = SimpleNamespace(left=Examined(Unexplained(False, 0.0, 1.0), 1.0, "stated"), fit=looked.fit)
     assert _left(calm, gap) == 0.0
+
+
+def test_the_parts_agree_with_each_other(hall):
+    assert set(hall.verdict) == {"thermal_elongation", "backlash"}
+    assert hall.verdict == tuple(f.name for f in hall.effects if f.status == "found")
+    assert sum(hall.where.axes.values()) == pytest.approx(1.0)
+    # exactly these: each of them, and none of the others
+    inside = [hall.finding(name).probability for name in hall.verdict]
+    outside = [f.probability for f in hall.effects if f.status == "not_found" and not f.random]
+    assert 1.0 - sum(1.0 - p for p in inside) - sum(outside) <= hall.probability + 1e-9
+    assert hall.probability <= min(*inside, 1.0 - max(outside)) + 1e-9
+    assert hall.outliers == tuple(hall.rows.rows[hall.rows.outliers])
+    assert set(hall.model.needs) == {"temperature", *(f"approach.{j}" for j in hall.joint_names)}
+    assert {s.name for s in hall.gap.schemes} >= {"time", "region", "reach"}
+    assert hall.remaining is hall.unexplained or hall.remaining == hall.unexplained
+    assert hall.reach == pytest.approx(np.linalg.norm(np.ptp(hall.fit.campaign.position, axis=0)))
+
+
+def test_every_quantity_and_joint_has_its_unit(hall):
+    assert set(hall.rows.units) == {*hall.rows.covariates, *hall.joint_names}
+    assert hall.rows.units["temperature"] == "°C"
+    assert hall.rows.units["joint_1"] == "rad"
+    assert hall.rows.units["time"] == "s"
+
+
+def test_rows_were_held_out_once_unless_set_aside(hall):
+    rows = hall.rows
+    assert (np.isnan(rows.held_out_after) <= rows.outliers).all()
+    kept = ~np.isnan(rows.held_out_after)
+    assert np.sqrt((rows.held_out_after[kept] ** 2).mean()) == pytest.approx(hall.gap.held_out.rms_after)
+    inside = ~rows.outliers
+    assert np.sqrt((rows.gap[inside] ** 2).sum(axis=1).mean()) == pytest.approx(hall.gap.rms_before)
+    assert np.sqrt((rows.remainder[inside] ** 2).sum(axis=1).mean()) == pytest.approx(hall.gap.rms_after)
+
+
+def test_orientation_has_figures_where_it_was_measured(rv_m2, hall):
+    poses = diagnose(simulate(rv_m2, ["joint_offset"], seed=2, turning=3e-5)[0])
+    assert poses.measures == "pose"
+    assert poses.gap.orientation_after < poses.gap.orientation_before
+    assert poses.gap.orientation_after == pytest.approx(np.sqrt(3.0) * 3e-5, rel=0.2)
+    assert (hall.measures, hall.gap.orientation_before, hall.gap.orientation_after) == ("position", None, None)
+
+
+def test_what_was_not_asked_for_is_not_said(rv_m2):
+    campaign = simulate(rv_m2, seed=2)[0]
+    narrow = diagnose(campaign, only=["drift", "encoder_resolution"])
+    assert {f.name for f in narrow.effects} == {"drift", "encoder_resolution"}
+    assert narrow.narrowed
+    without = diagnose(campaign, without=["drift", "encoder_resolution"])
+    assert not {"drift", "encoder_resolution"} & {f.name for f in without.effects}

@@ -1,15 +1,24 @@
-"""Effects that a scatter feigned are not chosen beside it."""
+"""Effects that a scatter feigned are not chosen beside it; those at work stay."""
 
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from simulate import simulate
 
 from thermal_robot import diagnose
+from thermal_robot.diagnosis.beside_scatter import beside_scatter
+from thermal_robot.effects import choose
+from thermal_robot.inference.fit import fit
+from thermal_robot.inference.frames import register
+from thermal_robot.inference.random_gap import random_gap
 from thermal_robot.kinematics import Displacement
 from thermal_robot.observations import Frames, observe
 
+NOISE, SIGMA = 20e-6, 4e-4  # m, rad
 
+
+@pytest.mark.slow
 def test_steps_of_an_encoder_feign_no_systematic_effect(rv_m2):
     step, names = 1.5e-3, []
     for seed in range(12):
@@ -22,3 +31,47 @@ def test_steps_of_an_encoder_feign_no_systematic_effect(rv_m2):
         assert found.gap.noise_source == "scatter"
         names.append(found.verdict)
     assert names.count(("encoder_resolution",)) >= 11, names
+
+
+def scattering(robot, effects=()):
+    """A campaign with repeats in which joint 2 comes to rest elsewhere at each visit; effects may be at work beside."""
+    rng = np.random.default_rng(4)
+    once = simulate(robot, list(effects), samples=60, seed=4, noise=1e-9, ratio=(4e5, 4.2e5))[
+        0
+    ]  # exact; an effect of 0.7 mm
+    rows = np.tile(np.arange(60), 3)
+    plain = replace(once.take(rows), rows=np.arange(2, 182), noise_position=NOISE)
+    error = np.zeros_like(plain.q)
+    error[:, 1] = SIGMA * rng.normal(size=180)
+    here = observe(plain, register(plain))
+    shift = observe(plain, here.frames, displacement=Displacement(joint=error)).predicted_position
+    noise = NOISE * rng.normal(size=shift.shape)
+    return replace(plain, position=plain.position + shift - here.predicted_position + noise)
+
+
+def concluded(campaign, names):
+    known = fit(campaign, choose(names, (), ()))
+    chance = random_gap(known)
+    assert chance.explains_size
+    heard = []
+    return beside_scatter(known, chance, heard.append), known
+
+
+def test_scatter_explains_what_it_is_and_leaves_nothing(rv_m2):
+    campaign = scattering(rv_m2)
+    last, known = concluded(campaign, ("joint_offset", "backlash"))
+    assert last.fit.effects == ()
+    assert last.laws == ()
+    assert not last.left.unexplained.flagged
+    assert last.left.source == "scatter"
+    assert [k.component.joint for k in last.chance.kept] == [1]
+    # one sigma per axis of noise and scatter together
+    lever = known.corrected.joint_sensitivity[:, :3, 1]
+    expected = np.sqrt(NOISE**2 + SIGMA**2 * (lever**2).sum(axis=1).mean() / 3.0)
+    assert last.left.floor == pytest.approx(expected, rel=0.15)
+
+
+def test_an_effect_that_is_there_stays_beside_the_scatter(rv_m2):
+    last, _ = concluded(scattering(rv_m2, ["joint_offset"]), ("joint_offset", "backlash"))
+    assert [effect.name for effect, _ in last.fit.effects] == ["joint_offset"]
+    assert [k.component.joint for k in last.chance.kept] == [1]

@@ -4,9 +4,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers import NOISE
 from simulate import simulate
 
 from thermal_robot import diagnose
+from thermal_robot.diagnosis.cautions import cautions, contradicted, usable
+from thermal_robot.diagnosis.stand_in import StandIn
+from thermal_robot.effects import choose
+from thermal_robot.inference.fit import fit
+from thermal_robot.kinematics import Displacement
+from thermal_robot.observations import Frames, observe
 
 
 def test_a_table_pasted_twice_is_not_taken_for_repeats(clean):
@@ -42,3 +49,58 @@ def test_encoders_that_deny_the_commands_are_a_fault_of_the_log(rv_m2):
     assert f"row {int(clean.rows[10])}" in told
     assert "fault of the log" in told
     assert denying.verdict == agreeing.verdict == ("drift",)
+
+
+def test_an_orientation_that_the_simulator_does_not_predict_is_left_out(rv_m2):
+    poses = simulate(rv_m2, samples=30, seed=2, turning=3e-5)[0]
+    kept, notes = usable(replace(poses, simulated_position=np.asarray(poses.position)))
+    assert (kept.orientation, kept.noise_orientation, kept.measures) == (None, None, "position")
+    assert any("orientation is left out" in note for note in notes)
+    assert usable(poses) == (poses, ())
+
+
+def test_copies_are_left_out_and_repeats_are_not(rv_m2):
+    once = simulate(rv_m2, samples=30, seed=2)[0]
+    rows = np.array([*range(30), 4, 4, 9])
+    kept, (note,) = usable(replace(once.take(rows), rows=np.arange(2, 35)))
+    assert note.startswith("3 rows repeat another one")
+    np.testing.assert_array_equal(kept.rows, np.arange(2, 32))
+    # the same command, measured again at another time: a repeat
+    later = once.covariates["time"][rows] + np.arange(33)
+    again = replace(once.take(rows), covariates={**once.take(rows).covariates, "time": later}, rows=np.arange(2, 35))
+    assert usable(again)[0].samples == 33
+
+
+@pytest.mark.parametrize(("away", "said"), [(0.0, []), (0.004, []), (0.3, ["another zero, or another unit"])])
+def test_encoders_that_are_off_throughout_have_another_zero(rv_m2, away, said):
+    plain = simulate(rv_m2, samples=30, seed=2)[0]
+    notes = contradicted(replace(plain, covariates={**plain.covariates, "encoder.joint_2": plain.q[:, 1] + away}))
+    assert [any(words in note for note in notes) for words in said] == [True] * len(said)
+    assert bool(notes) == bool(said)
+
+
+def test_parameters_that_cancel_each_other_are_remarked(rv_m2):
+    """Near zero 4 sin q − 2 sin 2q is 2 q³: two large waves that leave little."""
+    plain = simulate(rv_m2, seed=2, noise=NOISE)[0]
+    q = plain.q.copy()
+    q[:, 1] = 0.6 * (q[:, 1] - q[:, 1].mean()) / np.ptp(q[:, 1])
+    narrow, error = replace(plain, q=q), np.zeros_like(q)
+    error[:, 1] = 0.05 * (4.0 * np.sin(q[:, 1]) - 2.0 * np.sin(2.0 * q[:, 1]))
+    true = observe(narrow, Frames.declared(narrow), displacement=Displacement(joint=error)).predicted_position
+    noisy = replace(narrow, position=true + NOISE * np.random.default_rng(2).normal(size=true.shape), priors={})
+    wheel = fit(noisy, choose(("transmission_error",), (), ()))
+    (note,) = (n for n in cautions(wheel, (), {}) if "cancel" in n)
+    assert note.startswith("parameters of transmission_error cancel each other")
+    whole = fit(simulate(rv_m2, ["joint_offset"], seed=2)[0], choose(("joint_offset",), (), ()))
+    assert whole.effects
+    assert not any("cancel" in n for n in cautions(whole, (), {}))
+
+
+def test_what_was_left_out_and_what_changes_are_said(rv_m2):
+    known = fit(simulate(rv_m2, seed=2)[0], choose(("drift",), (), ()))
+    assert cautions(known, (), {}) == ()
+    (narrowed,) = cautions(known, choose(("drift", "backlash"), (), ()), {})
+    assert "drift" in narrowed
+    assert "backlash" in narrowed
+    (changing,) = cautions(known, (), {"drift": StandIn(0.2, "payload"), "backlash": StandIn(0.9, "time")})
+    assert changing.startswith("the size of drift changes with payload")

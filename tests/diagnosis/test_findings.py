@@ -3,10 +3,15 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from conftest import load_arm
 from simulate import simulate
 
 from thermal_robot import diagnose
+from thermal_robot.diagnosis.findings import findings, by_share, separates, titled
+from thermal_robot.diagnosis.parts import Finding
+from thermal_robot.effects import choose, library, random_effects
+from thermal_robot.inference.fit import fit
 from thermal_robot.inference.frames import register
 
 
@@ -38,3 +43,84 @@ def test_rows_in_another_sequence_leave_the_verdict():
     campaign = in_the_root_frame(simulate(load_arm("ur10"), ["drift"], samples=100, seed=3)[0])
     mixed = campaign.take(np.random.default_rng(0).permutation(100))
     assert diagnose(campaign).verdict == diagnose(mixed).verdict
+
+
+@pytest.fixture(scope="module")
+def offsets(rv_m2):
+    """Joint zeros at fault, found among a few candidates; time is not recorded."""
+    campaign = simulate(rv_m2, ["joint_offset"], seed=2, ratio=(4.0, 5.0))[0]
+    bare = {name: values for name, values in campaign.covariates.items() if name != "time"}
+    few = choose(("joint_offset", "geometric", "drift", "instrument_scale"), (), ())
+    return fit(replace(campaign, covariates=bare), few)
+
+
+def said(known, believed=None, share=0.9):
+    names = dict.fromkeys(known.families)
+    shares = {name: (share if name == "joint_offset" else 0.01, (0.0, 1.0)) for name in names}
+    return {f.name: f for f in findings(known, shares, {}, believed or {})}
+
+
+def test_every_candidate_has_one_finding(offsets):
+    found = said(offsets)
+    assert {name: f.status for name, f in found.items()} == {
+        "joint_offset": "found",
+        "geometric": "not_found",
+        "instrument_scale": "not_found",
+        "drift": "not_testable",
+    }
+    assert found["drift"].needs
+    assert found["drift"].probability is None
+    for f in found.values():
+        assert f.probability is None or 0.0 <= f.probability <= 1.0
+        assert bool(f.parameters) == (f.status == "found")
+
+
+def test_what_is_believed_less_is_less_probable(offsets):
+    whole, half = said(offsets)["joint_offset"], said(offsets, {"joint_offset": 0.5})["joint_offset"]
+    assert half.probability == pytest.approx(0.5 * whole.probability)
+    assert half.parameters == whole.parameters
+
+
+def test_a_parameter_that_the_data_do_not_determine_has_no_number(offsets, rv_m2):
+    """The zero of the first joint turns the whole robot about an axis, as the unknown base does."""
+    estimates = {p.name.rpartition(", ")[2]: p for p in said(offsets)["joint_offset"].parameters}
+    first = estimates[rv_m2.joint_names[0]]
+    assert (first.identified, first.value, first.std) == (False, None, None)
+    for name in rv_m2.joint_names[1:4]:
+        assert estimates[name].identified
+        assert estimates[name].std > 0.0
+
+
+def test_titles_are_those_of_the_effects(offsets):
+    effects = library()
+    found = titled(tuple(said(offsets).values()), (*effects.values(), *random_effects()))
+    assert {f.name: f.title for f in found} == {f.name: effects[f.name].title for f in found}
+    assert not any(f.random for f in found)
+    scatter = random_effects()[0]
+    law = Finding("discovered.1", "found", 1.0, describes="a step in time")
+    again = titled((law, Finding(scatter.name, "found", 1.0)), random_effects())
+    assert [(f.title, f.random) for f in again] == [("a step in time", False), (scatter.title, True)]
+
+
+def test_the_largest_share_comes_first_and_what_is_not_testable_last():
+    found = [
+        Finding("d", "not_testable"),
+        Finding("c", "not_found", 0.1, -0.01),
+        Finding("a", "found", 1.0, 0.2),
+        Finding("b", "not_found", 0.4, 0.0),
+        Finding("e", "found", 1.0, 0.7),
+    ]
+    assert [f.name for f in by_share(found)] == ["e", "a", "b", "c", "d"]
+
+
+def test_separates_lists_each_group_once_and_frames_only_where_nothing_else_is_left():
+    def one(name, *others, needs=()):
+        return Finding(name, "confounded", 0.5, confounded_with=others, needs=needs)
+
+    pair = [one("drift", "thermal_elongation"), one("thermal_elongation", "drift")]
+    base = one("joint_offset", "base_frame")
+    unknown = Finding("base_frame", "not_testable", needs=("frames.base",))
+    assert separates(pair) == (("drift", "thermal_elongation"),)
+    assert separates([base, unknown]) == (("base_frame", "joint_offset"),)
+    assert separates([*pair, base, unknown]) == (("drift", "thermal_elongation"),)
+    assert separates([Finding("drift", "found", 1.0)]) == ()

@@ -4,8 +4,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from simulate import simulate
 
 from thermal_robot import EstimationError, diagnose
+from thermal_robot.diagnosis.remainder import nearest, remainder, repeats
+from thermal_robot.effects import choose
+from thermal_robot.inference.fit import fit
 from thermal_robot.inference.frames import register
 from thermal_robot.observations import observe
 
@@ -48,3 +52,68 @@ def test_too_few_poses_are_refused_and_the_need_is_named(clean, rows):
 def test_three_poses_repeated_are_three_poses(clean):
     with pytest.raises(EstimationError, match="3 different poses"):
         diagnose(repeated(clean.take(np.arange(3)), 20, 0))
+
+
+@pytest.fixture(scope="module")
+def left(rv_m2):
+    """A fit with an effect, some rows spoilt, and what it leaves."""
+    known = fit(simulate(rv_m2, ["backlash"], seed=2, outliers=0.05)[0], choose(("backlash",), (), ()))
+    return known, remainder(known)
+
+
+def test_nothing_that_was_fitted_is_left(left):
+    known, rest = left
+    e = known.explanation
+    assert e.outliers.any()
+    np.testing.assert_array_equal(rest.rows, np.flatnonzero(~e.outliers))
+    assert rest.white.shape == (len(rest.rows), 3)
+    columns = np.concatenate([e.linear.frames, *(e.linear.blocks[b].columns for b in e.best.blocks)], axis=2)
+    design = columns[rest.rows].reshape(rest.white.size, -1)
+    along = design.T @ rest.white.ravel() / np.linalg.norm(design, axis=0)
+    assert np.abs(along).max() < 1e-9 * np.linalg.norm(rest.white)
+
+
+def test_noise_leaves_one_square_an_equation(left):
+    known, rest = left
+    assert rest.freedom == rest.white.size - rest.target.basis.shape[1]
+    assert rest.scale2 == pytest.approx((known.explanation.best.noise) ** 2, rel=0.2)
+
+
+def test_some_rows_stand_for_all(left):
+    _, rest = left
+    assert rest.some(1000) is rest
+    few = rest.some(50)
+    assert len(few.rows) == 50
+    assert set(few.rows) < set(rest.rows)
+    assert few.scale2 == pytest.approx(rest.scale2, rel=0.5)
+    np.testing.assert_array_equal(few.rows, rest.some(50).rows)
+
+
+def test_repeats_tell_the_noise_and_not_the_error(clean):
+    """What both visits have in common cancels: an error of 40 noises is none of the repeats' business."""
+    twice = repeated(clean, 2, 3)
+    wave = 8e-4 * np.sin(5.0 * twice.q[:, :3])
+    known = fit(replace(twice, position=twice.position + wave), ())
+    rest = remainder(known)
+    said = repeats(known, rest)
+    assert said.pairs == 60
+    assert said.position == pytest.approx(20e-6, rel=0.15)
+    assert rest.scale2 > 100.0 * said.scale2
+
+
+def test_too_few_repeats_say_nothing(clean):
+    known = fit(clean, ())
+    assert repeats(known, remainder(known)) is None
+
+
+def test_nobody_is_his_own_neighbour():
+    rng = np.random.default_rng(0)
+    points = np.vstack([rng.normal(size=(30, 2)), np.tile([5.0, 5.0], (6, 1))])
+    distance, number = nearest(points, 3)
+    assert distance.shape == number.shape == (36, 3)
+    assert not (number == np.arange(36)[:, None]).any()
+    assert (np.diff(distance, axis=1) >= 0.0).all()
+    np.testing.assert_allclose(np.linalg.norm(points[:, None] - points[number], axis=2), distance)
+    assert (distance[30:] == 0.0).all()
+    apart = np.linalg.norm(points[:30, None] - points[None], axis=2)
+    np.testing.assert_allclose(distance[:30], np.sort(apart, axis=1)[:, 1:4])

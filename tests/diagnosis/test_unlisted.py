@@ -11,10 +11,14 @@ from helpers import NOISE, with_law
 from simulate import simulate
 
 from thermal_robot import CorrectedModel, diagnose
+from thermal_robot.diagnosis.examine import examine
+from thermal_robot.diagnosis.parts import Unexplained
+from thermal_robot.diagnosis.unlisted import Stage, as_laws_say, one_more_law
 from thermal_robot.effects import choose
 from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.law import Discovered
 from thermal_robot.effects.quantities import GRAVITY, quantities
+from thermal_robot.inference import settings
 from thermal_robot.inference.fit import fit
 from thermal_robot.inference.frames import register
 from thermal_robot.inference.random_gap import random_gap
@@ -102,20 +106,33 @@ def test_a_law_becomes_an_effect_file_that_does_the_same(found, tmp_path, rv_m2)
     np.testing.assert_array_equal(own, again)
 
 
-def test_with_a_known_effect_beside_it_both_are_named(rv_m2):
+def beside_play(robot, seed):
+    """The verdict where a step in time works beside play of a joint."""
     law, values = CASES["step"]
-    hits = 0
-    for seed in range(4):
-        data = simulate(rv_m2, ["backlash"], seed=seed, samples=120, noise=NOISE, places=["joint_2"])[0]
-        here = observe(data, register(data))
-        moved, _ = displacement(here, [(law, np.array(values))])
-        shift = observe(data, here.frames, displacement=moved).predicted_position - here.predicted_position
-        names = diagnose(replace(data, position=data.position + shift)).verdict
-        hits += "backlash" in names and any(n.startswith("discovered.") for n in names) and len(names) == 2
-    assert hits >= 3
+    data = simulate(robot, ["backlash"], seed=seed, samples=120, noise=NOISE, places=["joint_2"])[0]
+    here = observe(data, register(data))
+    moved, _ = displacement(here, [(law, np.array(values))])
+    shift = observe(data, here.frames, displacement=moved).predicted_position - here.predicted_position
+    return diagnose(replace(data, position=data.position + shift)).verdict
 
 
-@pytest.mark.parametrize("arm", ["rv_m2", "ur10"], indirect=True)
+def both_are_named(names):
+    return "backlash" in names and any(n.startswith("discovered.") for n in names) and len(names) == 2
+
+
+def test_with_a_known_effect_beside_it_both_are_found(rv_m2):
+    """The slow test below asks for the names alone, and more often."""
+    names = beside_play(rv_m2, 0)
+    assert "backlash" in names
+    assert any(n.startswith("discovered.") for n in names)
+
+
+@pytest.mark.slow
+def test_with_a_known_effect_beside_it_both_are_named(rv_m2):
+    assert sum(both_are_named(beside_play(rv_m2, seed)) for seed in range(4)) >= 3
+
+
+@pytest.mark.parametrize("arm", ["rv_m2", pytest.param("ur10", marks=pytest.mark.slow)], indirect=True)
 def test_in_noise_nothing_is_discovered(arm):
     for seed in range(8):
         verdict = diagnose(simulate(arm, seed=seed, noise=NOISE)[0]).verdict
@@ -171,11 +188,14 @@ def test_what_a_law_follows_does_not_depend_on_the_law(rv_m2):
         np.testing.assert_array_equal(quantities(bent)[name], values, err_msg=name)
 
 
-def test_one_eccentric_wheel_is_no_unlisted_cause(rv_m2):
-    """Over part of a turn it is nearly a parabola: a law of few numbers, where the effect has four for every joint."""
+def eccentric_wheel(robot, seeds):
+    """Verdicts where one wheel is eccentric; nothing is left of it.
+
+    Over part of a turn it is nearly a parabola: a law of few numbers, where the effect has four for every joint.
+    """
     names = []
-    for seed in range(8):
-        plain = simulate(rv_m2, samples=130, seed=seed, noise=NOISE)[0]
+    for seed in seeds:
+        plain = simulate(robot, samples=130, seed=seed, noise=NOISE)[0]
         q, error = plain.q[:, 1], np.zeros_like(plain.q)
         error[:, 1] = 3e-3 * np.cos(q) - 1.4e-3 * np.sin(q) - 7e-4 * np.cos(2 * q) - 2e-4 * np.sin(2 * q)
         true = observe(plain, Frames.declared(plain), displacement=Displacement(joint=error)).predicted_position
@@ -184,5 +204,49 @@ def test_one_eccentric_wheel_is_no_unlisted_cause(rv_m2):
         assert not found.unexplained.flagged
         assert np.sqrt(((found.model.predict(plain)[0] - true) ** 2).mean()) < 0.5 * NOISE
         names.append(found.verdict)
+    return names
+
+
+def test_an_eccentric_wheel_leaves_nothing(rv_m2):
+    assert len(eccentric_wheel(rv_m2, range(2))) == 2
+
+
+@pytest.mark.slow
+def test_one_eccentric_wheel_is_no_unlisted_cause(rv_m2):
+    names = eccentric_wheel(rv_m2, range(8))
     # where the parabola is lost in the noise a zero and a gain say the same with fewer numbers
     assert names.count(("transmission_error",)) >= 6, names
+
+
+def test_noise_is_not_worth_a_law(rv_m2):
+    known = fit(simulate(rv_m2, seed=2, noise=NOISE)[0], choose(("backlash",), (), ()))
+    heard = []
+    assert one_more_law(Stage(known, (), examine(known)), heard.append) is None
+    assert heard == ["causes that nobody listed: scan 1"]
+
+
+def test_a_law_joins_the_explanation_and_takes_its_remainder(rv_m2):
+    law, values = CASES["step"]
+    known = fit(with_law(rv_m2, law, values, seed=3)[0], choose(("joint_offset",), (), ()))
+    before = Stage(known, (), examine(known))
+    assert before.left.unexplained.flagged
+    after = one_more_law(before, lambda _: None)
+    (discovery,) = after.laws
+    assert (discovery.law.place, discovery.law.quantity) == (law.place, law.quantity)
+    assert discovery.law.name in {effect.name for effect, _ in after.fit.effects}
+    assert not after.left.unexplained.flagged
+    said = as_laws_say(before.left.unexplained, after.left.unexplained, after.laws)
+    assert (said.rms, said.p_value, said.reasons) == (
+        before.left.unexplained.rms,
+        before.left.unexplained.p_value,
+        before.left.unexplained.reasons,
+    )
+    assert (said.locations[0].kind, said.locations[0].name) == (law.kind, law.place)
+    assert [d.covariate for d in said.depends_on] == [law.quantity]
+    assert all(0.0 <= d.p_value <= 1.0 for d in said.depends_on)
+    assert all(settings.LIKELY_PLACE <= place.share <= 1.0 for place in said.locations)
+
+
+def test_without_laws_it_is_said_what_is_left():
+    first, left = Unexplained(True, 2e-4, 1e-9), Unexplained(True, 1e-4, 1e-6)
+    assert as_laws_say(first, left, ()) is left

@@ -1,4 +1,4 @@
-"""What is said of the last explanation: every part of a diagnosis from its fit."""
+"""Assemble a diagnosis from the last fit: gap, findings, places, shrinkage, corrected model."""
 
 from __future__ import annotations
 
@@ -31,20 +31,20 @@ from thermal_robot.inference.rows import in_a_row
 
 @dataclass(frozen=True, eq=False)
 class Conclusion:
-    """The last explanation, and what it leaves.
+    """The final fit and its residual.
 
     Attributes
     ----------
     fit
-        Known effects and laws.
+        The fit with the chosen effects and discovered laws.
     laws
-        Those that were discovered and belong to it.
+        The discovered laws in that fit.
     unexplained
-        What the known effects leave: where it enters and what it follows as the laws say, if there are any.
+        The residual of the known effects alone. Where laws were discovered, they name its place and its quantity.
     left
-        What the explanation leaves.
+        The residual of the whole fit, laws included.
     chance
-        What is random in that beyond the instrument.
+        The random part of that residual that the instrument's noise does not account for.
     """
 
     fit: Fit
@@ -70,15 +70,15 @@ def answer(
     last
         The last explanation.
     shrinkage
-        What held-out rows say.
+        Held-out shrinkage, overall and per effect.
     candidates
-        Effects that were considered.
+        Systematic effects that were considered.
     asked
-        Whether an effect of this name was asked for, random ones too.
+        Tells whether the user asked for an effect of this name, systematic or random.
     narrowed
-        Whether effects were left out by request.
+        Whether the user left effects out.
     notes
-        What was left out of the campaign.
+        What was left out of the campaign, one sentence each.
     """
     fit, campaign, remaining = last.fit, last.fit.campaign, last.left.unexplained
     shares = {name: value for name, (value, _) in shrinkage.shares.items()}
@@ -118,7 +118,10 @@ def answer(
 
 
 def _left(last: Conclusion, gap: Gap) -> float:
-    """Share of the gap's mean square that is not explained; rows that were set aside and follow each other are part."""
+    """Share of the gap's mean square that stays unexplained.
+
+    Consecutive outliers count as unexplained: they are a change that the fit does not follow, not gross errors.
+    """
     remaining, fit = last.left.unexplained, last.fit
     if not remaining.flagged:
         return 0.0
@@ -130,7 +133,7 @@ def _left(last: Conclusion, gap: Gap) -> float:
 
 
 def _probability(fit: Fit) -> float:
-    """Posterior probability of exactly these effects, whatever the settings of their nonlinear arguments."""
+    """Posterior probability of exactly this set of effects, summed over the settings of nonlinear arguments."""
     e, chosen = fit.explanation, {effect.name for effect, _ in fit.effects}
     same = [{fit.families[b] for b in c.blocks} == chosen for c in e.combinations]
     return min(float(e.probabilities[same].sum()), 1.0)

@@ -1,4 +1,4 @@
-"""Where joints scatter: the systematic effects chosen again in the covariance of that scatter, which may feign some."""
+"""Choose the systematic effects again where joints scatter, as scatter can be mistaken for a systematic effect."""
 
 from __future__ import annotations
 
@@ -19,16 +19,21 @@ from thermal_robot.inference.rows import row_groups
 
 
 def beside_scatter(fit: Fit, chance: RandomGap, progress: Callable[[str], None]) -> Conclusion:
-    """Choose the systematic effects again beside a scatter that explains what remains.
+    """Choose the systematic effects again, with the joints' scatter in the covariance of the noise.
 
     Parameters
     ----------
     fit
-        Chosen as if the instrument alone scattered.
+        Fit whose effects were chosen with the instrument's noise alone.
     chance
-        The scatter.
+        The scatter, which accounts for the residual of that fit.
     progress
         Called with a few words at each stage.
+
+    Returns
+    -------
+    Conclusion
+        Without laws. Effects that the scatter had imitated are no longer in the fit.
     """
     e, campaign = fit.explanation, fit.campaign
     covariance = chance.scatter.covariance(fit.corrected.joint_sensitivity)

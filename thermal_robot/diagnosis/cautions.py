@@ -1,4 +1,4 @@
-"""What to leave out of a campaign, and what to know before one believes its diagnosis."""
+"""Rows and columns to leave out of a campaign, and warnings about its diagnosis."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from thermal_robot.inference.fit import Fit
 
 
 def usable(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
-    """Leave out what is no measurement of its own, and say so."""
+    """Leave out copied rows, and an orientation that the simulator does not predict; return the reasons."""
     notes = []
     if (
         campaign.orientation is not None
@@ -39,7 +39,7 @@ def usable(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
 
 
 def contradicted(campaign: Campaign) -> list[str]:
-    """Say where the controller's own readings deny that the robot went where it was sent: a fault of the log."""
+    """Return warnings where encoder readings are far from the commands: the log is wrong, not the robot."""
     found = []
     for j, name in enumerate(campaign.robot.joint_names):
         read = campaign.covariates.get(f"encoder.{name}")
@@ -60,16 +60,16 @@ def contradicted(campaign: Campaign) -> list[str]:
 
 
 def cautions(fitted: Fit, considered: Sequence[Effect], doubts: Mapping[str, StandIn]) -> tuple[str, ...]:
-    """Return what a reader should know before he believes the diagnosis.
+    """Return warnings about the diagnosis, one sentence each.
 
     Parameters
     ----------
     fitted
-        The last fit.
+        The final fit.
     considered
-        The effects that were considered, where not all were.
+        The effects that were considered, if the user left some out; empty otherwise.
     doubts
-        By name: effects whose size changes with the circumstances.
+        By effect: the quantity with which its parameters change, see :func:`stand_ins`.
     """
     notes = []
     campaign, e = fitted.campaign, fitted.explanation
@@ -87,9 +87,10 @@ def cautions(fitted: Fit, considered: Sequence[Effect], doubts: Mapping[str, Sta
 
 
 def _cancelling(fitted: Fit) -> Iterator[tuple[str, float]]:
-    """Yield effects whose parameters stand for nothing one by one, and by how much the largest exceeds their sum.
+    """Yield effects whose parameters cancel each other: name, and largest single contribution over the sum.
 
-    Over part of a turn harmonics of low order are nearly alike, and what frames can do as well cancels against these.
+    Such parameters have no meaning one by one. Over part of a turn, for example, harmonics of low order are nearly
+    collinear. Contributions are taken with the unknown frames projected out.
     """
     e = fitted.explanation
     frames = e.linear.frames.reshape(e.linear.gap.size, e.linear.frames.shape[2])

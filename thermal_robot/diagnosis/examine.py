@@ -1,4 +1,4 @@
-"""Tell noise from a remainder by five tests, each counted; where it enters, and what it follows."""
+"""Tell whether the residual is noise: five tests with Bonferroni correction; where it enters and what it follows."""
 
 from __future__ import annotations
 
@@ -25,16 +25,16 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Examined:
-    """Whether a remainder is noise.
+    """Whether the residual is noise.
 
     Attributes
     ----------
     unexplained
-        With the place where it enters and the quantity that it follows.
+        The residual, with the place where it enters and the quantity that it follows.
     floor
-        One sigma per axis that instrument and repeatability alone would leave, m.
+        Noise floor: one sigma per axis of instrument and repeatability together, m.
     source
-        Where that figure comes from: ``stated``, ``repeats``, ``scatter`` or ``remainder``.
+        Where the floor comes from: ``stated``, ``repeats``, ``scatter`` or ``remainder``.
     """
 
     unexplained: Unexplained
@@ -43,7 +43,11 @@ class Examined:
 
 
 def examine(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Examined:
-    """Say whether the remainder is noise: by its size, its repeats, its neighbours, and what it follows."""
+    """Test whether the residual is noise.
+
+    The tests are its size against the stated noise, lack of fit against repeats, correlation of neighbours, smooth laws
+    of recorded quantities, and runs of outliers.
+    """
     e, left = fit.explanation, remainder(fit)
     stated, again = fit.campaign.noise_position, repeats(fit, left)
     rms = float(
@@ -83,7 +87,7 @@ def examine(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Exami
 
 
 def _too_large(fit: Fit, left: Remainder) -> tuple[float, str]:
-    """Chi-square of the remainder against the stated noise, its freedom reduced by the tails."""
+    """Chi-square test of the residual against the stated noise; heavy tails reduce the degrees of freedom."""
     noise, worst = fit.explanation.whitening.noise, (1.0, "")
     stated = (fit.campaign.noise_position, fit.campaign.noise_orientation)
     for part, sigma in enumerate(stated[: left.white.shape[1] // 3]):
@@ -102,7 +106,7 @@ def _too_large(fit: Fit, left: Remainder) -> tuple[float, str]:
 
 
 def _lack_of_fit(left: Remainder, again: Repeats | None) -> tuple[float, str]:
-    """F test of the remainder against the differences of near-repeats."""
+    """F test of the residual against the differences of near-repeats (lack of fit)."""
     if again is None:
         return 1.0, ""
     m = left.white.shape[1]
@@ -115,7 +119,10 @@ def _lack_of_fit(left: Remainder, again: Repeats | None) -> tuple[float, str]:
 
 
 def _in_a_row(fit: Fit) -> tuple[float, str]:
-    """Chance that so many of the rows set aside follow each other; spoilt rows do not, but those after a change do."""
+    """Return the p-value that so many outliers are consecutive by chance, and the reason.
+
+    Gross errors are not consecutive. Rows after a change of the robot or the setup are.
+    """
     aside = fit.explanation.outliers[in_order(fit.campaign)]
     count, samples = int(aside.sum()), len(aside)
     if count < settings.FEW_ASIDE * samples:
@@ -128,9 +135,9 @@ def _in_a_row(fit: Fit) -> tuple[float, str]:
 
 
 def _neighbours(fit: Fit, left: Remainder) -> tuple[tuple[float, str], float]:
-    """Compare the remainders of neighbours, in joint space and in order, with those of shuffled rows.
+    """Test whether residuals of neighbours, in joint space and in time, are correlated (permutation test).
 
-    Returns p-value and reason, and the largest correlation that is not chance.
+    Returns p-value and reason, and the largest correlation that is significant.
     """
     q = fit.campaign.q[left.rows]
     spread = q.std(axis=0)
@@ -164,7 +171,7 @@ def _neighbours(fit: Fit, left: Remainder) -> tuple[tuple[float, str], float]:
 
 @dataclass(frozen=True)
 class _Tested:
-    """A law that was put into a place, and what it is worth there."""
+    """A smooth law of one quantity at one place, and how much of the residual it explains."""
 
     kind: str
     place: str
@@ -173,9 +180,9 @@ class _Tested:
 
 
 def _scan(fit: Fit, left: Remainder) -> tuple[tuple[float, str], tuple[Location, ...], tuple[Dependence, ...], float]:
-    """F tests of a smooth law of every quantity in every place; p-values after counting them all.
+    """F tests of a smooth law of every quantity at every place, with Bonferroni correction.
 
-    Returns p-value and reason, places, quantities, and the share of the remainder that the best law explains.
+    Returns p-value and reason, places, quantities, and the share of the residual that the best law explains.
     """
     tested = sorted(_tests(fit.corrected, left.some(settings.ENOUGH_REMAINDER)), key=lambda t: -t.worth.gain)
     if not tested:
@@ -215,7 +222,7 @@ def _tests(observations: Observations, left: Remainder) -> Iterator[_Tested]:
 
 
 def _locations(tested: Sequence[_Tested]) -> tuple[Location, ...]:
-    """Return the places by the posterior probability of their best laws."""
+    """Return the places with the posterior probability of the best law at each, largest first."""
     best: dict[tuple[str, str], float] = {}
     for t in tested:
         best[(t.kind, t.place)] = max(best.get((t.kind, t.place), -np.inf), t.worth.gain)

@@ -25,9 +25,18 @@ Shares = dict[str, tuple[float, tuple[float, float]]]
 def findings(
     fit: Fit, shares: Shares, locations: dict[str, tuple[Location, ...]], believed: Mapping[str, float]
 ) -> tuple[Finding, ...]:
-    """Return what is said of every candidate, in order of its held-out share; those not testable come last.
+    """Return a finding for every candidate; those that are not testable come last.
 
-    ``believed`` is what the probability of an effect of the explanation is multiplied with.
+    Parameters
+    ----------
+    fit
+        The final fit.
+    shares
+        By effect: share of the gap on held-out rows, and its 95 % interval.
+    locations
+        By effect of the fit: its places.
+    believed
+        By effect of the fit: factor (0..1) on its probability, see :func:`trust`.
     """
     e = fit.explanation
     explained = {effect.name: b for b, (effect, _) in zip(e.best.blocks, fit.effects, strict=True)}
@@ -67,7 +76,7 @@ def findings(
 
 
 def titled(found: Sequence[Finding], effects: Iterable[Effect]) -> tuple[Finding, ...]:
-    """Return findings with the titles of effects, and laws with what they describe."""
+    """Return the findings with titles: that of the effect, or what a discovered law describes."""
     known = {effect.name: effect for effect in effects}
     found = [replace(f, probability=settings.MOST_SAID) if _unsaid(f) else f for f in found]
     return tuple(
@@ -91,13 +100,13 @@ def by_share(found: Sequence[Finding]) -> tuple[Finding, ...]:
 
 
 def _unknown_frames(fit: Fit) -> tuple[str, ...]:
-    """Return the effects of the library that displace a frame which is fitted anyway."""
+    """Return the names of the frame effects whose frame is unknown and therefore fitted."""
     frames = [effect for effect in library().values() if effect.frame]
     return tuple(effect.name for effect in frames if gate.missing(effect, fit.nominal))
 
 
 def _within_frames(fit: Fit, block: int) -> bool:
-    """Whether all that an effect can do is what the unknown frames can do, too."""
+    """Whether the columns of an effect lie in the span of those of the unknown frames."""
     item, linear = fit.explanation.linear.blocks[block], fit.explanation.linear
     if not linear.frames.size or not item.parameters:
         return False
@@ -108,11 +117,11 @@ def _within_frames(fit: Fit, block: int) -> bool:
 
 
 def _rivals(fit: Fit, explained: dict[str, int]) -> dict[str, tuple[str, ...]]:
-    """Effects of the explanation that another could take the place of, and those others.
+    """Return by effect the effects that it is confounded with.
 
-    An effect is confounded with one outside the explanation when it is itself uncertain and where it is absent that
-    other is present, or when the other is its exact alias. A larger effect that contains it is no
-    rival: the smaller is preferred where it suffices.
+    An effect of the fit is confounded with one outside it in two cases: it is uncertain, and the other is present in
+    most combinations that lack it; or the other is its exact alias. A larger effect that contains it does not count,
+    as the smaller one is preferred where it suffices.
     """
     e: Explanation = fit.explanation
     held = [{fit.families[b] for b in c.blocks} for c in e.combinations]
@@ -136,10 +145,10 @@ def _rivals(fit: Fit, explained: dict[str, int]) -> dict[str, tuple[str, ...]]:
 
 
 def _imitates(fit: Fit, block: int, other: int) -> bool:
-    """Whether what an effect was found to do is, but for noise, exactly what another can do.
+    """Whether another effect can reproduce the fitted contribution of this one to within the noise.
 
-    Exact aliases are the directions that both column spaces share (principal angle zero, Björck and Golub 1973).
-    Another effect that merely comes near is the evidence's affair.
+    Exact aliases are the directions that both column spaces share (principal angle zero, Björck and Golub 1973). An
+    effect that merely comes close is weighed by the evidence instead.
     """
     e = fit.explanation
     matrix, slices = e.problem.matrix, e.problem.slices
@@ -174,6 +183,9 @@ def _estimates(fit: Fit, block: int) -> tuple[Estimate, ...]:
 
 
 def separates(found: Sequence[Finding]) -> tuple[tuple[str, ...], ...]:
-    """Return the groups of effects that the data cannot tell apart; those with an unknown frame only if alone."""
+    """Return the groups of effects that the data cannot tell apart.
+
+    A group with an unknown frame is listed only if it is the only group.
+    """
     groups = tuple(dict.fromkeys(tuple(sorted((f.name, *f.confounded_with))) for f in found if f.confounded_with))
     return tuple(g for g in groups if len(groups) == 1 or not any(is_frame(found, name) for name in g))

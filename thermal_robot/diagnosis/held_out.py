@@ -25,17 +25,17 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Shrinkage:
-    """What held-out rows say.
+    """Held-out shrinkage of the gap, overall and per effect.
 
     Attributes
     ----------
     overall
-        Before against after; what is redone in every fold stands at :func:`held_out`.
+        Rms before and after on held-out rows; :func:`held_out` says what is fitted anew in each fold.
     before, after
         (N,) distance of each row while it was held out, m; NaN where it was set aside.
     shares
-        By effect: share of the gap's mean square with its 95 % interval. Shapley values for the effects of the
-        explanation, the gain on top of it for the others.
+        By effect: share of the gap's mean square with its 95 % interval. For an effect of the fit it is the Shapley
+        value; for another the gain from adding it to the fit.
     """
 
     overall: HeldOut
@@ -47,9 +47,14 @@ class Shrinkage:
 def held_out(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Shrinkage:
     """Cross-validate in blocks of consecutive measurements.
 
-    Frames, outliers, prior scales and the choice of effects are found anew from the other folds' rows. A held-out row
-    is set aside only where both its own fold's model and the whole diagnosis call it a gross error. The point of
-    linearisation and the settings of nonlinear arguments are those of all rows.
+    In each fold, frames, outliers, prior scales and the choice of effects come from the training rows alone. The point
+    of linearisation and the settings of nonlinear arguments are those of all rows. A held-out row is left out as an
+    outlier only if both the model of its fold and the whole diagnosis call it one.
+
+    Raises
+    ------
+    EstimationError
+        If all rows repeat one pose, so that there is only one fold.
     """
     campaign, explanation = fit.campaign, fit.explanation
     fold, block = folds(campaign)
@@ -84,9 +89,9 @@ def held_out(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Shri
 
 
 def _in_question(fit: Fit) -> tuple[Linear, tuple[str, ...], tuple[int, ...]]:
-    """Leave out effects that all rows together all but exclude: they are not chosen anew in a fold.
+    """Leave out effects whose posterior probability on all rows is negligible; folds need not consider them.
 
-    Returns the problem, its families, and where the search may start.
+    Returns the reduced problem, its families, and the blocks at which the search starts.
     """
     e = fit.explanation
     own = {f: [b for b, g in enumerate(fit.families) if g == f] for f in fit.families}
@@ -112,7 +117,7 @@ def _interval(values: Array) -> tuple[float, float]:
 
 
 def _draws(block: NDArray[np.int64], kept: NDArray[np.bool_]) -> Array:
-    """(R, B) how often each block is drawn in each bootstrap resample; blocks without rows are never drawn."""
+    """(R, B) counts of each block in each bootstrap resample; blocks without rows are never drawn."""
     count = int(block.max()) + 1
     filled = np.flatnonzero(np.bincount(block[kept], minlength=count))
     rng = np.random.default_rng(settings.BOOTSTRAP_SEED)
@@ -122,7 +127,7 @@ def _draws(block: NDArray[np.int64], kept: NDArray[np.bool_]) -> Array:
 
 
 class _Subsets:
-    """Fits any subset of effects on the rows of the other folds, from sums of squares and products alone."""
+    """Cross-validated fits of any subset of effects, from sums of squares and products alone."""
 
     def __init__(self, fit: Fit, fold: NDArray[np.int64], block: NDArray[np.int64]) -> None:
         e = fit.explanation
@@ -153,7 +158,7 @@ class _Subsets:
         self.variance = e.best.noise**2 * e.design_effect
 
     def squares(self, scales: dict[int, float]) -> Array:
-        """(B,) squared held-out distances, summed a block of rows, with the given effects at their prior scales, m²."""
+        """(B,) sums of squared held-out distances of each block of rows, m², with effects at the given scales."""
         spans = [np.arange(self.slices[b].start, self.slices[b].stop) for b in scales]
         index = np.concatenate([np.arange(self.frames), *spans]).astype(int)
         tight = np.repeat([1.0 / v**2 for v in scales.values()], [len(span) for span in spans])
@@ -168,7 +173,7 @@ class _Subsets:
         return result
 
     def _fit(self, train: Array, tight: Array) -> Array:
-        """Return the ridge solution, negative, then 1; what a subset of effects leaves out is noise to it."""
+        """Return (−θ, 1) with θ the ridge solution; what the subset does not explain counts as noise."""
         variance = self.variance
         for _ in range(settings.FOLD_ROUNDS):
             signed = np.concatenate([-ridge(train, self.frames, variance * tight), [1.0]])

@@ -1,4 +1,4 @@
-"""What to measure next: the samples that best tell the leading explanations apart.
+"""Optimal design: the samples to measure next, which best tell the leading explanations apart.
 
 Each leading explanation k is a linear model with a normal posterior, y = A f + Σ_b X_b θ_b + e: what it expects of
 samples S is N(μ_k, V_k), V_k = A_S Σ_k A_S' + noise. Under explanation i, samples S are expected to bring a log Bayes
@@ -7,10 +7,10 @@ factor of i against j of
     KL(i, j) = ½ [ tr V_j⁻¹ V_i + (μ_i − μ_j)' V_j⁻¹ (μ_i − μ_j) − |S| + ln |V_j| / |V_i| ]   nats
 
 (Box and Hill, *Technometrics* 9, 1967; Hill, Hunter and Wichern, *Technometrics* 10, 1968). What is maximised is that
-of the true explanation against its nearest rival, Σ_i p_i min_j KL(i, j), p being the probabilities so far. Samples are
-chosen one after the other, and are not exchanged later. Where an explanation is settled, or no sample could tell it
-apart, those are chosen that tell most of its parameters (D-optimal, the frames being unknown). Whether a pose is free
-of obstacles, and seen by the instrument, is for the reader to say.
+of the true explanation against its nearest rival, Σ_i p_i min_j KL(i, j), with p the posterior probabilities. Samples
+are chosen greedily, one after the other. Where one explanation is settled, or no sample could tell it from another,
+they are D-optimal for its parameters, with the frames unknown. Collisions and the line of sight of the instrument are
+not checked.
 """
 
 from __future__ import annotations
@@ -48,13 +48,13 @@ class NextSample:
     position
         Joint positions by name, rad (m for a prismatic joint).
     conditions
-        By column, SI: what matters to the explanations. A ``time`` is a proposal: any after the campaign will do.
+        By column, SI: the conditions that the explanations depend on. ``time`` is a proposal; any later time will do.
     separates
-        The explanations, each as its effects (without any: noise alone), that this sample tells apart most; a single
-        one where nothing is left to tell apart and the sample sharpens its parameters.
+        The explanations that this sample tells apart best, each as a tuple of effects (empty: noise alone). A single
+        one if the explanation is settled and the sample improves its parameters.
     gain
-        Nats that this sample and those before it are expected to bring: the log Bayes factor of the true explanation
-        against its nearest rival; information about the parameters where there is a single one.
+        Expected gain of this sample and those before it, nats: the log Bayes factor of the true explanation against
+        its nearest rival, or the information about the parameters where there is a single explanation.
     """
 
     position: dict[str, float]
@@ -74,14 +74,14 @@ class NextSample:
 
 @dataclass(frozen=True, eq=False)
 class NextSamples:
-    """Samples to measure, most telling first.
+    """Samples to measure, most informative first.
 
     Attributes
     ----------
     samples
-        One by one.
+        The samples.
     commands
-        The same as a campaign without measurements, with a value in every column; :func:`write_table` writes it.
+        The same samples as a campaign without measurements, with a value in every column, for :func:`write_table`.
     """
 
     samples: tuple[NextSample, ...]
@@ -114,18 +114,18 @@ def next_samples(fit: Fit, count: int = 10, pool: int = 400, seed: int = 0) -> N
     Parameters
     ----------
     fit
-        What is known so far.
+        The fit of the campaign so far.
     count
-        How many samples.
+        Number of samples.
     pool
-        How many candidates they are chosen from: see :func:`candidates`.
+        Number of candidates from which they are chosen, see :func:`candidates`.
     seed
-        Of the candidates: the same one always gives the same samples.
+        Seed of the candidates; the same seed gives the same samples.
 
     Returns
     -------
     NextSamples
-        Without samples where there is nothing to learn.
+        Empty where no sample would be informative.
     """
     offered = candidates(fit, pool, seed)
     leading, probability = _leading(fit)
@@ -152,10 +152,11 @@ def next_samples(fit: Fit, count: int = 10, pool: int = 400, seed: int = 0) -> N
 def candidates(fit: Fit, pool: int = 400, seed: int = 0) -> Campaign:
     """Draw samples that could be measured next: a campaign without measurements.
 
-    Joints lie anywhere between their limits or where the campaign has been (within 2.4 rad where a joint can turn once
-    round). Temperatures are those at the campaign's ends and 5 K beyond, the same end for all links; payloads are
-    those of the campaign; every joint may come from either side; times follow the campaign, for as long as it lasted.
-    What else was recorded is as in some row of the campaign; a torque as in the row with the nearest pose.
+    Joint positions are uniform within the limits, and within 2.4 rad for a joint that can turn once round; the
+    range of the campaign is always included. Temperatures are the campaign's lowest and highest, and 5 K beyond them,
+    alike for all links. Payloads are those of the campaign. Joints are approached from either side. Times follow the
+    campaign, for as long as it lasted. Other columns are copied from a random row; torques and encoder readings from
+    the row with the nearest pose.
     """
     from scipy.spatial import cKDTree
 
@@ -211,7 +212,7 @@ def _effects(fit: Fit, combination: Combination) -> Effects:
 
 
 def _leading(fit: Fit) -> tuple[list[Combination], Array]:
-    """Return the explanations to be told apart, each in its most probable settings, and their probabilities."""
+    """Return the leading explanations, each with its most probable settings, and their probabilities."""
     e = fit.explanation
     best: dict[Effects, Combination] = {}
     total: dict[Effects, float] = {}
@@ -227,7 +228,7 @@ def _leading(fit: Fit) -> tuple[list[Combination], Array]:
 
 
 def _conditions(fit: Fit, leading: Sequence[Combination]) -> list[str]:
-    """Columns that any of the explanations reads and that can be asked for."""
+    """Columns that an explanation depends on and that can be commanded."""
     listed = {b for combination in leading for b in combination.blocks}
     read = {name for b in listed for name in gate.reads(fit.explanation.linear.blocks[b].effect, fit.nominal)}
     return [n for n in fit.campaign.covariates if n in read and n.partition(".")[0] not in _GIVEN]
@@ -235,14 +236,14 @@ def _conditions(fit: Fit, leading: Sequence[Combination]) -> list[str]:
 
 @dataclass(frozen=True, eq=False)
 class _Expected:
-    """What one explanation expects of the candidates, in units of the noise: N(mean, root root' + 1).
+    """Predictive distribution of the candidates under one explanation, in units of the noise: N(mean, root root' + 1).
 
     Attributes
     ----------
     mean
         (K, m).
     root, frames
-        (K, m, p) and (K, m, f): a root of the covariance, and of what the frames leave of it were the effects known.
+        (K, m, p) and (K, m, f): root of the covariance, and of the part from the frames, were the effects known.
     """
 
     mean: Array
@@ -292,7 +293,7 @@ def _root(design: Array, precision: Array) -> Array:
 
 
 class _Conditional:
-    """What is expected of every candidate once the chosen ones are known: y_c − B y_S with covariance C."""
+    """Distribution of every candidate given the chosen samples S: mean y_c − B y_S, covariance C."""
 
     def __init__(self, root: Array, chosen: Sequence[int]) -> None:
         measures = root.shape[1]
@@ -305,7 +306,7 @@ class _Conditional:
 
 
 def _further(i: _Conditional, j: _Conditional, apart: Array, chosen: Sequence[int]) -> Array:
-    """(K,) what each candidate adds to KL(i, j); ``apart`` is μ_i − μ_j."""
+    """(K,) increase of KL(i, j) by each candidate; ``apart`` is μ_i − μ_j."""
     left = apart - j.gain @ apart[list(chosen)].ravel()
     crossed = j.gain @ i.cross.transpose(0, 2, 1)
     spread = i.own - crossed - crossed.transpose(0, 2, 1) + j.gain @ i.past @ j.gain.transpose(0, 2, 1)
@@ -317,7 +318,7 @@ def _further(i: _Conditional, j: _Conditional, apart: Array, chosen: Sequence[in
 def _chosen(
     models: Sequence[_Expected], probability: Array, count: int
 ) -> tuple[list[int], list[tuple[int, ...]], list[float]]:
-    """Return the rows chosen, the explanations that each tells apart most, and the gain with those before it."""
+    """Choose rows greedily; return them, the explanations that each tells apart best, and the cumulative gain."""
     number = len(models)
     itself = np.eye(number, dtype=bool)[:, :, None]
     so_far, learnt = np.zeros((number, number)), 0.0

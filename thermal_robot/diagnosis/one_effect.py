@@ -1,8 +1,8 @@
-"""What one effect explains, place by place: the remainder with the effect left in, and without it.
+"""What one effect explains, place by place: the residual with the effect and without it.
 
-A component-plus-residual plot (Ezekiel 1924; Larsen and McCleary, *American Sociological Review* 37, 1972), in the
-place's own quantity. Row by row, with r the remainder of the whole explanation (m, rad), c what the effect does at this
-place, and D how an error of one unit there moves the target, in units of the noise,
+These are the data of component-plus-residual plots (Ezekiel 1924; Larsen and McCleary, *American Sociological Review*
+37, 1972). In each row, r is the residual of the whole fit (m, rad), c the contribution of the effect at this place, and
+D the displacement of the target for a unit error there, in units of the noise:
 
     before = D'(r + c) / D'D        after = D'r / D'D        spread = 1 / √(D'D)
 """
@@ -29,19 +29,19 @@ Array = NDArray[np.float64]
 
 
 def explained(fit: Fit, effect: str) -> Explained:
-    """Show what an effect of the explanation explains; rows that were set aside are left out.
+    """Return what one effect of the fit explains at each place, without the outliers.
 
     Parameters
     ----------
     fit
         The fit.
     effect
-        Name of an effect that belongs to the explanation.
+        Name of an effect of the fit.
 
     Raises
     ------
     EffectError
-        If it does not.
+        If the effect is not part of the fit.
     """
     held = {e.name: (e, values) for e, values in fit.effects}
     if effect not in held:
@@ -90,9 +90,9 @@ def _shown(
 
 
 def _error(observations: Observations, parameters: list[tuple[Parameter, float]]) -> tuple[Array, Array, str]:
-    """Return (N,) the error at a place, (N, m) how the target moves with a unit of it, and its unit.
+    """Return (N,) the error at a place, (N, m) the displacement of the target per unit error, and the unit.
 
-    What enters in several components keeps the proportions that it has on the whole (first singular vector).
+    An error with several components is taken along its principal direction (first singular vector).
     """
     measures = observations.gap.shape[1]
     samples = len(observations.q)
@@ -130,7 +130,7 @@ def _error(observations: Observations, parameters: list[tuple[Parameter, float]]
 def _driver(
     observations: Observations, effect: Effect, parameters: list[tuple[Parameter, float]], error: Array
 ) -> Driver:
-    """Return what drives an effect at a place; of one that says nothing, the quantity that goes with it most."""
+    """Return the quantity that drives an effect at a place, or else the one that its error follows best."""
     if known_driver := driver(effect, observations, [parameter for parameter, _ in parameters], error):
         return known_driver
     known = quantities(observations)
@@ -139,13 +139,13 @@ def _driver(
 
 
 def _unsteady(values: Array, error: Array) -> float:
-    """Mean variance of an error among neighbours in a quantity."""
+    """Mean variance of the error among rows with neighbouring values of a quantity."""
     parts = np.array_split(error[np.argsort(values, kind="stable")], max(len(error) // settings.ROWS_ALIKE, 2))
     return float(np.mean([part.var() for part in parts if len(part)]))
 
 
 def _line(values: Array, error: Array) -> Array:
-    """(2, k) the law along its quantity: means of neighbours where it follows other quantities, too."""
+    """(2, k) the fitted law over its quantity; means of neighbouring rows where it depends on others, too."""
     levels = np.unique(values)
     if len(levels) <= settings.FEW_LEVELS:
         return np.array([levels, [error[values == level].mean() for level in levels]])

@@ -1,4 +1,4 @@
-"""The parts of a diagnosis: plain frozen values that findings hand to a report."""
+"""The parts of a diagnosis: frozen values without behaviour."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ Status = Literal["found", "not_found", "not_testable", "confounded"]
 
 @dataclass(frozen=True)
 class Location:
-    """A place and its share of the gap's mean square (or, for a remainder, its probability)."""
+    """A place with its share of the gap's mean square; for an unexplained residual, with its probability."""
 
     kind: str
     name: str
@@ -31,7 +31,7 @@ class Location:
 
 @dataclass(frozen=True)
 class Estimate:
-    """A parameter: SI value with its standard deviation, both ``None`` where the data do not determine it."""
+    """A parameter: SI value and standard deviation; both are ``None`` if the data do not identify it."""
 
     name: str
     value: float | None
@@ -53,22 +53,22 @@ class Finding:
     probability
         Posterior probability that it is at work; ``None`` where it is not testable.
     shrinkage, shrinkage_ci95
-        Its share of the gap's mean square, on data not used for the fit: Shapley value over the explanation for an
-        effect that belongs to it; what adding it brings for another; ``None`` where it is not testable.
+        Its share of the gap's mean square on held-out rows, and the 95 % interval. For an effect of the fit it is the
+        Shapley value; for another the gain from adding it. ``None`` where it is not testable.
     needs
-        What would make it testable.
+        Columns or frames that would make it testable.
     confounded_with
         Effects that the data cannot tell it from.
     locations
-        Where it sits, largest share first.
+        Places where it acts, largest share first.
     parameters
-        Its estimates; empty where it does not belong to the explanation.
+        Its estimates; empty if it is not part of the fit.
     quantity, shape, describes
-        Of a law that was discovered: what it follows, how, and a sentence about it; ``None`` otherwise.
+        Only of a discovered law: the quantity that it follows, the shape, and a sentence about it.
     title
         The effect in plain words.
     random
-        Whether it scatters, so that no correction takes it away.
+        Whether it is random, so that no correction can remove it.
     """
 
     name: str
@@ -88,14 +88,17 @@ class Finding:
 
 
 def is_frame(found: Sequence[Finding], name: str) -> bool:
-    """Tell whether an effect displaces a frame that is unknown; such an effect may be confounded and no candidate."""
+    """Tell whether an effect is the displacement of an unknown frame.
+
+    A name without a finding counts as one: only unknown frames are confounded with effects without being candidates.
+    """
     needs = next((f.needs for f in found if f.name == name), ("frames.",))
     return any(need.startswith("frames.") for need in needs)
 
 
 @dataclass(frozen=True)
 class HeldOut:
-    """How far the gap shrinks on rows that were not used for the fit: rms distances in m, shares 0..1."""
+    """Shrinkage of the gap on held-out rows: rms distances in m, shares 0..1."""
 
     scheme: str
     folds: int
@@ -107,7 +110,7 @@ class HeldOut:
 
 @dataclass(frozen=True)
 class FoldScheme:
-    """How far the gap shrinks when rows are held out in one way.
+    """Shrinkage of the gap under one scheme of holding rows out.
 
     Attributes
     ----------
@@ -118,11 +121,11 @@ class FoldScheme:
     folds, rows
         How many folds could be fitted, and how many rows were held out in them.
     rms_before, rms_after
-        Rms distances of these rows, m: frames alone, and the explanation.
+        Rms distances of these rows, m: with the frames alone, and with the effects.
     shrinkage
         1 − (rms_after / rms_before)².
     uncertainty
-        Standard error of rms_after, m: what chance alone makes of it.
+        Standard error of rms_after, m.
     """
 
     name: str
@@ -137,7 +140,7 @@ class FoldScheme:
 
 @dataclass(frozen=True)
 class Gap:
-    """Rms distances in m (orientation: rad) over the rows that are not outliers; ``None`` without orientation."""
+    """Rms distances in m over the rows that are not outliers; of orientation in rad, ``None`` if not measured."""
 
     rms_before: float
     rms_after: float
@@ -153,8 +156,8 @@ class Gap:
 class Where:
     """Shares 0..1 of the gap's mean square: by axis of the root frame, joint, link, and recorded quantity.
 
-    Axes sum to one. Joints and links share what the explanation explains. A quantity's share is what a smooth law of
-    it alone would explain, so these overlap.
+    Axes sum to one. Joints and links share the part that the fit explains. The share of a quantity is what a smooth law
+    of it alone would explain; these shares overlap.
     """
 
     axes: Mapping[str, float]
@@ -182,23 +185,22 @@ class Dependence:
 
 @dataclass(frozen=True)
 class Unexplained:
-    """What the explanation leaves beyond the noise.
+    """The residual beyond the noise.
 
     Attributes
     ----------
     flagged
-        Whether it is larger or more structured than the noise allows.
+        Whether the residual is significantly larger or more structured than noise.
     rms
-        Its rms distance, m: noise subtracted where a stated noise or repeats tell it, all of it where nothing does; 0
-        where nothing is left.
+        Its rms distance, m. The noise is subtracted if it is stated or known from repeats. 0 if not flagged.
     p_value
-        Of the most telling test, after counting all of them.
+        The smallest of all tests, with Bonferroni correction.
     reasons
-        Plain sentences: which test says so.
+        One sentence for each test that failed.
     locations
         Where it most probably enters.
     depends_on
-        The quantities that it follows, most telling first.
+        The quantities that it follows, most significant first.
     """
 
     flagged: bool
@@ -211,16 +213,16 @@ class Unexplained:
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """What the figures show, one row a measurement, N rows.
+    """The data of the figures, one row per measurement, N rows.
 
     Attributes
     ----------
     rows
         (N,) row numbers in the file.
     gap, remainder
-        (N, m) before and after, root frame axes: m, and rad.
+        (N, m) residual with the frames alone and with the effects, in root frame axes: m, then rad.
     outliers
-        (N,) True where set aside.
+        (N,) True for outliers.
     position
         (N, 3) predicted position of the target in the root frame, m.
     q
@@ -228,7 +230,7 @@ class Rows:
     covariates
         Recorded quantities by name, (N,).
     held_out_before, held_out_after
-        (N,) distance in m while the row was held out; NaN where it was set aside.
+        (N,) distance in m of the row when held out; NaN where it was left out as an outlier.
     units
         SI unit of every covariate and of every joint's position, by name; empty where it has none.
     """
@@ -247,7 +249,7 @@ class Rows:
 
 @dataclass(frozen=True)
 class Sensitivity:
-    """Posterior probability of the verdict's effects were every prior size a third, or three times, what is stated."""
+    """Posterior probability of the verdict with all prior sizes a third (smaller) or three times (larger) as stated."""
 
     smaller: float
     larger: float
@@ -255,14 +257,14 @@ class Sensitivity:
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """One place where an effect is at work, n rows.
+    """One place where an effect acts, n rows.
 
     Attributes
     ----------
     kind, name
         ``joint`` and its name, and so on.
     share
-        Part of what the effect does that it does here, 0..1.
+        Share of the effect's contribution that enters here, 0..1.
     quantity, quantity_unit
         What drives the effect here.
     values
@@ -272,7 +274,7 @@ class Place:
     unit
         Of the error: ``rad`` or ``m`` at the place; ``m at the tool`` where the error both shifts and turns.
     before, after, spread
-        (n,) the error with the effect left in, without it, and one sigma of the noise in either.
+        (n,) the error with the effect left in, without it, and one sigma of noise of both.
     line
         (2, k) the fitted law: quantity and error.
     """
@@ -305,9 +307,9 @@ class Explained:
     effect
         Its name.
     places
-        Those with a material share, largest first.
+        Places with a share worth drawing, largest first.
     left_out
-        How many more there are.
+        Number of further places.
     """
 
     effect: str

@@ -1,4 +1,4 @@
-"""What is said of the effects that scatter."""
+"""Findings of the random effects: joints that scatter."""
 
 from __future__ import annotations
 
@@ -16,17 +16,18 @@ from thermal_robot.inference.random_gap import Kept, RandomGap
 
 
 def random_findings(fit: Fit, chance: RandomGap, *, beside_unlisted: bool = False) -> tuple[Finding, ...]:
-    """Return what is said of every effect that scatters; none shrinks the gap, as a mean cannot take scatter away.
+    """Return a finding for every random effect.
 
-    Without repeats the two kinds of scatter are one: what a pose brings is found where its steps are seen, otherwise
-    confounded with what comes anew at each visit, which is then not testable.
+    None shrinks the gap, as a correction predicts a mean and leaves scatter. Scatter between poses (encoder steps) and
+    scatter between visits (repeatability) are told apart by repeated poses. Without repeats, scatter between visits is
+    not testable, and scatter between poses is confounded with it unless the steps of the encoder are seen.
 
     Parameters
     ----------
     fit
-        Frames and systematic effects.
+        Fit of frames and systematic effects.
     chance
-        What is random in what they leave.
+        The random part of its residual.
     beside_unlisted
         Whether an unlisted cause is at work. It may be what makes the error differ from pose to pose, so that an
         encoder is named only where its steps are seen.
@@ -44,9 +45,9 @@ def _is_of_poses(finding: Finding) -> bool:
 
 
 def _doubted(finding: Finding) -> Finding:
-    """Take a finding back: an unlisted cause, known to be there, explains the scatter as well.
+    """Withdraw a finding: an unlisted cause, known to be there, explains the scatter as well.
 
-    Scatter that both predict speaks for neither (explaining away), so that at most the prior probability is left.
+    The scatter is then no evidence for the effect (explaining away): its probability is at most the prior's.
     """
     return replace(
         finding,

@@ -1,4 +1,4 @@
-"""What an explanation leaves, whitened, and what near-repeats say of it."""
+"""The whitened residual of a fit, and the noise that near-repeats show."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Remainder:
-    """What is left after the explanation, of N rows that are not outliers.
+    """Residual of a fit, of the N rows that are not outliers.
 
     Attributes
     ----------
     rows
         Their numbers.
     target
-        The remainder in units of the noise that was settled on, everything that was fitted projected out.
+        The residual in units of the estimated noise, with all fitted columns projected out.
     """
 
     rows: NDArray[np.int64]
@@ -32,21 +32,21 @@ class Remainder:
 
     @property
     def white(self) -> Array:
-        """(N, m) remainder over the noise."""
+        """(N, m) residual over the noise."""
         return self.target.white.reshape(len(self.rows), -1)
 
     @property
     def freedom(self) -> int:
-        """Equations less what was fitted."""
+        """Degrees of freedom: equations less fitted columns."""
         return self.target.freedom
 
     @property
     def scale2(self) -> float:
-        """Mean square, corrected for what was fitted, in squares of the noise."""
+        """Sum of squares over the degrees of freedom, in squares of the noise."""
         return float((self.white**2).sum() / self.freedom)
 
     def some(self, count: int) -> Remainder:
-        """Return so many rows drawn at random, with what was fitted projected out of them; all if they are fewer."""
+        """Return a random subset of rows with the fitted columns projected out again; all rows if there are fewer."""
         if len(self.rows) <= count:
             return self
         drawn = np.sort(np.random.default_rng(settings.TEST_SEED).choice(len(self.rows), count, replace=False))
@@ -57,7 +57,7 @@ class Remainder:
 
 
 def remainder(fit: Fit) -> Remainder:
-    """Refit frames and explanation without priors, so that tests on what is left are exact."""
+    """Return the residual of a fit of frames and effects without priors, so that tests on it are exact."""
     e = fit.explanation
     rows = np.flatnonzero(~e.outliers)
     columns = [e.linear.frames[rows]]
@@ -73,7 +73,7 @@ def remainder(fit: Fit) -> Remainder:
 
 @dataclass(frozen=True)
 class Repeats:
-    """What near-repeats say: the noise's mean square in squares of the settled noise, from how many pairs."""
+    """Noise from near-repeats: number of pairs, mean square over the estimated noise², sigma of position, m."""
 
     pairs: int
     scale2: float
@@ -81,7 +81,7 @@ class Repeats:
 
 
 def repeats(fit: Fit, left: Remainder) -> Repeats | None:
-    """Compare each command with its nearest neighbour, if near (``settings.NEAR``); ``None`` where too few have one."""
+    """Estimate the noise from pairs of nearest commands within ``settings.NEAR``; ``None`` with too few pairs."""
     q = fit.campaign.q[left.rows]
     distance, neighbour = nearest(q, 1)
     close = np.flatnonzero(distance[:, 0] < settings.NEAR)
@@ -95,7 +95,7 @@ def repeats(fit: Fit, left: Remainder) -> Repeats | None:
 
 
 def nearest(points: Array, count: int) -> tuple[Array, NDArray[np.int64]]:
-    """Return distances and numbers (N, count) of each point's nearest others, itself left out however many coincide."""
+    """Return distances and indices (N, count) of the nearest other points; a point is never its own neighbour."""
     from scipy.spatial import cKDTree
 
     distance, number = cKDTree(points).query(points, k=count + 1)

@@ -1,7 +1,7 @@
 """The result of a diagnosis: one frozen value, its JSON, and the port through which it is put into words and drawn.
 
-A diagnosis does not know who draws it. The package hands it a room that can (:func:`told_by`); any other that has the
-functions of :class:`Teller` serves as well.
+This module knows nothing of reports. The package registers one with :func:`told_by`; any object with the methods of
+:class:`Teller` will do.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ _tellers: list[Teller] = []
 
 
 def told_by(teller: Teller) -> None:
-    """Let a room put every diagnosis into words from now on."""
+    """Register who puts every diagnosis into words and figures from now on."""
     _tellers[:] = [teller]
 
 
@@ -58,7 +58,7 @@ def _teller() -> Teller:
 
 
 def told(diagnosis: Diagnosis) -> Diagnosis:
-    """Return a diagnosis with its sentences."""
+    """Return the diagnosis with its summary and advice."""
     teller = _teller()
     return replace(diagnosis, summary=teller.headline(diagnosis), advice=teller.advice(diagnosis))
 
@@ -78,7 +78,7 @@ class Diagnosis:
     gap, effects, where, unexplained
         The parts of the answer; effects are ordered by held-out share.
     verdict
-        Names of the effects of the explanation, largest share first.
+        Names of the effects of the fit, largest share first, then of the random effects that were found.
     probability
         Posterior probability of exactly this explanation.
     separates
@@ -92,13 +92,14 @@ class Diagnosis:
     warnings
         What a reader should know about the data.
     remaining
-        What is left when laws that were discovered are taken off, too; where absent, ``unexplained``.
+        The residual of the whole fit, discovered laws included, while ``unexplained`` is that of the known effects
+        alone; ``None`` where the two are the same.
     reach
-        Size of the volume that was measured, m.
+        Diagonal of the measured volume, m.
     narrowed
         Whether effects were left out by request.
     sensitivity, fit
-        How far the verdict hangs on prior sizes; the fit behind it all.
+        How far the verdict depends on the prior sizes; the fit behind the diagnosis.
     """
 
     campaign: str
@@ -127,12 +128,12 @@ class Diagnosis:
     fit: Fit | None = None
 
     def explain(self, effect: str) -> Any:
-        """Draw what is left before and after one effect, against the quantity that drives it, place by place.
+        """Draw the residual with and without one effect, against the quantity that drives it, place by place.
 
         Parameters
         ----------
         effect
-            Name of an effect of the explanation.
+            Name of an effect of the fit.
 
         Returns
         -------
@@ -141,7 +142,7 @@ class Diagnosis:
         Raises
         ------
         EffectError
-            If it does not belong to the explanation.
+            If the effect is not part of the fit.
         """
         from thermal_robot.diagnosis.one_effect import explained
 
@@ -159,7 +160,7 @@ class Diagnosis:
         return self.fit
 
     def finding(self, effect: str) -> Finding:
-        """Return what is said of one effect; ``KeyError`` for a name that was not a candidate."""
+        """Return the finding of one effect; ``KeyError`` for a name that was not a candidate."""
         return {f.name: f for f in self.effects}[effect]
 
     def title(self, effect: str) -> str:

@@ -1,8 +1,8 @@
-"""Other ways to hold rows out: an explanation that only interpolates gives itself away where it must extrapolate.
+"""Other hold-out schemes, which show whether the fit extrapolates.
 
-Neighbouring rows are alike in time, temperature and place, so that folds of consecutive rows flatter what follows the
-campaign's course (Roberts et al., *Ecography* 40, 2017, on blocked cross-validation). Effects, prior scales and the
-rows set aside are those of the diagnosis; frames and parameters are fitted anew without the rows held out.
+Neighbouring rows are alike in time, temperature and place. Folds of consecutive rows therefore favour a fit that only
+follows the course of the campaign (Roberts et al., *Ecography* 40, 2017, on blocked cross-validation). Effects, prior
+scales and outliers are those of the diagnosis; frames and parameters are fitted anew in each fold.
 """
 
 from __future__ import annotations
@@ -24,21 +24,21 @@ Labels = NDArray[np.int64]
 
 
 def worst_folds(fit: Fit) -> tuple[FoldScheme, ...]:
-    """Hold rows out by time, session, temperature and region; the least favourable scheme comes first.
+    """Hold rows out by time, session, temperature, region and reach; the least favourable scheme comes first.
 
-    Least favourable is what leaves most. Its shrinkage need not be the smallest: where rows far out are held out, the
-    gap before is larger, too.
+    The least favourable scheme has the largest rms after. Its shrinkage need not be the smallest, as the gap before may
+    be larger on its rows, too.
 
     Parameters
     ----------
     fit
-        With or without effects.
+        The fit, with or without effects.
 
     Returns
     -------
     tuple of FoldScheme
-        In order of rms_after, the largest first. A scheme is left out where the campaign has no such column, a fold
-        where the remaining rows do not determine the frames.
+        In order of rms_after, the largest first. A scheme is left out if the campaign lacks its column; a fold is left
+        out if its training rows do not determine the frames.
     """
     problem, kept = _problem(fit), ~fit.explanation.outliers
     found = [_judged(problem, kept, *scheme) for scheme in _schemes(fit)]
@@ -46,9 +46,9 @@ def worst_folds(fit: Fit) -> tuple[FoldScheme, ...]:
 
 
 def worse_elsewhere(narrow: Fit, wider: Fit) -> bool:
-    """Tell whether a wider explanation leaves more where neighbourhoods of joint positions are held out.
+    """Tell whether a wider explanation is worse on held-out regions of joint space.
 
-    It then fits what was measured by large errors that cancel there, and goes astray between.
+    It then overfits: large contributions cancel where poses were measured and not between them.
     """
     kept = ~(narrow.explanation.outliers | wider.explanation.outliers)
     tests = _each(neighbourhoods(narrow.campaign, settings.FOLDS))
@@ -73,7 +73,7 @@ def _problem(fit: Fit) -> _Problem:
 
 
 def _schemes(fit: Fit) -> Iterator[tuple[str, str, list[NDArray[np.bool_]]]]:
-    """Yield name, words and the rows (N,) that each fold holds out."""
+    """Yield name and description of each scheme, and a mask (N,) of the rows that each of its folds holds out."""
     campaign = fit.campaign
     yield "time", "blocks of consecutive rows", _each(folds(campaign)[0])
     session = campaign.labels.get("session")
@@ -93,14 +93,14 @@ def _each(labels: NDArray[np.int64]) -> list[NDArray[np.bool_]]:
 
 
 def _temperature(campaign: Campaign) -> Array | None:
-    """(N,) of the robot as a whole, or the mean of its links, °C."""
+    """(N,) temperature of the robot, or the mean of its links, °C; ``None`` if not recorded."""
     recorded = campaign.covariates
     columns = ["temperature"] if "temperature" in recorded else [c for c in recorded if c.startswith("temperature.")]
     return np.mean([recorded[c] for c in columns], axis=0) if columns else None
 
 
 class _Problem:
-    """Rows of the linear problem, fitted from sums of products alone."""
+    """The linear problem, fitted to any rows from sums of products."""
 
     def __init__(self, design: Array, gap: Array, flat: int, weights: Array, noise: Array) -> None:
         self.design, self.gap, self.flat = design, gap, flat
@@ -121,14 +121,14 @@ class _Problem:
         return int((value > settings.FRAME_DETERMINED).sum())
 
     def left(self, test: NDArray[np.bool_]) -> tuple[Array, Array] | None:
-        """(n,) distances of the rows held out, m: before and after; ``None`` where nothing is left to fit."""
+        """(n,) distances of the held-out rows, m: before, after; ``None`` if the others do not determine the frames."""
         train = self.total - self._products(test)
         if self._rank(train) < self.rank or (~test).sum() < 2 or not test.any():
             return None
         return self._distance(train, test, self.flat), self._distance(train, test, len(train) - 1)
 
     def _distance(self, train: Array, test: NDArray[np.bool_], columns: int) -> Array:
-        """(n,) distances that the frames and the first of the effects' columns leave."""
+        """(n,) distances of the held-out rows, m, with the first columns of the design fitted to the others."""
         picked = np.concatenate([np.arange(columns), [-1]])
         # a unit of an effect's column is one sigma of its prior
         solution = ridge(train[np.ix_(picked, picked)], self.flat, np.ones(columns - self.flat))

@@ -1,4 +1,4 @@
-"""How far the verdict hangs on the prior sizes of the effects."""
+"""How far the verdict depends on the prior sizes of the effects."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ from thermal_robot.inference.fit import Fit
 
 
 def prior_sensitivity(fit: Fit) -> Sensitivity:
-    """Weigh the leading combinations again with all prior sizes smaller and larger by :data:`settings.PRIOR_FACTOR`.
+    """Recompute the probability of the verdict with all prior sizes divided and multiplied by ``PRIOR_FACTOR``.
 
-    A size is itself only expected to within its spread (ln λ ~ N(0, 1.5²)) and is learnt from the data, so that little
-    should hang on it; where much does, the data do not decide.
+    The scale of each effect is learnt from the data, with the prior ln λ ~ N(0, 1.5²) about the stated size. The
+    verdict should therefore depend little on the stated sizes; where it does, the data do not decide. The leading
+    combinations alone are compared.
     """
     e = fit.explanation
     problem = e.problem.tempered(e.design_effect) if e.design_effect > 1.0 else e.problem

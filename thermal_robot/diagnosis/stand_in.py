@@ -1,4 +1,4 @@
-"""Effects that may stand in for an unlisted cause: a physical constant does not vary with time or place."""
+"""Effects that stand in for an unlisted cause: their parameters, which should be constant, change with a quantity."""
 
 from __future__ import annotations
 
@@ -21,28 +21,29 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class StandIn:
-    """How far an effect is believed to be itself (0..1), and the quantity with which its size changes."""
+    """Probability (0..1) that an effect is real and no stand-in, and the quantity with which its size changes."""
 
     belief: float
     quantity: str
 
 
 def trust(shares: Mapping[str, float], doubts: Mapping[str, StandIn], unlisted: float) -> dict[str, float]:
-    """Return by name what the probability of each known effect is multiplied with, at most one.
+    """Return by name a factor (at most 1) for the probability of each known effect.
 
-    An unlisted cause can be absorbed in part by a listed effect, the more the larger it is beside that effect. With the
-    effect's share s of the gap and the share u of what is not listed, the effect is believed by s/(s + u).
-    That something works on an effect, or beside it, does not say that it is not there: hence never below
-    :data:`~thermal_robot.inference.settings.BESIDE_UNLISTED`.
+    An effect of the library may fit part of an unlisted cause. The larger the unlisted cause is beside the effect, the
+    more of the effect may be due to it. The factor is s/(s + u), with s the effect's share of the gap and u that of
+    everything unlisted. An effect whose size changes gets (1 + belief)/2 if that is smaller. The factor is never below
+    :data:`~thermal_robot.inference.settings.BESIDE_UNLISTED`, as an effect may well be at work beside an unlisted
+    cause.
 
     Parameters
     ----------
     shares
-        Of the gap, on rows held out, of every effect of the explanation, laws among them.
+        Share of the gap on held-out rows, of every effect of the fit, discovered laws included.
     doubts
-        See :func:`stand_ins`.
+        By effect, see :func:`stand_ins`.
     unlisted
-        Share of the gap that is left; 0 where it is noise.
+        Share of the gap that stays unexplained; 0 where the residual is noise.
     """
     unlisted += sum(max(share, 0.0) for name, share in shares.items() if name.startswith(PREFIX))
     result = {}
@@ -57,15 +58,17 @@ def trust(shares: Mapping[str, float], doubts: Mapping[str, StandIn], unlisted: 
 
 
 def stand_ins(fit: Fit) -> dict[str, StandIn]:
-    """Ask of every known effect of the explanation whether its size stays the same.
+    """Test every known effect of the fit for a size that changes with a recorded quantity.
 
-    An expansion, a scale or an eccentricity is what it is at any time, temperature and place. Where what an effect was
-    found to do, multiplied with a smooth law of some quantity, explains part of what is left, its size changes with
-    that: the effect was taken for something that it is not. The belief is 1/(1 + e^g), with g the gain in log
-    evidence of the best such law (Bayes information criterion) less the logarithm of the number that were tried.
+    The parameters of an effect, such as an expansion coefficient or an eccentricity, are constants. The test multiplies
+    the fitted contribution of the effect with a smooth law of each quantity. If the product explains part of the
+    residual, the size of the effect changes with that quantity, and the effect stands in for another cause. Its belief
+    is 1/(1 + e^g), with g the gain in log evidence of the best law (Bayes information criterion) less the logarithm of
+    the number of laws that were tried.
 
-    Where a law was discovered, or a remainder is left, an unlisted cause is at work, which may enter at several places:
-    then the best law that could take the effect's own place is weighed against it, too.
+    An effect that passes is compared with the best law that could replace it, with g the log evidence of the law over
+    the effect. Call this only where a law was discovered or a residual is left, as a law of one parameter may otherwise
+    be preferred to an effect of many.
     """
     e, thin = fit.explanation, Thin.of(fit)
     columns = [thin.linear.blocks[b].columns for b in e.best.blocks]

@@ -1,4 +1,4 @@
-"""Causes that nobody listed: one more law beside an explanation, and what laws say of what the known effects leave."""
+"""Unlisted causes: add one more empirical law to the fit, and describe the residual of the known effects by laws."""
 
 from __future__ import annotations
 
@@ -19,16 +19,16 @@ from thermal_robot.inference.laws import of_quantity
 
 @dataclass(frozen=True, eq=False)
 class Stage:
-    """An explanation on the way to the last one.
+    """One step of the search for laws.
 
     Attributes
     ----------
     fit
-        Known effects and laws.
+        The fit with known effects and the laws so far.
     laws
-        What was discovered and belongs to it, in the order in which it was found.
+        The discovered laws in that fit, in the order of their discovery.
     left
-        What it leaves.
+        Its residual.
     """
 
     fit: Fit
@@ -37,7 +37,10 @@ class Stage:
 
 
 def one_more_law(stage: Stage, progress: Callable[[str], None]) -> Stage | None:
-    """Return the explanation with one more law, or a finer one in place of its own; ``None`` where none is worth it."""
+    """Add the best further law, or refine one that is already in the fit with more knots.
+
+    Returns ``None`` if no law is worth its parameters.
+    """
     fit, found = stage.fit, stage.laws
     number = 1 + max((int(d.law.name.removeprefix(PREFIX)) for d in found), default=0)
     progress(f"causes that nobody listed: scan {number}")
@@ -64,10 +67,11 @@ def one_more_law(stage: Stage, progress: Callable[[str], None]) -> Stage | None:
 
 
 def _alone(fit: Fit, law: Discovered) -> dict[str, tuple[Effect, ...]]:
-    """Return, by name, the settings of known effects to choose among, with one in this joint alone.
+    """Return by name the settings of known effects that compete with a law of one joint's own position.
 
-    With parameters in every joint an effect is penalised for the sound joints, too, and a law of the one joint that
-    errs would always be preferred.
+    Such an effect has parameters for every joint. If a single joint is at fault, the parameters of the sound joints
+    count against it, and the law wins although the effect is the cause. The settings returned here therefore include
+    the effect in this joint alone.
     """
     if law.kind != "joint" or law.quantity != law.place:
         return {}
@@ -76,14 +80,14 @@ def _alone(fit: Fit, law: Discovered) -> dict[str, tuple[Effect, ...]]:
 
 
 def _same(law: Discovered, other: Discovered) -> bool:
-    """Whether two laws follow the same quantity at the same place; two orders of a wheel stand beside each other."""
+    """Whether two laws follow the same quantity at the same place; harmonics of different order do not."""
     if law.shape == other.shape == "harmonic" and law.marks != other.marks:
         return False
     return (law.kind, law.place, law.quantity) == (other.kind, other.place, other.quantity)
 
 
 def as_laws_say(first: Unexplained, left: Unexplained, found: Sequence[Discovery]) -> Unexplained:
-    """Describe the remainder of the known effects by the places and quantities of the discovered laws."""
+    """Return the residual of the known effects with the places and quantities of the laws that explain it."""
     if not found:
         return left
     places: dict[tuple[str, str], float] = {}

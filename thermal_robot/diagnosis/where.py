@@ -1,4 +1,4 @@
-"""Where the gap lies: axes, joints, links, quantities; and where each effect sits."""
+"""Where the gap lies: shares of axes, joints, links and quantities, and the places of each effect."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ Array = NDArray[np.float64]
 
 
 def locate(fit: Fit, shrinkage: dict[str, float]) -> tuple[Where, dict[str, tuple[Location, ...]]]:
-    """Share the gap out over places.
+    """Attribute the gap to places.
 
     Parameters
     ----------
     fit
         The fit.
     shrinkage
-        Held-out share of each effect of the explanation, which its places divide among them.
+        By effect of the fit: its share of the gap on held-out rows, which is divided among its places.
 
     Returns
     -------
     where
         Shares over axes, joints, links and quantities.
     locations
-        By effect, its places, largest first. A place's part is in proportion to the mean square of the displacement
-        that its parameters cause beyond what the unknown frames would take up.
+        By effect: its places, largest first. The share of a place is proportional to the mean square displacement that
+        its parameters cause, with the unknown frames projected out.
     """
     e = fit.explanation
     rows = np.flatnonzero(~e.outliers)
@@ -68,7 +68,7 @@ def locate(fit: Fit, shrinkage: dict[str, float]) -> tuple[Where, dict[str, tupl
 
 
 def _displaced(observations: Observations, block: Block, values: Array) -> dict[tuple[str, str], Array]:
-    """(N, m) displacement by place; a parameter that acts on all links at once is shared out by its responses."""
+    """(N, m) displacement by place; a parameter common to all links is divided by its response at each."""
     found: dict[tuple[str, str], Array] = {}
     measures = block.columns.shape[1]
     for k, parameter in enumerate(block.parameters):
@@ -88,7 +88,7 @@ def _axes(gap: Array) -> dict[str, float]:
 
 
 def _covariates(fit: Fit, gap: Array, rows: NDArray[np.int64]) -> dict[str, float]:
-    """Return the adjusted share of the gap that a smooth law of each quantity alone would explain."""
+    """Return by quantity the adjusted R² of a smooth law of it alone, fitted to the gap."""
     centred = gap - gap.mean(axis=0)
     total = float((centred**2).sum()) or 1.0
     shares = {}
