@@ -1,12 +1,15 @@
 """The gate: every answer that breaks the contract is refused, with the effect, the parameter and what was found."""
 
+import ast
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from helpers import SAMPLES, commanded
 
+import thermal_robot
 from thermal_robot import EffectError, diagnose
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.effects import (
@@ -289,3 +292,21 @@ def test_a_model_is_saved_through_the_gate(rv_m2, observations):
     model = CorrectedModel(rv_m2, campaign.settings, observations.frames, ((effect, np.zeros(1)),), "position")
     with pytest.raises(EffectError, match="'mine': arguments answers"):
         model.to_dict()
+
+
+def asked_directly(source):
+    """Yield the calls of an effect's methods on anything but the gate; ``at`` of an effect takes one argument."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in ASK:
+            call = ast.unparse(node)
+            if not call.startswith("gate.") and (node.func.attr != "at" or len(node.args) == 1):
+                yield call
+
+
+def test_nobody_asks_an_effect_but_the_gate():
+    source = "f(e.reads(seen)); gate.reads(e, seen); e.at(joint); np.add.at(a, b, c)"
+    assert set(asked_directly(source)) == {"e.reads(seen)", "e.at(joint)"}
+    root = Path(thermal_robot.__file__).parent
+    others = [path for path in root.rglob("*.py") if path.parent.name != "effects"]
+    assert len(others) > 100
+    assert {path.name: found for path in others if (found := list(asked_directly(path.read_text("utf-8"))))} == {}
