@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign, Settings, read_samples
-from thermal_robot.effects import Effect, library
+from thermal_robot.effects import Effect, gate, library
 from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.errors import CampaignError, EffectError
@@ -148,7 +148,8 @@ class CorrectedModel:
             "settings": self.settings.to_dict(),
             "frames": {"base": self.frames.base.tolist(), "tool": self.frames.tool.tolist()},
             "effects": [
-                {"name": e.name, "arguments": e.arguments(), "values": np.asarray(v).tolist()} for e, v in self.effects
+                {"name": e.name, "arguments": gate.arguments(e), "values": np.asarray(v).tolist()}
+                for e, v in self.effects
             ],
             "measures": self.measures,
             "needs": list(self.needs),

@@ -1,4 +1,4 @@
-"""Robot meets campaign, once: everything that an effect may read and estimation needs, frozen.
+"""Robot meets campaign, once: everything that an effect may read and inference needs, frozen.
 
 An :class:`Observations` means "kinematics have been run": the chain is evaluated at the commands, with the frames and
 displacements that are known so far, and the gap is there. Gauss-Newton re-observes with the corrected model.

@@ -1,14 +1,29 @@
 """The gate: every answer that breaks the contract is refused, with the effect, the parameter and what was found."""
 
+import ast
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 from helpers import SAMPLES, commanded
 
+import thermal_robot
 from thermal_robot import EffectError, diagnose
-from thermal_robot.effects import Effect, Parameter, Response, at_base, at_instrument, at_joint, at_segment, at_tool
+from thermal_robot.correction import CorrectedModel
+from thermal_robot.effects import (
+    Effect,
+    JointOffset,
+    Parameter,
+    Response,
+    at_base,
+    at_instrument,
+    at_joint,
+    at_segment,
+    at_tool,
+    gate,
+)
 from thermal_robot.effects.gate import checked, driver
 from thermal_robot.inference.columns import block
 from thermal_robot.observations import observe
@@ -57,6 +72,9 @@ WRONG = {
     "unit not text": ((replace(GOOD, unit=None),), "unit is None, expected text"),
     "label not text": ((replace(GOOD, label=3),), "label is 3, expected text"),
     "place not text": ((replace(GOOD, place=1),), "place is 1, expected text"),
+    "a joint of no robot": ((replace(GOOD, place="nowhere"),), "place is 'nowhere', expected a joint of the robot"),
+    "a joint for a link": ((replace(GOOD, kind="link"),), "place is 'joint_2', expected a link of the robot"),
+    "a tool elsewhere": ((replace(GOOD, kind="tool"),), "place is 'joint_2', expected 'tool' or a link of the robot"),
     "one response": ((replace(GOOD, responses=at_joint(1, 1.0)),), "responses are Response"),
     "numbers": ((replace(GOOD, responses=(1.0,)),), "a response is float"),
     "channel unknown": (with_response("wrist", 0, np.ones(6)), "channel is 'wrist', expected one of joint, segment"),
@@ -102,6 +120,20 @@ def test_a_right_answer_passes_as_it_is(observations, responses):
     assert checked(Answers(list(given)), observations) == given
 
 
+def test_every_place_of_the_robot_may_be_named(observations):
+    robot = observations.robot
+    right = {
+        "joint": ("", *robot.joint_names, *robot.urdf_joints),
+        "link": ("", robot.root_frame, robot.tool_frame, *(s.parent_link for s in robot.segments)),
+        "base": ("", "base", robot.root_frame),
+        "tool": ("", "tool", robot.tool_frame),
+        "instrument": ("", "instrument"),
+    }
+    for kind, places in right.items():
+        for place in places:
+            assert checked(Answers((replace(GOOD, kind=kind, place=place),)), observations)
+
+
 def test_what_is_no_effect_is_refused(observations):
     with pytest.raises(EffectError, match="not an effect"):
         checked("joint_offset", observations)
@@ -133,3 +165,150 @@ def test_a_driver_is_a_name_a_unit_and_rows(observations):
     ):
         with pytest.raises(EffectError, match="'sagging': driver answers"):
             driver(Answers(drives=wrong), observations, (GOOD,), error)
+
+
+@dataclass(frozen=True)
+class Mine(Effect):
+    """An effect of somebody's own, right in all it says; each test spoils one answer."""
+
+    share: Any = 0.5
+    name = "mine"
+
+    def parameters(self, observations):
+        return (GOOD,)
+
+
+def spoilt(member, answer):
+    """An instance of a :class:`Mine` of which one member raises an exception, answers a value, or is a value."""
+
+    def answers(self, *arguments):
+        if isinstance(answer, Exception):
+            raise answer
+        return answer(self) if callable(answer) else answer
+
+    return type("Spoilt", (Mine,), {member: answer if member == "needs" else answers})()
+
+
+ASK = {
+    "parameters": lambda effect, seen: checked(effect, seen),
+    "missing": lambda effect, seen: gate.missing(effect, seen),
+    "needs": lambda effect, seen: gate.missing(effect, seen),
+    "reads": lambda effect, seen: gate.reads(effect, seen),
+    "variants": lambda effect, seen: gate.variants(effect, seen),
+    "nearby": lambda effect, seen: gate.nearby(effect, 1.6),
+    "at": lambda effect, seen: gate.at(effect, "joint_2"),
+    "driver": lambda effect, seen: driver(effect, seen, (GOOD,), np.zeros(SAMPLES)),
+    "arguments": lambda effect, seen: gate.arguments(effect),
+}
+
+
+@pytest.mark.parametrize("member", [name for name in ASK if name != "needs"])
+def test_whatever_an_effect_raises_names_it_and_what_was_asked(observations, member):
+    cause = KeyError("payload")
+    with pytest.raises(EffectError, match=rf"^effect 'mine': {member}\(\) raised KeyError\('payload'\)$") as caught:
+        ASK[member](spoilt(member, cause), observations)
+    assert caught.value.__cause__ is cause
+
+
+@pytest.mark.parametrize(
+    ("member", "answer", "found"),
+    [
+        ("needs", "speed", "needs is 'speed', expected a tuple of texts"),
+        ("needs", (1,), r"needs is \(1,\)"),
+        ("needs", None, "needs is None"),
+        ("missing", None, "missing answers None, expected a tuple of texts"),
+        ("missing", "speed", "missing answers 'speed'"),
+        ("missing", (1,), r"missing answers \(1,\)"),
+        ("missing", ("",), r"missing answers \('',\)"),
+        ("missing", True, "missing answers True"),
+        ("reads", None, "reads answers None"),
+        ("reads", "speed", "reads answers 'speed'"),
+        ("reads", (1,), r"reads answers \(1,\)"),
+        ("reads", ("nowhere",), r"reads answers \('nowhere',\), expected columns of the campaign"),
+        ("variants", (), r"variants answers \(\), expected a tuple of effects named 'mine', at least one"),
+        ("variants", (1,), r"variants answers \(1,\)"),
+        ("variants", None, "variants answers None"),
+        ("variants", lambda own: own, "variants answers Spoilt"),
+        ("variants", lambda own: (own, JointOffset()), "variants answers .*JointOffset"),
+        ("variants", (Mine,), "variants answers .*Mine"),
+        ("nearby", (), r"nearby answers \(\)"),
+        ("nearby", ("mine",), "nearby answers"),
+        ("nearby", lambda own: (replace(own, share=0.8),), r"nearby answers .*0\.8.*, expected it to hold itself"),
+        ("at", "joint_2", "at answers 'joint_2', expected None or an effect named 'mine'"),
+        ("at", JointOffset(), "at answers JointOffset"),
+        ("at", (), r"at answers \(\)"),
+        ("arguments", None, "arguments answers None, expected numbers, texts and tuples of them by name"),
+        ("arguments", {"share": np.ones(2)}, "arguments answers {'share': array"),
+        ("arguments", {1: 2.0}, "arguments answers {1: 2.0}"),
+    ],
+)
+def test_junk_is_refused_with_what_was_asked(observations, member, answer, found):
+    with pytest.raises(EffectError, match=f"^effect 'mine': {found}"):
+        ASK[member](spoilt(member, answer), observations)
+
+
+def test_right_answers_pass_as_they_are(rv_m2, observations):
+    effect, other, speed = Mine(), Mine(0.8), {"speed": np.arange(float(SAMPLES))}
+    recorded = observe(commanded(rv_m2, speed))
+    assert gate.missing(spoilt("needs", ("speed",)), observations) == ("speed",)
+    assert gate.missing(spoilt("needs", ("speed",)), recorded) == ()
+    assert gate.missing(spoilt("missing", ["masses in the URDF"]), observations) == ("masses in the URDF",)
+    assert gate.reads(spoilt("needs", ("speed",)), recorded) == ("speed",)
+    assert gate.variants(effect, observations) == gate.nearby(effect, 1.6) == (effect,)
+    assert gate.variants(spoilt("variants", [effect, other]), observations) == (effect, other)
+    assert gate.nearby(spoilt("nearby", lambda own: (replace(own, share=0.8), own)), 1.6)[0].share == 0.8
+    assert gate.at(effect, "joint_2") is None
+    assert gate.at(spoilt("at", other), "joint_2") is other
+    assert gate.arguments(JointOffset()) == {}
+    assert gate.arguments(Mine(("a", 1.0))) == {"share": ("a", 1.0)}
+
+
+@pytest.mark.parametrize(
+    ("member", "answer", "found"),
+    [
+        ("variants", (), r"variants answers \(\)"),
+        ("variants", (1,), r"variants answers \(1,\)"),
+        ("missing", None, "missing answers None"),
+        ("needs", "speed", "needs is 'speed'"),
+        ("parameters", KeyError("payload"), r"parameters\(\) raised KeyError\('payload'\)"),
+        ("parameters", (replace(GOOD, place="nowhere"),), "place is 'nowhere'"),
+        ("nearby", (), r"nearby answers \(\)"),
+        ("reads", "speed", "reads answers 'speed'"),
+    ],
+)
+def test_a_diagnosis_asks_through_the_gate(rv_m2, member, answer, found):
+    from simulate import simulate
+
+    data = simulate(rv_m2, samples=40)[0]
+    # joint 2 is off by what the effect can do, so that it is chosen and then asked for all else
+    off = replace(data, q=data.q - 3e-3 * (np.arange(rv_m2.n) == 1))
+    assert diagnose(off, effects=[Mine()], only=["mine"]).verdict == ("mine",)
+    with pytest.raises(EffectError, match=f"^effect 'mine'.*{found}"):
+        diagnose(off, effects=[spoilt(member, answer)], only=["mine"])
+
+
+def test_a_model_is_saved_through_the_gate(rv_m2, observations):
+    campaign, effect = observations.campaign, Mine(np.ones(2))
+    model = CorrectedModel(rv_m2, campaign.settings, observations.frames, ((effect, np.zeros(1)),), "position")
+    with pytest.raises(EffectError, match="'mine': arguments answers"):
+        model.to_dict()
+
+
+def asked_directly(source):
+    """Yield the calls of an effect's methods on anything but the gate; ``at`` of an effect takes one argument."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute) and node.func.attr in ASK:
+            call = ast.unparse(node)
+            if not call.startswith("gate.") and (node.func.attr != "at" or len(node.args) == 1):
+                yield call
+
+
+def test_nobody_asks_an_effect_but_the_gate():
+    assert list(asked_directly("f(e.reads(seen)); gate.reads(e, seen); e.at(joint); np.add.at(a, b, c)")) == [
+        "e.reads(seen)",
+        "e.at(joint)",
+    ]
+    root = Path(thermal_robot.__file__).parent
+    others = [path for path in root.rglob("*.py") if path.parent.name != "effects"]
+    assert len(others) > 100
+    assert {path.name: found for path in others if (found := list(asked_directly(path.read_text("utf-8"))))} == {}

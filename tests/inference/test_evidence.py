@@ -195,7 +195,6 @@ def test_a_column_of_noise_lowers_the_evidence_on_average():
     assert np.mean(np.array(gained) > 0.0) < 0.15
 
 
-@pytest.mark.xfail(strict=True, raises=ValueError, reason="the scale of a block without columns is lost on the way")
 @pytest.mark.parametrize("present", [(), (1,)])
 def test_a_block_of_which_the_data_see_nothing_changes_nothing_but_the_odds(present):
     """An effect that the unknown frames take up whole, alone and beside others."""

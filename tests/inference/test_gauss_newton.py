@@ -51,25 +51,37 @@ def fitted(rv_m2):
     return campaign, explanation, held, seen, gauss_newton(campaign, seen.frames, explanation, held, SETTLED)
 
 
-def test_no_neighbour_of_the_fit_has_a_smaller_misfit(fitted):
-    campaign, explanation, _, _, (observations, held) = fitted
+def assert_least(campaign, explanation, observations, held, step):
+    """No step of a value or a frame lowers the objective: the middle of its parabola is here."""
     least = objective(campaign, explanation, observations.frames, held)
-    steps = []
     for k, (effect, values) in enumerate(held):
-        for p in range(len(values)):
-            steps.append((k, effect, values, np.eye(len(values))[p] * 1e-6))
-    for k, effect, values, step in steps:
-        sides = []
-        for sign in (1.0, -1.0):
-            near = [*held[:k], (effect, values + sign * step), *held[k + 1 :]]
-            sides.append(objective(campaign, explanation, observations.frames, near))
-        # the middle of the parabola lies within a hundredth of its own width
-        bend = sides[0] + sides[1] - 2.0 * least
-        assert abs(sides[0] - sides[1]) / (2.0 * bend) * np.sqrt(bend) < 0.01
+        for axis in np.eye(len(values)):
+            near = [[*held[:k], (effect, values + s * step * axis), *held[k + 1 :]] for s in (1.0, -1.0)]
+            ahead, behind = (objective(campaign, explanation, observations.frames, pairs) for pairs in near)
+            # to within a hundredth of the parabola's own width
+            bend = ahead + behind - 2.0 * least
+            assert abs(ahead - behind) / (2.0 * np.sqrt(bend)) < 0.01
     names = frame_columns(observations)[1]
     for axis in np.eye(len(names)):
-        near = [moved(observations.frames, sign * 1e-5 * axis, names) for sign in (1.0, -1.0)]
+        near = [moved(observations.frames, s * 1e-5 * axis, names) for s in (1.0, -1.0)]
         assert min(objective(campaign, explanation, frames, held) for frames in near) > least
+
+
+def test_no_neighbour_of_the_fit_has_a_smaller_misfit(fitted):
+    campaign, explanation, _, _, (observations, held) = fitted
+    assert_least(campaign, explanation, observations, held, 1e-6)
+
+
+def test_a_firm_prior_is_balanced_against_the_data(rv_m2):
+    """Offsets that are believed to be ten microradians, and are a hundred."""
+    campaign = simulate(rv_m2, ["joint_offset"], seed=6)[0]
+    seen, explanation = explained(campaign, choose(("joint_offset",), (), ()))
+    size = explanation.linear.blocks[0].sizes[0]
+    held = [(explanation.linear.blocks[0].effect, explanation.values[0][0])]
+    firm = replace(explanation, best=replace(explanation.best, scales={0: 1e-5 / size}))
+    free, tight = (gauss_newton(campaign, seen.frames, e, held, SETTLED) for e in (explanation, firm))
+    assert_least(campaign, firm, *tight, 1e-6)
+    assert 0.0 < np.linalg.norm(tight[1][0][1]) < 0.9 * np.linalg.norm(free[1][0][1])
 
 
 def test_the_exact_model_leaves_the_noise_where_the_linear_one_did_not(fitted):

@@ -13,7 +13,7 @@ VISIT, POSE = ("visit", 1), ("pose", 2)
 
 
 def drawn(seed, poses=30, repeats=3, measures=3, noise=1.0, visit=2.0, pose=3.0, common=0.5):
-    """Rows in units of the noise: values, columns, pose, each pose with one Jacobian."""
+    """IndependentRows in units of the noise: values, columns, pose, each pose with one Jacobian."""
     rng = np.random.default_rng(seed)
     columns = rng.normal(size=(poses, measures, JOINTS))
     number = rng.permutation(np.repeat(np.arange(poses), repeats))

@@ -62,7 +62,6 @@ def test_no_setting_is_defined_twice():
     assert [name for name, times in names.items() if times > 1] == []
 
 
-@pytest.mark.xfail(strict=True, reason="six constants of drawn laws stand in diagnosis/one_effect.py instead")
 def test_every_setting_is_used():
     text = "\n".join(path.read_text(encoding="utf-8") for path in ROOT.rglob("*.py") if path.name != "settings.py")
     unused = [name for name, _ in constants(OWN) if f"settings.{name}" not in text]

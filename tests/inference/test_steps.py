@@ -103,12 +103,13 @@ def test_the_quantity_that_errors_follow_is_named(name):
         assert followed(errors, np.full(120, 1e8), known) == name
 
 
-def test_noise_follows_nothing():
+@pytest.mark.parametrize("rows", [25, 120])
+def test_noise_follows_nothing(rows):
+    """Among few errors many a law explains a sixth by chance: it is named once in a thousand campaigns."""
     names = []
     for seed in range(200):
         rng = np.random.default_rng(seed)
-        names.append(followed(1e-4 * rng.normal(size=120), np.full(120, 1e8), recorded(rng)))
-    # at a level of one in a thousand
+        names.append(followed(1e-4 * rng.normal(size=rows), np.full(rows, 1e8), recorded(rng, rows)))
     assert sum(bool(name) for name in names) <= 2
 
 

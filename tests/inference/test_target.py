@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.stats import f as f_law
 from scipy.stats import kstest
 
 from thermal_robot.inference.target import NOTHING, Target
@@ -76,6 +77,16 @@ def test_the_gain_is_the_difference_of_the_bayes_information_criterion():
         assert own.worth(further).gain == pytest.approx(0.5 * falls, rel=1e-6, abs=1e-9)
 
 
+def test_the_p_value_is_that_of_the_f_test_of_two_nested_fits():
+    rng = np.random.default_rng(9)
+    for rows in (6, ROWS):
+        gap, design, further = drawn(rng, rows)
+        before, after = squares(gap, design), squares(gap, np.concatenate([design, further], axis=2))
+        left = 3 * rows - DESIGN - FURTHER
+        expected = f_law.sf((before - after) / FURTHER / (after / left), FURTHER, left)
+        assert plain(gap, design).worth(further).p_value == pytest.approx(expected, rel=1e-6)
+
+
 def test_the_share_is_that_of_what_is_left():
     rng = np.random.default_rng(3)
     shares = []
@@ -94,7 +105,6 @@ def test_columns_that_explain_everything_leave_nothing():
     assert np.isfinite(exact.gain)
 
 
-@pytest.mark.xfail(strict=True, reason="rounding that projection leaves of an exact alias is counted as a column")
 def test_what_the_design_holds_already_is_worth_nothing():
     gap, design, further = drawn(np.random.default_rng(5))
     own = plain(gap, design)

@@ -11,16 +11,16 @@ from numpy.typing import NDArray
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.diagnosis.cautions import cautions
 from thermal_robot.diagnosis.examine import Examined
-from thermal_robot.diagnosis.findings import findings, in_order, separates, titled
+from thermal_robot.diagnosis.findings import by_share, findings, separates, titled
 from thermal_robot.diagnosis.held_out import Shrinkage
 from thermal_robot.diagnosis.parts import Gap, Rows, Unexplained
 from thermal_robot.diagnosis.random_findings import random_findings
 from thermal_robot.diagnosis.result import Diagnosis
 from thermal_robot.diagnosis.schemes import worst_folds
-from thermal_robot.diagnosis.sensitivity import sensitivity
+from thermal_robot.diagnosis.sensitivity import prior_sensitivity
 from thermal_robot.diagnosis.stand_in import stand_ins, trust
 from thermal_robot.diagnosis.where import locate
-from thermal_robot.effects import Effect, random_effects
+from thermal_robot.effects import Effect, gate, random_effects
 from thermal_robot.effects.quantities import unit
 from thermal_robot.inference import settings
 from thermal_robot.inference.discover import Discovery
@@ -89,7 +89,7 @@ def answer(
     believed = trust({name: shares.get(name, 0.0) for name in held}, doubts, _left(last, gap))
     systematic = findings(fit, shrinkage.shares, locations, believed)
     chance = [f for f in random_findings(fit, last.chance, beside_unlisted=remaining.flagged) if asked(f.name)]
-    found = in_order(titled((*systematic, *chance), (*candidates, *random_effects())))
+    found = by_share(titled((*systematic, *chance), (*candidates, *random_effects())))
     return Diagnosis(
         campaign=campaign.name,
         robot=campaign.robot.name,
@@ -108,7 +108,7 @@ def answer(
         model=_model(fit),
         rows=_rows(fit, shrinkage),
         warnings=(*campaign.warnings, *notes, *cautions(fit, candidates if narrowed else (), doubts)),
-        sensitivity=sensitivity(fit),
+        sensitivity=prior_sensitivity(fit),
         fit=fit,
         remaining=remaining,
         # the diagonal of the volume that was measured
@@ -162,7 +162,7 @@ def _gap(last: Conclusion, shrinkage: Shrinkage) -> Gap:
 
 def _model(fit: Fit) -> CorrectedModel:
     campaign = fit.campaign
-    needs = [column for effect, _ in fit.effects for column in effect.reads(fit.nominal)]
+    needs = [column for effect, _ in fit.effects for column in gate.reads(effect, fit.nominal)]
     clock = campaign.covariates.get("order")
     return CorrectedModel(
         robot=campaign.robot,

@@ -83,10 +83,11 @@ def diagnose(
 
 
 def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
-    """Explain the residual of the known effects, until what is left is noise.
+    """Look for what the known effects leave.
 
-    Where scatter of the joints accounts for the residual, the effects are chosen again beside it. Otherwise laws are
-    added one by one. Laws are taken back if they make held-out regions of joint space worse.
+    Scatter is asked first: where joints scatter, and that explains the size of what remains, the effects are chosen
+    again beside it, and that is the end. Otherwise, as long as what remains is not noise, one law after another joins
+    the explanation, while each is worth its place and rows of regions held out do not get worse.
     """
     stages = [Stage(known, (), examine(known, progress))]
     chance = random_gap(known)

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from thermal_robot.diagnosis.parts import Estimate, Finding, Location, Status, is_frame
-from thermal_robot.effects import Effect, library
+from thermal_robot.effects import Effect, gate, library
 from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import orthonormal, whitener, without
@@ -78,6 +78,7 @@ def findings(
 def titled(found: Sequence[Finding], effects: Iterable[Effect]) -> tuple[Finding, ...]:
     """Return the findings with titles: that of the effect, or what a discovered law describes."""
     known = {effect.name: effect for effect in effects}
+    found = [replace(f, probability=settings.MOST_SAID) if _unsaid(f) else f for f in found]
     return tuple(
         replace(f, title=known[f.name].title, random=known[f.name].random)
         if f.name in known
@@ -86,7 +87,12 @@ def titled(found: Sequence[Finding], effects: Iterable[Effect]) -> tuple[Finding
     )
 
 
-def in_order(found: Sequence[Finding]) -> tuple[Finding, ...]:
+def _unsaid(finding: Finding) -> bool:
+    """Whether an effect is not found although it is more likely there than not, in one place or another."""
+    return finding.status == "not_found" and (finding.probability or 0.0) > settings.MOST_SAID
+
+
+def by_share(found: Sequence[Finding]) -> tuple[Finding, ...]:
     """Sort by held-out share, then by probability; what is not testable comes last."""
     return tuple(
         sorted(found, key=lambda f: (f.status == "not_testable", -(f.shrinkage or 0.0), -(f.probability or 0.0)))
@@ -96,7 +102,7 @@ def in_order(found: Sequence[Finding]) -> tuple[Finding, ...]:
 def _unknown_frames(fit: Fit) -> tuple[str, ...]:
     """Return the names of the frame effects whose frame is unknown and therefore fitted."""
     frames = [effect for effect in library().values() if effect.frame]
-    return tuple(effect.name for effect in frames if effect.missing(fit.nominal))
+    return tuple(effect.name for effect in frames if gate.missing(effect, fit.nominal))
 
 
 def _within_frames(fit: Fit, block: int) -> bool:

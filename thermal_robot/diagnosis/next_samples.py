@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign
+from thermal_robot.effects import gate
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.evidence import Combination
@@ -229,7 +230,7 @@ def _leading(fit: Fit) -> tuple[list[Combination], Array]:
 def _conditions(fit: Fit, leading: Sequence[Combination]) -> list[str]:
     """Columns that an explanation depends on and that can be commanded."""
     listed = {b for combination in leading for b in combination.blocks}
-    read = {name for b in listed for name in fit.explanation.linear.blocks[b].effect.reads(fit.nominal)}
+    read = {name for b in listed for name in gate.reads(fit.explanation.linear.blocks[b].effect, fit.nominal)}
     return [n for n in fit.campaign.covariates if n in read and n.partition(".")[0] not in _GIVEN]
 
 

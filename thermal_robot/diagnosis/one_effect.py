@@ -20,20 +20,12 @@ from thermal_robot.effects.effect import Channel, Driver
 from thermal_robot.effects.gate import driver
 from thermal_robot.effects.quantities import quantities, unit
 from thermal_robot.errors import EffectError
+from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.fit import Fit
 from thermal_robot.observations import Observations
 
 Array = NDArray[np.float64]
-
-_PURE = 1e-6  # of a unit twist, m or rad: with less of one kind it is all of the other
-_MATERIAL = 0.03  # of what the effect does: a place with less is not worth a panel
-_MOST = 8  # panels that a page can hold
-_LEVELS = 6  # values of a quantity, up to which each is a level and not a point of a curve
-_LINE = 25  # points of a law whose rows scatter about it, because it follows other quantities, too
-_ROUGH = 0.01  # of the law's range: neighbours that differ by less follow this quantity alone
-_NEIGHBOURS = 8  # rows that are taken together when asking whether an error follows a quantity
-_FINEST = 400  # points of a law that is drawn row by row
 
 
 def explained(fit: Fit, effect: str) -> Explained:
@@ -58,7 +50,7 @@ def explained(fit: Fit, effect: str) -> Explained:
     setting, values = held[effect]
     parameters = block(fit.corrected, setting).parameters
     found = [p for p in locate(fit, {effect: 1.0})[1][effect] if p.share > 0.0]
-    shown = [p for p in found if p.share >= _MATERIAL][:_MOST]
+    shown = [p for p in found if p.share >= settings.MATERIAL_PLACE][: settings.MOST_PLACES]
     rows, robot = ~fit.explanation.outliers, fit.campaign.robot
     places = []
     for location in shown:
@@ -88,7 +80,7 @@ def _shown(
         name,
         name_unit,
         values,
-        len(np.unique(values)) <= _LEVELS,
+        len(np.unique(values)) <= settings.FEW_LEVELS,
         unit,
         error + after,
         after,
@@ -129,7 +121,7 @@ def _error(observations: Observations, parameters: list[tuple[Parameter, float]]
     direction = moves @ main
     if len(parts) == 1:
         shift, turn = np.linalg.norm(main[:3]), np.linalg.norm(main[3:])
-        if min(shift, turn) < _PURE:
+        if min(shift, turn) < settings.PURE:
             return twists @ main, direction, "m" if shift > turn else "rad"
     size = float(np.sqrt((direction[:, :3] ** 2).sum(axis=1).mean()))
     return twists @ main * size, direction / max(size, 1e-300), "m at the tool"
@@ -148,19 +140,24 @@ def _driver(
 
 def _unsteady(values: Array, error: Array) -> float:
     """Mean variance of the error among rows with neighbouring values of a quantity."""
-    parts = np.array_split(error[np.argsort(values, kind="stable")], max(len(error) // _NEIGHBOURS, 2))
+    parts = np.array_split(error[np.argsort(values, kind="stable")], max(len(error) // settings.ROWS_ALIKE, 2))
     return float(np.mean([part.var() for part in parts if len(part)]))
 
 
 def _line(values: Array, error: Array) -> Array:
     """(2, k) the fitted law over its quantity; means of neighbouring rows where it depends on others, too."""
     levels = np.unique(values)
-    if len(levels) <= _LEVELS:
+    if len(levels) <= settings.FEW_LEVELS:
         return np.array([levels, [error[values == level].mean() for level in levels]])
     order = np.argsort(values, kind="stable")
     x, y = values[order], error[order]
     # a law of this quantity alone lies between its neighbours
     between = np.interp(x[1:-1:2], x[::2], y[::2])[: len(x[1:-1:2])]
-    alone = float(np.abs(between - y[1:-1:2]).mean()) < _ROUGH * float(np.ptp(y)) + 1e-300
-    parts = np.array_split(order, min(len(order), _FINEST) if alone else min(_LINE, max(len(order) // 10, 2)))
+    alone = float(np.abs(between - y[1:-1:2]).mean()) < settings.ROUGH * float(np.ptp(y)) + settings.TINY
+    parts = np.array_split(
+        order,
+        min(len(order), settings.DENSE_POINTS)
+        if alone
+        else min(settings.LINE_POINTS, max(len(order) // settings.ROWS_A_POINT, 2)),
+    )
     return np.array([[values[p].mean() for p in parts], [error[p].mean() for p in parts]])

@@ -168,7 +168,16 @@ class Where:
 
 @dataclass(frozen=True)
 class Dependence:
-    """A recorded quantity that the residual follows, with its p-value corrected for all that were tried."""
+    """A recorded quantity that the remainder follows.
+
+    Attributes
+    ----------
+    covariate
+        Its name.
+    p_value
+        Of an F test, after counting every quantity that was tried; where a discovered law follows it, exp(−gain), the
+        odds that the data give against that law.
+    """
 
     covariate: str
     p_value: float

@@ -13,7 +13,7 @@ from thermal_robot.inference.explain import log_priors
 from thermal_robot.inference.fit import Fit
 
 
-def sensitivity(fit: Fit) -> Sensitivity:
+def prior_sensitivity(fit: Fit) -> Sensitivity:
     """Recompute the probability of the verdict with all prior sizes divided and multiplied by ``PRIOR_FACTOR``.
 
     The scale of each effect is learnt from the data, with the prior ln λ ~ N(0, 1.5²) about the stated size. The

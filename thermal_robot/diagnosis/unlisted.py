@@ -9,7 +9,7 @@ import numpy as np
 
 from thermal_robot.diagnosis.examine import Examined, examine
 from thermal_robot.diagnosis.parts import Dependence, Location, Unexplained
-from thermal_robot.effects import Effect
+from thermal_robot.effects import Effect, gate
 from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.inference import settings
 from thermal_robot.inference.discover import Discovery, discover
@@ -75,7 +75,7 @@ def _alone(fit: Fit, law: Discovered) -> dict[str, tuple[Effect, ...]]:
     """
     if law.kind != "joint" or law.quantity != law.place:
         return {}
-    own = {name: (settings, settings[0].at(law.place)) for name, settings in fit.variants.items()}
+    own = {name: (variants, gate.at(variants[0], law.place)) for name, variants in fit.variants.items()}
     return {name: (*known, single) for name, (known, single) in own.items() if single and single not in known}
 
 

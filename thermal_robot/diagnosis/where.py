@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from thermal_robot.diagnosis.parts import Location, Where
 from thermal_robot.effects.channel import by_place, column
 from thermal_robot.effects.quantities import quantities
+from thermal_robot.inference.algebra import orthonormal, without
 from thermal_robot.inference.columns import Block
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.laws import smooth_columns
@@ -40,7 +41,7 @@ def locate(fit: Fit, shrinkage: dict[str, float]) -> tuple[Where, dict[str, tupl
     rows = np.flatnonzero(~e.outliers)
     gap = fit.nominal.gap[rows, :3]
     frames = e.linear.frames[rows].reshape(-1, e.linear.frames.shape[2]) if e.linear.frames.shape[2] else None
-    basis = np.linalg.qr(frames)[0] if frames is not None else None
+    basis = orthonormal(frames) if frames is not None else None
     locations: dict[str, tuple[Location, ...]] = {}
     by_kind: dict[str, dict[str, float]] = {"joint": defaultdict(float), "link": defaultdict(float)}
     for b, (effect, values) in zip(e.best.blocks, fit.effects, strict=True):
@@ -49,7 +50,7 @@ def locate(fit: Fit, shrinkage: dict[str, float]) -> tuple[Where, dict[str, tupl
         for site, displaced in _displaced(fit.corrected, block, values).items():
             moved = displaced[rows].ravel()
             if basis is not None:
-                moved = moved - basis @ (basis.T @ moved)
+                moved = without(moved, basis)
             power[site] = float((moved.reshape(len(rows), -1)[:, :3] ** 2).sum())
         total = sum(power.values()) or 1.0
         share = max(shrinkage.get(effect.name, 0.0), 0.0)

@@ -3,7 +3,7 @@
 An effect is a frozen dataclass that names its parameters and gives, for each, the *unit response*: what a
 parameter of one unit does in the channels, read from the observations. It calls no kinematics, fits nothing and
 holds no fitted value. Constructor arguments carry what is nonlinear (a time constant, an origin of time, an order);
-:meth:`Effect.variants` proposes values for them, and estimation chooses.
+:meth:`Effect.variants` proposes values for them, and inference chooses.
 
 A new effect is a file like this one::
 
@@ -25,6 +25,9 @@ Register it under the entry point group ``thermal_robot.effects`` or pass it to 
 others want to know of it stands in the same class, each with a default: ``title`` (in plain words), ``frame`` and
 ``contained_in`` (what it cannot be told from), ``missing`` and ``reads`` (columns), ``variants``, ``nearby`` and ``at``
 (settings), ``driver`` (what it is drawn against).
+
+Nobody asks an effect directly: :mod:`thermal_robot.effects.gate` does, checks the answer, and names the effect where it
+breaks the contract or raises.
 """
 
 from __future__ import annotations
@@ -110,7 +113,8 @@ class Parameter:
     kind
         ``joint``, ``link``, ``base``, ``tool`` or ``instrument``: the kind of place it sits in.
     place
-        The joint's or link's URDF name.
+        The joint's or link's URDF name; ``base``, ``tool`` or ``instrument`` (or a link) for these kinds; empty for all
+        that the responses act on.
     responses
         What one unit does in the channels.
     """
@@ -165,7 +169,7 @@ class Effect(ABC):
         return tuple(need for need in self.needs if need in observations.covariates)
 
     def variants(self, observations: Observations) -> tuple[Effect, ...]:
-        """Return the settings of the nonlinear arguments that estimation should compare: the coarse grid.
+        """Return the settings of the nonlinear arguments that inference should compare: the coarse grid.
 
         What a setting takes from the campaign (an origin of time, a record) is fixed here, once, so that a saved model
         predicts other samples with it.

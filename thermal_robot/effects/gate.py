@@ -1,7 +1,12 @@
-"""The one gate through which everybody gets an effect's answers: one that breaks the contract is refused."""
+"""The one gate through which everybody gets an effect's answers: one that breaks the contract is refused.
+
+An effect may be anybody's code. What it raises ends in an ``EffectError`` that names the effect and what was asked, and
+so does an answer of the wrong type or content.
+"""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Sequence
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, get_args
@@ -13,6 +18,7 @@ from thermal_robot.errors import EffectError
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
+    from thermal_robot.robot import Robot
 
 KINDS = ("joint", "link", "base", "tool", "instrument")
 """Kinds of place that a parameter may sit in."""
@@ -31,17 +37,17 @@ def checked(effect: Effect, observations: Observations) -> tuple[Parameter, ...]
     Returns
     -------
     tuple of Parameter
-        Each with a name of its own, a known kind of place, a positive size, and responses of finite values in a
-        channel and at an index that the robot has, of that channel's shape (see :class:`Response`).
+        Each with a name of its own, a known kind of place, a place of that kind that the robot has (or none), a
+        positive size, and responses of finite values in a channel and at an index that the robot has, of that
+        channel's shape (see :class:`Response`).
 
     Raises
     ------
     EffectError
-        Otherwise; names the effect, the parameter, what was found and what was expected.
+        Otherwise, or if the effect raises anything; names the effect, the parameter, what was found and what was
+        expected.
     """
-    if not isinstance(effect, Effect):
-        raise EffectError(f"{effect!r} is not an effect; expected an instance of a subclass of Effect")
-    answer: Any = effect.parameters(observations)
+    answer = _asked(effect, "parameters", observations)
     if not isinstance(answer, (tuple, list)):
         raise EffectError(f"effect {effect.name!r} answers {type(answer).__name__}, expected a tuple of Parameter")
     names = set()
@@ -67,7 +73,7 @@ def driver(effect: Effect, observations: Observations, parameters: Sequence[Para
     EffectError
         If it is not a name, a unit and (N,) finite values.
     """
-    answer: Any = effect.driver(observations, parameters, error)
+    answer = _asked(effect, "driver", observations, parameters, error)
     if answer is None:
         return None
     if isinstance(answer, tuple) and len(answer) == 3:
@@ -78,6 +84,120 @@ def driver(effect: Effect, observations: Observations, parameters: Sequence[Para
     raise EffectError(
         f"effect {effect.name!r}: driver answers {answer!r}, expected name, unit and {len(error)} finite values"
     )
+
+
+def missing(effect: Effect, observations: Observations) -> tuple[str, ...]:
+    """Return what the campaign lacks for an effect (:meth:`Effect.missing`); its ``needs`` are checked, too.
+
+    Raises
+    ------
+    EffectError
+        If either is not a tuple of texts.
+    """
+    if isinstance(effect, Effect):
+        _texts(effect, "needs is", effect.needs)
+    return _texts(effect, "missing answers", _asked(effect, "missing", observations))
+
+
+def reads(effect: Effect, observations: Observations) -> tuple[str, ...]:
+    """Return the covariates that an effect reads (:meth:`Effect.reads`).
+
+    Raises
+    ------
+    EffectError
+        If they are not a tuple of names of columns that the campaign has.
+    """
+    answer = _texts(effect, "reads answers", _asked(effect, "reads", observations))
+    if any(column not in observations.covariates for column in answer):
+        raise EffectError(f"effect {effect.name!r}: reads answers {answer!r}, expected columns of the campaign")
+    return answer
+
+
+def variants(effect: Effect, observations: Observations) -> tuple[Effect, ...]:
+    """Return the settings of an effect that are compared (:meth:`Effect.variants`).
+
+    Raises
+    ------
+    EffectError
+        If they are not a tuple of at least one effect, each of this one's name.
+    """
+    return _settings(effect, "variants", _asked(effect, "variants", observations))
+
+
+def nearby(effect: Effect, factor: float) -> tuple[Effect, ...]:
+    """Return settings near an effect's own (:meth:`Effect.nearby`).
+
+    Raises
+    ------
+    EffectError
+        If they are not a tuple of effects of this one's name, itself among them.
+    """
+    answer = _settings(effect, "nearby", _asked(effect, "nearby", factor))
+    if effect not in answer:
+        raise EffectError(f"effect {effect.name!r}: nearby answers {answer!r}, expected it to hold itself, {effect!r}")
+    return answer
+
+
+def at(effect: Effect, joint: str) -> Effect | None:
+    """Return an effect in one joint alone (:meth:`Effect.at`); ``None`` where it has no such setting.
+
+    Raises
+    ------
+    EffectError
+        If it is something else than an effect of this one's name.
+    """
+    answer = _asked(effect, "at", joint)
+    if answer is None or _is_setting(effect, answer):
+        return answer  # type: ignore[no-any-return]
+    raise EffectError(
+        f"effect {effect.name!r}: at answers {answer!r}, expected None or an effect named {effect.name!r}"
+    )
+
+
+def arguments(effect: Effect) -> dict[str, Any]:
+    """Return the arguments of an effect, for saving (:meth:`Effect.arguments`).
+
+    Raises
+    ------
+    EffectError
+        If they are not values by name that JSON can hold.
+    """
+    answer = _asked(effect, "arguments")
+    try:
+        json.dumps(answer)
+        if isinstance(answer, dict) and all(isinstance(name, str) for name in answer):
+            return answer
+    except (TypeError, ValueError):
+        pass
+    expected = "numbers, texts and tuples of them by name"
+    raise EffectError(f"effect {effect.name!r}: arguments answers {answer!r}, expected {expected}")
+
+
+def _asked(effect: Effect, question: str, *about: Any) -> Any:
+    """Return what a method of an effect answers; whatever it raises names the effect and the method."""
+    if not isinstance(effect, Effect):
+        raise EffectError(f"{effect!r} is not an effect; expected an instance of a subclass of Effect")
+    try:
+        return getattr(effect, question)(*about)
+    except Exception as error:  # somebody else's code may raise anything
+        raise EffectError(f"effect {effect.name!r}: {question}() raised {error!r}") from error
+
+
+def _texts(effect: Effect, what: str, answer: Any) -> tuple[str, ...]:
+    if isinstance(answer, (tuple, list)) and all(isinstance(text, str) and text for text in answer):
+        return tuple(answer)
+    raise EffectError(f"effect {effect.name!r}: {what} {answer!r}, expected a tuple of texts")
+
+
+def _settings(effect: Effect, question: str, answer: Any) -> tuple[Effect, ...]:
+    if isinstance(answer, (tuple, list)) and answer and all(_is_setting(effect, other) for other in answer):
+        return tuple(answer)
+    expected = f"effects named {effect.name!r}, at least one"
+    raise EffectError(f"effect {effect.name!r}: {question} answers {answer!r}, expected a tuple of {expected}")
+
+
+def _is_setting(effect: Effect, answer: Any) -> bool:
+    return isinstance(answer, Effect) and answer.name == effect.name
 
 
 def _wrong(parameter: Any, observations: Observations) -> str:
@@ -91,7 +211,17 @@ def _wrong(parameter: Any, observations: Observations) -> str:
         return f"size is {parameter.size!r}, expected a finite number above 0"
     if not isinstance(parameter.responses, (tuple, list)):
         return f"responses are {type(parameter.responses).__name__}, expected a tuple of Response"
-    return next((wrong for r in parameter.responses if (wrong := _wrong_response(r, observations))), "")
+    wrong = next((wrong for r in parameter.responses if (wrong := _wrong_response(r, observations))), "")
+    return wrong or _wrong_place(parameter, observations.robot)
+
+
+def _wrong_place(parameter: Parameter, robot: Robot) -> str:
+    kind, place = parameter.kind, parameter.place
+    known = robot.urdf_joints if kind == "joint" else robot.urdf_links
+    own = kind in ("joint", "link")
+    if not place or place in known or (place == kind and not own):
+        return ""
+    return f"place is {place!r}, expected {f'a {kind}' if own else f'{kind!r} or a link'} of the robot"
 
 
 def _wrong_response(response: Any, observations: Observations) -> str:

@@ -1,6 +1,6 @@
-"""Directions that the data see: here, and only here, columns are scaled, weak directions dropped, the rest solved for.
+"""Least squares in the directions that the data determine: the one place where weak directions are dropped.
 
-Every function scales to unit columns first, so that one floor serves metres, radians and coefficients alike.
+Every function scales its columns to unit length first, so that one floor serves metres, radians and coefficients alike.
 """
 
 from __future__ import annotations
@@ -14,9 +14,9 @@ Array = NDArray[np.float64]
 
 
 def whitener(gram: Array, floor: float = settings.SEEN) -> Array:
-    """Return R (D, r) with Rᵀ G R = 1: columns with the Gram matrix G (D, D), times R, are orthonormal.
+    """Return R (D, r) with Rᵀ G R = 1: it makes columns with the Gram matrix G (D, D) orthonormal.
 
-    Directions whose eigenvalue, of the matrix scaled to a unit diagonal, lies below ``floor`` times the largest are
+    G is first scaled to a unit diagonal. Directions whose eigenvalue is then below ``floor`` times the largest are
     left out: what remains of them is rounding.
     """
     length = np.sqrt(np.maximum(np.diag(gram), 0.0))
@@ -27,31 +27,31 @@ def whitener(gram: Array, floor: float = settings.SEEN) -> Array:
 
 
 def solve(matrix: Array, vector: Array) -> Array:
-    """Return the (D,) least-squares solution of normal equations; what nothing determines is zero."""
+    """Return the (D,) least-squares solution of normal equations, zero in directions that nothing determines."""
     root = whitener(matrix)
     return np.asarray(root @ (root.T @ vector))
 
 
 def orthonormal(columns: Array) -> Array:
-    """Return (E, r) an orthonormal basis of what (E, D) columns span."""
+    """Return an orthonormal basis (E, r) of the span of columns (E, D)."""
     scaled = columns / (np.linalg.norm(columns, axis=0) + settings.TINY)
     return np.linalg.qr(scaled @ whitener(scaled.T @ scaled))[0]
 
 
 def without(columns: Array, basis: Array) -> Array:
-    """Return (E, ...) columns with an orthonormal basis (E, r) projected out."""
+    """Return columns (E, ...) with the span of an orthonormal basis (E, r) projected out."""
     return np.asarray(columns - basis @ (basis.T @ columns))
 
 
 def ridge(products: Array, flat: int, prior: Array) -> Array:
-    """Return the (K,) solution of a fit from its sums of products alone.
+    """Return the (K,) posterior mean of a linear fit with normal priors, from its sums of products alone.
 
     Parameters
     ----------
     products
         (K + 1, K + 1) products of K columns and the values, summed over the rows.
     flat
-        How many columns come first that have no prior; what nothing determines stays where it is.
+        Number of leading columns without a prior. Those that nothing determines stay at zero.
     prior
         (K − flat,) one over the prior variance of each other column, in the units of ``products``.
     """

@@ -1,4 +1,4 @@
-"""From effects to columns: what each parameter does to the gap, and what the unknown frames do."""
+"""From effects to columns: the derivative of the gap by each parameter, and by the unknown frames."""
 
 from __future__ import annotations
 
@@ -54,7 +54,7 @@ def block(observations: Observations, effect: Effect) -> Block:
             columns[:, :, p] += column(observations, response, measures)
     sizes = np.array([parameter.size for parameter in parameters])
     if effect.name in campaign.priors and len(sizes):
-        # one size is stated for the effect; where its parameters differ in unit, their default proportions stay
+        # one size is stated for the whole effect: its parameters keep their default proportions
         sizes = sizes * (campaign.priors[effect.name] / sizes[0])
     return Block(effect, parameters, columns, sizes)
 
@@ -63,7 +63,7 @@ def frame_columns(observations: Observations) -> tuple[Array, tuple[str, ...]]:
     """(N, m, f) derivative of the gap by the unknown frames, and what each column is.
 
     Base: twist in the root frame. Tool: translation of the target in the tool frame, and its turn where orientation is
-    measured. An unknown tool is not refitted to a simulator's prediction.
+    measured. Where the campaign brings a simulator's prediction, that holds the tool, and it is not fitted.
     """
     campaign = observations.campaign
     measures = 6 if campaign.measures == "pose" else 3

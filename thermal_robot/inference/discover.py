@@ -1,4 +1,4 @@
-"""Causes that nobody listed: laws of places and quantities that join the known effects in one comparison."""
+"""Unlisted causes: laws of places and quantities that compete with the known effects in one comparison."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Discovery:
     beside
         Names of the known effects that stay beside it.
     rarity
-        Log prior probability lost to the number of laws that were tried.
+        Log prior odds of having been picked out of all the laws that were tried; below zero.
     gain
         Log evidence over the best combination without a law.
     places
@@ -53,9 +53,9 @@ class Discovery:
 def discover(fit: Fit, number: int) -> Discovery | None:
     """Scan every place and quantity for a law; ``None`` where none is worth its place.
 
-    Two remainders are scanned, that of the explanation and that of the frames alone: where known effects have taken
-    part of an unlisted cause upon themselves, it shows in the second only. The best candidates then compete with the
-    known effects in one comparison, so that these can go again.
+    Two remainders are scanned: that of the explanation, and that of the frames alone. Known effects may have absorbed
+    part of an unlisted cause, which then shows in the second only. The best candidates compete with the known effects
+    in one comparison, so that effects that merely stood in for a law are dropped again.
 
     Parameters
     ----------
@@ -83,7 +83,7 @@ def discover(fit: Fit, number: int) -> Discovery | None:
 
 
 def _with_joints(own: Sequence[Scanned]) -> list[Scanned]:
-    """Return the first candidates, and beside that of a segment the joint behind it, which is simpler."""
+    """Return the best candidates; where one is at a segment, also the law of the joint behind it, which is simpler."""
     first = list(own[: settings.SHAPED])
     simpler = {(i.law.place, i.law.quantity) for i in first if i.law.kind == "link"}
     return first + [
@@ -104,7 +104,7 @@ def _in_turn(lists: Sequence[Sequence[Discovered]], everything: Sequence[Discove
 
 
 def _compare(fit: Fit, thin: Thin, laws: Sequence[Discovered], tried: int) -> Discovery | None:
-    """Climb over the known effects and one law at a time; what the law's presence allows to go, goes."""
+    """Search over known effects and one law at a time; effects that are no longer needed beside the law are dropped."""
     e = fit.explanation
     known = len(e.linear.blocks)
     problem = gram(_with(thin, laws), _all_rows(fit, thin))
@@ -181,7 +181,7 @@ def instead(fit: Fit, name: str) -> tuple[Discovered, float] | None:
 
 
 def _climb(search: Search, best: Combination, known: int, barred: frozenset[int] = frozenset()) -> Combination:
-    """Add, drop, or exchange for another law, while it helps; pairs of known effects are not exchanged here."""
+    """Add or drop one block, or exchange one law for another, while the evidence grows."""
     count = len(search.gram.slices)
     while True:
         around = [(*best.blocks, b) for b in range(count) if b not in best.blocks and b not in barred]
@@ -204,7 +204,7 @@ def _with(thin: Thin, laws: Sequence[Discovered]) -> Linear:
 
 
 def _all_rows(fit: Fit, thin: Thin) -> Whitening:
-    """Weigh every row, those set aside by how far they lie: under another explanation they may be sound."""
+    """Weigh every row, those set aside by their distance: under another explanation they may be sound."""
     stated = (fit.campaign.noise_position, fit.campaign.noise_orientation)
     noise = thin.whitening.noise.copy()
     for part, sigma in enumerate(stated[: len(noise) // 3]):

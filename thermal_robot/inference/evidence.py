@@ -5,8 +5,9 @@ blocks that are in the combination. F is projected out first. For a combination 
 
     log p(y | γ) = −½ [ n log s² + log|I + Λ G/s²| + (y'y − b'(G + s²Λ⁻¹)⁻¹ b)/s² ] + log p(s) + log p(λ),
 
-with G = X'X and b = X'y restricted to γ. The scales s and λ_b are found by MacKay's fixed point (*Neural Computation*
-4, 1992), their priors being scaled inverse chi-square about the stated noise, and log-normal about the stated sizes;
+with G = X'X and b = X'y restricted to γ. Noise s and scales λ_b are found at their most probable values, s by MacKay's
+fixed point (*Neural Computation* 4, 1992), ln λ_b by Newton's steps; their priors are scaled inverse chi-square about
+the stated noise, and log-normal about the stated sizes;
 ln λ is integrated out by Laplace's method, s held.
 """
 
@@ -83,6 +84,8 @@ class Combination:
         Posterior mean of the reduced columns, block after block.
     covariance
         Their posterior covariance.
+    effective
+        How many parameters the data determine.
     """
 
     blocks: tuple[int, ...]
@@ -192,7 +195,7 @@ class _Posterior:
         """Solve (G/s² + Λ⁻¹) θ = b/s²."""
         size = len(vector)
         if not size:
-            return cls(np.zeros(0), np.zeros((0, 0)), 0.0, np.zeros(0), np.zeros(0))
+            return cls(np.zeros(0), np.zeros((0, 0)), 0.0, np.zeros(len(scale)), np.zeros(len(scale)))
         diagonal = np.diag_indices(size)
         precision = matrix / variance
         precision[diagonal] += 1.0 / scale[owner] ** 2

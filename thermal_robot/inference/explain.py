@@ -19,12 +19,12 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Explanation:
-    """What the data speak for, and how sure they are.
+    """The most probable combination of effects, with its outliers and noise, and the probability of each rival.
 
     Attributes
     ----------
     linear, whitening, problem
-        The problem, with the weights and the noise that were settled on.
+        The linear problem, and the final weights and noise; ``problem`` is its Gram matrix.
     best
         The most probable combination.
     combinations, probabilities
@@ -34,11 +34,11 @@ class Explanation:
     frame_step
         (f,) step of the frames that goes with it.
     remainder
-        (N, m) gap − all of it, for all rows, used or not.
+        (N, m) residual: gap less effects and frames, for all rows, used or not.
     outliers
         (N,) True for rows set aside.
     design_effect
-        How many rows were taken to be worth one.
+        How many rows count as one independent row.
     """
 
     linear: Linear
@@ -54,7 +54,7 @@ class Explanation:
     design_effect: float
 
     def far(self, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
-        """(N,) True for those of the given rows that lie further from this explanation than noise allows."""
+        """(N,) True for those of the given rows whose residual is larger than noise allows."""
         distance2 = ((self.remainder / (self.whitening.noise * self.best.noise)) ** 2).sum(axis=1)
         return np.asarray(rows & (distance2 > distance_limit(self.linear.measures, len(rows))))
 
@@ -84,7 +84,7 @@ def explain(
     noise
         As the campaign states it.
     rows
-        (N,) rows to use; all where absent. What is learnt comes from these alone.
+        (N,) rows to use; all where absent. The others are held out: they bear on nothing.
     families
         Name of the effect that each block belongs to: blocks of one effect are settings that exclude each other and
         share its prior probability.
@@ -93,13 +93,13 @@ def explain(
     groups
         Labels (N,) of rows that belong together, several groupings: see :func:`design_effect`.
     rarity
-        By family: what its log prior odds are less than another's, because it was picked out of many.
+        By family: added to its log prior odds, below zero for one that was picked out of many.
 
     Returns
     -------
     Explanation
-        Gross errors do not bear on it: rows further than noise allows from the explanation are set aside, and rows in
-        the tail weigh less (Huber).
+        Robust: rows further than noise allows from the explanation are set aside, and rows in the tail weigh less
+        (Huber).
     """
     measures, samples = linear.measures, len(linear.gap)
     use = np.ones(samples, dtype=bool) if rows is None else rows

@@ -1,4 +1,4 @@
-"""The whole estimation: frames, then effects jointly, then the exact model of the explanation by Gauss-Newton."""
+"""The whole fit: frames, then effects jointly, then the exact model of the explanation by Gauss-Newton."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign
-from thermal_robot.effects import Effect
+from thermal_robot.effects import Effect, gate
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import frame_columns
@@ -88,8 +88,8 @@ def fit(campaign: Campaign, effects: Sequence[Effect], progress: Callable[[str],
     progress("unknown frames")
     _require_enough(campaign)
     nominal = observe(campaign, register(campaign))
-    needs = {e.name: missing for e in effects if (missing := e.missing(nominal))}
-    variants = {e.name: e.variants(nominal) for e in effects if e.name not in needs}
+    needs = {e.name: missing for e in effects if (missing := gate.missing(e, nominal))}
+    variants = {e.name: gate.variants(e, nominal) for e in effects if e.name not in needs}
     groups = row_groups(campaign)
     settled = settle(nominal, variants, groups, progress)
     if settled.second_order:

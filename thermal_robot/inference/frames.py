@@ -1,4 +1,4 @@
-"""Unknown frames, fitted exactly before anything else: the tracker may stand anywhere, turned by any angle."""
+"""Unknown frames, fitted exactly before any effect: the tracker may stand anywhere, turned by any angle."""
 
 from __future__ import annotations
 
@@ -133,7 +133,7 @@ def _refine(campaign: Campaign, frames: Frames, robust: bool) -> Frames:
         for part in (slice(0, 3), slice(3, 6))[: gap.shape[1] // 3]:
             distance = np.linalg.norm(gap[:, part], axis=1)
             weight = np.sqrt(_soft(distance)) if robust else np.ones(len(distance))
-            root_weight[:, part] = weight[:, None] / (np.median(distance) + 1e-15)
+            root_weight[:, part] = weight[:, None] / (np.median(distance) + settings.NO_DISTANCE)
         design = (columns * root_weight[:, :, None]).reshape(-1, len(names))
         step = solve(design.T @ design, design.T @ (gap * root_weight).ravel())
         frames = moved(frames, step, names)

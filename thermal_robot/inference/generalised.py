@@ -1,4 +1,4 @@
-"""The linear problem in the covariance of a scatter: rows in units in which all are equally sure."""
+"""Generalised least squares: the linear problem whitened by the covariance of each row."""
 
 from __future__ import annotations
 
@@ -13,16 +13,18 @@ Array = NDArray[np.float64]
 
 
 def generalised(linear: Linear, covariance: Array, noise: Array) -> Linear:
-    """Return the problem multiplied with diag(noise) L⁻¹ in each row, L Lᵀ its covariance (Aitken 1935).
+    """Return the problem with each row multiplied by diag(noise) L⁻¹, where L Lᵀ is its covariance (Aitken 1935).
+
+    All rows then have the covariance diag(noise²).
 
     Parameters
     ----------
     linear
         The problem, N rows of m components.
     covariance
-        (N, m, m) of what is left in each row: m², m rad, rad².
+        (N, m, m) of the residual of each row: m², m rad, rad².
     noise
-        (m,) one sigma of each component that the result shall have: m, rad.
+        (m,) one sigma of each component of the result: m, rad.
     """
     root = np.linalg.cholesky(covariance)
 

@@ -1,4 +1,4 @@
-"""The grammar of laws that nobody wrote down: which places, quantities and shapes are tried."""
+"""Candidate laws for an unlisted cause: the places, quantities and shapes that are tried."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ CLOCK = ("time", "order")
 
 
 def laws(observations: Observations, kinds: Sequence[str], names: Iterable[str] | None = None) -> list[Discovered]:
-    """Return a smooth law of every quantity at every place of some kinds; at a segment also a constant one.
+    """Return a smooth law of each quantity at each place of the given kinds, and at a segment a constant one, too.
 
     Parameters
     ----------
@@ -57,7 +57,7 @@ def laws(observations: Observations, kinds: Sequence[str], names: Iterable[str] 
 
 
 def harmonics(observations: Observations, joint: str) -> tuple[float, ...]:
-    """Return the orders that are looked for in a joint: a few a turn, and the motor's where its ratio is stated."""
+    """Return the harmonics tried in a joint: the first three, and the motor's where its ratio is stated."""
     ratio = observations.campaign.gears.get(joint)
     return settings.HARMONICS if ratio is None else (*settings.HARMONICS, float(ratio), 2.0 * float(ratio))
 
@@ -84,10 +84,11 @@ def of_quantity(law: Discovered, values: Array, knots: int = settings.KNOTS) -> 
 def shapes(
     law: Discovered, values: Array, jumps: bool = True, orders: Sequence[float] = settings.HARMONICS
 ) -> list[Discovered]:
-    """Return simple shapes that might do instead of a smooth law, and that law.
+    """Return a law in its own shape, and in all simpler shapes that may suffice.
 
-    Hinges at the quantity's quantiles, straight and quadratic laws; steps and bumps of what a robot does or what passes
-    (positions, gravity, the clock), as nothing jumps at a temperature; three harmonics of a joint's position.
+    Always: straight, quadratic, and hinges at quantiles of the quantity. With ``jumps`` also steps and bumps: of
+    positions, gravity and the clock, as nothing jumps at a temperature. Of a velocity also its sign. Of a joint's own
+    position also harmonics of the given orders.
     """
     if law.shape in ("constant", "levels"):
         return [law, replace(law, shape="ramp", marks=())] if law.shape == "levels" and len(law.marks) > 2 else [law]
@@ -111,10 +112,10 @@ def shapes(
 
 
 def smooth_columns(values: Array) -> Array:
-    """Return (N, k) columns of a smooth law of a quantity, its constant removed; of mean square one and uncorrelated.
+    """Return an (N, k) basis of the smooth laws of a quantity: centred, uncorrelated, of mean square one.
 
-    Levels for a quantity with few values, a natural cubic spline otherwise: the space of a law of :func:`of_quantity`.
-    Empty (N, 0) where the quantity does not vary.
+    It spans the laws of :func:`of_quantity` without their constant: levels of a quantity with few values, a natural
+    cubic spline otherwise. It is empty (N, 0) where the quantity does not vary.
     """
     if np.ptp(values) == 0.0:
         return np.zeros((len(values), 0))

@@ -24,7 +24,7 @@ class Linear:
     Attributes
     ----------
     gap
-        (N, m) with the contribution of values already applied put back, so that θ is absolute.
+        (N, m) m and rad, with the contribution of values already applied added back, so that θ is the whole value.
     frames
         (N, m, f) columns of the unknown frames.
     blocks
@@ -62,7 +62,7 @@ class Whitening:
     noise
         (m,) one sigma: m for the first three, rad for the rest.
     held
-        Degrees of freedom that the noise is worth as prior knowledge.
+        Degrees of freedom of the prior on the noise; 0 where none is stated, or the residual is well above it.
     """
 
     weights: Array
@@ -71,7 +71,7 @@ class Whitening:
 
 
 def gram(linear: Linear, whitening: Whitening) -> Gram:
-    """Form the normal equations, project the frames out, reduce each block to what the data see of it."""
+    """Form the normal equations, project the frames out, and reduce each block to what the data determine of it."""
     stack, flat = whitened(linear, whitening), linear.frames.shape[2]
     sizes = np.concatenate([*(b.sizes for b in linear.blocks), [1.0]])
     full = stack.T @ stack
@@ -112,7 +112,7 @@ def whitened(linear: Linear, whitening: Whitening) -> Array:
 
 
 def scores(linear: Linear, whitening: Whitening, problem: Gram, remainder: Array) -> Array:
-    """(rows, D) each row's part in the derivative of the misfit by the reduced columns, frames projected out."""
+    """(rows, D) score of each row: its share in the slope of the log likelihood by the reduced columns."""
     used = np.flatnonzero(whitening.weights > 0)
     left = remainder[used] * (whitening.weights[used][:, None] / whitening.noise**2)
     raw = np.einsum("nmk,nm->nk", linear.stack[used][:, :, :-1], left)
@@ -123,9 +123,10 @@ def scores(linear: Linear, whitening: Whitening, problem: Gram, remainder: Array
 
 
 def contained(problem: Gram) -> frozenset[frozenset[int]]:
-    """Return the pairs of blocks of which one's columns lie, as far as the data can see, within the other's.
+    """Return the pairs of blocks of which the smaller lies, as far as the data can tell, in the span of the larger.
 
-    Such a pair is never named together: the smaller is preferred where it suffices, the larger carries both otherwise.
+    The two are confounded and never named together. The smaller is preferred where it suffices; otherwise the larger
+    stands for both.
     """
     pairs = set()
     matrix, slices = problem.matrix, problem.slices
@@ -161,7 +162,7 @@ def parameter_values(linear: Linear, problem: Gram, found: Combination) -> dict[
 
 
 def frame_step(linear: Linear, whitening: Whitening, remainder: Array) -> Array:
-    """(f,) step of the unknown frames that fits what is left, least squares over the rows with weight."""
+    """(f,) step of the unknown frames that fits the remainder, by least squares over the rows with weight."""
     if not linear.frames.shape[2]:
         return np.zeros(0)
     used = np.flatnonzero(whitening.weights > 0)

@@ -23,7 +23,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Kept:
-    """A component that is scatter: its step where it is an encoder's, and whether it might be wear as well."""
+    """A component that counts as scatter, the step that an encoder would have, and whether it may as well be wear."""
 
     component: JointScatter
     step: float
@@ -39,10 +39,10 @@ class RandomGap:
     kept
         The components of the scatter that are scatter.
     explains_size
-        Whether there is scatter with which what remains is no larger than the noise allows; what is merely confounded
-        does not count.
+        Whether scatter explains the size of the remainder: no more is left than instrument and scatter allow. Scatter
+        that may as well be a systematic effect does not count.
     p_value
-        Of the χ² test of that.
+        Of the χ² test that no more is left.
     scatter
         The variances behind it.
     steps
@@ -65,9 +65,10 @@ class RandomGap:
 def random_gap(fit: Fit) -> RandomGap:
     """Say which joints scatter beyond the instrument, anew at each visit or once a pose.
 
-    What a systematic effect leaves may look like scatter of a joint. Errors of a joint that follow a smooth law of a
-    recorded quantity are none. Those of an encoder are a sawtooth of the command with a period of √12 of their
-    standard deviation. Where repeats do not tell pose from visit, that period does: without it scatter may be wear.
+    What a systematic effect leaves may look like scatter of a joint. If a joint's errors follow a smooth law of a
+    recorded quantity, they are no scatter. Errors of an encoder are a sawtooth of the command with the period √12 σ.
+    Without repeats only that period separates an encoder's steps from wear; where it is not seen, the component is
+    marked doubtful.
 
     Parameters
     ----------
@@ -108,8 +109,8 @@ def random_gap(fit: Fit) -> RandomGap:
 def _refitted(fit: Fit, scatter: Scatter, used: NDArray[np.bool_]) -> Array:
     """(N, m) remainder once frames and explanation are fitted in the covariance of the scatter.
 
-    Generalised least squares. Fitted as if the noise were the instrument's, a joint that scatters pulls the frames by
-    far more than the instrument's noise, and what they are off by would count as scatter of everything else.
+    Generalised least squares. If the noise were taken for the instrument's alone, a joint that scatters would pull the
+    frames far off, and their error would then count as scatter of the other joints.
     """
     e = fit.explanation
     blocks = [e.linear.blocks[b].columns * e.linear.blocks[b].sizes for b in e.best.blocks]
@@ -148,7 +149,7 @@ class _Mean:
 def _judge(
     fit: Fit, scatter: Scatter, gap: Array, pose: NDArray[np.int64], used: NDArray[np.bool_], noise: Array
 ) -> tuple[dict[str, str], dict[str, float], list[Kept]]:
-    """Tell scatter from laws, and steps from scatter."""
+    """Sort the chosen components: those that follow a law, those with an encoder's steps, and other scatter."""
     names, sensitivity = fit.campaign.robot.joint_names, fit.corrected.joint_sensitivity
     recorded = {name: values[used] for name, values in quantities(fit.corrected).items()}
     number = np.unique(pose[used], return_inverse=True)[1].ravel()
@@ -216,7 +217,7 @@ def _chance_of_size(
     held: list[bool],
     freedom: int,
 ) -> tuple[float, bool]:
-    """χ² of what remains in the rows' whole covariance; its freedom is reduced by the tails."""
+    """Test the remainder in the rows' whole covariance by χ²; heavy tails reduce its degrees of freedom."""
     parts = np.repeat(held, 3)
     # what may as well be a systematic effect that is not known must not explain the size away
     real = tuple(k.component for k in kept) if any(not k.doubtful for k in kept) else ()

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.effects import Effect
+from thermal_robot.effects import Effect, gate
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import Block, block
 from thermal_robot.inference.evidence import Combination, Gram, Search
@@ -41,7 +41,7 @@ def refined(explanation: Explanation, observations: Observations, factor: float)
     blocks = [explanation.linear.blocks[b] for b in explanation.best.blocks]
     values = [explanation.values[b][0] for b in explanation.best.blocks]
     for place, item in enumerate(blocks):
-        if len(item.effect.nearby(factor)) > 1:
+        if len(gate.nearby(item.effect, factor)) > 1:
             blocks[place] = _moved(explanation, observations, blocks, place, factor)
             if blocks[place] is not item:
                 linear, problem, found = _evaluated(explanation, blocks)
@@ -60,7 +60,7 @@ def _moved(
 
     own = evidence(item)
     for _ in range(settings.REFINED_TRIES):
-        near = [block(observations, e) for e in item.effect.nearby(factor) if e != item.effect]
+        near = [block(observations, e) for e in gate.nearby(item.effect, factor) if e != item.effect]
         near = [n for n in near if len(n.sizes) == len(item.sizes)]
         gains = [evidence(n) - own for n in near]
         if not near:
@@ -69,7 +69,7 @@ def _moved(
         if gains[best] > settings.REFINED_GAIN:
             item, own = near[best], own + gains[best]
             continue
-        apart = item.effect.nearby(1.0)  # settings that do not come closer
+        apart = gate.nearby(item.effect, 1.0)  # settings that do not come closer
         if all(g > -settings.REFINED_FLAT for n, g in zip(near, gains, strict=True) if n.effect not in apart):
             break
         factor = float(np.sqrt(factor))

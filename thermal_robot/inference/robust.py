@@ -1,4 +1,4 @@
-"""Noise, gross errors and rows that are alike: how much each row is worth."""
+"""Robust weights: the noise of a residual, its gross errors, and what correlated rows are worth."""
 
 from __future__ import annotations
 
@@ -24,26 +24,30 @@ class Noise:
     orientation: float | None = None
 
     def parts(self, measures: int) -> tuple[float | None, ...]:
-        """Return one entry for every three components."""
+        """Return the noise of positions, and with six components that of orientations."""
         return (self.position, self.orientation)[: measures // 3]
 
 
 def distance_limit(measures: int, rows: int) -> float:
-    """Return the squared distance, in noise, beyond which one of so many rows is a gross error."""
+    """Return the squared distance, in units of the noise, beyond which one of so many rows is a gross error."""
     return settings.GROSS_FACTOR * float(chdtri(measures, settings.GROSS_LEVEL / max(rows, 1)))
 
 
 def robust_noise(remainder: Array, leverage: float = 0.0) -> Array:
-    """Return one sigma per axis of each three components, from the median of their squared length."""
+    """Return one sigma per axis of positions and of orientations, from the median squared length of a residual.
+
+    The ``leverage``, the share of the equations that the fit has taken up, is given back to the noise.
+    """
     parts = remainder.reshape(len(remainder), -1, 3)
     middle = np.median((parts**2).sum(axis=2), axis=0) / float(chdtri(3, 0.5))
     return np.asarray(np.maximum(np.sqrt(middle / (1.0 - leverage)), settings.ROUNDING))
 
 
 def settled_noise(measured: Array, noise: Noise, measures: int) -> tuple[Array, float]:
-    """Return the noise of each component, never below what is stated, and how firmly it is held.
+    """Return the noise of each component, never below what is stated, and the degrees of freedom of its prior.
 
-    A remainder well above the stated noise is not noise: it then sets the scale by which effects are judged.
+    The stated noise counts. Where the residual is well above it, the residual sets the scale by which effects are
+    judged, and the prior has no weight.
     """
     stated = noise.parts(measures)
     sigma = np.array(
@@ -57,7 +61,7 @@ def settled_noise(measured: Array, noise: Noise, measures: int) -> tuple[Array, 
 
 
 def first_whitening(linear: Linear, noise: Noise, use: NDArray[np.bool_]) -> Whitening:
-    """Weigh all rows in use alike, at the noise that the median of the gap shows."""
+    """Give all rows in use the same weight, and take the noise from the median of the gap."""
     weights = use.astype(float)
     sigma, held = settled_noise(robust_noise(linear.gap[use]), noise, linear.measures)
     return Whitening(weights, sigma, held)
@@ -66,7 +70,7 @@ def first_whitening(linear: Linear, noise: Noise, use: NDArray[np.bool_]) -> Whi
 def reweigh(
     remainder: Array, noise: Noise, use: NDArray[np.bool_], leverage: float, measures: int
 ) -> tuple[Whitening, NDArray[np.bool_]]:
-    """Set gross errors aside and let the tail weigh less (Huber 1964), at the noise that the remainder shows.
+    """Set gross errors aside and give the tail less weight (Huber 1964), at the noise of the remainder.
 
     Parameters
     ----------
@@ -77,7 +81,7 @@ def reweigh(
     use
         (N,) rows that may be used; no more than a quarter of them is set aside.
     leverage
-        Share of the equations that the explanation has taken up.
+        Of the explanation: the share of the equations that it takes up.
     measures
         m.
 
@@ -102,10 +106,11 @@ def reweigh(
 def design_effect(
     linear: Linear, problem: Gram, remainder: Array, whitening: Whitening, groups: Sequence[NDArray[np.int64]]
 ) -> float:
-    """Return how many rows are worth one, because the remainder of rows that belong together is alike.
+    """Return the design effect: how many rows are worth one independent row (Kish, *Survey Sampling*, 1965).
 
-    The variance of the columns' scores summed within groups, over what it would be if rows were independent (Kish,
-    *Survey Sampling*, 1965); the largest over the groupings, 1 where chance would give as much.
+    Residuals of rows that belong together may be correlated. The design effect is the variance of the scores summed
+    within groups, over what it would be if rows were independent. The largest over the groupings counts; it is 1 where
+    chance alone could give as much.
     """
     if not groups or not problem.slices or not problem.slices[-1].stop:
         return 1.0

@@ -44,13 +44,13 @@ def near_repeats(campaign: Campaign) -> Labels:
 
 
 def in_order(campaign: Campaign) -> Labels:
-    """(N,) row numbers in the sequence of measurement: by ``time`` or ``order`` where recorded, else as in the file."""
+    """(N,) row numbers in the order of measurement: by ``time`` or ``order`` where recorded, else as in the file."""
     clock = campaign.covariates.get("time", campaign.covariates.get("order"))
     return np.arange(campaign.samples) if clock is None else np.argsort(clock, kind="stable")
 
 
 def in_a_row(campaign: Campaign, aside: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(N,) which of the rows set aside follow each other: something changed there, which is no gross error."""
+    """(N,) those rows set aside whose neighbour in time is set aside, too: a change, and not gross errors."""
     order = in_order(campaign)
     own = aside[order]
     beside = np.zeros_like(own)
@@ -89,7 +89,7 @@ def neighbourhoods(campaign: Campaign, count: int) -> Labels:
 def folds(
     campaign: Campaign, count: int = settings.FOLDS, blocks_a_fold: int = settings.BLOCKS_A_FOLD
 ) -> tuple[Labels, Labels]:
-    """Assign rows to folds, in blocks of consecutive measurements, near-repeats never apart.
+    """Assign rows to the folds of a hold-out, in blocks of consecutive measurements; near-repeats stay together.
 
     Returns
     -------
@@ -130,6 +130,6 @@ def repeated_poses(campaign: Campaign) -> NDArray[np.int64]:
 
 
 def row_groups(campaign: Campaign) -> tuple[NDArray[np.int64], ...]:
-    """Return the groupings within which a remainder may be alike: spells of time and neighbourhoods of poses."""
+    """Return the groupings within which residuals may be correlated: spells of time and neighbourhoods of poses."""
     count = min(max(campaign.samples // settings.ROWS_A_GROUP, 2), settings.MOST_GROUPS)
     return spells(campaign, count), neighbourhoods(campaign, count)

@@ -1,4 +1,4 @@
-"""Places × quantities: which law, entering where, a remainder speaks for."""
+"""Scan of places and quantities: which law, entering where, explains a remainder best."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.effects.law import Discovered
 from thermal_robot.effects.quantities import GRAVITY, quantities
+from thermal_robot.effects.shapes import SHAPES
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.laws import CLOCK, harmonics, laws, shapes
@@ -18,12 +19,10 @@ from thermal_robot.observations import Observations
 
 Array = NDArray[np.float64]
 
-_REFINED = ("slide", "hinge", "bump")
-
 
 @dataclass(frozen=True, eq=False)
 class Scanned:
-    """One candidate: the law, and what log evidence it gains over noise by the Bayes information criterion."""
+    """One candidate: the law, and the log evidence that it gains over noise (Bayes information criterion)."""
 
     law: Discovered
     gain: float
@@ -32,7 +31,7 @@ class Scanned:
 def scan(observations: Observations, targets: Sequence[Target]) -> tuple[list[list[Scanned]], int]:
     """Return, for every target, all candidates, best first; and how many were tried.
 
-    Segments have six components, so that only the quantities that speak elsewhere are tried there.
+    A law at a segment has six components, so that only the quantities that gain most elsewhere are tried there.
     """
     found: list[list[Scanned]] = [[] for _ in targets]
     first = laws(observations, ("joint", "base", "tool"))
@@ -50,7 +49,7 @@ def scan(observations: Observations, targets: Sequence[Target]) -> tuple[list[li
 
 
 def shaped(observations: Observations, target: Target, law: Discovered) -> Scanned:
-    """Return a law in the shape that gains most."""
+    """Return a law in the shape that gains most log evidence."""
     values = quantities(observations).get(law.quantity)
     jumps = law.quantity in (*CLOCK, *GRAVITY, *observations.robot.joint_names)
     orders = harmonics(observations, law.place) if law.kind == "joint" else settings.HARMONICS
@@ -60,7 +59,7 @@ def shaped(observations: Observations, target: Target, law: Discovered) -> Scann
         return Scanned(candidate, target.worth(block(observations, candidate).columns).gain)
 
     best = max(map(measured, candidates), key=lambda item: item.gain)
-    return best if best.law.shape not in _REFINED else _refined(best, measured)
+    return best if SHAPES[best.law.shape].mark != "gradual" else _refined(best, measured)
 
 
 def _refined(best: Scanned, measured: Callable[[Discovered], Scanned]) -> Scanned:
@@ -69,7 +68,7 @@ def _refined(best: Scanned, measured: Callable[[Discovered], Scanned]) -> Scanne
     for _ in range(settings.MARK_ROUNDS):
         law, (mark, *width) = best.law, best.law.marks
         near = [replace(law, marks=(mark + s * step * law.span, *width)) for s in (1, -1)]
-        if law.shape in ("slide", "bump"):
+        if SHAPES[law.shape].width:
             near += [
                 replace(law, marks=(mark, width[0] * f))
                 for f in (1.0 + settings.WIDTH_STEP * step, 1.0 / (1.0 + settings.WIDTH_STEP * step))

@@ -12,7 +12,7 @@ from scipy.special import logsumexp
 
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
-from thermal_robot.inference.scatter_likelihood import Component, Fitted, Likelihood, Rows, independent_rows
+from thermal_robot.inference.scatter_likelihood import Component, Fitted, IndependentRows, Likelihood, independent_rows
 
 Array = NDArray[np.float64]
 
@@ -47,7 +47,7 @@ class JointScatter:
 
 @dataclass(frozen=True, eq=False)
 class Scatter:
-    """What the scatter of a remainder consists of; see :func:`variance_components`.
+    """The variance components of a remainder; see :func:`variance_components`.
 
     Attributes
     ----------
@@ -106,7 +106,7 @@ def variance_components(
     freedom: int = 0,
     weights: Array | None = None,
 ) -> Scatter:
-    """Tell joints that scatter from an instrument that does.
+    """Estimate variance components: how much each joint scatters, and how much the instrument.
 
     Row i of pose p is r_i = e_i + J_i (u_p + v_i): e is the instrument's noise, v (``visit``) comes anew at each visit
     and u (``pose``) once a commanded pose. Variances are those of largest restricted likelihood, as far as a common
@@ -126,7 +126,7 @@ def variance_components(
     pose
         (N,) number of the commanded pose; ``None`` where none was repeated.
     stated
-        Whether the noise is stated and held near, or free; one for all or one for every three components.
+        Whether the noise is stated, and then held near that, or free; one for all or one for every three components.
     freedom
         Number of parameters that were fitted before.
     weights
@@ -202,7 +202,7 @@ class _Search:
     fits: dict[frozenset[Component], tuple[Fitted, float, tuple[Component, ...]]] = field(default_factory=dict)
 
     @property
-    def rows(self) -> Rows:
+    def rows(self) -> IndependentRows:
         return self.likelihood.rows
 
     @property

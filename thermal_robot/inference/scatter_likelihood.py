@@ -17,7 +17,7 @@ _LOWEST, _HIGHEST = settings.LOG_VARIANCE
 
 
 @dataclass(frozen=True, eq=False)
-class Rows:
+class IndependentRows:
     """Remainder as independent rows, everything in units of the noise.
 
     Attributes
@@ -46,12 +46,14 @@ class Rows:
         return int((self.repeats == 0).sum())
 
 
-def independent_rows(values: Array, columns: Array, pose: NDArray[np.int64], weights: Array, freedom: int) -> Rows:
-    """Turn repeats into rows that are independent of each other.
+def independent_rows(
+    values: Array, columns: Array, pose: NDArray[np.int64], weights: Array, freedom: int
+) -> IndependentRows:
+    """Turn the visits of each pose into independent rows: contrasts among them, and their mean.
 
     With one Jacobian J for the k visits of a pose, Helmert's contrasts of them have the covariance
     Σ + J Λ_v Jᵀ, and √k times their mean has Σ + J (Λ_v + k Λ_u) Jᵀ (Searle, Casella, McCulloch, *Variance
-    Components*, 1992, ch. 3). Parameters that were fitted shrink the means; these are enlarged again.
+    Components*, 1992, ch. 3). Parameters that were fitted have shrunk the means; these are enlarged again.
     """
     order = np.argsort(pose, kind="stable")
     _, first, count = np.unique(pose[order], return_index=True, return_counts=True)
@@ -69,7 +71,7 @@ def independent_rows(values: Array, columns: Array, pose: NDArray[np.int64], wei
     fitted = min(freedom / (len(first) * values.shape[1]), 1.0 - 1.0 / settings.MOST_INFLATION)
     stacked = np.concatenate([common[place[later]], common])
     lever = np.sqrt((common**2).mean(axis=(0, 1)))
-    return Rows(
+    return IndependentRows(
         np.concatenate([contrast[later], mean[last] / np.sqrt(1.0 - fitted)]),
         stacked / np.where(lever > 0.0, lever, 1.0),
         np.concatenate([np.zeros(int(later.sum())), count.astype(float)]),
@@ -116,7 +118,7 @@ class Likelihood:
         covariance is the model's.
     """
 
-    rows: Rows
+    rows: IndependentRows
     stated: tuple[bool, ...]
     tails: float = np.inf
 

@@ -1,6 +1,7 @@
 """Every number that was chosen in the inference and the diagnosis: its value, its unit, and why that one.
 
-None of them was tuned on the cases that score the program. What is known of one effect stands in that effect's file.
+One was learnt from the cases that score the program, and says so (BESIDE_UNLISTED). What is known of one effect stands
+in that effect's file.
 """
 
 import numpy as np
@@ -8,7 +9,7 @@ import numpy as np
 # --- what is believed before the data ---
 
 PRIOR_PROBABILITY = 0.1
-"""Of an effect being at work, random ones too: of sixteen, one or two are worth a campaign."""
+"""That an effect is at work, random ones included: of sixteen effects one or two are then expected."""
 SIZE_SPREAD = 1.5
 """Standard deviation of ln λ: an effect three times larger or smaller than stated is no surprise."""
 NEVER = -1e9
@@ -18,20 +19,21 @@ GIVEN_NOISE_DOF = 20.0
 NOISE_SLACK = 1.3
 """Times a stated noise: a remainder above it is no longer that noise (two sigma of those 15 %)."""
 MISTRUST = 5.0
-"""Natural logarithms that it costs at most to call a stated noise wrong: e⁵, about 1 in 150."""
+"""Largest penalty, natural logarithm, for calling a stated noise wrong: e⁵, about 1 in 150."""
 BESIDE_UNLISTED = 0.85
-"""How often an effect that is found beside an unlisted cause is there, by the blind trial's faint cases."""
+"""Floor of what is believed of an effect beside an unlisted cause. It was read off the faint cases of a blind trial of
+version 0.1, and other simulations contradict it: a floor, not a measurement."""
 
 # --- rounding ---
 
 ROUNDING = 1e-9
-"""m and rad: no table and no robot is better."""
+"""m and rad: no table and no robot is more accurate."""
 ALIAS = 1e-6
-"""Share of a column's length below which what is left of it, others projected out, is rounding: an exact alias."""
+"""Of a column's length: where less is left of it once others are projected out, it is an exact alias of them."""
 TINY = 1e-300
 """Keeps a quotient of nothing from being infinite."""
 BETTER = 1e-9
-"""Natural logarithms: by less no explanation is better than another."""
+"""Log evidence, natural logarithm: a smaller difference makes no explanation better than another."""
 SAME_COMMAND = 1e-6
 """rad or m: commands nearer than this repeat each other; controllers print fewer digits."""
 
@@ -52,7 +54,7 @@ ROWS_A_GROUP = 5
 MOST_GROUPS = 60
 """Such groups at most: a design effect is then known to a fifth."""
 DESIGN_SIGMAS = 4.0
-"""By so many standard deviations of chance rows must be alike before they count for less."""
+"""Standard deviations of chance by which residuals of a group must be correlated before rows count for less."""
 GROSS_LEVEL = 0.01
 """Chance that noise alone sets any row of a campaign aside."""
 GROSS_FACTOR = 1.5
@@ -70,7 +72,7 @@ CAUCHY_ROUNDS = 4
 FAR = 9.0
 """Mean squared distance, in squares of the noise, from which a row set aside weighs less in a comparison of laws."""
 STATED_REACH = 2.0
-"""Times the stated noise: what is left may be no larger when laws are compared, so that a law finds its own error."""
+"""Times the stated noise: no larger noise is assumed when laws are compared, as it would hide what they explain."""
 FEW_ASIDE = 0.05
 """Of all rows: fewer that follow each other may be one lapse of the instrument."""
 
@@ -85,7 +87,7 @@ REFINE_ROUNDS, REFINE_SETTLED = 60, 1e-9
 TARGET_STARTS = np.vstack([np.zeros(3), 0.2 * np.eye(3), -0.2 * np.eye(3)])
 """m: where the target may sit on the tool frame; from each the fit reaches 0.3 m."""
 SPARE_EQUATIONS = 6
-"""That must be left when the frames are fitted: one pose's worth of position and orientation."""
+"""Equations that must be left once the frames are fitted: as many as one pose has."""
 EVIDENCE_STEPS, EVIDENCE_SETTLED, LEAST_VARIANCE = 40, 1e-3, 1e-12
 """Newton steps of scales and noise at most, the change of a logarithm at which they end, and the smallest variance, in
 squares of the noise: what fits better is rounding."""
@@ -94,7 +96,7 @@ FLATTEST_PEAK = 0.5
 FIRST_ROUNDS = 8
 """Rounds of choice, outliers and noise at most: they settle after two or three."""
 MOST_LEVERAGE = 0.9
-"""Share of the equations that may be taken up by what is fitted when the noise is judged by what is left."""
+"""Largest leverage, the share of the equations that a fit takes up, with which its residual tells the noise."""
 FIT_STEPS = 12
 """Gauss-Newton steps at most: quadratic convergence needs four."""
 REVISIONS = 3
@@ -115,11 +117,11 @@ REFINED_FLAT = 8.0 * REFINED_GAIN
 LARGE = 0.02
 """rad or m: products of parameters this large show beside noise of tens of micrometres."""
 NO_WORSE = 1.02
-"""Times the noise of a container's fit: an explanation without it that leaves no more is preferred."""
+"""Times the noise of a fit with an effect that contains others: a fit without it that leaves no more is preferred."""
 ENOUGH_ROWS = 1500
-"""Of very many rows so many are scanned for laws: one that explains a hundredth of what remains is then seen."""
+"""Rows that are scanned for laws, of very many: a law that explains a hundredth of the remainder is then seen."""
 ENOUGH_REMAINDER = 2000
-"""The same for the tests of what remains."""
+"""The same for the tests of the remainder."""
 DRAW_SEED, TEST_SEED, BOOTSTRAP_SEED = 61, 17, 20180901
 """Of the rows drawn for a scan, for a test, and of the bootstrap: the same campaign always gets the same answer."""
 
@@ -132,9 +134,9 @@ STEP_FLOOR = 1e-13
 PROJECTED_FLOOR = 1e-12
 """Of a column's square before the frames were projected out: what is left below it is rounding."""
 INFORMATION_FLOOR = 1e-5
-"""A column that moves the whole gap by less than this, squared and in noise, is not seen."""
+"""Squared length of a column, in units of the noise, below which the data do not see it."""
 CONTAINED, CONTAINED_LEFT = 1e-3, 0.5
-"""A block lies within another when the other leaves less of it than this share, or this squared length in noise."""
+"""A block is contained in another that leaves less of it than this share, or this squared length in noise."""
 
 # --- laws that nobody wrote down ---
 
@@ -143,7 +145,7 @@ KNOTS, FINER_KNOTS = 5, 9
 FEW_LEVELS = 6
 """A quantity with no more values than this is one of levels."""
 OUTER_KNOTS = 0.02
-"""Quantile of the outer knots: beyond, few rows would bend the law."""
+"""Quantile of the outer knots: beyond it, a few rows alone would bend the law."""
 NARROW_KNOTS = 0.2
 """Of an even share of the range: the least distance of two knots."""
 HARMONICS = (1.0, 2.0, 3.0)
@@ -161,9 +163,9 @@ SHAPED = 6
 COMPARED_LAWS = 8
 """Candidates that are compared jointly with the known effects."""
 IN_TIME = float(np.log(3.0))
-"""Log odds of the clock over another quantity that says the same: things happen in time."""
+"""Log prior odds of the clock over another quantity that explains the same: changes happen in time."""
 LEAST_GAIN = 6.0
-"""Log evidence that a law must bring over none: 1 in 400."""
+"""Log evidence that a law must gain over none: 1 in 400."""
 MOST_LAWS = 4
 """Laws of one campaign: a fifth no longer helps anybody to find the cause."""
 RIVAL_LAWS = 3
@@ -173,8 +175,8 @@ RIVALLED_EFFECTS = 4
 FEWEST_LEFT = 5
 """Equations that must be left beside a law for a test of it."""
 LAW_FLOOR = 1e-6
-"""Of the scaled Gram matrix's eigenvalues: a direction of a law below it is nearly one of those before and says nothing
-new, but would be counted as a parameter."""
+"""Of the largest eigenvalue of a law's scaled Gram matrix: a direction below it is nearly a sum of the others, and
+would yet be counted as a parameter."""
 SPLINE_FLOOR = 1e-8
 """Of the largest singular value: functions of a quantity below it are no functions of their own."""
 NAMED = 5
@@ -182,12 +184,12 @@ NAMED = 5
 LIKELY_PLACE = 0.01
 """Probability of a place below which it is not listed."""
 WORSE_ELSEWHERE = 1.05
-"""Times the rms in regions held out: laws that leave more go astray between the poses that were measured."""
+"""Times the rms in regions held out: an explanation that leaves more goes astray between the poses measured."""
 
 # --- what remains ---
 
 LEVEL = 1e-3
-"""p-value, after counting the tests, below which a remainder is not called noise."""
+"""p-value, corrected for the number of tests, below which a remainder is not called noise."""
 LAW_LEVEL = 0.05
 """The same for naming a quantity that it follows, once it is not noise."""
 MATERIAL_SCALE = 1.15
@@ -197,7 +199,7 @@ MATERIAL_REPEATS = 1.3
 MATERIAL_SHARE = 0.04
 """A law that explains less of the remainder than this is not worth a name."""
 FEWEST_PAIRS = 12
-"""Pairs of near-repeats below which they say nothing of the noise: it would be known to a third."""
+"""Fewer pairs of near-repeats say nothing of the noise: they would tell it to a third."""
 SHUFFLES, FEW_SHUFFLES, SHUFFLED_ROWS = 200, 40, 3000
 """Shuffles that tell chance likeness of neighbours; fewer above so many rows, where chance is nearly normal."""
 CLIPPED = 4.0
@@ -216,7 +218,7 @@ SCATTER_ROWS = 1500
 MOST_COMPONENTS = 6
 """Joints that scatter at once."""
 TAILS, WORTH_TAILS = 4.0, 3.0
-"""Degrees of freedom of the heavy-tailed law beside the normal one, and the logarithms it must fit better by."""
+"""Degrees of freedom of the Student law tried beside the normal one, and the log likelihood that it must gain."""
 NORMAL_ROWS = 1000
 """Above, the likelihood of a variance that is well seen is normal in its logarithm."""
 DROP_95 = 1.92
@@ -273,10 +275,10 @@ HEIGHT_SIGMAS = 1.6
 DETERMINED = 0.5
 """A parameter is identified when the data leave less than half of its prior's standard deviation."""
 SURE, RIVAL, RIVAL_SHARE = 0.75, 0.2, 0.8
-"""An effect less probable than the first has rivals: those that are there with the second probability, and in the
-third share of what it is absent from."""
+"""An effect less probable than the first has rivals: effects at least as probable as the second, and present in the
+third share of the explanations without it."""
 EXACT_LEVEL = 0.01
-"""Chance that noise lets an exact alias look like none."""
+"""Chance that noise makes an exact alias look like none."""
 EXCLUDED = 1e-3
 """Probability below which an effect is not chosen anew in a fold."""
 RESAMPLES = 2000
@@ -302,12 +304,18 @@ CONTRADICTED = 0.01
 STATED_TOO_LARGE = 0.5
 """Of the stated noise: less that remains says that it is stated too large."""
 MOST_BELIEF = 50.0
-"""Natural logarithms: beyond, a probability is 0 or 1 in double precision."""
+"""Log odds, natural logarithm: beyond, a probability is 0 or 1 in double precision."""
 MATERIAL_PLACE, MOST_PLACES = 0.03, 8
 """Of an effect's work: a place with less is not drawn; and how many are."""
 LINE_POINTS, ROUGH, DENSE_POINTS, ROWS_A_POINT = 25, 0.01, 400, 10
 """Points of a drawn law; of its range, the roughness below which it follows one quantity alone, its points then, and
 rows that a point stands for otherwise."""
+ROWS_ALIKE = 8
+"""Rows that are taken together when asking whether an error follows a quantity."""
+PURE = 1e-6
+"""Of a unit twist, m or rad: with less of one kind it is all of the other."""
+MOST_SAID = 0.5
+"""Probability that an effect outside the most probable explanation is said to have at most: found it would be more."""
 
 # --- what to measure next ---
 
@@ -316,7 +324,7 @@ LEADING, MOST_LEADING = 0.01, 4
 LEAST_LEADING = 1e-3
 """Explanations that are less probable are not worth a measurement."""
 DECIDED, WORTHWHILE = 0.9, 1.0
-"""So probable that rivals which all samples together leave below so many nats do not count."""
+"""An explanation so probable is decided where further samples would bring less than so many nats for any rival."""
 WIDE = 2.4
 """rad: as far as a joint without a limit is sent; nearly once round."""
 BEYOND = 5.0
@@ -324,6 +332,6 @@ BEYOND = 5.0
 LOOSE = 0.1
 """m and rad: where the data leave a frame open, it is somewhere there."""
 TIE = 1e-3
-"""Weight of what a sample tells of parameters beside what it tells of explanations: it only breaks ties."""
+"""Weight of the information on parameters beside that on explanations, when samples are proposed: it breaks ties."""
 FEW_PAYLOADS = 6
 """A campaign with no more payloads than this is offered these; another its lightest and heaviest."""

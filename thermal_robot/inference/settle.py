@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.effects import Effect
+from thermal_robot.effects import Effect, gate
 from thermal_robot.effects.apply import displacement
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block, frame_columns
@@ -128,7 +128,7 @@ def settle(
             break
         outliers = explanation.outliers
         for effect, _ in held:
-            variants[effect.name] = effect.nearby(factor)
+            variants[effect.name] = gate.nearby(effect, factor)
     return Settled(observations, explanation, tuple(held), families)
 
 

@@ -17,7 +17,10 @@ Array = NDArray[np.float64]
 
 
 def followed(errors: Array, weight: Array, recorded: Mapping[str, Array], pose: NDArray[np.int64] | None = None) -> str:
-    """Name the quantity that errors follow smoothly, or nothing: F tests, counted.
+    """Name the quantity that errors follow smoothly; empty where none does.
+
+    Each quantity has an F test, its p-value multiplied by the number of quantities (Bonferroni). A law must
+    also explain a good part of the errors.
 
     Parameters
     ----------
@@ -50,11 +53,11 @@ class Steps:
     Attributes
     ----------
     step
-        With which errors repeat, rad or m; the one that their size says where none is seen.
+        Period of the errors along the command, rad or m; where none is seen, that which their size implies.
     p_value
-        Of there being none; ``None`` where there are too many periods to search.
+        Of the hypothesis that there is no period; ``None`` where there are too many to search.
     visible
-        Whether steps would have been seen.
+        Whether steps would be seen if all of the errors came from them.
     """
 
     step: float
@@ -63,10 +66,19 @@ class Steps:
 
 
 def period(errors: Array, weight: Array, command: Array, step: float) -> Steps:
-    """Look for the step with which errors repeat along the command, near the one that their size says.
+    """Look for the period with which errors repeat along the command, as those of an encoder do.
 
-    Periodogram over all steps near the one that the scatter's size says (Scargle 1982): at a frequency that is not
-    the error's its height is exponential. ``None`` where there are too many to search.
+    The size of the errors implies a step, and the periodogram (Scargle 1982) is searched near it. At a frequency that
+    the errors do not have, its height is exponentially distributed: this gives the p-value.
+
+    Parameters
+    ----------
+    errors, weight
+        (K,) errors, rad or m, and one over the variance of each.
+    command
+        (K,) commanded position of the joint, rad or m.
+    step
+        That the size of the errors implies, rad or m.
     """
     from scipy.fft import next_fast_len, rfft
 

@@ -1,4 +1,4 @@
-"""What is left of a gap, and what further columns would explain of it: one projection, one criterion."""
+"""The residual of a gap, and how much of it further columns would explain: one projection, one criterion."""
 
 from __future__ import annotations
 
@@ -17,16 +17,17 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Worth:
-    """What further columns are worth beside what was fitted.
+    """How much further columns explain beyond what was fitted.
 
     Attributes
     ----------
     p_value
-        Of an F test.
+        Of the F test that the columns explain nothing.
     share
-        Of the mean square that is left, adjusted for the number of columns.
+        Share of the residual mean square that they explain, adjusted for their number; below zero by chance.
     gain
-        In log evidence, by the Bayes information criterion: ½ ν ln(S₀/S₁) − ½ k ln ν.
+        Log evidence gained, by the Bayes information criterion: ½ ν ln(S₀/S₁) − ½ k ln ν, with S₀ and S₁ the residual
+        sums of squares without and with the k columns, and ν the residual degrees of freedom.
     """
 
     p_value: float
@@ -39,16 +40,16 @@ NOTHING = Worth(1.0, 0.0, -np.inf)
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """A remainder to be explained: what is left of the gap after everything in ``design``.
+    """A remainder to be explained: the residual of the gap after a fit of a design.
 
     Attributes
     ----------
     white
-        (N·m,) remainder, weighted and over the noise.
+        (N·m,) residual, weighted and in units of the noise.
     root
-        (N, m) what columns are multiplied with.
+        (N, m) square root of each row's weight, over the noise: further columns are multiplied by it.
     basis
-        (N·m, r) orthonormal: the design.
+        (N·m, r) orthonormal basis of the design.
     """
 
     white: Array
@@ -59,7 +60,7 @@ class Target:
     def of(cls, gap: Array, design: Array, trusted: NDArray[np.bool_] | None = None) -> Target:
         """Project a design (N, m, K) out of a gap (N, m), robustly: rows far from the rest weigh little (Cauchy).
 
-        ``trusted`` (N,) rows weigh fully in what is left, however far they are.
+        Rows that are ``trusted`` (N,) weigh fully in the residual, however far they are.
         """
         measures = gap.shape[1]
         noise = np.repeat(robust_noise(gap), 3)
@@ -82,12 +83,15 @@ class Target:
 
     @property
     def freedom(self) -> int:
-        """Equations less what was fitted."""
+        """Residual degrees of freedom: equations less the rank of the design."""
         return max(int(len(self.white) - self.basis.shape[1]), 1)
 
     def worth(self, columns: Array) -> Worth:
-        """Return what (N, m, K) further columns are worth; nothing where too few equations would be left."""
-        flat = without((columns * self.root[:, :, None]).reshape(len(self.white), -1), self.basis)
+        """Return what further columns (N, m, K) explain; nothing where they would leave too few degrees of freedom."""
+        whole = (columns * self.root[:, :, None]).reshape(len(self.white), -1)
+        flat = without(whole, self.basis)
+        # what is left of an exact alias of the design is rounding, no column
+        flat[:, np.linalg.norm(flat, axis=0) < settings.ALIAS * np.linalg.norm(whole, axis=0)] = 0.0
         own = whitener(flat.T @ flat, settings.LAW_FLOOR)
         k, freedom = own.shape[1], self.freedom
         if not k or freedom - k < settings.FEWEST_LEFT:

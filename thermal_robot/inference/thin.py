@@ -32,7 +32,7 @@ class Thin:
     remainder
         (M, m) what the explanation leaves.
     changed
-        (M,) rows that were set aside and follow each other.
+        (M,) rows that were set aside and follow each other in time.
     """
 
     observations: Observations
@@ -64,6 +64,6 @@ class Thin:
         )
 
     def target(self, blocks: Iterable[int]) -> Target:
-        """Return what is left when frames and some blocks are projected out."""
+        """Return the residual once the frames and some blocks are projected out."""
         columns = [self.linear.blocks[b].columns for b in blocks]
         return Target.of(self.linear.gap, np.concatenate([self.linear.frames, *columns], axis=2), self.changed)
