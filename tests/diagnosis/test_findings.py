@@ -8,7 +8,7 @@ from conftest import load_arm
 from simulate import simulate
 
 from thermal_robot import diagnose
-from thermal_robot.diagnosis.findings import findings, in_order, separates, titled
+from thermal_robot.diagnosis.findings import by_share, findings, separates, titled
 from thermal_robot.diagnosis.parts import Finding
 from thermal_robot.effects import choose, library, random_effects
 from thermal_robot.inference.fit import fit
@@ -110,7 +110,7 @@ def test_the_largest_share_comes_first_and_what_is_not_testable_last():
         Finding("b", "not_found", 0.4, 0.0),
         Finding("e", "found", 1.0, 0.7),
     ]
-    assert [f.name for f in in_order(found)] == ["e", "a", "b", "c", "d"]
+    assert [f.name for f in by_share(found)] == ["e", "a", "b", "c", "d"]
 
 
 def test_separates_lists_each_group_once_and_frames_only_where_nothing_else_is_left():
