@@ -304,10 +304,8 @@ def asked_directly(source):
 
 
 def test_nobody_asks_an_effect_but_the_gate():
-    assert list(asked_directly("f(e.reads(seen)); gate.reads(e, seen); e.at(joint); np.add.at(a, b, c)")) == [
-        "e.reads(seen)",
-        "e.at(joint)",
-    ]
+    source = "f(e.reads(seen)); gate.reads(e, seen); e.at(joint); np.add.at(a, b, c)"
+    assert set(asked_directly(source)) == {"e.reads(seen)", "e.at(joint)"}
     root = Path(thermal_robot.__file__).parent
     others = [path for path in root.rglob("*.py") if path.parent.name != "effects"]
     assert len(others) > 100
