@@ -17,8 +17,8 @@ from thermal_robot.observations import observe
 ALONE = [name for name in library() if name not in ("base_frame", "tool_frame")]
 COLUMNS = {"tracking_lag": {"moving": True}, "thermal_bending": {"links": True}}
 NOISE = 25e-6
-SLOW_PANDA = pytest.param("panda", marks=pytest.mark.slow)
-on_arms = pytest.mark.parametrize("arm", ["rv_m2", "ur10", SLOW_PANDA], indirect=True)
+SLOW_ARMS = [pytest.param(name, marks=pytest.mark.slow) for name in ("ur10", "panda")]
+on_arms = pytest.mark.parametrize("arm", ["rv_m2", *SLOW_ARMS], indirect=True)
 
 
 @dataclass(frozen=True)

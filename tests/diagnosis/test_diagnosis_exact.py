@@ -12,7 +12,8 @@ from thermal_robot.effects.apply import displacement
 from thermal_robot.kinematics import exp3, rotation_to_quaternion
 from thermal_robot.observations import Frames, observe
 
-on_arms = pytest.mark.parametrize("arm", ["rv_m2", "ur10", "panda"], indirect=True)
+SLOW_UR10 = pytest.param("ur10", marks=pytest.mark.slow)
+on_arms = pytest.mark.parametrize("arm", ["rv_m2", SLOW_UR10, "panda"], indirect=True)
 
 
 def measured(robot, sizes, seed, noise, turning=None):

@@ -95,7 +95,10 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("convention", WRONG)
+@pytest.mark.parametrize(
+    "convention",
+    ["scalar last", *(pytest.param(name, marks=pytest.mark.slow) for name in ("conjugate", "at random"))],
+)
 def test_orientations_in_another_convention_are_not_explained(rv_m2, convention):
     for seed in range(2):
         campaign = simulate(rv_m2, ["joint_offset"], seed=seed, turning=3e-5)[0]
@@ -109,7 +112,7 @@ def test_orientations_in_another_convention_are_not_explained(rv_m2, convention)
         assert found.gap.orientation_after > 0.1
 
 
-@pytest.mark.parametrize("arm", ["rv_m2", "panda"], indirect=True)
+@pytest.mark.parametrize("arm", ["rv_m2", pytest.param("panda", marks=pytest.mark.slow)], indirect=True)
 def test_joints_in_the_wrong_unit_or_order_are_not_explained(arm):
     campaign = simulate(arm, ["joint_offset"], seed=1)[0]
     for wrong in (np.rad2deg(campaign.q), campaign.q[:, ::-1]):

@@ -8,7 +8,7 @@ from conftest import load_arm
 from simulate import simulate
 
 from thermal_robot import diagnose
-from thermal_robot.diagnosis.findings import findings, by_share, separates, titled
+from thermal_robot.diagnosis.findings import by_share, findings, separates, titled
 from thermal_robot.diagnosis.parts import Finding
 from thermal_robot.effects import choose, library, random_effects
 from thermal_robot.inference.fit import fit
