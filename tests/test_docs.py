@@ -117,11 +117,11 @@ def test_the_map_names_every_page():
 
 
 def test_a_line_that_is_not_printed_is_noticed():
-    shown_lines_are_printed("…\na 1.0 µm\n", "x\n  a  1.1 µm\n")
+    shown_lines_are_printed("…\na 1.100 µm\n", "x\n  a  1.102 µm\n")
     with pytest.raises(AssertionError, match="not printed"):
         shown_lines_are_printed("a 1 mm", "a 1 µm")
     with pytest.raises(AssertionError, match="other figures"):
-        shown_lines_are_printed("a 1 µm", "a 2 µm")
+        shown_lines_are_printed("a 1.0 µm", "a 1.1 µm")
 
 
 @pytest.mark.slow
