@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from campaign.files import URDF
@@ -74,3 +75,21 @@ def require(error: CampaignError, row: int | None, column: str | None, found: st
         assert error.found == found
     for word in words:
         assert word in str(error)
+
+
+def table_is_refused(folder: Path, table: str | bytes, *said: Any) -> None:
+    """Assert that this table is refused, and the file named; ``said`` is what :func:`require` asks of the words."""
+    error = refusal(folder, table=table)
+    assert error.file == str(folder / "measurements.csv")
+    require(error, *said)
+
+
+def toml_is_refused(
+    folder: Path, old: str, new: str, row: int | None, column: str | None, found: str | None, words: list[str]
+) -> None:
+    """Assert that campaign.toml is refused once this text stands in it for that."""
+    assert TOML.count(old) >= 1
+    error = refusal(folder, toml=TOML.replace(old, new, 1))
+    assert error.file == str(folder / "campaign.toml")
+    assert error.found == found
+    require(error, row, column, found, words)

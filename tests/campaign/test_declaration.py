@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
 from campaign.files import put
-from campaign.spoilt import TOML, refusal, require
+from campaign.spoilt import toml_is_refused
 
 from thermal_robot.campaign import Settings, Units, read_campaign
 from thermal_robot.campaign.declaration import Declaration, check_gears, read_declaration
@@ -52,21 +53,9 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("old", "new", "row", "column", "found", "words"), REFUSED)
-def test_refused(
-    tmp_path: Path,
-    old: str,
-    new: str,
-    row: int | None,
-    column: str | None,
-    found: str | None,
-    words: list[str],
-) -> None:
-    assert TOML.count(old) >= 1
-    error = refusal(tmp_path, toml=TOML.replace(old, new, 1))
-    assert error.file == str(tmp_path / "campaign.toml")
-    assert error.found == found
-    require(error, row, column, found, words)
+@pytest.mark.parametrize("refused", REFUSED)
+def test_refused(tmp_path: Path, refused: tuple[Any, ...]) -> None:
+    toml_is_refused(tmp_path, *refused)
 
 
 def test_no_campaign(tmp_path: Path) -> None:

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pytest
-from campaign.spoilt import TOML, refusal, require
+from campaign.spoilt import toml_is_refused
 
 from thermal_robot.campaign import read_campaign
 from thermal_robot.campaign.document import Document
@@ -33,21 +34,9 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("old", "new", "row", "column", "found", "words"), REFUSED)
-def test_refused(
-    tmp_path: Path,
-    old: str,
-    new: str,
-    row: int | None,
-    column: str | None,
-    found: str | None,
-    words: list[str],
-) -> None:
-    assert TOML.count(old) >= 1
-    error = refusal(tmp_path, toml=TOML.replace(old, new, 1))
-    assert error.file == str(tmp_path / "campaign.toml")
-    assert error.found == found
-    require(error, row, column, found, words)
+@pytest.mark.parametrize("refused", REFUSED)
+def test_refused(tmp_path: Path, refused: tuple[Any, ...]) -> None:
+    toml_is_refused(tmp_path, *refused)
 
 
 def test_campaign_toml_in_another_encoding(tmp_path: Path) -> None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import pytest
 from campaign.files import ROWS as WHOLE
 from campaign.files import URDF, add, full, put
-from campaign.spoilt import read, refusal, renamed, require, with_column
+from campaign.spoilt import read, renamed, table_is_refused, with_column
 
 from thermal_robot.campaign import campaign_from_table, read_campaign
 from thermal_robot.campaign.recognise import recognise
@@ -45,18 +46,9 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("table", "row", "column", "found", "words"), REFUSED)
-def test_refused(
-    tmp_path: Path,
-    table: str | bytes,
-    row: int | None,
-    column: str | None,
-    found: str | None,
-    words: list[str],
-) -> None:
-    error = refusal(tmp_path, table=table)
-    assert error.file == str(tmp_path / "measurements.csv")
-    require(error, row, column, found, words)
+@pytest.mark.parametrize("refused", REFUSED)
+def test_refused(tmp_path: Path, refused: tuple[Any, ...]) -> None:
+    table_is_refused(tmp_path, *refused)
 
 
 @pytest.mark.parametrize("name", ["x", "time", "sim.x", "approach.lift"])

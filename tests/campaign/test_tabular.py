@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd
 import pytest
 from campaign.files import ROWS as WHOLE
 from campaign.files import add, put
-from campaign.spoilt import ROWS, TOML, refusal, renamed, require
+from campaign.spoilt import ROWS, TOML, refusal, renamed, table_is_refused
 
 from thermal_robot.campaign import read_campaign
 from thermal_robot.campaign.tabular import table_from_frame
@@ -107,18 +108,9 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("table", "row", "column", "found", "words"), REFUSED)
-def test_refused(
-    tmp_path: Path,
-    table: str | bytes,
-    row: int | None,
-    column: str | None,
-    found: str | None,
-    words: list[str],
-) -> None:
-    error = refusal(tmp_path, table=table)
-    assert error.file == str(tmp_path / "measurements.csv")
-    require(error, row, column, found, words)
+@pytest.mark.parametrize("refused", REFUSED)
+def test_refused(tmp_path: Path, refused: tuple[Any, ...]) -> None:
+    table_is_refused(tmp_path, *refused)
 
 
 def test_no_table(tmp_path: Path) -> None:

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from campaign.files import ROWS as WHOLE
 from campaign.files import add, put
-from campaign.spoilt import TOML, read, refusal, require, with_column
+from campaign.spoilt import TOML, read, refusal, table_is_refused, with_column
 
 from thermal_robot.campaign import read_campaign
 
@@ -34,18 +35,9 @@ REFUSED = [
 ]
 
 
-@pytest.mark.parametrize(("table", "row", "column", "found", "words"), REFUSED)
-def test_refused(
-    tmp_path: Path,
-    table: str | bytes,
-    row: int | None,
-    column: str | None,
-    found: str | None,
-    words: list[str],
-) -> None:
-    error = refusal(tmp_path, table=table)
-    assert error.file == str(tmp_path / "measurements.csv")
-    require(error, row, column, found, words)
+@pytest.mark.parametrize("refused", REFUSED)
+def test_refused(tmp_path: Path, refused: tuple[Any, ...]) -> None:
+    table_is_refused(tmp_path, *refused)
 
 
 def test_quaternions_are_normalised(tmp_path: Path) -> None:
