@@ -13,6 +13,8 @@ from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import solve
 from thermal_robot.inference.fit import Fit
+from thermal_robot.inference.generalised import generalised
+from thermal_robot.inference.problem import Linear
 from thermal_robot.inference.robust import distance_limit
 from thermal_robot.inference.rows import repeated_poses
 from thermal_robot.inference.scatter import JointScatter, Scatter, enough_rows, joint_errors, variance_components
@@ -118,10 +120,10 @@ def _refitted(fit: Fit, scatter: Scatter, used: NDArray[np.bool_]) -> Array:
     gap = fit.corrected.gap
     if not design.shape[2]:
         return gap
-    root = np.linalg.cholesky(scatter.covariance(fit.corrected.joint_sensitivity[used]))
-    white = np.linalg.solve(root, design[used]).reshape(-1, design.shape[2])
-    step = solve(white.T @ white, white.T @ np.linalg.solve(root, gap[used, :, None]).ravel())
-    return np.asarray(gap - design @ step)
+    covariance = scatter.covariance(fit.corrected.joint_sensitivity[used])
+    white = generalised(Linear(gap[used], design[used], ()), covariance, np.ones(gap.shape[1]))
+    columns = white.frames.reshape(-1, design.shape[2])
+    return np.asarray(gap - design @ solve(columns.T @ columns, columns.T @ white.gap.ravel()))
 
 
 def _distance2(scatter: Scatter, gap: Array, sensitivity: Array, noise: Array) -> Array:
