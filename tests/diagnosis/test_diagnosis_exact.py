@@ -94,3 +94,11 @@ def test_exactness_does_not_add_effects_that_are_not_at_work(rv_m2):
     both = {"transmission_error": 5e-3, "instrument_scale": 1e-3}
     right = [set(diagnose(measured(rv_m2, both, s, 1e-8)[0]).verdict) == set(both) for s in range(4)]
     assert right == [True] * 4
+
+
+@pytest.mark.slow
+@pytest.mark.xfail(reason="at 1 nm double precision decides, see the test at 10 nm", strict=False)
+def test_exactness_adds_nothing_at_a_nanometre_either(rv_m2):
+    both = {"transmission_error": 5e-3, "instrument_scale": 1e-3}
+    right = [set(diagnose(measured(rv_m2, both, s, 1e-9)[0]).verdict) == set(both) for s in range(4)]
+    assert sum(right) >= 3

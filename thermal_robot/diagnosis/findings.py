@@ -76,7 +76,10 @@ def findings(
 
 
 def titled(found: Sequence[Finding], effects: Iterable[Effect]) -> tuple[Finding, ...]:
-    """Return the findings with titles: that of the effect, or what a discovered law describes."""
+    """Return the findings with titles: that of the effect, or what a discovered law describes.
+
+    Of an effect that is not found no more is said than that it is as likely there as not.
+    """
     known = {effect.name: effect for effect in effects}
     found = [replace(f, probability=settings.MOST_SAID) if _unsaid(f) else f for f in found]
     return tuple(
