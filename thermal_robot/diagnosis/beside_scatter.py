@@ -15,7 +15,6 @@ from thermal_robot.inference.fit import Fit, refit
 from thermal_robot.inference.generalised import generalised
 from thermal_robot.inference.random_gap import RandomGap, random_gap
 from thermal_robot.inference.robust import Noise
-from thermal_robot.inference.rows import row_groups
 
 
 def beside_scatter(fit: Fit, chance: RandomGap, progress: Callable[[str], None]) -> Conclusion:
@@ -39,7 +38,7 @@ def beside_scatter(fit: Fit, chance: RandomGap, progress: Callable[[str], None])
     covariance = chance.scatter.covariance(fit.corrected.joint_sensitivity)
     linear = generalised(e.linear, covariance, chance.scatter.noise)
     noise = Noise(*(float(s) for s in chance.scatter.noise[::3]))
-    again = explain(linear, noise, families=fit.families, groups=row_groups(campaign), rarity=fit.rarity)
+    again = explain(linear, noise, families=fit.families, rarity=fit.rarity)
     kept = tuple(dict.fromkeys(fit.families[b] for b in again.best.blocks))
     feigned = {name: settings.NEVER for name in dict.fromkeys(fit.families) if name not in kept}
     fit = refit(fit, {}, kept, feigned, progress)

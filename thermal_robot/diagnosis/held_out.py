@@ -18,7 +18,7 @@ from thermal_robot.inference.explain import explain
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.problem import Linear, Whitening, frame_step
 from thermal_robot.inference.robust import Noise
-from thermal_robot.inference.rows import folds, row_groups
+from thermal_robot.inference.rows import folds
 
 Array = NDArray[np.float64]
 
@@ -61,13 +61,13 @@ def held_out(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Shri
     count = int(fold.max()) + 1
     if count < 2:
         raise EstimationError("all rows repeat one pose: nothing can be held out, and nothing told about the robot")
-    noise, groups = Noise(campaign.noise_position, campaign.noise_orientation), row_groups(campaign)
+    noise = Noise(campaign.noise_position, campaign.noise_orientation)
     linear, families, start = _in_question(fit)
     before, after = np.full(campaign.samples, np.nan), np.full(campaign.samples, np.nan)
     for k in range(count):
         progress(f"held out: fold {k + 1} of {count}")
         train, test = fold != k, fold == k
-        found = explain(linear, noise, rows=train, families=families, start=start, groups=groups, rarity=fit.rarity)
+        found = explain(linear, noise, rows=train, families=families, start=start, forms=explanation.forms, rarity=fit.rarity)
         plain = Whitening((train & ~found.outliers).astype(float), found.whitening.noise, 0.0)
         step = frame_step(fit.before, plain, fit.before.gap)
         left = fit.before.gap - fit.before.frames @ step
@@ -154,8 +154,8 @@ class _Subsets:
             self.whole[b] = both.T @ both
             self.position[b] = place.T @ place * metres if measures == 6 else self.whole[b] * metres
         self.total = self.whole.sum(axis=0)
-        self.worth, self.equations = e.design_effect, len(used) * measures
-        self.variance = e.best.noise**2 * e.design_effect
+        self.equations = len(used) * measures
+        self.variance = e.best.noise**2 * (1.0 + e.discrepancy.tau**2)
 
     def squares(self, scales: dict[int, float]) -> Array:
         """(B,) sums of squared held-out distances of each block of rows, m², with effects at the given scales."""
@@ -177,7 +177,7 @@ class _Subsets:
         variance = self.variance
         for _ in range(settings.FOLD_ROUNDS):
             signed = np.concatenate([-ridge(train, self.frames, variance * tight), [1.0]])
-            left = self.worth * float(signed @ train @ signed) / max(self.equations, 1)
+            left = float(signed @ train @ signed) / max(self.equations, 1)
             variance = max(left, self.variance)
         return signed
 

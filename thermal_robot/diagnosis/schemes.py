@@ -67,8 +67,8 @@ def _problem(fit: Fit) -> _Problem:
         np.concatenate([explanation.linear.frames, *scaled], axis=2),
         explanation.linear.gap,
         explanation.linear.frames.shape[2],
-        explanation.whitening.weights / explanation.design_effect,
-        explanation.whitening.noise * best.noise,
+        explanation.whitening.weights,
+        explanation.whitening.noise * best.noise * np.hypot(1.0, explanation.discrepancy.tau),
     )
 
 

@@ -21,7 +21,7 @@ def prior_sensitivity(fit: Fit) -> Sensitivity:
     combinations alone are compared.
     """
     e = fit.explanation
-    problem = e.problem.tempered(e.design_effect) if e.design_effect > 1.0 else e.problem
+    problem = e.problem
     prior = log_priors(fit.families, fit.rarity)
     chosen = {effect.name for effect, _ in fit.effects}
     found = []

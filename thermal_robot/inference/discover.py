@@ -173,7 +173,7 @@ def instead(fit: Fit, name: str) -> tuple[Discovered, float] | None:
     problem = gram(_with(thin, laws), thin.whitening)
     places = fit.campaign.robot.n + len(fit.campaign.robot.segments)
     prior = [*log_priors(fit.families, fit.rarity), *[-float(np.log(places))] * len(laws)]
-    search = Search(problem.tempered(e.design_effect), prior)
+    search = Search(problem, prior)
     now = search.evaluate(e.best.blocks).log_evidence
     gains = [search.evaluate((*rest, known + k)).log_evidence - now for k in range(len(laws))]
     best = int(np.argmax(gains))

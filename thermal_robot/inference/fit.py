@@ -16,7 +16,6 @@ from thermal_robot.inference.columns import frame_columns
 from thermal_robot.inference.explain import Explanation
 from thermal_robot.inference.frames import register
 from thermal_robot.inference.problem import Linear
-from thermal_robot.inference.rows import row_groups
 from thermal_robot.inference.settle import Settled, settle
 from thermal_robot.observations import Observations, observe
 
@@ -90,14 +89,13 @@ def fit(campaign: Campaign, effects: Sequence[Effect], progress: Callable[[str],
     nominal = observe(campaign, register(campaign))
     needs = {e.name: missing for e in effects if (missing := gate.missing(e, nominal))}
     variants = {e.name: gate.variants(e, nominal) for e in effects if e.name not in needs}
-    groups = row_groups(campaign)
-    settled = settle(nominal, variants, groups, progress)
+    settled = settle(nominal, variants, progress)
     if settled.second_order:
         # a container fits large errors of the effects inside it before they are linear: let those try without it
         inside = {n: v for n, v in variants.items() if n not in settled.containers}
-        apart = settle(nominal, inside, groups, progress)
+        apart = settle(nominal, inside, progress)
         if apart.noise <= settings.NO_WORSE * settled.noise:
-            again = settle(apart.observations, variants, groups, progress, apart)
+            again = settle(apart.observations, variants, progress, apart)
             settled = settled if set(again.names) & settled.containers else again
     return _fitted(campaign, settled, needs, variants, {})
 
@@ -126,8 +124,7 @@ def refit(
     """
     variants = {**known.variants, **laws}
     whole = {**known.rarity, **rarity}
-    groups = row_groups(known.campaign)
-    settled = settle(known.nominal, variants, groups, progress, begin=begin, rarity=whole)
+    settled = settle(known.nominal, variants, progress, begin=begin, rarity=whole)
     return _fitted(known.campaign, settled, known.needs, variants, whole)
 
 

@@ -24,6 +24,25 @@ BESIDE_UNLISTED = 0.85
 """Floor of what is believed of an effect beside an unlisted cause. It was read off the faint cases of a blind trial of
 version 0.1, and other simulations contradict it: a floor, not a measurement."""
 
+SMOOTH_PRIOR = 0.5
+"""That something smooth is at work that no effect and no law accounts for: as likely as not."""
+TAUS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
+"""Rms of a discrepancy over the noise: below the first it is noise, above the last a mistake; factors of two."""
+LENGTHS = (0.7, 1.4)
+"""Length scales of the discrepancy at the tool, in standard deviations of the inputs times the root of their number."""
+LANDMARKS = 100
+"""Rows that stand for all in a discrepancy of very many (Nyström): smooth functions need no more."""
+NYSTROM_FLOOR, SMOOTH_FLOOR = 1e-6, 1e-9
+"""Of the largest eigenvalue, and of the noise's variance: directions of a discrepancy below are rounding."""
+COSINES = 5
+"""Functions of each quantity in the discrepancy of places: with amplitudes 1/k² further ones bring 1 %."""
+ERROR_AT_JOINT, ERROR_ELSEWHERE = 3e-4, 1e-4
+"""rad, and m and rad: sizes of errors in a joint and in a twist elsewhere, in proportion; those of discovered laws."""
+LEVER = 0.3
+"""m: a discrepancy of the tool turns it by what moves it over this length."""
+RUNG_REACH = 6.0
+"""Log evidence below the best at which a discrepancy still counts: 1 in 400."""
+
 # --- rounding ---
 
 ROUNDING = 1e-9
@@ -88,14 +107,18 @@ TARGET_STARTS = np.vstack([np.zeros(3), 0.2 * np.eye(3), -0.2 * np.eye(3)])
 """m: where the target may sit on the tool frame; from each the fit reaches 0.3 m."""
 SPARE_EQUATIONS = 6
 """Equations that must be left once the frames are fitted: as many as one pose has."""
-EVIDENCE_STEPS, EVIDENCE_SETTLED, LEAST_VARIANCE = 40, 1e-3, 1e-12
+EVIDENCE_STEPS, EVIDENCE_SETTLED, LEAST_VARIANCE = 40, 1e-2, 1e-12
 """Newton steps of scales and noise at most, the change of a logarithm at which they end, and the smallest variance, in
 squares of the noise: what fits better is rounding."""
+SCALE_GRID = tuple(np.linspace(-6.0, 6.0, 25))
+"""ln λ at which a block that might be added is weighed: four standard deviations of its prior, in thirds of one."""
+NEARLY, MOST_EXACT = 3.0, 12
+"""Log evidence below the best down to which a neighbour is computed exactly, and how many are at most."""
 FLATTEST_PEAK = 0.5
 """Curvature of a peak over ln λ, that of the prior being 1: of a flatter one a parabola is up to 0.9 nat off."""
 FIRST_ROUNDS = 8
 """Rounds of choice, outliers and noise at most: they settle after two or three."""
-MOST_LEVERAGE = 0.9
+MOST_LEVERAGE = 0.999
 """Largest leverage, the share of the equations that a fit takes up, with which its residual tells the noise."""
 FIT_STEPS = 12
 """Gauss-Newton steps at most: quadratic convergence needs four."""

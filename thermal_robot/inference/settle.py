@@ -12,6 +12,7 @@ from thermal_robot.effects import Effect, gate
 from thermal_robot.effects.apply import displacement
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block, frame_columns
+from thermal_robot.inference.discrepancy import forms
 from thermal_robot.inference.explain import Explanation, explain
 from thermal_robot.inference.gauss_newton import gauss_newton
 from thermal_robot.inference.problem import Linear, contained
@@ -51,7 +52,8 @@ class Settled:
     @property
     def noise(self) -> float:
         """What remains per axis, m."""
-        return float(self.explanation.whitening.noise[0] * self.explanation.best.noise)
+        left = self.explanation.remainder[~self.explanation.outliers, :3]
+        return float(np.sqrt((left**2).mean()))
 
     @property
     def containers(self) -> set[str]:
@@ -70,7 +72,6 @@ class Settled:
 def settle(
     start: Observations,
     variants: dict[str, tuple[Effect, ...]],
-    groups: Sequence[NDArray[np.int64]],
     progress: Callable[[str], None],
     known: Settled | None = None,
     begin: Sequence[str] = (),
@@ -84,8 +85,6 @@ def settle(
         Where the first choice is linearised.
     variants
         By name: settings of each effect among which to choose.
-    groups
-        Groupings of rows: see :func:`~thermal_robot.inference.robust.design_effect`.
     progress
         Called with a few words at each stage.
     known
@@ -115,7 +114,7 @@ def settle(
             observations.gap + sum(moved_by, np.zeros_like(observations.gap)), frame_columns(observations)[0], blocks
         )
         explanation = explain(
-            linear, noise, families=families, start=start_at, outliers=outliers, groups=groups, rarity=rarity
+            linear, noise, families=families, start=start_at, outliers=outliers, forms=forms(observations), rarity=rarity
         )
         factor = settings.REFINEMENT ** (1 / 2**revision)
         held = [(candidates[b], explanation.values[b][0]) for b in explanation.best.blocks]
