@@ -151,6 +151,8 @@ class Effect(ABC):
     """By which it is asked for and reported."""
     title: ClassVar[str] = ""
     """What it is in plain words, for a sentence; the name with spaces where a class states none."""
+    singular: ClassVar[str] = ""
+    """What it is in a single joint, for a sentence; the title where a class states none."""
     needs: ClassVar[tuple[str, ...]] = ()
     """Covariates without which the effect is not testable."""
     random: ClassVar[bool] = False
@@ -162,10 +164,12 @@ class Effect(ABC):
     arms only, the class says so."""
 
     def __init_subclass__(cls, **options: Any) -> None:
-        """Give a class with a name of its own, but no title, one."""
+        """Give a class with a name of its own, but no title, one; the same for its singular."""
         super().__init_subclass__(**options)
         if "name" in vars(cls) and "title" not in vars(cls):
             cls.title = str(cls.name).replace("_", " ")
+        if "name" in vars(cls) and "singular" not in vars(cls):
+            cls.singular = cls.title
 
     @abstractmethod
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:

@@ -54,6 +54,7 @@ class JointCompliance(Effect):
 
     name: ClassVar[str] = "joint_compliance"
     title: ClassVar[str] = "joints that yield to load"
+    singular: ClassVar[str] = "a yielding to load"
 
     def __post_init__(self) -> None:
         """Read a model that was saved when ``joints`` meant the numbers of the shapes' joints."""

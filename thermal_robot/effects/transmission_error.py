@@ -33,6 +33,7 @@ class TransmissionError(Effect):
 
     name: ClassVar[str] = "transmission_error"
     title: ClassVar[str] = "periodic transmission errors"
+    singular: ClassVar[str] = "a periodic transmission error"
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """Two amplitudes a joint and order; rad. Prismatic joints have a period only with a ratio in rad/m."""
