@@ -1,6 +1,7 @@
 """How far a joint has gone since it turned round: by hand, against a walk row by row, and with rows taken away."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -41,7 +42,7 @@ def test_nothing_is_remembered_between_sessions():
 def test_it_is_what_a_walk_from_row_to_row_finds(seed):
     path = np.random.default_rng(seed).normal(size=60).round(1)
     last, way, expected = path[0], 0.0, [0.0]
-    for before, now in zip(path[:-1], path[1:], strict=True):
+    for before, now in pairwise(path):
         step = np.sign(now - before)
         if step * way < 0.0:
             last = before

@@ -131,7 +131,12 @@ class Campaign:
             if value is not None:
                 number = np.int64 if key == "rows" else np.float64
                 object.__setattr__(self, key, self._frozen(key, value, shape, number))
-        kinds: dict[str, Any] = {"covariates": np.float64, "labels": np.str_, "missing": np.bool_, "travelled": np.float64}
+        kinds: dict[str, Any] = {
+            "covariates": np.float64,
+            "labels": np.str_,
+            "missing": np.bool_,
+            "travelled": np.float64,
+        }
         for key, kind in kinds.items():
             arrays = {name: self._frozen(name, value, (samples,), kind) for name, value in getattr(self, key).items()}
             object.__setattr__(self, key, arrays)
