@@ -182,7 +182,7 @@ class Campaign:
         It follows from the order of the whole campaign's rows; those that are taken from it keep theirs. See
         :func:`~thermal_robot.campaign.turning.since_turns`.
         """
-        if self.travelled:
+        if self.travelled and {"time", "order"} & set(self.covariates):
             return self.travelled
         return since_turns(self.q, self.robot.joint_names, self.covariates, self.labels.get("session"))
 

@@ -100,7 +100,7 @@ class Discovered(Effect):
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return the quantities that the campaign lacks, and what the effect in the law lacks."""
-        lacking = () if self.values(observations) is not None else (self.quantity,)
+        lacking: tuple[str, ...] = () if self.values(observations) is not None else (self.quantity,)
         if self.by and quantity(observations, self.by) is None:
             lacking += (self.by,)
         return lacking + (gate.missing(self.modulated, observations) if self.modulated else ())

@@ -88,13 +88,14 @@ class Seats:
 def scan(
     observations: Observations, targets: Sequence[Target], effects: Iterable[Effect] | None = None
 ) -> tuple[list[list[Scanned]], int]:
-    """Return, for every target, the candidates, the one worth most first; and how many laws were tried.
+    """Return, for every target, the candidates, best first; and how many laws were tried.
 
     Tried are a smooth and a straight law of each quantity at each place; a wave of any order in each joint; what each
     joint remembers of its moves; known effects whose size in one joint changes with a quantity; products of two
     quantities. A law at a segment has six components, so that only the quantities that gain most elsewhere are tried
-    there. Left out of the answer are laws that are no better than what they contain: an effect that changes than the
-    effect itself in that joint, a product than one of its quantities.
+    there. Candidates are ordered by :attr:`Scanned.worth`, the leading ones by that of their best shape. Left out of
+    the answer are laws that are no better than what they contain: an effect that changes than the effect itself in that
+    joint, a product than one of its quantities.
 
     Parameters
     ----------
@@ -148,11 +149,18 @@ def shaped(observations: Observations, target: Target, law: Discovered) -> Scann
     Each kind of shape has the same share of the prior, which the places of its marks divide: ``tried`` counts shapes.
     """
     seats = Seats(observations, [target])
-    best = _shaped(seats, 0, law)
-    return best if SHAPES[best.law.shape].mark != "gradual" else _refined(best, seats)
+    measured = _measured(seats, 0, law)
+    best = max(measured, key=lambda item: item.worth)
+    sudden = [item for item in measured if SHAPES[item.law.shape].mark == "sudden"]
+    if SHAPES[best.law.shape].mark == "gradual":
+        best = _refined(best, seats)
+    # between the marks that were tried a step may lie that is worth more than anything gradual
+    timed = [_timed(max(sudden, key=lambda item: item.gain), seats)] if sudden else []
+    return max([best, *timed], key=lambda item: item.worth)
 
 
-def _shaped(seats: Seats, t: int, law: Discovered) -> Scanned:
+def _measured(seats: Seats, t: int, law: Discovered) -> list[Scanned]:
+    """Return a law in every shape that it may have."""
     observations = seats.observations
     whole = replace(law, shape="product") if law.by else law
     values = None if law.quantity == "none" else whole.values(observations)
@@ -161,11 +169,10 @@ def _shaped(seats: Seats, t: int, law: Discovered) -> Scanned:
     candidates = [law] if values is None else shapes(law, values, jumps, waves)
     names = [candidate.shape for candidate in candidates]
     gains = seats.seen_from(law)[t].gains([seats.functions(candidate) for candidate in candidates])
-    measured = [
+    return [
         Scanned(candidate, float(gain), len(set(names)) * names.count(candidate.shape))
         for candidate, gain in zip(candidates, gains, strict=True)
     ]
-    return max(measured, key=lambda item: item.worth)
 
 
 def _refined(best: Scanned, seats: Seats) -> Scanned:
@@ -185,6 +192,19 @@ def _refined(best: Scanned, seats: Seats) -> Scanned:
         else:
             step /= 2.0
     return best
+
+
+def _timed(best: Scanned, seats: Seats) -> Scanned:
+    """Move a sudden mark to the best of the gaps between values near it; it was picked among all gaps."""
+    law, followed = best.law, best.law.values(seats.observations)
+    values = np.unique(followed if followed is not None else np.zeros(1))
+    gaps = 0.5 * (values[1:] + values[:-1])
+    beside = -(-len(gaps) // settings.MARKS)
+    middle = int(np.searchsorted(gaps, law.marks[0]))
+    near = [law, *(replace(law, marks=(float(m),)) for m in gaps[max(middle - beside, 0) : middle + beside + 1])]
+    gains = seats.gains(near)[0]
+    chosen = int(gains.argmax())
+    return Scanned(near[chosen], float(gains[chosen]), max(best.tried * len(gaps) // settings.MARKS, best.tried))
 
 
 def _steady(law: Discovered) -> Discovered:
@@ -233,7 +253,7 @@ def _waves(seats: Seats, t: int, grids: Mapping[str, Array], tried: int) -> list
 
 def _best(own: Mapping[str, list[Scanned]], seats: Seats, t: int) -> list[Scanned]:
     """Return all that is better than what it contains, sorted; of a smooth and a straight law the better one."""
-    single: dict[tuple[str, ...], Scanned] = {}
+    single: dict[tuple[str, str, str], Scanned] = {}
     for item in (*own["plain"], *own["memory"]):
         key = (item.law.kind, item.law.place, item.law.quantity)
         if key not in single or item.worth > single[key].worth:
@@ -241,12 +261,13 @@ def _best(own: Mapping[str, list[Scanned]], seats: Seats, t: int) -> list[Scanne
     alone = {key: item.worth for key, item in single.items()}
     for key in sorted(alone, key=lambda key: -alone[key])[: settings.SHAPED]:
         # a step is no smooth law; a product of the clock with anything would stand in for it
-        best = _shaped(seats, t, single[key].law)
-        alone[key] = max(alone[key], best.worth - float(np.log(single[key].tried)))
+        best = max(item.worth for item in _measured(seats, t, single[key].law))
+        alone[key] = max(alone[key], best - float(np.log(single[key].tried)))
     inside = [
         max(alone.get((i.law.kind, i.law.place, name), -np.inf) for name in (i.law.quantity, i.law.by))
         for i in own["product"]
     ]
     products = [item for item, least in zip(own["product"], inside, strict=True) if item.worth > least]
-    every = [*single.values(), *own["wave"], *own["free wave"], *own["modulated"], *products]
-    return sorted(every, key=lambda item: -item.worth)
+    others = [*own["wave"], *own["free wave"], *own["modulated"], *products]
+    ranked = [*((item, alone[key]) for key, item in single.items()), *((item, item.worth) for item in others)]
+    return [item for item, _ in sorted(ranked, key=lambda pair: -pair[1])]

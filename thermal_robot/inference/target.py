@@ -156,11 +156,11 @@ class Seat:
         """(C,) the same of C laws of K functions each, (C, N, K)."""
         laws, rows, k = functions.shape
         r, d, _ = self.design.shape
-        products = (functions[:, :, :, None] * functions[:, :, None, :]).reshape(laws, rows, k * k)
-        whole = products.transpose(0, 2, 1) @ self.weight.reshape(rows, d * d)
-        whole = whole.reshape(laws, k, k, d, d).transpose(0, 1, 3, 2, 4).reshape(laws, k * d, k * d)
-        inside = (self.design.reshape(r * d, rows) @ functions).reshape(laws, r, d, k)
-        inside = inside.transpose(0, 1, 3, 2).reshape(laws, r, k * d)
+        products = functions[:, :, :, None] * functions[:, :, None, :]
+        summed = products.reshape(laws, rows, k * k).transpose(0, 2, 1) @ self.weight.reshape(rows, d * d)
+        whole = summed.reshape(laws, k, k, d, d).transpose(0, 1, 3, 2, 4).reshape(laws, k * d, k * d)
+        seen = (self.design.reshape(r * d, rows) @ functions).reshape(laws, r, d, k)
+        inside = seen.transpose(0, 1, 3, 2).reshape(laws, r, k * d)
         gram = whole - inside.transpose(0, 2, 1) @ inside
         vector = (functions.transpose(0, 2, 1) @ self.remainder).reshape(laws, k * d)
         explained, rank = _explained(gram, vector, np.einsum("cii->ci", whole))
