@@ -238,7 +238,7 @@ class Discovered(Effect):
         if self.by:
             return f"an error at {at} that follows {self.quantity} times {self.by} ({how})"
         if (self.kind, self.shape) == ("joint", "step") and self.quantity in CLOCK:
-            return f"the zero of {at} jumped at {self.quantity} {self._marked(mark)}"
+            return f"the zero of {at} jumped at {self.quantity} {_whole(mark)} {self.unit}".rstrip()
         if self.quantity.startswith(TURN):
             return f"an error at {at} that follows how far it has gone since it last turned round ({how})"
         return f"an error at {at} that follows {self.quantity} ({how})"
@@ -254,6 +254,11 @@ class Discovered(Effect):
         segments = observations.robot.segments
         s = next(s for s, segment in enumerate(segments) if segment.name == self.place)
         return lambda twist: at_segment(s, twist), segments[s].parent_link
+
+
+def _whole(mark: float) -> str:
+    """Return a time or an order without an exponent."""
+    return (f"{mark:.0f}" if abs(mark) >= 1000.0 else f"{mark:.4g}").replace("-", "−")
 
 
 def _times(parameter: Parameter, function: Array, label: str) -> Parameter:

@@ -120,7 +120,7 @@ def scan(
             kind: [Scanned(law, float(g), filled * len(made)) for law, g in zip(made, gains[kind][t], strict=True)]
             for kind, made in kinds.items()
         }
-        own["free wave"] = _waves(seats, t, grids, filled * waves)
+        own["free wave"] = _free_waves(seats, t, grids, filled * waves)
         own["modulated"] = [item for item in own["modulated"] if item.worth > itself[_steady(item.law)][t]]
         found.append(_best(own, seats, t))
     return found, sum(map(len, kinds.values())) + waves
@@ -238,7 +238,7 @@ def _grids(observations: Observations) -> dict[str, Array]:
     return {joint: grid for joint, grid in every.items() if len(grid)}
 
 
-def _waves(seats: Seats, t: int, grids: Mapping[str, Array], tried: int) -> list[Scanned]:
+def _free_waves(seats: Seats, t: int, grids: Mapping[str, Array], tried: int) -> list[Scanned]:
     """Return the best wave of each joint."""
     observations, found = seats.observations, []
     for joint, grid in grids.items():
