@@ -203,6 +203,11 @@ def grammar(robot, name, rng):
     return law, 1e-4 * np.asarray(values)
 
 
+on_arms = pytest.mark.parametrize(
+    ("arm", "seeds"),
+    [("rv_m2", range(1)), *(pytest.param(arm, range(3), marks=pytest.mark.slow) for arm in ("rv_m2", "ur10", "panda"))],
+    indirect=["arm"],
+)
 KINDS = (
     "lost motion x payload",
     "compliance x temperature",
@@ -214,10 +219,10 @@ KINDS = (
 )
 
 
-@pytest.mark.parametrize("arm", ["rv_m2", "ur10", "panda"], indirect=True)
+@on_arms
 @pytest.mark.parametrize("name", KINDS)
-def test_each_kind_of_law_comes_first_where_it_is_at_work(arm, name):
-    for seed in range(2):
+def test_each_kind_of_law_comes_first_where_it_is_at_work(arm, seeds, name):
+    for seed in seeds:
         law, values = grammar(arm, name, np.random.default_rng([seed, 99]))
         here, target = put_in(arm, law, values, seed, 3.0)
         found = scan(here, [target])[0][0]
@@ -233,10 +238,10 @@ def test_each_kind_of_law_comes_first_where_it_is_at_work(arm, name):
             assert best.law.describe().startswith(f"the zero of {in_words('joint', law.place)} jumped at time")
 
 
-@pytest.mark.parametrize("arm", ["rv_m2", "ur10", "panda"], indirect=True)
+@on_arms
 @pytest.mark.parametrize("reach", [(1.0, 60.0), (60.0, 200.0)])
-def test_a_wave_of_any_order_comes_first_with_its_order(arm, reach):
-    for seed in range(3):
+def test_a_wave_of_any_order_comes_first_with_its_order(arm, seeds, reach):
+    for seed in seeds:
         rng = np.random.default_rng([seed, 5])
         joint = arm.joint_names[int(rng.integers(1, arm.n - 1))]
         order = float(rng.uniform(*reach))
@@ -281,3 +286,12 @@ def test_a_scan_of_a_hundred_rows_is_quick():
         scan(here, [target, target])
         took.append(process_time() - start)
     assert min(took) < 0.7
+
+
+def test_a_wave_of_a_screw_is_found_with_its_lead(awkward):
+    law = Discovered(place="slide", quantity="slide", shape="harmonic", marks=(2.0 * np.pi / 0.01,))
+    here, target = put_in(awkward, law, np.array([0.0, 1e-4, 1e-4]), 1, 10.0)
+    first = scan(here, [target])[0][0][0].law
+    assert (first.place, first.shape) == ("slide", "harmonic")
+    assert 2.0 * np.pi / first.marks[0] == pytest.approx(0.01, rel=1e-3)
+    assert first.describe().endswith("(a wave of 0.01 m)")

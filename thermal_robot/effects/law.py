@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from thermal_robot.campaign.units import SI
 from thermal_robot.effects import gate
 from thermal_robot.effects.catalogue import restored
 from thermal_robot.effects.effect import (
@@ -231,6 +232,8 @@ class Discovered(Effect):
         )
         mark = self.marks[0] if self.marks else 0.0
         how = SHAPES[self.shape].words.format(mark=self._marked(mark), order=mark)
+        if self.shape == "harmonic" and self.unit == SI.length:
+            how = f"a wave of {2.0 * np.pi / mark:.4g} {self.unit}"
         if self.modulated is not None:
             return f"{self.modulated.singular} in {at} that changes with {self.quantity} ({how})"
         if self.shape == "constant":
