@@ -75,7 +75,7 @@ def _alone(fit: Fit, law: Discovered) -> dict[str, tuple[Effect, ...]]:
     """
     if law.kind != "joint" or law.quantity != law.place:
         return {}
-    own = {name: (variants, gate.at(variants[0], law.place)) for name, variants in fit.variants.items()}
+    own = {name: (variants, gate.at(variants[0], law.place, fit.corrected)) for name, variants in fit.variants.items()}
     return {name: (*known, single) for name, (known, single) in own.items() if single and single not in known}
 
 

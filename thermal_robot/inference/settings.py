@@ -200,6 +200,18 @@ FEWEST_LEFT = 5
 LAW_FLOOR = 1e-6
 """Of the largest eigenvalue of a law's scaled Gram matrix: a direction below it is nearly a sum of the others, and
 would yet be counted as a parameter."""
+HIGHEST_ORDER, SHORTEST_PERIOD = 200.0, 0.004
+"""Orders a turn up to which waves of a joint are looked for: twice the ratio of common gears; and the shortest wave
+of one that slides, m: a fine ball screw's lead."""
+LOWEST_ORDER = 0.5
+"""Turns of the joint that the longest wave takes, inverted: a longer one is a bend, which smooth laws tell."""
+ORDER_STEP, ORDER_CHUNK, ORDER_ZOOMS = 0.125, 256, 4
+"""Of the width of a peak, 2π over the joint's range: an eighth costs 1 % of a peak's height; orders that are measured
+at a time; and rounds in which the best one is refined, each eight times finer."""
+LATTICE = 1e-3
+"""Of their spacing: positions that lie on a lattice to within this cannot tell an order from its alias."""
+REVERSALS = (0.03, 0.1, 0.3)
+"""Of a joint's range: distances within which its error may turn over; each 3 times the one before."""
 SPLINE_FLOOR = 1e-8
 """Of the largest singular value: functions of a quantity below it are no functions of their own."""
 NAMED = 5
