@@ -14,7 +14,7 @@ from thermal_robot.diagnosis.parts import HeldOut
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import ridge
-from thermal_robot.inference.explain import explain
+from thermal_robot.inference.explain import explain, log_priors
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.problem import Linear, Whitening, frame_step
 from thermal_robot.inference.robust import Noise
@@ -62,12 +62,14 @@ def held_out(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Shri
     if count < 2:
         raise EstimationError("all rows repeat one pose: nothing can be held out, and nothing told about the robot")
     noise = Noise(campaign.noise_position, campaign.noise_orientation)
-    linear, families, start = _in_question(fit)
+    linear, families, priors, start = _in_question(fit)
     before, after = np.full(campaign.samples, np.nan), np.full(campaign.samples, np.nan)
     for k in range(count):
         progress(f"held out: fold {k + 1} of {count}")
         train, test = fold != k, fold == k
-        found = explain(linear, noise, rows=train, families=families, start=start, forms=explanation.forms, rarity=fit.rarity)
+        found = explain(
+            linear, noise, rows=train, families=families, starts=[start], log_prior=priors, forms=explanation.forms
+        )
         plain = Whitening((train & ~found.outliers).astype(float), found.whitening.noise, 0.0)
         step = frame_step(fit.before, plain, fit.before.gap)
         left = fit.before.gap - fit.before.frames @ step
@@ -88,7 +90,7 @@ def held_out(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Shri
     return Shrinkage(overall, before, after, _shares(fit, fold, block, draws))
 
 
-def _in_question(fit: Fit) -> tuple[Linear, tuple[str, ...], tuple[int, ...]]:
+def _in_question(fit: Fit) -> tuple[Linear, tuple[str, ...], list[float], tuple[int, ...]]:
     """Leave out effects whose posterior probability on all rows is negligible; folds need not consider them.
 
     Returns the reduced problem, its families, and the blocks at which the search starts.
@@ -100,7 +102,13 @@ def _in_question(fit: Fit) -> tuple[Linear, tuple[str, ...], tuple[int, ...]]:
     }
     kept = [b for b, f in enumerate(fit.families) if f in likely]
     linear = Linear(e.linear.gap, e.linear.frames, tuple(e.linear.blocks[b] for b in kept))
-    return linear, tuple(fit.families[b] for b in kept), tuple(kept.index(b) for b in e.best.blocks)
+    prior = log_priors([b.effect for b in e.linear.blocks])
+    return (
+        linear,
+        tuple(fit.families[b] for b in kept),
+        [prior[b] for b in kept],
+        tuple(kept.index(b) for b in e.best.blocks),
+    )
 
 
 def _sums(values: Array, block: NDArray[np.int64]) -> Array:

@@ -27,8 +27,8 @@ from thermal_robot.effects import gate
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.evidence import Combination
-from thermal_robot.inference.problem import Linear, whitened
 from thermal_robot.inference.fit import Fit
+from thermal_robot.inference.problem import Linear, whitened
 from thermal_robot.observations import Observations, observe
 
 if TYPE_CHECKING:

@@ -22,7 +22,7 @@ def prior_sensitivity(fit: Fit) -> Sensitivity:
     """
     e = fit.explanation
     problem = e.problem
-    prior = log_priors(fit.families, fit.rarity)
+    prior = log_priors([b.effect for b in e.linear.blocks])
     chosen = {effect.name for effect, _ in fit.effects}
     found = []
     for factor in (1.0 / settings.PRIOR_FACTOR, settings.PRIOR_FACTOR):

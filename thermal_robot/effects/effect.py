@@ -179,6 +179,11 @@ class Effect(ABC):
         """Return what the campaign lacks for this effect to be testable; empty when it can be tested."""
         return tuple(need for need in self.needs if not observations.varies(need))
 
+    @property
+    def share(self) -> float | None:
+        """Of the prior probability of its name; ``None`` where all settings of a name have the same share."""
+        return None
+
     def reads(self, observations: Observations) -> tuple[str, ...]:
         """Return the covariates that its responses were read from: whoever predicts must know them, too."""
         return tuple(need for need in self.needs if need in observations.covariates)

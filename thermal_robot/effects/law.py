@@ -69,6 +69,8 @@ class Discovered(Effect):
         The second quantity, and what it is counted from and in; empty where there is none.
     of, of_arguments
         Name of the known effect that changes with the quantity, and its arguments as JSON text; empty where none does.
+    tried
+        Among how many laws it was picked.
     """
 
     title: ClassVar[str] = "an unlisted law"
@@ -88,6 +90,12 @@ class Discovered(Effect):
     by_span: float = 1.0
     of: str = ""
     of_arguments: str = "{}"
+    tried: float = 1.0
+
+    @property
+    def share(self) -> float:
+        """Of the prior probability of a law: one of all that were tried."""
+        return 1.0 / self.tried
 
     @property
     def follows(self) -> str:

@@ -202,20 +202,29 @@ def _gains(gram: Gram, base: Combination, blocks: Sequence[int]) -> list[tuple[i
     square = np.exp(2.0 * log_scale)[:, None]
     prior = -0.5 * (log_scale / settings.SIZE_SPREAD) ** 2
     norm = np.log((log_scale[1] - log_scale[0]) / (np.sqrt(2.0 * np.pi) * settings.SIZE_SPREAD))
+    worth = 0.5 * (gram.equations + gram.noise_dof)
     result = []
-    for b in blocks:
-        own = gram.slices[b]
-        cross = gram.matrix[own, used]
-        value, vector = np.linalg.eigh(gram.matrix[own, own] - cross @ (base.covariance / variance) @ cross.T)
-        value = np.maximum(value, 0.0)
-        along = (vector.T @ left[own]) ** 2
-        taken = (along * square / (variance + square * value)).sum(axis=1)
-        log = -0.5 * np.log1p(square * value / variance).sum(axis=1) + prior
-        log -= 0.5 * (gram.equations + gram.noise_dof) * np.log1p(-np.minimum(taken / total, 1.0 - 1e-9))
-        top = int(np.argmax(log))
-        gain = float(log[top] + np.log(np.exp(log - log[top]).sum()) + norm)
-        result.append((b, gain, float(np.exp(log_scale[top]))))
+    for alike in _by_width(gram, blocks):
+        own = np.array([np.arange(gram.slices[b].start, gram.slices[b].stop) for b in alike])
+        cross = gram.matrix[own[:, :, None], used]
+        inside = gram.matrix[own[:, :, None], own[:, None, :]]
+        value, vector = np.linalg.eigh(inside - cross @ (base.covariance / variance) @ cross.transpose(0, 2, 1))
+        value = np.maximum(value, 0.0)[:, None, :]
+        along = ((vector.transpose(0, 2, 1) @ left[own][:, :, None])[:, :, 0] ** 2)[:, None, :]
+        taken = (along * square / (variance + square * value)).sum(axis=2)
+        log = -0.5 * np.log1p(square * value / variance).sum(axis=2) + prior
+        log -= worth * np.log1p(-np.minimum(taken / total, settings.ALL_BUT))
+        top = log.max(axis=1)
+        gain = top + np.log(np.exp(log - top[:, None]).sum(axis=1)) + norm
+        result += list(zip(alike, gain.tolist(), np.exp(log_scale[log.argmax(axis=1)]).tolist(), strict=True))
     return result
+
+
+def _by_width(gram: Gram, blocks: Sequence[int]) -> list[list[int]]:
+    widths: dict[int, list[int]] = {}
+    for b in blocks:
+        widths.setdefault(gram.slices[b].stop - gram.slices[b].start, []).append(b)
+    return list(widths.values())
 
 
 @dataclass(eq=False)
@@ -266,7 +275,9 @@ class _Posterior:
     def step(self, log_scale: Array) -> Array:
         """Return the Newton step of ln λ, its curvature held positive."""
         slope = self.fitted - self.determined - log_scale / settings.SIZE_SPREAD**2
-        return np.minimum(np.maximum(slope / (self.fitted + self.determined + 1.0 / settings.SIZE_SPREAD**2), -1.0), 1.0)
+        return np.minimum(
+            np.maximum(slope / (self.fitted + self.determined + 1.0 / settings.SIZE_SPREAD**2), -1.0), 1.0
+        )
 
 
 def _evidence(gram: Gram, blocks: tuple[int, ...], prior: float, start: Combination | None) -> Combination:

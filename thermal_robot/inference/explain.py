@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.effects import Effect
 from thermal_robot.inference import settings
 from thermal_robot.inference.discrepancy import Form
 from thermal_robot.inference.evidence import Combination, Gram
@@ -85,10 +86,10 @@ def explain(
     *,
     rows: NDArray[np.bool_] | None = None,
     families: Sequence[str] = (),
-    start: Sequence[int] = (),
+    starts: Sequence[Sequence[int]] = (),
     outliers: NDArray[np.bool_] | None = None,
     forms: Sequence[Form] = (),
-    rarity: Mapping[str, float] | None = None,
+    log_prior: Sequence[float] | None = None,
 ) -> Explanation:
     """Find the most probable combination of blocks together with outliers, noise and what no block accounts for.
 
@@ -103,12 +104,12 @@ def explain(
     families
         Name of the effect that each block belongs to: blocks of one effect are settings that exclude each other and
         share its prior probability.
-    start, outliers
-        Where the search starts: blocks and rows set aside.
+    starts, outliers
+        Where the search starts: combinations of blocks, and rows set aside.
     forms
         Of the discrepancy that is considered; none where nothing but noise may remain.
-    rarity
-        By family: added to its log prior odds, below zero for one that was picked out of many.
+    log_prior
+        Log prior odds of each block; see :func:`log_priors`, by which those of the blocks' effects are taken if absent.
 
     Returns
     -------
@@ -120,14 +121,14 @@ def explain(
     use = np.ones(samples, dtype=bool) if rows is None else rows
     aside = np.zeros(samples, dtype=bool) if outliers is None else outliers & use
     families = families or [str(k) for k in range(len(linear.blocks))]
-    log_prior = log_priors(families, rarity or {})
+    log_prior = log_priors([b.effect for b in linear.blocks]) if log_prior is None else log_prior
     rivals = settings_of_one(families)
     whitening = first_whitening(linear, noise, use & ~aside)
     history: list[tuple[object, ...]] = []
-    seed = tuple(start)
+    seeds = [tuple(start) for start in starts]
     while True:
         ladder = Ladder(linear, whitening, forms, log_prior, rivals)
-        rung, best = ladder.run(seed)
+        rung, best = ladder.run(seeds)
         white = ladder.whitened_at(rung)
         values = parameter_values(linear, ladder.at(rung).gram, best)
         remainder = _remainder(linear, values)
@@ -141,7 +142,7 @@ def explain(
         followed = best.effective + linear.frames.shape[2] + (white.smooth.degrees if white.smooth else 0.0)
         leverage = followed / max(ladder.at(rung).gram.equations + linear.frames.shape[2], 1)
         whitening, aside = reweigh(remainder - smooth, noise, use, min(leverage, settings.MOST_LEVERAGE), measures)
-        seed = best.blocks
+        seeds = [best.blocks]
     compared, probabilities = ladder.probabilities()
     return Explanation(
         linear,
@@ -170,9 +171,11 @@ def settings_of_one(families: Sequence[str]) -> frozenset[frozenset[int]]:
     return frozenset(frozenset((a, b)) for a, b in pairs if families[a] == families[b])
 
 
-def log_priors(families: Sequence[str], rarity: Mapping[str, float]) -> list[float]:
-    """Return the log prior odds of each block: settings of one effect share its own."""
-    return [log_odds() - float(np.log(list(families).count(f))) + rarity.get(f, 0.0) for f in families]
+def log_priors(effects: Sequence[Effect]) -> list[float]:
+    """Return the log prior odds of each setting of an effect: it has its share of those of its name."""
+    names = [effect.name for effect in effects]
+    shares = [1.0 / names.count(e.name) if e.share is None else e.share for e in effects]
+    return [log_odds() + float(np.log(share)) for share in shares]
 
 
 def _remainder(linear: Linear, values: dict[int, tuple[Array, Array]]) -> Array:

@@ -80,14 +80,17 @@ class Ladder:
         offset = problem.offset + self._priors[rung]
         return Search(replace(problem, offset=offset), self.log_prior, self._pairs)
 
-    def run(self, start: Sequence[int] = ()) -> tuple[Rung, Combination]:
-        """Climb over combinations and discrepancies until neither betters the other."""
+    def run(self, starts: Sequence[tuple[int, ...]] = ()) -> tuple[Rung, Combination]:
+        """Climb over combinations and discrepancies until neither betters the other, from the best of several starts."""
         first = self.at(PLAIN)
-        rung, best = PLAIN, first.run(start if first.allowed(tuple(start)) else ())
-        seeds: set[tuple[int, ...]] = {()}
+        allowed = dict.fromkeys([*(s for s in starts if first.allowed(s)), ()])
+        begin = max((first.evaluate(s) for s in allowed), key=lambda c: c.log_evidence)
+        rung, best = PLAIN, first.run(begin.blocks)
+        seeds = list(allowed)
         while True:
-            found = [self._size(k, blocks) for k in range(len(self.forms)) for blocks in {best.blocks, *seeds}]
-            seeds = set()
+            tried = dict.fromkeys([best.blocks, *seeds])
+            found = [self._size(k, blocks) for k in range(len(self.forms)) for blocks in tried]
+            seeds = []
             other = max(found, key=lambda item: item[1].log_evidence, default=(rung, best))
             if other[1].log_evidence > best.log_evidence + settings.BETTER:
                 rung, best = other[0], self.at(other[0]).run(other[1].blocks)

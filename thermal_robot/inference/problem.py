@@ -80,7 +80,9 @@ def gram(linear: Linear, whitening: Whitening) -> Gram:
     return normal_equations(linear, whitening, stack.T @ stack, len(stack))
 
 
-def normal_equations(linear: Linear, whitening: Whitening, full: Array, equations: int, like: Gram | None = None) -> Gram:
+def normal_equations(
+    linear: Linear, whitening: Whitening, full: Array, equations: int, like: Gram | None = None
+) -> Gram:
     """Project the frames out of the products of all columns, and reduce each block.
 
     Parameters

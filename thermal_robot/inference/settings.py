@@ -1,6 +1,6 @@
 """Every number that was chosen in the inference and the diagnosis: its value, its unit, and why that one.
 
-One was learnt from the cases that score the program, and says so (BESIDE_UNLISTED). What is known of one effect stands
+What is known of one effect stands
 in that effect's file.
 """
 
@@ -12,18 +12,12 @@ PRIOR_PROBABILITY = 0.1
 """That an effect is at work, random ones included: of sixteen effects one or two are then expected."""
 SIZE_SPREAD = 1.5
 """Standard deviation of ln λ: an effect three times larger or smaller than stated is no surprise."""
-NEVER = -1e9
-"""Log prior odds of an effect that scatter had feigned: more than any data can outweigh."""
 GIVEN_NOISE_DOF = 20.0
 """Degrees of freedom that a stated noise is worth: it is trusted to about 15 %, as data sheets are."""
 NOISE_SLACK = 1.3
 """Times a stated noise: a remainder above it is no longer that noise (two sigma of those 15 %)."""
 MISTRUST = 5.0
 """Largest penalty, natural logarithm, for calling a stated noise wrong: e⁵, about 1 in 150."""
-BESIDE_UNLISTED = 0.85
-"""Floor of what is believed of an effect beside an unlisted cause. It was read off the faint cases of a blind trial of
-version 0.1, and other simulations contradict it: a floor, not a measurement."""
-
 SMOOTH_PRIOR = 0.5
 """That something smooth is at work that no effect and no law accounts for: as likely as not."""
 TAUS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
@@ -114,6 +108,8 @@ SCALE_GRID = tuple(np.linspace(-6.0, 6.0, 25))
 """ln λ at which a block that might be added is weighed: four standard deviations of its prior, in thirds of one."""
 NEARLY, MOST_EXACT = 3.0, 12
 """Log evidence below the best down to which a neighbour is computed exactly, and how many are at most."""
+ALL_BUT = 1.0 - 1e-9
+"""Of the residual: a block that takes more of it is computed exactly."""
 FLATTEST_PEAK = 0.5
 """Curvature of a peak over ln λ, that of the prior being 1: of a flatter one a parabola is up to 0.9 nat off."""
 FIRST_ROUNDS = 8
@@ -183,18 +179,12 @@ LINK_QUANTITIES = 6
 """A segment has six components: only so many quantities that speak elsewhere are tried there."""
 SHAPED = 6
 """Candidates of each remainder whose shape is looked at."""
+LEFT_OUT = 4
+"""Effects of an explanation, up to which a law is looked for in the remainder without each of them."""
 COMPARED_LAWS = 8
 """Candidates that are compared jointly with the known effects."""
-IN_TIME = float(np.log(3.0))
-"""Log prior odds of the clock over another quantity that explains the same: changes happen in time."""
-LEAST_GAIN = 6.0
-"""Log evidence that a law must gain over none: 1 in 400."""
 MOST_LAWS = 4
 """Laws of one campaign: a fifth no longer helps anybody to find the cause."""
-RIVAL_LAWS = 3
-"""Laws that are tried in an effect's own place."""
-RIVALLED_EFFECTS = 4
-"""Effects, of the largest share, for which a law is looked for in their place."""
 FEWEST_LEFT = 5
 """Equations that must be left beside a law for a test of it."""
 LAW_FLOOR = 1e-6
@@ -349,8 +339,6 @@ ROWS_ALIKE = 8
 """Rows that are taken together when asking whether an error follows a quantity."""
 PURE = 1e-6
 """Of a unit twist, m or rad: with less of one kind it is all of the other."""
-MOST_SAID = 0.5
-"""Probability that an effect outside the most probable explanation is said to have at most: found it would be more."""
 
 # --- what to measure next ---
 
