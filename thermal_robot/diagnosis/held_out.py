@@ -68,7 +68,13 @@ def held_out(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Shri
         progress(f"held out: fold {k + 1} of {count}")
         train, test = fold != k, fold == k
         found = explain(
-            linear, noise, rows=train, families=families, starts=[start], log_prior=priors, forms=explanation.forms
+            linear,
+            noise,
+            rows=train,
+            families=families,
+            starts=[start],
+            log_prior=priors,
+            forms=[f for f in explanation.forms if f is explanation.discrepancy.form],
         )
         plain = Whitening((train & ~found.outliers).astype(float), found.whitening.noise, 0.0)
         step = frame_step(fit.before, plain, fit.before.gap)
@@ -96,11 +102,8 @@ def _in_question(fit: Fit) -> tuple[Linear, tuple[str, ...], list[float], tuple[
     Returns the reduced problem, its families, and the blocks at which the search starts.
     """
     e = fit.explanation
-    own = {f: [b for b, g in enumerate(fit.families) if g == f] for f in fit.families}
-    likely = {
-        f for f, blocks in own.items() if e.probability(blocks) > settings.EXCLUDED or set(blocks) & set(e.best.blocks)
-    }
-    kept = [b for b, f in enumerate(fit.families) if f in likely]
+    best = set(e.best.blocks)
+    kept = [b for b in range(len(fit.families)) if b in best or e.probability([b]) > settings.EXCLUDED]
     linear = Linear(e.linear.gap, e.linear.frames, tuple(e.linear.blocks[b] for b in kept))
     prior = log_priors([b.effect for b in e.linear.blocks])
     return (

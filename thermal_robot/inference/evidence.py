@@ -110,16 +110,24 @@ class Search:
     exclusive: frozenset[frozenset[int]] = frozenset()
     seen: dict[tuple[int, ...], Combination] = field(default_factory=dict)
 
-    def allowed(self, blocks: tuple[int, ...]) -> bool:
+    def __post_init__(self) -> None:
+        """List what each block excludes."""
+        self._apart: dict[int, set[int]] = {}
+        for a, b in self.exclusive:
+            self._apart.setdefault(a, set()).add(b)
+            self._apart.setdefault(b, set()).add(a)
+
+    def allowed(self, blocks: Sequence[int]) -> bool:
         """Tell whether no two of the blocks exclude each other."""
-        return not any(pair <= set(blocks) for pair in self.exclusive)
+        whole = set(blocks)
+        return not any(self._apart.get(b, whole - whole) & whole for b in blocks)
 
     def evaluate(self, blocks: Sequence[int], start: Combination | None = None) -> Combination:
         """Return the combination's evidence, computed once."""
         key = tuple(sorted(blocks))
         known = self.seen.get(key)
         if known is None or not known.exact:
-            found = _evidence(self.gram, key, sum(self.log_prior[b] for b in key), known or start)
+            found = evidence(self.gram, key, sum(self.log_prior[b] for b in key), known or start)
             if not np.isfinite(found.log_evidence):
                 raise EstimationError("the measurements do not determine anything: too few, or all alike")
             self.seen[key] = found
@@ -161,7 +169,8 @@ class Search:
     def _with_one_more(self, base: Combination, best: Combination) -> list[Combination]:
         others = [b for b in range(len(self.gram.slices)) if b not in best.blocks]
         keys = {b: tuple(sorted((*base.blocks, b))) for b in others}
-        new = [b for b in others if keys[b] not in self.seen and self.allowed(keys[b])]
+        barred = set().union(*(self._apart.get(b, ()) for b in base.blocks))
+        new = [b for b in others if b not in barred and keys[b] not in self.seen]
         for b, gain, scale in _gains(self.gram, base, new):
             self.seen[keys[b]] = Combination(
                 keys[b],
@@ -280,7 +289,20 @@ class _Posterior:
         )
 
 
-def _evidence(gram: Gram, blocks: tuple[int, ...], prior: float, start: Combination | None) -> Combination:
+def evidence(gram: Gram, blocks: tuple[int, ...], prior: float, start: Combination | None) -> Combination:
+    """Return one combination with noise and scales at their most probable values.
+
+    Parameters
+    ----------
+    gram
+        The problem.
+    blocks
+        That are in it.
+    prior
+        Their log prior odds.
+    start
+        A combination like it, from whose noise and scales the iteration starts.
+    """
     spans = [np.arange(gram.slices[b].start, gram.slices[b].stop) for b in blocks]
     used = np.concatenate([*spans, np.zeros(0, dtype=int)])
     owner = np.repeat(np.arange(len(blocks)), [len(span) for span in spans])

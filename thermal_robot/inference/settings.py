@@ -34,8 +34,8 @@ ERROR_AT_JOINT, ERROR_ELSEWHERE = 3e-4, 1e-4
 """rad, and m and rad: sizes of errors in a joint and in a twist elsewhere, in proportion; those of discovered laws."""
 LEVER = 0.3
 """m: a discrepancy of the tool turns it by what moves it over this length."""
-RUNG_REACH = 6.0
-"""Log evidence below the best at which a discrepancy still counts: 1 in 400."""
+RUNG_REACH = 4.0
+"""Log evidence below the best at which a discrepancy still counts: 1 in 50."""
 
 # --- rounding ---
 
