@@ -27,7 +27,22 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-Kind = Literal["single", "pair", "triple", "null", "hard", "faint", "removed", "hidden", "unlisted", "real"]
+Kind = Literal[
+    "single",
+    "large",
+    "visits",
+    "lags",
+    "pair",
+    "many",
+    "null",
+    "hard",
+    "mixed",
+    "removed",
+    "hidden",
+    "unlisted",
+    "both",
+    "real",
+]
 
 
 @dataclass(frozen=True)
@@ -72,11 +87,14 @@ class Case:
     hidden
         Columns (``temperature`` stands for ``temperature.<link>`` too) taken out of the table.
     ratio
-        Size of each effect: rms per axis after rigid alignment over the noise per axis, drawn evenly between the two.
+        Size of each effect: rms per axis after rigid alignment over the noise per axis, drawn between the two, evenly in
+        its logarithm.
     samples
         Number of rows, drawn between the two.
     background
         Ratio at which every other effect is present, 0 for none.
+    wants
+        What the campaign must be like, beside what its faults want: ``repeats``, ``moving``, ``sensor:air`` ...
     heavy
         Whether the noise has Student's law, with 3 to 8 degrees of freedom.
     own
@@ -94,5 +112,6 @@ class Case:
     ratio: tuple[float, float] = (2.0, 6.0)
     samples: tuple[int, int] = (75, 140)
     background: float = 0.0
+    wants: tuple[str, ...] = ()
     heavy: bool = False
     own: str = ""

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,6 +40,9 @@ class Fault:
         Whether it scatters anew at every visit.
     also
         Names of other effects that do part of it by definition, each with the columns of the values that do.
+    parameters
+        (setting, values) → true parameters by the names that the diagnosis has for them, in its units and with its
+        signs, where formats.md leaves no doubt what is meant.
     fixed
         Columns of the values that are no size (a phase, a time constant), each with the settings that span it.
     """
@@ -52,6 +55,7 @@ class Fault:
     wants: tuple[str, ...] = ()
     quantities: Callable[[Setting, Sequence[Place]], Sequence[str]] = lambda setting, places: ()
     random: bool = False
+    parameters: Callable[[Setting, Array], Mapping[str, float]] = lambda setting, values: {}
     also: tuple[tuple[str, tuple[int, ...]], ...] = ()
     fixed: tuple[tuple[int, tuple[float, ...]], ...] = ()
 
@@ -81,6 +85,19 @@ def own_position(setting: Setting, places: Sequence[Place]) -> list[str]:
 def clock(setting: Setting, places: Sequence[Place]) -> list[str]:
     """Return time and the order of rows, which are one."""
     return ["time", "order"]
+
+
+def each_joint(label: str, of: Callable[[Array], Array]) -> Callable[[Setting, Array], Mapping[str, float]]:
+    """Return one parameter a joint, its value a function of the (n, D) values."""
+    return lambda setting, values: {
+        f"{label}, {name}": float(value) for name, value in zip(setting.world.names, of(values), strict=True)
+    }
+
+
+def twist(where: str) -> Callable[[Setting, Array], Mapping[str, float]]:
+    """Return the components of a twist in the first row of the values: translation, then rotation."""
+    names = [f"{kind} {axis}, {where}" for kind in ("translation", "rotation") for axis in "xyz"]
+    return lambda setting, values: dict(zip(names, values[0].tolist(), strict=True))
 
 
 def some(
