@@ -12,13 +12,18 @@ A **record** is what is known of one case after its seal was opened, as plain JS
         "parts": {"drift": {"ratio": 3.1, "main": true, "places": [{"kind": "joint", "name": "elbow_joint"}]}, ...},
                                        ratio: what it leaves after the best rigid alignment, rms per axis over noise;
                                        places: where it sits, most first, where few places are at fault
+        "parameters": {"drift": {"translation x, base": 2e-4}},
+                                       true values by effect and by the diagnosis's name of the parameter, SI
         "places": [{"kind": "joint", "name": ...}], "quantities": ["time", "order"],
-                                       any of these is a right answer for what is unlisted, removed or hidden
+                                       any of these is a right answer for what is unlisted, removed or hidden;
+                                       quantity "none": it follows nothing that is recorded
+        "near": [{"kind": "joint", "name": ...}],    these places and those beside them
         "needs": ["temperature"],      columns that the diagnosis should ask for (hidden condition)
         "outliers": [17, 80]},
      "said": {diagnosis JSON of formats.md} | null,
-     "fresh": {"rms_before": 1.2e-4, "rms_after": 2.0e-6},   rms distance on noise-free fresh samples, m: frames alone,
-                                       and the corrected model | null
+     "fresh": {"rms_before": 1.2e-4, "rms_after": 2.0e-6,   rms distance on noise-free fresh samples, m: frames alone,
+                                       and the corrected model
+               "shares": {"drift": 0.9}} | null,            of each effect in the model, on the same samples
      "seconds": 0.4, "error": null | "the diagnosis failed: ..."}
 """
 
@@ -87,8 +92,8 @@ class Case:
     hidden
         Columns (``temperature`` stands for ``temperature.<link>`` too) taken out of the table.
     ratio
-        Size of each effect: rms per axis after rigid alignment over the noise per axis, drawn between the two, evenly in
-        its logarithm.
+        Size of each effect: rms per axis after rigid alignment over the noise per axis, drawn between the two,
+        evenly in its logarithm.
     samples
         Number of rows, drawn between the two.
     background

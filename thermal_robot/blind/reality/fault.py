@@ -128,3 +128,34 @@ def some(
         return np.abs(values) if positive else values
 
     return draw
+
+
+Number = Callable[[Setting, int, np.random.Generator], float]
+"""Draws a number for a joint, by its index."""
+
+
+def one(*numbers: Number) -> Callable[[Setting, np.random.Generator], Array]:
+    """Draw one joint, never the first or the last, and numbers for it; the first one is its size."""
+
+    def draw(setting: Setting, rng: np.random.Generator) -> Array:
+        values = np.zeros((setting.world.n, len(numbers)))
+        j = int(rng.integers(1, setting.world.n - 1))
+        values[j] = [number(setting, j, rng) for number in numbers]
+        return values
+
+    return draw
+
+
+def milli(setting: Setting, j: int, rng: np.random.Generator) -> float:
+    """Return a thousandth, of either sign."""
+    return float(rng.choice([-1e-3, 1e-3]))
+
+
+def part(low: float, high: float) -> Number:
+    """Draw a number between two."""
+    return lambda setting, j, rng: float(rng.uniform(low, high))
+
+
+def within(low: float, high: float) -> Number:
+    """Draw a position of the joint between two quantiles of where it goes."""
+    return lambda setting, j, rng: float(np.quantile(setting.q[:, j], rng.uniform(low, high)))

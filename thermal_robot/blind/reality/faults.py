@@ -96,7 +96,14 @@ def _all_segments(size: float, spread: tuple[float, float], numbers: int = 1) ->
 FAULTS: dict[str, Fault] = {
     fault.name: fault
     for fault in (
-        Fault("base_frame", _rigid, _misplaced("base"), lambda s: [("base", "base")], wants=("base_known",), parameters=twist("base")),
+        Fault(
+            "base_frame",
+            _rigid,
+            _misplaced("base"),
+            lambda s: [("base", "base")],
+            wants=("base_known",),
+            parameters=twist("base"),
+        ),
         Fault("tool_frame", _rigid, _misplaced("tool"), lambda s: [("tool", "tool")], wants=("tool_known",)),
         Fault(
             "joint_offset",

@@ -63,7 +63,7 @@ def draw_wheels(setting: Setting, rng: np.random.Generator) -> Array:
 
 
 def harmonics(setting: Setting, values: Array) -> dict[str, float]:
-    """Fourier's amplitudes of :func:`wheels`: a disc that is off by e adds eᵏ/k of order k, an oval one nearly order 2."""
+    """Fourier's amplitudes of :func:`wheels`: a disc off by e adds eᵏ/k of order k, an oval one nearly order 2."""
     found = {}
     for name, (across, along, oval, phase, ratio) in zip(setting.world.names, values, strict=True):
         disc = complex(along, -across)

@@ -26,14 +26,14 @@ class Setting:
     world
         The robot.
     given
-        (N,) whether a row is measured; the others are commands of which a prediction is asked.
+        (N,) whether a row is measured; the others are commands of which a prediction is asked: the same day over again,
+        spent on other poses.
     q, velocity, acceleration
         (N, n) joint positions at the instant of measurement, and how they change there (zero where it stands still).
     time
         (N,) s.
     approach
-        (N, n) sign of the last move of each joint; 0 where it has not moved yet. The last move begins at the row before
-        that was measured: what is to be predicted is where the robot might have gone instead.
+        (N, n) sign of the last move of each joint; 0 where it has not moved yet.
     payload
         (N,) kg.
     air, links
@@ -82,9 +82,14 @@ class Setting:
 
     @property
     def before(self) -> NDArray[np.int64]:
-        """(N,) the row that was measured last before each row; the first one's is itself."""
-        last = np.maximum.accumulate(np.where(self.given, np.arange(self.samples), 0))
-        return np.asarray(np.append(0, last[:-1]))
+        """(N,) where the robot came from: the row before among those that are measured, or among the others.
+
+        The first one's is itself.
+        """
+        before = np.empty(self.samples, dtype=np.int64)
+        for rows in (np.flatnonzero(self.given), np.flatnonzero(~self.given)):
+            before[rows] = np.append(rows[:1], rows[:-1])
+        return before
 
 
 def draw_setting(

@@ -94,7 +94,7 @@ def slopes(world: World, q: Array, payload: Array, target: Array) -> Slopes:
 
 
 def _held(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
-    """What holds every coordinate against gravity."""
+    """Return what holds every coordinate against gravity."""
     held = np.zeros(model.nv)
     mujoco.mj_kinematics(model, data)
     mujoco.mj_comPos(model, data)
