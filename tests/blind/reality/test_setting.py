@@ -105,13 +105,13 @@ def test_payloads_are_nothing_half_and_all_of_what_suits(days):
         assert 0.5 <= heaviest <= 8.0
 
 
-def test_what_is_to_be_predicted_starts_where_the_robot_was_measured_last(ur10):
+def test_the_day_is_spent_twice_on_poses_to_measure_and_on_others(ur10):
     day = draw_setting(ur10, 12, np.random.default_rng(4), fresh=30, visits=(2, 3))
     assert (day.samples, day.given.sum(), day.given[0]) == (42, 12, True)
-    at = 0
-    for row in range(1, 42):
-        np.testing.assert_array_equal(day.approach[row], np.sign(day.q[row] - day.q[at]))
-        at = row if day.given[row] else at
+    for rows in (np.flatnonzero(day.given), np.flatnonzero(~day.given)):
+        np.testing.assert_array_equal(day.before[rows], np.append(rows[:1], rows[:-1]))
+        moves = np.diff(day.q[rows], axis=0, prepend=day.q[rows][:1])
+        np.testing.assert_array_equal(day.approach[rows], np.sign(moves))
     # rows to predict are poses that were never measured
     assert not set(day.pose[day.given]) & set(day.pose[~day.given])
 
