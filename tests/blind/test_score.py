@@ -44,7 +44,7 @@ def test_misses_can_be_looked_up():
     assert misses["a4"].error == "the diagnosis failed: late"
     assert (misses["a2"].truth, misses["a2"].said, misses["a2"].probability) == (("drift",), ("backlash", "drift"), 0.9)
     assert misses["a2"].wrong == ("exact", "first_named", "false_alarm")
-    assert misses["a3"].unexplained == "somewhere"
+    assert misses["a3"].unexplained == "none"
 
 
 @pytest.mark.parametrize("records", [[], trial(), [crash("single", "drift")], [record("null", said())]])

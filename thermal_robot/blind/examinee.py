@@ -77,6 +77,7 @@ def answer(request: dict[str, Any]) -> dict[str, Any]:
         at = "prediction"
         if (folder / FRESH).is_file():
             reply["predicted"] = _predict(found, folder)
+            at = "refit of its parts"
             samples = found.model.samples(folder / FRESH)
             parts = refitted(found, read_campaign(folder / CAMPAIGN), samples)
             reply["refitted"] = {names: _plain(position) for names, position in parts.items()}
