@@ -41,7 +41,7 @@ def test_only_what_is_identified_and_known_of_a_right_answer_counts():
 
 def test_shrinkage_is_held_against_fresh_rows_with_the_noise_in_it():
     """Gap 10 σ, remainder 1 σ, rms distances; each with 3 σ² of noise: 1 − 4/103."""
-    one = record("single", said(effect("drift")), ["drift"])
+    one = record("single", said(effect("drift", shrinkage=0.9)), ["drift"])
     reached = 1.0 - 4.0 / 103.0
     for interval, inside in (((reached - 1e-9, reached + 1e-9), 1), ((0.98, 1.0), 0)):
         held = {**one["said"]["gap"]["held_out"], "shrinkage_ci95": interval}

@@ -37,11 +37,12 @@ def test_a_case_without_a_gap_or_without_an_answer_makes_no_pair():
 
 
 def test_a_model_is_worse_than_none_where_it_names_something_and_errs_more():
-    good = record("single", said(effect("drift")), ["drift"])
+    good = record("single", said(effect("drift", shrinkage=0.9)), ["drift"])
     bad = {**good, "fresh": {"rms_before": NOISE, "rms_after": 1.1 * NOISE}}
     silent = {**bad, "said": said()}  # names nothing: it is the frames alone
-    found = worse([good, bad, silent, crash("single", "drift"), {**good, "fresh": None}])
-    assert (found.successes, found.trials) == (1, 3)
+    scattering = {**bad, "said": said(effect("encoder_resolution", shrinkage=0.0))}
+    found = worse([good, bad, silent, scattering, crash("single", "drift"), {**good, "fresh": None}])
+    assert (found.successes, found.trials) == (1, 4)
 
 
 def test_the_spread_of_nothing_is_nothing():

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from thermal_robot.blind.judged import Record, at_work, failed, found, unexplained
+from thermal_robot.blind.judged import Record, at_work, corrects, failed, found, unexplained
 from thermal_robot.blind.rate import Rate, rate
 
 SIGMAS = 1.959963984540054
@@ -23,8 +23,8 @@ class Coverage:
         Every parameter that is called identified and whose true value is in the record; normal, from its standard
         deviation. Those of one effect do not err independently: the rate's own interval is too narrow.
     shrinkage
-        Where the verdict names something: the held-out shrinkage, against that on fresh rows. Both have the noise in
-        them; fresh rows are many, so that their own scatter hardly counts.
+        Where something is named that a correction takes away: the held-out shrinkage, against that on fresh rows. Both
+        have the noise in them; fresh rows are many, so that their own scatter hardly counts.
     shares
         Of each effect in the model that is named: its held-out share, against the Shapley value on fresh rows with
         frames and each subset of the effects fitted to the given rows (:mod:`thermal_robot.blind.refitted`).
@@ -37,7 +37,7 @@ class Coverage:
 
 def coverage(records: Sequence[Record]) -> Coverage:
     """Count intervals of all records but real ones, of which nobody knows the truth."""
-    told = [r for r in records if not failed(r) and r["kind"] != "real" and r["said"]["verdict"]["effects"]]
+    told = [r for r in records if not failed(r) and r["kind"] != "real"]
     return Coverage(
         rate(inside for r in told for inside in _parameters(r)),
         rate(inside for r in told for inside in _shrinkage(r)),
@@ -58,7 +58,7 @@ def _parameters(record: Record) -> Iterator[bool]:
 
 def _shrinkage(record: Record) -> Iterator[bool]:
     fresh, held = record.get("fresh"), record["said"]["gap"]["held_out"]
-    if not fresh or record.get("noise") is None or not held.get("shrinkage_ci95"):
+    if not fresh or record.get("noise") is None or not corrects(record):
         return
     noise2 = 3.0 * float(record["noise"]) ** 2
     real = 1.0 - (fresh["rms_after"] ** 2 + noise2) / (fresh["rms_before"] ** 2 + noise2)

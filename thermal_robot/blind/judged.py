@@ -91,6 +91,15 @@ def unexplained(record: Record) -> bool:
     return bool(said(record)["verdict"]["unexplained"])
 
 
+def corrects(record: Record) -> bool:
+    """Whether the corrected model holds anything beside the frames: an effect that is named and shrinks the gap.
+
+    Effects that scatter are named, too, but no correction takes them away: they shrink nothing at all.
+    """
+    named = set(said(record)["verdict"]["effects"])
+    return any(e["name"] in named and e.get("shrinkage") for e in said(record)["effects"])
+
+
 def is_absent(record: Record, effect: str) -> bool:
     """Whether an effect is not at work, not even in the background."""
     return effect not in at_work(record) and (ratio(record, effect) or 0.0) < ABSENT

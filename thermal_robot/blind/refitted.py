@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 
 MOST = 6
 """Effects of which every subset is fitted: 64 fits."""
+_ROUNDS = 3  # after which noise and fit agree to a per cent
 
 
 def refitted(found: Diagnosis, campaign: Campaign, samples: Campaign) -> dict[str, Array]:
@@ -26,7 +27,8 @@ def refitted(found: Diagnosis, campaign: Campaign, samples: Campaign) -> dict[st
 
     Linear about the corrected model, by least squares on the positions of the rows that were not set aside, with the
     settings of the whole diagnosis (time constants, places, quantities) and each effect's parameters held to the size
-    that they have in it. So the held-out shares of a diagnosis are defined, too.
+    that they have in it, the more so the more a subset leaves: what it leaves counts as noise. So the held-out shares
+    of a diagnosis are defined, too.
 
     Parameters
     ----------
@@ -59,7 +61,7 @@ def refitted(found: Diagnosis, campaign: Campaign, samples: Campaign) -> dict[st
         for chosen in combinations(range(len(slices)), size):
             used = np.concatenate([np.arange(slices[0].start), *(np.r_[slices[k]] for k in chosen)]).astype(int)
             fitted = np.zeros(len(values))
-            fitted[used] = _ridge(flat[:, used], whole, noise * tight[used])
+            fitted[used] = _ridge(flat[:, used], whole, noise, tight[used])
             names = "+".join(model.effects[k][0].name for k in chosen)
             predicted[names] = best + (fresh @ (fitted - values)) @ base.T
     return predicted
@@ -106,11 +108,15 @@ def _design(
     return columns, fresh, np.concatenate(tight), tuple(slices)
 
 
-def _ridge(columns: Array, gap: Array, tight: Array) -> Array:
-    """Least squares with a row for each parameter that is held; what is free and not seen stays where it is."""
-    held = tight > 0
-    rows = np.diag(np.where(held, tight, 0.0))[held]
-    size = np.linalg.norm(np.vstack([columns, rows]), axis=0)
-    size[size == 0.0] = 1.0
-    both = np.vstack([columns, rows]) / size
-    return np.asarray(np.linalg.lstsq(both, np.concatenate([gap, np.zeros(len(rows))]), rcond=1e-10)[0] / size)
+def _ridge(columns: Array, gap: Array, noise: float, tight: Array) -> Array:
+    """Least squares with a row for each parameter that is held, noise and remainder found together."""
+    rows = np.diag(tight)[tight > 0]
+    level = noise
+    for _ in range(_ROUNDS):
+        both = np.vstack([columns, level * rows])
+        size = np.linalg.norm(both, axis=0)
+        size[size == 0.0] = 1.0
+        padded = np.concatenate([gap, np.zeros(len(rows))])
+        fitted = np.linalg.lstsq(both / size, padded, rcond=1e-10)[0] / size
+        level = max(float(np.sqrt(np.mean((gap - columns @ fitted) ** 2))), noise)
+    return np.asarray(fitted)
