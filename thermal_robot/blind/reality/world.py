@@ -18,6 +18,7 @@ NODES = 3  # hinges into which a beam's bending is lumped
 _SHORTEST = 1e-6  # m
 _SETTLED = 1e-13  # rad
 _ROUNDS = 60
+_ROTOR = 1.0  # kg m², kg: MuJoCo wants inertia in every freedom; where nothing is accelerated it plays no part
 
 
 @dataclass
@@ -231,7 +232,7 @@ class World:
             if joint.movable and k is not None:
                 slide = joint.kind == "prismatic"
                 kind = mujoco.mjtJoint.mjJNT_SLIDE if slide else mujoco.mjtJoint.mjJNT_HINGE
-                body.add_joint(name=joint.name, type=kind, axis=joint.axis)
+                body.add_joint(name=joint.name, type=kind, axis=joint.axis, armature=_ROTOR)
             elif joint.movable and joint.held:
                 self._hold(body, joint, rotation)
             bodies[joint.child] = body
@@ -268,7 +269,8 @@ class World:
             parent = parent.add_body(name=f"{joint.name}/{node}", pos=step)
             self._mass(parent, 0.0, np.zeros(3))
             for axis, vector in enumerate((first, second)):
-                parent.add_joint(name=f"{joint.name}/{node}/{axis}", type=mujoco.mjtJoint.mjJNT_HINGE, axis=vector)
+                name, kind = f"{joint.name}/{node}/{axis}", mujoco.mjtJoint.mjJNT_HINGE
+                parent.add_joint(name=name, type=kind, axis=vector, armature=_ROTOR)
         return parent
 
     def _steps(self, model: mujoco.MjModel, k: int, bending: bool) -> list[int]:
