@@ -49,7 +49,7 @@ COUNTS = {
     "null": 80,
     "unlisted": 900,
     "both": 50,
-    "mixed": 400,
+    "mixed": 700,
 }
 """More than it takes, for what is withdrawn; the last two for calibration, laws and intervals."""
 

@@ -66,7 +66,7 @@ FULL = {
     "many": 60,
     "null": 100,
     "hard": 100,
-    "mixed": 400,
+    "mixed": 700,
     "removed": 40,
     "hidden": 24,
     "unlisted": 216,
