@@ -49,9 +49,9 @@ class Discovery:
 def candidates(fit: Fit, number: int) -> tuple[Discovered, ...]:
     """Return the laws that may be worth their place, best first.
 
-    Several remainders are scanned: that of the explanation, that of the frames and laws alone, and that of the
-    explanation without each of its effects. Known effects may have absorbed an unlisted cause, which then shows only
-    where they are left out.
+    Several remainders are scanned: that of the explanation, and unless one effect leaves but noise, that of the laws
+    alone and that without each of the effects. Known effects may have absorbed an unlisted cause, which then shows only where
+    they are left out.
 
     Parameters
     ----------
@@ -63,8 +63,8 @@ def candidates(fit: Fit, number: int) -> tuple[Discovered, ...]:
     thin = Thin.of(fit)
     remainders = list(dict.fromkeys(_remainders(fit)))
     targets = [thin.target(blocks) for blocks in remainders]
-    # what is large in few rows looks like gross errors until its law is known
-    targets += [thin.target(blocks, sound=True) for blocks in remainders[:2]]
+    if fit.explanation.outliers.any():
+        targets += [thin.target(blocks, sound=True) for blocks in remainders[:2]]
     found, _ = scan(thin.observations, targets, [effect for own in fit.variants.values() for effect in own[:1]])
     offered = [_offered(thin, target, own) for target, own in zip(targets, found, strict=True)]
     chosen: list[Discovered] = []
@@ -78,12 +78,12 @@ def _remainders(fit: Fit) -> Iterator[tuple[int, ...]]:
     """Yield the blocks of the explanation that are taken out of each remainder that is scanned."""
     best = fit.explanation.best.blocks
     laws = tuple(b for b in best if fit.families[b].startswith(PREFIX))
+    effects = [b for b in best if b not in laws]
     yield best
-    yield laws
-    if len(best) - len(laws) <= settings.LEFT_OUT:
-        for out in best:
-            if out not in laws:
-                yield tuple(b for b in best if b != out)
+    if len(effects) > 1 or fit.explanation.discrepancy.probability > settings.SMOOTH_PRIOR:
+        yield laws
+    if 2 < len(effects) <= settings.LEFT_OUT or (len(effects) == 2 and laws):
+        yield from (tuple(b for b in best if b != out) for out in effects)
 
 
 def _offered(thin: Thin, target: Target, own: Sequence[Scanned]) -> list[Discovered]:

@@ -128,7 +128,8 @@ def explain(
     seeds = [tuple(start) for start in starts]
     while True:
         ladder = Ladder(linear, whitening, forms, log_prior, rivals)
-        rung, best = ladder.run(seeds)
+        ladder.run(seeds)
+        rung, best = ladder.consensus(families)
         white = ladder.whitened_at(rung)
         values = parameter_values(linear, ladder.at(rung).gram, best)
         remainder = _remainder(linear, values)

@@ -84,9 +84,9 @@ class Ladder:
         """Climb over combinations and discrepancies until neither betters the other, from several starts."""
         first = self.at(PLAIN)
         allowed = dict.fromkeys([*(s for s in starts if first.allowed(s)), ()])
-        begin = max((first.evaluate(s) for s in allowed), key=lambda c: c.log_evidence)
-        rung, best = PLAIN, first.run(begin.blocks)
-        seeds = list(allowed)
+        begin = sorted((first.evaluate(s) for s in allowed), key=lambda c: -c.log_evidence)
+        rung, best = PLAIN, first.run(begin[0].blocks)
+        seeds = [c.blocks for c in begin[: settings.STARTS]]
         while True:
             tried = dict.fromkeys([best.blocks, *seeds])
             found = [(*self._size(k, blocks), blocks) for k in range(len(self.forms)) for blocks in tried]
@@ -148,6 +148,23 @@ class Ladder:
     @staticmethod
     def _counts(log_evidence: float, best: Combination) -> bool:
         return log_evidence > best.log_evidence - settings.RUNG_REACH
+
+    def consensus(self, families: Sequence[str]) -> tuple[Rung, Combination]:
+        """Return the best combination of the most probable set of names, settings and discrepancies summed over."""
+        compared, probabilities = self.probabilities()
+        mass: dict[frozenset[str], float] = {}
+        for combination, p in zip(compared, probabilities, strict=True):
+            names = frozenset(families[b] for b in combination.blocks)
+            mass[names] = mass.get(names, 0.0) + float(p)
+        chosen = max(mass, key=lambda names: mass[names])
+        held = [
+            (rung, c)
+            for rung, search in self.searches.items()
+            for c in search.seen.values()
+            if frozenset(families[b] for b in c.blocks) == chosen
+        ]
+        rung, best = max(held, key=lambda item: item[1].log_evidence)
+        return rung, self.at(rung).evaluate(best.blocks)
 
     def probabilities(self) -> tuple[list[Combination], Array]:
         """Return all combinations seen beside all discrepancies, most probable first, with their probabilities."""

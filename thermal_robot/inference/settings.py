@@ -34,6 +34,8 @@ ERROR_AT_JOINT, ERROR_ELSEWHERE = 3e-4, 1e-4
 """rad, and m and rad: sizes of errors in a joint and in a twist elsewhere, in proportion; those of discovered laws."""
 LEVER = 0.3
 """m: a discrepancy of the tool turns it by what moves it over this length."""
+STARTS = 3
+"""Combinations, the best of those that a search starts from, beside which each form of a discrepancy is tried."""
 RUNG_REACH = 4.0
 """Log evidence below the best at which a discrepancy still counts: 1 in 50."""
 

@@ -60,8 +60,14 @@ class Thin:
     def target(self, blocks: Iterable[int], *, sound: bool = False) -> Target:
         """Return the residual once the frames and some blocks are projected out.
 
-        Rows far from the rest weigh little, unless they follow each other, or all rows are taken for ``sound``.
+        Rows far from the rest weigh little, unless they follow each other, or all but the farthest few are taken for
+        ``sound``: what is large in few rows looks like gross errors until its law is known.
         """
         columns = [self.linear.blocks[b].columns for b in blocks]
-        trusted = np.ones_like(self.changed) if sound else self.changed
-        return Target.of(self.linear.gap, np.concatenate([self.linear.frames, *columns], axis=2), trusted)
+        design = np.concatenate([self.linear.frames, *columns], axis=2)
+        first = Target.of(self.linear.gap, design, self.changed)
+        if not sound:
+            return first
+        distance = np.linalg.norm(first.white.reshape(first.root.shape) / first.root, axis=1)
+        near = distance <= np.quantile(distance, 1.0 - settings.FEW_ASIDE)
+        return Target.of(self.linear.gap, design, near | self.changed)
