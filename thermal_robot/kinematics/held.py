@@ -22,7 +22,7 @@ def held_configuration(model: pin.Model, ends: Mapping[str, Mimic]) -> Array:
     model
         Of the whole URDF; a mimicking joint is one like any other there.
     ends
-        What each mimicking joint follows in the end.
+        What each mimicking joint follows in the end; none of them is fixed.
 
     Returns
     -------
@@ -35,19 +35,18 @@ def held_configuration(model: pin.Model, ends: Mapping[str, Mimic]) -> Array:
         If a joint mimics one that has no single position (a floating or planar one).
     """
     q = np.asarray(pin.neutral(model), dtype=float)
-    for joint in model.joints:
+    for joint in list(model.joints)[1:]:
         if joint.nq == 1:
             low, high = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
             if low < high:
                 q[joint.idx_q] = min(max(0.0, low), high)
     for name, end in ends.items():
         position = end.multiplier * held_position(model, q, end.joint) + end.offset
-        if model.existJointName(name):  # a fixed joint stays where it is
-            joint = model.joints[model.getJointId(name)]
-            if joint.nq == 1:
-                q[joint.idx_q] = position
-            elif joint.nv == 1:
-                q[joint.idx_q : joint.idx_q + 2] = np.cos(position), np.sin(position)
+        joint = model.joints[model.getJointId(name)]
+        if joint.nq == 1:
+            q[joint.idx_q] = position
+        elif joint.nv == 1:
+            q[joint.idx_q : joint.idx_q + 2] = np.cos(position), np.sin(position)
     return q
 
 

@@ -148,7 +148,9 @@ def build_chain_model(
     elements = _elements_between(full, root, tool)
     joint_types = _joint_types(full, elements)
 
-    ends = followed(mimics(urdf), _joint_names(full))
+    # a fixed joint stays where it is, whatever it is said to mimic
+    found = {name: mimic for name, mimic in mimics(urdf).items() if full.existJointName(name)}
+    ends = followed(found, _joint_names(full))
     held = held_configuration(full, ends)
     in_chain = {full.frames[e].parentJoint for e in elements if full.frames[e].type == pin.FrameType.JOINT}
     model = _reduced(full, [j for j in range(1, full.njoints) if j not in in_chain], held)
@@ -212,15 +214,7 @@ def _reduced(full: pin.Model, held_joints: list[int], held: Array) -> pin.Model:
 def _chain_arrays(full: pin.Model, model: pin.Model, elements: list[int], held: Array, coupling: Coupling) -> Chain:
     frames = [full.frames[e] for e in elements]
     placements = [_placement(full, e) for e in elements]
-    kinds = np.zeros(len(elements), dtype=np.int64)
-    axes = np.zeros((len(elements), 3))
-    for k, frame in enumerate(frames):
-        if frame.type == pin.FrameType.JOINT:
-            motion = unit_motion(full, full.joints[frame.parentJoint])
-            kinds[k] = PRISMATIC if np.any(motion[:3]) else REVOLUTE
-            axes[k] = motion[:3] + motion[3:]
-            if not np.isclose(np.linalg.norm(axes[k]), 1.0):
-                raise RobotError(f"the axis of joint {frame.name!r} has no direction", name=frame.name)
+    kinds, axes = _kinds_and_axes(full, frames)
     movable = np.flatnonzero(kinds)
     masses = np.array([model.inertias[j].mass for j in range(1, model.njoints)])
     centres = np.empty((len(movable), 3))
@@ -251,6 +245,18 @@ def _chain_arrays(full: pin.Model, model: pin.Model, elements: list[int], held: 
         hanging,
         hanging_centres,
     )
+
+
+def _kinds_and_axes(full: pin.Model, frames: list[pin.Frame]) -> tuple[NDArray[np.int64], Array]:
+    kinds, axes = np.zeros(len(frames), dtype=np.int64), np.zeros((len(frames), 3))
+    for k, frame in enumerate(frames):
+        if frame.type == pin.FrameType.JOINT:
+            motion = unit_motion(full, full.joints[frame.parentJoint])
+            kinds[k] = PRISMATIC if np.any(motion[:3]) else REVOLUTE
+            axes[k] = motion[:3] + motion[3:]
+            if not np.isclose(np.linalg.norm(axes[k]), 1.0):
+                raise RobotError(f"the axis of joint {frame.name!r} has no direction", name=frame.name)
+    return kinds, axes
 
 
 def _placement(model: pin.Model, element: int) -> pin.SE3:
