@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
@@ -242,9 +243,25 @@ def _urdf_text(urdf: str | Path | WritesUrdf) -> tuple[str, str]:
     if isinstance(urdf, Path):
         return _read(urdf)
     if isinstance(urdf, WritesUrdf):
-        written = urdf.write_xml_string()
-        return written.decode() if isinstance(written, bytes) else written, _DESCRIPTION
+        return _written(urdf), _DESCRIPTION
     raise RobotError(f"a robot is a path, URDF text or a yourdfpy.URDF, not {type(urdf).__name__}")
+
+
+def _written(urdf: WritesUrdf) -> str:
+    """Text of a robot that writes itself, with the mimic tags that yourdfpy (to 0.0.60) reads but does not write."""
+    written = urdf.write_xml_string()
+    text = written.decode() if isinstance(written, bytes) else written
+    joints = getattr(getattr(urdf, "robot", None), "joints", ())
+    known = {joint.name: joint.mimic for joint in joints if getattr(joint, "mimic", None) is not None}
+    if not known or "<mimic" in text:
+        return text
+    tree = ElementTree.fromstring(text)
+    for joint in tree.iter("joint"):
+        mimic = known.get(joint.get("name"))
+        if mimic is not None:
+            values = {"joint": mimic.joint, "multiplier": str(mimic.multiplier), "offset": str(mimic.offset)}
+            ElementTree.SubElement(joint, "mimic", values)
+    return ElementTree.tostring(tree, encoding="unicode")
 
 
 def _read(path: Path) -> tuple[str, str]:
