@@ -164,7 +164,8 @@ def static_regressor(robot: Robot, q: ArrayLike, *, frames: ChainFrames | None =
                 regressor[:, j, b, 1:] = np.einsum("nim,ni->nm", rotation, turn)
             else:
                 regressor[:, j, b, 0] = -axis @ robot.gravity
-    return np.asarray(np.einsum("nmbi,mj->njbi", regressor, chain.coupling.matrix))
+    driven = chain.coupling.matrix.T @ regressor.reshape(rows, bodies, -1)
+    return np.asarray(driven.reshape(rows, robot.n, bodies, 4))
 
 
 def _rows_last(frames: ChainFrames) -> tuple[Array, Array, Array, Array]:
