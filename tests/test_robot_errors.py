@@ -4,7 +4,7 @@ import re
 import sys
 
 import pytest
-from coupled import PARALLELOGRAM
+from coupled import PARALLELOGRAM, joint, link
 
 from thermal_robot.errors import RobotError
 from thermal_robot.robot import load_robot
@@ -139,6 +139,13 @@ def test_limits_that_never_meet_are_named():
 
 def test_a_mimic_tag_in_a_comment_is_none():
     assert load_robot(two_links("continuous", '<axis xyz="0 0 1"/><!-- <mimic joint="k"/> -->'), "b").n == 1
+
+
+def test_fingers_that_mimic_nothing_beyond_the_tool_do_not_matter():
+    hand = link("thumb") + joint("bend", "continuous", "hand", "thumb", mimic='joint="no such joint"')
+    text = PARALLELOGRAM.replace("</robot>", hand + "</robot>")
+    assert load_robot(text, "tool").n == 4
+    assert refusal(text, "thumb").name == "bend"
 
 
 def test_a_mimic_finger_stands_where_the_other_one_is_held():

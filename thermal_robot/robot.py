@@ -167,8 +167,8 @@ def load_robot(
     ------
     RobotError
         If there is no such file, name or link, if it is not a URDF, if the chain has no movable joint, or one
-        that is not revolute, continuous, prismatic or fixed, if a joint mimics one that does not exist, or in the
-        end itself, or if gravity is not three finite numbers.
+        that is not revolute, continuous, prismatic or fixed, if one of its joints mimics one that does not exist, or
+        in the end itself, or if gravity is not three finite numbers.
     """
     text, source = _urdf_text(urdf)
     if not tool_frame:

@@ -14,7 +14,7 @@ from thermal_robot.robot import load_robot
 
 def held(text):
     model = parse_urdf(text, "a test")
-    return model, held_configuration(model, followed(mimics(text), list(model.names)))
+    return model, held_configuration(model, followed(mimics(text), list(model.names), []))
 
 
 def test_joints_stand_at_zero_or_at_the_limit_nearest_to_it(awkward_urdf):

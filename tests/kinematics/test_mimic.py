@@ -232,7 +232,7 @@ def test_what_is_no_number_is_said(field, written):
 
 def test_a_chain_of_mimics_is_followed_to_its_end():
     found = {"b": Mimic("a", 2.0, 0.1), "c": Mimic("b", -3.0, 0.5), "d": Mimic("c", 0.5)}
-    ends = followed(found, {"a", "b", "c", "d"})
+    ends = followed(found, {"a", "b", "c", "d"}, {"d"})
     # c = −3 (2 a + 0.1) + 0.5, d half of it
     assert {name: end.joint for name, end in ends.items()} == {"b": "a", "c": "a", "d": "a"}
     np.testing.assert_allclose([ends[n].multiplier for n in "bcd"], [2.0, -6.0, -3.0], rtol=1e-15)
@@ -251,9 +251,11 @@ def test_a_chain_of_mimics_is_followed_to_its_end():
 )
 def test_circles_and_missing_joints_are_named(found, words, name):
     with pytest.raises(RobotError) as refused:
-        followed(found, ["elbow", "a", "b", "c"])
+        followed(found, ["elbow", "a", "b", "c"], list(found)[:1])
     assert words in str(refused.value)
     assert refused.value.name == name
+    # beyond the tool it is nobody's concern
+    assert followed({**found, "d": Mimic("elbow")}, ["elbow", "a", "b", "c", "d"], []) == {"d": Mimic("elbow")}
 
 
 def test_the_coupling_of_a_chain():

@@ -91,8 +91,11 @@ def mimics(urdf: str) -> dict[str, Mimic]:
     return found
 
 
-def followed(found: Mapping[str, Mimic], joints: Collection[str]) -> dict[str, Mimic]:
+def followed(found: Mapping[str, Mimic], joints: Collection[str], chain: Collection[str]) -> dict[str, Mimic]:
     """Follow each mimicking joint, over others that mimic, to one that does not.
+
+    Outside the chain a joint that follows nothing, or in the end itself, is left out: as many a hand in use is written,
+    and it moves nothing that was measured.
 
     Parameters
     ----------
@@ -100,33 +103,42 @@ def followed(found: Mapping[str, Mimic], joints: Collection[str]) -> dict[str, M
         From :func:`mimics`.
     joints
         Names of all joints of the robot.
+    chain
+        Names of those of the chain.
 
     Raises
     ------
     RobotError
-        If a joint follows one that does not exist, or in the end itself; both are named.
+        If a joint of the chain follows one that does not exist, or in the end itself; both are named.
     """
     ends = {}
-    for name, end in found.items():
-        seen = [name]
-        while True:
-            if end.joint not in joints:
-                near = nearest(end.joint, joints)
-                raise RobotError(
-                    f"joint {seen[-1]!r} mimics {end.joint!r}, which is not a joint of the robot; "
-                    f"nearest: {', '.join(near)}",
-                    name=seen[-1],
-                    candidates=near,
-                )
-            if end.joint in seen:
-                circle = " mimics ".join(repr(joint) for joint in (*seen[seen.index(end.joint) :], end.joint))
-                raise RobotError(f"joints mimic each other in a circle: {circle}", name=end.joint)
-            if end.joint not in found:
-                break
-            seen.append(end.joint)
-            end = end.after(found[end.joint])
-        ends[name] = end
+    for name in found:
+        try:
+            ends[name] = _end(name, found, joints)
+        except RobotError:
+            if name in chain:
+                raise
     return ends
+
+
+def _end(name: str, found: Mapping[str, Mimic], joints: Collection[str]) -> Mimic:
+    seen, end = [name], found[name]
+    while True:
+        if end.joint not in joints:
+            near = nearest(end.joint, joints)
+            raise RobotError(
+                f"joint {seen[-1]!r} mimics {end.joint!r}, which is not a joint of the robot; "
+                f"nearest: {', '.join(near)}",
+                name=seen[-1],
+                candidates=near,
+            )
+        if end.joint in seen:
+            circle = " mimics ".join(repr(joint) for joint in (*seen[seen.index(end.joint) :], end.joint))
+            raise RobotError(f"joints mimic each other in a circle: {circle}", name=end.joint)
+        if end.joint not in found:
+            return end
+        seen.append(end.joint)
+        end = end.after(found[end.joint])
 
 
 def couple(names: Sequence[str], ends: Mapping[str, Mimic], held: Mapping[str, float]) -> Coupling:

@@ -138,8 +138,8 @@ def build_chain_model(
     ------
     RobotError
         If the text is not a URDF, a link is unknown, the tool is not below the root frame, or the chain holds
-        no movable joint or one that is not revolute, continuous or prismatic, or if a joint mimics one that does
-        not exist, that has no single position, or in the end itself.
+        no movable joint or one that is not revolute, continuous or prismatic, or if a joint of the chain mimics
+        one that does not exist, that has no single position, or in the end itself.
     """
     full = parse_urdf(urdf, source)
     links = {frame.name: i for i, frame in enumerate(full.frames) if frame.type == pin.FrameType.BODY}
@@ -150,7 +150,7 @@ def build_chain_model(
 
     # a fixed joint stays where it is, whatever it is said to mimic
     found = {name: mimic for name, mimic in mimics(urdf).items() if full.existJointName(name)}
-    ends = followed(found, _joint_names(full))
+    ends = followed(found, _joint_names(full), [full.frames[e].name for e in elements])
     held = held_configuration(full, ends)
     in_chain = {full.frames[e].parentJoint for e in elements if full.frames[e].type == pin.FrameType.JOINT}
     model = _reduced(full, [j for j in range(1, full.njoints) if j not in in_chain], held)
