@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from contextlib import suppress
 from pathlib import Path
 from typing import Any, get_args
 
@@ -17,18 +16,6 @@ from thermal_robot.robot import load_robot
 ARMS = Path(__file__).parent / "reality" / "arms"
 """Arms of other builds: a rail, a SCARA, a gantry, parallelograms."""
 PARALLELOGRAMS = ("palletiser", str(ARMS / "palletiser.urdf"), "tool0")
-
-
-def _loadable(*chosen: tuple[str, str, str]) -> tuple[tuple[str, str, str], ...]:
-    """Leave out robots that the program does not read yet: joints that mimic another one."""
-    found = []
-    for name, urdf, tool_frame in chosen:
-        with suppress(RobotError):
-            load_robot(urdf, tool_frame)
-            found.append((name, urdf, tool_frame))
-    return tuple(found)
-
-
 ROBOTS = (
     ("rv_m2", "builtin:rv_m2", "tool0"),
     ("ur3", "example-robot-data:ur3", "tool0"),
@@ -38,7 +25,7 @@ ROBOTS = (
     ("z1", "example-robot-data:z1", "gripperStator"),
     ("kinova", "example-robot-data:kinova", "j2s6s200_end_effector"),
     *((name, str(ARMS / f"{name}.urdf"), "tool0") for name in ("rail", "scara", "gantry")),
-    *_loadable(PARALLELOGRAMS),
+    PARALLELOGRAMS,
 )
 """Name, URDF and tool frame of the trial's robots."""
 

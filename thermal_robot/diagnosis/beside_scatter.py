@@ -36,7 +36,7 @@ def beside_scatter(fit: Fit, chance: RandomGap, progress: Callable[[str], None])
     Conclusion
         Effects and laws that the scatter had imitated are no longer in the fit.
     """
-    e, campaign = fit.explanation, fit.campaign
+    e = fit.explanation
     covariance = chance.scatter.covariance(fit.corrected.joint_sensitivity)
     linear = generalised(e.linear, covariance, chance.scatter.noise)
     noise = Noise(*(float(s) for s in chance.scatter.noise[::3]))

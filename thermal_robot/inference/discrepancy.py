@@ -14,10 +14,11 @@ Sources: M. C. Kennedy, A. O'Hagan, *J. R. Statist. Soc. B* 63 (2001), eq. 4; lo
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg.lapack import dpotrf, dpotri, dpotrs, dtrtrs
 
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference import settings
@@ -46,109 +47,208 @@ class Form:
     functions: Array
     moves: Array
 
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """B of the rows in use, never written out: B = functions × moves, row by row.
+
+    Attributes
+    ----------
+    functions
+        (n, k), square roots of the rows' weights included.
+    moves
+        (n, m, c) in units of the noise; (m, c) where all rows have the same.
+    """
+
+    functions: Array
+    moves: Array
+
+    def adjoint(self, stack: Array) -> Array:
+        """Bᵀ times (n, m, s): (c k, s)."""
+        carried = np.moveaxis(np.matmul(np.swapaxes(self.moves, -1, -2), stack), 1, 0)
+        return np.asarray(np.matmul(self.functions.T, carried).reshape(-1, stack.shape[2]))
+
+    def times(self, inner: Array) -> Array:
+        """B times (c k, s): (n, m, s)."""
+        carried = np.matmul(self.functions, inner.reshape(self.moves.shape[-1], -1, inner.shape[1]))
+        return np.asarray(np.matmul(self.moves, np.moveaxis(carried, 0, 1)))
+
     @property
-    def columns(self) -> Array:
-        """(N, m, k c) B."""
+    def wide(self) -> bool:
+        """Whether B has more columns than rows."""
+        rows, count = self.functions.shape
+        return bool(rows * self.moves.shape[-2] <= count * self.moves.shape[-1])
+
+    def own(self) -> Array:
+        """B Bᵀ (n m, n m) where B is wide, else BᵀB (c k, c k)."""
         rows, count = self.functions.shape
         moves = np.broadcast_to(self.moves, (rows, *self.moves.shape[-2:]))
-        columns = self.functions[:, None, :, None] * moves[:, :, None, :]
-        return np.asarray(columns.reshape(rows, moves.shape[1], count * moves.shape[2]))
+        m, c = moves.shape[1:]
+        if self.wide:
+            flat = moves.reshape(-1, c)
+            return np.asarray(np.repeat(np.repeat(self.functions @ self.functions.T, m, 0), m, 1) * (flat @ flat.T))
+        pairs = np.einsum("nac,nad->cdn", moves, moves, optimize=True)
+        found = np.empty((c, count, c, count))
+        for i in range(c):
+            for j in range(i, c):
+                found[i, :, j] = (self.functions * pairs[i, j][:, None]).T @ self.functions
+                found[j, :, i] = found[i, :, j].T
+        return found.reshape(c * count, c * count)
 
 
 @dataclass(frozen=True, eq=False)
 class Smooth:
-    """The correlated part of the rows' covariance, in units of the noise: 1 + U diag(d) Uᵀ on the rows in use.
+    """The correlated part of the rows' covariance, in units of the noise: 1 + τ²BBᵀ on the rows in use.
 
     Attributes
     ----------
-    columns
-        (N, m, M) B of all rows, in units of the noise.
+    spectrum
+        The form, on the rows in use.
     tau
-        τ, by which it is multiplied.
-    basis
-        (E, r) U, orthonormal, on the equations of the rows in use.
-    variance
-        (r,) d.
+        τ.
     """
 
-    columns: Array
+    spectrum: Spectrum
     tau: float
-    basis: Array
-    variance: Array
+
+    def products(self, stack: Array) -> Array:
+        """Return Sᵀ (1 + τ²BBᵀ)⁻¹ S of (E, K) columns S."""
+        return self.spectrum.products(self.tau, self.spectrum.along(stack), stack.T @ stack)
 
     def whitened(self, stack: Array) -> Array:
-        """Return (1 + U d Uᵀ)^(−½) times (E, K) columns."""
-        shrink = 1.0 - 1.0 / np.sqrt(1.0 + self.variance)
-        return np.asarray(stack - self.basis @ (shrink[:, None] * (self.basis.T @ stack)))
+        """Return (1 + τ²BBᵀ)^(−½) times (E, K) columns; dearer than :meth:`products`."""
+        found, spectrum = [], self.spectrum
+        for k, (part, rows) in enumerate(zip(spectrum.parts, spectrum.apart(stack), strict=True)):
+            value, vector = spectrum.decomposed(k)
+            power = np.expm1(-0.5 * np.log1p(self.tau**2 * value))
+            flat = rows.reshape(-1, rows.shape[2])
+            if part.wide:
+                found.append((flat + vector @ (power[:, None] * (vector.T @ flat))).reshape(rows.shape))
+            else:
+                over = power / np.maximum(value, settings.SMOOTH_FLOOR)
+                found.append(rows + part.times(vector @ (over[:, None] * (vector.T @ part.adjoint(rows)))))
+        return spectrum.joined(found).reshape(stack.shape)
 
     @property
     def log_det(self) -> float:
-        """log|1 + U d Uᵀ|."""
-        return float(np.log1p(self.variance).sum())
+        """log|1 + τ²BBᵀ|."""
+        return self.spectrum.log_det(self.tau)
 
     @property
     def degrees(self) -> float:
         """How many equations the discrepancy follows: the trace of its smoother."""
-        return float((self.variance / (1.0 + self.variance)).sum())
+        factors = [self.spectrum.factor(self.tau, k) for k in range(len(self.spectrum.parts))]
+        return float(sum(len(f) - np.trace(dpotri(f, lower=1)[0]) for f in factors))
 
-    def mean(self, left: Array, root: Array, used: NDArray[np.int64]) -> Array:
-        """(N, m) posterior mean of the discrepancy, in units of the noise, given the residual of the rows in use.
+    def mean(self, left: Array) -> Array:
+        """(N, m) posterior mean of the discrepancy, in units of the noise.
 
-        Parameters
-        ----------
-        left
-            (E,) residual of the rows in use, whitened by weights and noise alone.
-        root
-            (n,) square root of the weights of the rows in use.
-        used
-            (n,) their numbers.
+        Given the (E,) residual of the rows in use, whitened by weights and noise alone.
         """
-        along = self.basis.T @ left
-        solved = left - self.basis @ (self.variance / (1.0 + self.variance) * along)
-        rows = self.columns[used] * root[:, None, None]
-        inner = rows.reshape(len(left), -1).T @ solved
-        return np.asarray(self.columns @ inner) * self.tau**2
+        found, spectrum = [], self.spectrum
+        for k, (part, everywhere, rows) in enumerate(
+            zip(spectrum.parts, spectrum.everywhere, spectrum.apart(left[:, None]), strict=True)
+        ):
+            along = rows.reshape(-1, 1) if part.wide else part.adjoint(rows)
+            solved = dpotrs(spectrum.factor(self.tau, k), along, lower=1)[0]
+            inner = part.adjoint(solved.reshape(rows.shape)) if part.wide else solved
+            found.append(everywhere.times(self.tau**2 * inner))
+        return spectrum.joined(found)[:, :, 0]
 
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """One form on the rows in use, decomposed once for all τ: columns (N, m, M), basis (E, r) and values (r,)."""
+    """One form on the rows in use, ready for every size τ: one Cholesky factor a size, and no (E, M) array.
 
-    columns: Array
-    basis: Array
-    value: Array
+    With S the columns of the problem: where B has fewer columns than rows, by Woodbury's identity,
+    Sᵀ(1 + τ²BBᵀ)⁻¹S = SᵀS − τ² (BᵀS)ᵀ (1 + τ²BᵀB)⁻¹ BᵀS, and log|1 + τ²BBᵀ| = log|1 + τ²BᵀB|.
+
+    Attributes
+    ----------
+    axes
+        (m, m) orthonormal: components in which the parts are apart; one part has all of them where moves differ by row.
+    parts, everywhere
+        B on the rows in use, and on all rows without weights; one for each component, or one for all.
+    own
+        Of each part: :meth:`Part.own`.
+    """
+
+    axes: Array
+    parts: tuple[Part, ...]
+    everywhere: tuple[Part, ...]
+    own: tuple[Array, ...]
+    factors: dict[tuple[float, int], Array] = field(default_factory=dict)
+    vectors: dict[int, tuple[Array, Array]] = field(default_factory=dict)
 
     @classmethod
     def of(cls, form: Form, weights: Array, noise: Array) -> Spectrum:
-        """Scale a form to a mean of one on its diagonal, in units of the noise, and decompose it."""
-        columns = form.columns / noise[:, None]
-        scale = 1.0 / np.sqrt(max(float((columns**2).sum(axis=2).mean()), settings.TINY))
-        columns *= scale
+        """Scale a form to a mean of one on its diagonal, in units of the noise."""
         used = np.flatnonzero(weights > 0)
-        root = np.sqrt(weights[used])
-        if form.moves.ndim == 2:
-            rows = _decomposed(form.functions[used] * root[:, None])
-            parts = _decomposed(form.moves / noise[:, None] * scale)
-            basis: Array = np.kron(rows[0], parts[0])
-            value: Array = np.kron(rows[1], parts[1])
+        moves = form.moves / noise[:, None]
+        weight = (form.functions**2).sum(axis=1) if moves.ndim == 3 else (form.functions**2).sum(axis=1).mean()
+        square = (moves**2).sum(axis=-1)
+        mean = (square * weight[:, None]).mean() if moves.ndim == 3 else square.mean() * weight
+        moves = moves / np.sqrt(max(float(mean), settings.TINY))
+        functions = form.functions[used] * np.sqrt(weights[used])[:, None]
+        if moves.ndim == 3:
+            axes, each = np.eye(len(noise)), [(moves[used], moves)]
         else:
-            basis, value = _decomposed((columns[used] * root[:, None, None]).reshape(-1, columns.shape[2]))
-        seen = value > settings.SMOOTH_FLOOR
-        return cls(columns, basis[:, seen], value[seen])
+            value, axes = np.linalg.eigh(moves @ moves.T)
+            each = [(root, root) for root in np.sqrt(np.maximum(value, 0.0))[:, None, None]]
+        parts = tuple(Part(functions, near) for near, _ in each)
+        everywhere = tuple(Part(form.functions, far) for _, far in each)
+        return cls(axes, parts, everywhere, tuple(part.own() for part in parts))
+
+    def along(self, stack: Array) -> list[Array]:
+        """Return BᵀS of each part, or, where B is wide, the part's rows of S."""
+        rows = zip(self.parts, self.apart(stack), strict=True)
+        return [r.reshape(-1, stack.shape[1]) if part.wide else part.adjoint(r) for part, r in rows]
+
+    def apart(self, stack: Array) -> list[Array]:
+        """Split (E, K) columns into those of each part, (n, m, K)."""
+        rows = stack.reshape(-1, len(self.axes), stack.shape[1])
+        if len(self.parts) == 1:
+            return [rows]
+        return [np.einsum("a,nak->nk", axis, rows)[:, None] for axis in self.axes.T]
+
+    def joined(self, rows: list[Array]) -> Array:
+        """Put back together what :meth:`apart` split: (n, m, K)."""
+        if len(self.parts) == 1:
+            return rows[0]
+        return np.asarray(np.einsum("aj,jnk->nak", self.axes, np.array([r[:, 0] for r in rows])))
+
+    def factor(self, tau: float, k: int) -> Array:
+        """Cholesky factor of 1 + τ² times a part's own matrix, made once."""
+        if (tau, k) not in self.factors:
+            matrix = self.own[k] * tau**2
+            matrix.ravel()[:: len(matrix) + 1] += 1.0
+            self.factors[tau, k] = dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)[0]
+        return self.factors[tau, k]
+
+    def decomposed(self, k: int) -> tuple[Array, Array]:
+        """Eigenvalues and vectors of a part's own matrix, made once."""
+        if k not in self.vectors:
+            value, vector = np.linalg.eigh(self.own[k])
+            self.vectors[k] = np.maximum(value, 0.0), vector
+        return self.vectors[k]
+
+    def log_det(self, tau: float) -> float:
+        """log|1 + τ²BBᵀ|."""
+        factors = [self.factor(tau, k) for k in range(len(self.parts))]
+        return float(sum(2.0 * np.log(np.diag(factor)).sum() for factor in factors))
+
+    def products(self, tau: float, along: list[Array], plain: Array) -> Array:
+        """Return Sᵀ(1 + τ²BBᵀ)⁻¹S, from :meth:`along` and SᵀS."""
+        found = plain.copy()
+        for k, (part, own) in enumerate(zip(self.parts, along, strict=True)):
+            solved, _ = dtrtrs(self.factor(tau, k), own, lower=1)
+            within = solved.T @ solved
+            found -= own.T @ own - within if part.wide else tau**2 * within
+        return found
 
     def at(self, tau: float) -> Smooth:
         """Return the covariance with a discrepancy of rms τ over the noise."""
-        return Smooth(self.columns, tau, self.basis, self.value * tau**2)
-
-
-def _decomposed(flat: Array) -> tuple[Array, Array]:
-    """Return U and d of B Bᵀ = U d Uᵀ, from the smaller of the two products."""
-    if flat.shape[0] <= flat.shape[1]:
-        value, basis = np.linalg.eigh(flat @ flat.T)
-        return basis, np.maximum(value, 0.0)
-    value, vector = np.linalg.eigh(flat.T @ flat)
-    seen = value > settings.SEEN * value.max(initial=settings.TINY)
-    return flat @ (vector[:, seen] / np.sqrt(value[seen])), value[seen]
+        return Smooth(self, tau)
 
 
 def forms(observations: Observations) -> tuple[Form, ...]:

@@ -140,9 +140,12 @@ def explain(
         if state in history or len(history) >= settings.FIRST_ROUNDS:
             break
         history.append(state)
-        followed = best.effective + linear.frames.shape[2] + (white.smooth.degrees if white.smooth else 0.0)
+        # what a pose brings of its own hides no gross error
+        close = white.smooth is not None and ladder.forms[rung[0]].name != "poses"
+        degrees = white.smooth.degrees if close else 0.0
+        followed = best.effective + linear.frames.shape[2] + degrees
         leverage = followed / max(ladder.at(rung).gram.equations + linear.frames.shape[2], 1)
-        whitening, aside = reweigh(remainder - smooth, noise, use, min(leverage, settings.MOST_LEVERAGE), measures)
+        whitening, aside = reweigh(remainder - smooth if close else remainder, noise, use, min(leverage, settings.MOST_LEVERAGE), measures)
         seeds = [best.blocks]
     compared, probabilities = ladder.probabilities()
     return Explanation(

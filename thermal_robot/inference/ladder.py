@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -48,13 +49,13 @@ class Ladder:
         stack = whitened(self.linear, w)
         self._products, self._equations = stack.T @ stack, len(stack)
         self._spectra = [Spectrum.of(form, w.weights, w.noise) for form in self.forms]
-        self._along = [spectrum.basis.T @ stack for spectrum in self._spectra]
+        self._along = [spectrum.along(stack) for spectrum in self._spectra]
         plain = normal_equations(self.linear, w, self._products, self._equations)
         self._pairs = contained(plain) | self.exclusive
         share = settings.SMOOTH_PRIOR if self.forms else 0.0
         each = max(len(self.forms) * len(settings.TAUS), 1)
         ends = np.cumsum([self.linear.frames.shape[2], *(len(block.sizes) for block in self.linear.blocks)])
-        self._spans = [np.arange(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+        self._spans = [np.arange(a, b) for a, b in pairwise(ends)]
         self._quick: dict[tuple[Rung, tuple[int, ...]], float] = {}
         self._priors = {PLAIN: float(np.log1p(-share))}
         for k in range(len(self.forms)):
@@ -131,9 +132,8 @@ class Ladder:
 
     def _left(self, rung: Rung, picked: NDArray[np.int64]) -> Array:
         """Return the products of some columns, whitened by the discrepancy of a rung."""
-        spectrum, along = self._spectra[rung[0]], self._along[rung[0]][:, picked]
-        variance = spectrum.value * rung[1] ** 2
-        return self._products[np.ix_(picked, picked)] - along.T @ ((variance / (1.0 + variance))[:, None] * along)
+        along = [own[:, picked] for own in self._along[rung[0]]]
+        return self._spectra[rung[0]].products(rung[1], along, self._products[np.ix_(picked, picked)])
 
     def _beside_others(self, best: Combination) -> tuple[Rung, Combination] | None:
         """Weigh the neighbours beside all discrepancies that count; return what is better than the best, if any is."""

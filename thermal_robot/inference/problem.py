@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -202,8 +202,9 @@ def frame_step(linear: Linear, whitening: Whitening, remainder: Array) -> Array:
     flat = linear.frames.shape[2]
     if not flat:
         return np.zeros(0)
-    stack = whitened(Linear(remainder, linear.frames, ()), whitening)
-    return solve(stack[:, :flat].T @ stack[:, :flat], stack[:, :flat].T @ stack[:, flat])
+    stack = whitened(Linear(remainder, linear.frames, ()), replace(whitening, smooth=None))
+    products = stack.T @ stack if whitening.smooth is None else whitening.smooth.products(stack)
+    return solve(products[:flat, :flat], products[:flat, flat])
 
 
 def discrepancy_mean(whitening: Whitening, remainder: Array) -> Array:
@@ -213,4 +214,4 @@ def discrepancy_mean(whitening: Whitening, remainder: Array) -> Array:
     used = np.flatnonzero(whitening.weights > 0)
     root = np.sqrt(whitening.weights[used])
     left = (remainder[used] / whitening.noise * root[:, None]).ravel()
-    return np.asarray(whitening.smooth.mean(left, root, used) * whitening.noise)
+    return np.asarray(whitening.smooth.mean(left) * whitening.noise)

@@ -109,7 +109,7 @@ squares of the noise: what fits better is rounding."""
 SCALE_GRID = tuple(np.linspace(-6.0, 6.0, 25))
 """ln λ at which a block that might be added is weighed: four standard deviations of its prior, in thirds of one."""
 NEARLY, AT_ONCE = 3.0, 8
-"""Log evidence below the best down to which neighbours are computed exactly, and how many before one of them is taken."""
+"""Log evidence below the best down to which neighbours are computed exactly, and how many before one is taken."""
 NOISE_ROUNDS = 6
 """Rounds in which the noise that a further block leaves settles."""
 FLATTEST_PEAK = 0.5
