@@ -46,9 +46,10 @@ CLOSEST = 1e-7
 LARGEST_CLUSTER = 0.1
 """Of all rows: a larger cluster is a path, not a repeated pose."""
 FOLDS = 5
-"""A fifth of the rows is held out at a time: the usual compromise between bias and variance."""
-BLOCKS_A_FOLD = 4
-"""Blocks of consecutive rows in each fold: the units of the bootstrap, twenty in all."""
+"""Regions of joint space that are held out in turn; of temperature and of reach the outermost fifth is."""
+BLOCKS = 20
+"""Blocks of consecutive rows that are held out in turn: a fit then lacks a twentieth of the rows, as good as none, and
+twenty values tell the spread of a figure to a sixth."""
 ROWS_A_GROUP = 5
 """Rows that one spell of time or neighbourhood of poses holds in a campaign of few rows."""
 MOST_GROUPS = 60
@@ -122,8 +123,8 @@ ENOUGH_ROWS = 1500
 """Rows that are scanned for laws, of very many: a law that explains a hundredth of the remainder is then seen."""
 ENOUGH_REMAINDER = 2000
 """The same for the tests of the remainder."""
-DRAW_SEED, TEST_SEED, BOOTSTRAP_SEED = 61, 17, 20180901
-"""Of the rows drawn for a scan, for a test, and of the bootstrap: the same campaign always gets the same answer."""
+DRAW_SEED, TEST_SEED = 61, 17
+"""Of the rows drawn for a scan, and for a test: the same campaign always gets the same answer."""
 
 # --- the linear problem ---
 
@@ -279,10 +280,6 @@ SURE, RIVAL, RIVAL_SHARE = 0.75, 0.2, 0.8
 third share of the explanations without it."""
 EXACT_LEVEL = 0.01
 """Chance that noise makes an exact alias look like none."""
-EXCLUDED = 1e-3
-"""Probability below which an effect is not chosen anew in a fold."""
-RESAMPLES = 2000
-"""Of the bootstrap: ends of a 95 % interval are then known to a tenth of its width."""
 INTERVAL = (0.025, 0.975)
 """Quantiles of every interval."""
 FOLD_ROUNDS = 3
