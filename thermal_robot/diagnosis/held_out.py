@@ -87,7 +87,7 @@ def shrinkage(explanation: Explanation, before: Linear, families: Sequence[str],
         (N,) label 0..B−1 of each row: which are held out together.
     """
     walks = _Walks.of(explanation, before, block)
-    far, near = walks.before.distances(()), walks.distances()
+    far, near = walks.distances(()), walks.distances(walks.players)
     value, interval = share(walks.gain((), walks.players), walks.left(()))
     kept = ~explanation.outliers
     overall = HeldOut("blocked", int(block.max()) + 1, _rms(far[kept]), _rms(near[kept]), value, interval)
@@ -137,8 +137,12 @@ class _Walks:
     def gain(self, chosen: Sequence[int], more: Sequence[int]) -> Squares:
         return self.left(chosen) - self.left((*chosen, *more))
 
-    def distances(self) -> Array:
-        return self.after.distances(self.players) if self.players else self.before.distances(())
+    def distances(self, chosen: Sequence[int]) -> Array:
+        """(N,) distance of each row from its prediction while held out, m, outliers too; NaN where it never was."""
+        walk = self.after if chosen else self.before
+        distance = np.full(len(walk.model.block), np.nan)
+        distance[walk.numbers] = np.linalg.norm(walk.residuals(chosen)[:, :3], axis=1)
+        return distance
 
 
 def _rms(distance: Array) -> float:

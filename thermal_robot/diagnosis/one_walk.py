@@ -243,13 +243,18 @@ class Walk:
         left[np.arange(len(fold)), block] = 0.0
         return Squares(float(total), left.sum(axis=0))
 
-    def distances(self, chosen: Sequence[int]) -> Array:
-        """(N,) distance of each row from its prediction while held out, m, outliers too; NaN where it never was."""
+    def residuals(self, chosen: Sequence[int]) -> Array:
+        """(H, m) what is left of each row held out by a model with some of the blocks, fold after fold, m and rad."""
         picked = self.model.columns(chosen)
-        distance = np.full(len(self.model.block), np.nan)
-        for test, fit in zip(self.tests, self.model.fits([~t for t in self.tests], chosen), strict=True):
-            distance[test] = np.linalg.norm(self.model.linear.stack[test, :3][:, :, picked] @ fit, axis=1)
-        return distance
+        fits = self.model.fits([~test for test in self.tests], chosen)
+        stack = self.model.linear.stack
+        left = [stack[test][:, :, picked] @ fit for test, fit in zip(self.tests, fits, strict=True)]
+        return np.concatenate(left)
+
+    @property
+    def numbers(self) -> NDArray[np.int64]:
+        """(H,) the number of each row held out, fold after fold, outliers too."""
+        return np.concatenate([np.flatnonzero(test) for test in self.tests])
 
 
 def share(part: Squares, whole: Squares) -> tuple[float, tuple[float, float]]:
