@@ -4,10 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from diagnosis.simulated import WIDTHS, drawn, explained, on_fresh
 from simulate import simulate
 
 from thermal_robot import EstimationError, diagnose
-from thermal_robot.diagnosis.held_out import held_out
+from thermal_robot.diagnosis.held_out import held_out, shrinkage
 from thermal_robot.effects import choose
 from thermal_robot.inference.fit import fit
 
@@ -113,3 +114,56 @@ def test_rows_of_one_pose_cannot_be_held_out(rv_m2):
     alike = replace(known, campaign=replace(campaign, labels={"pose": np.full(40, "home")}))
     with pytest.raises(EstimationError, match="nothing can be held out"):
         held_out(alike)
+
+
+def coverage(rows, campaigns):
+    """How often the intervals of the shrinkage, and of shares, hold what fresh rows say; and wrong choices' part."""
+    total, shares, wrong = [], [], []
+    for seed in range(campaigns):
+        linear, fresh, present = drawn(np.random.default_rng([rows, seed]), rows)
+        e = explained(linear, stated=seed % 3 > 0)
+        if not e.best.blocks:
+            continue
+        block = np.arange(rows) * 20 // rows
+        found = shrinkage(e, linear, [str(k) for k in range(len(WIDTHS))], block)
+        real, parts = on_fresh(e, block, fresh)
+        low, high = found.overall.shrinkage_ci95
+        total.append(low <= real <= high)
+        said = [found.shares[str(b)][1] for b in e.best.blocks]
+        shares.append(np.mean([low <= part <= high for part, (low, high) in zip(parts, said, strict=True)]))
+        wrong.append(set(e.best.blocks) != present)
+    return np.array(total), np.array(shares), np.array(wrong)
+
+
+@pytest.mark.slow
+def test_intervals_hold_what_fresh_rows_say():
+    """Effects of half to sixty noises, chosen rightly or not: 95 % of the intervals hold, whatever the rows."""
+    parts = [coverage(rows, 260) for rows in (30, 45, 100, 300)]
+    for held in zip(*parts, strict=True):
+        assert len(np.concatenate(held)) >= 1000
+    total, shares, wrong = (np.concatenate(held) for held in zip(*parts, strict=True))
+    for held in (total, shares):
+        assert 0.93 - 2.0 * chance(len(held)) < held.mean() < 0.97 + 2.0 * chance(len(held))
+    for few in (*(part[0] for part in parts), *(part[1] for part in parts), total[wrong], shares[wrong]):
+        assert 0.93 - 2.5 * chance(len(few)) < few.mean() < 0.97 + 2.5 * chance(len(few))
+
+
+def chance(count):
+    """Standard deviation of a share of 95 % among so many."""
+    return np.sqrt(0.95 * 0.05 / count)
+
+
+def test_rows_set_aside_are_told_with_the_figure(rv_m2):
+    """Spoilt rows are no part of the claim, and the figure that has them in it says how bad they are."""
+    campaign, truth, _ = simulate(rv_m2, ["backlash"], seed=4, outliers=0.06)
+    known = fit(campaign, choose(("backlash",), (), ()))
+    found, aside = held_out(known), known.explanation.outliers
+    assert aside.sum() >= len(truth["outliers"]) >= 3
+    assert np.isnan(found.after[aside]).all()
+    assert not np.isnan(found.after[~aside]).any()
+    assert found.overall.rms_after == pytest.approx(np.sqrt(np.mean(found.after[~aside] ** 2)))
+    spoilt = np.sqrt(np.mean((campaign.position - known.corrected.predicted_position)[aside] ** 2) * 3.0)
+    share = aside.mean()
+    expected = np.hypot(np.sqrt(1.0 - share) * found.overall.rms_after, np.sqrt(share) * spoilt)
+    assert found.with_aside[1] == pytest.approx(expected, rel=0.05)
+    assert found.with_aside[0] > found.with_aside[1] > 2.0 * found.overall.rms_after

@@ -47,13 +47,17 @@ class Earned:
     hardest
         By the scheme of the smallest lower bound.
     helps
-        Whether it is worth its word: the interval of ``blocked`` is above zero, and under no scheme the whole interval
-        is below zero.
+        Whether it is worth its word, as is asked of a law: the interval of ``blocked`` is above zero, and it does no
+        harm.
+    harms
+        Whether rows are predicted worse with it: the share of ``blocked`` is not above zero, or under one scheme the
+        whole interval is below zero. A known effect that others could nearly stand in for neither helps nor harms.
     """
 
     blocked: Gained
     hardest: Gained
     helps: bool
+    harms: bool
 
 
 def earned(fit: Fit) -> dict[str, Earned]:
@@ -108,5 +112,5 @@ def _gained(scheme: str, left: Array, moved: Array, block: NDArray[np.int64]) ->
 def _earned(found: list[Gained]) -> Earned:
     blocked = found[0]
     hardest = min(found, key=lambda gained: gained.interval[0])
-    harmful = any(gained.interval[1] < 0.0 for gained in found)
-    return Earned(blocked, hardest, blocked.interval[0] > 0.0 and not harmful)
+    harms = blocked.share <= 0.0 or any(gained.interval[1] < 0.0 for gained in found)
+    return Earned(blocked, hardest, blocked.interval[0] > 0.0 and not harms, harms)

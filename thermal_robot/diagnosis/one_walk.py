@@ -276,8 +276,8 @@ def share(part: Squares, whole: Squares) -> tuple[float, tuple[float, float]]:
         half = wide * deviation(each)
         return value, (value - half, value + half)
     half = wide * deviation(np.log1p(-each))
-    rest = 1.0 - value
-    return value, (1.0 - rest * float(np.exp(half)), 1.0 - rest * float(np.exp(-half)))
+    wider = float(np.expm1(half))
+    return value, (value - (1.0 - value) * wider, value + (1.0 - value) * wider / (1.0 + wider))
 
 
 def deviation(values: Array) -> float:
