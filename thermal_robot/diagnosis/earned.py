@@ -103,7 +103,7 @@ def _gained(scheme: str, left: Array, moved: Array, block: NDArray[np.int64]) ->
         return Gained(scheme, 0.0 if total <= 0.0 else gain / total, (-np.inf, 1.0))
     variance = max(
         float(((by_chance - by_chance.mean()) ** 2).sum()) * count / (count - 1),
-        4.0 * float((left**2).mean()) * float((moved**2).sum()),
+        float((left**2).mean()) * float(((2.0 * moved) ** 2).sum()),
     )
     half = float(stdtrit(count - 1, settings.INTERVAL[1]) * np.sqrt(variance)) / total
     return Gained(scheme, gain / total, (gain / total - half, gain / total + half))

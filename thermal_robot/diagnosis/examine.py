@@ -1,4 +1,4 @@
-"""Tell whether the residual is noise: five tests with Bonferroni correction; where it enters and what it follows."""
+"""Tell whether the residual is noise: tests with Bonferroni correction; where it enters and what it follows."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from scipy.special import chdtrc, fdtrc, ndtr, pdtr
 
 from thermal_robot.diagnosis.parts import Dependence, Location, Unexplained
 from thermal_robot.diagnosis.remainder import Remainder, Repeats, nearest, remainder, repeats
+from thermal_robot.diagnosis.set_aside import alike, too_many
 from thermal_robot.effects.effect import in_words
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference import settings
@@ -46,7 +47,7 @@ def examine(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Exami
     """Test whether the residual is noise.
 
     The tests are its size against the stated noise, lack of fit against repeats, correlation of neighbours, smooth laws
-    of recorded quantities, and runs of outliers.
+    of recorded quantities, and whether the rows set aside are too many, follow each other, or have something in common.
     """
     e, left = fit.explanation, remainder(fit)
     stated, again = fit.campaign.noise_position, repeats(fit, left)
@@ -62,17 +63,20 @@ def examine(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Exami
     else:
         floor, source = rms / np.sqrt(3.0), "remainder"
     progress("remainder: size and neighbours")
-    alike, likeness = _neighbours(fit, left)
+    near, likeness = _neighbours(fit, left)
     progress("remainder: places and quantities")
     law, locations, depends, share = _scan(fit, left)
-    verdicts = [_too_large(fit, left), _lack_of_fit(left, again), alike, law, _in_a_row(fit)]
+    verdicts = [_too_large(fit, left), _lack_of_fit(left, again), near, law, _in_a_row(fit)]
+    verdicts += [too_many(fit, left), alike(fit)]
     p_value = min(1.0, len(verdicts) * min(p for p, _ in verdicts))
     reasons = tuple(reason for p, reason in verdicts if reason and len(verdicts) * p < settings.LEVEL)
     flagged = bool(reasons) and rms > settings.ROUNDING
     if flagged and source == "remainder":
         # nothing tells the noise but the remainder itself: at most what neighbours do not have in common
         floor *= np.sqrt(1.0 - np.clip(max(likeness, share), 0.0, 1.0))
-    beyond = np.sqrt(max(rms**2 - 3.0 * floor**2, 0.0)) if flagged else 0.0
+    # what neighbours or a law have in common is no noise, however small beside the stated one
+    common = max(likeness, share) * rms**2
+    beyond = np.sqrt(max(rms**2 - 3.0 * floor**2, common, 0.0)) if flagged else 0.0
     if flagged and source == "remainder":
         beyond = rms  # neither a stated noise nor repeats vouch for any of it
     unexplained = Unexplained(

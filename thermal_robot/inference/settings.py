@@ -207,6 +207,14 @@ CLIPPED = 4.0
 """Sigmas at which rows are clipped when neighbours are compared: no two rows decide it."""
 NEIGHBOURS, FEWEST_NEIGHBOURS = 3, 20
 """Neighbours of each row in joint space, and the rows below which there are no neighbours."""
+SPOILT = 0.03
+"""Of all rows: as many an instrument spoils where its noise is clean; a tracker's lost beams are fewer."""
+HEAVY_SIGMAS = 4.0
+"""Standard deviations of chance by which a kurtosis must exceed the normal one to speak of heavy tails."""
+FEWEST_ASIDE = 3
+"""Rows set aside below which nothing can be said of what they have in common: two are always side by side."""
+ASIDE_MARKS = 24
+"""Of the rows set aside, between whose values ranges are tried: a twentieth of them is not missed."""
 
 # --- scatter ---
 
