@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from thermal_robot.campaign import Campaign
-from thermal_robot.diagnosis.stand_in import StandIn
 from thermal_robot.effects import Effect
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import orthonormal, without
@@ -59,7 +58,7 @@ def contradicted(campaign: Campaign) -> list[str]:
     return found
 
 
-def cautions(fitted: Fit, considered: Sequence[Effect], doubts: Mapping[str, StandIn]) -> tuple[str, ...]:
+def cautions(fitted: Fit, considered: Sequence[Effect]) -> tuple[str, ...]:
     """Return warnings about the diagnosis, one sentence each.
 
     Parameters
@@ -68,8 +67,6 @@ def cautions(fitted: Fit, considered: Sequence[Effect], doubts: Mapping[str, Sta
         The final fit.
     considered
         The effects that were considered, if the user left some out; empty otherwise.
-    doubts
-        By effect: the quantity with which its parameters change, see :func:`stand_ins`.
     """
     notes = []
     campaign, e = fitted.campaign, fitted.explanation
@@ -83,7 +80,7 @@ def cautions(fitted: Fit, considered: Sequence[Effect], doubts: Mapping[str, Sta
         )
     if considered:
         notes.append("only these effects were considered: " + ", ".join(effect.name for effect in considered))
-    return (*notes, *_changing(doubts))
+    return tuple(notes)
 
 
 def _cancelling(fitted: Fit) -> Iterator[tuple[str, float]]:
@@ -102,11 +99,3 @@ def _cancelling(fitted: Fit) -> Iterator[tuple[str, float]]:
         times = float(np.linalg.norm(moved, axis=0).max(initial=0.0)) / max(whole, settings.TINY)
         if times > settings.CANCELLING:
             yield effect.name, times
-
-
-def _changing(doubts: Mapping[str, StandIn]) -> tuple[str, ...]:
-    return tuple(
-        f"the size of {name} changes with {doubt.quantity}: it may stand in for a cause that is not listed"
-        for name, doubt in doubts.items()
-        if doubt.belief < settings.DOUBTFUL
-    )

@@ -188,7 +188,8 @@ def _scan(fit: Fit, left: Remainder) -> tuple[tuple[float, str], tuple[Location,
 
     Returns p-value and reason, places, quantities, and the share of the residual that the best law explains.
     """
-    tested = sorted(_tests(fit.corrected, left.some(settings.ENOUGH_REMAINDER)), key=lambda t: -t.worth.gain)
+    all_tests = _tests(fit.corrected, left.some(settings.ENOUGH_REMAINDER))
+    tested = sorted((t for t in all_tests if np.isfinite(t.worth.gain)), key=lambda t: -t.worth.gain)
     if not tested:
         return (1.0, ""), (), (), 0.0
     locations = _locations(tested)[: settings.NAMED]

@@ -86,7 +86,7 @@ def shrinkage(explanation: Explanation, before: Linear, families: Sequence[str],
     block
         (N,) label 0..B−1 of each row: which are held out together.
     """
-    walks = _Walks.of(explanation, before, block)
+    walks = _Walks.of(explanation, before, families, block)
     far, near = walks.distances(()), walks.distances(walks.players)
     value, interval = share(walks.gain((), walks.players), walks.left(()))
     kept = ~explanation.outliers
@@ -119,11 +119,16 @@ class _Walks:
     seen: dict[tuple[int, ...], Squares] = field(default_factory=dict)
 
     @classmethod
-    def of(cls, explanation: Explanation, before: Linear, block: Labels) -> _Walks:
-        best = explanation.best.blocks
-        scales = {c.blocks: c.scales for c in explanation.combinations}
-        wider = {b: tuple(sorted((*best, b))) for b in range(len(explanation.linear.blocks)) if b not in best}
-        further = {b: scales[blocks][b] for b, blocks in wider.items() if blocks in scales}
+    def of(cls, explanation: Explanation, before: Linear, families: Sequence[str], block: Labels) -> _Walks:
+        """Take the effects of the model, and of each other the setting that the evidence likes best beside them."""
+        best, further, taken = explanation.best.blocks, {}, set()
+        for found in sorted(explanation.combinations, key=lambda c: -c.log_evidence):
+            beside = set(found.blocks) - set(best)
+            if len(beside) == 1 and len(found.blocks) == len(best) + 1:
+                (b,) = beside
+                if families[b] not in taken:
+                    taken.add(families[b])
+                    further[b] = found.scales[b]
         model = Model.of(explanation, block, further)
         plain, walk = (Walk.over(m, each(block)) for m in (model.bare(before), model))
         return cls(plain, walk, (*best, *further), tuple(range(len(best))))
@@ -161,9 +166,9 @@ def _shares(walks: _Walks, families: Sequence[str]) -> dict[str, Share]:
             for chosen in combinations(others, size):
                 value += weight * walks.gain(chosen, (player,))
         shares[families[walks.numbers[player]]] = share(value, nothing)
+    others = {families[b]: k for k, b in enumerate(walks.numbers) if k not in players}
     for family in dict.fromkeys(families):
         if family not in shares:
-            own = [k for k, b in enumerate(walks.numbers) if families[b] == family]
-            gains = [walks.gain(players, (k,)) for k in own]
-            shares[family] = share(max(gains, key=lambda g: g.total, default=0.0 * nothing), nothing)
+            gained = walks.gain(players, (others[family],)) if family in others else 0.0 * nothing
+            shares[family] = share(gained, nothing)
     return shares

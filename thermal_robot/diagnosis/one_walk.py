@@ -69,8 +69,7 @@ class Model:
         e = explanation
         scales = {**{b: e.best.scales[b] for b in e.best.blocks}, **(further or {})}
         linear = Linear(e.linear.gap, e.linear.frames, tuple(e.linear.blocks[b] for b in scales))
-        variance = e.best.noise**2 * e.design_effect
-        return cls(linear, tuple(scales.values()), e.whitening, variance, ~e.outliers, block)
+        return cls(linear, tuple(scales.values()), e.whitening, e.best.noise**2, ~e.outliers, block)
 
     def bare(self, linear: Linear) -> Model:
         """Return the model of another linearisation without effects: its frames alone."""
@@ -93,13 +92,31 @@ class Model:
         own = [(b.sizes * scale) ** -2.0 for b, scale in zip(self.linear.blocks, self.scales, strict=True)]
         return np.concatenate([*own, np.zeros(0)])
 
+    @cached_property
+    def _white(self) -> tuple[Rows, Array, Array, Array]:
+        """Which rows have weight, their columns whitened as if independent, and U and d of what they have in common."""
+        used, smooth = self.whitening.weights > 0, self.whitening.smooth
+        stack = whitened(self.linear, replace(self.whitening, smooth=None))
+        if smooth is None:
+            return used, stack, np.zeros((len(stack), 0)), np.zeros(0)
+        heard = smooth.variance > settings.UNHEARD
+        return used, stack, smooth.basis[:, heard], smooth.variance[heard]
+
     def products(self, rows: Rows) -> Array:
-        """(K + 1, K + 1) sums of products of the columns and the gap over some rows, whitened; computed once."""
+        """(K + 1, K + 1) Xᵀ V⁻¹ X of the columns and the gap over some rows, V their own covariance; computed once.
+
+        Where rows have a smooth discrepancy in common, V = 1 + U d Uᵀ with U on these rows alone (Woodbury).
+        """
         key = rows.tobytes()
         if key not in self.seen:
-            weights = np.where(rows, self.whitening.weights, 0.0)
-            stack = whitened(self.linear, replace(self.whitening, weights=weights))
-            self.seen[key] = stack.T @ stack
+            used, stack, basis, variance = self._white
+            picked = np.repeat(rows[used], self.linear.measures)
+            stack, basis = stack[picked], basis[picked]
+            products = stack.T @ stack
+            if len(variance):
+                along = basis.T @ stack
+                products = products - along.T @ np.linalg.solve(np.diag(1.0 / variance) + basis.T @ basis, along)
+            self.seen[key] = products
         return self.seen[key]
 
     @cached_property
@@ -212,18 +229,6 @@ class Walk:
         return each(self.model.block)
 
     @cached_property
-    def _cells(self) -> tuple[Labels, Labels, Array]:
-        """Fold and block of each of C sets of held-out rows, and their (C, K + 1, K + 1) products of positions, m²."""
-        model, found = self.model, []
-        for k, test in enumerate(self.tests):
-            for b, own in enumerate(self._blocks):
-                place = model.linear.stack[test & model.kept & own, :3].reshape(-1, len(model.whole))
-                if len(place):
-                    found.append((k, b, place.T @ place))
-        fold, block, products = zip(*found, strict=True)
-        return np.array(fold), np.array(block), np.stack(products)
-
-    @cached_property
     def _shared(self) -> Array:
         """(F, B) share of each block's rows on which the fit of each fold rests."""
         return np.array([[(own & ~test).sum() / own.sum() for own in self._blocks] for test in self.tests])
@@ -235,13 +240,15 @@ class Walk:
         rows = [*(~test for test in self.tests), *(~own for own in self._blocks), every]
         found = np.stack(model.fits(rows, chosen))
         fits, moved = found[:folds], found[folds:-1] - found[-1]
-        fold, block, products = self._cells
-        products = products[:, picked[:, None], picked]
-        total = np.einsum("ci,cij,cj->", fits[fold], products, fits[fold], optimize=True)
-        without = fits[fold][:, None] + self._shared[fold][:, :, None] * moved
-        left = ((without @ products) * without).sum(axis=2)
-        left[np.arange(len(fold)), block] = 0.0
-        return Squares(float(total), left.sum(axis=0))
+        total, without = 0.0, np.zeros(len(moved))
+        for test, fit, shared in zip(self.tests, fits, self._shared, strict=True):
+            judged = test & model.kept
+            place = model.linear.stack[judged, :3][:, :, picked]
+            total += float(((place @ fit) ** 2).sum())
+            each_without = ((place @ (fit + shared[:, None] * moved).T) ** 2).sum(axis=1)
+            each_without[np.arange(len(each_without)), model.block[judged]] = 0.0
+            without += each_without.sum(axis=0)
+        return Squares(total, without)
 
     def residuals(self, chosen: Sequence[int]) -> Array:
         """(H, m) what is left of each row held out by a model with some of the blocks, fold after fold, m and rad."""

@@ -43,6 +43,7 @@ class Backlash(Effect):
 
     name: ClassVar[str] = "backlash"
     title: ClassVar[str] = "lost motion in the joints"
+    singular: ClassVar[str] = "lost motion"
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return the approach columns, unless at least one of them varies."""

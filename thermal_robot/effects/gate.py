@@ -39,7 +39,7 @@ def checked(effect: Effect, observations: Observations) -> tuple[Parameter, ...]
     tuple of Parameter
         Each with a name of its own, a known kind of place, a place of that kind that the robot has (or none), a
         positive size, and responses of finite values in a channel and at an index that the robot has, of that
-        channel's shape (see :class:`Response`).
+        channel's shape (see :class:`Response`). Where the effect names ``joints``, only those in these joints.
 
     Raises
     ------
@@ -62,7 +62,7 @@ def checked(effect: Effect, observations: Observations) -> tuple[Parameter, ...]
         if problem:
             raise EffectError(f"effect {effect.name!r}, parameter {parameter.name!r}: {problem}")
         names.add(parameter.name)
-    return tuple(answer)
+    return _kept(effect, tuple(answer), observations.robot)
 
 
 def driver(effect: Effect, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
@@ -138,14 +138,36 @@ def nearby(effect: Effect, factor: float) -> tuple[Effect, ...]:
     return answer
 
 
-def at(effect: Effect, joint: str) -> Effect | None:
-    """Return an effect in one joint alone (:meth:`Effect.at`); ``None`` where it has no such setting.
+def at(effect: Effect, joint: str, observations: Observations) -> Effect | None:
+    """Return an effect in one joint alone (:meth:`Effect.at`); ``None`` where it has no parameters there.
 
     Raises
     ------
     EffectError
-        If it is something else than an effect of this one's name.
+        If it is something else than an effect of this one's name, or the effect breaks the contract otherwise.
     """
+    return _at(effect, joint) if joint in joints_of(checked(effect, observations)) else None
+
+
+def alone(effect: Effect, observations: Observations) -> tuple[Effect, ...]:
+    """Return the settings of an effect in each single joint; empty where it has parameters in one joint or none.
+
+    Raises
+    ------
+    EffectError
+        As :func:`at`.
+    """
+    joints = joints_of(checked(effect, observations))
+    single = (_at(effect, joint) for joint in joints)
+    return tuple(setting for setting in single if setting is not None) if len(joints) > 1 else ()
+
+
+def joints_of(parameters: Sequence[Parameter]) -> tuple[str, ...]:
+    """Return the joints that parameters sit in, in their order, each once."""
+    return tuple(dict.fromkeys(p.place for p in parameters if p.kind == "joint" and p.place))
+
+
+def _at(effect: Effect, joint: str) -> Effect | None:
     answer = _asked(effect, "at", joint)
     if answer is None or _is_setting(effect, answer):
         return answer  # type: ignore[no-any-return]
@@ -181,6 +203,17 @@ def _asked(effect: Effect, question: str, *about: Any) -> Any:
         return getattr(effect, question)(*about)
     except Exception as error:  # somebody else's code may raise anything
         raise EffectError(f"effect {effect.name!r}: {question}() raised {error!r}") from error
+
+
+def _kept(effect: Effect, parameters: tuple[Parameter, ...], robot: Robot) -> tuple[Parameter, ...]:
+    """Return the parameters in the joints that the effect names; all where it names none."""
+    if not effect.joints:
+        return parameters
+    known = dict.fromkeys((*robot.joint_names, *joints_of(parameters)))
+    for joint in _texts(effect, "joints is", effect.joints):
+        if joint not in known:
+            raise EffectError(f"effect {effect.name!r}: joints holds {joint!r}, expected any of {', '.join(known)}")
+    return tuple(p for p in parameters if p.kind == "joint" and p.place in effect.joints)
 
 
 def _texts(effect: Effect, what: str, answer: Any) -> tuple[str, ...]:

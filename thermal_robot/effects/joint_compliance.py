@@ -44,16 +44,23 @@ class JointCompliance(Effect):
 
     Attributes
     ----------
-    joints, weights
+    shape_joints, weights
         Joint of each of K shapes, and K·4n weights one after the other: what the shape takes of the mass and first
         moment of each body. Empty where the torques are known.
     """
 
-    joints: tuple[int, ...] = ()
+    shape_joints: tuple[int, ...] = ()
     weights: tuple[float, ...] = ()
 
     name: ClassVar[str] = "joint_compliance"
     title: ClassVar[str] = "joints that yield to load"
+    singular: ClassVar[str] = "a yielding to load"
+
+    def __post_init__(self) -> None:
+        """Read a model that was saved when ``joints`` meant the numbers of the shapes' joints."""
+        if any(isinstance(joint, int) for joint in self.joints):
+            object.__setattr__(self, "shape_joints", self.joints)
+            object.__setattr__(self, "joints", ())
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return what would give torques, where neither these nor the shape of gravity's vary."""
@@ -74,18 +81,18 @@ class JointCompliance(Effect):
     def _set(self, observations: Observations) -> JointCompliance:
         robot, recorded = observations.robot, observations.covariates
         if robot.has_masses or any(f"torque.{joint}" in recorded for joint in robot.joint_names):
-            return replace(self, joints=(), weights=())
+            return replace(self, shape_joints=(), weights=())
         few = _few_weights(robot)
         flat = np.concatenate([*(weights for _, weights in few), np.zeros(0)])
-        return replace(self, joints=tuple(j for j, _ in few), weights=tuple(flat.tolist()))
+        return replace(self, shape_joints=tuple(j for j, _ in few), weights=tuple(flat.tolist()))
 
     def _shapes(self, observations: Observations) -> list[tuple[int, Array]]:
         """Joint and (N,) values of each shape of gravity's torques."""
-        if not self.joints:
+        if not self.shape_joints:
             return []
         regressor = _weighed(observations.robot, observations.q)
-        each = np.reshape(self.weights, (len(self.joints), -1))
-        return [(j, regressor[:, j] @ weights) for j, weights in zip(self.joints, each, strict=True)]
+        each = np.reshape(self.weights, (len(self.shape_joints), -1))
+        return [(j, regressor[:, j] @ weights) for j, weights in zip(self.shape_joints, each, strict=True)]
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """One compliance a joint, rad/(N·m), or m/N for a prismatic joint; free weights in rad or m."""
@@ -93,7 +100,7 @@ class JointCompliance(Effect):
         names = robot.joint_names
         found = []
         for k, (j, shape) in enumerate(self._shapes(observations)):
-            label = f"yield to gravity, shape {self.joints[: k + 1].count(j)}"
+            label = f"yield to gravity, shape {self.shape_joints[: k + 1].count(j)}"
             found.append(Parameter(label, unit(robot, names[j]), _WIND_UP, "joint", names[j], (at_joint(j, -shape),)))
         if torque is not None:
             size = _WIND_UP / max(float(np.abs(torque).max()), 1e-9)

@@ -12,13 +12,16 @@ hinge     1, max(x − m, 0) / span, or on the other side           where it ben
 bump      1, exp(−½ ((x − m) / w)²)                               middle, width
 drag      1, x / span, sign(x)                                    of a quantity with a sign
 harmonic  1, sin(k x), cos(k x)                                   order k
+product   1, x / span                                             x the product of two quantities
+reversal  1, sign(x) (2 min(|x| / w, 1) − 1)                      distance w over which it turns over
 levels    x = m_k                                                 the levels
 smooth    natural cubic splines that are 1 at one knot, 0 at all  the knots
           others
 ========= ======================================================= ==========================
 
 Splines: Hastie, Tibshirani and Friedman, *The Elements of Statistical Learning*, 2009, 5.2.1; beyond the outer knots
-they run straight.
+they run straight. Reversal: a play operator of Prandtl and Ishlinskii, x the distance since the joint last turned round
+(Kuhnen, *Modeling, identification and compensation of complex hysteretic nonlinearities*, 2003).
 """
 
 from __future__ import annotations
@@ -30,6 +33,8 @@ from typing import Literal
 import numpy as np
 
 from thermal_robot.effects.effect import Array
+
+_NARROWEST = 1e-6  # of the range: a joint that turns over within less does so at once
 
 Functions = Callable[[Array, tuple[float, ...], float, float], Array]
 """(N, K) of the (N,) quantity, the marks, origin and span."""
@@ -52,6 +57,8 @@ class Shape:
         passes a row, ``gradual`` where they change smoothly; empty where it is not to be moved.
     width
         Whether the second mark is a width, to be refined, too.
+    distance
+        Whether the first mark is a distance, which is above 0.
     """
 
     functions: Functions
@@ -59,6 +66,7 @@ class Shape:
     words: str
     mark: Literal["", "sudden", "gradual"] = ""
     width: bool = False
+    distance: bool = False
 
 
 def _constant(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
@@ -103,6 +111,16 @@ def _harmonic(x: Array, marks: tuple[float, ...], origin: float, span: float) ->
     return np.column_stack([np.ones_like(x), np.sin(marks[0] * x), np.cos(marks[0] * x)])
 
 
+def _reversal(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
+    within = max(marks[0], _NARROWEST * span)
+    over = 2.0 * np.minimum(np.abs(x) / within, 1.0) - 1.0
+    return np.column_stack([np.ones_like(x), np.sign(x) * over])
+
+
+def _product(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
+    return np.column_stack([np.ones_like(x), x / span])
+
+
 def _levels(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
     return np.asarray(np.eye(len(marks))[np.abs(x[:, None] - np.array(marks)).argmin(axis=1)])
 
@@ -129,6 +147,10 @@ SHAPES: dict[str, Shape] = {
     "bump": Shape(_bump, ("constant", "height"), "a bump at {mark}", "gradual", width=True),
     "drag": Shape(_drag, ("constant", "slope over the range", "of its sign"), "its slope and its sign"),
     "harmonic": Shape(_harmonic, ("constant", "sine", "cosine"), "harmonic of order {order:g}"),
+    "product": Shape(_product, ("constant", "at the largest product"), "in proportion to the product"),
+    "reversal": Shape(
+        _reversal, ("constant", "half the loop"), "it turns over within {mark}", "gradual", distance=True
+    ),
     "levels": Shape(_levels, (), "a value at each of its levels"),
     "smooth": Shape(_smooth, (), "smooth"),
 }

@@ -14,7 +14,7 @@ ln λ is integrated out by Laplace's method, s held.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
@@ -38,12 +38,13 @@ class Gram:
         Where each block's D_b columns stand; blocks are reduced to what the data can see of them.
     bases
         Per block, (P_b, D_b): parameter values, in prior sizes, of a unit of each reduced column.
-    projector
-        (f, P) what the frames take up of each parameter's column.
     equations
         n: scalar equations with weight, less the rank of the frames.
     noise_dof
         How firmly the whitening noise is held (degrees of freedom); 0 where it is not known.
+    offset
+        Log evidence that all combinations share: −½ log of the determinants of the rows' covariance and of the frames,
+        and the log prior of that covariance.
     """
 
     matrix: Array
@@ -51,19 +52,9 @@ class Gram:
     total: float
     slices: tuple[slice, ...]
     bases: tuple[Array, ...]
-    projector: Array
     equations: float
     noise_dof: float
-
-    def tempered(self, design_effect: float) -> Gram:
-        """Return the problem as if every ``design_effect`` rows were one: what correlated rows are worth."""
-        return replace(
-            self,
-            matrix=self.matrix / design_effect,
-            vector=self.vector / design_effect,
-            total=self.total / design_effect,
-            equations=self.equations / design_effect,
-        )
+    offset: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +77,8 @@ class Combination:
         Their posterior covariance.
     effective
         How many parameters the data determine.
+    exact
+        Whether all scales are at their most probable values; else those of one block alone, and there are no values.
     """
 
     blocks: tuple[int, ...]
@@ -95,6 +88,7 @@ class Combination:
     values: Array
     covariance: Array
     effective: float
+    exact: bool = True
 
 
 @dataclass(eq=False)
@@ -123,8 +117,9 @@ class Search:
     def evaluate(self, blocks: Sequence[int], start: Combination | None = None) -> Combination:
         """Return the combination's evidence, computed once."""
         key = tuple(sorted(blocks))
-        if key not in self.seen:
-            found = _evidence(self.gram, key, sum(self.log_prior[b] for b in key), start)
+        known = self.seen.get(key)
+        if known is None or not known.exact:
+            found = _evidence(self.gram, key, sum(self.log_prior[b] for b in key), known or start)
             if not np.isfinite(found.log_evidence):
                 raise EstimationError("the measurements do not determine anything: too few, or all alike")
             self.seen[key] = found
@@ -133,7 +128,7 @@ class Search:
     def run(self, start: Sequence[int] = ()) -> Combination:
         """Climb from a combination by adding, dropping and swapping blocks until nothing is better.
 
-        Every neighbour of the best combination is evaluated, so that its probability is against all of them.
+        Every neighbour of the best combination is weighed, so that its probability is against all of them.
         """
         best = self._climb(start, frozenset())
         large = {b for pair in self.exclusive for b in pair if self._width(b) == max(map(self._width, pair))}
@@ -149,18 +144,36 @@ class Search:
     def _climb(self, start: Sequence[int], barred: frozenset[int]) -> Combination:
         best = max(self.evaluate(()), self.evaluate(start), key=lambda c: c.log_evidence)
         while True:
-            around = [self.evaluate(n, best) for n in self._neighbours(best.blocks) if not barred & set(n)]
-            better = max(around, key=lambda c: c.log_evidence, default=best)
+            around = [c for c in self._neighbours(best) if not barred & set(c.blocks)]
+            around.sort(key=lambda c: -c.log_evidence)
+            close = [c for c in around if c.log_evidence > best.log_evidence - settings.NEARLY][: settings.MOST_EXACT]
+            better = max((self.evaluate(c.blocks, best) for c in close), key=lambda c: c.log_evidence, default=best)
             if better.log_evidence <= best.log_evidence + settings.BETTER:
                 return best
             best = better
 
-    def _neighbours(self, blocks: tuple[int, ...]) -> list[tuple[int, ...]]:
-        others = [b for b in range(len(self.gram.slices)) if b not in blocks]
-        found = [(*blocks, b) for b in others]
-        found += [tuple(c for c in blocks if c != b) for b in blocks]
-        found += [(*(c for c in blocks if c != b), a) for b in blocks for a in others]
-        return [f for f in dict.fromkeys(tuple(sorted(f)) for f in found) if self.allowed(f)]
+    def _neighbours(self, best: Combination) -> list[Combination]:
+        """Return the combinations with one block more, less or another; those with a new one to first order."""
+        without = [self.evaluate([c for c in best.blocks if c != b], best) for b in best.blocks]
+        added = [c for base in (best, *without) for c in self._with_one_more(base, best)]
+        return [*without, *added]
+
+    def _with_one_more(self, base: Combination, best: Combination) -> list[Combination]:
+        others = [b for b in range(len(self.gram.slices)) if b not in best.blocks]
+        keys = {b: tuple(sorted((*base.blocks, b))) for b in others}
+        new = [b for b in others if keys[b] not in self.seen and self.allowed(keys[b])]
+        for b, gain, scale in _gains(self.gram, base, new):
+            self.seen[keys[b]] = Combination(
+                keys[b],
+                base.log_evidence + gain + self.log_prior[b],
+                base.noise,
+                {**base.scales, b: scale},
+                base.values,
+                base.covariance,
+                base.effective,
+                exact=False,
+            )
+        return [self.seen[keys[b]] for b in others if keys[b] in self.seen]
 
     def probabilities(self) -> tuple[list[Combination], Array]:
         """Return the combinations seen, most probable first, with their posterior probabilities."""
@@ -168,6 +181,50 @@ class Search:
         log = np.array([c.log_evidence for c in order])
         weight = np.exp(log - log[0])
         return order, weight / weight.sum()
+
+
+def _gains(gram: Gram, base: Combination, blocks: Sequence[int]) -> list[tuple[int, float, float]]:
+    """Return for each block what adding it gains in log evidence, its scale integrated out, and its best scale.
+
+    Scales of the others stay, and so does the noise but for what the block takes of it. In the eigenvectors of the
+    block's own information beside the others, w, with the vector c there,
+
+        gain(λ) = −½ Σ log(1 + λ² w/s²) − ½ (n + ν) log(1 − Σ c² λ²/(s² + λ² w) / T) ,
+
+    T = (n + ν) s², of which the second term is ½ Σ c² λ²/(s² + λ² w)/s² where the block takes little of the noise.
+    """
+    spans = [np.arange(gram.slices[b].start, gram.slices[b].stop) for b in base.blocks]
+    used = np.concatenate([*spans, np.zeros(0, dtype=int)])
+    variance = base.noise**2
+    left = gram.vector - gram.matrix[:, used] @ base.values
+    total = (gram.equations + gram.noise_dof) * variance
+    log_scale = np.array(settings.SCALE_GRID)
+    square = np.exp(2.0 * log_scale)[:, None]
+    prior = -0.5 * (log_scale / settings.SIZE_SPREAD) ** 2
+    norm = np.log((log_scale[1] - log_scale[0]) / (np.sqrt(2.0 * np.pi) * settings.SIZE_SPREAD))
+    worth = 0.5 * (gram.equations + gram.noise_dof)
+    result = []
+    for alike in _by_width(gram, blocks):
+        own = np.array([np.arange(gram.slices[b].start, gram.slices[b].stop) for b in alike])
+        cross = gram.matrix[own[:, :, None], used]
+        inside = gram.matrix[own[:, :, None], own[:, None, :]]
+        value, vector = np.linalg.eigh(inside - cross @ (base.covariance / variance) @ cross.transpose(0, 2, 1))
+        value = np.maximum(value, 0.0)[:, None, :]
+        along = ((vector.transpose(0, 2, 1) @ left[own][:, :, None])[:, :, 0] ** 2)[:, None, :]
+        taken = (along * square / (variance + square * value)).sum(axis=2)
+        log = -0.5 * np.log1p(square * value / variance).sum(axis=2) + prior
+        log -= worth * np.log1p(-np.minimum(taken / total, settings.ALL_BUT))
+        top = log.max(axis=1)
+        gain = top + np.log(np.exp(log - top[:, None]).sum(axis=1)) + norm
+        result += list(zip(alike, gain.tolist(), np.exp(log_scale[log.argmax(axis=1)]).tolist(), strict=True))
+    return result
+
+
+def _by_width(gram: Gram, blocks: Sequence[int]) -> list[list[int]]:
+    widths: dict[int, list[int]] = {}
+    for b in blocks:
+        widths.setdefault(gram.slices[b].stop - gram.slices[b].start, []).append(b)
+    return list(widths.values())
 
 
 @dataclass(eq=False)
@@ -196,21 +253,21 @@ class _Posterior:
         size = len(vector)
         if not size:
             return cls(np.zeros(0), np.zeros((0, 0)), 0.0, np.zeros(len(scale)), np.zeros(len(scale)))
-        diagonal = np.diag_indices(size)
+        tight = 1.0 / scale[owner] ** 2
         precision = matrix / variance
-        precision[diagonal] += 1.0 / scale[owner] ** 2
+        precision.ravel()[:: size + 1] += tight
         factor, failed = dpotrf(precision, lower=1, clean=1)
         if failed:
             raise EstimationError("the measurements do not determine anything: too few, or all alike")
         lower, _ = dpotri(factor, lower=1)
         covariance = lower + lower.T  # above the diagonal it is zero
-        covariance[diagonal] *= 0.5
+        covariance.ravel(order="K")[:: size + 1] *= 0.5
         values = covariance @ vector / variance
-        well = 1.0 - np.diag(covariance) / scale[owner] ** 2
+        well = 1.0 - covariance.ravel(order="K")[:: size + 1] * tight
         return cls(
             values,
             covariance,
-            float(2.0 * np.log(np.diag(factor)).sum() + 2.0 * np.log(scale[owner]).sum()),
+            float(2.0 * np.log(factor.ravel(order="K")[:: size + 1]).sum() - np.log(tight).sum()),
             np.bincount(owner, values**2, len(scale)) / scale**2,
             np.bincount(owner, well, len(scale)).astype(float),
         )
@@ -218,7 +275,9 @@ class _Posterior:
     def step(self, log_scale: Array) -> Array:
         """Return the Newton step of ln λ, its curvature held positive."""
         slope = self.fitted - self.determined - log_scale / settings.SIZE_SPREAD**2
-        return np.clip(slope / (self.fitted + self.determined + 1.0 / settings.SIZE_SPREAD**2), -1.0, 1.0)
+        return np.minimum(
+            np.maximum(slope / (self.fitted + self.determined + 1.0 / settings.SIZE_SPREAD**2), -1.0), 1.0
+        )
 
 
 def _evidence(gram: Gram, blocks: tuple[int, ...], prior: float, start: Combination | None) -> Combination:
@@ -246,6 +305,7 @@ def _evidence(gram: Gram, blocks: tuple[int, ...], prior: float, start: Combinat
         - 0.5 * float(((np.log(scale) / settings.SIZE_SPREAD) ** 2).sum())
         + _log_volume(owner, scale, found.values, found.covariance)
         + prior
+        + gram.offset
     )
     scales = dict(zip(blocks, scale.tolist(), strict=True))
     return Combination(

@@ -2,19 +2,31 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.effects import Effect
 from thermal_robot.inference import settings
-from thermal_robot.inference.evidence import Combination, Gram, Search
-from thermal_robot.inference.problem import Linear, Whitening, contained, frame_step, gram, parameter_values
-from thermal_robot.inference.robust import Noise, design_effect, distance_limit, first_whitening, reweigh
+from thermal_robot.inference.discrepancy import Form
+from thermal_robot.inference.evidence import Combination, Gram
+from thermal_robot.inference.ladder import Ladder
+from thermal_robot.inference.problem import Linear, Whitening, discrepancy_mean, frame_step, parameter_values
+from thermal_robot.inference.robust import Noise, distance_limit, first_whitening, reweigh
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Discrepancy:
+    """What no effect accounts for: form and rms τ over the noise beside the best combination, and its probability."""
+
+    form: str
+    tau: float
+    probability: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,14 +43,16 @@ class Explanation:
         All that were compared, most probable first.
     values
         Per block of the best combination: mean and covariance of its parameters.
-    frame_step
-        (f,) step of the frames that goes with it.
     remainder
         (N, m) residual: gap less effects and frames, for all rows, used or not.
+    smooth
+        (N, m) posterior mean of the discrepancy, a part of the residual.
     outliers
         (N,) True for rows set aside.
-    design_effect
-        How many rows count as one independent row.
+    discrepancy
+        What no effect accounts for.
+    forms
+        Of the discrepancy that were considered.
     """
 
     linear: Linear
@@ -48,14 +62,16 @@ class Explanation:
     combinations: Sequence[Combination]
     probabilities: Array
     values: dict[int, tuple[Array, Array]]
-    frame_step: Array
     remainder: Array
+    smooth: Array
     outliers: NDArray[np.bool_]
-    design_effect: float
+    discrepancy: Discrepancy
+    forms: Sequence[Form]
 
     def far(self, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """(N,) True for those of the given rows whose residual is larger than noise allows."""
-        distance2 = ((self.remainder / (self.whitening.noise * self.best.noise)) ** 2).sum(axis=1)
+        beyond = self.whitening.noise * self.best.noise * np.hypot(1.0, self.discrepancy.tau)
+        distance2 = ((self.remainder / beyond) ** 2).sum(axis=1)
         return np.asarray(rows & (distance2 > distance_limit(self.linear.measures, len(rows))))
 
     def probability(self, blocks: Sequence[int]) -> float:
@@ -70,12 +86,12 @@ def explain(
     *,
     rows: NDArray[np.bool_] | None = None,
     families: Sequence[str] = (),
-    start: Sequence[int] = (),
+    starts: Sequence[Sequence[int]] = (),
     outliers: NDArray[np.bool_] | None = None,
-    groups: Sequence[NDArray[np.int64]] = (),
-    rarity: Mapping[str, float] | None = None,
+    forms: Sequence[Form] = (),
+    log_prior: Sequence[float] | None = None,
 ) -> Explanation:
-    """Find the most probable combination of blocks together with outliers and noise.
+    """Find the most probable combination of blocks together with outliers, noise and what no block accounts for.
 
     Parameters
     ----------
@@ -88,12 +104,12 @@ def explain(
     families
         Name of the effect that each block belongs to: blocks of one effect are settings that exclude each other and
         share its prior probability.
-    start, outliers
-        Where the search starts: blocks and rows set aside.
-    groups
-        Labels (N,) of rows that belong together, several groupings: see :func:`design_effect`.
-    rarity
-        By family: added to its log prior odds, below zero for one that was picked out of many.
+    starts, outliers
+        Where the search starts: combinations of blocks, and rows set aside.
+    forms
+        Of the discrepancy that is considered; none where nothing but noise may remain.
+    log_prior
+        Log prior odds of each block; see :func:`log_priors`, by which those of the blocks' effects are taken if absent.
 
     Returns
     -------
@@ -105,36 +121,43 @@ def explain(
     use = np.ones(samples, dtype=bool) if rows is None else rows
     aside = np.zeros(samples, dtype=bool) if outliers is None else outliers & use
     families = families or [str(k) for k in range(len(linear.blocks))]
-    log_prior = log_priors(families, rarity or {})
+    log_prior = log_priors([b.effect for b in linear.blocks]) if log_prior is None else log_prior
     rivals = settings_of_one(families)
     whitening = first_whitening(linear, noise, use & ~aside)
-    history: list[tuple[tuple[int, ...], bytes]] = []
-    seed = tuple(start)
+    history: list[tuple[object, ...]] = []
+    seeds = [tuple(start) for start in starts]
     while True:
-        problem = gram(linear, whitening)
-        search = Search(problem, log_prior, contained(problem) | rivals)
-        best = search.run(seed if search.allowed(seed) else ())
-        values = parameter_values(linear, problem, best)
+        ladder = Ladder(linear, whitening, forms, log_prior, rivals)
+        rung, best = ladder.run(seeds)
+        white = ladder.whitened_at(rung)
+        values = parameter_values(linear, ladder.at(rung).gram, best)
         remainder = _remainder(linear, values)
-        step = frame_step(linear, whitening, remainder)
+        step = frame_step(linear, white, remainder)
         remainder = remainder - linear.frames @ step
-        state = (best.blocks, np.packbits(whitening.weights > 0).tobytes())
+        smooth = discrepancy_mean(white, remainder)
+        state = (best.blocks, rung, np.packbits(whitening.weights > 0).tobytes())
         if state in history or len(history) >= settings.FIRST_ROUNDS:
             break
         history.append(state)
-        leverage = (best.effective + linear.frames.shape[2]) / max(problem.equations + linear.frames.shape[2], 1)
-        whitening, aside = reweigh(remainder, noise, use, min(leverage, settings.MOST_LEVERAGE), measures)
-        seed = best.blocks
-    worth = design_effect(linear, problem, remainder, whitening, groups)
-    if worth > 1.0:
-        search = Search(problem.tempered(worth), log_prior, contained(problem) | rivals)
-        best = search.run(best.blocks)
-        values = parameter_values(linear, problem, best)
-        remainder = _remainder(linear, values)
-        step = frame_step(linear, whitening, remainder)
-        remainder = remainder - linear.frames @ step
-    compared, probabilities = search.probabilities()
-    return Explanation(linear, whitening, problem, best, compared, probabilities, values, step, remainder, aside, worth)
+        followed = best.effective + linear.frames.shape[2] + (white.smooth.degrees if white.smooth else 0.0)
+        leverage = followed / max(ladder.at(rung).gram.equations + linear.frames.shape[2], 1)
+        whitening, aside = reweigh(remainder - smooth, noise, use, min(leverage, settings.MOST_LEVERAGE), measures)
+        seeds = [best.blocks]
+    compared, probabilities = ladder.probabilities()
+    return Explanation(
+        linear,
+        white,
+        ladder.at(rung).gram,
+        best,
+        compared,
+        probabilities,
+        values,
+        remainder,
+        smooth,
+        aside,
+        Discrepancy(ladder.forms[rung[0]].name if rung[0] >= 0 else "", rung[1], ladder.discrepancy()),
+        forms,
+    )
 
 
 def log_odds() -> float:
@@ -148,9 +171,11 @@ def settings_of_one(families: Sequence[str]) -> frozenset[frozenset[int]]:
     return frozenset(frozenset((a, b)) for a, b in pairs if families[a] == families[b])
 
 
-def log_priors(families: Sequence[str], rarity: Mapping[str, float]) -> list[float]:
-    """Return the log prior odds of each block: settings of one effect share its own."""
-    return [log_odds() - float(np.log(list(families).count(f))) + rarity.get(f, 0.0) for f in families]
+def log_priors(effects: Sequence[Effect]) -> list[float]:
+    """Return the log prior odds of each setting of an effect: it has its share of those of its name."""
+    names = [effect.name for effect in effects]
+    shares = [1.0 / names.count(e.name) if e.share is None else e.share for e in effects]
+    return [log_odds() + float(np.log(share)) for share in shares]
 
 
 def _remainder(linear: Linear, values: dict[int, tuple[Array, Array]]) -> Array:

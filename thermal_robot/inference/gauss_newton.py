@@ -55,6 +55,7 @@ def gauss_newton(
     state = np.concatenate([*(values for _, values in held), np.zeros(0)])
     used = np.flatnonzero(whitening.weights > 0)
     root = (np.sqrt(whitening.weights[used])[:, None] / (whitening.noise * best.noise)).ravel()
+    smooth = whitening.smooth
 
     def pairs() -> list[tuple[Effect, Array]]:
         return list(zip(effects, np.split(state, ends), strict=True)) if effects else []
@@ -63,8 +64,10 @@ def gauss_newton(
     for _ in range(settings.FIT_STEPS):
         flat, names = frame_columns(observations)
         columns = [block(observations, effect).columns for effect in effects]
-        design = np.concatenate([flat, *columns], axis=2)[used].reshape(len(root), -1) * root[:, None]
-        step, size = _ridge_step(design, observations.gap[used].ravel() * root, state, prior)
+        stack = np.concatenate([flat, *columns, observations.gap[:, :, None]], axis=2)[used]
+        white = stack.reshape(len(root), -1) * root[:, None]
+        white = white if smooth is None else smooth.whitened(white)
+        step, size = _ridge_step(white[:, :-1], white[:, -1], state, prior)
         frames = moved(frames, step[: len(names)], names)
         state = state + step[len(names) :]
         observations = corrected_observations(campaign, frames, pairs())

@@ -80,5 +80,4 @@ def _evaluated(explanation: Explanation, blocks: Sequence[Block]) -> tuple[Linea
     """Evaluate these blocks together and no others."""
     linear = Linear(explanation.linear.gap, explanation.linear.frames, tuple(blocks))
     problem = gram(linear, explanation.whitening)
-    tempered = problem.tempered(explanation.design_effect)
-    return linear, problem, Search(tempered, [0.0] * len(blocks)).evaluate(range(len(blocks)))
+    return linear, problem, Search(problem, [0.0] * len(blocks)).evaluate(range(len(blocks)))

@@ -1,6 +1,6 @@
 """Every number that was chosen in the inference and the diagnosis: its value, its unit, and why that one.
 
-One was learnt from the cases that score the program, and says so (BESIDE_UNLISTED). What is known of one effect stands
+What is known of one effect stands
 in that effect's file.
 """
 
@@ -12,17 +12,30 @@ PRIOR_PROBABILITY = 0.1
 """That an effect is at work, random ones included: of sixteen effects one or two are then expected."""
 SIZE_SPREAD = 1.5
 """Standard deviation of ln λ: an effect three times larger or smaller than stated is no surprise."""
-NEVER = -1e9
-"""Log prior odds of an effect that scatter had feigned: more than any data can outweigh."""
 GIVEN_NOISE_DOF = 20.0
 """Degrees of freedom that a stated noise is worth: it is trusted to about 15 %, as data sheets are."""
 NOISE_SLACK = 1.3
 """Times a stated noise: a remainder above it is no longer that noise (two sigma of those 15 %)."""
 MISTRUST = 5.0
 """Largest penalty, natural logarithm, for calling a stated noise wrong: e⁵, about 1 in 150."""
-BESIDE_UNLISTED = 0.85
-"""Floor of what is believed of an effect beside an unlisted cause. It was read off the faint cases of a blind trial of
-version 0.1, and other simulations contradict it: a floor, not a measurement."""
+SMOOTH_PRIOR = 0.5
+"""That something smooth is at work that no effect and no law accounts for: as likely as not."""
+TAUS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
+"""Rms of a discrepancy over the noise: below the first it is noise, above the last a mistake; factors of two."""
+LENGTHS = (0.7, 1.4)
+"""Length scales of the discrepancy at the tool, in standard deviations of the inputs times the root of their number."""
+LANDMARKS = 100
+"""Rows that stand for all in a discrepancy of very many (Nyström): smooth functions need no more."""
+NYSTROM_FLOOR, SMOOTH_FLOOR = 1e-6, 1e-9
+"""Of the largest eigenvalue, and of the noise's variance: directions of a discrepancy below are rounding."""
+COSINES = 5
+"""Functions of each quantity in the discrepancy of places: with amplitudes 1/k² further ones bring 1 %."""
+ERROR_AT_JOINT, ERROR_ELSEWHERE = 3e-4, 1e-4
+"""rad, and m and rad: sizes of errors in a joint and in a twist elsewhere, in proportion; those of discovered laws."""
+LEVER = 0.3
+"""m: a discrepancy of the tool turns it by what moves it over this length."""
+RUNG_REACH = 6.0
+"""Log evidence below the best at which a discrepancy still counts: 1 in 400."""
 
 # --- rounding ---
 
@@ -89,14 +102,20 @@ TARGET_STARTS = np.vstack([np.zeros(3), 0.2 * np.eye(3), -0.2 * np.eye(3)])
 """m: where the target may sit on the tool frame; from each the fit reaches 0.3 m."""
 SPARE_EQUATIONS = 6
 """Equations that must be left once the frames are fitted: as many as one pose has."""
-EVIDENCE_STEPS, EVIDENCE_SETTLED, LEAST_VARIANCE = 40, 1e-3, 1e-12
+EVIDENCE_STEPS, EVIDENCE_SETTLED, LEAST_VARIANCE = 40, 1e-2, 1e-12
 """Newton steps of scales and noise at most, the change of a logarithm at which they end, and the smallest variance, in
 squares of the noise: what fits better is rounding."""
+SCALE_GRID = tuple(np.linspace(-6.0, 6.0, 25))
+"""ln λ at which a block that might be added is weighed: four standard deviations of its prior, in thirds of one."""
+NEARLY, MOST_EXACT = 3.0, 12
+"""Log evidence below the best down to which a neighbour is computed exactly, and how many are at most."""
+ALL_BUT = 1.0 - 1e-9
+"""Of the residual: a block that takes more of it is computed exactly."""
 FLATTEST_PEAK = 0.5
 """Curvature of a peak over ln λ, that of the prior being 1: of a flatter one a parabola is up to 0.9 nat off."""
 FIRST_ROUNDS = 8
 """Rounds of choice, outliers and noise at most: they settle after two or three."""
-MOST_LEVERAGE = 0.9
+MOST_LEVERAGE = 0.999
 """Largest leverage, the share of the equations that a fit takes up, with which its residual tells the noise."""
 FIT_STEPS = 12
 """Gauss-Newton steps at most: quadratic convergence needs four."""
@@ -161,23 +180,29 @@ LINK_QUANTITIES = 6
 """A segment has six components: only so many quantities that speak elsewhere are tried there."""
 SHAPED = 6
 """Candidates of each remainder whose shape is looked at."""
+LEFT_OUT = 4
+"""Effects of an explanation, up to which a law is looked for in the remainder without each of them."""
 COMPARED_LAWS = 8
 """Candidates that are compared jointly with the known effects."""
-IN_TIME = float(np.log(3.0))
-"""Log prior odds of the clock over another quantity that explains the same: changes happen in time."""
-LEAST_GAIN = 6.0
-"""Log evidence that a law must gain over none: 1 in 400."""
 MOST_LAWS = 4
 """Laws of one campaign: a fifth no longer helps anybody to find the cause."""
-RIVAL_LAWS = 3
-"""Laws that are tried in an effect's own place."""
-RIVALLED_EFFECTS = 4
-"""Effects, of the largest share, for which a law is looked for in their place."""
 FEWEST_LEFT = 5
 """Equations that must be left beside a law for a test of it."""
 LAW_FLOOR = 1e-6
 """Of the largest eigenvalue of a law's scaled Gram matrix: a direction below it is nearly a sum of the others, and
 would yet be counted as a parameter."""
+HIGHEST_ORDER, SHORTEST_PERIOD = 200.0, 0.004
+"""Orders a turn up to which waves of a joint are looked for: twice the ratio of common gears; and the shortest wave
+of one that slides, m: a fine ball screw's lead."""
+LOWEST_ORDER = 0.5
+"""Turns of the joint that the longest wave takes, inverted: a longer one is a bend, which smooth laws tell."""
+ORDER_STEP, ORDER_CHUNK, ORDER_ZOOMS = 0.125, 256, 4
+"""Of the width of a peak, 2π over the joint's range: an eighth costs 1 % of a peak's height; orders that are measured
+at a time; and rounds in which the best one is refined, each eight times finer."""
+LATTICE = 1e-3
+"""Of their spacing: positions that lie on a lattice to within this cannot tell an order from its alias."""
+REVERSALS = (0.03, 0.1, 0.3)
+"""Of a joint's range: distances within which its error may turn over; each 3 times the one before."""
 SPLINE_FLOOR = 1e-8
 """Of the largest singular value: functions of a quantity below it are no functions of their own."""
 NAMED = 5
@@ -319,8 +344,8 @@ ROWS_ALIKE = 8
 """Rows that are taken together when asking whether an error follows a quantity."""
 PURE = 1e-6
 """Of a unit twist, m or rad: with less of one kind it is all of the other."""
-MOST_SAID = 0.5
-"""Probability that an effect outside the most probable explanation is said to have at most: found it would be more."""
+UNHEARD = 1e-2
+"""Of the noise's variance: what rows have in common below it is left out where rows are held out."""
 
 # --- what to measure next ---
 

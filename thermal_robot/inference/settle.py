@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,6 +12,7 @@ from thermal_robot.effects import Effect, gate
 from thermal_robot.effects.apply import displacement
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block, frame_columns
+from thermal_robot.inference.discrepancy import forms
 from thermal_robot.inference.explain import Explanation, explain
 from thermal_robot.inference.gauss_newton import gauss_newton
 from thermal_robot.inference.problem import Linear, contained
@@ -51,7 +52,8 @@ class Settled:
     @property
     def noise(self) -> float:
         """What remains per axis, m."""
-        return float(self.explanation.whitening.noise[0] * self.explanation.best.noise)
+        left = self.explanation.remainder[~self.explanation.outliers, :3]
+        return float(np.sqrt((left**2).mean()))
 
     @property
     def containers(self) -> set[str]:
@@ -70,11 +72,9 @@ class Settled:
 def settle(
     start: Observations,
     variants: dict[str, tuple[Effect, ...]],
-    groups: Sequence[NDArray[np.int64]],
     progress: Callable[[str], None],
     known: Settled | None = None,
-    begin: Sequence[str] = (),
-    rarity: Mapping[str, float] | None = None,
+    begin: Sequence[Effect] = (),
 ) -> Settled:
     """Choose effects, refine their constants, refit exactly, and choose again there, until the choice stays.
 
@@ -84,18 +84,16 @@ def settle(
         Where the first choice is linearised.
     variants
         By name: settings of each effect among which to choose.
-    groups
-        Groupings of rows: see :func:`~thermal_robot.inference.robust.design_effect`.
     progress
         Called with a few words at each stage.
     known
         An explanation from which to start, with its outliers.
     begin
-        Names of effects with which the search starts, where none is known.
-    rarity
-        By name: log prior odds lost to having been picked out of many.
+        Settings of effects with which the search starts, where none is known.
     """
-    campaign, observations, variants = start.campaign, start, dict(variants)
+    campaign, observations, whole = start.campaign, start, dict(variants)
+    whole.update({e.name: tuple(dict.fromkeys((*whole.get(e.name, ()), e))) for e in begin})
+    variants = dict(whole)
     noise = Noise(campaign.noise_position, campaign.noise_orientation)
     held: list[tuple[Effect, Array]] = []
     outliers = None
@@ -108,14 +106,14 @@ def settle(
         progress("combinations of effects" if revision == 0 else f"exact fit, revision {revision}")
         candidates, families = _listed(variants)
         chosen = [candidates.index(effect) for effect, _ in held]
-        start_at = chosen if revision or not begin else [families.index(name) for name in begin]
+        start_at = chosen if revision or not begin else [candidates.index(effect) for effect in begin]
         blocks = tuple(block(observations, c) for c in candidates)
         moved_by = (blocks[b].columns @ v for b, (_, v) in zip(chosen, held, strict=True))
         linear = Linear(
             observations.gap + sum(moved_by, np.zeros_like(observations.gap)), frame_columns(observations)[0], blocks
         )
         explanation = explain(
-            linear, noise, families=families, start=start_at, outliers=outliers, groups=groups, rarity=rarity
+            linear, noise, families=families, starts=[tuple(start_at)], outliers=outliers, forms=forms(observations)
         )
         factor = settings.REFINEMENT ** (1 / 2**revision)
         held = [(candidates[b], explanation.values[b][0]) for b in explanation.best.blocks]
@@ -128,8 +126,26 @@ def settle(
             break
         outliers = explanation.outliers
         for effect, _ in held:
-            variants[effect.name] = gate.nearby(effect, factor)
+            near = gate.nearby(effect, factor)
+            variants[effect.name] = tuple(dict.fromkeys((*near, *_others(effect, start, whole[effect.name]))))
     return Settled(observations, explanation, tuple(held), families)
+
+
+def _others(chosen: Effect, observations: Observations, settings_of: Sequence[Effect]) -> Iterator[Effect]:
+    """Yield what stays a rival of a setting while its constants are refined.
+
+    Other joints, all joints, and its joint in other settings; of a law, all that were compared with it.
+    """
+    if chosen.share is not None:
+        yield from settings_of
+        return
+    yield replace(chosen, joints=())
+    yield from gate.alone(replace(chosen, joints=()), observations)
+    for joint in chosen.joints:
+        for setting in settings_of:
+            alone = gate.at(setting, joint, observations)
+            if alone is not None and not setting.joints:
+                yield alone
 
 
 def _listed(variants: dict[str, tuple[Effect, ...]]) -> tuple[list[Effect], tuple[str, ...]]:

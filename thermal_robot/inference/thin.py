@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from thermal_robot.inference import settings
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.gauss_newton import corrected_observations
-from thermal_robot.inference.problem import Linear, Whitening
+from thermal_robot.inference.problem import Linear
 from thermal_robot.inference.rows import in_a_row
 from thermal_robot.inference.target import Target
 from thermal_robot.observations import Observations
@@ -28,17 +28,13 @@ class Thin:
     observations
         Of the corrected model, at these rows.
     linear
-        The problem there, whitening its weights and noise.
-    remainder
-        (M, m) what the explanation leaves.
+        The problem there.
     changed
         (M,) rows that were set aside and follow each other in time.
     """
 
     observations: Observations
     linear: Linear
-    whitening: Whitening
-    remainder: Array
     changed: NDArray[np.bool_]
 
     @classmethod
@@ -46,7 +42,7 @@ class Thin:
         """Return the rows of a fit."""
         e = fit.explanation
         if fit.campaign.samples <= settings.ENOUGH_ROWS:
-            return cls(fit.corrected, e.linear, e.whitening, e.remainder, in_a_row(fit.campaign, e.outliers))
+            return cls(fit.corrected, e.linear, in_a_row(fit.campaign, e.outliers))
         drawn = np.random.default_rng(settings.DRAW_SEED).choice(
             fit.campaign.samples, settings.ENOUGH_ROWS, replace=False
         )
@@ -58,8 +54,6 @@ class Thin:
                 e.linear.frames[rows],
                 tuple(replace(b, columns=b.columns[rows]) for b in e.linear.blocks),
             ),
-            replace(e.whitening, weights=e.whitening.weights[rows]),
-            e.remainder[rows],
             in_a_row(fit.campaign, e.outliers)[rows],
         )
 

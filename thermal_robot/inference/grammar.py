@@ -1,0 +1,106 @@
+"""Laws beyond one place that follows one quantity: effects that change, products of quantities, memory."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from thermal_robot.effects import Effect, Parameter, Response, gate, library
+from thermal_robot.effects.law import Discovered
+from thermal_robot.effects.quantities import GRAVITY, REACH, TURN, quantities, unit
+from thermal_robot.inference.laws import law_of, reversals, straight
+from thermal_robot.observations import Observations
+
+
+def conditions(observations: Observations, joint: str = "") -> list[str]:
+    """Return the quantities of the campaign that may act on a place: recorded ones, the clock and the session.
+
+    Of those recorded for each joint, a joint's own; what another joint does is no condition of this one.
+    """
+    robot = observations.robot
+    others = tuple(f".{name}" for name in robot.joint_names if name != joint)
+    computed = {*robot.joint_names, *GRAVITY, *REACH}
+    return [name for name in quantities(observations) if name not in computed and not name.endswith(others)]
+
+
+def modulated(observations: Observations, effects: Iterable[Effect] | None = None) -> list[Discovered]:
+    """Return laws of known effects whose size in one joint changes with a condition or with the joint's position.
+
+    An effect whose response is the same in all rows, such as a zero that is off, is left out: times a law it is a plain
+    law of that joint. So is an effect that is not installed, as a saved law could not be read.
+
+    Parameters
+    ----------
+    observations
+        Where columns and quantities are read from.
+    effects
+        In the settings that are to be tried; the whole library, each in its first setting, where absent.
+    """
+    installed = library()
+    offered = installed.values() if effects is None else effects
+    known = quantities(observations)
+    found = []
+    for effect in offered:
+        if type(installed.get(effect.name)) is not type(effect) or gate.missing(effect, observations):
+            continue
+        setting = gate.variants(effect, observations)[0] if effects is None else effect
+        arguments = {k: v for k, v in gate.arguments(setting).items() if k != "joints"}
+        for joint in _changing(setting, observations):
+            plain = Discovered(place=joint, of=effect.name, of_arguments=json.dumps(arguments))
+            for name in [*conditions(observations, joint), joint]:
+                if name in known:
+                    found.append(straight(law_of(observations, plain, name, known[name])))
+    return found
+
+
+def _changing(effect: Effect, observations: Observations) -> tuple[str, ...]:
+    """Return the joints in which an effect's response differs between rows."""
+    varied = [p for p in gate.checked(effect, observations) if any(np.ptp(r.values, axis=0).any() for r in _rows(p))]
+    return gate.joints_of(varied)
+
+
+def _rows(parameter: Parameter) -> Iterator[Response]:
+    """Yield the responses of a parameter that have a value for each row."""
+    yield from (r for r in parameter.responses if r.values.ndim == (1 if r.channel == "joint" else 2))
+
+
+def products(observations: Observations, kinds: Sequence[str]) -> list[Discovered]:
+    """Return laws of two quantities at once: 1, u, v and u·v, the first a condition of the place or a joint's position.
+
+    Parameters
+    ----------
+    observations
+        Where quantities are read from.
+    kinds
+        ``joint``, ``base``, ``tool``.
+    """
+    robot, known = observations.robot, quantities(observations)
+    turns = observations.campaign.measures == "pose"
+    further = [name for name in (*robot.joint_names, *GRAVITY, *REACH) if name in known]
+    found = []
+    for kind in kinds:
+        for place in robot.joint_names if kind == "joint" else (kind,):
+            own = [n for n in conditions(observations, place) if n not in observations.campaign.labels]
+            first = [*own, place] if place in known else own
+            plain = Discovered(kind=kind, place=place, turns=turns, shape="ramp")
+            for i, name in enumerate(first):
+                for second in [*first[i + 1 :], *(n for n in further if n not in first)]:
+                    x, y = known[name], known[second]
+                    law = replace(plain, quantity=name, unit=unit(robot, name), by=second)
+                    law = replace(law, origin=float(x.min()), span=float(np.ptp(x)))
+                    found.append(replace(law, by_origin=float(y.min()), by_span=float(np.ptp(y))))
+    return found
+
+
+def memory(observations: Observations) -> list[Discovered]:
+    """Return laws of what each joint remembers: the distance from its last turning point, smooth or turning over."""
+    found = []
+    for joint, values in observations.campaign.since_turn.items():
+        if not np.ptp(values) > 0.0:
+            continue
+        smooth = law_of(observations, Discovered(place=joint), TURN + joint, values)
+        found += [smooth, *reversals(smooth)]
+    return found
