@@ -7,7 +7,7 @@ import numpy as np
 
 from thermal_robot.diagnosis.one_walk import Model
 from thermal_robot.inference.columns import Block
-from thermal_robot.inference.explain import explain
+from thermal_robot.inference.explain import explain, log_odds
 from thermal_robot.inference.problem import Linear
 from thermal_robot.inference.robust import Noise
 
@@ -42,7 +42,7 @@ def drawn(rng, rows, sizes=(0.5, 60.0), most=3):
 
 
 def explained(linear, stated=True):
-    return explain(linear, Noise(1.0 if stated else None))
+    return explain(linear, Noise(1.0 if stated else None), log_prior=[log_odds()] * len(linear.blocks))
 
 
 def on_fresh(explanation, block, fresh):

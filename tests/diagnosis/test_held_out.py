@@ -51,7 +51,11 @@ def test_noise_is_not_explained_and_does_not_shrink(arm):
         kept = campaign.samples - len(found.outliers)
         assert set(found.outliers) >= {row for row in truth["outliers"] if far(campaign, found, row)}
         assert found.gap.rms_before / found.gap.noise_floor == pytest.approx(1.0, abs=4.0 / np.sqrt(3 * kept) + 0.2)
-        assert "noise" in found.summary
+        if len(truth["outliers"]) > 0.03 * campaign.samples and found.unexplained.flagged:
+            # more rows than an instrument spoils are no noise, and nothing else is said
+            assert all("rows were set aside" in reason for reason in found.unexplained.reasons)
+        else:
+            assert "noise" in found.summary
     assert sum(bool(n) for n in named) + sum(flagged) <= 1, named
     assert np.median(shrinkage) < 0.005
     assert max(shrinkage) < 0.05

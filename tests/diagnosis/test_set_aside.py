@@ -47,6 +47,9 @@ def test_more_rows_than_an_instrument_spoils_are_unexplained(rv_m2):
     left = examine(known).unexplained
     assert left.flagged
     assert any("15 of 100 rows were set aside (15%)" in reason for reason in left.reasons)
+    # the rest is noise: it follows nothing, and what is unexplained is in the rows set aside
+    assert left.locations == left.depends_on == ()
+    assert left.rms == pytest.approx(np.sqrt(0.15) * 40.0 * NOISE, rel=0.1)
 
 
 def test_heavy_tails_set_a_few_more_rows_aside(rv_m2):

@@ -48,6 +48,8 @@ def examine(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Exami
 
     The tests are its size against the stated noise, lack of fit against repeats, correlation of neighbours, smooth laws
     of recorded quantities, and whether the rows set aside are too many, follow each other, or have something in common.
+    Only the first asks for more than the stated noise by a margin. Rows set aside count in the unexplained rms where
+    they are no gross errors.
     """
     e, left = fit.explanation, remainder(fit)
     stated, again = fit.campaign.noise_position, repeats(fit, left)
@@ -66,28 +68,28 @@ def examine(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Exami
     near, likeness = _neighbours(fit, left)
     progress("remainder: places and quantities")
     law, locations, depends, share = _scan(fit, left)
-    verdicts = [_too_large(fit, left), _lack_of_fit(left, again), near, law, _in_a_row(fit)]
-    verdicts += [too_many(fit, left), alike(fit)]
-    p_value = min(1.0, len(verdicts) * min(p for p, _ in verdicts))
-    reasons = tuple(reason for p, reason in verdicts if reason and len(verdicts) * p < settings.LEVEL)
-    flagged = bool(reasons) and rms > settings.ROUNDING
-    if flagged and source == "remainder":
-        # nothing tells the noise but the remainder itself: at most what neighbours do not have in common
-        floor *= np.sqrt(1.0 - np.clip(max(likeness, share), 0.0, 1.0))
+    rest = [_too_large(fit, left), _lack_of_fit(left, again), near, law]
+    aside = [_in_a_row(fit), too_many(fit, left), alike(fit)]
+    count = len(rest) + len(aside)
+    p_value = min(1.0, count * min(p for p, _ in (*rest, *aside)))
+    told, of_aside = (tuple(reason for p, reason in tests if count * p < settings.LEVEL) for tests in (rest, aside))
+    flagged = bool(told or of_aside) and rms > settings.ROUNDING
+    if not flagged:
+        return Examined(Unexplained(False, 0.0, p_value), floor, source)
+    likeness = min(max(likeness, share, 0.0), 1.0)
     # what neighbours or a law have in common is no noise, however small beside the stated one
-    common = max(likeness, share) * rms**2
-    beyond = np.sqrt(max(rms**2 - 3.0 * floor**2, common, 0.0)) if flagged else 0.0
-    if flagged and source == "remainder":
-        beyond = rms  # neither a stated noise nor repeats vouch for any of it
-    unexplained = Unexplained(
-        flagged,
-        float(beyond),
-        float(p_value),
-        reasons if flagged else (),
-        locations if flagged else (),
-        depends if flagged else (),
+    beyond2 = max(rms**2 - 3.0 * floor**2, likeness * rms**2)
+    if source == "remainder":
+        # nothing tells the noise but the remainder itself: at most what neighbours do not have in common, if that
+        floor, beyond2 = floor * float(np.sqrt(1.0 - likeness)), rms**2
+    if of_aside:
+        every2 = float((fit.corrected.gap[:, :3] ** 2).sum(axis=1).mean())
+        beyond2 = max(beyond2, every2 - 3.0 * floor**2)
+    # what the rest follows is said only where the rest is no noise
+    followed = (locations, depends) if told else ((), ())
+    return Examined(
+        Unexplained(True, float(np.sqrt(beyond2)), p_value, (*told, *of_aside), *followed), float(floor), source
     )
-    return Examined(unexplained, float(floor), source)
 
 
 def _too_large(fit: Fit, left: Remainder) -> tuple[float, str]:

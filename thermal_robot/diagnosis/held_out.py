@@ -166,9 +166,9 @@ def _shares(walks: _Walks, families: Sequence[str]) -> dict[str, Share]:
             for chosen in combinations(others, size):
                 value += weight * walks.gain(chosen, (player,))
         shares[families[walks.numbers[player]]] = share(value, nothing)
-    others = {families[b]: k for k, b in enumerate(walks.numbers) if k not in players}
+    outside = {families[b]: k for k, b in enumerate(walks.numbers) if k not in players}
     for family in dict.fromkeys(families):
         if family not in shares:
-            gained = walks.gain(players, (others[family],)) if family in others else 0.0 * nothing
+            gained = walks.gain(players, (outside[family],)) if family in outside else 0.0 * nothing
             shares[family] = share(gained, nothing)
     return shares
