@@ -1,5 +1,6 @@
 """Linear problems with many candidates, of which some are at work, and fresh rows of the same kind."""
 
+from dataclasses import replace
 from itertools import combinations
 from math import factorial
 
@@ -7,8 +8,9 @@ import numpy as np
 
 from thermal_robot.diagnosis.one_walk import Model
 from thermal_robot.inference.columns import Block
+from thermal_robot.inference.evidence import Search
 from thermal_robot.inference.explain import explain, log_odds
-from thermal_robot.inference.problem import Linear
+from thermal_robot.inference.problem import Linear, gram
 from thermal_robot.inference.robust import Noise
 
 WIDTHS = (1, 1, 2, 3, 5, 6, 12)
@@ -64,3 +66,15 @@ def on_fresh(explanation, block, fresh):
             value += weight * (left[chosen] - left[tuple(sorted((*chosen, player)))])
         shares.append(value / left[()])
     return 1.0 - left[tuple(range(count))] / left[()], shares
+
+
+def forced(known, item):
+    """The same fit, said to hold one block more and no discrepancy, whatever the evidence."""
+    e, white = known.explanation, replace(known.explanation.whitening, smooth=None)
+    linear = replace(e.linear, blocks=(*(e.linear.blocks[b] for b in e.best.blocks), item))
+    problem = gram(linear, white)
+    best = Search(problem, [0.0] * len(linear.blocks)).evaluate(range(len(linear.blocks)))
+    effects = (*known.effects, (item.effect, np.zeros(item.columns.shape[2])))
+    return replace(
+        known, explanation=replace(e, linear=linear, whitening=white, problem=problem, best=best), effects=effects
+    )

@@ -5,30 +5,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from diagnosis.simulated import forced
 from simulate import demo, simulate
 
 from thermal_robot.diagnosis.earned import earned
 from thermal_robot.effects import choose
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference.columns import Block, block
-from thermal_robot.inference.evidence import Search
 from thermal_robot.inference.fit import fit
 from thermal_robot.inference.laws import smooth_columns
-from thermal_robot.inference.problem import gram
 from thermal_robot.inference.target import Target
 
 NOISE = 25e-6
 SINGLE = ("joint_offset", "joint_gain", "transmission_error", "backlash", "joint_compliance", "thermal_elongation")
-
-
-def forced(known, item):
-    """The same fit, said to hold one block more, whatever the evidence."""
-    e = known.explanation
-    linear = replace(e.linear, blocks=(*(e.linear.blocks[b] for b in e.best.blocks), item))
-    problem = gram(linear, e.whitening)
-    best = Search(problem, [0.0] * len(linear.blocks)).evaluate(range(len(linear.blocks)))
-    effects = (*known.effects, (item.effect, np.zeros(item.columns.shape[2])))
-    return replace(known, explanation=replace(e, linear=linear, problem=problem, best=best), effects=effects)
 
 
 class Law:

@@ -5,14 +5,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from diagnosis.simulated import forced
 from simulate import demo, simulate
 
 from thermal_robot.diagnosis.schemes import worse_elsewhere, worst_folds
 from thermal_robot.effects import choose
+from thermal_robot.inference.columns import block
 from thermal_robot.inference.fit import fit
 
 NOISE = 25e-6
-SEEDS = range(18)
+SEEDS = range(8)
 
 
 def in_sessions(campaign, count=4):
@@ -28,10 +30,10 @@ def warm(rv_m2):
     for seed in SEEDS:
         campaign, _, _ = simulate(rv_m2, ["thermal_elongation"], seed=seed, ratio=(4.0, 6.0))
         campaign = in_sessions(campaign)
-        right, wrong = (fit(campaign, choose(only, (), ())) for only in ((), ("drift",)))
-        if wrong.effects:  # drift is not always worth its parameters beside a discrepancy
-            found.append([{s.name: s for s in worst_folds(f)} for f in (right, wrong)])
-    assert len(found) >= 5
+        right, nothing = (fit(campaign, choose(only, (), ()) if only else ()) for only in (("thermal_elongation",), ()))
+        (drift,) = choose(("drift",), (), ())
+        wrong = forced(nothing, block(nothing.corrected, drift))
+        found.append([{s.name: s for s in worst_folds(f)} for f in (right, wrong)])
     return found
 
 
