@@ -61,7 +61,10 @@ def candidates(fit: Fit, number: int) -> tuple[Discovered, ...]:
         Of the law: it is called ``discovered.<number>``.
     """
     thin = Thin.of(fit)
-    targets = [thin.target(blocks) for blocks in dict.fromkeys(_remainders(fit))]
+    remainders = list(dict.fromkeys(_remainders(fit)))
+    targets = [thin.target(blocks) for blocks in remainders]
+    # what is large in few rows looks like gross errors until its law is known
+    targets += [thin.target(blocks, sound=True) for blocks in remainders[:2]]
     found, _ = scan(thin.observations, targets, [effect for own in fit.variants.values() for effect in own[:1]])
     offered = [_offered(thin, target, own) for target, own in zip(targets, found, strict=True)]
     chosen: list[Discovered] = []

@@ -62,7 +62,9 @@ class Smooth:
     Attributes
     ----------
     columns
-        (N, m, M) B times τ, all rows, in units of the noise.
+        (N, m, M) B of all rows, in units of the noise.
+    tau
+        τ, by which it is multiplied.
     basis
         (E, r) U, orthonormal, on the equations of the rows in use.
     variance
@@ -70,6 +72,7 @@ class Smooth:
     """
 
     columns: Array
+    tau: float
     basis: Array
     variance: Array
 
@@ -104,7 +107,7 @@ class Smooth:
         solved = left - self.basis @ (self.variance / (1.0 + self.variance) * along)
         rows = self.columns[used] * root[:, None, None]
         inner = rows.reshape(len(left), -1).T @ solved
-        return np.asarray(self.columns @ inner)
+        return np.asarray(self.columns @ inner) * self.tau**2
 
 
 @dataclass(frozen=True, eq=False)
@@ -126,7 +129,8 @@ class Spectrum:
         if form.moves.ndim == 2:
             rows = _decomposed(form.functions[used] * root[:, None])
             parts = _decomposed(form.moves / noise[:, None] * scale)
-            basis, value = np.kron(rows[0], parts[0]), np.kron(rows[1], parts[1])
+            basis: Array = np.kron(rows[0], parts[0])
+            value: Array = np.kron(rows[1], parts[1])
         else:
             basis, value = _decomposed((columns[used] * root[:, None, None]).reshape(-1, columns.shape[2]))
         seen = value > settings.SMOOTH_FLOOR
@@ -134,7 +138,7 @@ class Spectrum:
 
     def at(self, tau: float) -> Smooth:
         """Return the covariance with a discrepancy of rms τ over the noise."""
-        return Smooth(self.columns * tau, self.basis, self.value * tau**2)
+        return Smooth(self.columns, tau, self.basis, self.value * tau**2)
 
 
 def _decomposed(flat: Array) -> tuple[Array, Array]:

@@ -110,16 +110,24 @@ class Search:
     exclusive: frozenset[frozenset[int]] = frozenset()
     seen: dict[tuple[int, ...], Combination] = field(default_factory=dict)
 
-    def allowed(self, blocks: tuple[int, ...]) -> bool:
+    def __post_init__(self) -> None:
+        """List what each block excludes."""
+        self._apart: dict[int, set[int]] = {}
+        for a, b in self.exclusive:
+            self._apart.setdefault(a, set()).add(b)
+            self._apart.setdefault(b, set()).add(a)
+
+    def allowed(self, blocks: Sequence[int]) -> bool:
         """Tell whether no two of the blocks exclude each other."""
-        return not any(pair <= set(blocks) for pair in self.exclusive)
+        whole = set(blocks)
+        return not any(self._apart.get(b, whole - whole) & whole for b in blocks)
 
     def evaluate(self, blocks: Sequence[int], start: Combination | None = None) -> Combination:
         """Return the combination's evidence, computed once."""
         key = tuple(sorted(blocks))
         known = self.seen.get(key)
         if known is None or not known.exact:
-            found = _evidence(self.gram, key, sum(self.log_prior[b] for b in key), known or start)
+            found = evidence(self.gram, key, sum(self.log_prior[b] for b in key), known or start)
             if not np.isfinite(found.log_evidence):
                 raise EstimationError("the measurements do not determine anything: too few, or all alike")
             self.seen[key] = found
@@ -136,7 +144,19 @@ class Search:
             # several smaller effects may suffice where one that contains them all came first
             best = max(best, self._climb((), frozenset(large)), key=lambda c: c.log_evidence)
             best = self._climb(best.blocks, frozenset())
+        while (missed := self._missed(best)) is not None:
+            best = self._climb(missed.blocks, frozenset())
         return best
+
+    def _missed(self, best: Combination) -> Combination | None:
+        """Compute exactly what was weighed on the way and comes near the best; return one that is better, if any is."""
+        near = [c.blocks for c in self.seen.values() if not c.exact and self._near(c, best)]
+        found = max((self.evaluate(blocks) for blocks in near), key=lambda c: c.log_evidence, default=best)
+        return found if found.log_evidence > best.log_evidence + settings.BETTER else None
+
+    @staticmethod
+    def _near(one: Combination, best: Combination) -> bool:
+        return one.log_evidence > best.log_evidence - settings.NEARLY
 
     def _width(self, block: int) -> int:
         return int(self.gram.slices[block].stop - self.gram.slices[block].start)
@@ -146,9 +166,14 @@ class Search:
         while True:
             around = [c for c in self._neighbours(best) if not barred & set(c.blocks)]
             around.sort(key=lambda c: -c.log_evidence)
-            close = [c for c in around if c.log_evidence > best.log_evidence - settings.NEARLY][: settings.MOST_EXACT]
-            better = max((self.evaluate(c.blocks, best) for c in close), key=lambda c: c.log_evidence, default=best)
-            if better.log_evidence <= best.log_evidence + settings.BETTER:
+            close = [c.blocks for c in around if self._near(c, best)]
+            better = best
+            for k in range(0, len(close), settings.AT_ONCE):
+                some = (self.evaluate(blocks, best) for blocks in close[k : k + settings.AT_ONCE])
+                better = max((better, *some), key=lambda c: c.log_evidence)
+                if better.log_evidence > best.log_evidence + settings.BETTER:
+                    break
+            else:
                 return best
             best = better
 
@@ -161,7 +186,8 @@ class Search:
     def _with_one_more(self, base: Combination, best: Combination) -> list[Combination]:
         others = [b for b in range(len(self.gram.slices)) if b not in best.blocks]
         keys = {b: tuple(sorted((*base.blocks, b))) for b in others}
-        new = [b for b in others if keys[b] not in self.seen and self.allowed(keys[b])]
+        barred = set().union(*(self._apart.get(b, ()) for b in base.blocks))
+        new = [b for b in others if b not in barred and keys[b] not in self.seen]
         for b, gain, scale in _gains(self.gram, base, new):
             self.seen[keys[b]] = Combination(
                 keys[b],
@@ -186,23 +212,24 @@ class Search:
 def _gains(gram: Gram, base: Combination, blocks: Sequence[int]) -> list[tuple[int, float, float]]:
     """Return for each block what adding it gains in log evidence, its scale integrated out, and its best scale.
 
-    Scales of the others stay, and so does the noise but for what the block takes of it. In the eigenvectors of the
-    block's own information beside the others, w, with the vector c there,
+    Scales of the others stay. In the eigenvectors of the block's own information beside the others, w, with the vector
+    c there, and with the noise s'² that it leaves,
 
-        gain(λ) = −½ Σ log(1 + λ² w/s²) − ½ (n + ν) log(1 − Σ c² λ²/(s² + λ² w) / T) ,
+        (n + ν) s'² = ν + Q − Σ c² λ²/(s'² + λ² w) ,
+        gain(λ) = −½ Σ log(1 + λ² w/s'²) − ½ (n + ν) log(s'²/s₀²) ,
 
-    T = (n + ν) s², of which the second term is ½ Σ c² λ²/(s² + λ² w)/s² where the block takes little of the noise.
+    Q = y'y − b'θ, and s₀ the same without the block.
     """
     spans = [np.arange(gram.slices[b].start, gram.slices[b].stop) for b in base.blocks]
     used = np.concatenate([*spans, np.zeros(0, dtype=int)])
     variance = base.noise**2
     left = gram.vector - gram.matrix[:, used] @ base.values
-    total = (gram.equations + gram.noise_dof) * variance
     log_scale = np.array(settings.SCALE_GRID)
     square = np.exp(2.0 * log_scale)[:, None]
     prior = -0.5 * (log_scale / settings.SIZE_SPREAD) ** 2
     norm = np.log((log_scale[1] - log_scale[0]) / (np.sqrt(2.0 * np.pi) * settings.SIZE_SPREAD))
-    worth = 0.5 * (gram.equations + gram.noise_dof)
+    freedom = gram.equations + gram.noise_dof
+    rest = (gram.noise_dof + gram.total - float(gram.vector[used] @ base.values)) / freedom
     result = []
     for alike in _by_width(gram, blocks):
         own = np.array([np.arange(gram.slices[b].start, gram.slices[b].stop) for b in alike])
@@ -211,9 +238,12 @@ def _gains(gram: Gram, base: Combination, blocks: Sequence[int]) -> list[tuple[i
         value, vector = np.linalg.eigh(inside - cross @ (base.covariance / variance) @ cross.transpose(0, 2, 1))
         value = np.maximum(value, 0.0)[:, None, :]
         along = ((vector.transpose(0, 2, 1) @ left[own][:, :, None])[:, :, 0] ** 2)[:, None, :]
-        taken = (along * square / (variance + square * value)).sum(axis=2)
-        log = -0.5 * np.log1p(square * value / variance).sum(axis=2) + prior
-        log -= worth * np.log1p(-np.minimum(taken / total, settings.ALL_BUT))
+        left_over = np.full((len(alike), len(log_scale)), rest)
+        for _ in range(settings.NOISE_ROUNDS):
+            taken = (along * square / (left_over[:, :, None] + square * value)).sum(axis=2) / freedom
+            left_over = np.maximum(rest - taken, settings.LEAST_VARIANCE * rest)
+        log = -0.5 * np.log1p(square * value / left_over[:, :, None]).sum(axis=2) + prior
+        log -= 0.5 * freedom * np.log(left_over / rest)
         top = log.max(axis=1)
         gain = top + np.log(np.exp(log - top[:, None]).sum(axis=1)) + norm
         result += list(zip(alike, gain.tolist(), np.exp(log_scale[log.argmax(axis=1)]).tolist(), strict=True))
@@ -280,7 +310,20 @@ class _Posterior:
         )
 
 
-def _evidence(gram: Gram, blocks: tuple[int, ...], prior: float, start: Combination | None) -> Combination:
+def evidence(gram: Gram, blocks: tuple[int, ...], prior: float, start: Combination | None) -> Combination:
+    """Return one combination with noise and scales at their most probable values.
+
+    Parameters
+    ----------
+    gram
+        The problem.
+    blocks
+        That are in it.
+    prior
+        Their log prior odds.
+    start
+        A combination like it, from whose noise and scales the iteration starts.
+    """
     spans = [np.arange(gram.slices[b].start, gram.slices[b].stop) for b in blocks]
     used = np.concatenate([*spans, np.zeros(0, dtype=int)])
     owner = np.repeat(np.arange(len(blocks)), [len(span) for span in spans])

@@ -24,7 +24,7 @@ Array = NDArray[np.float64]
 class Discrepancy:
     """What no effect accounts for: form and rms τ over the noise beside the best combination, and its probability."""
 
-    form: str
+    form: Form | None
     tau: float
     probability: float
 
@@ -155,7 +155,7 @@ def explain(
         remainder,
         smooth,
         aside,
-        Discrepancy(ladder.forms[rung[0]].name if rung[0] >= 0 else "", rung[1], ladder.discrepancy()),
+        Discrepancy(ladder.forms[rung[0]] if rung[0] >= 0 else None, rung[1], ladder.discrepancy()),
         forms,
     )
 

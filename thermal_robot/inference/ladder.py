@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.inference import settings
 from thermal_robot.inference.discrepancy import Form, Spectrum
-from thermal_robot.inference.evidence import Combination, Gram, Search
+from thermal_robot.inference.evidence import Combination, Gram, Search, evidence
 from thermal_robot.inference.problem import Linear, Whitening, contained, normal_equations, whitened
 
 Array = NDArray[np.float64]
@@ -53,6 +53,9 @@ class Ladder:
         self._pairs = contained(plain) | self.exclusive
         share = settings.SMOOTH_PRIOR if self.forms else 0.0
         each = max(len(self.forms) * len(settings.TAUS), 1)
+        ends = np.cumsum([self.linear.frames.shape[2], *(len(block.sizes) for block in self.linear.blocks)])
+        self._spans = [np.arange(a, b) for a, b in zip(ends[:-1], ends[1:], strict=True)]
+        self._quick: dict[tuple[Rung, tuple[int, ...]], float] = {}
         self._priors = {PLAIN: float(np.log1p(-share))}
         for k in range(len(self.forms)):
             self._priors |= {(k, tau): float(np.log(share / each)) for tau in settings.TAUS}
@@ -66,10 +69,7 @@ class Ladder:
     def at(self, rung: Rung) -> Search:
         """Return the search beside one discrepancy, made once."""
         if rung not in self.searches:
-            along, white = self._along[rung[0]], self.whitened_at(rung)
-            assert white.smooth is not None
-            taken = white.smooth.variance / (1.0 + white.smooth.variance)
-            products = self._products - along.T @ (taken[:, None] * along)
+            white, products = self.whitened_at(rung), self._left(rung, np.arange(len(self._products)))
             plain = self.searches[PLAIN].gram
             self.searches[rung] = self._search(
                 rung, normal_equations(self.linear, white, products, self._equations, like=plain)
@@ -81,7 +81,7 @@ class Ladder:
         return Search(replace(problem, offset=offset), self.log_prior, self._pairs)
 
     def run(self, starts: Sequence[tuple[int, ...]] = ()) -> tuple[Rung, Combination]:
-        """Climb over combinations and discrepancies until neither betters the other, from the best of several starts."""
+        """Climb over combinations and discrepancies until neither betters the other, from several starts."""
         first = self.at(PLAIN)
         allowed = dict.fromkeys([*(s for s in starts if first.allowed(s)), ()])
         begin = max((first.evaluate(s) for s in allowed), key=lambda c: c.log_evidence)
@@ -89,39 +89,65 @@ class Ladder:
         seeds = list(allowed)
         while True:
             tried = dict.fromkeys([best.blocks, *seeds])
-            found = [self._size(k, blocks) for k in range(len(self.forms)) for blocks in tried]
+            found = [(*self._size(k, blocks), blocks) for k in range(len(self.forms)) for blocks in tried]
             seeds = []
-            other = max(found, key=lambda item: item[1].log_evidence, default=(rung, best))
-            if other[1].log_evidence > best.log_evidence + settings.BETTER:
-                rung, best = other[0], self.at(other[0]).run(other[1].blocks)
+            other = max(found, key=lambda item: item[1], default=(rung, -np.inf, ()))
+            if other[0] != rung and other[1] > best.log_evidence + settings.BETTER:
+                rung, best = other[0], self.at(other[0]).run(other[2])
                 continue
             nearby = self._beside_others(best)
             if nearby is None:
                 return rung, best
             rung, best = nearby
 
-    def _size(self, form: int, blocks: tuple[int, ...]) -> tuple[Rung, Combination]:
-        """Return the most probable size of a form beside one combination; its evidence has one peak."""
+    def _size(self, form: int, blocks: tuple[int, ...]) -> tuple[Rung, float]:
+        """Return the most probable size of a form beside one combination, with the log evidence; it has one peak."""
         k = settings.TAUS.index(1.0)
-        step, seen = 1, {k: self.at((form, settings.TAUS[k])).evaluate(blocks)}
+        step, best = 1, self._beside((form, settings.TAUS[k]), blocks)
         for _ in range(2):
             while 0 <= k + step < len(settings.TAUS):
-                seen[k + step] = self.at((form, settings.TAUS[k + step])).evaluate(blocks)
-                if seen[k + step].log_evidence < seen[k].log_evidence:
+                other = self._beside((form, settings.TAUS[k + step]), blocks)
+                if other < best:
                     break
-                k += step
+                k, best = k + step, other
             step = -step
-        return (form, settings.TAUS[k]), seen[k]
+        return (form, settings.TAUS[k]), best
+
+    def _beside(self, rung: Rung, blocks: tuple[int, ...]) -> float:
+        """Return the log evidence of one combination beside one discrepancy, from the columns of its blocks alone."""
+        key = rung, tuple(sorted(blocks))
+        if key not in self._quick:
+            flat, white = self.linear.frames.shape[2], self.whitened_at(rung)
+            picked = np.concatenate([np.arange(flat), *(self._spans[b] for b in key[1]), [len(self._products) - 1]])
+            problem = normal_equations(
+                Linear(self.linear.gap, self.linear.frames, tuple(self.linear.blocks[b] for b in key[1])),
+                white,
+                self._left(rung, picked.astype(int)),
+                self._equations,
+            )
+            prior = self._priors[rung] + sum(self.log_prior[b] for b in key[1])
+            self._quick[key] = evidence(problem, tuple(range(len(blocks))), prior, None).log_evidence
+        return self._quick[key]
+
+    def _left(self, rung: Rung, picked: NDArray[np.int64]) -> Array:
+        """Return the products of some columns, whitened by the discrepancy of a rung."""
+        spectrum, along = self._spectra[rung[0]], self._along[rung[0]][:, picked]
+        variance = spectrum.value * rung[1] ** 2
+        return self._products[np.ix_(picked, picked)] - along.T @ ((variance / (1.0 + variance))[:, None] * along)
 
     def _beside_others(self, best: Combination) -> tuple[Rung, Combination] | None:
         """Weigh the neighbours beside all discrepancies that count; return what is better than the best, if any is."""
-        for other, search in list(self.searches.items()):
-            own = search.seen.get(best.blocks)
-            if own is not None and own.log_evidence > best.log_evidence - settings.RUNG_REACH:
-                nearby = search.run(best.blocks)
+        near = [r for (r, blocks), log in self._quick.items() if blocks == best.blocks and self._counts(log, best)]
+        for other in dict.fromkeys((PLAIN, *near)):
+            if self._counts(self.at(other).evaluate(best.blocks).log_evidence, best):
+                nearby = self.at(other).run(best.blocks)
                 if nearby.log_evidence > best.log_evidence + settings.BETTER:
                     return other, nearby
         return None
+
+    @staticmethod
+    def _counts(log_evidence: float, best: Combination) -> bool:
+        return log_evidence > best.log_evidence - settings.RUNG_REACH
 
     def probabilities(self) -> tuple[list[Combination], Array]:
         """Return all combinations seen beside all discrepancies, most probable first, with their probabilities."""

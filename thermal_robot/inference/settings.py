@@ -34,8 +34,8 @@ ERROR_AT_JOINT, ERROR_ELSEWHERE = 3e-4, 1e-4
 """rad, and m and rad: sizes of errors in a joint and in a twist elsewhere, in proportion; those of discovered laws."""
 LEVER = 0.3
 """m: a discrepancy of the tool turns it by what moves it over this length."""
-RUNG_REACH = 6.0
-"""Log evidence below the best at which a discrepancy still counts: 1 in 400."""
+RUNG_REACH = 4.0
+"""Log evidence below the best at which a discrepancy still counts: 1 in 50."""
 
 # --- rounding ---
 
@@ -107,10 +107,10 @@ EVIDENCE_STEPS, EVIDENCE_SETTLED, LEAST_VARIANCE = 40, 1e-2, 1e-12
 squares of the noise: what fits better is rounding."""
 SCALE_GRID = tuple(np.linspace(-6.0, 6.0, 25))
 """ln λ at which a block that might be added is weighed: four standard deviations of its prior, in thirds of one."""
-NEARLY, MOST_EXACT = 3.0, 12
-"""Log evidence below the best down to which a neighbour is computed exactly, and how many are at most."""
-ALL_BUT = 1.0 - 1e-9
-"""Of the residual: a block that takes more of it is computed exactly."""
+NEARLY, AT_ONCE = 3.0, 8
+"""Log evidence below the best down to which neighbours are computed exactly, and how many before one of them is taken."""
+NOISE_ROUNDS = 6
+"""Rounds in which the noise that a further block leaves settles."""
 FLATTEST_PEAK = 0.5
 """Curvature of a peak over ln λ, that of the prior being 1: of a flatter one a parabola is up to 0.9 nat off."""
 FIRST_ROUNDS = 8

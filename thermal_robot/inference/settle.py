@@ -134,11 +134,17 @@ def settle(
 def _others(chosen: Effect, observations: Observations, settings_of: Sequence[Effect]) -> Iterator[Effect]:
     """Yield what stays a rival of a setting while its constants are refined.
 
-    Other joints, all joints, and its joint in other settings; of a law, all that were compared with it.
+    One joint more or less, other joints, all joints, and its joint in other settings; of a law, all that were compared
+    with it.
     """
     if chosen.share is not None:
         yield from settings_of
         return
+    every = [alone.joints[0] for alone in gate.alone(replace(chosen, joints=()), observations)]
+    if chosen.joints:
+        yield from (replace(chosen, joints=(*chosen.joints, j)) for j in every if j not in chosen.joints)
+    if len(chosen.joints) > 1:
+        yield from (replace(chosen, joints=tuple(k for k in chosen.joints if k != j)) for j in chosen.joints)
     yield replace(chosen, joints=())
     yield from gate.alone(replace(chosen, joints=()), observations)
     for joint in chosen.joints:

@@ -57,7 +57,11 @@ class Thin:
             in_a_row(fit.campaign, e.outliers)[rows],
         )
 
-    def target(self, blocks: Iterable[int]) -> Target:
-        """Return the residual once the frames and some blocks are projected out."""
+    def target(self, blocks: Iterable[int], *, sound: bool = False) -> Target:
+        """Return the residual once the frames and some blocks are projected out.
+
+        Rows far from the rest weigh little, unless they follow each other, or all rows are taken for ``sound``.
+        """
         columns = [self.linear.blocks[b].columns for b in blocks]
-        return Target.of(self.linear.gap, np.concatenate([self.linear.frames, *columns], axis=2), self.changed)
+        trusted = np.ones_like(self.changed) if sound else self.changed
+        return Target.of(self.linear.gap, np.concatenate([self.linear.frames, *columns], axis=2), trusted)
