@@ -44,9 +44,12 @@ def test_too_few_poses_are_refused(offset, rows, stated):
         diagnose(few if stated else replace(few, noise_position=None))
 
 
-def test_seven_poses_without_a_stated_noise_are_refused_without_a_warning(offset):
-    with pytest.raises(EstimationError):
-        diagnose(replace(offset.take(np.arange(7)), noise_position=None))
+def test_seven_poses_without_a_stated_noise_are_diagnosed_without_a_warning(offset):
+    """Each is held out once: six others determine the frames."""
+    found = diagnose(replace(offset.take(np.arange(7)), noise_position=None))
+    assert found.gap.held_out.folds == 7
+    low, high = found.gap.held_out.shrinkage_ci95
+    assert low <= found.gap.held_out.shrinkage <= high <= 1.0
 
 
 @pytest.mark.parametrize("rows", [8, 11, 20])
@@ -140,7 +143,9 @@ def test_a_fifth_of_the_rows_may_be_wrong_but_not_half(rv_m2, gross, explained):
         campaign, truth, _ = simulate(rv_m2, ["joint_offset"], seed=seed, outliers=gross)
         found = diagnose(campaign)
         if explained:
-            right += found.verdict == ("joint_offset",) and not found.unexplained.flagged
+            # so many are no gross errors of an instrument, and that is all that is said against it
+            (reason,) = found.unexplained.reasons
+            right += found.verdict == ("joint_offset",) and "rows were set aside" in reason
             assert len(set(found.outliers) ^ set(truth["outliers"])) <= 2
         else:
             right += found.unexplained.flagged

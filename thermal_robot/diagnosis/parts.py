@@ -53,8 +53,9 @@ class Finding:
     probability
         Posterior probability that it is at work; ``None`` where it is not testable.
     shrinkage, shrinkage_ci95
-        Its share of the gap's mean square on held-out rows, and the 95 % interval. For an effect of the fit it is the
-        Shapley value; for another the gain from adding it. ``None`` where it is not testable.
+        Its share of the gap's mean square on held-out rows, noise included, and the 95 % interval. For an effect of the
+        fit it is the Shapley value, and these sum to the overall shrinkage; for another the gain from adding it.
+        ``None`` where it is not testable.
     needs
         Columns or frames that would make it testable.
     confounded_with
@@ -98,7 +99,21 @@ def is_frame(found: Sequence[Finding], name: str) -> bool:
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Shrinkage of the gap on held-out rows: rms distances in m, shares 0..1."""
+    """Shrinkage of the gap on held-out rows: rms distances in m, shares 0..1; all with the noise of the rows in it.
+
+    Frames and parameters are fitted anew without each fold. Candidates, the choice among them, the place and quantity
+    of a law, refined constants, prior scales and outliers are those of all rows.
+
+    Attributes
+    ----------
+    scheme, folds
+        How rows are held out, and how many times.
+    rms_before, rms_after
+        With the frames alone, and with the effects; outliers left out.
+    shrinkage, shrinkage_ci95
+        1 − (rms_after / rms_before)², the sum of the shares of the model's effects; with the interval in which it lies
+        on fresh rows of the same kind with the model that is saved.
+    """
 
     scheme: str
     folds: int

@@ -86,17 +86,10 @@ def neighbourhoods(campaign: Campaign, count: int) -> Labels:
     return labels
 
 
-def folds(
-    campaign: Campaign, count: int = settings.FOLDS, blocks_a_fold: int = settings.BLOCKS_A_FOLD
-) -> tuple[Labels, Labels]:
-    """Assign rows to the folds of a hold-out, in blocks of consecutive measurements; near-repeats stay together.
+def blocks(campaign: Campaign, count: int = settings.BLOCKS) -> Labels:
+    """(N,) label 0..B−1 of one of at most ``count`` blocks of consecutive measurements; near-repeats stay together.
 
-    Returns
-    -------
-    fold
-        (N,) fold of each row.
-    block
-        (N,) block of each row: the unit that a bootstrap resamples.
+    A block is what a hold-out holds out at a time, and what its figures' uncertainty is told by.
     """
     cluster = near_repeats(campaign)
     rank = np.empty(campaign.samples)
@@ -108,10 +101,13 @@ def folds(
     ahead = np.empty(len(order))
     ahead[order] = np.cumsum(sizes[order]) - sizes[order]
     count = min(count, len(order))
-    blocks = min(count * blocks_a_fold, len(order))
-    block = np.minimum(ahead * blocks // campaign.samples, blocks - 1).astype(np.int64)[cluster]
-    block = np.unique(block, return_inverse=True)[1].astype(np.int64)
-    return block % count, block
+    block = np.minimum(ahead * count // campaign.samples, count - 1).astype(np.int64)[cluster]
+    return np.unique(block, return_inverse=True)[1].astype(np.int64)
+
+
+def each(labels: Labels) -> list[NDArray[np.bool_]]:
+    """Return for each label, in order, a mask (N,) of its rows."""
+    return [labels == label for label in np.unique(labels)]
 
 
 def repeated_poses(campaign: Campaign) -> NDArray[np.int64]:
