@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -42,6 +42,8 @@ class Conclusion:
         The residual of the whole fit, laws included.
     chance
         The random part of that residual that the instrument's noise does not account for.
+    refused
+        By effect that was taken out of the fit again: its probability.
     """
 
     fit: Fit
@@ -49,6 +51,7 @@ class Conclusion:
     unexplained: Unexplained
     left: Examined
     chance: RandomGap
+    refused: Mapping[str, float]
 
 
 def answer(
@@ -82,7 +85,9 @@ def answer(
     where, locations = locate(fit, shares)
     gap = _gap(last, shrinkage)
     held = [effect.name for effect, _ in fit.effects]
-    systematic = findings(fit, shrinkage.shares, locations, {d.law.name: d.probability for d in last.laws})
+    systematic = findings(
+        fit, shrinkage.shares, locations, {d.law.name: d.probability for d in last.laws}, last.refused
+    )
     chance = [f for f in random_findings(fit, last.chance, beside_unlisted=remaining.flagged) if asked(f.name)]
     found = by_share(titled((*systematic, *chance), (*candidates, *random_effects())))
     return Diagnosis(

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -19,7 +19,9 @@ from thermal_robot.inference.random_gap import RandomGap, random_gap
 from thermal_robot.inference.robust import Noise
 
 
-def beside_scatter(fit: Fit, chance: RandomGap, progress: Callable[[str], None]) -> Conclusion:
+def beside_scatter(
+    fit: Fit, chance: RandomGap, refused: Mapping[str, float], progress: Callable[[str], None]
+) -> Conclusion:
     """Choose the systematic effects again, with the joints' scatter in the covariance of the noise.
 
     Parameters
@@ -28,6 +30,8 @@ def beside_scatter(fit: Fit, chance: RandomGap, progress: Callable[[str], None])
         Fit whose effects were chosen with the instrument's noise alone.
     chance
         The scatter, which accounts for the residual of that fit.
+    refused
+        By effect that rows held out refused: its probability.
     progress
         Called with a few words at each stage.
 
@@ -43,6 +47,8 @@ def beside_scatter(fit: Fit, chance: RandomGap, progress: Callable[[str], None])
     again = explain(linear, noise, families=fit.families)
     kept = tuple(dict.fromkeys(fit.families[b] for b in again.best.blocks))
     feigned: dict[str, tuple[Effect, ...]] = {name: () for name in dict.fromkeys(fit.families) if name not in kept}
+    own = {name: [b for b, f in enumerate(fit.families) if f == name] for name in feigned}
+    refused = {**refused, **{name: again.probability(blocks) for name, blocks in own.items()}}
     fit = refit(fit, feigned, [linear.blocks[b].effect for b in again.best.blocks], progress)
     chance = random_gap(fit)
     covariance = chance.scatter.covariance(fit.corrected.joint_sensitivity)[:, :3, :3]
@@ -51,4 +57,4 @@ def beside_scatter(fit: Fit, chance: RandomGap, progress: Callable[[str], None])
     if left.flagged:
         left = examine(fit, progress).unexplained
     laws = discovered(fit)
-    return Conclusion(fit, laws, as_laws_say(left, laws), Examined(left, floor, "scatter"), chance)
+    return Conclusion(fit, laws, as_laws_say(left, laws), Examined(left, floor, "scatter"), chance, refused)

@@ -16,6 +16,7 @@ from thermal_robot.diagnosis.held_out import held_out
 from thermal_robot.diagnosis.result import Diagnosis, told
 from thermal_robot.diagnosis.schemes import worse_elsewhere
 from thermal_robot.diagnosis.unlisted import as_laws_say, one_more_law
+from thermal_robot.diagnosis.word import worth_their_word
 from thermal_robot.effects import Effect, choose, library
 from thermal_robot.errors import CampaignError
 from thermal_robot.inference import settings
@@ -98,12 +99,12 @@ def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
     # the first of several laws may go astray between the places that were measured, and the others set it right
     while len(stages) > 1 and worse_elsewhere(known, stages[-1]):
         stages.pop()
-    fit = stages[-1]
+    fit, refused = worth_their_word(stages[-1], progress)
     chance = random_gap(fit)
     if chance.explains_size:
-        return beside_scatter(fit, chance, progress)
+        return beside_scatter(fit, chance, refused, progress)
     left, laws = examine(fit, progress), discovered(fit)
-    return Conclusion(fit, laws, as_laws_say(left.unexplained, laws), left, chance)
+    return Conclusion(fit, laws, as_laws_say(left.unexplained, laws), left, chance, refused)
 
 
 def _check_priors(campaign: Campaign, known: set[str]) -> None:

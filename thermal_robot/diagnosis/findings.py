@@ -23,7 +23,11 @@ Shares = dict[str, tuple[float, tuple[float, float]]]
 
 
 def findings(
-    fit: Fit, shares: Shares, locations: dict[str, tuple[Location, ...]], laws: Mapping[str, float]
+    fit: Fit,
+    shares: Shares,
+    locations: dict[str, tuple[Location, ...]],
+    laws: Mapping[str, float],
+    refused: Mapping[str, float],
 ) -> tuple[Finding, ...]:
     """Return a finding for every candidate; those that are not testable come last.
 
@@ -37,6 +41,8 @@ def findings(
         By effect of the fit: its places.
     laws
         By discovered law of the fit: probability that what it follows, where, is right.
+    refused
+        By effect that was taken out of the fit again: its probability.
     """
     e = fit.explanation
     explained = {effect.name: b for b, (effect, _) in zip(e.best.blocks, fit.effects, strict=True)}
@@ -71,6 +77,7 @@ def findings(
                 describes=law.describe() if law else None,
             )
         )
+    result += [Finding(name, "not_found", p, *shares.get(name, (0.0, (0.0, 0.0)))) for name, p in refused.items()]
     result += [Finding(name, "not_testable", needs=needs) for name, needs in fit.needs.items()]
     return tuple(result)
 

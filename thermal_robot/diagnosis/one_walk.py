@@ -99,8 +99,7 @@ class Model:
         stack = whitened(self.linear, replace(self.whitening, smooth=None))
         if smooth is None:
             return used, stack, np.zeros((len(stack), 0)), np.zeros(0)
-        heard = smooth.variance > settings.UNHEARD
-        return used, stack, smooth.basis[:, heard], smooth.variance[heard]
+        return used, stack, *smooth.eigen(settings.UNHEARD)
 
     def products(self, rows: Rows) -> Array:
         """(K + 1, K + 1) Xᵀ V⁻¹ X of the columns and the gap over some rows, V their own covariance; computed once.

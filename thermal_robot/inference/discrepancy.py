@@ -129,6 +129,23 @@ class Smooth:
                 found.append(rows + part.times(vector @ (over[:, None] * (vector.T @ part.adjoint(rows)))))
         return spectrum.joined(found).reshape(stack.shape)
 
+    def eigen(self, floor: float) -> tuple[Array, Array]:
+        """Return U (E, r), orthonormal, and d (r,) with τ²BBᵀ = U diag(d) Uᵀ; what lies below a floor is left out."""
+        found, variance, spectrum = [], [], self.spectrum
+        m = len(spectrum.axes)
+        for k, part in enumerate(spectrum.parts):
+            value, vector = spectrum.decomposed(k)
+            heard = self.tau**2 * value > floor
+            own = vector[:, heard]
+            if not part.wide:
+                rows = part.times(own / np.sqrt(value[heard]))
+                own = rows.reshape(-1, rows.shape[2])
+            if len(spectrum.parts) > 1:
+                own = (own[:, None, :] * spectrum.axes[None, :, k, None]).reshape(len(own) * m, -1)
+            found.append(own)
+            variance.append(self.tau**2 * value[heard])
+        return np.concatenate(found, axis=1), np.concatenate(variance)
+
     @property
     def log_det(self) -> float:
         """log|1 + τ²BBᵀ|."""

@@ -141,11 +141,12 @@ def explain(
             break
         history.append(state)
         # what a pose brings of its own hides no gross error
-        close = white.smooth is not None and ladder.forms[rung[0]].name != "poses"
-        degrees = white.smooth.degrees if close else 0.0
-        followed = best.effective + linear.frames.shape[2] + degrees
+        close = white.smooth if rung[0] >= 0 and ladder.forms[rung[0]].name != "poses" else None
+        followed = best.effective + linear.frames.shape[2] + (close.degrees if close else 0.0)
         leverage = followed / max(ladder.at(rung).gram.equations + linear.frames.shape[2], 1)
-        whitening, aside = reweigh(remainder - smooth if close else remainder, noise, use, min(leverage, settings.MOST_LEVERAGE), measures)
+        whitening, aside = reweigh(
+            remainder - smooth if close else remainder, noise, use, min(leverage, settings.MOST_LEVERAGE), measures
+        )
         seeds = [best.blocks]
     compared, probabilities = ladder.probabilities()
     return Explanation(

@@ -1,0 +1,44 @@
+"""What rows held out refuse: an effect that predicts them worse, and a law that does not predict them better."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.special import expit
+
+from thermal_robot.diagnosis.earned import Earned, earned
+from thermal_robot.effects.law import PREFIX
+from thermal_robot.inference.explain import log_odds
+from thermal_robot.inference.fit import Fit, refit
+
+
+def worth_their_word(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, float]]:
+    """Take effects and laws out of a fit one after another, the worst first, until all that stay earn their word.
+
+    A law stays if it predicts rows held out better, a known effect unless it predicts them worse; see
+    :func:`~thermal_robot.diagnosis.earned.earned`.
+
+    Returns
+    -------
+    fit
+        With what is left of it.
+    refused
+        By name: the probability that a known effect was at work, by its prior and the rows held out alone.
+    """
+    refused: dict[str, float] = {}
+    while True:
+        judged = {name: e for name, e in earned(fit).items() if e.harms or (name.startswith(PREFIX) and not e.helps)}
+        if not judged:
+            return fit, refused
+        worst = min(judged, key=lambda name: judged[name].blocked.share)
+        progress(f"rows held out refuse {worst}")
+        if not worst.startswith(PREFIX):
+            refused[worst] = _probability(fit, judged[worst])
+        fit = refit(fit, {worst: ()}, [effect for effect, _ in fit.effects if effect.name != worst], progress)
+
+
+def _probability(fit: Fit, judged: Earned) -> float:
+    """Return the posterior probability of an effect, given what it does to the likelihood of rows held out."""
+    equations = fit.explanation.problem.equations
+    return float(expit(log_odds() - 0.5 * equations * np.log1p(-judged.blocked.share)))
