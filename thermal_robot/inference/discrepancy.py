@@ -6,7 +6,8 @@ mean one on its diagonal, so that τ is the discrepancy's rms over the noise:
 * ``tool``: the target moves by a smooth function of all joint positions and conditions together;
 * ``places``: each joint, the base and the tool err by a sum of smooth functions of single quantities,
   K = Σ_p J_p k_p J_pᵀ;
-* ``poses``: what a pose brings, anew for each pose and the same at every visit.
+* ``poses``: what a pose brings, anew for each pose and the same at every visit, to the target or in one joint; or what
+  a visit brings, in one joint.
 
 Sources: M. C. Kennedy, A. O'Hagan, *J. R. Statist. Soc. B* 63 (2001), eq. 4; low rank: Rasmussen and Williams,
 *Gaussian Processes for Machine Learning*, 2006, 8.1.
@@ -276,10 +277,20 @@ def forms(observations: Observations) -> tuple[Form, ...]:
     functions = [_spectral(values) for values in quantities(observations).values()]
     found.append(Form("places", np.concatenate(functions, axis=1), _moves(observations, measures)))
     pose = repeated_poses(observations.campaign)
-    count = int(pose.max()) + 1
-    if observations.campaign.noise_position is not None or count < len(pose):
-        found.append(Form("poses", np.eye(count)[pose], units))
+    each = np.eye(int(pose.max()) + 1)[pose]
+    if observations.campaign.noise_position is not None or each.shape[1] < len(pose):
+        found.append(Form("poses", each, units))
+        found += _scattering(observations, each, measures)
+    if each.shape[1] < len(pose):
+        found += _scattering(observations, np.eye(len(pose)), measures)
     return tuple(found)
+
+
+def _scattering(observations: Observations, each: Array, measures: int) -> list[Form]:
+    """Return a form for each joint that errs anew in every pose or visit, (N, k) which of them a row is."""
+    moves = observations.joint_sensitivity[:, :measures]
+    seen = [j for j in range(moves.shape[2]) if np.ptp(observations.q[:, j]) > 0.0]
+    return [Form("poses", each, moves[:, :, [j]]) for j in seen]
 
 
 def _together(observations: Observations) -> list[Array]:

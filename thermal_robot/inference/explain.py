@@ -125,9 +125,11 @@ def explain(
     rivals = settings_of_one(families)
     whitening = first_whitening(linear, noise, use & ~aside)
     history: list[tuple[object, ...]] = []
+    # a smooth discrepancy would follow gross errors, and a noise that is far off: those are settled first
+    beside: Sequence[Form] = ()
     seeds = [tuple(start) for start in starts]
     while True:
-        ladder = Ladder(linear, whitening, forms, log_prior, rivals)
+        ladder = Ladder(linear, whitening, beside, log_prior, rivals)
         ladder.run(seeds)
         rung, best = ladder.consensus(families)
         white = ladder.whitened_at(rung)
@@ -137,7 +139,7 @@ def explain(
         remainder = remainder - linear.frames @ step
         smooth = discrepancy_mean(white, remainder)
         state = (best.blocks, rung, np.packbits(whitening.weights > 0).tobytes())
-        if state in history or len(history) >= settings.FIRST_ROUNDS:
+        if beside is forms and (state in history or len(history) >= settings.FIRST_ROUNDS):
             break
         history.append(state)
         # what a pose brings of its own hides no gross error
@@ -147,7 +149,7 @@ def explain(
         whitening, aside = reweigh(
             remainder - smooth if close else remainder, noise, use, min(leverage, settings.MOST_LEVERAGE), measures
         )
-        seeds = [best.blocks]
+        seeds, beside = [best.blocks], forms
     compared, probabilities = ladder.probabilities()
     return Explanation(
         linear,

@@ -50,14 +50,12 @@ def in_order(campaign: Campaign) -> Labels:
 
 
 def in_a_row(campaign: Campaign, aside: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(N,) those rows set aside whose neighbour in time is set aside, too: a change, and not gross errors."""
+    """(N,) those rows set aside that follow each other in time, three or more: a change, and not gross errors."""
     order = in_order(campaign)
     own = aside[order]
-    beside = np.zeros_like(own)
-    beside[1:] |= own[:-1]
-    beside[:-1] |= own[1:]
+    run = np.cumsum(np.diff(own, prepend=False))  # odd within runs
     result = np.zeros_like(own)
-    result[order] = own & beside
+    result[order] = own & (np.bincount(run, minlength=1)[run] >= settings.RUN)
     return result
 
 

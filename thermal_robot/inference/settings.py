@@ -22,7 +22,7 @@ SMOOTH_PRIOR = 0.5
 """That something smooth is at work that no effect and no law accounts for: as likely as not."""
 TAUS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
 """Rms of a discrepancy over the noise: below the first it is noise, above the last a mistake; factors of two."""
-LENGTHS = (0.7, 1.4)
+LENGTHS = (1.4, 2.8)
 """Length scales of the discrepancy at the tool, in standard deviations of the inputs times the root of their number."""
 LANDMARKS = 100
 """Rows that stand for all in a discrepancy of very many (Nyström): smooth functions need no more."""
@@ -89,6 +89,8 @@ FAR = 9.0
 """Mean squared distance, in squares of the noise, from which a row set aside weighs less in a comparison of laws."""
 STATED_REACH = 2.0
 """Times the stated noise: no larger noise is assumed when laws are compared, as it would hide what they explain."""
+RUN = 3
+"""Rows set aside one after another that are a change: of five gross errors in a hundred, three are so once in 170."""
 FEW_ASIDE = 0.05
 """Of all rows: fewer that follow each other may be one lapse of the instrument."""
 
