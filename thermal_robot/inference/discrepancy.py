@@ -36,7 +36,9 @@ class Form:
     Attributes
     ----------
     name
-        ``tool``, ``places``, ``poses``.
+        Which one, such as ``tool`` with its length scale, or ``poses`` with a joint.
+    anew
+        Whether each pose or visit brings its own, so that nothing is smooth.
     functions
         (N, k) smooth functions of what is commanded and recorded.
     moves
@@ -47,6 +49,7 @@ class Form:
     name: str
     functions: Array
     moves: Array
+    anew: bool = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -273,24 +276,26 @@ def forms(observations: Observations) -> tuple[Form, ...]:
     """Return the forms of the discrepancy that a campaign allows."""
     measures = 6 if observations.campaign.measures == "pose" else 3
     units = np.diag([settings.LEVER] * 3 + [1.0] * 3)[:measures, :measures]
-    found = [Form("tool", functions, units) for functions in _together(observations)]
+    lengths = zip(settings.LENGTHS, _together(observations), strict=True)
+    found = [Form(f"tool, {length:g}", functions, units) for length, functions in lengths]
     functions = [_spectral(values) for values in quantities(observations).values()]
     found.append(Form("places", np.concatenate(functions, axis=1), _moves(observations, measures)))
     pose = repeated_poses(observations.campaign)
     each = np.eye(int(pose.max()) + 1)[pose]
     if observations.campaign.noise_position is not None or each.shape[1] < len(pose):
-        found.append(Form("poses", each, units))
-        found += _scattering(observations, each, measures)
+        found.append(Form("poses", each, units, anew=True))
+        found += _scattering(observations, "poses", each, measures)
     if each.shape[1] < len(pose):
-        found += _scattering(observations, np.eye(len(pose)), measures)
+        found += _scattering(observations, "visits", np.eye(len(pose)), measures)
     return tuple(found)
 
 
-def _scattering(observations: Observations, each: Array, measures: int) -> list[Form]:
+def _scattering(observations: Observations, what: str, each: Array, measures: int) -> list[Form]:
     """Return a form for each joint that errs anew in every pose or visit, (N, k) which of them a row is."""
     moves = observations.joint_sensitivity[:, :measures]
     seen = [j for j in range(moves.shape[2]) if np.ptp(observations.q[:, j]) > 0.0]
-    return [Form("poses", each, moves[:, :, [j]]) for j in seen]
+    names = observations.robot.joint_names
+    return [Form(f"{what}, {names[j]}", each, moves[:, :, [j]], anew=True) for j in seen]
 
 
 def _together(observations: Observations) -> list[Array]:

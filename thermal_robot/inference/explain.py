@@ -138,18 +138,19 @@ def explain(
         step = frame_step(linear, white, remainder)
         remainder = remainder - linear.frames @ step
         smooth = discrepancy_mean(white, remainder)
-        state = (best.blocks, rung, np.packbits(whitening.weights > 0).tobytes())
-        if beside is forms and (state in history or len(history) >= settings.FIRST_ROUNDS):
+        form = ladder.forms[rung[0]] if rung[0] >= 0 else None
+        state = (best.blocks, form and form.name, rung[1], np.packbits(whitening.weights > 0).tobytes())
+        if history and (state in history or len(history) >= settings.FIRST_ROUNDS):
             break
         history.append(state)
         # what a pose brings of its own hides no gross error
-        close = white.smooth if rung[0] >= 0 and ladder.forms[rung[0]].name != "poses" else None
+        close = white.smooth if form and not form.anew else None
         followed = best.effective + linear.frames.shape[2] + (close.degrees if close else 0.0)
         leverage = followed / max(ladder.at(rung).gram.equations + linear.frames.shape[2], 1)
         whitening, aside = reweigh(
             remainder - smooth if close else remainder, noise, use, min(leverage, settings.MOST_LEVERAGE), measures
         )
-        seeds, beside = [best.blocks], forms
+        seeds, beside = [best.blocks], ladder.in_question(best) if len(history) > 1 else forms
     compared, probabilities = ladder.probabilities()
     return Explanation(
         linear,
@@ -162,8 +163,8 @@ def explain(
         remainder,
         smooth,
         aside,
-        Discrepancy(ladder.forms[rung[0]] if rung[0] >= 0 else None, rung[1], ladder.discrepancy()),
-        forms,
+        Discrepancy(form, rung[1], ladder.discrepancy()),
+        ladder.forms,
     )
 
 

@@ -135,6 +135,15 @@ class Ladder:
         along = [own[:, picked] for own in self._along[rung[0]]]
         return self._spectra[rung[0]].products(rung[1], along, self._products[np.ix_(picked, picked)])
 
+    def in_question(self, best: Combination) -> tuple[Form, ...]:
+        """Return the forms beside which the best combination is not out of the question."""
+        near = {r[0] for (r, blocks), log in self._quick.items() if blocks == best.blocks and self._close(log, best)}
+        return tuple(form for k, form in enumerate(self.forms) if k in near)
+
+    @staticmethod
+    def _close(log_evidence: float, best: Combination) -> bool:
+        return log_evidence > best.log_evidence - settings.FORM_REACH
+
     def _beside_others(self, best: Combination) -> tuple[Rung, Combination] | None:
         """Weigh the neighbours beside all discrepancies that count; return what is better than the best, if any is."""
         near = [r for (r, blocks), log in self._quick.items() if blocks == best.blocks and self._counts(log, best)]

@@ -36,6 +36,8 @@ LEVER = 0.3
 """m: a discrepancy of the tool turns it by what moves it over this length."""
 STARTS = 3
 """Combinations, the best of those that a search starts from, beside which each form of a discrepancy is tried."""
+FORM_REACH = 20.0
+"""Log evidence below the best at which a form of the discrepancy is given up while a fit settles."""
 RUNG_REACH = 4.0
 """Log evidence below the best at which a discrepancy still counts: 1 in 50."""
 

@@ -97,6 +97,7 @@ def settle(
     noise = Noise(campaign.noise_position, campaign.noise_orientation)
     held: list[tuple[Effect, Array]] = []
     outliers = None
+    alive: set[str] = set()
     if known is not None:
         held, outliers = list(known.held), known.explanation.outliers
         variants.update({effect.name: (effect,) for effect, _ in held})
@@ -112,8 +113,9 @@ def settle(
         linear = Linear(
             observations.gap + sum(moved_by, np.zeros_like(observations.gap)), frame_columns(observations)[0], blocks
         )
+        beside = [form for form in forms(observations) if not alive or form.name in alive]
         explanation = explain(
-            linear, noise, families=families, starts=[tuple(start_at)], outliers=outliers, forms=forms(observations)
+            linear, noise, families=families, starts=[tuple(start_at)], outliers=outliers, forms=beside
         )
         factor = settings.REFINEMENT ** (1 / 2**revision)
         held = [(candidates[b], explanation.values[b][0]) for b in explanation.best.blocks]
@@ -124,7 +126,7 @@ def settle(
         observations, held = gauss_newton(campaign, observations.frames, explanation, held, least)
         if last:
             break
-        outliers = explanation.outliers
+        outliers, alive = explanation.outliers, {form.name for form in explanation.forms}
         for effect, _ in held:
             near = gate.nearby(effect, factor)
             variants[effect.name] = tuple(dict.fromkeys((*near, *_others(effect, start, whole[effect.name]))))
