@@ -118,6 +118,15 @@ def test_a_pedestal_rocks_away_from_where_the_arm_leans(setting, body):
     lean = setting.poses[:, :2, 3]
     top = body.base[:, :2, 2]  # where the pedestal's upright points
     assert ((lean * top).sum(axis=1) > 0).all()
+    # twice the load leans twice as far, so that the product of load and place is an answer
+    light, heavy = (setting.world.sound(setting.samples) for _ in range(2))
+    one = np.tile([1.0, 0.0], setting.samples)[: setting.samples]
+    UNLISTED["soft_pedestal"].act(light, replace(setting, payload=one), np.array([[1e-4, 1.0]]))
+    UNLISTED["soft_pedestal"].act(heavy, replace(setting, payload=1.0 - one), np.array([[1e-4, 1.0]]))
+    ratio = np.linalg.norm(light.base[:, :2, 2], axis=1) / np.linalg.norm(heavy.base[:, :2, 2], axis=1)
+    np.testing.assert_allclose(ratio, np.where(one, 2.0, 0.5), rtol=1e-6)
+    told = UNLISTED["soft_pedestal"].quantities(setting, [("base", "base")])
+    assert {"payload * reach.x", "reach.y * payload"} <= set(told)
 
 
 def test_a_bolt_tilts_a_link_across_its_axis_once(setting, body):

@@ -19,6 +19,8 @@ GRAVITY = ("gravity.x", "gravity.y", "gravity.z")
 """Gravity's direction in the tool frame: a quantity that nobody records and anybody can compute."""
 REACH = ("reach.x", "reach.y")
 """Where the tool is, from which the moment on a pedestal follows."""
+MOMENT = tuple(f"{a} * {b}" for place in REACH for a, b in (("payload", place), (place, "payload")))
+"""That moment: the load times where it is, in either order."""
 
 
 def _slip(body: Body, setting: Setting, values: Array) -> None:
@@ -157,7 +159,7 @@ UNLISTED: dict[str, Fault] = {
             lambda s, rng: np.array([[1e-4, rng.uniform(0.2, 0.6)]]),
             _pedestal,
             _base,
-            quantities=lambda s, places: [*s.world.names[:3], "payload", *REACH],
+            quantities=lambda s, places: [*s.world.names[:3], "payload", *REACH, *MOMENT],
             fixed=((1, (0.4,)),),
         ),
         Fault(
