@@ -148,9 +148,8 @@ def test_it_is_described_by_place_quantity_and_shape(shape):
             "an error at the tool that follows time times payload (in proportion)",
         ),
         (
-            replace(STEP, quantity="since_turn.joint_3", shape="reversal", marks=(0.05,), unit="rad"),
-            "an error at joint_3 that follows how far it has gone since it last turned round "
-            "(it turns over within 0.05 rad)",
+            replace(STEP, quantity="since_turn.joint_3", shape="hysteresis", marks=(0.25,), unit="rad"),
+            "an error at joint_3 that follows how far it has gone since it last turned round (springs that slip)",
         ),
     ],
 )
@@ -209,7 +208,7 @@ RICHER = {
         kind="tool", place="tool", quantity="payload", shape="ramp", span=2.0, by="time", by_origin=50.0, by_span=800.0
     ),
     "their product": Discovered(place="joint_2", quantity="payload", shape="product", by="joint_1", span=3.0),
-    "memory": Discovered(place="joint_3", quantity="since_turn.joint_3", shape="reversal", marks=(0.3,), span=2.0),
+    "memory": Discovered(place="joint_3", quantity="since_turn.joint_3", shape="hysteresis", marks=(0.25, 1.0)),
     "a wave": Discovered(place="joint_3", quantity="joint_3", shape="harmonic", marks=(37.62,)),
 }
 
@@ -268,11 +267,14 @@ def test_memory_follows_the_distance_since_the_turn_and_needs_an_order(rich, rv_
     np.testing.assert_array_equal(law.values(rich), since)
     assert law.reads(rich) == ("time",)
     assert law.missing(observe(commanded(rv_m2))) == ("since_turn.joint_3",)
-    loop = law.at_rows(rich)[0][:, 1]
-    # far from the turn it is on one side or the other, as lost motion is
-    far = np.abs(since) >= 0.3
-    np.testing.assert_array_equal(loop[far], np.sign(since[far]))
-    assert (np.abs(loop) <= 1.0).all()
+    functions, labels = law.at_rows(rich)
+    assert labels == ("constant", "at 0.25", "at 1")
+    np.testing.assert_array_equal(functions[:, 0], 1.0)
+    for slip, strain in zip(law.marks, functions[:, 1:].T, strict=True):
+        # twice its slip from the turn an element slips, whatever it was strained by before, as lost motion does
+        far = np.abs(since) >= 2.0 * slip
+        np.testing.assert_allclose(strain[far], np.sign(since[far]), atol=1e-12)
+        assert (np.abs(strain) <= 1.0).all()
     assert checked(law, rich)[0].unit == "rad"
 
 
@@ -303,9 +305,3 @@ def test_a_richer_law_is_kept_whole_by_a_model_and_by_a_file(rich, rv_m2, tmp_pa
     own, other = (displacement(rich, [(e, values)])[0] for e in (law, named["SlippingBelt"]()))
     np.testing.assert_array_equal(own.joint, other.joint)
     np.testing.assert_array_equal(own.tool, other.tool)
-
-
-def test_a_distance_stays_above_nothing():
-    law = RICHER["memory"]
-    assert all(near.marks[0] > 0.0 for near in replace(law, marks=(1e-4,)).nearby(1.6))
-    assert law.shifted(0.1).marks == (0.4,)

@@ -13,20 +13,23 @@ MARKS = {
     "hinge": (0.7, 1.0),
     "bump": (0.7, 0.3),
     "harmonic": (2.0,),
-    "reversal": (0.7,),
+    "hysteresis": (0.7, 3.0),
     "levels": (-2.0, 0.0, 1.0, 4.0),
     "smooth": (-1.5, 0.0, 0.4, 2.0, 3.5),
 }
 
 
 def values(name, x=X, marks=None, origin=-2.0, span=6.0):
-    return SHAPES[name].functions(x, MARKS.get(name, ()) if marks is None else marks, origin, span)
+    marks = MARKS.get(name, ()) if marks is None else marks
+    if SHAPES[name].of == "strains":  # of elements that have slipped at −2 and are pulled
+        x = np.column_stack([np.minimum((x + 2.0) / slip - 1.0, 1.0) for slip in marks])
+    return SHAPES[name].functions(x, marks, origin, span)
 
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_a_shape_has_a_label_for_each_function_and_contains_a_constant(name):
     found = values(name)
-    labels = SHAPES[name].labels or MARKS[name]
+    labels = (*SHAPES[name].labels, *(MARKS[name] if SHAPES[name].each else ()))
     assert found.shape == (len(X), len(labels))
     assert np.isfinite(found).all()
     # whatever the law, an offset of the place is part of it

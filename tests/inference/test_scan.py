@@ -10,6 +10,7 @@ from conftest import load_arm
 from helpers import NOISE, with_law
 from simulate import simulate
 
+from thermal_robot.campaign.turning import SLIPS
 from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.effect import in_words
 from thermal_robot.effects.law import Discovered
@@ -19,6 +20,7 @@ from thermal_robot.inference.frames import register
 from thermal_robot.inference.laws import shapes
 from thermal_robot.inference.scan import scan, shaped
 from thermal_robot.inference.target import Target
+from thermal_robot.kinematics import Displacement
 from thermal_robot.observations import Frames, observe
 
 TWIST = [3e-4, 0.0, 0.0, 0.0, 4e-4, 0.0]  # m, rad
@@ -192,8 +194,8 @@ def grammar(robot, name, rng):
             [*np.zeros(6), *rng.normal(size=6)],
         ),
         "memory": (
-            replace(plain, quantity=f"since_turn.{joint}", shape="reversal", marks=(float(rng.uniform(0.05, 0.8)),)),
-            [0.0, 1.0],
+            replace(plain, quantity=f"since_turn.{joint}", shape="hysteresis", marks=SLIPS[13:29:5]),
+            [0.0, *rng.uniform(0.3, 1.0, 4)],
         ),
         "jump": (
             replace(plain, quantity="time", shape="step", marks=(float(rng.uniform(1800.0, 5400.0)),)),
@@ -236,6 +238,43 @@ def test_each_kind_of_law_comes_first_where_it_is_at_work(arm, seeds, name):
         assert best.worth > 50.0
         if name == "jump":
             assert best.law.describe().startswith(f"the zero of {in_words('joint', law.place)} jumped at time")
+
+
+def wound(path, slips):
+    """How far elements hold a joint that passes positions (N,) in this order, each from −1 to 1, summed."""
+    held = np.zeros((len(path), len(slips)))
+    for row in range(1, len(path)):
+        held[row] = np.maximum(-1.0, np.minimum(1.0, held[row - 1] + (path[row] - path[row - 1]) / slips))
+    return held.sum(axis=1)
+
+
+@on_arms
+@pytest.mark.parametrize("ratio", [3.0, 12.0, 24.0])
+def test_friction_on_springs_comes_first_and_leaves_the_noise(arm, seeds, ratio):
+    """Four elements that slip anywhere between a twentieth and 0.6 of the joint's range (Jenkin)."""
+    for seed in seeds:
+        rng = np.random.default_rng([seed, 11])
+        data = replace(simulate(arm, samples=120, seed=seed, noise=NOISE)[0], priors={})
+        j = int(rng.integers(1, arm.n - 1))
+        shift = np.zeros_like(data.q)
+        shift[:, j] = wound(data.q[:, j], rng.uniform(0.05, 0.6, 4) * np.ptp(data.q[:, j]))
+        frames = Frames.declared(data)
+        small = observe(data, frames, displacement=Displacement(joint=1e-5 * shift))
+        moved = (small.predicted_position - observe(data, frames).predicted_position).ravel()
+        fitted = frame_columns(small)[0].reshape(len(moved), -1)
+        left = moved - fitted @ np.linalg.lstsq(fitted, moved, rcond=1e-10)[0]
+        shift *= 1e-5 * ratio * NOISE / np.sqrt((left**2).mean())
+        real = observe(data, frames, displacement=Displacement(joint=shift))
+        noise = NOISE * np.random.default_rng([seed, 7]).normal(size=data.position.shape)
+        here, target = seen(replace(data, position=real.predicted_position + noise))
+        first = scan(here, [target])[0][0][0].law
+        assert (first.place, first.quantity) == (arm.joint_names[j], f"since_turn.{arm.joint_names[j]}")
+        best = shaped(here, target, first).law
+        assert best.shape == "hysteresis"
+        columns = np.concatenate([frame_columns(here)[0], block(here, best).columns], axis=2)
+        columns = columns.reshape(here.gap.size, -1)
+        left = here.gap.ravel() - columns @ np.linalg.lstsq(columns, here.gap.ravel(), rcond=1e-10)[0]
+        assert np.sqrt((left**2).sum() / (left.size - columns.shape[1])) < 1.3 * NOISE
 
 
 @on_arms

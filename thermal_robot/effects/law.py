@@ -25,7 +25,7 @@ from thermal_robot.effects.effect import (
     at_tool,
     in_words,
 )
-from thermal_robot.effects.quantities import CLOCK, TURN, driving, quantity, unit
+from thermal_robot.effects.quantities import CLOCK, TURN, driving, quantity, strains, unit
 from thermal_robot.effects.shapes import SHAPES
 
 if TYPE_CHECKING:
@@ -145,21 +145,23 @@ class Discovered(Effect):
         return quantity(observations, self.quantity)
 
     def functions(self, values: Array) -> tuple[Array, tuple[str, ...]]:
-        """Return (N, K) the functions φ at values of the quantity, and a name for each."""
+        """Return (N, K) the functions φ at values of what the shape is of, and a name for each."""
         shape = SHAPES[self.shape]
-        if shape.labels:
-            labels = shape.labels
-        elif self.labels:
-            labels = tuple(f"at {self.labels[int(mark)]}" for mark in self.marks)
-        else:
+        labels = shape.labels
+        if shape.each and self.labels:
+            labels += tuple(f"at {self.labels[int(mark)]}" for mark in self.marks)
+        elif shape.each:
             # as many digits as tell the marks apart
             digits = next(d for d in range(3, 18) if len({f"{m:.{d}g}" for m in self.marks}) == len(set(self.marks)))
-            labels = tuple(f"at {self._marked(mark, digits)}" for mark in self.marks)
+            labels += tuple(f"at {self._marked(mark, digits)}" for mark in self.marks)
         return shape.functions(values, self.marks, self.origin, self.span), labels
 
     def at_rows(self, observations: Observations) -> tuple[Array, tuple[str, ...]] | None:
         """Return the (N, K) functions at the rows, and a name for each; ``None`` where the campaign cannot tell."""
-        values = self.values(observations)
+        if SHAPES[self.shape].of == "strains":
+            values = strains(observations, self.quantity.removeprefix(TURN), self.marks)
+        else:
+            values = self.values(observations)
         if values is None:
             return None
         functions, labels = self.functions(values)
@@ -208,9 +210,8 @@ class Discovered(Effect):
         return tuple(moved)
 
     def shifted(self, by: float) -> Discovered:
-        """Return the same law with its mark moved; a distance stays above 0."""
-        mark = self.marks[0] + by
-        return replace(self, marks=(abs(mark) if SHAPES[self.shape].distance else mark, *self.marks[1:]))
+        """Return the same law with its mark moved."""
+        return replace(self, marks=(self.marks[0] + by, *self.marks[1:]))
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
         """Return the quantity that it follows."""

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from thermal_robot.campaign.turning import strained
 from thermal_robot.campaign.units import SI, unit_of
 from thermal_robot.effects.effect import Array, Driver
 
@@ -62,6 +64,17 @@ def quantity(observations: Observations, name: str) -> Array | None:
     if labels is None or len(set(labels.tolist())) < 2:
         return None
     return np.unique(labels, return_inverse=True)[1].astype(float)
+
+
+def strains(observations: Observations, joint: str, slips: Sequence[float]) -> Array | None:
+    """Return (N, K) strains of a joint's elements as shares of what makes them slip, −1 to 1; ``None`` without order.
+
+    See :func:`thermal_robot.campaign.turning.since_turns`.
+    """
+    past = observations.campaign.since_turn
+    if joint not in past:
+        return None
+    return np.column_stack([past[strained(joint, slip)] / slip for slip in slips])
 
 
 def driving(observations: Observations, name: str) -> Driver | None:

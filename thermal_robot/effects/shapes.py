@@ -1,27 +1,26 @@
 """The shapes of laws that nobody wrote down, one entry each: functions of a quantity, their names, their words.
 
-========= ======================================================= ==========================
-shape     φ_k(x), with u = (x − origin) / span                    marks
-========= ======================================================= ==========================
-constant  1
-ramp      1, u
-quadratic 1, u, u²
-step      x ≤ m, x > m                                            where it steps
-slide     ½ (1 ∓ tanh((x − m) / w))                               middle, width
-hinge     1, max(x − m, 0) / span, or on the other side           where it bends, side ±1
-bump      1, exp(−½ ((x − m) / w)²)                               middle, width
-drag      1, x / span, sign(x)                                    of a quantity with a sign
-harmonic  1, sin(k x), cos(k x)                                   order k
-product   1, x / span                                             x the product of two quantities
-reversal  1, sign(x) (2 min(|x| / w, 1) − 1)                      distance w over which it turns over
-levels    x = m_k                                                 the levels
-smooth    natural cubic splines that are 1 at one knot, 0 at all  the knots
-          others
-========= ======================================================= ==========================
+========== ======================================================= ==========================
+shape      φ_k(x), with u = (x − origin) / span                    marks
+========== ======================================================= ==========================
+constant   1
+ramp       1, u
+quadratic  1, u, u²
+step       x ≤ m, x > m                                            where it steps
+slide      ½ (1 ∓ tanh((x − m) / w))                               middle, width
+hinge      1, max(x − m, 0) / span, or on the other side           where it bends, side ±1
+bump       1, exp(−½ ((x − m) / w)²)                               middle, width
+drag       1, x / span, sign(x)                                    of a quantity with a sign
+harmonic   1, sin(k x), cos(k x)                                   order k
+product    1, x / span                                             x the product of two quantities
+hysteresis 1, x_k: how far elements are strained, −1 to 1          how far each goes till it slips
+levels     x = m_k                                                 the levels
+smooth     natural cubic splines that are 1 at one knot, 0 at all  the knots
+           others
+========== ======================================================= ==========================
 
 Splines: Hastie, Tibshirani and Friedman, *The Elements of Statistical Learning*, 2009, 5.2.1; beyond the outer knots
-they run straight. Reversal: a play operator of Prandtl and Ishlinskii, x the distance since the joint last turned round
-(Kuhnen, *Modeling, identification and compensation of complex hysteretic nonlinearities*, 2003).
+they run straight. Hysteresis: stop operators of Prandtl and Ishlinskii (:mod:`thermal_robot.campaign.turning`).
 """
 
 from __future__ import annotations
@@ -34,10 +33,8 @@ import numpy as np
 
 from thermal_robot.effects.effect import Array
 
-_NARROWEST = 1e-6  # of the range: a joint that turns over within less does so at once
-
 Functions = Callable[[Array, tuple[float, ...], float, float], Array]
-"""(N, K) of the (N,) quantity, the marks, origin and span."""
+"""(N, K) of what the shape is of, (N,) or (N, K), the marks, origin and span."""
 
 
 @dataclass(frozen=True)
@@ -49,7 +46,7 @@ class Shape:
     functions
         The φ of the table above.
     labels
-        A name for each; empty where each is a value at one of the marks.
+        A name for each, but for those that belong to one of the marks each.
     words
         The shape in a sentence; ``{mark}`` stands for its first mark with the quantity's unit, ``{order}`` without.
     mark
@@ -57,8 +54,10 @@ class Shape:
         passes a row, ``gradual`` where they change smoothly; empty where it is not to be moved.
     width
         Whether the second mark is a width, to be refined, too.
-    distance
-        Whether the first mark is a distance, which is above 0.
+    each
+        Whether there is a function for each mark, after those that ``labels`` names.
+    of
+        What the functions are of: the (N,) ``quantity``, or the (N, K) ``strains`` of elements of slips as marked.
     """
 
     functions: Functions
@@ -66,7 +65,8 @@ class Shape:
     words: str
     mark: Literal["", "sudden", "gradual"] = ""
     width: bool = False
-    distance: bool = False
+    each: bool = False
+    of: Literal["quantity", "strains"] = "quantity"
 
 
 def _constant(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
@@ -111,10 +111,8 @@ def _harmonic(x: Array, marks: tuple[float, ...], origin: float, span: float) ->
     return np.column_stack([np.ones_like(x), np.sin(marks[0] * x), np.cos(marks[0] * x)])
 
 
-def _reversal(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
-    within = max(marks[0], _NARROWEST * span)
-    over = 2.0 * np.minimum(np.abs(x) / within, 1.0) - 1.0
-    return np.column_stack([np.ones_like(x), np.sign(x) * over])
+def _hysteresis(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
+    return np.column_stack([np.ones(len(x)), x])
 
 
 def _product(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
@@ -148,10 +146,8 @@ SHAPES: dict[str, Shape] = {
     "drag": Shape(_drag, ("constant", "slope over the range", "of its sign"), "its slope and its sign"),
     "harmonic": Shape(_harmonic, ("constant", "sine", "cosine"), "harmonic of order {order:g}"),
     "product": Shape(_product, ("constant", "at the largest product"), "in proportion to the product"),
-    "reversal": Shape(
-        _reversal, ("constant", "half the loop"), "it turns over within {mark}", "gradual", distance=True
-    ),
-    "levels": Shape(_levels, (), "a value at each of its levels"),
-    "smooth": Shape(_smooth, (), "smooth"),
+    "hysteresis": Shape(_hysteresis, ("constant",), "springs that slip", each=True, of="strains"),
+    "levels": Shape(_levels, (), "a value at each of its levels", each=True),
+    "smooth": Shape(_smooth, (), "smooth", each=True),
 }
 """Every shape by its name."""

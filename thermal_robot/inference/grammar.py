@@ -11,7 +11,7 @@ import numpy as np
 from thermal_robot.effects import Effect, Parameter, Response, gate, library
 from thermal_robot.effects.law import Discovered
 from thermal_robot.effects.quantities import GRAVITY, REACH, TURN, quantities, unit
-from thermal_robot.inference.laws import law_of, reversals, straight
+from thermal_robot.inference.laws import hystereses, law_of, straight
 from thermal_robot.observations import Observations
 
 
@@ -96,11 +96,10 @@ def products(observations: Observations, kinds: Sequence[str]) -> list[Discovere
 
 
 def memory(observations: Observations) -> list[Discovered]:
-    """Return laws of what each joint remembers: the distance from its last turning point, smooth or turning over."""
-    found = []
-    for joint, values in observations.campaign.since_turn.items():
-        if not np.ptp(values) > 0.0:
-            continue
-        smooth = law_of(observations, Discovered(place=joint), TURN + joint, values)
-        found += [smooth, *reversals(smooth)]
+    """Return laws of what each joint remembers: of the distance from its last turning point, smooth or of elements."""
+    found, past = [], observations.campaign.since_turn
+    for joint in observations.robot.joint_names:
+        if joint in past and np.ptp(past[joint]) > 0.0:
+            smooth = law_of(observations, Discovered(place=joint), TURN + joint, past[joint])
+            found += [smooth, *hystereses(smooth, past[joint])[:2]]
     return found

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.campaign.turning import SLIPS
 from thermal_robot.effects.law import Discovered
 from thermal_robot.effects.quantities import CLOCK, TURN, quantities, unit
 from thermal_robot.inference import settings
@@ -15,7 +16,7 @@ from thermal_robot.observations import Observations
 
 Array = NDArray[np.float64]
 
-__all__ = ["CLOCK", "harmonics", "law_of", "laws", "of_quantity", "reversals", "shapes", "smooth_columns", "straight"]
+__all__ = ["CLOCK", "harmonics", "hystereses", "law_of", "laws", "of_quantity", "shapes", "smooth_columns", "straight"]
 
 
 def laws(observations: Observations, kinds: Sequence[str], names: Iterable[str] | None = None) -> list[Discovered]:
@@ -98,8 +99,8 @@ def shapes(
 
     Always: straight, quadratic, and hinges at quantiles of the quantity. With ``jumps`` also steps and bumps: of
     positions, gravity and the clock, as nothing jumps at a temperature. Of a velocity also its sign. Of a joint's own
-    position also harmonics of the given orders. Of two quantities their product alone. Of what a joint remembers, all
-    ways to turn over.
+    position also harmonics of the given orders. Of two quantities their product alone. Of what a joint remembers
+    elements that slip.
     """
     if law.shape == "constant":
         return [law]
@@ -112,7 +113,7 @@ def shapes(
     found.append(replace(law, shape="quadratic", marks=()))
     middle = np.quantile(values, np.linspace(settings.INNER_MARKS, 1.0 - settings.INNER_MARKS, settings.MARKS))
     if law.quantity.startswith(TURN):
-        return list(dict.fromkeys([*found, *reversals(law)]))
+        return list(dict.fromkeys([*found, *hystereses(law, values)]))
     if jumps:
         found += _jumps(law, middle)
     found += [replace(law, shape="hinge", marks=(float(m), side)) for m in middle[2:-2:2] for side in (1.0, -1.0)]
@@ -136,10 +137,23 @@ def _of_two(law: Discovered, values: Array) -> list[Discovered]:
     return [replace(law, shape="product", span=largest)] if largest > 0.0 else []
 
 
-def reversals(law: Discovered) -> list[Discovered]:
-    """Return a law of a joint's memory as one whose error turns over within a distance, and one of slope and sign."""
-    over = [replace(law, shape="reversal", marks=(share * law.span,)) for share in settings.REVERSALS]
-    return [*over, replace(law, shape="drag", marks=())]
+def hystereses(law: Discovered, values: Array) -> list[Discovered]:
+    """Return a law of a joint's memory as elements that slip: over the whole range, coarsely first, or a few side by side.
+
+    One that slips between two of the grid is nearly a sum of these two.
+
+    Parameters
+    ----------
+    law
+        Of the distance (N,) from the joint's last turning point.
+    values
+        That distance, rad or m: which slips show, it tells.
+    """
+    least, most = (share * float(np.abs(values).max()) for share in settings.SLIP_SHARES)
+    slips = tuple(r for r in SLIPS if least <= r <= most)
+    whole = [slips[::step] for step in settings.SLIP_STEPS]
+    few = [slips[k : k + n] for n in settings.SLIPS_TOGETHER for k in range(len(slips) - n + 1)]
+    return [replace(law, shape="hysteresis", marks=marks) for marks in dict.fromkeys([*whole, *few]) if marks]
 
 
 def smooth_columns(values: Array) -> Array:

@@ -207,8 +207,12 @@ ORDER_STEP, ORDER_CHUNK, ORDER_ZOOMS = 0.125, 256, 4
 at a time; and rounds in which the best one is refined, each eight times finer."""
 LATTICE = 1e-3
 """Of their spacing: positions that lie on a lattice to within this cannot tell an order from its alias."""
-REVERSALS = (0.03, 0.1, 0.3)
-"""Of a joint's range: distances within which its error may turn over; each 3 times the one before."""
+SLIP_SHARES = (0.03, 1.0)
+"""Of the longest way between two turns: how far the first and the last element goes before it slips; one below is lost
+motion, one above a spring that never slips."""
+SLIP_STEPS, SLIPS_TOGETHER = (4, 2, 1), (1, 2, 4)
+"""Of the grid of slips, four a factor of two: every which ones are tried over the whole range, and how many that stand
+side by side: one element, one between two, several alike."""
 SPLINE_FLOOR = 1e-8
 """Of the largest singular value: functions of a quantity below it are no functions of their own."""
 NAMED = 5
