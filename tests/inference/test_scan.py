@@ -166,6 +166,7 @@ def grammar(robot, name, rng):
     """A law of a kind at random in a robot, and its values."""
     joint = robot.joint_names[int(rng.integers(1, robot.n - 1))]
     other = robot.joint_names[0]
+    k = int(rng.integers(14, 26))
     plain = Discovered(place=joint)
     law, values = {
         "lost motion x payload": (
@@ -194,8 +195,8 @@ def grammar(robot, name, rng):
             [*np.zeros(6), *rng.normal(size=6)],
         ),
         "memory": (
-            replace(plain, quantity=f"since_turn.{joint}", shape="hysteresis", marks=SLIPS[13:29:5]),
-            [0.0, *rng.uniform(0.3, 1.0, 4)],
+            replace(plain, quantity=f"since_turn.{joint}", shape="hysteresis", marks=SLIPS[k : k + 2]),
+            [0.0, 1.0, 1.0],
         ),
         "jump": (
             replace(plain, quantity="time", shape="step", marks=(float(rng.uniform(1800.0, 5400.0)),)),
@@ -325,6 +326,53 @@ def test_a_scan_of_a_hundred_rows_is_quick():
         scan(here, [target, target])
         took.append(process_time() - start)
     assert min(took) < 0.7
+
+
+def in_sessions(robot, joint, zeros, seed=3):
+    """A joint whose zero is another in each of three sessions, an hour between each and the next."""
+    plain = replace(simulate(robot, samples=120, seed=seed, noise=NOISE)[0], priors={})
+    part = np.digitize(plain.covariates["time"], [2400.0, 4800.0])
+    covariates = {**plain.covariates, "time": plain.covariates["time"] + 3600.0 * part}
+    data = replace(plain, covariates=covariates, labels={"session": np.array(["am", "noon", "pm"])[part]})
+    shift = np.zeros_like(data.q)
+    shift[:, robot.joint_names.index(joint)] = np.array(zeros)[part]
+    real = observe(data, Frames.declared(data), displacement=Displacement(joint=shift))
+    noise = NOISE * np.random.default_rng([seed, 7]).normal(size=data.position.shape)
+    return replace(data, position=real.predicted_position + noise)
+
+
+@pytest.mark.parametrize("zeros", [(0.0, 0.0, 4e-4), (0.0, -4e-4, -4e-4)])
+def test_one_jump_between_sessions_is_a_jump_in_time(rv_m2, zeros):
+    here, target = seen(in_sessions(rv_m2, "joint_3", zeros))
+    found = scan(here, [target])[0][0]
+    assert "session" not in {i.law.quantity for i in found if i.law.place == "joint_3" and not i.law.of}
+    assert (found[0].law.place, found[0].law.quantity) == ("joint_3", "time")
+    best = shaped(here, target, found[0].law)
+    sessions = ("noon", "pm") if zeros[1] == 0.0 else ("am", "noon")
+    assert (best.law.shape, best.law.runs) == ("step", sessions)
+    assert best.law.describe().endswith(f", between session {sessions[0]} and {sessions[1]}")
+    # an hour is a quarter of the time: of all steps it has nearly that share
+    time = here.covariates["time"]
+    late = time > best.law.marks[0]
+    gap = time[late].min() - time[~late].max()
+    assert gap > 3500.0
+    # a step elsewhere has a smaller one, by the time between its rows
+    inner = shaped(*seen(with_law(rv_m2, *PUT_IN["step"], seed=3)[0]), PUT_IN["step"][0])
+    assert inner.law.shape == "step"
+    assert inner.law.runs == ()
+    assert inner.tried > 5.0 * best.tried
+    assert best.law.shifted(1.0).runs == ()
+
+
+def test_zeros_that_are_found_anew_in_each_session_follow_the_session(rv_m2):
+    here, target = seen(in_sessions(rv_m2, "joint_3", (0.0, 6e-4, -4e-4)))
+    found = scan(here, [target])[0][0]
+    assert (found[0].law.place, found[0].law.quantity) == ("joint_3", "session")
+    # where nobody says when, the session is all that there is
+    two = in_sessions(rv_m2, "joint_3", (0.0, 0.0, 4e-4))
+    blind = replace(two, covariates={k: v for k, v in two.covariates.items() if k != "time"})
+    here, target = seen(blind)
+    assert scan(here, [target])[0][0][0].law.quantity in ("session", "order")
 
 
 def test_a_wave_of_a_screw_is_found_with_its_lead(awkward):

@@ -65,6 +65,8 @@ class Discovered(Effect):
         Whether orientation was measured: without it a turn of the tool shows nothing.
     labels
         Names of the levels, where the quantity is a label such as the session.
+    runs
+        Sessions between which it steps in time; empty where it does not.
     by, by_origin, by_span
         The second quantity, and what it is counted from and in; empty where there is none.
     of, of_arguments
@@ -85,6 +87,7 @@ class Discovered(Effect):
     unit: str = ""
     turns: bool = True
     labels: tuple[str, ...] = ()
+    runs: tuple[str, ...] = ()
     by: str = ""
     by_origin: float = 0.0
     by_span: float = 1.0
@@ -210,8 +213,8 @@ class Discovered(Effect):
         return tuple(moved)
 
     def shifted(self, by: float) -> Discovered:
-        """Return the same law with its mark moved."""
-        return replace(self, marks=(self.marks[0] + by, *self.marks[1:]))
+        """Return the same law with its mark moved; a step does not stay between sessions."""
+        return replace(self, marks=(self.marks[0] + by, *self.marks[1:]), runs=())
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
         """Return the quantity that it follows."""
@@ -250,7 +253,8 @@ class Discovered(Effect):
         if self.by:
             return f"an error at {at} that follows {self.quantity} times {self.by} ({how})"
         if (self.kind, self.shape) == ("joint", "step") and self.quantity in CLOCK:
-            return f"the zero of {at} jumped at {self.quantity} {_whole(mark)} {self.unit}".rstrip()
+            between = f", between session {self.runs[0]} and {self.runs[1]}" if self.runs else ""
+            return f"the zero of {at} jumped at {self.quantity} {_whole(mark)} {self.unit}".rstrip() + between
         if self.quantity.startswith(TURN):
             return f"an error at {at} that follows how far it has gone since it last turned round ({how})"
         return f"an error at {at} that follows {self.quantity} ({how})"

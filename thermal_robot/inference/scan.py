@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.effects import Effect
 from thermal_robot.effects.law import Discovered
-from thermal_robot.effects.quantities import CLOCK, GRAVITY, unit
+from thermal_robot.effects.quantities import CLOCK, GRAVITY, quantities, unit
 from thermal_robot.effects.shapes import SHAPES
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block
@@ -40,7 +40,7 @@ class Scanned:
 
     law: Discovered
     gain: float
-    tried: int = 1
+    tried: float = 1.0
 
     @property
     def worth(self) -> float:
@@ -195,16 +195,34 @@ def _refined(best: Scanned, seats: Seats) -> Scanned:
 
 
 def _timed(best: Scanned, seats: Seats) -> Scanned:
-    """Move a sudden mark to the best of the gaps between values near it; it was picked among all gaps."""
+    """Move a sudden mark to the best of the gaps between values near it.
+
+    A mark may lie anywhere in the range, so that each gap has its share of the prior: a break between two sessions has
+    more than the seconds between two rows.
+    """
     law, followed = best.law, best.law.values(seats.observations)
     values = np.unique(followed if followed is not None else np.zeros(1))
-    gaps = 0.5 * (values[1:] + values[:-1])
+    gaps, widths = 0.5 * (values[1:] + values[:-1]), np.diff(values)
     beside = -(-len(gaps) // settings.MARKS)
     middle = int(np.searchsorted(gaps, law.marks[0]))
-    near = [law, *(replace(law, marks=(float(m),)) for m in gaps[max(middle - beside, 0) : middle + beside + 1])]
-    gains = seats.gains(near)[0]
-    chosen = int(gains.argmax())
-    return Scanned(near[chosen], float(gains[chosen]), max(best.tried * len(gaps) // settings.MARKS, best.tried))
+    near = range(max(middle - beside, 0), min(middle + beside + 1, len(gaps)))
+    moved = [_between_runs(replace(law, marks=(float(gaps[k]),)), seats.observations) for k in near]
+    shapes_tried = best.tried / settings.MARKS
+    tried = [shapes_tried * float(np.ptp(values) / widths[k]) for k in near]
+    found = [Scanned(*item) for item in zip(moved, map(float, seats.gains(moved)[0]), tried, strict=True)]
+    return max(found, key=lambda item: item.worth)
+
+
+def _between_runs(law: Discovered, observations: Observations) -> Discovered:
+    """Return a step in time with the sessions between which it lies, if all rows before it belong to others."""
+    clock, runs = law.values(observations), observations.campaign.labels.get("session")
+    if law.quantity not in CLOCK or clock is None or runs is None:
+        return law
+    late = clock > law.marks[0]
+    if not late.any() or late.all() or set(runs[late]) & set(runs[~late]):
+        return law
+    last, first = np.flatnonzero(~late)[clock[~late].argmax()], np.flatnonzero(late)[clock[late].argmin()]
+    return replace(law, runs=(str(runs[last]), str(runs[first])))
 
 
 def _steady(law: Discovered) -> Discovered:
@@ -251,6 +269,23 @@ def _free_waves(seats: Seats, t: int, grids: Mapping[str, Array], tried: int) ->
     return found
 
 
+def _break(seats: Seats, t: int, levels: Scanned) -> Scanned | None:
+    """Return the best step in time between two sessions that follow each other, at the place of a law of sessions."""
+    observations = seats.observations
+    known = quantities(observations)
+    clock = next((name for name in CLOCK if name in known), None)
+    if clock is None:
+        return None
+    law = replace(levels.law, quantity=clock, shape="step", labels=())
+    ends = [float(known[clock][observations.campaign.labels["session"] == run].max()) for run in levels.law.labels]
+    steps = [_between_runs(replace(law, marks=(end,)), observations) for end in sorted(ends)[:-1]]
+    steps = [step for step in steps if step.runs]
+    if not steps:
+        return None
+    gains = seats.seen_from(law)[t].gains([seats.functions(step) for step in steps])
+    return Scanned(steps[int(gains.argmax())], float(gains.max()))
+
+
 def _best(own: Mapping[str, list[Scanned]], seats: Seats, t: int) -> list[Scanned]:
     """Return all that is better than what it contains, sorted; of a smooth and a straight law the better one."""
     single: dict[tuple[str, str, str], Scanned] = {}
@@ -258,6 +293,11 @@ def _best(own: Mapping[str, list[Scanned]], seats: Seats, t: int) -> list[Scanne
         key = (item.law.kind, item.law.place, item.law.quantity)
         if key not in single or item.worth > single[key].worth:
             single[key] = item
+    for key in [key for key in single if key[2] == "session"]:
+        step = _break(seats, t, single[key])
+        if step is not None and step.gain > single[key].gain - settings.REFINED_GAIN:
+            # one step in time explains as much: nothing is known of the session beside when it was
+            del single[key]
     alone = {key: item.worth for key, item in single.items()}
     for key in sorted(alone, key=lambda key: -alone[key])[: settings.SHAPED]:
         # a step is no smooth law; a product of the clock with anything would stand in for it
