@@ -66,7 +66,9 @@ class Discovered(Effect):
     labels
         Names of the levels, where the quantity is a label such as the session.
     runs
-        Sessions between which it steps in time; empty where it does not.
+        Sessions between which it steps in time, or in each of which it relaxes anew; empty elsewhere.
+    starts
+        When those began in which it relaxes, s; one start where there are no sessions.
     by, by_origin, by_span
         The second quantity, and what it is counted from and in; empty where there is none.
     of, of_arguments
@@ -88,6 +90,7 @@ class Discovered(Effect):
     turns: bool = True
     labels: tuple[str, ...] = ()
     runs: tuple[str, ...] = ()
+    starts: tuple[float, ...] = ()
     by: str = ""
     by_origin: float = 0.0
     by_span: float = 1.0
@@ -134,6 +137,37 @@ class Discovered(Effect):
         second = quantity(observations, self.by)
         return None if second is None else first * second
 
+    def _followed(self, observations: Observations) -> Array | None:
+        """Return what the shape is of, at the rows; ``None`` where the campaign cannot tell."""
+        of, clock = SHAPES[self.shape].of, self.values(observations)
+        if of == "quantity" or clock is None:
+            return clock
+        if of == "strains":
+            return strains(observations, self.quantity.removeprefix(TURN), self.marks)
+        since, run = self._since_start(observations, clock)
+        return (
+            since[:, None]
+            if of == "run"
+            else np.where(run[:, None] == np.arange(len(self.runs)), since[:, None], np.inf)
+        )
+
+    def _since_start(self, observations: Observations, clock: Array) -> tuple[Array, Array]:
+        """(N,) time since the row's session began, and the number of that session.
+
+        A session that was not there began with the first of its rows, and is taken for the last; a row of none belongs
+        to the last that had begun.
+        """
+        starts, rows = np.array(self.starts), observations.campaign.labels.get("session")
+        run = np.clip(np.searchsorted(np.sort(starts), clock, side="right") - 1, 0, len(starts) - 1)
+        run = np.argsort(starts)[run]
+        began = starts[run]
+        for label in np.unique(rows) if rows is not None and self.runs else ():
+            own = rows == label
+            known = label in self.runs
+            run[own] = self.runs.index(label) if known else int(starts.argmax())
+            began[own] = starts[run[own]] if known else clock[own].min()
+        return np.maximum(clock - began, 0.0), run
+
     def _first(self, observations: Observations) -> Array | None:
         campaign = observations.campaign
         if self.shape == "constant":
@@ -157,14 +191,13 @@ class Discovered(Effect):
             # as many digits as tell the marks apart
             digits = next(d for d in range(3, 18) if len({f"{m:.{d}g}" for m in self.marks}) == len(set(self.marks)))
             labels += tuple(f"at {self._marked(mark, digits)}" for mark in self.marks)
+        if shape.of == "runs":
+            labels += tuple(f"at the start of {run}" for run in self.runs)
         return shape.functions(values, self.marks, self.origin, self.span), labels
 
     def at_rows(self, observations: Observations) -> tuple[Array, tuple[str, ...]] | None:
         """Return the (N, K) functions at the rows, and a name for each; ``None`` where the campaign cannot tell."""
-        if SHAPES[self.shape].of == "strains":
-            values = strains(observations, self.quantity.removeprefix(TURN), self.marks)
-        else:
-            values = self.values(observations)
+        values = self._followed(observations)
         if values is None:
             return None
         functions, labels = self.functions(values)
@@ -213,7 +246,9 @@ class Discovered(Effect):
         return tuple(moved)
 
     def shifted(self, by: float) -> Discovered:
-        """Return the same law with its mark moved; a step does not stay between sessions."""
+        """Return the same law with its mark moved; a step does not stay between sessions, a time stays above 0."""
+        if self.starts:
+            return replace(self, marks=(abs(self.marks[0] + by), *self.marks[1:]))
         return replace(self, marks=(self.marks[0] + by, *self.marks[1:]), runs=())
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:

@@ -15,6 +15,9 @@ harmonic   1, sin(k x), cos(k x)                                   order k
 product    1, x / span                                             x the product of two quantities
 hysteresis 1, x_k: how far elements are strained, −1 to 1          how far each goes till it slips
 levels     x = m_k                                                 the levels
+relaxing   1, exp(−x / τ), x the time since each session began    τ
+relaxing   1, the same for each session with a size of its own     τ
+each
 smooth     natural cubic splines that are 1 at one knot, 0 at all  the knots
            others
 ========== ======================================================= ==========================
@@ -32,6 +35,8 @@ from typing import Literal
 import numpy as np
 
 from thermal_robot.effects.effect import Array
+
+_SHORTEST = 1e-6  # of the range: what settles within less is settled at once
 
 Functions = Callable[[Array, tuple[float, ...], float, float], Array]
 """(N, K) of what the shape is of, (N,) or (N, K), the marks, origin and span."""
@@ -57,7 +62,8 @@ class Shape:
     each
         Whether there is a function for each mark, after those that ``labels`` names.
     of
-        What the functions are of: the (N,) ``quantity``, or the (N, K) ``strains`` of elements of slips as marked.
+        What the functions are of: the (N,) ``quantity``; the (N, K) ``strains`` of elements of slips as marked; the
+        (N, 1) time since the ``run`` began, or since each of the ``runs`` began, infinite in the others (N, R).
     """
 
     functions: Functions
@@ -66,7 +72,7 @@ class Shape:
     mark: Literal["", "sudden", "gradual"] = ""
     width: bool = False
     each: bool = False
-    of: Literal["quantity", "strains"] = "quantity"
+    of: Literal["quantity", "strains", "run", "runs"] = "quantity"
 
 
 def _constant(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
@@ -115,6 +121,10 @@ def _hysteresis(x: Array, marks: tuple[float, ...], origin: float, span: float) 
     return np.column_stack([np.ones(len(x)), x])
 
 
+def _relaxing(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
+    return np.column_stack([np.ones(len(x)), np.exp(-x / max(abs(marks[0]), _SHORTEST * span))])
+
+
 def _product(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
     return np.column_stack([np.ones_like(x), x / span])
 
@@ -147,6 +157,10 @@ SHAPES: dict[str, Shape] = {
     "harmonic": Shape(_harmonic, ("constant", "sine", "cosine"), "harmonic of order {order:g}"),
     "product": Shape(_product, ("constant", "at the largest product"), "in proportion to the product"),
     "hysteresis": Shape(_hysteresis, ("constant",), "springs that slip", each=True, of="strains"),
+    "relaxing": Shape(
+        _relaxing, ("constant", "at the start"), "it settles within {mark} of each start", "gradual", of="run"
+    ),
+    "relaxing each": Shape(_relaxing, ("constant",), "it settles within {mark} of each start", "gradual", of="runs"),
     "levels": Shape(_levels, (), "a value at each of its levels", each=True),
     "smooth": Shape(_smooth, (), "smooth", each=True),
 }

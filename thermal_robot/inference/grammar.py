@@ -10,8 +10,8 @@ import numpy as np
 
 from thermal_robot.effects import Effect, Parameter, Response, gate, library
 from thermal_robot.effects.law import Discovered
-from thermal_robot.effects.quantities import GRAVITY, REACH, TURN, quantities, unit
-from thermal_robot.inference.laws import hystereses, law_of, straight
+from thermal_robot.effects.quantities import CLOCK, GRAVITY, REACH, TURN, quantities, unit
+from thermal_robot.inference.laws import hystereses, law_of, relaxing, straight
 from thermal_robot.observations import Observations
 
 
@@ -96,10 +96,15 @@ def products(observations: Observations, kinds: Sequence[str]) -> list[Discovere
 
 
 def memory(observations: Observations) -> list[Discovered]:
-    """Return laws of what each joint remembers: of the distance from its last turning point, smooth or of elements."""
-    found, past = [], observations.campaign.since_turn
+    """Return laws of what each joint remembers: of the distance from its last turning point, smooth or of elements;
+    of its last start.
+    """
+    found, past, known = [], observations.campaign.since_turn, quantities(observations)
+    clock = next((name for name in CLOCK if name in observations.covariates and name in known), None)
     for joint in observations.robot.joint_names:
         if joint in past and np.ptp(past[joint]) > 0.0:
             smooth = law_of(observations, Discovered(place=joint), TURN + joint, past[joint])
             found += [smooth, *hystereses(smooth, past[joint])[:2]]
+        if clock:
+            found += relaxing(observations, law_of(observations, Discovered(place=joint), clock, known[clock]))
     return found

@@ -16,7 +16,18 @@ from thermal_robot.observations import Observations
 
 Array = NDArray[np.float64]
 
-__all__ = ["CLOCK", "harmonics", "hystereses", "law_of", "laws", "of_quantity", "shapes", "smooth_columns", "straight"]
+__all__ = [
+    "CLOCK",
+    "harmonics",
+    "hystereses",
+    "law_of",
+    "laws",
+    "of_quantity",
+    "relaxing",
+    "shapes",
+    "smooth_columns",
+    "straight",
+]
 
 
 def laws(observations: Observations, kinds: Sequence[str], names: Iterable[str] | None = None) -> list[Discovered]:
@@ -104,6 +115,7 @@ def shapes(
     """
     if law.shape == "constant":
         return [law]
+    law = replace(of_quantity(law, values), runs=(), starts=()) if law.starts else law
     if law.by:
         return list(dict.fromkeys([law, *_of_two(law, values)]))
     smooth = of_quantity(law, values)
@@ -154,6 +166,25 @@ def hystereses(law: Discovered, values: Array) -> list[Discovered]:
     whole = [slips[::step] for step in settings.SLIP_STEPS]
     few = [slips[k : k + n] for n in settings.SLIPS_TOGETHER for k in range(len(slips) - n + 1)]
     return [replace(law, shape="hysteresis", marks=marks) for marks in dict.fromkeys([*whole, *few]) if marks]
+
+
+def relaxing(observations: Observations, law: Discovered) -> list[Discovered]:
+    """Return a law of the clock as one that relaxes after each start: of one size, and of one each.
+
+    A session begins with its first row; where there are none, the campaign does.
+    """
+    clock, rows = law.values(observations), observations.campaign.labels.get("session")
+    if clock is None or not np.ptp(clock) > 0.0:
+        return []
+    span = float(np.ptp(clock))
+    law = replace(law, labels=(), runs=(), origin=float(clock.min()), span=span)
+    if rows is None or len(set(rows)) < 2:
+        found = [replace(law, shape="relaxing", starts=(law.origin,))]
+    else:
+        runs = tuple(np.unique(rows).tolist())
+        starts = tuple(float(clock[rows == run].min()) for run in runs)
+        found = [replace(law, shape=shape, runs=runs, starts=starts) for shape in ("relaxing", "relaxing each")]
+    return [replace(one, marks=(share * span,)) for one in found for share in settings.RELAXED_WITHIN]
 
 
 def smooth_columns(values: Array) -> Array:

@@ -15,7 +15,7 @@ from thermal_robot.effects.shapes import SHAPES
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.grammar import memory, modulated, products
-from thermal_robot.inference.laws import harmonics, laws, shapes, straight
+from thermal_robot.inference.laws import harmonics, laws, relaxing, shapes, straight
 from thermal_robot.inference.periodogram import independent, orders, peak
 from thermal_robot.inference.target import Seat, Target
 from thermal_robot.observations import Observations
@@ -54,7 +54,7 @@ class Seats:
     def __init__(self, observations: Observations, targets: Sequence[Target]) -> None:
         self.observations, self.targets = observations, targets
         self._seats: dict[Discovered, tuple[Seat, ...]] = {}
-        self._functions: dict[Discovered, Array] = {}
+        self._functions: dict[tuple[object, ...], Array] = {}
 
     def seen_from(self, law: Discovered) -> tuple[Seat, ...]:
         """Return the targets as they are seen from a law's place, or from the known effect in it."""
@@ -66,9 +66,13 @@ class Seats:
 
     def functions(self, law: Discovered) -> Array:
         """Return a law's (N, K) functions of what it follows, wherever it enters."""
-        followed = replace(law, kind="", place="", of="", of_arguments="")
+        # all that the functions hang on
+        followed = (
+            *(law.quantity, law.shape, law.marks, law.origin, law.span, law.labels, law.runs, law.starts),
+            *(law.by, law.by_origin, law.by_span),
+        )
         if followed not in self._functions:
-            rows = followed.at_rows(self.observations)
+            rows = law.at_rows(self.observations)
             self._functions[followed] = np.zeros((len(self.observations.q), 0)) if rows is None else rows[0]
         return self._functions[followed]
 
@@ -167,6 +171,8 @@ def _measured(seats: Seats, t: int, law: Discovered) -> list[Scanned]:
     jumps = law.quantity in (*CLOCK, *GRAVITY, *observations.robot.joint_names) and not law.of
     waves = harmonics(observations, law.place) if law.kind == "joint" else settings.HARMONICS
     candidates = [law] if values is None else shapes(law, values, jumps, waves)
+    if law.quantity in CLOCK and law.quantity in observations.covariates and not law.of and not law.by:
+        candidates += relaxing(observations, law)
     names = [candidate.shape for candidate in candidates]
     gains = seats.seen_from(law)[t].gains([seats.functions(candidate) for candidate in candidates])
     return [

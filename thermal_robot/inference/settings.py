@@ -213,6 +213,8 @@ motion, one above a spring that never slips."""
 SLIP_STEPS, SLIPS_TOGETHER = (4, 2, 1), (1, 2, 4)
 """Of the grid of slips, four a factor of two: every which ones are tried over the whole range, and how many that stand
 side by side: one element, one between two, several alike."""
+RELAXED_WITHIN = (0.02, 0.06, 0.2)
+"""Of the campaign's time: time constants from which a joint that relaxes after each start is refined; 3 times apart."""
 SPLINE_FLOOR = 1e-8
 """Of the largest singular value: functions of a quantity below it are no functions of their own."""
 NAMED = 5
