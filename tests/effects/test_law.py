@@ -209,6 +209,15 @@ RICHER = {
     ),
     "their product": Discovered(place="joint_2", quantity="payload", shape="product", by="joint_1", span=3.0),
     "memory": Discovered(place="joint_3", quantity="since_turn.joint_3", shape="hysteresis", marks=(0.25, 1.0)),
+    "a start": Discovered(
+        place="joint_3",
+        quantity="time",
+        shape="relaxing each",
+        marks=(90.0,),
+        span=800.0,
+        runs=("am", "pm"),
+        starts=(float(TIME[0]), float(TIME[5])),
+    ),
     "a wave": Discovered(place="joint_3", quantity="joint_3", shape="harmonic", marks=(37.62,)),
 }
 
@@ -305,3 +314,22 @@ def test_a_richer_law_is_kept_whole_by_a_model_and_by_a_file(rich, rv_m2, tmp_pa
     own, other = (displacement(rich, [(e, values)])[0] for e in (law, named["SlippingBelt"]()))
     np.testing.assert_array_equal(own.joint, other.joint)
     np.testing.assert_array_equal(own.tool, other.tool)
+
+
+def test_what_relaxes_knows_its_sessions_and_takes_a_new_one_for_the_last(rv_m2):
+    law = RICHER["a start"]
+    session = np.array(["pm"] * 3 + ["am"] * 3 + ["night"] * 4)  # rows may be told of any session, in any order
+    here = observe(commanded(rv_m2, COLUMNS, labels={"session": session}))
+    functions, labels = law.at_rows(here)
+    assert labels == ("constant", "at the start of am", "at the start of pm")
+    am, pm, new = session == "am", session == "pm", session == "night"
+    np.testing.assert_allclose(functions[am, 1], np.exp(-np.maximum(TIME[am] - TIME[0], 0.0) / 90.0))
+    np.testing.assert_allclose(functions[pm, 2], np.exp(-np.maximum(TIME[pm] - TIME[5], 0.0) / 90.0))
+    np.testing.assert_allclose(functions[new, 2], np.exp(-(TIME[new] - TIME[new].min()) / 90.0))
+    assert not functions[am, 2].any()
+    assert not functions[pm | new, 1].any()
+    assert law.shifted(-200.0).marks == (110.0,)
+    assert (law.follows, law.describe()) == (
+        "time",
+        "an error at joint_3 that follows time (it settles within 90 of each start)",
+    )

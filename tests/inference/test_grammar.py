@@ -96,8 +96,24 @@ def test_a_product_holds_a_condition_or_the_joints_own_position(here):
         assert functions.max() == pytest.approx(1.0)
 
 
+def test_a_joint_relaxes_after_each_start_by_as_much_or_by_its_own(rv_m2):
+    labels = {"session": np.repeat(["am", "pm"], 20)}
+    there = observed(rv_m2, labels=labels)
+    time = there.covariates["time"]
+    found = [law for law in memory(there) if law.quantity == "time" and law.place == "joint_2"]
+    assert {law.shape for law in found} == {"relaxing", "relaxing each"}
+    assert all((law.runs, law.starts) == (("am", "pm"), (time[:20].min(), time[20:].min())) for law in found)
+    for law in found:
+        functions, names = law.at_rows(there)
+        assert len(names) == functions.shape[1] == (2 if law.shape == "relaxing" else 3)
+        left = functions[:, 1:].sum(axis=1)
+        expected = np.exp(-(time - np.repeat([time[0], time[20]], 20)) / law.marks[0])
+        np.testing.assert_allclose(left, expected, rtol=1e-9)
+
+
 def test_each_joint_remembers_its_own_turns_if_rows_are_in_an_order(here):
-    found = memory(here)
+    every = memory(here)
+    found = [law for law in every if law.quantity != "time"]
     assert {law.quantity for law in found} == {f"since_turn.{joint}" for joint in here.robot.joint_names}
     assert all(law.quantity == f"since_turn.{law.place}" and law.unit == "rad" for law in found)
     assert {law.shape for law in found} == {"smooth", "hysteresis"}
@@ -105,6 +121,9 @@ def test_each_joint_remembers_its_own_turns_if_rows_are_in_an_order(here):
         # what shows between lost motion and a spring that never slips
         longest = np.abs(here.campaign.since_turn[law.place]).max()
         assert law.shape == "smooth" or (0.03 * longest <= min(law.marks) and max(law.marks) <= longest)
-    assert {len(law.marks) for law in found if law.shape == "hysteresis"} <= {5, 6, 10, 11}
+    # each joint its start, too: here that of the campaign
+    started = [law for law in every if law.quantity == "time"]
+    assert {law.place for law in started} == set(here.robot.joint_names)
+    assert {(law.shape, law.starts) for law in started} == {("relaxing", (here.covariates["time"].min(),))}
     assert memory(observed(here.robot, covariates={})) == []
     assert memory(observe(commanded(here.robot))) == []

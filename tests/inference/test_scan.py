@@ -63,8 +63,14 @@ def test_every_candidate_is_counted_and_segments_are_tried_with_what_speaks_else
     tried = scan(here, [target])[1]
     assert tried > len(found)
     # each kind of law has the same share of the prior, which its laws divide
-    by_kind = {item.tried for item in found}
-    assert sum(by_kind) == pytest.approx(6 * tried, rel=0.01)
+    by_kind: dict[str, float] = {}
+    for item in found:
+        memory = item.law.quantity.startswith("since_turn.") or item.law.shape.startswith("relaxing")
+        wave = "grid" if item.law.marks in ((1.0,), (2.0,), (3.0,)) else "free"
+        kind = (item.law.of and "modulated") or (item.law.by and "product") or (memory and "memory")
+        by_kind.setdefault(kind or (wave if item.law.shape == "harmonic" else "plain"), item.tried)
+    assert len(by_kind) == 6
+    assert sum(by_kind.values()) == pytest.approx(6 * tried, rel=0.01)
     assert all(item.worth == pytest.approx(item.gain - np.log(item.tried)) for item in found)
     links = {item.law.quantity for item in found if item.law.kind == "link"}
     assert "none" in links  # a constant of a segment: its geometry
@@ -373,6 +379,25 @@ def test_zeros_that_are_found_anew_in_each_session_follow_the_session(rv_m2):
     blind = replace(two, covariates={k: v for k, v in two.covariates.items() if k != "time"})
     here, target = seen(blind)
     assert scan(here, [target])[0][0][0].law.quantity in ("session", "order")
+
+
+@pytest.mark.parametrize("sizes", [(1.0, 1.0, 1.0), (1.0, -0.6, 0.4)])
+def test_a_joint_that_relaxes_after_each_start_comes_first(rv_m2, sizes):
+    data = in_sessions(rv_m2, "joint_3", (0.0, 0.0, 0.0))
+    time, session = data.covariates["time"], data.labels["session"]
+    runs, which = np.unique(session, return_inverse=True)
+    since = time - np.array([time[session == run].min() for run in runs])[which]
+    shift = np.zeros_like(data.q)
+    shift[:, 2] = 8e-4 * np.array(sizes)[which] * np.exp(-since / 500.0)
+    frames = Frames.declared(data)
+    real, sound = (observe(data, frames, displacement=Displacement(joint=s)) for s in (shift, 0.0 * shift))
+    here, target = seen(replace(data, position=data.position + real.predicted_position - sound.predicted_position))
+    first = scan(here, [target])[0][0][0].law
+    assert (first.place, first.quantity) == ("joint_3", "time")
+    best = shaped(here, target, first).law
+    assert best.shape == ("relaxing" if sizes[1] == 1.0 else "relaxing each")
+    assert best.marks[0] == pytest.approx(500.0, rel=0.25)
+    assert best.follows == "time"
 
 
 def test_a_wave_of_a_screw_is_found_with_its_lead(awkward):

@@ -96,9 +96,7 @@ def products(observations: Observations, kinds: Sequence[str]) -> list[Discovere
 
 
 def memory(observations: Observations) -> list[Discovered]:
-    """Return laws of what each joint remembers: of the distance from its last turning point, smooth or of elements;
-    of its last start.
-    """
+    """Return laws of what each joint remembers: its last turning point (smooth, or elements that slip), its start."""
     found, past, known = [], observations.campaign.since_turn, quantities(observations)
     clock = next((name for name in CLOCK if name in observations.covariates and name in known), None)
     for joint in observations.robot.joint_names:

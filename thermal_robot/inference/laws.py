@@ -150,7 +150,7 @@ def _of_two(law: Discovered, values: Array) -> list[Discovered]:
 
 
 def hystereses(law: Discovered, values: Array) -> list[Discovered]:
-    """Return a law of a joint's memory as elements that slip: over the whole range, coarsely first, or a few side by side.
+    """Return a law of a joint's memory as elements that slip: over the whole range, coarsely first, or some neighbours.
 
     One that slips between two of the grid is nearly a sum of these two.
 
