@@ -8,6 +8,7 @@ from textwrap import fill
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
 from thermal_robot.campaign.units import SI
 from thermal_robot.effects import gate
@@ -151,7 +152,7 @@ class Discovered(Effect):
             else np.where(run[:, None] == np.arange(len(self.runs)), since[:, None], np.inf)
         )
 
-    def _since_start(self, observations: Observations, clock: Array) -> tuple[Array, Array]:
+    def _since_start(self, observations: Observations, clock: Array) -> tuple[Array, NDArray[np.int64]]:
         """(N,) time since the row's session began, and the number of that session.
 
         A session that was not there began with the first of its rows, and is taken for the last; a row of none belongs

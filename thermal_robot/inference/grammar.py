@@ -42,6 +42,7 @@ def modulated(observations: Observations, effects: Iterable[Effect] | None = Non
     installed = library()
     offered = installed.values() if effects is None else effects
     known = quantities(observations)
+    follow = {name: straight(law_of(observations, Discovered(), name, values)) for name, values in known.items()}
     found = []
     for effect in offered:
         if type(installed.get(effect.name)) is not type(effect) or gate.missing(effect, observations):
@@ -49,10 +50,10 @@ def modulated(observations: Observations, effects: Iterable[Effect] | None = Non
         setting = gate.variants(effect, observations)[0] if effects is None else effect
         arguments = {k: v for k, v in gate.arguments(setting).items() if k != "joints"}
         for joint in _changing(setting, observations):
-            plain = Discovered(place=joint, of=effect.name, of_arguments=json.dumps(arguments))
-            for name in [*conditions(observations, joint), joint]:
-                if name in known:
-                    found.append(straight(law_of(observations, plain, name, known[name])))
+            names = [*conditions(observations, joint), joint]
+            plain = [follow[name] for name in names if name in known]
+            text = json.dumps(arguments)
+            found += [replace(law, place=joint, of=effect.name, of_arguments=text) for law in plain]
     return found
 
 
@@ -80,18 +81,26 @@ def products(observations: Observations, kinds: Sequence[str]) -> list[Discovere
     robot, known = observations.robot, quantities(observations)
     turns = observations.campaign.measures == "pose"
     further = [name for name in (*robot.joint_names, *GRAVITY, *REACH) if name in known]
+    follow = {
+        name: Discovered(
+            turns=turns,
+            quantity=name,
+            shape="ramp",
+            unit=unit(robot, name),
+            origin=float(values.min()),
+            span=float(np.ptp(values)),
+        )
+        for name, values in known.items()
+    }
     found = []
     for kind in kinds:
         for place in robot.joint_names if kind == "joint" else (kind,):
             own = [n for n in conditions(observations, place) if n not in observations.campaign.labels]
             first = [*own, place] if place in known else own
-            plain = Discovered(kind=kind, place=place, turns=turns, shape="ramp")
             for i, name in enumerate(first):
-                for second in [*first[i + 1 :], *(n for n in further if n not in first)]:
-                    x, y = known[name], known[second]
-                    law = replace(plain, quantity=name, unit=unit(robot, name), by=second)
-                    law = replace(law, origin=float(x.min()), span=float(np.ptp(x)))
-                    found.append(replace(law, by_origin=float(y.min()), by_span=float(np.ptp(y))))
+                law = replace(follow[name], kind=kind, place=place)
+                for by in [*first[i + 1 :], *(n for n in further if n not in first)]:
+                    found.append(replace(law, by=by, by_origin=follow[by].origin, by_span=follow[by].span))
     return found
 
 

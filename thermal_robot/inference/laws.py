@@ -52,14 +52,18 @@ def laws(observations: Observations, kinds: Sequence[str], names: Iterable[str] 
         "link": tuple(s.name for s in robot.segments[1:] if s.movable),
     }
     known = quantities(observations)
+    # knots and levels are the same wherever it enters
+    follow = {
+        n: law_of(observations, Discovered(turns=turns), n, known[n]) for n in (known if names is None else names)
+    }
     found = []
     for kind in kinds:
         for place in places[kind]:
             plain = Discovered(kind=kind, place=place, turns=turns)
             if kind == "link":
                 found.append(replace(plain, shape="constant", quantity="none"))
-            for name in known if names is None else names:
-                law = law_of(observations, plain, name, known[name])
+            for name, followed in follow.items():
+                law = replace(followed, kind=kind, place=place)
                 found.append(law)
                 if kind == "joint" and name == place and law.shape == "smooth":
                     # five knots do not follow a wheel that turns more than once

@@ -53,14 +53,14 @@ class Seats:
 
     def __init__(self, observations: Observations, targets: Sequence[Target]) -> None:
         self.observations, self.targets = observations, targets
-        self._seats: dict[Discovered, tuple[Seat, ...]] = {}
+        self._seats: dict[tuple[object, ...], tuple[Seat, ...]] = {}
         self._functions: dict[tuple[object, ...], Array] = {}
 
     def seen_from(self, law: Discovered) -> tuple[Seat, ...]:
         """Return the targets as they are seen from a law's place, or from the known effect in it."""
-        place = _steady(law)
+        place = (law.kind, law.place, law.turns, law.of, law.of_arguments)
         if place not in self._seats:
-            moves = block(self.observations, place).columns
+            moves = block(self.observations, _steady(law)).columns
             self._seats[place] = tuple(target.seat(moves) for target in self.targets)
         return self._seats[place]
 
