@@ -104,7 +104,9 @@ def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
     if chance.explains_size:
         return beside_scatter(fit, chance, refused, progress)
     left, laws = examine(fit, progress), discovered(fit)
-    return Conclusion(fit, laws, as_laws_say(left.unexplained, laws), left, chance, refused)
+    return Conclusion(
+        fit, laws, as_laws_say(left.unexplained, laws, fit.explanation.discrepancy), left, chance, refused
+    )
 
 
 def _check_priors(campaign: Campaign, known: set[str]) -> None:
