@@ -96,6 +96,8 @@ def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
         if wider is None:
             break
         stages.append(wider)
+        if len(wider.effects) == 1 and wider.explanation.discrepancy.probability < settings.SMOOTH_PRIOR:
+            break  # one law says it all, and its rivals were compared with it
     # the first of several laws may go astray between the places that were measured, and the others set it right
     while len(stages) > 1 and worse_elsewhere(known, stages[-1]):
         stages.pop()
