@@ -38,7 +38,7 @@ class Ladder:
 
     linear: Linear
     whitening: Whitening
-    forms: Sequence[Form]
+    forms: list[Form]
     log_prior: Sequence[float]
     exclusive: frozenset[frozenset[int]] = frozenset()
     searches: dict[Rung, Search] = field(default_factory=dict)
@@ -46,21 +46,32 @@ class Ladder:
     def __post_init__(self) -> None:
         """Decompose the forms once for all sizes."""
         w = self.whitening
-        stack = whitened(self.linear, w)
-        self._products, self._equations = stack.T @ stack, len(stack)
-        self._spectra = [Spectrum.of(form, w.weights, w.noise) for form in self.forms]
-        self._along = [spectrum.along(stack) for spectrum in self._spectra]
+        self._stack = whitened(self.linear, w)
+        self._products, self._equations = self._stack.T @ self._stack, len(self._stack)
         plain = normal_equations(self.linear, w, self._products, self._equations)
         self._pairs = contained(plain) | self.exclusive
         share = settings.SMOOTH_PRIOR if self.forms else 0.0
-        each = max(len(self.forms) * len(settings.TAUS), 1)
         ends = np.cumsum([self.linear.frames.shape[2], *(len(block.sizes) for block in self.linear.blocks)])
         self._spans = [np.arange(a, b) for a, b in pairwise(ends)]
         self._quick: dict[tuple[Rung, tuple[int, ...]], float] = {}
         self._priors = {PLAIN: float(np.log1p(-share))}
-        for k in range(len(self.forms)):
-            self._priors |= {(k, tau): float(np.log(share / each)) for tau in settings.TAUS}
+        self._joined = False
+        given, self.forms = self.forms, []
+        self._spectra: list[Spectrum] = []
+        self._along: list[list[Array]] = []
+        for form in given:
+            self._consider(form, float(np.log(share / len(given))))
         self.searches[PLAIN] = self._search(PLAIN, plain)
+
+    def _consider(self, form: Form, log_prior: float) -> int:
+        """Add a form, which shares its prior among all sizes; return its number."""
+        self.forms.append(form)
+        spectrum = Spectrum.of(form, self.whitening.weights, self.whitening.noise)
+        self._spectra.append(spectrum)
+        self._along.append(spectrum.along(self._stack))
+        number, each = len(self.forms) - 1, log_prior - float(np.log(settings.OCTAVES))
+        self._priors |= {(number, tau): each for tau in settings.TAUS}
+        return number
 
     def whitened_at(self, rung: Rung) -> Whitening:
         """Return the whitening with the discrepancy of a rung."""
@@ -96,22 +107,67 @@ class Ladder:
             if other[0] != rung and other[1] > best.log_evidence + settings.BETTER:
                 rung, best = other[0], self.at(other[0]).run(other[2])
                 continue
-            nearby = self._beside_others(best)
+            nearby = self._beside_others(best) or self._several_joints(rung, best)
             if nearby is None:
                 return rung, best
             rung, best = nearby
 
+    def _several_joints(self, rung: Rung, best: Combination) -> tuple[Rung, Combination] | None:
+        """Let several joints err in every pose or visit, one after another; return what is better, if any is.
+
+        Once beside the best combination and once beside none, so that neither has the sizes that suit the other.
+        """
+        if self._joined or rung[0] < 0 or not self.forms[rung[0]].anew:
+            return None
+        self._joined = True
+        single = [k for k, f in enumerate(self.forms) if f.anew and f.place[0] == "joint"]
+        if not single:
+            return None
+        tried = [(*self._joined_beside(blocks, single), blocks) for blocks in {best.blocks, ()}]
+        found = max(tried, key=lambda item: item[1])
+        if found[1] <= best.log_evidence + settings.BETTER:
+            return None
+        return found[0], self.at(found[0]).run(found[2])
+
+    def _joined_beside(self, blocks: tuple[int, ...], single: Sequence[int]) -> tuple[Rung, float]:
+        found = max((self._size(k, blocks) for k in single), key=lambda item: item[1])
+        for _ in range(settings.SCATTERING - 1):
+            further = self._one_more_joint(found[0], blocks, single)
+            if further is None or further[1] <= found[1]:
+                break
+            found = further
+        return found
+
+    def _one_more_joint(self, rung: Rung, blocks: tuple[int, ...], single: Sequence[int]) -> tuple[Rung, float] | None:
+        form = self.forms[rung[0]]
+        others = [self.forms[k] for k in single if self.forms[k].functions is form.functions]
+        others = [f for f in others if f.place[1] not in form.name.split(", ")]
+        if not others:
+            return None
+        prior = float(self._priors[rung] + np.log(settings.OCTAVES) - np.log(len(others) * len(settings.PARTS)))
+        tried = []
+        for further in (form.beside(other, part) for other in others for part in settings.PARTS):
+            tried.append((self._size(self._consider(further, prior), blocks)[1], further))
+            self._forget()
+        return self._size(self._consider(max(tried, key=lambda item: item[0])[1], prior), blocks)
+
+    def _forget(self) -> None:
+        """Take the last form out again."""
+        number = len(self.forms) - 1
+        del self.forms[number], self._spectra[number], self._along[number]
+        self._quick = {key: log for key, log in self._quick.items() if key[0][0] != number}
+
     def _size(self, form: int, blocks: tuple[int, ...]) -> tuple[Rung, float]:
         """Return the most probable size of a form beside one combination, with the log evidence; it has one peak."""
         k = settings.TAUS.index(1.0)
-        step, best = 1, self._beside((form, settings.TAUS[k]), blocks)
-        for _ in range(2):
-            while 0 <= k + step < len(settings.TAUS):
-                other = self._beside((form, settings.TAUS[k + step]), blocks)
-                if other < best:
-                    break
-                k, best = k + step, other
-            step = -step
+        best = self._beside((form, settings.TAUS[k]), blocks)
+        for step in settings.TAU_STEPS:
+            for sign in (step, -step):
+                while 0 <= k + sign < len(settings.TAUS):
+                    other = self._beside((form, settings.TAUS[k + sign]), blocks)
+                    if other <= best:
+                        break
+                    k, best = k + sign, other
         return (form, settings.TAUS[k]), best
 
     def _beside(self, rung: Rung, blocks: tuple[int, ...]) -> float:
@@ -138,7 +194,9 @@ class Ladder:
     def in_question(self, best: Combination) -> tuple[Form, ...]:
         """Return the forms beside which the best combination is not out of the question."""
         near = {r[0] for (r, blocks), log in self._quick.items() if blocks == best.blocks and self._close(log, best)}
-        return tuple(form for k, form in enumerate(self.forms) if k in near)
+        single = [form for form in self.forms if not form.several]
+        several = any(self.forms[k].several for k in near)
+        return tuple(f for k, f in enumerate(single) if k in near or (several and f.anew))
 
     @staticmethod
     def _close(log_evidence: float, best: Combination) -> bool:
@@ -183,9 +241,12 @@ class Ladder:
         weight = np.exp(log - log[0])
         return order, weight / weight.sum()
 
-    def discrepancy(self) -> float:
-        """Posterior probability that there is a discrepancy."""
+    def forms_in_question(self) -> dict[str, float]:
+        """Return the posterior probability of each form by its name, and by an empty name that of none."""
         log = {r: [c.log_evidence for c in s.seen.values()] for r, s in self.searches.items()}
         top = max(max(values) for values in log.values())
-        mass = {r: float(np.exp(np.array(values) - top).sum()) for r, values in log.items()}
-        return 1.0 - mass[PLAIN] / sum(mass.values())
+        mass: dict[str, float] = {}
+        for rung, values in log.items():
+            name = self.forms[rung[0]].name if rung[0] >= 0 else ""
+            mass[name] = mass.get(name, 0.0) + float(np.exp(np.array(values) - top).sum())
+        return {name: m / sum(mass.values()) for name, m in mass.items()}

@@ -20,8 +20,13 @@ MISTRUST = 5.0
 """Largest penalty, natural logarithm, for calling a stated noise wrong: e⁵, about 1 in 150."""
 SMOOTH_PRIOR = 0.5
 """That something smooth is at work that no effect and no law accounts for: as likely as not."""
-TAUS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
-"""Rms of a discrepancy over the noise: below the first it is noise, above the last a mistake; factors of two."""
+TAUS = tuple(2.0 ** (k / 4) for k in range(-4, 25))
+"""Rms of a discrepancy over the noise: below the first it is noise, above the last a mistake. In quarters of an octave:
+beside a hundred independent errors a size a factor of two off costs 20 nats."""
+TAU_STEPS = (4, 2, 1)
+"""Of that grid: steps in which the best size is looked for."""
+OCTAVES = 7
+"""Octaves of these sizes, which share the prior of a form; each stands for all sizes in it."""
 LENGTHS = (1.4, 2.8)
 """Length scales of the discrepancy at the tool, in standard deviations of the inputs times the root of their number."""
 LANDMARKS = 100
@@ -36,6 +41,10 @@ LEVER = 0.3
 """m: a discrepancy of the tool turns it by what moves it over this length."""
 STARTS = 3
 """Combinations, the best of those that a search starts from, beside which each form of a discrepancy is tried."""
+SCATTERING = 3
+"""Joints at most that err anew in every pose or visit beside each other."""
+PARTS = tuple(2.0 ** (k / 2) for k in range(-3, 4))
+"""Rms of a further joint over that of those before it, in halves of an octave."""
 FORM_REACH = 20.0
 """Log evidence below the best at which a form of the discrepancy is given up while a fit settles."""
 RUNG_REACH = 4.0
@@ -108,7 +117,7 @@ TARGET_STARTS = np.vstack([np.zeros(3), 0.2 * np.eye(3), -0.2 * np.eye(3)])
 """m: where the target may sit on the tool frame; from each the fit reaches 0.3 m."""
 SPARE_EQUATIONS = 6
 """Equations that must be left once the frames are fitted: as many as one pose has."""
-EVIDENCE_STEPS, EVIDENCE_SETTLED, LEAST_VARIANCE = 40, 1e-2, 1e-12
+EVIDENCE_STEPS, EVIDENCE_SETTLED, LEAST_VARIANCE = 40, 1e-3, 1e-12
 """Newton steps of scales and noise at most, the change of a logarithm at which they end, and the smallest variance, in
 squares of the noise: what fits better is rounding."""
 SCALE_GRID = tuple(np.linspace(-6.0, 6.0, 25))
