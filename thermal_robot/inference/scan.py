@@ -17,7 +17,7 @@ from thermal_robot.inference.columns import block
 from thermal_robot.inference.grammar import memory, modulated, products
 from thermal_robot.inference.laws import harmonics, laws, relaxing, shapes, straight
 from thermal_robot.inference.periodogram import independent, orders, peak
-from thermal_robot.inference.target import Seat, Target
+from thermal_robot.inference.target import Alike, Seat, Target
 from thermal_robot.observations import Observations
 
 Array = NDArray[np.float64]
@@ -83,7 +83,7 @@ class Seats:
         for i, law in enumerate(candidates):
             together.setdefault(self.seen_from(law), []).append(i)
         for seats, which in together.items():
-            functions = [self.functions(candidates[i]) for i in which]
+            functions = Alike.of([self.functions(candidates[i]) for i in which])
             for t, seat in enumerate(seats):
                 found[t, which] = seat.gains(functions)
         return found

@@ -120,6 +120,32 @@ class Target:
 
 
 @dataclass(frozen=True, eq=False)
+class Alike:
+    """Functions of laws, those of as many functions together: what all targets ask of them is computed once.
+
+    Attributes
+    ----------
+    laws
+        How many there are.
+    stacks
+        Which C laws have K functions each, these (C, N, K), and their products (C, N, K, K).
+    """
+
+    laws: int
+    stacks: tuple[tuple[list[int], Array, Array], ...]
+
+    @classmethod
+    def of(cls, laws: Sequence[Array]) -> Alike:
+        """Put together laws, each with its (N, K) functions."""
+        stacks = []
+        for width in {law.shape[1] for law in laws}:
+            which = [i for i, law in enumerate(laws) if law.shape[1] == width]
+            functions = np.stack([laws[i] for i in which])
+            stacks.append((which, functions, functions[:, :, :, None] * functions[:, :, None, :]))
+        return cls(len(laws), tuple(stacks))
+
+
+@dataclass(frozen=True, eq=False)
 class Seat:
     """A target seen from one place: what many laws there need, summed over the components of a row once.
 
@@ -144,19 +170,18 @@ class Seat:
     total: float
     freedom: int
 
-    def gains(self, laws: Sequence[Array]) -> Array:
+    def gains(self, laws: Sequence[Array] | Alike) -> Array:
         """Return the log evidence that laws gain (:attr:`Worth.gain`), each with its (N, K) functions."""
-        found = np.full(len(laws), -np.inf)
-        for width in {law.shape[1] for law in laws}:
-            which = [i for i, law in enumerate(laws) if law.shape[1] == width]
-            found[which] = self._alike(np.stack([laws[i] for i in which]))
+        alike = laws if isinstance(laws, Alike) else Alike.of(laws)
+        found = np.full(alike.laws, -np.inf)
+        for which, functions, products in alike.stacks:
+            found[which] = self._alike(functions, products)
         return found
 
-    def _alike(self, functions: Array) -> Array:
-        """(C,) the same of C laws of K functions each, (C, N, K)."""
+    def _alike(self, functions: Array, products: Array) -> Array:
+        """(C,) the same of C laws of K functions each, (C, N, K), and these functions' products (C, N, K, K)."""
         laws, rows, k = functions.shape
         r, d, _ = self.design.shape
-        products = functions[:, :, :, None] * functions[:, :, None, :]
         summed = products.reshape(laws, rows, k * k).transpose(0, 2, 1) @ self.weight.reshape(rows, d * d)
         whole = summed.reshape(laws, k, k, d, d).transpose(0, 1, 3, 2, 4).reshape(laws, k * d, k * d)
         seen = (self.design.reshape(r * d, rows) @ functions).reshape(laws, r, d, k)
