@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import load_arm
+from inference.densities import dense
 from scipy.linalg import sqrtm
 from simulate import simulate
 
@@ -37,15 +38,6 @@ CASES = {
     "by row, wide": lambda rng: by_row(rng, 9, 30),
     "by row, poses": lambda rng: by_row(rng, 10, 4, measures=6, components=3),
 }
-
-
-def dense(form, noise):
-    """(N m, N m) covariance of what the form moves, in units of the noise, with a mean of one on its diagonal."""
-    count = len(form.functions)
-    moves = np.broadcast_to(form.moves, (count, *form.moves.shape[-2:])) / noise[:, None]
-    columns = (form.functions[:, None, :, None] * moves[:, :, None, :]).reshape(count * len(noise), -1)
-    whole = columns @ columns.T
-    return whole / np.diag(whole).mean()
 
 
 @pytest.fixture(params=list(CASES))
