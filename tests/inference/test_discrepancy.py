@@ -136,7 +136,10 @@ def seen(campaign):
 @pytest.mark.parametrize("turning", [None, 3e-5], ids=["positions", "poses"])
 @pytest.mark.parametrize(("repeats", "stated"), [(1, True), (1, False), (3, True), (3, False)])
 def test_a_campaign_allows_what_it_can_tell(repeats, stated, turning):
-    """What a pose brings is told from noise by a stated noise or by repeats; what a visit brings, by repeats."""
+    """What a pose brings is told from noise by a stated noise or by repeats; what a visit brings, by repeats.
+
+    To the target, in one joint, or at the base.
+    """
     campaign = campaign_of("ur10", repeats, turning=turning)
     if not stated:
         campaign = replace(campaign, noise_position=None)
@@ -147,9 +150,14 @@ def test_a_campaign_allows_what_it_can_tell(repeats, stated, turning):
     smooth = [form for form in found if not form.anew]
     assert [form.name.split(",")[0] for form in smooth] == ["tool", "tool", "places"]
     anew = {form.name for form in found if form.anew}
-    poses = {"poses", *(f"poses, {joint}" for joint in joints)} if stated or repeats > 1 else set()
-    visits = {f"visits, {joint}" for joint in joints} if repeats > 1 else set()
+    poses = {"poses", *(f"poses, {place}" for place in (*joints, "base"))} if stated or repeats > 1 else set()
+    visits = {f"visits, {place}" for place in (*joints, "base")} if repeats > 1 else set()
     assert anew == poses | visits
+    for form in found:
+        if "," in form.name and form.anew:
+            assert form.place == (("base" if form.name.endswith("base") else "joint"), form.name.split(", ")[1])
+        else:
+            assert form.place == ("", "")
     measures = 3 if turning is None else 6
     for form in found:
         assert len(form.functions) == campaign.samples
@@ -164,6 +172,17 @@ def test_a_joint_that_never_moves_does_not_scatter(rv_m2):
     names = {form.name for form in forms(observe(replace(campaign, q=q), Frames.declared(campaign)))}
     assert "poses, joint_2" in names
     assert "poses, joint_3" not in names
+
+
+@pytest.mark.parametrize("part", [0.5, 2.0])
+def test_a_second_joint_errs_beside_the_first_and_independently_of_it(part):
+    """Their covariances add up; the second's root mean square at the target is so many times the first's."""
+    campaign, noise = campaign_of("ur10"), np.full(3, NOISE)
+    one, other = (f for f in forms(seen(campaign)) if f.name in ("poses, elbow_joint", "poses, wrist_1_joint"))
+    both = one.beside(other, part)
+    assert (both.name, both.several, both.anew) == ("poses, elbow_joint, wrist_1_joint", True, True)
+    expected = (dense(one, noise) + part**2 * dense(other, noise)) / (1.0 + part**2)
+    np.testing.assert_allclose(dense(both, noise), expected, rtol=0, atol=1e-10)
 
 
 def test_visits_of_a_pose_share_what_the_pose_brings_and_not_what_a_visit_brings():
