@@ -55,6 +55,7 @@ class Ladder:
         self._spans = [np.arange(a, b) for a, b in pairwise(ends)]
         self._quick: dict[tuple[Rung, tuple[int, ...]], float] = {}
         self._priors = {PLAIN: float(np.log1p(-share))}
+        self._joined = False
         given, self.forms = self.forms, []
         self._spectra: list[Spectrum] = []
         self._along: list[list[Array]] = []
@@ -113,8 +114,9 @@ class Ladder:
 
     def _several_joints(self, rung: Rung, best: Combination) -> tuple[Rung, Combination] | None:
         """Let several joints err in every pose or visit, one after another; return what is better, if any is."""
-        if rung[0] < 0 or not self.forms[rung[0]].anew or self.forms[rung[0]].several:
+        if self._joined or rung[0] < 0 or not self.forms[rung[0]].anew:
             return None
+        self._joined = True
         single = [k for k, f in enumerate(self.forms) if f.anew and f.place[0] == "joint" and not f.several]
         found = max((self._size(k, best.blocks) for k in single), key=lambda item: item[1], default=(rung, -np.inf))
         for _ in range(settings.SCATTERING - 1):
@@ -130,13 +132,20 @@ class Ladder:
         form = self.forms[rung[0]]
         others = [self.forms[k] for k in single if self.forms[k].functions is form.functions]
         others = [f for f in others if f.place[1] not in form.name.split(", ")]
-        prior = self._priors[rung] + np.log(len(settings.TAUS)) - np.log(max(len(others) * len(settings.PARTS), 1))
-        tried = [
-            self._size(self._consider(form.beside(other, part), float(prior)), best.blocks)
-            for other in others
-            for part in settings.PARTS
-        ]
-        return max(tried, key=lambda item: item[1], default=None)
+        if not others:
+            return None
+        prior = float(self._priors[rung] + np.log(len(settings.TAUS)) - np.log(len(others) * len(settings.PARTS)))
+        tried = []
+        for further in (form.beside(other, part) for other in others for part in settings.PARTS):
+            tried.append((self._size(self._consider(further, prior), best.blocks)[1], further))
+            self._forget()
+        return self._size(self._consider(max(tried, key=lambda item: item[0])[1], prior), best.blocks)
+
+    def _forget(self) -> None:
+        """Take the last form out again."""
+        number = len(self.forms) - 1
+        del self.forms[number], self._spectra[number], self._along[number]
+        self._quick = {key: log for key, log in self._quick.items() if key[0][0] != number}
 
     def _size(self, form: int, blocks: tuple[int, ...]) -> tuple[Rung, float]:
         """Return the most probable size of a form beside one combination, with the log evidence; it has one peak."""
