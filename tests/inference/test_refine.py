@@ -21,7 +21,7 @@ def explained(data, names):
     variants = [effect.variants(seen) for effect in choose(names, (), ())]
     settings = [own[-1] for own in variants]
     linear = Linear(seen.gap, frame_columns(seen)[0], tuple(block(seen, s) for s in settings))
-    return seen, explain(linear, Noise(data.noise_position), start=range(len(settings)))
+    return seen, explain(linear, Noise(data.noise_position), starts=[tuple(range(len(settings)))])
 
 
 def evidence(explanation, seen, effect):

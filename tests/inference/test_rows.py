@@ -118,18 +118,18 @@ def test_rows_follow_each_other_by_the_clock_and_without_one_as_in_the_file(rv_m
     np.testing.assert_array_equal(in_order(both), np.arange(12))
 
 
-def test_of_rows_set_aside_those_with_a_neighbour_in_time_stand_in_a_row(rv_m2):
+def test_of_rows_set_aside_those_that_follow_each_other_thrice_stand_in_a_row(rv_m2):
     time = np.array([0, 6, 1, 7, 2, 8, 3, 9, 4, 10, 5, 11])
-    aside = np.isin(np.arange(12), [0, 1, 2, 9, 10])
-    # measured one after the other: rows 0, 2 at 0 and 1; rows 10, 1 at 5 and 6; row 9, at 10, is alone
+    aside = np.isin(np.arange(12), [0, 1, 2, 4, 9, 10, 11])
+    # by the clock: rows 0, 2, 4 at 0, 1, 2; rows 10, 1 at 5 and 6; rows 9, 11 at 10 and 11
     own = in_a_row(clocked(rv_m2, time=time), aside)
-    np.testing.assert_array_equal(np.flatnonzero(own), [0, 1, 2, 10])
-    # as they stand in the file: 0, 1, 2 and 9, 10
-    np.testing.assert_array_equal(in_a_row(clocked(rv_m2), aside), aside)
-    for few in ([], [3], [3, 5, 7]):
+    np.testing.assert_array_equal(np.flatnonzero(own), [0, 2, 4])
+    # as they stand in the file: 0, 1, 2; then 4 alone; 9, 10, 11
+    np.testing.assert_array_equal(np.flatnonzero(in_a_row(clocked(rv_m2), aside)), [0, 1, 2, 9, 10, 11])
+    for few in ([], [3], [3, 4], [3, 5, 7], [0, 1, 3, 4]):
         assert not in_a_row(clocked(rv_m2), np.isin(np.arange(12), few)).any()
-    # the first row does not follow the last
-    assert not in_a_row(clocked(rv_m2), np.isin(np.arange(12), [0, 11])).any()
+    # the first rows do not follow the last
+    assert not in_a_row(clocked(rv_m2), np.isin(np.arange(12), [0, 1, 11])).any()
 
 
 @on_arms

@@ -65,7 +65,7 @@ def test_weights_that_nobody_wrote_down_are_free(name, tmp_path):
     found = diagnose(replace(campaign, robot=bare))
     assert found.verdict == ("joint_compliance",)
     effect = found.model.effects[0][0]
-    assert effect.joints
+    assert effect.shape_joints
     fresh = replace(fresh, robot=bare)
     predicted = found.model.predict(fresh)[0]
     assert np.sqrt(((predicted - place) ** 2).mean()) < 1.0 * NOISE

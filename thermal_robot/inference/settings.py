@@ -80,8 +80,6 @@ ROWS_A_GROUP = 5
 """Rows that one spell of time or neighbourhood of poses holds in a campaign of few rows."""
 MOST_GROUPS = 60
 """Such groups at most: a design effect is then known to a fifth."""
-DESIGN_SIGMAS = 4.0
-"""Standard deviations of chance by which residuals of a group must be correlated before rows count for less."""
 GROSS_LEVEL = 0.01
 """Chance that noise alone sets any row of a campaign aside."""
 GROSS_FACTOR = 1.5
@@ -96,10 +94,6 @@ NO_DISTANCE = 1e-12
 """m: added to that scale, for rows that fit exactly."""
 CAUCHY_ROUNDS = 4
 """Rounds of weights and noise in a scan: they settle to a per cent."""
-FAR = 9.0
-"""Mean squared distance, in squares of the noise, from which a row set aside weighs less in a comparison of laws."""
-STATED_REACH = 2.0
-"""Times the stated noise: no larger noise is assumed when laws are compared, as it would hide what they explain."""
 RUN = 3
 """Rows set aside one after another that are a change: of five gross errors in a hundred, three are so once in 170."""
 FEW_ASIDE = 0.05
@@ -175,8 +169,8 @@ CONTAINED, CONTAINED_LEFT = 1e-3, 0.5
 
 # --- laws that nobody wrote down ---
 
-KNOTS, FINER_KNOTS = 5, 9
-"""Of a smooth law (Harrell 2001: five suffice for most), and of one for which they did not."""
+KNOTS = 5
+"""Of a smooth law: five suffice for most (Harrell 2001)."""
 FEW_LEVELS = 6
 """A quantity with no more values than this is one of levels."""
 OUTER_KNOTS = 0.02
@@ -346,16 +340,12 @@ FRAME_PRIOR = 1e-12
 """Of a frame's own information, added to it, so that what nothing determines stays where it is."""
 PRIOR_FACTOR, COMPARED = 3.0, 8
 """Factor of all prior sizes, down and up, under which the verdict is weighed again, and among how many explanations."""
-DOUBTFUL = 0.5
-"""Belief below which an effect is said to stand in for something else."""
 CANCELLING = 5.0
 """Times the sum of an effect's parts: single ones that are larger cancel each other."""
 CONTRADICTED = 0.01
 """rad or m: no servo that has settled is as far from its command."""
 STATED_TOO_LARGE = 0.5
 """Of the stated noise: less that remains says that it is stated too large."""
-MOST_BELIEF = 50.0
-"""Log odds, natural logarithm: beyond, a probability is 0 or 1 in double precision."""
 MATERIAL_PLACE, MOST_PLACES = 0.03, 8
 """Of an effect's work: a place with less is not drawn; and how many are."""
 LINE_POINTS, ROUGH, DENSE_POINTS, ROWS_A_POINT = 25, 0.01, 400, 10
