@@ -57,4 +57,5 @@ def beside_scatter(
     if left.flagged:
         left = examine(fit, progress).unexplained
     laws = discovered(fit)
-    return Conclusion(fit, laws, as_laws_say(left, laws), Examined(left, floor, "scatter"), chance, refused)
+    unexplained = as_laws_say(left, laws, fit.explanation.discrepancy)
+    return Conclusion(fit, laws, unexplained, Examined(left, floor, "scatter"), chance, refused)

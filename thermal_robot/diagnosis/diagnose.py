@@ -96,6 +96,8 @@ def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
         if wider is None:
             break
         stages.append(wider)
+        if len(wider.effects) == 1 and wider.explanation.discrepancy.probability < settings.SMOOTH_PRIOR:
+            break  # one law says it all, and its rivals were compared with it
     # the first of several laws may go astray between the places that were measured, and the others set it right
     while len(stages) > 1 and worse_elsewhere(known, stages[-1]):
         stages.pop()
@@ -104,7 +106,9 @@ def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
     if chance.explains_size:
         return beside_scatter(fit, chance, refused, progress)
     left, laws = examine(fit, progress), discovered(fit)
-    return Conclusion(fit, laws, as_laws_say(left.unexplained, laws), left, chance, refused)
+    return Conclusion(
+        fit, laws, as_laws_say(left.unexplained, laws, fit.explanation.discrepancy), left, chance, refused
+    )
 
 
 def _check_priors(campaign: Campaign, known: set[str]) -> None:

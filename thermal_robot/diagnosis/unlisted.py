@@ -9,6 +9,7 @@ from thermal_robot.diagnosis.parts import Dependence, Location, Unexplained
 from thermal_robot.effects.law import PREFIX
 from thermal_robot.inference import settings
 from thermal_robot.inference.discover import Discovery, candidates, worthwhile
+from thermal_robot.inference.explain import Discrepancy
 from thermal_robot.inference.fit import Fit, refit
 
 
@@ -27,8 +28,15 @@ def one_more_law(fit: Fit, number: int, progress: Callable[[str], None]) -> Fit 
     return wider if any(effect.name == name for effect, _ in wider.effects) else None
 
 
-def as_laws_say(left: Unexplained, found: Sequence[Discovery]) -> Unexplained:
-    """Return the residual of the known effects with the places and quantities of the laws that explain it."""
+def as_laws_say(left: Unexplained, found: Sequence[Discovery], discrepancy: Discrepancy) -> Unexplained:
+    """Return the residual of the known effects with the places and quantities of the laws that explain it.
+
+    Where no law does, and the discrepancy errs anew at one place in every pose or visit, that is the place, and nothing
+    that was recorded is followed.
+    """
+    form = discrepancy.form
+    if not found and left.flagged and form is not None and form.anew and form.place[0]:
+        return replace(left, locations=(Location(*form.place, discrepancy.forms[form.name]),), depends_on=())
     if not found:
         return left
     places: dict[tuple[str, str], float] = {}

@@ -8,6 +8,7 @@ import numpy as np
 from scipy.special import expit
 
 from thermal_robot.diagnosis.earned import Earned, earned
+from thermal_robot.diagnosis.held_out import held_out
 from thermal_robot.effects.law import PREFIX
 from thermal_robot.inference.explain import log_odds
 from thermal_robot.inference.fit import Fit, refit
@@ -16,8 +17,8 @@ from thermal_robot.inference.fit import Fit, refit
 def worth_their_word(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, float]]:
     """Take effects and laws out of a fit one after another, the worst first, until all that stay earn their word.
 
-    A law stays if it predicts rows held out better, a known effect unless it predicts them worse; see
-    :func:`~thermal_robot.diagnosis.earned.earned`.
+    A law stays if it predicts rows held out better (:func:`~thermal_robot.diagnosis.earned.earned`) and the interval of
+    its share is above zero, a known effect unless it predicts them worse.
 
     Returns
     -------
@@ -29,6 +30,11 @@ def worth_their_word(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, di
     refused: dict[str, float] = {}
     while True:
         judged = {name: e for name, e in earned(fit).items() if e.harms or (name.startswith(PREFIX) and not e.helps)}
+        if not judged and any(effect.name.startswith(PREFIX) for effect, _ in fit.effects):
+            shares = held_out(fit).shares
+            judged = {
+                name: e for name, e in earned(fit).items() if name.startswith(PREFIX) and shares[name][1][0] <= 0.0
+            }
         if not judged:
             return fit, refused
         worst = min(judged, key=lambda name: judged[name].blocked.share)

@@ -50,8 +50,8 @@ def candidates(fit: Fit, number: int) -> tuple[Discovered, ...]:
     """Return the laws that may be worth their place, best first.
 
     Several remainders are scanned: that of the explanation, and unless one effect leaves but noise, that of the laws
-    alone and that without each of the effects. Known effects may have absorbed an unlisted cause, which then shows only where
-    they are left out.
+    alone and that without each of the effects. Known effects may have absorbed an unlisted cause, which then shows only
+    where they are left out.
 
     Parameters
     ----------

@@ -39,6 +39,8 @@ class Form:
         Which one, such as ``tool`` with its length scale, or ``poses`` with a joint.
     anew
         Whether each pose or visit brings its own, so that nothing is smooth.
+    place
+        Kind and name of the one place where it enters; empty where there are several.
     functions
         (N, k) smooth functions of what is commanded and recorded.
     moves
@@ -50,6 +52,7 @@ class Form:
     functions: Array
     moves: Array
     anew: bool = False
+    place: tuple[str, str] = ("", "")
 
 
 @dataclass(frozen=True, eq=False)
@@ -291,11 +294,15 @@ def forms(observations: Observations) -> tuple[Form, ...]:
 
 
 def _scattering(observations: Observations, what: str, each: Array, measures: int) -> list[Form]:
-    """Return a form for each joint that errs anew in every pose or visit, (N, k) which of them a row is."""
-    moves = observations.joint_sensitivity[:, :measures]
+    """Return a form for each joint, and one for the base, that errs anew in every pose or visit.
+
+    ``each`` (N, k) says which of them a row is.
+    """
+    moves, names = observations.joint_sensitivity[:, :measures], observations.robot.joint_names
     seen = [j for j in range(moves.shape[2]) if np.ptp(observations.q[:, j]) > 0.0]
-    names = observations.robot.joint_names
-    return [Form(f"{what}, {names[j]}", each, moves[:, :, [j]], anew=True) for j in seen]
+    found = [Form(f"{what}, {names[j]}", each, moves[:, :, [j]], True, ("joint", names[j])) for j in seen]
+    base = observations.base_sensitivity[:, :measures]
+    return [*found, Form(f"{what}, base", each, base, True, ("base", "base"))]
 
 
 def _together(observations: Observations) -> list[Array]:

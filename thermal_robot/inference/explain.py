@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
 
@@ -22,11 +22,22 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Discrepancy:
-    """What no effect accounts for: form and rms τ over the noise beside the best combination, and its probability."""
+    """What no effect accounts for.
+
+    Attributes
+    ----------
+    form, tau
+        Beside the best combination: which, and its rms over the noise; ``None`` and 0 where there is none.
+    probability
+        That there is any.
+    forms
+        Probability of each form by its name, those of the forms that are not in question left out.
+    """
 
     form: Form | None
     tau: float
     probability: float
+    forms: Mapping[str, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -152,6 +163,7 @@ def explain(
         )
         seeds, beside = [best.blocks], ladder.in_question(best) if len(history) > 1 else forms
     compared, probabilities = ladder.probabilities()
+    odds = ladder.forms_in_question()
     return Explanation(
         linear,
         white,
@@ -163,7 +175,7 @@ def explain(
         remainder,
         smooth,
         aside,
-        Discrepancy(form, rung[1], ladder.discrepancy()),
+        Discrepancy(form, rung[1], 1.0 - odds.get("", 0.0), odds),
         ladder.forms,
     )
 

@@ -183,9 +183,12 @@ class Ladder:
         weight = np.exp(log - log[0])
         return order, weight / weight.sum()
 
-    def discrepancy(self) -> float:
-        """Posterior probability that there is a discrepancy."""
+    def forms_in_question(self) -> dict[str, float]:
+        """Return the posterior probability of each form by its name, and by an empty name that of none."""
         log = {r: [c.log_evidence for c in s.seen.values()] for r, s in self.searches.items()}
         top = max(max(values) for values in log.values())
-        mass = {r: float(np.exp(np.array(values) - top).sum()) for r, values in log.items()}
-        return 1.0 - mass[PLAIN] / sum(mass.values())
+        mass: dict[str, float] = {}
+        for rung, values in log.items():
+            name = self.forms[rung[0]].name if rung[0] >= 0 else ""
+            mass[name] = mass.get(name, 0.0) + float(np.exp(np.array(values) - top).sum())
+        return {name: m / sum(mass.values()) for name, m in mass.items()}
