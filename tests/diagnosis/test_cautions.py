@@ -102,6 +102,4 @@ def test_what_was_left_out_and_what_was_refused_are_said(rv_m2):
     assert "drift" in narrowed
     assert "backlash" in narrowed
     (refused,) = cautions(known, (), {"joint_gain": -0.053})
-    assert refused == (
-        "rows held out are predicted no better with joint_gain (share -5.3 %): not reported as found"
-    )
+    assert refused == ("rows held out are predicted no better with joint_gain (share -5.3 %): not reported as found")
