@@ -67,6 +67,8 @@ class Finding:
         Its estimates; empty if it is not part of the fit.
     quantity, shape, describes
         Only of a discovered law: the quantity that it follows, the shape, and a sentence about it.
+    of
+        Only of a discovered law that is a known effect whose size follows the quantity: that effect's name.
     title
         The effect in plain words.
     random
@@ -85,6 +87,7 @@ class Finding:
     quantity: str | None = None
     shape: str | None = None
     describes: str | None = None
+    of: str | None = None
     title: str = ""
     random: bool = False
 

@@ -161,7 +161,8 @@ def law(finding: Finding) -> str:
     """Describe a law that was discovered in the data; empty for an effect of the library."""
     if not finding.quantity:
         return ""
-    return f"a law found in the data: follows {finding.quantity}" + (
+    what = f"a {finding.of} whose size follows" if finding.of else "follows"
+    return f"a law found in the data: {what} {finding.quantity}" + (
         f", shape: {finding.shape}" if finding.shape else ""
     )
 
