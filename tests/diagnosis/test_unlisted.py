@@ -12,7 +12,7 @@ from simulate import simulate
 
 from thermal_robot import CorrectedModel, diagnose
 from thermal_robot.diagnosis.examine import examine
-from thermal_robot.diagnosis.parts import Unexplained
+from thermal_robot.diagnosis.parts import Dependence, Location, Unexplained
 from thermal_robot.diagnosis.unlisted import as_laws_say, one_more_law
 from thermal_robot.effects import choose
 from thermal_robot.effects.apply import displacement
@@ -20,6 +20,8 @@ from thermal_robot.effects.law import Discovered
 from thermal_robot.effects.quantities import GRAVITY, quantities
 from thermal_robot.inference import settings
 from thermal_robot.inference.discover import Discovery, discovered
+from thermal_robot.inference.discrepancy import Form
+from thermal_robot.inference.explain import Discrepancy
 from thermal_robot.inference.fit import fit
 from thermal_robot.inference.frames import register
 from thermal_robot.inference.random_gap import random_gap
@@ -236,7 +238,7 @@ def test_a_law_joins_the_fit_and_takes_its_remainder(rv_m2):
     assert (own.name, own.place, own.quantity) == ("discovered.2", law.place, law.quantity)
     assert "discovered.2" in after.families
     assert not examine(after).unexplained.flagged
-    said = as_laws_say(before, discovered(after))
+    said = as_laws_say(before, discovered(after), after.explanation.discrepancy)
     assert (said.rms, said.p_value, said.reasons) == (before.rms, before.p_value, before.reasons)
     assert (said.locations[0].kind, said.locations[0].name) == (law.kind, law.place)
     assert [d.covariate for d in said.depends_on] == [law.quantity]
@@ -259,6 +261,9 @@ def test_a_second_law_is_looked_for_beside_the_first(rv_m2):
     assert set(laws.values()) == {first.place, second.place}
 
 
+NONE = Discrepancy(None, 0.0, 0.0, {})
+
+
 def a_discovery(place, quantity, probability, places=None):
     law = Discovered("discovered.1", "joint", place, quantity, "ramp", (), 1.0)
     return Discovery(
@@ -271,7 +276,7 @@ def test_laws_say_where_the_remainder_enters_and_what_it_follows():
     likely, unlikely = settings.LIKELY_PLACE + 0.01, settings.LIKELY_PLACE - 0.01
     places = ((("joint", "elbow"), 1.0 + 1e-12), (("base", "base"), likely), (("tool", "tool"), unlikely))
     found = (a_discovery("elbow", "payload", 0.9, places), a_discovery("wrist", "speed", 0.8))
-    said = as_laws_say(left, found)
+    said = as_laws_say(left, found, NONE)
     assert [(p.kind, p.name) for p in said.locations] == [("joint", "elbow"), ("base", "base"), ("joint", "wrist")]
     assert max(p.share for p in said.locations) == 1.0
     assert [d.covariate for d in said.depends_on] == ["payload", "speed"]
@@ -280,14 +285,40 @@ def test_laws_say_where_the_remainder_enters_and_what_it_follows():
 
 def test_with_a_law_something_is_unexplained_however_little_is_left():
     """A law describes, it does not say why."""
-    assert as_laws_say(Unexplained(False, 0.0, 0.4), (a_discovery("elbow", "payload", 0.9),)).flagged
+    assert as_laws_say(Unexplained(False, 0.0, 0.4), (a_discovery("elbow", "payload", 0.9),), NONE).flagged
 
 
 def test_a_probability_that_rounding_lifts_above_one_leaves_a_p_value():
-    (depends,) = as_laws_say(Unexplained(True, 1e-4, 1e-9), (a_discovery("elbow", "payload", 1.0 + 1e-12),)).depends_on
+    found = (a_discovery("elbow", "payload", 1.0 + 1e-12),)
+    (depends,) = as_laws_say(Unexplained(True, 1e-4, 1e-9), found, NONE).depends_on
     assert depends.p_value == 0.0
 
 
 def test_without_laws_it_is_said_what_is_left():
     left = Unexplained(True, 1e-4, 1e-6)
-    assert as_laws_say(left, ()) is left
+    assert as_laws_say(left, (), NONE) is left
+
+
+def beside(anew, place):
+    """A discrepancy of one form that has three quarters of the probability."""
+    form = Form("poses, elbow", np.zeros((0, 0)), np.zeros((3, 0)), anew, place)
+    return Discrepancy(form, 4.0, 0.9, {form.name: 0.75})
+
+
+def test_what_errs_anew_in_every_pose_has_a_place_and_follows_nothing():
+    left = Unexplained(True, 1e-4, 1e-6, (), (Location("base", "base", 1.0),), (Dependence("time", 1e-6),))
+    said = as_laws_say(left, (), beside(True, ("joint", "elbow")))
+    assert said.locations == (Location("joint", "elbow", 0.75),)
+    assert said.depends_on == ()
+    assert (said.rms, said.p_value) == (left.rms, left.p_value)
+
+
+@pytest.mark.parametrize(("anew", "place"), [(False, ("joint", "elbow")), (True, ("", ""))])
+def test_what_is_smooth_or_anywhere_has_the_place_that_the_tests_found(anew, place):
+    left = Unexplained(True, 1e-4, 1e-6, (), (Location("base", "base", 1.0),), (Dependence("time", 1e-6),))
+    assert as_laws_say(left, (), beside(anew, place)) is left
+
+
+def test_where_nothing_is_left_a_discrepancy_names_no_place():
+    left = Unexplained(False, 0.0, 0.4)
+    assert as_laws_say(left, (), beside(True, ("joint", "elbow"))) is left
