@@ -45,7 +45,7 @@ def as_laws_say(left: Unexplained, found: Sequence[Discovery], discrepancy: Disc
         for place, probability in discovery.places:
             places.setdefault(place, probability)
         for quantity, probability in discovery.quantities[:1]:
-            followed.setdefault(quantity, 1.0 - probability)
+            followed.setdefault(quantity, max(1.0 - probability, 0.0))
     locations = tuple(
         Location(kind, name, min(p, 1.0)) for (kind, name), p in places.items() if p >= settings.LIKELY_PLACE
     )

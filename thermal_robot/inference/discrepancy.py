@@ -15,7 +15,7 @@ Sources: M. C. Kennedy, A. O'Hagan, *J. R. Statist. Soc. B* 63 (2001), eq. 4; lo
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -40,7 +40,9 @@ class Form:
     anew
         Whether each pose or visit brings its own, so that nothing is smooth.
     place
-        Kind and name of the one place where it enters; empty where there are several.
+        Kind and name of the place where it enters, the first of several joints; empty where it may be anywhere.
+    several
+        Whether several joints err in it.
     functions
         (N, k) smooth functions of what is commanded and recorded.
     moves
@@ -53,6 +55,13 @@ class Form:
     moves: Array
     anew: bool = False
     place: tuple[str, str] = ("", "")
+    several: bool = False
+
+    def beside(self, other: Form, part: float) -> Form:
+        """Return the form with that of another joint beside it, whose rms is a part of that of all so far."""
+        length = [np.sqrt((form.moves**2).sum(axis=2).mean()) for form in (self, other)]
+        moves = np.concatenate([self.moves, other.moves * (part * length[0] / max(length[1], settings.TINY))], axis=2)
+        return replace(self, name=f"{self.name}, {other.place[1]}", moves=moves, several=True)
 
 
 @dataclass(frozen=True, eq=False)

@@ -230,6 +230,7 @@ def _gains(gram: Gram, base: Combination, blocks: Sequence[int]) -> list[tuple[i
     norm = np.log((log_scale[1] - log_scale[0]) / (np.sqrt(2.0 * np.pi) * settings.SIZE_SPREAD))
     freedom = gram.equations + gram.noise_dof
     rest = (gram.noise_dof + gram.total - float(gram.vector[used] @ base.values)) / freedom
+    rest = max(rest, settings.LEAST_VARIANCE * variance)
     result = []
     for alike in _by_width(gram, blocks):
         own = np.array([np.arange(gram.slices[b].start, gram.slices[b].stop) for b in alike])

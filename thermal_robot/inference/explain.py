@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
@@ -13,7 +13,7 @@ from thermal_robot.effects import Effect
 from thermal_robot.inference import settings
 from thermal_robot.inference.discrepancy import Form
 from thermal_robot.inference.evidence import Combination, Gram
-from thermal_robot.inference.ladder import Ladder
+from thermal_robot.inference.ladder import PLAIN, Ladder, Rung
 from thermal_robot.inference.problem import Linear, Whitening, discrepancy_mean, frame_step, parameter_values
 from thermal_robot.inference.robust import Noise, distance_limit, first_whitening, reweigh
 
@@ -128,56 +128,110 @@ def explain(
         Robust: rows further than noise allows from the explanation are set aside, and rows in the tail weigh less
         (Huber).
     """
-    measures, samples = linear.measures, len(linear.gap)
+    samples = len(linear.gap)
     use = np.ones(samples, dtype=bool) if rows is None else rows
     aside = np.zeros(samples, dtype=bool) if outliers is None else outliers & use
     families = families or [str(k) for k in range(len(linear.blocks))]
     log_prior = log_priors([b.effect for b in linear.blocks]) if log_prior is None else log_prior
-    rivals = settings_of_one(families)
-    whitening = first_whitening(linear, noise, use & ~aside)
-    history: list[tuple[object, ...]] = []
-    # a smooth discrepancy would follow gross errors, and a noise that is far off: those are settled first
+    asked = _Asked(linear, families, log_prior, settings_of_one(families))
+    # effects that are far off, and gross errors, are settled first, beside a noise that is free
+    whitening = replace(first_whitening(linear, noise, use & ~aside), held=0.0)
     beside: Sequence[Form] = ()
     seeds = [tuple(start) for start in starts]
+    history: list[tuple[object, ...]] = []
     while True:
-        ladder = Ladder(linear, whitening, beside, log_prior, rivals)
-        ladder.run(seeds)
-        rung, best = ladder.consensus(families)
-        white = ladder.whitened_at(rung)
-        values = parameter_values(linear, ladder.at(rung).gram, best)
-        remainder = _remainder(linear, values)
-        step = frame_step(linear, white, remainder)
-        remainder = remainder - linear.frames @ step
-        smooth = discrepancy_mean(white, remainder)
-        form = ladder.forms[rung[0]] if rung[0] >= 0 else None
-        state = (best.blocks, form and form.name, rung[1], np.packbits(whitening.weights > 0).tobytes())
+        found = _Round.of(asked, whitening, beside, seeds)
+        state = (*found.state, np.packbits(whitening.weights > 0).tobytes())
         if history and (state in history or len(history) >= settings.FIRST_ROUNDS):
-            break
+            return found.told(aside)
         history.append(state)
-        # what a pose brings of its own hides no gross error
-        close = white.smooth if form and not form.anew else None
-        followed = best.effective + linear.frames.shape[2] + (close.degrees if close else 0.0)
-        leverage = followed / max(ladder.at(rung).gram.equations + linear.frames.shape[2], 1)
-        whitening, aside = reweigh(
-            remainder - smooth if close else remainder, noise, use, min(leverage, settings.MOST_LEVERAGE), measures
+        whitening, aside = reweigh(found.rough, noise, use, found.leverage, linear.measures)
+        seeds = [found.best.blocks]
+        beside = found.ladder.in_question(found.best) if len(history) > 1 else forms
+
+
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """What stays the same in all rounds."""
+
+    linear: Linear
+    families: Sequence[str]
+    log_prior: Sequence[float]
+    rivals: frozenset[frozenset[int]]
+
+
+@dataclass(frozen=True, eq=False)
+class _Round:
+    """One search with given weights: the best combination, the discrepancy beside it, and what both leave."""
+
+    asked: _Asked
+    ladder: Ladder
+    rung: Rung
+    best: Combination
+    remainder: Array
+    smooth: Array
+
+    @classmethod
+    def of(
+        cls, asked: _Asked, whitening: Whitening, beside: Sequence[Form], seeds: Sequence[tuple[int, ...]]
+    ) -> _Round:
+        ladder = Ladder(asked.linear, whitening, list(beside), asked.log_prior, asked.rivals)
+        ladder.run(seeds)
+        rung, best = ladder.consensus(asked.families)
+        white = ladder.whitened_at(rung)
+        remainder = _left(asked.linear, white, parameter_values(asked.linear, ladder.at(rung).gram, best))
+        return cls(asked, ladder, rung, best, remainder, discrepancy_mean(white, remainder))
+
+    @property
+    def form(self) -> Form | None:
+        return self.ladder.forms[self.rung[0]] if self.rung[0] >= 0 else None
+
+    @property
+    def state(self) -> tuple[object, ...]:
+        return self.best.blocks, self.form and self.form.name, self.rung[1]
+
+    @property
+    def rough(self) -> Array:
+        """(N, m) what neither effects nor a smooth discrepancy follow; one that is anew hides no gross error."""
+        return self.remainder if self.form is None or self.form.anew else self.remainder - self.smooth
+
+    @property
+    def leverage(self) -> float:
+        """Share of the equations that effects, frames and a smooth discrepancy take up."""
+        flat, smooth = self.asked.linear.frames.shape[2], self.ladder.whitened_at(self.rung).smooth
+        followed = self.best.effective + flat
+        if smooth is not None and self.form is not None and not self.form.anew:
+            followed += smooth.degrees
+        equations = self.ladder.at(self.rung).gram.equations + flat
+        return float(min(followed / max(equations, 1), settings.MOST_LEVERAGE))
+
+    def told(self, aside: NDArray[np.bool_]) -> Explanation:
+        """Return the explanation.
+
+        Values are those that correct best: beside a smooth discrepancy, which is no part of the correction, effects are
+        fitted as if there were none, at a noise that holds it.
+        """
+        linear, ladder = self.asked.linear, self.ladder
+        rung = self.rung if self.form is None or self.form.anew else PLAIN
+        search, white = ladder.at(rung), ladder.whitened_at(rung)
+        best = search.evaluate(self.best.blocks)
+        values = parameter_values(linear, search.gram, best)
+        compared, probabilities = ladder.probabilities()
+        odds = ladder.forms_in_question()
+        return Explanation(
+            linear,
+            white,
+            search.gram,
+            best,
+            compared,
+            probabilities,
+            values,
+            _left(linear, white, values),
+            self.smooth,
+            aside,
+            Discrepancy(self.form, self.rung[1], 1.0 - odds.get("", 0.0), odds),
+            ladder.in_question(self.best),
         )
-        seeds, beside = [best.blocks], ladder.in_question(best) if len(history) > 1 else forms
-    compared, probabilities = ladder.probabilities()
-    odds = ladder.forms_in_question()
-    return Explanation(
-        linear,
-        white,
-        ladder.at(rung).gram,
-        best,
-        compared,
-        probabilities,
-        values,
-        remainder,
-        smooth,
-        aside,
-        Discrepancy(form, rung[1], 1.0 - odds.get("", 0.0), odds),
-        ladder.forms,
-    )
 
 
 def log_odds() -> float:
@@ -198,6 +252,8 @@ def log_priors(effects: Sequence[Effect]) -> list[float]:
     return [log_odds() + float(np.log(share)) for share in shares]
 
 
-def _remainder(linear: Linear, values: dict[int, tuple[Array, Array]]) -> Array:
+def _left(linear: Linear, whitening: Whitening, values: dict[int, tuple[Array, Array]]) -> Array:
+    """(N, m) gap less effects and frames."""
     moved = (linear.contribution(b, mean) for b, (mean, _) in values.items())
-    return linear.gap - sum(moved, np.zeros_like(linear.gap))
+    left = linear.gap - sum(moved, np.zeros_like(linear.gap))
+    return np.asarray(left - linear.frames @ frame_step(linear, whitening, left))

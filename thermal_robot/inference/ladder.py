@@ -38,7 +38,7 @@ class Ladder:
 
     linear: Linear
     whitening: Whitening
-    forms: Sequence[Form]
+    forms: list[Form]
     log_prior: Sequence[float]
     exclusive: frozenset[frozenset[int]] = frozenset()
     searches: dict[Rung, Search] = field(default_factory=dict)
@@ -46,21 +46,31 @@ class Ladder:
     def __post_init__(self) -> None:
         """Decompose the forms once for all sizes."""
         w = self.whitening
-        stack = whitened(self.linear, w)
-        self._products, self._equations = stack.T @ stack, len(stack)
-        self._spectra = [Spectrum.of(form, w.weights, w.noise) for form in self.forms]
-        self._along = [spectrum.along(stack) for spectrum in self._spectra]
+        self._stack = whitened(self.linear, w)
+        self._products, self._equations = self._stack.T @ self._stack, len(self._stack)
         plain = normal_equations(self.linear, w, self._products, self._equations)
         self._pairs = contained(plain) | self.exclusive
         share = settings.SMOOTH_PRIOR if self.forms else 0.0
-        each = max(len(self.forms) * len(settings.TAUS), 1)
         ends = np.cumsum([self.linear.frames.shape[2], *(len(block.sizes) for block in self.linear.blocks)])
         self._spans = [np.arange(a, b) for a, b in pairwise(ends)]
         self._quick: dict[tuple[Rung, tuple[int, ...]], float] = {}
         self._priors = {PLAIN: float(np.log1p(-share))}
-        for k in range(len(self.forms)):
-            self._priors |= {(k, tau): float(np.log(share / each)) for tau in settings.TAUS}
+        given, self.forms = self.forms, []
+        self._spectra: list[Spectrum] = []
+        self._along: list[list[Array]] = []
+        for form in given:
+            self._consider(form, float(np.log(share / len(given))))
         self.searches[PLAIN] = self._search(PLAIN, plain)
+
+    def _consider(self, form: Form, log_prior: float) -> int:
+        """Add a form, which shares its prior among all sizes; return its number."""
+        self.forms.append(form)
+        spectrum = Spectrum.of(form, self.whitening.weights, self.whitening.noise)
+        self._spectra.append(spectrum)
+        self._along.append(spectrum.along(self._stack))
+        number, each = len(self.forms) - 1, log_prior - float(np.log(len(settings.TAUS)))
+        self._priors |= {(number, tau): each for tau in settings.TAUS}
+        return number
 
     def whitened_at(self, rung: Rung) -> Whitening:
         """Return the whitening with the discrepancy of a rung."""
@@ -96,10 +106,37 @@ class Ladder:
             if other[0] != rung and other[1] > best.log_evidence + settings.BETTER:
                 rung, best = other[0], self.at(other[0]).run(other[2])
                 continue
-            nearby = self._beside_others(best)
+            nearby = self._beside_others(best) or self._several_joints(rung, best)
             if nearby is None:
                 return rung, best
             rung, best = nearby
+
+    def _several_joints(self, rung: Rung, best: Combination) -> tuple[Rung, Combination] | None:
+        """Let several joints err in every pose or visit, one after another; return what is better, if any is."""
+        if rung[0] < 0 or not self.forms[rung[0]].anew or self.forms[rung[0]].several:
+            return None
+        single = [k for k, f in enumerate(self.forms) if f.place[0] == "joint" and not f.several]
+        found = max((self._size(k, best.blocks) for k in single), key=lambda item: item[1], default=(rung, -np.inf))
+        for _ in range(settings.SCATTERING - 1):
+            further = self._one_more_joint(found[0], best, single)
+            if further is None or further[1] <= found[1]:
+                break
+            found = further
+        if found[1] <= best.log_evidence + settings.BETTER:
+            return None
+        return found[0], self.at(found[0]).run(best.blocks)
+
+    def _one_more_joint(self, rung: Rung, best: Combination, single: Sequence[int]) -> tuple[Rung, float] | None:
+        form = self.forms[rung[0]]
+        others = [self.forms[k] for k in single if self.forms[k].functions is form.functions]
+        others = [f for f in others if f.place[1] not in form.name.split(", ")]
+        prior = self._priors[rung] + np.log(len(settings.TAUS)) - np.log(max(len(others) * len(settings.PARTS), 1))
+        tried = [
+            self._size(self._consider(form.beside(other, part), float(prior)), best.blocks)
+            for other in others
+            for part in settings.PARTS
+        ]
+        return max(tried, key=lambda item: item[1], default=None)
 
     def _size(self, form: int, blocks: tuple[int, ...]) -> tuple[Rung, float]:
         """Return the most probable size of a form beside one combination, with the log evidence; it has one peak."""
@@ -138,7 +175,9 @@ class Ladder:
     def in_question(self, best: Combination) -> tuple[Form, ...]:
         """Return the forms beside which the best combination is not out of the question."""
         near = {r[0] for (r, blocks), log in self._quick.items() if blocks == best.blocks and self._close(log, best)}
-        return tuple(form for k, form in enumerate(self.forms) if k in near)
+        single = [form for form in self.forms if not form.several]
+        several = any(self.forms[k].several for k in near)
+        return tuple(f for k, f in enumerate(single) if k in near or (several and f.anew))
 
     @staticmethod
     def _close(log_evidence: float, best: Combination) -> bool:

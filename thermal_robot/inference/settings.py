@@ -36,6 +36,10 @@ LEVER = 0.3
 """m: a discrepancy of the tool turns it by what moves it over this length."""
 STARTS = 3
 """Combinations, the best of those that a search starts from, beside which each form of a discrepancy is tried."""
+SCATTERING = 3
+"""Joints at most that err anew in every pose or visit beside each other."""
+PARTS = (0.5, 1.0, 2.0)
+"""Rms of a further joint over that of those before it: factors of two, as of the sizes."""
 FORM_REACH = 20.0
 """Log evidence below the best at which a form of the discrepancy is given up while a fit settles."""
 RUNG_REACH = 4.0
@@ -108,7 +112,7 @@ TARGET_STARTS = np.vstack([np.zeros(3), 0.2 * np.eye(3), -0.2 * np.eye(3)])
 """m: where the target may sit on the tool frame; from each the fit reaches 0.3 m."""
 SPARE_EQUATIONS = 6
 """Equations that must be left once the frames are fitted: as many as one pose has."""
-EVIDENCE_STEPS, EVIDENCE_SETTLED, LEAST_VARIANCE = 40, 1e-2, 1e-12
+EVIDENCE_STEPS, EVIDENCE_SETTLED, LEAST_VARIANCE = 40, 1e-3, 1e-12
 """Newton steps of scales and noise at most, the change of a logarithm at which they end, and the smallest variance, in
 squares of the noise: what fits better is rounding."""
 SCALE_GRID = tuple(np.linspace(-6.0, 6.0, 25))
