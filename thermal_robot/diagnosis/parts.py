@@ -217,7 +217,8 @@ class Unexplained:
     rms
         Its rms distance, m. The noise is subtracted if it is stated or known from repeats. 0 if not flagged.
     p_value
-        The smallest of all tests, with Bonferroni correction.
+        The smallest of all tests, with Bonferroni correction; where laws were found, at most the posterior probability
+        that there is none.
     reasons
         One sentence for each test that failed.
     locations
