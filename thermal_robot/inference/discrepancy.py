@@ -86,7 +86,9 @@ class Part:
 
     def times(self, inner: Array) -> Array:
         """B times (c k, s): (n, m, s)."""
-        carried = np.matmul(self.functions, inner.reshape(self.moves.shape[-1], -1, inner.shape[1]))
+        carried = np.matmul(
+            self.functions, inner.reshape(self.moves.shape[-1], self.functions.shape[1], inner.shape[1])
+        )
         return np.asarray(np.matmul(self.moves, np.moveaxis(carried, 0, 1)))
 
     @property
@@ -155,9 +157,9 @@ class Smooth:
             own = vector[:, heard]
             if not part.wide:
                 rows = part.times(own / np.sqrt(value[heard]))
-                own = rows.reshape(-1, rows.shape[2])
+                own = rows.reshape(len(rows) * rows.shape[1], rows.shape[2])
             if len(spectrum.parts) > 1:
-                own = (own[:, None, :] * spectrum.axes[None, :, k, None]).reshape(len(own) * m, -1)
+                own = (own[:, None, :] * spectrum.axes[None, :, k, None]).reshape(len(own) * m, own.shape[1])
             found.append(own)
             variance.append(self.tau**2 * value[heard])
         return np.concatenate(found, axis=1), np.concatenate(variance)
@@ -290,28 +292,26 @@ def forms(observations: Observations) -> tuple[Form, ...]:
     units = np.diag([settings.LEVER] * 3 + [1.0] * 3)[:measures, :measures]
     lengths = zip(settings.LENGTHS, _together(observations), strict=True)
     found = [Form(f"tool, {length:g}", functions, units) for length, functions in lengths]
-    functions = [_spectral(values) for values in quantities(observations).values()]
-    found.append(Form("places", np.concatenate(functions, axis=1), _moves(observations, measures)))
+    functions = np.concatenate([_spectral(values) for values in quantities(observations).values()], axis=1)
+    found.append(Form("places", functions, _moves(observations, measures)))
+    found += _at_one_place(observations, "places", functions, measures, anew=False)
     pose = repeated_poses(observations.campaign)
     each = np.eye(int(pose.max()) + 1)[pose]
     if observations.campaign.noise_position is not None or each.shape[1] < len(pose):
         found.append(Form("poses", each, units, anew=True))
-        found += _scattering(observations, "poses", each, measures)
+        found += _at_one_place(observations, "poses", each, measures, anew=True)
     if each.shape[1] < len(pose):
-        found += _scattering(observations, "visits", np.eye(len(pose)), measures)
+        found += _at_one_place(observations, "visits", np.eye(len(pose)), measures, anew=True)
     return tuple(found)
 
 
-def _scattering(observations: Observations, what: str, each: Array, measures: int) -> list[Form]:
-    """Return a form for each joint, and one for the base, that errs anew in every pose or visit.
-
-    ``each`` (N, k) says which of them a row is.
-    """
+def _at_one_place(observations: Observations, what: str, functions: Array, measures: int, *, anew: bool) -> list[Form]:
+    """Return a form for each joint that moves, and one for the base, with the same functions (N, k)."""
     moves, names = observations.joint_sensitivity[:, :measures], observations.robot.joint_names
     seen = [j for j in range(moves.shape[2]) if np.ptp(observations.q[:, j]) > 0.0]
-    found = [Form(f"{what}, {names[j]}", each, moves[:, :, [j]], True, ("joint", names[j])) for j in seen]
+    found = [Form(f"{what}, {names[j]}", functions, moves[:, :, [j]], anew, ("joint", names[j])) for j in seen]
     base = observations.base_sensitivity[:, :measures]
-    return [*found, Form(f"{what}, base", each, base, True, ("base", "base"))]
+    return [*found, Form(f"{what}, base", functions, base, anew, ("base", "base"))]
 
 
 def _together(observations: Observations) -> list[Array]:

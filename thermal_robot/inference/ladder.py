@@ -115,7 +115,7 @@ class Ladder:
         """Let several joints err in every pose or visit, one after another; return what is better, if any is."""
         if rung[0] < 0 or not self.forms[rung[0]].anew or self.forms[rung[0]].several:
             return None
-        single = [k for k, f in enumerate(self.forms) if f.place[0] == "joint" and not f.several]
+        single = [k for k, f in enumerate(self.forms) if f.anew and f.place[0] == "joint" and not f.several]
         found = max((self._size(k, best.blocks) for k in single), key=lambda item: item[1], default=(rung, -np.inf))
         for _ in range(settings.SCATTERING - 1):
             further = self._one_more_joint(found[0], best, single)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from thermal_robot.effects import Effect, gate
 from thermal_robot.effects.apply import displacement
 from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import orthonormal, without
 from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.discrepancy import forms
 from thermal_robot.inference.explain import Explanation, explain
@@ -105,7 +106,7 @@ def settle(
     revisions = 1 if many else settings.REVISIONS
     for revision in range(revisions + 1):
         progress("combinations of effects" if revision == 0 else f"exact fit, revision {revision}")
-        candidates, families = _listed(variants)
+        candidates, families = _listed(variants, observations)
         chosen = [candidates.index(effect) for effect, _ in held]
         start_at = chosen if revision or not begin else [candidates.index(effect) for effect in begin]
         blocks = tuple(block(observations, c) for c in candidates)
@@ -156,6 +157,23 @@ def _others(chosen: Effect, observations: Observations, settings_of: Sequence[Ef
                 yield alone
 
 
-def _listed(variants: dict[str, tuple[Effect, ...]]) -> tuple[list[Effect], tuple[str, ...]]:
-    listed = [setting for own in variants.values() for setting in own]
+def _listed(
+    variants: dict[str, tuple[Effect, ...]], observations: Observations
+) -> tuple[list[Effect], tuple[str, ...]]:
+    """List all settings but those of single joints of which the data see nothing beside the unknown frames."""
+    frames = frame_columns(observations)[0]
+    basis = orthonormal(frames.reshape(-1, frames.shape[2]))
+    names, moves = observations.robot.joint_names, observations.joint_sensitivity[:, : frames.shape[1]]
+    flat = moves.reshape(-1, len(names))
+    left = np.linalg.norm(without(flat, basis), axis=0)
+    hidden = {
+        n for n, seen in zip(names, left > settings.ALIAS * np.linalg.norm(flat, axis=0), strict=True) if not seen
+    }
+    every = [setting for own in variants.values() for setting in own]
+    listed = [e for e in every if not (hidden & set(e.joints) and _constant(e, observations))]
     return listed, tuple(setting.name for setting in listed)
+
+
+def _constant(effect: Effect, observations: Observations) -> bool:
+    """Whether an effect displaces each joint by the same in all rows."""
+    return all(r.values.ndim == 0 for p in gate.checked(effect, observations) for r in p.responses)
