@@ -53,8 +53,7 @@ class Settled:
     @property
     def noise(self) -> float:
         """What remains per axis, m."""
-        left = self.explanation.remainder[~self.explanation.outliers, :3]
-        return float(np.sqrt((left**2).mean()))
+        return float(self.explanation.whitening.noise[0] * self.explanation.best.noise)
 
     @property
     def containers(self) -> set[str]:
