@@ -90,7 +90,12 @@ def test_what_the_known_effects_leave_has_what_the_laws_take_in_it(rv_m2):
     # what the law leaves is added in quadrature, and tests that say more are kept
     more = without_laws(with_it, Unexplained(True, said.rms, 1e-300, ("it is large",)))
     assert more.rms == pytest.approx(np.sqrt(2.0) * said.rms)
-    assert (more.p_value, more.reasons) == (min(1e-300, said.p_value), ("it is large",))
+    assert more.p_value == min(1e-300, said.p_value)
+    share = 1.0 - 3.0 * 25e-6**2 / whole**2
+    for reasons, rest in ((said.reasons, ()), (more.reasons, ("it is large",))):
+        assert reasons[1:] == rest
+        assert reasons[0].startswith("a law explains ")
+        assert float(reasons[0].split()[3].rstrip("%")) == pytest.approx(100.0 * share, abs=1.0)
 
 
 def test_without_laws_the_known_effects_leave_what_the_fit_leaves(rv_m2):

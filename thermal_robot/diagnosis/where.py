@@ -16,6 +16,7 @@ from thermal_robot.inference.algebra import orthonormal, without
 from thermal_robot.inference.columns import Block
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.laws import smooth_columns
+from thermal_robot.inference.settings import TINY
 from thermal_robot.observations import Observations
 
 Array = NDArray[np.float64]
@@ -36,10 +37,14 @@ def without_laws(fit: Fit, left: Unexplained) -> Unexplained:
     frames = e.linear.frames[kept].reshape(moved.size, -1)
     moved = without(moved.ravel(), orthonormal(frames)).reshape(moved.shape)[:, :3]
     chance = [1.0 - e.probability([b for b, f in enumerate(fit.families) if f == fit.families[own]]) for own in blocks]
+    taken2 = float((moved**2).sum(axis=1).mean())
+    rest2 = float((fit.corrected.gap[kept, :3] ** 2).sum(axis=1).mean())
+    what = "a law explains" if len(blocks) == 1 else f"{len(blocks)} laws explain"
     return replace(
         left,
-        rms=float(np.sqrt(left.rms**2 + (moved**2).sum(axis=1).mean())),
+        rms=float(np.sqrt(left.rms**2 + taken2)),
         p_value=max(min(left.p_value, *chance), 0.0),
+        reasons=(f"{what} {taken2 / max(taken2 + rest2, TINY):.0%} of what the known effects leave", *left.reasons),
     )
 
 
