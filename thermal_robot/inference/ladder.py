@@ -55,6 +55,7 @@ class Ladder:
         self._spans = [np.arange(a, b) for a, b in pairwise(ends)]
         self._quick: dict[tuple[Rung, tuple[int, ...]], float] = {}
         self._priors = {PLAIN: float(np.log1p(-share))}
+        self._joined = False
         given, self.forms = self.forms, []
         self._spectra: list[Spectrum] = []
         self._along: list[list[Array]] = []
@@ -68,7 +69,7 @@ class Ladder:
         spectrum = Spectrum.of(form, self.whitening.weights, self.whitening.noise)
         self._spectra.append(spectrum)
         self._along.append(spectrum.along(self._stack))
-        number, each = len(self.forms) - 1, log_prior - float(np.log(len(settings.TAUS)))
+        number, each = len(self.forms) - 1, log_prior - float(np.log(settings.OCTAVES))
         self._priors |= {(number, tau): each for tau in settings.TAUS}
         return number
 
@@ -112,43 +113,61 @@ class Ladder:
             rung, best = nearby
 
     def _several_joints(self, rung: Rung, best: Combination) -> tuple[Rung, Combination] | None:
-        """Let several joints err in every pose or visit, one after another; return what is better, if any is."""
-        if rung[0] < 0 or not self.forms[rung[0]].anew or self.forms[rung[0]].several:
+        """Let several joints err in every pose or visit, one after another; return what is better, if any is.
+
+        Once beside the best combination and once beside none, so that neither has the sizes that suit the other.
+        """
+        if self._joined or rung[0] < 0 or not self.forms[rung[0]].anew:
             return None
-        single = [k for k, f in enumerate(self.forms) if f.anew and f.place[0] == "joint" and not f.several]
-        found = max((self._size(k, best.blocks) for k in single), key=lambda item: item[1], default=(rung, -np.inf))
+        self._joined = True
+        single = [k for k, f in enumerate(self.forms) if f.anew and f.place[0] == "joint"]
+        if not single:
+            return None
+        tried = [(*self._joined_beside(blocks, single), blocks) for blocks in {best.blocks, ()}]
+        found = max(tried, key=lambda item: item[1])
+        if found[1] <= best.log_evidence + settings.BETTER:
+            return None
+        return found[0], self.at(found[0]).run(found[2])
+
+    def _joined_beside(self, blocks: tuple[int, ...], single: Sequence[int]) -> tuple[Rung, float]:
+        found = max((self._size(k, blocks) for k in single), key=lambda item: item[1])
         for _ in range(settings.SCATTERING - 1):
-            further = self._one_more_joint(found[0], best, single)
+            further = self._one_more_joint(found[0], blocks, single)
             if further is None or further[1] <= found[1]:
                 break
             found = further
-        if found[1] <= best.log_evidence + settings.BETTER:
-            return None
-        return found[0], self.at(found[0]).run(best.blocks)
+        return found
 
-    def _one_more_joint(self, rung: Rung, best: Combination, single: Sequence[int]) -> tuple[Rung, float] | None:
+    def _one_more_joint(self, rung: Rung, blocks: tuple[int, ...], single: Sequence[int]) -> tuple[Rung, float] | None:
         form = self.forms[rung[0]]
         others = [self.forms[k] for k in single if self.forms[k].functions is form.functions]
         others = [f for f in others if f.place[1] not in form.name.split(", ")]
-        prior = self._priors[rung] + np.log(len(settings.TAUS)) - np.log(max(len(others) * len(settings.PARTS), 1))
-        tried = [
-            self._size(self._consider(form.beside(other, part), float(prior)), best.blocks)
-            for other in others
-            for part in settings.PARTS
-        ]
-        return max(tried, key=lambda item: item[1], default=None)
+        if not others:
+            return None
+        prior = float(self._priors[rung] + np.log(settings.OCTAVES) - np.log(len(others) * len(settings.PARTS)))
+        tried = []
+        for further in (form.beside(other, part) for other in others for part in settings.PARTS):
+            tried.append((self._size(self._consider(further, prior), blocks)[1], further))
+            self._forget()
+        return self._size(self._consider(max(tried, key=lambda item: item[0])[1], prior), blocks)
+
+    def _forget(self) -> None:
+        """Take the last form out again."""
+        number = len(self.forms) - 1
+        del self.forms[number], self._spectra[number], self._along[number]
+        self._quick = {key: log for key, log in self._quick.items() if key[0][0] != number}
 
     def _size(self, form: int, blocks: tuple[int, ...]) -> tuple[Rung, float]:
         """Return the most probable size of a form beside one combination, with the log evidence; it has one peak."""
         k = settings.TAUS.index(1.0)
-        step, best = 1, self._beside((form, settings.TAUS[k]), blocks)
-        for _ in range(2):
-            while 0 <= k + step < len(settings.TAUS):
-                other = self._beside((form, settings.TAUS[k + step]), blocks)
-                if other < best:
-                    break
-                k, best = k + step, other
-            step = -step
+        best = self._beside((form, settings.TAUS[k]), blocks)
+        for step in settings.TAU_STEPS:
+            for sign in (step, -step):
+                while 0 <= k + sign < len(settings.TAUS):
+                    other = self._beside((form, settings.TAUS[k + sign]), blocks)
+                    if other <= best:
+                        break
+                    k, best = k + sign, other
         return (form, settings.TAUS[k]), best
 
     def _beside(self, rung: Rung, blocks: tuple[int, ...]) -> float:

@@ -20,8 +20,13 @@ MISTRUST = 5.0
 """Largest penalty, natural logarithm, for calling a stated noise wrong: e⁵, about 1 in 150."""
 SMOOTH_PRIOR = 0.5
 """That something smooth is at work that no effect and no law accounts for: as likely as not."""
-TAUS = (0.5, 1.0, 2.0, 4.0, 8.0, 16.0, 32.0, 64.0)
-"""Rms of a discrepancy over the noise: below the first it is noise, above the last a mistake; factors of two."""
+TAUS = tuple(2.0 ** (k / 4) for k in range(-4, 25))
+"""Rms of a discrepancy over the noise: below the first it is noise, above the last a mistake. In quarters of an octave:
+beside a hundred independent errors a size a factor of two off costs 20 nats."""
+TAU_STEPS = (4, 2, 1)
+"""Of that grid: steps in which the best size is looked for."""
+OCTAVES = 7
+"""Octaves of these sizes, which share the prior of a form; each stands for all sizes in it."""
 LENGTHS = (1.4, 2.8)
 """Length scales of the discrepancy at the tool, in standard deviations of the inputs times the root of their number."""
 LANDMARKS = 100
@@ -38,8 +43,8 @@ STARTS = 3
 """Combinations, the best of those that a search starts from, beside which each form of a discrepancy is tried."""
 SCATTERING = 3
 """Joints at most that err anew in every pose or visit beside each other."""
-PARTS = (0.5, 1.0, 2.0)
-"""Rms of a further joint over that of those before it: factors of two, as of the sizes."""
+PARTS = tuple(2.0 ** (k / 2) for k in range(-3, 4))
+"""Rms of a further joint over that of those before it, in halves of an octave."""
 FORM_REACH = 20.0
 """Log evidence below the best at which a form of the discrepancy is given up while a fit settles."""
 RUNG_REACH = 4.0

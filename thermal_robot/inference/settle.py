@@ -161,7 +161,7 @@ def _listed(
 ) -> tuple[list[Effect], tuple[str, ...]]:
     """List all settings but those of single joints of which the data see nothing beside the unknown frames."""
     frames = frame_columns(observations)[0]
-    basis = orthonormal(frames.reshape(-1, frames.shape[2]))
+    basis = orthonormal(frames.reshape(frames.shape[0] * frames.shape[1], frames.shape[2]))
     names, moves = observations.robot.joint_names, observations.joint_sensitivity[:, : frames.shape[1]]
     flat = moves.reshape(-1, len(names))
     left = np.linalg.norm(without(flat, basis), axis=0)
