@@ -192,9 +192,19 @@ def test_a_frame_that_is_declared_known_and_wrong_is_found_with_its_size(rv_m2, 
         assert abs(estimate.value - true) < 5.0 * estimate.std
 
 
-def test_a_prior_that_rules_an_effect_out_leaves_it_to_what_contains_it(offset):
+def test_a_prior_that_rules_an_effect_out_leaves_it_to_what_contains_it(rv_m2):
+    several = simulate(rv_m2, ["joint_offset"], seed=0, places=["joint_2", "joint_3", "joint_4"])[0]
+    assert diagnose(several).verdict == ("joint_offset",)
+    assert diagnose(replace(several, priors={"joint_offset": 1e-9})).verdict == ("geometric",)
+
+
+def test_a_prior_that_rules_one_joint_out_leaves_it_to_a_law_there(offset):
+    """One number at one place needs no geometry of thirty."""
     assert diagnose(offset).verdict == ("joint_offset",)
-    assert diagnose(replace(offset, priors={"joint_offset": 1e-9})).verdict == ("geometric",)
+    told = diagnose(replace(offset, priors={"joint_offset": 1e-9}))
+    assert told.verdict == ("discovered.1",)
+    (place,) = diagnose(offset).finding("joint_offset").locations
+    assert [p.name for p in told.finding("discovered.1").locations] == [place.name]
 
 
 def test_withholding_everything_is_refused(offset):

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
@@ -58,7 +59,9 @@ def contradicted(campaign: Campaign) -> list[str]:
     return found
 
 
-def cautions(fitted: Fit, considered: Sequence[Effect]) -> tuple[str, ...]:
+def cautions(
+    fitted: Fit, considered: Sequence[Effect], refused: Mapping[str, float] = MappingProxyType({})
+) -> tuple[str, ...]:
     """Return warnings about the diagnosis, one sentence each.
 
     Parameters
@@ -67,6 +70,8 @@ def cautions(fitted: Fit, considered: Sequence[Effect]) -> tuple[str, ...]:
         The final fit.
     considered
         The effects that were considered, if the user left some out; empty otherwise.
+    refused
+        By effect that rows held out refused: what adding it brings there, as a share of their mean square.
     """
     notes = []
     campaign, e = fitted.campaign, fitted.explanation
@@ -77,6 +82,10 @@ def cautions(fitted: Fit, considered: Sequence[Effect]) -> tuple[str, ...]:
     for name, times in _cancelling(fitted):
         notes.append(
             f"parameters of {name} cancel each other: single ones do up to {times:.0f} times what all do together"
+        )
+    for name, share in refused.items():
+        notes.append(
+            f"rows held out are predicted no better with {name} (share {100.0 * share:.1f} %): not reported as found"
         )
     if considered:
         notes.append("only these effects were considered: " + ", ".join(effect.name for effect in considered))

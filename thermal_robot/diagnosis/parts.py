@@ -51,7 +51,8 @@ class Finding:
     status
         ``found``, ``not_found``, ``not_testable`` or ``confounded``.
     probability
-        Posterior probability that it is at work; ``None`` where it is not testable.
+        Posterior probability that it is at work; of a discovered law, that one of this quantity is at work at this
+        place. ``None`` where it is not testable.
     shrinkage, shrinkage_ci95
         Its share of the gap's mean square on held-out rows, noise included, and the 95 % interval. For an effect of the
         fit it is the Shapley value, and these sum to the overall shrinkage; for another the gain from adding it.
@@ -66,6 +67,8 @@ class Finding:
         Its estimates; empty if it is not part of the fit.
     quantity, shape, describes
         Only of a discovered law: the quantity that it follows, the shape, and a sentence about it.
+    of
+        Only of a discovered law that is a known effect whose size follows the quantity: that effect's name.
     title
         The effect in plain words.
     random
@@ -84,6 +87,7 @@ class Finding:
     quantity: str | None = None
     shape: str | None = None
     describes: str | None = None
+    of: str | None = None
     title: str = ""
     random: bool = False
 
@@ -113,6 +117,8 @@ class HeldOut:
     shrinkage, shrinkage_ci95
         1 − (rms_after / rms_before)², the sum of the shares of the model's effects; with the interval in which it lies
         on fresh rows of the same kind with the model that is saved.
+    rms_before_with_aside, rms_after_with_aside
+        The same rms with the rows set aside in it; ``None`` where that was not asked.
     """
 
     scheme: str
@@ -121,6 +127,8 @@ class HeldOut:
     rms_after: float
     shrinkage: float
     shrinkage_ci95: tuple[float, float]
+    rms_before_with_aside: float | None = None
+    rms_after_with_aside: float | None = None
 
 
 @dataclass(frozen=True)
@@ -190,8 +198,8 @@ class Dependence:
     covariate
         Its name.
     p_value
-        Of an F test, after counting every quantity that was tried; where a discovered law follows it, exp(−gain), the
-        odds that the data give against that law.
+        Of an F test, after counting every quantity that was tried; where a discovered law follows it, the posterior
+        probability that it follows another one.
     """
 
     covariate: str
@@ -209,7 +217,8 @@ class Unexplained:
     rms
         Its rms distance, m. The noise is subtracted if it is stated or known from repeats. 0 if not flagged.
     p_value
-        The smallest of all tests, with Bonferroni correction.
+        The smallest of all tests, with Bonferroni correction; where laws were found, at most the posterior probability
+        that there is none.
     reasons
         One sentence for each test that failed.
     locations

@@ -45,6 +45,9 @@ def worth_their_word(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, di
 
 
 def _probability(fit: Fit, judged: Earned) -> float:
-    """Return the posterior probability of an effect, given what it does to the likelihood of rows held out."""
+    """Return the posterior probability of an effect, given what it does to the likelihood of rows held out.
+
+    It is at most the prior's: blocks of rows that speak for an effect do not outweigh others that refuse it.
+    """
     equations = fit.explanation.problem.equations
-    return float(expit(log_odds() - 0.5 * equations * np.log1p(-judged.blocked.share)))
+    return float(expit(log_odds() - 0.5 * equations * np.log1p(-min(judged.blocked.share, 0.0))))
