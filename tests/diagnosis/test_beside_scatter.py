@@ -8,6 +8,7 @@ from simulate import simulate
 
 from thermal_robot import diagnose
 from thermal_robot.diagnosis.beside_scatter import beside_scatter
+from thermal_robot.diagnosis.parts import Refused
 from thermal_robot.effects import choose
 from thermal_robot.inference import settings
 from thermal_robot.inference.fit import fit
@@ -79,8 +80,8 @@ def test_an_effect_that_is_there_stays_beside_the_scatter(rv_m2):
 
 
 def test_what_rows_held_out_refused_is_handed_on(rv_m2):
-    last, _ = concluded(scattering(rv_m2), ("joint_offset", "backlash"), {"joint_gain": 0.02})
-    assert last.refused["joint_gain"] == 0.02
+    last, _ = concluded(scattering(rv_m2), ("joint_offset", "backlash"), {"joint_gain": Refused(0.02, -0.01)})
+    assert last.refused["joint_gain"] == Refused(0.02, -0.01)
     # never offered beside the scatter: nothing else can be said of it
     assert "joint_gain" not in last.fit.families
 
@@ -91,11 +92,11 @@ def test_what_the_scatter_feigned_has_a_probability_below_its_prior(rv_m2):
     feigned = [effect.name for effect, _ in known.effects]
     assert set(feigned) <= set(last.refused)
     assert set(last.refused) == {"joint_offset", "backlash", "joint_gain", "transmission_error"}
-    assert all(0.0 <= p < settings.PRIOR_PROBABILITY for p in last.refused.values())
+    assert all(0.0 <= p < settings.PRIOR_PROBABILITY for p in (r.probability for r in last.refused.values()))
     assert not set(last.refused) & {effect.name for effect, _ in last.fit.effects}
 
 
 def test_of_what_stays_beside_the_scatter_nothing_is_refused(rv_m2):
     last, _ = concluded(scattering(rv_m2, ["joint_offset"]), ("joint_offset", "backlash"))
     assert "joint_offset" not in last.refused
-    assert last.refused["backlash"] < settings.PRIOR_PROBABILITY
+    assert last.refused["backlash"].probability < settings.PRIOR_PROBABILITY

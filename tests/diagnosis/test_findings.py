@@ -10,7 +10,7 @@ from simulate import simulate
 
 from thermal_robot import diagnose
 from thermal_robot.diagnosis.findings import by_share, findings, separates, titled
-from thermal_robot.diagnosis.parts import Finding
+from thermal_robot.diagnosis.parts import Finding, Refused
 from thermal_robot.effects import choose, library, random_effects
 from thermal_robot.effects.law import Discovered
 from thermal_robot.inference.fit import fit, refit
@@ -101,7 +101,7 @@ def test_a_law_is_as_probable_as_its_place_and_quantity(rv_m2):
 
 
 def test_what_rows_held_out_refused_is_not_found_with_its_probability(offsets):
-    found = said(offsets, refused={"joint_gain": 0.03})["joint_gain"]
+    found = said(offsets, refused={"joint_gain": Refused(0.03, -0.05)})["joint_gain"]
     assert (found.status, found.probability, found.parameters) == ("not_found", 0.03, ())
     assert found.shrinkage is not None
     assert found.shrinkage_ci95 is not None

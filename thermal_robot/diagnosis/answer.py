@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,8 @@ from thermal_robot.diagnosis.cautions import cautions
 from thermal_robot.diagnosis.examine import Examined
 from thermal_robot.diagnosis.findings import by_share, findings, separates, titled
 from thermal_robot.diagnosis.held_out import Shrinkage
-from thermal_robot.diagnosis.parts import Gap, Rows, Unexplained
+from thermal_robot.diagnosis.numbered import numbered
+from thermal_robot.diagnosis.parts import Gap, Refused, Rows, Unexplained
 from thermal_robot.diagnosis.random_findings import random_findings
 from thermal_robot.diagnosis.result import Diagnosis
 from thermal_robot.diagnosis.schemes import worst_folds
@@ -43,7 +44,7 @@ class Conclusion:
     chance
         The random part of that residual that the instrument's noise does not account for.
     refused
-        By effect that was taken out of the fit again: its probability.
+        Effects that were taken out of the fit again.
     """
 
     fit: Fit
@@ -51,7 +52,7 @@ class Conclusion:
     unexplained: Unexplained
     left: Examined
     chance: RandomGap
-    refused: Mapping[str, float]
+    refused: Mapping[str, Refused]
 
 
 def answer(
@@ -80,7 +81,10 @@ def answer(
     notes
         What was left out of the campaign, one sentence each.
     """
-    fit, campaign, remaining = last.fit, last.fit.campaign, last.left.unexplained
+    fit, shrinkage, laws = numbered(last.fit, shrinkage, last.laws)
+    last = replace(last, fit=fit, laws=laws)
+    campaign, remaining = fit.campaign, last.left.unexplained
+    refused = {name: r.share for name, r in last.refused.items() if r.share is not None}
     shares = {name: value for name, (value, _) in shrinkage.shares.items()}
     where, locations = locate(fit, shares)
     gap = _gap(last, shrinkage)
@@ -107,7 +111,7 @@ def answer(
         separates=separates(found),
         model=_model(fit),
         rows=_rows(fit, shrinkage),
-        warnings=(*campaign.warnings, *notes, *cautions(fit, candidates if narrowed else ())),
+        warnings=(*campaign.warnings, *notes, *cautions(fit, candidates if narrowed else (), refused)),
         sensitivity=prior_sensitivity(fit),
         fit=fit,
         remaining=remaining,

@@ -8,8 +8,9 @@ import numpy as np
 
 from thermal_robot.diagnosis.answer import Conclusion
 from thermal_robot.diagnosis.examine import Examined, examine
-from thermal_robot.diagnosis.parts import Unexplained
+from thermal_robot.diagnosis.parts import Refused, Unexplained
 from thermal_robot.diagnosis.unlisted import as_laws_say
+from thermal_robot.diagnosis.where import without_laws
 from thermal_robot.effects import Effect
 from thermal_robot.inference.discover import discovered
 from thermal_robot.inference.explain import explain
@@ -20,7 +21,7 @@ from thermal_robot.inference.robust import Noise
 
 
 def beside_scatter(
-    fit: Fit, chance: RandomGap, refused: Mapping[str, float], progress: Callable[[str], None]
+    fit: Fit, chance: RandomGap, refused: Mapping[str, Refused], progress: Callable[[str], None]
 ) -> Conclusion:
     """Choose the systematic effects again, with the joints' scatter in the covariance of the noise.
 
@@ -31,7 +32,7 @@ def beside_scatter(
     chance
         The scatter, which accounts for the residual of that fit.
     refused
-        By effect that rows held out refused: its probability.
+        Effects that rows held out refused.
     progress
         Called with a few words at each stage.
 
@@ -48,7 +49,7 @@ def beside_scatter(
     kept = tuple(dict.fromkeys(fit.families[b] for b in again.best.blocks))
     feigned: dict[str, tuple[Effect, ...]] = {name: () for name in dict.fromkeys(fit.families) if name not in kept}
     own = {name: [b for b, f in enumerate(fit.families) if f == name] for name in feigned}
-    refused = {**refused, **{name: again.probability(blocks) for name, blocks in own.items()}}
+    refused = {**refused, **{name: Refused(again.probability(blocks)) for name, blocks in own.items()}}
     fit = refit(fit, feigned, [linear.blocks[b].effect for b in again.best.blocks], progress)
     chance = random_gap(fit)
     covariance = chance.scatter.covariance(fit.corrected.joint_sensitivity)[:, :3, :3]
@@ -57,5 +58,5 @@ def beside_scatter(
     if left.flagged:
         left = examine(fit, progress).unexplained
     laws = discovered(fit)
-    unexplained = as_laws_say(left, laws, fit.explanation.discrepancy)
+    unexplained = as_laws_say(without_laws(fit, left), laws, fit.explanation.discrepancy)
     return Conclusion(fit, laws, unexplained, Examined(left, floor, "scatter"), chance, refused)

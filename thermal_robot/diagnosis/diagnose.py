@@ -16,6 +16,7 @@ from thermal_robot.diagnosis.held_out import held_out
 from thermal_robot.diagnosis.result import Diagnosis, told
 from thermal_robot.diagnosis.schemes import worse_elsewhere
 from thermal_robot.diagnosis.unlisted import as_laws_say, one_more_law
+from thermal_robot.diagnosis.where import without_laws
 from thermal_robot.diagnosis.word import worth_their_word
 from thermal_robot.effects import Effect, choose, library
 from thermal_robot.errors import CampaignError
@@ -106,9 +107,8 @@ def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
     if chance.explains_size:
         return beside_scatter(fit, chance, refused, progress)
     left, laws = examine(fit, progress), discovered(fit)
-    return Conclusion(
-        fit, laws, as_laws_say(left.unexplained, laws, fit.explanation.discrepancy), left, chance, refused
-    )
+    unexplained = as_laws_say(without_laws(fit, left.unexplained), laws, fit.explanation.discrepancy)
+    return Conclusion(fit, laws, unexplained, left, chance, refused)
 
 
 def _check_priors(campaign: Campaign, known: set[str]) -> None:

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
-from thermal_robot.diagnosis.parts import Estimate, Finding, Location, Status, is_frame
+from thermal_robot.diagnosis.parts import Estimate, Finding, Location, Refused, Status, is_frame
 from thermal_robot.effects import Effect, gate, library
 from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.inference import settings
@@ -27,7 +27,7 @@ def findings(
     shares: Shares,
     locations: dict[str, tuple[Location, ...]],
     laws: Mapping[str, float],
-    refused: Mapping[str, float],
+    refused: Mapping[str, Refused],
 ) -> tuple[Finding, ...]:
     """Return a finding for every candidate; those that are not testable come last.
 
@@ -42,7 +42,7 @@ def findings(
     laws
         By discovered law of the fit: probability that what it follows, where, is right.
     refused
-        By effect that was taken out of the fit again: its probability.
+        Effects that were taken out of the fit again.
     """
     e = fit.explanation
     explained = {effect.name: b for b, (effect, _) in zip(e.best.blocks, fit.effects, strict=True)}
@@ -75,9 +75,12 @@ def findings(
                 quantity=law.follows if law else None,
                 shape=law.shape if law else None,
                 describes=law.describe() if law else None,
+                of=(law.of or None) if law else None,
             )
         )
-    result += [Finding(name, "not_found", p, *shares.get(name, (0.0, (0.0, 0.0)))) for name, p in refused.items()]
+    result += [
+        Finding(name, "not_found", r.probability, *shares.get(name, (0.0, (0.0, 0.0)))) for name, r in refused.items()
+    ]
     result += [Finding(name, "not_testable", needs=needs) for name, needs in fit.needs.items()]
     return tuple(result)
 

@@ -90,8 +90,8 @@ def shrinkage(explanation: Explanation, before: Linear, families: Sequence[str],
     far, near = walks.distances(()), walks.distances(walks.players)
     value, interval = share(walks.gain((), walks.players), walks.left(()))
     kept = ~explanation.outliers
-    overall = HeldOut("blocked", int(block.max()) + 1, _rms(far[kept]), _rms(near[kept]), value, interval)
     aside = (_rms(far), _rms(near))
+    overall = HeldOut("blocked", int(block.max()) + 1, _rms(far[kept]), _rms(near[kept]), value, interval, *aside)
     far[~kept] = near[~kept] = np.nan
     return Shrinkage(overall, far, near, aside, _shares(walks, families))
 

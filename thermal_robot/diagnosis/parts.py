@@ -92,6 +92,17 @@ class Finding:
     random: bool = False
 
 
+@dataclass(frozen=True)
+class Refused:
+    """An effect that was taken out of the fit again: its probability, and what it brings rows held out as a share.
+
+    The share is ``None`` where it is the scatter of joints that had feigned it.
+    """
+
+    probability: float
+    share: float | None = None
+
+
 def is_frame(found: Sequence[Finding], name: str) -> bool:
     """Tell whether an effect is the displacement of an unknown frame.
 
