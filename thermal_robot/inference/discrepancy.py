@@ -23,6 +23,7 @@ from scipy.linalg.lapack import dpotrf, dpotri, dpotrs, dtrtrs
 
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference import settings
+from thermal_robot.inference.grouped import Grouped
 from thermal_robot.inference.rows import repeated_poses
 from thermal_robot.observations import Observations
 
@@ -44,7 +45,8 @@ class Form:
     several
         Whether several joints err in it.
     functions
-        (N, k) smooth functions of what is commanded and recorded.
+        (N, k) smooth functions of what is commanded and recorded; of a form that is anew, (N,) the number of the pose
+        or visit.
     moves
         (N, m, c) how far a unit of each of c components moves the target, root frame axes, m and rad; (m, c) where that
         is the same for all rows: K is then a product of one matrix of the rows and one of the components.
@@ -126,7 +128,7 @@ class Smooth:
         τ.
     """
 
-    spectrum: Spectrum
+    spectrum: Spectrum | Grouped
     tau: float
 
     def products(self, stack: Array) -> Array:
@@ -135,34 +137,11 @@ class Smooth:
 
     def whitened(self, stack: Array) -> Array:
         """Return (1 + τ²BBᵀ)^(−½) times (E, K) columns; dearer than :meth:`products`."""
-        found, spectrum = [], self.spectrum
-        for k, (part, rows) in enumerate(zip(spectrum.parts, spectrum.apart(stack), strict=True)):
-            value, vector = spectrum.decomposed(k)
-            power = np.expm1(-0.5 * np.log1p(self.tau**2 * value))
-            flat = rows.reshape(-1, rows.shape[2])
-            if part.wide:
-                found.append((flat + vector @ (power[:, None] * (vector.T @ flat))).reshape(rows.shape))
-            else:
-                over = power / np.maximum(value, settings.SMOOTH_FLOOR)
-                found.append(rows + part.times(vector @ (over[:, None] * (vector.T @ part.adjoint(rows)))))
-        return spectrum.joined(found).reshape(stack.shape)
+        return self.spectrum.whitened(self.tau, stack)
 
     def eigen(self, floor: float) -> tuple[Array, Array]:
         """Return U (E, r), orthonormal, and d (r,) with τ²BBᵀ = U diag(d) Uᵀ; what lies below a floor is left out."""
-        found, variance, spectrum = [], [], self.spectrum
-        m = len(spectrum.axes)
-        for k, part in enumerate(spectrum.parts):
-            value, vector = spectrum.decomposed(k)
-            heard = self.tau**2 * value > floor
-            own = vector[:, heard]
-            if not part.wide:
-                rows = part.times(own / np.sqrt(value[heard]))
-                own = rows.reshape(len(rows) * rows.shape[1], rows.shape[2])
-            if len(spectrum.parts) > 1:
-                own = (own[:, None, :] * spectrum.axes[None, :, k, None]).reshape(len(own) * m, own.shape[1])
-            found.append(own)
-            variance.append(self.tau**2 * value[heard])
-        return np.concatenate(found, axis=1), np.concatenate(variance)
+        return self.spectrum.eigen(self.tau, floor)
 
     @property
     def log_det(self) -> float:
@@ -172,23 +151,14 @@ class Smooth:
     @property
     def degrees(self) -> float:
         """How many equations the discrepancy follows: the trace of its smoother."""
-        factors = [self.spectrum.factor(self.tau, k) for k in range(len(self.spectrum.parts))]
-        return float(sum(len(f) - np.trace(dpotri(f, lower=1)[0]) for f in factors))
+        return self.spectrum.degrees(self.tau)
 
     def mean(self, left: Array) -> Array:
         """(N, m) posterior mean of the discrepancy, in units of the noise.
 
         Given the (E,) residual of the rows in use, whitened by weights and noise alone.
         """
-        found, spectrum = [], self.spectrum
-        for k, (part, everywhere, rows) in enumerate(
-            zip(spectrum.parts, spectrum.everywhere, spectrum.apart(left[:, None]), strict=True)
-        ):
-            along = rows.reshape(-1, 1) if part.wide else part.adjoint(rows)
-            solved = dpotrs(spectrum.factor(self.tau, k), along, lower=1)[0]
-            inner = part.adjoint(solved.reshape(rows.shape)) if part.wide else solved
-            found.append(everywhere.times(self.tau**2 * inner))
-        return spectrum.joined(found)[:, :, 0]
+        return self.spectrum.mean(self.tau, left)
 
 
 @dataclass(frozen=True, eq=False)
@@ -281,9 +251,61 @@ class Spectrum:
             found -= own.T @ own - within if part.wide else tau**2 * within
         return found
 
-    def at(self, tau: float) -> Smooth:
-        """Return the covariance with a discrepancy of rms τ over the noise."""
-        return Smooth(self, tau)
+    def whitened(self, tau: float, stack: Array) -> Array:
+        """Return (1 + τ²BBᵀ)^(−½) times (E, K) columns."""
+        found = []
+        for k, (part, rows) in enumerate(zip(self.parts, self.apart(stack), strict=True)):
+            value, vector = self.decomposed(k)
+            power = np.expm1(-0.5 * np.log1p(tau**2 * value))
+            flat = rows.reshape(-1, rows.shape[2])
+            if part.wide:
+                found.append((flat + vector @ (power[:, None] * (vector.T @ flat))).reshape(rows.shape))
+            else:
+                over = power / np.maximum(value, settings.SMOOTH_FLOOR)
+                found.append(rows + part.times(vector @ (over[:, None] * (vector.T @ part.adjoint(rows)))))
+        return self.joined(found).reshape(stack.shape)
+
+    def eigen(self, tau: float, floor: float) -> tuple[Array, Array]:
+        """Return U (E, r), orthonormal, and d (r,) with τ²BBᵀ = U diag(d) Uᵀ; what lies below a floor is left out."""
+        found, variance = [], []
+        m = len(self.axes)
+        for k, part in enumerate(self.parts):
+            value, vector = self.decomposed(k)
+            heard = tau**2 * value > floor
+            own = vector[:, heard]
+            if not part.wide:
+                rows = part.times(own / np.sqrt(value[heard]))
+                own = rows.reshape(len(rows) * rows.shape[1], rows.shape[2])
+            if len(self.parts) > 1:
+                own = (own[:, None, :] * self.axes[None, :, k, None]).reshape(len(own) * m, own.shape[1])
+            found.append(own)
+            variance.append(tau**2 * value[heard])
+        return np.concatenate(found, axis=1), np.concatenate(variance)
+
+    def degrees(self, tau: float) -> float:
+        """Trace of the smoother."""
+        factors = [self.factor(tau, k) for k in range(len(self.parts))]
+        return float(sum(len(f) - np.trace(dpotri(f, lower=1)[0]) for f in factors))
+
+    def mean(self, tau: float, left: Array) -> Array:
+        """(N, m) posterior mean given the (E,) residual of the rows in use, in units of the noise."""
+        found = []
+        for k, (part, everywhere, rows) in enumerate(
+            zip(self.parts, self.everywhere, self.apart(left[:, None]), strict=True)
+        ):
+            along = rows.reshape(-1, 1) if part.wide else part.adjoint(rows)
+            solved = dpotrs(self.factor(tau, k), along, lower=1)[0]
+            inner = part.adjoint(solved.reshape(rows.shape)) if part.wide else solved
+            found.append(everywhere.times(tau**2 * inner))
+        return self.joined(found)[:, :, 0]
+
+
+def decomposed(form: Form, weights: Array, noise: Array) -> Spectrum | Grouped:
+    """Make a form ready for every size: scaled to a mean of one on K's diagonal, in units of the noise."""
+    if not form.anew:
+        return Spectrum.of(form, weights, noise)
+    moves = np.broadcast_to(form.moves, (len(form.functions), *form.moves.shape[-2:]))
+    return Grouped.of(moves, form.functions.astype(np.int64), weights, noise)
 
 
 def forms(observations: Observations) -> tuple[Form, ...]:
@@ -296,12 +318,12 @@ def forms(observations: Observations) -> tuple[Form, ...]:
     found.append(Form("places", functions, _moves(observations, measures)))
     found += _at_one_place(observations, "places", functions, measures, anew=False)
     pose = repeated_poses(observations.campaign)
-    each = np.eye(int(pose.max()) + 1)[pose]
-    if observations.campaign.noise_position is not None or each.shape[1] < len(pose):
+    each, repeated = pose.astype(float), int(pose.max()) + 1 < len(pose)
+    if observations.campaign.noise_position is not None or repeated:
         found.append(Form("poses", each, units, anew=True))
         found += _at_one_place(observations, "poses", each, measures, anew=True)
-    if each.shape[1] < len(pose):
-        found += _at_one_place(observations, "visits", np.eye(len(pose)), measures, anew=True)
+    if repeated:
+        found += _at_one_place(observations, "visits", np.arange(len(pose), dtype=float), measures, anew=True)
     return tuple(found)
 
 

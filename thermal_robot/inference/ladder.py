@@ -10,8 +10,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.inference import settings
-from thermal_robot.inference.discrepancy import Form, Spectrum
+from thermal_robot.inference.discrepancy import Form, Smooth, Spectrum, decomposed
 from thermal_robot.inference.evidence import Combination, Gram, Search, evidence
+from thermal_robot.inference.grouped import Grouped
 from thermal_robot.inference.problem import Linear, Whitening, contained, normal_equations, whitened
 
 Array = NDArray[np.float64]
@@ -57,7 +58,7 @@ class Ladder:
         self._priors = {PLAIN: float(np.log1p(-share))}
         self._joined = False
         given, self.forms = self.forms, []
-        self._spectra: list[Spectrum] = []
+        self._spectra: list[Spectrum | Grouped] = []
         self._along: list[list[Array]] = []
         for form in given:
             self._consider(form, float(np.log(share / len(given))))
@@ -66,17 +67,17 @@ class Ladder:
     def _consider(self, form: Form, log_prior: float) -> int:
         """Add a form, which shares its prior among all sizes; return its number."""
         self.forms.append(form)
-        spectrum = Spectrum.of(form, self.whitening.weights, self.whitening.noise)
+        spectrum = decomposed(form, self.whitening.weights, self.whitening.noise)
         self._spectra.append(spectrum)
         self._along.append(spectrum.along(self._stack))
-        number, each = len(self.forms) - 1, log_prior - float(np.log(settings.OCTAVES))
+        number, each = len(self.forms) - 1, log_prior - float(np.log(len(settings.TAUS)))
         self._priors |= {(number, tau): each for tau in settings.TAUS}
         return number
 
     def whitened_at(self, rung: Rung) -> Whitening:
         """Return the whitening with the discrepancy of a rung."""
         form, tau = rung
-        return self.whitening if form < 0 else replace(self.whitening, smooth=self._spectra[form].at(tau))
+        return self.whitening if form < 0 else replace(self.whitening, smooth=Smooth(self._spectra[form], tau))
 
     def at(self, rung: Rung) -> Search:
         """Return the search beside one discrepancy, made once."""
@@ -144,7 +145,7 @@ class Ladder:
         others = [f for f in others if f.place[1] not in form.name.split(", ")]
         if not others:
             return None
-        prior = float(self._priors[rung] + np.log(settings.OCTAVES) - np.log(len(others) * len(settings.PARTS)))
+        prior = float(self._priors[rung] + np.log(len(settings.TAUS)) - np.log(len(others) * len(settings.PARTS)))
         tried = []
         for further in (form.beside(other, part) for other in others for part in settings.PARTS):
             tried.append((self._size(self._consider(further, prior), blocks)[1], further))

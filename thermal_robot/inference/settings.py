@@ -25,8 +25,6 @@ TAUS = tuple(2.0 ** (k / 4) for k in range(-4, 25))
 beside a hundred independent errors a size a factor of two off costs 20 nats."""
 TAU_STEPS = (4, 2, 1)
 """Of that grid: steps in which the best size is looked for."""
-OCTAVES = 7
-"""Octaves of these sizes, which share the prior of a form; each stands for all sizes in it."""
 LENGTHS = (1.4, 2.8)
 """Length scales of the discrepancy at the tool, in standard deviations of the inputs times the root of their number."""
 LANDMARKS = 100
