@@ -57,6 +57,7 @@ class Ladder:
         self._quick: dict[tuple[Rung, tuple[int, ...]], float] = {}
         self._priors = {PLAIN: float(np.log1p(-share))}
         self._joined = False
+        self._sizes: dict[int, float] = {}
         given, self.forms = self.forms, []
         self._spectra: list[Spectrum | Grouped] = []
         self._along: list[list[Array]] = []
@@ -147,10 +148,15 @@ class Ladder:
             return None
         prior = float(self._priors[rung] + np.log(len(settings.TAUS)) - np.log(len(others) * len(settings.PARTS)))
         tried = []
-        for further in (form.beside(other, part) for other in others for part in settings.PARTS):
-            tried.append((self._size(self._consider(further, prior), blocks)[1], further))
-            self._forget()
-        return self._size(self._consider(max(tried, key=lambda item: item[0])[1], prior), blocks)
+        for other in others:
+            for part in settings.PARTS:
+                further = form.beside(other, part)
+                # the joints so far stay as they are
+                tau = min(settings.TAUS, key=lambda t: abs(t - rung[1] * float(np.hypot(1.0, part))))
+                tried.append((self._beside((self._consider(further, prior), tau), blocks), tau, further))
+                self._forget()
+        _, tau, best = max(tried, key=lambda item: item[0])
+        return self._size(self._consider(best, prior), blocks, tau)
 
     def _forget(self) -> None:
         """Take the last form out again."""
@@ -158,9 +164,9 @@ class Ladder:
         del self.forms[number], self._spectra[number], self._along[number]
         self._quick = {key: log for key, log in self._quick.items() if key[0][0] != number}
 
-    def _size(self, form: int, blocks: tuple[int, ...]) -> tuple[Rung, float]:
+    def _size(self, form: int, blocks: tuple[int, ...], start: float = 1.0) -> tuple[Rung, float]:
         """Return the most probable size of a form beside one combination, with the log evidence; it has one peak."""
-        k = settings.TAUS.index(1.0)
+        k = settings.TAUS.index(self._sizes.get(form, start))
         best = self._beside((form, settings.TAUS[k]), blocks)
         for step in settings.TAU_STEPS:
             for sign in (step, -step):
@@ -169,6 +175,7 @@ class Ladder:
                     if other <= best:
                         break
                     k, best = k + sign, other
+        self._sizes[form] = settings.TAUS[k]
         return (form, settings.TAUS[k]), best
 
     def _beside(self, rung: Rung, blocks: tuple[int, ...]) -> float:
