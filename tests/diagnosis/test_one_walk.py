@@ -7,7 +7,7 @@ import pytest
 from diagnosis.simulated import WIDTHS, drawn, explained
 
 from thermal_robot.diagnosis.one_walk import Model, Squares, Walk, deviation, share
-from thermal_robot.inference.discrepancy import Form, Spectrum
+from thermal_robot.inference.discrepancy import Form, Smooth, Spectrum
 from thermal_robot.inference.problem import Linear
 from thermal_robot.inference.rows import each
 
@@ -82,7 +82,7 @@ def test_rows_that_are_alike_count_by_their_own_covariance():
     rng = np.random.default_rng(2)
     form = Form("some", rng.normal(size=(ROWS, 4)), rng.normal(size=(3, 2)))
     weights, noise = np.where(np.arange(ROWS) == 5, 0.0, 1.0), np.full(3, 2.0)
-    smooth = Spectrum.of(form, weights, noise).at(3.0)
+    smooth = Smooth(Spectrum.of(form, weights, noise), 3.0)
     alike = replace(known, whitening=replace(known.whitening, weights=weights, noise=noise, smooth=smooth), seen={})
     # K of mean one on the diagonal, in units of the noise
     likeness = np.kron(form.functions @ form.functions.T, form.moves @ form.moves.T)

@@ -11,7 +11,7 @@ from simulate import simulate
 
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import frame_columns
-from thermal_robot.inference.discrepancy import Form, Spectrum, forms
+from thermal_robot.inference.discrepancy import Form, Smooth, Spectrum, forms
 from thermal_robot.inference.explain import explain
 from thermal_robot.inference.frames import register
 from thermal_robot.inference.problem import Linear
@@ -43,7 +43,7 @@ CASES = {
 
 @pytest.fixture(params=list(CASES))
 def case(request):
-    """Form, noise, weights of which two are zero, its spectrum; the dense covariance of all rows and those in use."""
+    """A form's spectrum, weights of two rows zero; the dense covariance of those in use, and of all with them."""
     rng = np.random.default_rng(len(request.param))
     form = CASES[request.param](rng)
     count, measures = len(form.functions), form.moves.shape[-2]
@@ -63,7 +63,7 @@ def test_products_are_those_beside_the_dense_covariance(case, tau):
     spectrum, inside, _, _, rng = case
     stack = rng.normal(size=(len(inside), 7))
     expected = stack.T @ np.linalg.solve(np.eye(len(inside)) + tau**2 * inside, stack)
-    found = spectrum.at(tau).products(stack)
+    found = Smooth(spectrum, tau).products(stack)
     np.testing.assert_allclose(found, expected, rtol=0, atol=1e-10 * np.abs(expected).max())
     # from columns that were carried over once
     again = spectrum.products(tau, spectrum.along(stack), stack.T @ stack)
@@ -75,9 +75,9 @@ def test_columns_are_whitened_by_the_root_of_the_dense_covariance(case, tau):
     spectrum, inside, _, _, rng = case
     stack = rng.normal(size=(len(inside), 5))
     expected = np.linalg.inv(np.real(sqrtm(np.eye(len(inside)) + tau**2 * inside))) @ stack
-    np.testing.assert_allclose(spectrum.at(tau).whitened(stack), expected, rtol=0, atol=1e-8)
-    white = spectrum.at(tau).whitened(stack)
-    products = spectrum.at(tau).products(stack)
+    np.testing.assert_allclose(Smooth(spectrum, tau).whitened(stack), expected, rtol=0, atol=1e-8)
+    white = Smooth(spectrum, tau).whitened(stack)
+    products = Smooth(spectrum, tau).products(stack)
     np.testing.assert_allclose(white.T @ white, products, rtol=0, atol=1e-10 * np.abs(products).max())
 
 
@@ -85,7 +85,7 @@ def test_columns_are_whitened_by_the_root_of_the_dense_covariance(case, tau):
 def test_the_determinant_and_what_is_followed_are_those_of_the_dense_covariance(case, tau):
     spectrum, inside, _, _, _ = case
     covariance = np.eye(len(inside)) + tau**2 * inside
-    smooth = spectrum.at(tau)
+    smooth = Smooth(spectrum, tau)
     assert smooth.log_det == pytest.approx(np.linalg.slogdet(covariance)[1], rel=1e-10)
     assert smooth.degrees == pytest.approx(np.trace(np.linalg.solve(covariance, tau**2 * inside)), rel=1e-10)
 
@@ -93,11 +93,11 @@ def test_the_determinant_and_what_is_followed_are_those_of_the_dense_covariance(
 @pytest.mark.parametrize("tau", TAUS)
 def test_the_eigenvectors_put_the_covariance_together(case, tau):
     spectrum, inside, _, _, _ = case
-    vectors, variance = spectrum.at(tau).eigen(1e-8)
+    vectors, variance = Smooth(spectrum, tau).eigen(1e-8)
     assert (variance > 1e-8).all()
     np.testing.assert_allclose(vectors.T @ vectors, np.eye(len(variance)), rtol=0, atol=1e-8)
     np.testing.assert_allclose((vectors * variance) @ vectors.T, tau**2 * inside, rtol=0, atol=2e-8 * len(inside))
-    few, large = spectrum.at(tau).eigen(float(np.median(variance)))
+    few, large = Smooth(spectrum, tau).eigen(float(np.median(variance)))
     assert few.shape[1] == len(large) < len(variance)
 
 
@@ -106,7 +106,7 @@ def test_the_mean_is_that_of_the_process_given_the_rows_in_use(case, tau):
     spectrum, inside, across, measures, rng = case
     left = rng.normal(size=len(inside))
     expected = tau**2 * across @ np.linalg.solve(np.eye(len(inside)) + tau**2 * inside, left)
-    found = spectrum.at(tau).mean(left)
+    found = Smooth(spectrum, tau).mean(left)
     assert found.shape == (len(across) // measures, measures)
     np.testing.assert_allclose(found.ravel(), expected, rtol=0, atol=1e-10 * np.abs(expected).max())
 
@@ -120,9 +120,15 @@ def test_a_unit_of_a_form_is_the_noise(name):
     noise = np.repeat(rng.uniform(0.5, 2.0, measures // 3), 3)
     for factor in (1.0, 1e-5):
         other = replace(form, moves=factor * form.moves, functions=7.0 * form.functions)
-        smooth = Spectrum.of(other, np.ones(count), noise).at(2.0)
+        smooth = Smooth(Spectrum.of(other, np.ones(count), noise), 2.0)
         covariance = np.linalg.inv(smooth.products(np.eye(count * measures)))
         assert (np.diag(covariance) - 1.0).mean() == pytest.approx(4.0, rel=1e-8)
+
+
+def one_hot(form):
+    """A form that is anew, with a function for each pose or visit."""
+    assert form.anew
+    return replace(form, functions=np.eye(form.functions.max().astype(int) + 1)[form.functions.astype(int)])
 
 
 def campaign_of(name, repeats=1, **told):
@@ -183,8 +189,8 @@ def test_a_second_joint_errs_beside_the_first_and_independently_of_it(part):
     one, other = (f for f in forms(seen(campaign)) if f.name in ("poses, elbow_joint", "poses, wrist_1_joint"))
     both = one.beside(other, part)
     assert (both.name, both.several, both.anew) == ("poses, elbow_joint, wrist_1_joint", True, True)
-    expected = (dense(one, noise) + part**2 * dense(other, noise)) / (1.0 + part**2)
-    np.testing.assert_allclose(dense(both, noise), expected, rtol=0, atol=1e-10)
+    expected = (dense(one_hot(one), noise) + part**2 * dense(one_hot(other), noise)) / (1.0 + part**2)
+    np.testing.assert_allclose(dense(one_hot(both), noise), expected, rtol=0, atol=1e-10)
 
 
 def test_visits_of_a_pose_share_what_the_pose_brings_and_not_what_a_visit_brings():
@@ -194,7 +200,7 @@ def test_visits_of_a_pose_share_what_the_pose_brings_and_not_what_a_visit_brings
     own = np.repeat(np.repeat(np.eye(60), 3, axis=0), 3, axis=1)
     for form in forms(seen(campaign)):
         if form.anew:
-            found = np.abs(dense(form, noise)) > 1e-12
+            found = np.abs(dense(one_hot(form), noise)) > 1e-12
             assert not found[(same if form.name.startswith("poses") else own) == 0.0].any()
             assert found.any()
 

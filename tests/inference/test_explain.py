@@ -131,7 +131,7 @@ def alike(copies, size, seed=5):
     pose = np.repeat(np.arange(ROWS // copies), copies)
     steady = columns_of(rng.normal(size=(len(linear.gap) // copies, 3, 2))[pose], np.full(2, 3e-5))
     shared = size * rng.normal(size=(ROWS // copies, 3))[pose]
-    each = Form("poses", np.eye(ROWS // copies)[pose], np.eye(3), anew=True)
+    each = Form("poses", pose.astype(float), np.eye(3), anew=True)
     return Linear(linear.gap + shared, linear.frames, (steady,)), each
 
 
