@@ -238,10 +238,10 @@ def test_blocks_that_contain_each_other_are_apart_beside_every_discrepancy():
 SCATTERED = ("joint_2", "joint_4")
 
 
-def scattering(places, seed, rows=60, tau=6.0):
+def scattering(places, seed, rows=60, tau=6.0, present=()):
     """Rows of which several joints, or one, err anew by so many times the noise; five joints on offer."""
     rng = np.random.default_rng([seed, 9])
-    linear, whitening = small_problem(seed, rows=rows, present=())
+    linear, whitening = small_problem(seed, rows=rows, present=present)
     whitening = replace(whitening, weights=np.ones(rows))
     offered, gap, each = [], linear.gap, np.arange(rows, dtype=float)
     for k in range(1, 6):
@@ -265,3 +265,43 @@ def test_joints_that_scatter_are_told_whether_one_or_two(places):
         # what was put together is no form to start with: single ones are
         assert not any(form.several for form in ladder.in_question(best))
         assert {f"poses, {name}" for name in places} <= {form.name for form in ladder.in_question(best)}
+
+
+def test_joints_that_scatter_are_told_beside_an_effect():
+    """They are put together beside the best combination and beside none, once each, and no trial is kept."""
+    for seed in range(5):
+        ladder = scattering(SCATTERED, seed, present=(1,))
+        rung, best = ladder.run()
+        assert set(ladder.forms[rung[0]].name.split(", ")[1:]) == set(SCATTERED)
+        assert best.blocks == (1,)
+        joined = [form for form in ladder.forms if form.several]
+        assert 1 <= len(joined) <= 2 * (settings.SCATTERING - 1)
+        assert len(ladder.forms) == 5 + len(joined)
+        asked = {r[0] for r in (*ladder.searches, *(r for r, _ in ladder._quick))}
+        assert asked <= {-1, *range(len(ladder.forms))}
+
+
+def test_an_evidence_beside_several_joints_is_that_of_their_joined_covariance():
+    """Beside one joint and beside two, after others were tried and taken out again: against the gap's density."""
+    ladder = scattering(SCATTERED, 2, rows=30, present=(1,))
+    rung, _ = ladder.run()
+    assert ladder.forms[rung[0]].several
+    one = ladder.forms.index(next(form for form in ladder.forms if form.name == "poses, joint_2"))
+    linear, whitening = ladder.linear, ladder.whitening
+    off = []
+    for number, tau in (rung, (one, 1.0), (one, 8.0)):
+        form = ladder.forms[number]
+        covariance = tau**2 * inside(replace(form, functions=np.eye(30)), whitening)
+        alone = Ladder(linear, whitening, [form], PRIOR)
+        for blocks in CHOSEN:
+            found = alone.at((0, tau)).evaluate(blocks)
+            less_prior = found.log_evidence - alone._priors[0, tau]
+            ours = ladder._beside((number, tau), blocks) - ladder._priors[number, tau]
+            assert ours == pytest.approx(less_prior, abs=1e-6)
+            density = direct(linear, whitening, found, PRIOR, beside=covariance)
+            density += volume(linear, whitening, found, beside=covariance)
+            off.append(less_prior - density)
+    off = np.array(off)[np.isfinite(off)]
+    assert len(off) > 0.8 * 3 * len(CHOSEN)
+    assert np.mean(np.abs(off - np.median(off)) < 1e-5) > 0.9
+    assert (off - np.median(off)).max() < 0.6
