@@ -141,8 +141,8 @@ def _rivals(fit: Fit, explained: dict[str, int]) -> dict[str, tuple[str, ...]]:
             both = np.array([other in h for h in held])
             instead = float(e.probabilities[absent & both].sum())
             doubtful = mass >= 1.0 - settings.SURE and instead > max(settings.RIVAL, settings.RIVAL_SHARE * mass)
-            whole = next(b for b, f in enumerate(fit.families) if f == name)
-            apart = not any(frozenset((whole, b)) in containing for b in own)
+            whole = [k for k, f in enumerate(fit.families) if f == name]
+            apart = not all(any(frozenset((w, b)) in containing for b in own) for w in whole)
             if doubtful or (apart and any(_imitates(fit, block, b) for b in own)):
                 rivals.setdefault(name, set()).add(other)
                 rivals.setdefault(other, set()).add(name)

@@ -164,7 +164,7 @@ def alone(effect: Effect, observations: Observations) -> tuple[Effect, ...]:
 
 def joints_of(parameters: Sequence[Parameter]) -> tuple[str, ...]:
     """Return the joints that parameters sit in, in their order, each once."""
-    return tuple(dict.fromkeys(p.place for p in parameters if p.kind == "joint" and p.place))
+    return tuple(dict.fromkeys(p.place for p in parameters if p.kind in ("joint", "link") and p.place))
 
 
 def _at(effect: Effect, joint: str) -> Effect | None:
@@ -213,7 +213,7 @@ def _kept(effect: Effect, parameters: tuple[Parameter, ...], robot: Robot) -> tu
     for joint in _texts(effect, "joints is", effect.joints):
         if joint not in known:
             raise EffectError(f"effect {effect.name!r}: joints holds {joint!r}, expected any of {', '.join(known)}")
-    return tuple(p for p in parameters if p.kind == "joint" and p.place in effect.joints)
+    return tuple(p for p in parameters if p.kind in ("joint", "link") and p.place in effect.joints)
 
 
 def _texts(effect: Effect, what: str, answer: Any) -> tuple[str, ...]:

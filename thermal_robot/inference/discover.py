@@ -17,7 +17,7 @@ from thermal_robot.inference.explain import explain, log_priors
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.problem import Linear
 from thermal_robot.inference.robust import Noise
-from thermal_robot.inference.scan import Scanned, scan, shaped
+from thermal_robot.inference.scan import Scanned, Seats, scan, shaped
 from thermal_robot.inference.target import Target
 from thermal_robot.inference.thin import Thin
 
@@ -87,8 +87,19 @@ def _remainders(fit: Fit) -> Iterator[tuple[int, ...]]:
 
 
 def _offered(thin: Thin, target: Target, own: Sequence[Scanned]) -> list[Discovered]:
-    """Return the best laws of a remainder in their best shapes, each with the number that it was picked among."""
+    """Return the best laws of a remainder in their best shapes, each with the number that it was picked among.
+
+    The best shape at a segment is also tried in the joint behind it, which is simpler.
+    """
     first = [(item, shaped(thin.observations, target, item.law)) for item in _with_joints(own)]
+    at_links = [(item, s) for item, s in first if s.law.kind == "link"]
+    if at_links:
+        simpler = [replace(s.law, kind="joint", unit=s.law.unit) for _, s in at_links]
+        gains = Seats(thin.observations, [target]).gains(simpler)[0]
+        first += [
+            (item, replace(s, law=law, gain=float(gain)))
+            for (item, s), law, gain in zip(at_links, simpler, gains, strict=True)
+        ]
     worth = [(s.gain - float(np.log(item.tried * s.tried)), item, s) for item, s in first]
     worth.sort(key=lambda entry: -entry[0])
     return [replace(s.law, tried=float(item.tried * s.tried)) for gain, item, s in worth if gain > -settings.RUNG_REACH]

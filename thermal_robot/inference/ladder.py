@@ -9,6 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
 from thermal_robot.inference.discrepancy import Form, Smooth, Spectrum, decomposed
 from thermal_robot.inference.evidence import Combination, Gram, Search, evidence
@@ -191,7 +192,10 @@ class Ladder:
                 self._equations,
             )
             prior = self._priors[rung] + sum(self.log_prior[b] for b in key[1])
-            self._quick[key] = evidence(problem, tuple(range(len(blocks))), prior, None).log_evidence
+            try:
+                self._quick[key] = evidence(problem, tuple(range(len(blocks))), prior, None).log_evidence
+            except EstimationError:  # what so large a discrepancy leaves is rounding
+                self._quick[key] = -np.inf
         return self._quick[key]
 
     def _left(self, rung: Rung, picked: NDArray[np.int64]) -> Array:
