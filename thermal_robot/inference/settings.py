@@ -45,8 +45,8 @@ PARTS = tuple(2.0 ** (k / 2) for k in range(-3, 4))
 """Rms of a further joint over that of those before it, in halves of an octave."""
 FORM_REACH = 20.0
 """Log evidence below the best at which a form of the discrepancy is given up while a fit settles."""
-RUNG_REACH = 4.0
-"""Log evidence below the best at which a discrepancy still counts: 1 in 50."""
+RUNG_REACH = 5.4
+"""Log evidence below the best at which a size of a discrepancy still counts: 1 in 200, four sizes an octave."""
 
 # --- rounding ---
 
