@@ -92,9 +92,10 @@ def _offered(thin: Thin, target: Target, own: Sequence[Scanned]) -> list[Discove
     The best shape at a segment is also tried in the joint behind it, which is simpler.
     """
     first = [(item, shaped(thin.observations, target, item.law)) for item in _with_joints(own)]
-    at_links = [(item, s) for item, s in first if s.law.kind == "link"]
+    joints = thin.observations.robot.joint_names
+    at_links = [(item, s) for item, s in first if s.law.kind == "link" and s.law.place in joints]
     if at_links:
-        simpler = [replace(s.law, kind="joint", unit=s.law.unit) for _, s in at_links]
+        simpler = [replace(s.law, kind="joint") for _, s in at_links]
         gains = Seats(thin.observations, [target]).gains(simpler)[0]
         first += [
             (item, replace(s, law=law, gain=float(gain)))

@@ -159,7 +159,7 @@ def _others(chosen: Effect, observations: Observations, settings_of: Sequence[Ef
 def _listed(
     variants: dict[str, tuple[Effect, ...]], observations: Observations
 ) -> tuple[list[Effect], tuple[str, ...]]:
-    """List all settings but those of single joints of which the data see nothing beside the unknown frames."""
+    """List all settings but those of single places of which the data see nothing beside the frames."""
     frames = frame_columns(observations)[0]
     basis = orthonormal(frames.reshape(frames.shape[0] * frames.shape[1], frames.shape[2]))
     names, moves = observations.robot.joint_names, observations.joint_sensitivity[:, : frames.shape[1]]
@@ -168,11 +168,15 @@ def _listed(
     hidden = {
         n for n, seen in zip(names, left > settings.ALIAS * np.linalg.norm(flat, axis=0), strict=True) if not seen
     }
+    segments = observations.robot.segments
+    # before the first joint a segment is the base, behind the last one the tool
+    hidden |= {s.parent_link for s in segments} - {s.parent_link for s in segments[1:] if s.movable}
     every = [setting for own in variants.values() for setting in own]
     listed = [e for e in every if not (hidden & set(e.joints) and _constant(e, observations))]
     return listed, tuple(setting.name for setting in listed)
 
 
 def _constant(effect: Effect, observations: Observations) -> bool:
-    """Whether an effect displaces each joint by the same in all rows."""
-    return all(r.values.ndim == 0 for p in gate.checked(effect, observations) for r in p.responses)
+    """Whether an effect displaces each place by the same in all rows."""
+    responses = [r for p in gate.checked(effect, observations) for r in p.responses]
+    return all(r.values.ndim == (0 if r.channel == "joint" else 1) for r in responses)
