@@ -55,3 +55,12 @@ def with_law(robot, law, values, seed, samples=120, fresh=100):
     rest = np.setdiff1d(np.arange(samples + fresh), mine)
     data = replace(whole.take(mine), rows=np.arange(2, samples + 2))
     return data, replace(whole.take(rest), position=None), true[rest]
+
+
+def numbers(value):
+    """Every number of a plain structure."""
+    if isinstance(value, dict):
+        value = list(value.values())
+    if isinstance(value, list):
+        return [n for v in value for n in numbers(v)]
+    return [value] if isinstance(value, float) else []

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers import numbers
 from simulate import simulate
 
 from thermal_robot import EffectError, EstimationError, ThermalRobotError, diagnose
@@ -25,15 +26,6 @@ def _nothing_may_overflow_in_silence():
 def offset(rv_m2):
     """A campaign of positions with joint offsets."""
     return simulate(rv_m2, ["joint_offset"], seed=0)[0]
-
-
-def numbers(value):
-    """Every number of a plain structure."""
-    if isinstance(value, dict):
-        value = list(value.values())
-    if isinstance(value, list):
-        return [n for v in value for n in numbers(v)]
-    return [value] if isinstance(value, float) else []
 
 
 @pytest.mark.parametrize("rows", [1, 2, 3, 4, 5, 6])

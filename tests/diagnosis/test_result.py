@@ -5,6 +5,7 @@ from dataclasses import FrozenInstanceError, replace
 
 import jsonschema
 import pytest
+from helpers import numbers
 
 from thermal_robot.diagnosis import result
 from thermal_robot.diagnosis.result import told, told_by
@@ -57,14 +58,6 @@ def test_whoever_was_named_last_is_asked(hall, nobody):
     told_by(Other())
     assert told(hall).summary == "other"
     assert said.effects == hall.effects
-
-
-def numbers(value):
-    if isinstance(value, dict):
-        value = list(value.values())
-    if isinstance(value, list):
-        return [n for v in value for n in numbers(v)]
-    return [value] if isinstance(value, float) else []
 
 
 def test_json_holds_all_and_nothing_that_json_cannot(hall, tmp_path):
