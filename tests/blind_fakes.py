@@ -68,7 +68,8 @@ for line in sys.stdin:
         print("not JSON", flush=True)
         continue
     predicted = [[3.0, 0.0, 0.0], [1.0, 4.0, 0.0]]
-    print(json.dumps({"said": {"was": request}, "predicted": predicted, "seconds": 0.1, "error": None}), flush=True)
+    reply = {"said": {"was": request}, "predicted": predicted, "refitted": {}, "seconds": 0.1, "error": None}
+    print(json.dumps(reply), flush=True)
 """
 
 

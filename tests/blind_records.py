@@ -1,6 +1,7 @@
 """Records of a blind trial, made by hand."""
 
 NOISE = 2e-5
+_TRUE = ("unlisted", "places", "near", "quantities", "needs", "parameters")
 J1, J2, L2 = ({"kind": k, "name": n} for k, n in (("joint", "j1"), ("joint", "j2"), ("link", "l2")))
 
 
@@ -28,7 +29,7 @@ def record(kind, diagnosis, effects=(), parts=None, **more):
     ratios = {**dict.fromkeys(effects, 3.0), **(parts or {})}
     truth = {"effects": list(effects), "unlisted": None, "places": [], "quantities": [], "needs": [], "outliers": []}
     truth["parts"] = {n: {"ratio": r, "main": n in effects, "places": [J1]} for n, r in ratios.items()}
-    truth |= {name: more.pop(name) for name in ("unlisted", "places", "quantities", "needs") if name in more}
+    truth |= {name: more.pop(name) for name in _TRUE if name in more}
     rest = {"id": "c1", "kind": kind, "robot": "ur3", "samples": 100, "measures": "position", "noise": NOISE}
     fresh = {"rms_before": 10 * NOISE, "rms_after": NOISE}
     rest |= {"without": [], "hidden": [], "fresh": fresh, "seconds": 0.5, "error": None}

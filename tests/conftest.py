@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from coupled import COUPLED, PARALLELOGRAM
 
 from thermal_robot.robot import load_robot
 
@@ -57,6 +58,8 @@ ARMS = {
     "rv_m2": ("builtin:rv_m2", "tool0", None),
     "awkward": (AWKWARD, "tip", None),
     "awkward-from-base": (AWKWARD, "tip", "base"),
+    "parallelogram": (PARALLELOGRAM, "tool", None),
+    "coupled": (COUPLED, "tip", None),
     "ur3": ("example-robot-data:ur3", "tool0", None),
     "ur5": ("example-robot-data:ur5", "tool0", "base_link"),
     "ur10": ("example-robot-data:ur10", "tool0", None),

@@ -9,6 +9,7 @@ import numpy as np
 import pinocchio
 import pytest
 import yourdfpy
+from coupled import coupled
 
 from thermal_robot import kinematics as kin
 from thermal_robot import robot as robot_module
@@ -42,10 +43,14 @@ def test_an_arm_is_what_its_urdf_says(arm):
         chain.insert(0, by_child[link])
         link = by_child[link].parent
     assert arm.chain.names == tuple(joint.name for joint in chain)
-    assert arm.joint_names == tuple(joint.name for joint in chain if joint.type != "fixed")
-    assert arm.joint_types == tuple(joint.type for joint in chain if joint.type != "fixed")
+    driven = [joint for joint in chain if joint.type != "fixed" and joint.mimic is None]
+    assert arm.joint_names == tuple(joint.name for joint in driven)
+    assert arm.joint_types == tuple(joint.type for joint in driven)
+    assert {segment.joint for segment in arm.segments} - {None} == set(arm.joint_names)
     for joint, lower, upper in zip(arm.joint_names, arm.lower, arm.upper, strict=True):
         limit = joints[joint].limit
+        if any(other.mimic is not None and other.mimic.joint == joint for other in chain):
+            continue  # narrowed by what follows it: see tests/kinematics/test_mimic.py
         if joints[joint].type == "continuous":
             assert (lower, upper) == (-np.inf, np.inf)
         else:
@@ -212,4 +217,35 @@ def test_segments_are_the_paths_from_joint_to_joint(arm):
         k = segment.index
         along = arm.chain.rotations[k] @ segment.direction * segment.length
         np.testing.assert_allclose(along, arm.chain.translations[k], atol=1e-12)
-        assert segment.movable == (segment.name in arm.joint_names)
+        assert segment.movable == (segment.index in arm.chain.movable)
+        assert segment.movable or segment.joint is None
+
+
+@pytest.mark.parametrize("name", ["parallelogram", "coupled"])
+def test_mimics_survive_what_writes_and_saves_robots(name, configurations):
+    arm = coupled(name)
+    # yourdfpy reads the tag, and does not write it
+    written = parsed(arm.urdf)
+    assert "mimic" not in written.write_xml_string().decode()
+    same_robot(arm, load_robot(written, arm.tool_frame), configurations, atol=1e-10)
+    same_robot(arm, pickle.loads(pickle.dumps(arm)), configurations)
+
+
+def test_what_a_newer_yourdfpy_might_write_is_believed(configurations):
+    arm = coupled("parallelogram")
+
+    class Writing:
+        robot = parsed(arm.urdf.replace('multiplier="-1"', 'multiplier="0.5"')).robot
+
+        def write_xml_string(self):
+            return arm.urdf
+
+    same_robot(arm, load_robot(Writing(), "tool"), configurations)
+
+
+def test_a_segment_knows_the_joint_that_moves_it():
+    moved = {segment.name: segment.joint for segment in coupled("coupled").segments}
+    assert moved == {
+        "mount": None, "early": "swing", "turret": "turret", "swing": "swing", "stage_1": "stage_1",
+        "stage_2": "stage_1", "stage_3": "stage_1", "half": "turret", "rack": "turret", "jaw": None, "tip_joint": None,
+    }  # fmt: skip

@@ -4,6 +4,7 @@ import re
 import sys
 
 import pytest
+from coupled import PARALLELOGRAM, joint, link
 
 from thermal_robot.errors import RobotError
 from thermal_robot.robot import load_robot
@@ -115,20 +116,43 @@ def test_joints_with_more_freedoms_are_named(kind):
     )
 
 
-def test_mimic_joint_is_named():
+def test_mimics_of_nothing_and_of_themselves_are_named():
     error = refusal(two_links("continuous", '<axis xyz="0 0 1"/><mimic joint="k"/>'), "b")
-    assert str(error) == "joint 'j' of the chain mimics another joint, which is not supported"
+    assert str(error) == "joint 'j' mimics 'k', which is not a joint of the robot; nearest: j"
     assert error.name == "j"
+    error = refusal(two_links("continuous", '<axis xyz="0 0 1"/><mimic joint="j"/>'), "b")
+    assert str(error) == "joints mimic each other in a circle: 'j' mimics 'j'"
+    assert error.name == "j"
+
+
+@pytest.mark.parametrize("tag", ['<mimic joint="j" multiplier="3,4"/>', '<mimic joint="j" offset=""/>', "<mimic/>"])
+def test_a_spoilt_mimic_tag_is_said(tag):
+    assert "is not a valid URDF: " in str(refusal(two_links("continuous", f'<axis xyz="0 0 1"/>{tag}'), "b"))
+
+
+def test_limits_that_never_meet_are_named():
+    text = PARALLELOGRAM.replace('offset="0.3"', 'offset="5"')
+    error = refusal(text, "tool")
+    assert str(error) == "joint 'upright' mimics 'reach', but the two are never both within their limits"
+    assert error.name == "upright"
 
 
 def test_a_mimic_tag_in_a_comment_is_none():
     assert load_robot(two_links("continuous", '<axis xyz="0 0 1"/><!-- <mimic joint="k"/> -->'), "b").n == 1
 
 
-def test_mimic_fingers_beyond_the_tool_do_not_matter():
+def test_fingers_that_mimic_nothing_beyond_the_tool_do_not_matter():
+    hand = link("thumb") + joint("bend", "continuous", "hand", "thumb", mimic='joint="no such joint"')
+    text = PARALLELOGRAM.replace("</robot>", hand + "</robot>")
+    assert load_robot(text, "tool").n == 4
+    assert refusal(text, "thumb").name == "bend"
+
+
+def test_a_mimic_finger_stands_where_the_other_one_is_held():
     pytest.importorskip("example_robot_data", reason="the arm is in the package example-robot-data-loaders")
     assert load_robot("example-robot-data:panda", "panda_hand").n == 7
-    assert refusal("example-robot-data:panda", "panda_rightfinger").name == "panda_finger_joint2"
+    finger = load_robot("example-robot-data:panda", "panda_rightfinger")
+    assert finger.joint_names == load_robot("example-robot-data:panda", "panda_hand").joint_names
 
 
 def test_an_axis_without_direction_is_named():

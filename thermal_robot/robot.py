@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
@@ -57,6 +58,9 @@ class Segment:
         Chain element that it belongs to.
     movable
         Whether the placement is a movable joint's.
+    joint
+        Name of the joint whose position moves what is behind it: its own, or the one that it mimics; ``None`` for a
+        fixed frame, and for a joint that mimics one outside the chain.
     """
 
     name: str
@@ -65,11 +69,12 @@ class Segment:
     direction: Array
     index: int
     movable: bool
+    joint: str | None
 
 
 @dataclass(frozen=True, eq=False, repr=False)
 class Robot:
-    """One kinematic chain with n movable joints and S segments; made by :func:`load_robot`, then unchanged.
+    """One kinematic chain with n joints that can be driven and S segments; made by :func:`load_robot`, then unchanged.
 
     Parameters
     ----------
@@ -83,9 +88,9 @@ class Robot:
         (3,) m/s² in the root frame.
     joint_names, joint_types
         n names and types (``revolute``, ``continuous`` or ``prismatic``) of the movable joints, from the root
-        on.
+        on. A joint that mimics another is none of them: it follows.
     lower, upper
-        (n,) limits, rad or m; infinite for a continuous joint or where the URDF gives none.
+        (n,) limits, rad or m, narrowed to those of the joints that mimic it; infinite where the URDF gives none.
     has_masses
         Whether the URDF gives a mass to anything that the joints carry.
     segments
@@ -93,7 +98,7 @@ class Robot:
     chain
         Constant arrays for the functions of :mod:`thermal_robot.kinematics`.
     model
-        ``pinocchio.Model`` reduced to the movable joints.
+        ``pinocchio.Model`` reduced to the movable joints, mimicking ones too.
     urdf_links, urdf_joints
         Names of all links and of all joints of the URDF, in the chain or not, fixed joints too.
     """
@@ -116,7 +121,7 @@ class Robot:
 
     @property
     def n(self) -> int:
-        """Number of movable joints."""
+        """Number of joints that can be driven."""
         return len(self.joint_names)
 
     def __repr__(self) -> str:
@@ -138,7 +143,8 @@ def load_robot(
     """Load the chain of a robot from its URDF; meshes are not read.
 
     Joints outside the chain, and those between the root of the URDF and ``root_frame``, are held at 0, or at
-    their limit nearest to 0.
+    their limit nearest to 0. A joint with a ``<mimic>`` tag follows the joint that it names, and stands still where
+    that one is held; outside the chain it is held in any case, where the held position of that one takes it.
 
     Parameters
     ----------
@@ -161,7 +167,8 @@ def load_robot(
     ------
     RobotError
         If there is no such file, name or link, if it is not a URDF, if the chain has no movable joint, or one
-        that is not revolute, continuous, prismatic or fixed, or if gravity is not three finite numbers.
+        that is not revolute, continuous, prismatic or fixed, if one of its joints mimics one that does not exist, or
+        in the end itself, or if gravity is not three finite numbers.
     """
     text, source = _urdf_text(urdf)
     if not tool_frame:
@@ -186,12 +193,12 @@ def _build(
         tool_frame=tool_frame,
         root_frame=built.root_frame,
         gravity=built.gravity,
-        joint_names=tuple(chain.names[k] for k in chain.movable),
+        joint_names=built.joint_names,
         joint_types=built.joint_types,
         lower=built.lower,
         upper=built.upper,
         has_masses=bool(np.any(chain.masses > 0.0)),
-        segments=tuple(_segment(chain, int(k)) for k in chain.placed),
+        segments=tuple(_segment(chain, built.joint_names, int(k)) for k in chain.placed),
         chain=chain,
         model=built.model,
         urdf_links=built.urdf_links,
@@ -199,12 +206,15 @@ def _build(
     )
 
 
-def _segment(chain: Chain, k: int) -> Segment:
+def _segment(chain: Chain, joints: tuple[str, ...], k: int) -> Segment:
     offset = chain.translations[k]
     length = float(np.linalg.norm(offset))
     direction = chain.rotations[k].T @ offset / length if length > SHORTEST_SEGMENT else np.zeros(3)
     direction.setflags(write=False)
-    return Segment(chain.names[k], chain.parent_links[k], length, direction, k, k in chain.movable)
+    movable = np.flatnonzero(chain.movable == k)
+    leader = chain.coupling.leader(int(movable[0])) if len(movable) else None
+    joint = None if leader is None else joints[leader]
+    return Segment(chain.names[k], chain.parent_links[k], length, direction, k, len(movable) > 0, joint)
 
 
 def _three_finite_numbers(gravity: ArrayLike | None) -> Array | None:
@@ -233,9 +243,25 @@ def _urdf_text(urdf: str | Path | WritesUrdf) -> tuple[str, str]:
     if isinstance(urdf, Path):
         return _read(urdf)
     if isinstance(urdf, WritesUrdf):
-        written = urdf.write_xml_string()
-        return written.decode() if isinstance(written, bytes) else written, _DESCRIPTION
+        return _written(urdf), _DESCRIPTION
     raise RobotError(f"a robot is a path, URDF text or a yourdfpy.URDF, not {type(urdf).__name__}")
+
+
+def _written(urdf: WritesUrdf) -> str:
+    """Text of a robot that writes itself, with the mimic tags that yourdfpy (to 0.0.60) reads but does not write."""
+    written = urdf.write_xml_string()
+    text = written.decode() if isinstance(written, bytes) else written
+    joints = getattr(getattr(urdf, "robot", None), "joints", ())
+    known = {joint.name: joint.mimic for joint in joints if getattr(joint, "mimic", None) is not None}
+    if not known or "<mimic" in text:
+        return text
+    tree = ElementTree.fromstring(text)
+    for joint in tree.iter("joint"):
+        mimic = known.get(joint.get("name"))
+        if mimic is not None:
+            values = {"joint": mimic.joint, "multiplier": str(mimic.multiplier), "offset": str(mimic.offset)}
+            ElementTree.SubElement(joint, "mimic", values)
+    return ElementTree.tostring(tree, encoding="unicode")
 
 
 def _read(path: Path) -> tuple[str, str]:

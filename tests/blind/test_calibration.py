@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from blind_records import crash, effect, record, said
+from blind_records import J1, L2, crash, effect, record, said
 
 from thermal_robot.blind.calibration import calibration, reliability
 
@@ -20,15 +20,25 @@ def test_calibration_counts_what_is_clearly_there_or_clearly_not():
     effects = [effect("drift", 0.6), effect("backlash", 0.2), effect("joint_gain", 0.4), effect("geometric", 0.7)]
     effects += [effect("joint_offset", 0.03), effect("tracking_lag", None, "not_testable")]
     parts = {"joint_gain": 0.3, "geometric": 0.6, "joint_offset": 0.05}
-    cases = [record("faint", said(*effects), ["drift"], parts), record("removed", said(effect("drift", 0.5)))]
+    cases = [record("mixed", said(*effects), ["drift"], parts), record("removed", said(effect("drift", 0.5)))]
     cases.append(record("hard", said(effect("backlash", 0.5), effect("drift", 0.5)), ["drift"], {"backlash": 0.15}))
-    cases.append(record("faint", said(effect("discovered.1", 0.8), flagged=True), unlisted="cable"))
-    found = calibration([*cases, crash("single", "drift")])
-    # joint_gain is neither; the removed, the hard and the failed case say nothing, nor does a law of what is unlisted
+    cases.append(record("single", said(effect("drift", 0.5)), ["drift"]))
+    found = calibration([*cases, crash("mixed", "drift")])
+    # joint_gain is neither; the removed, the hard, the single and the failed case say nothing
     assert found.all.trials == 4
     assert found.doubtful.trials == 3
     assert found.doubtful.error == pytest.approx((0.4 + 0.2 + 0.3) / 3)
     assert found.all.error == pytest.approx((0.4 + 0.2 + 0.3 + 0.03) / 4)
+
+
+def test_a_law_counts_as_right_where_place_or_neighbour_and_quantity_are():
+    true = {"unlisted": "cable", "places": [J1], "near": [J1, L2], "quantities": ["time"]}
+    laws = [effect("discovered.1", 0.8, places=[L2], quantity="time"), effect("discovered.2", 0.6, quantity="payload")]
+    found = calibration([record("mixed", said(*laws, flagged=True), **true)])
+    assert (found.all.bins[8].present.successes, found.all.bins[8].present.trials) == (1, 1)
+    assert (found.all.bins[6].present.successes, found.all.bins[6].present.trials) == (0, 1)
+    # without a cause no law is right
+    assert calibration([record("mixed", said(laws[0], flagged=True))]).all.bins[8].present.successes == 0
 
 
 def test_who_says_what_is_so_has_no_error_and_who_boasts_has_his_boast():

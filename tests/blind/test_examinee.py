@@ -38,7 +38,10 @@ def test_the_answer_holds_the_diagnosis_and_where_its_model_has_the_fresh_sample
     assert reply["seconds"] > 0.0
     model = CorrectedModel.load(folder / "model.json")
     position, _ = model.predict(model.samples(folder / "fresh.csv"))
-    assert np.array_equal(reply["predicted"], position)
+    np.testing.assert_allclose(reply["predicted"], position, atol=1e-9)  # to a nanometre
+    # frames alone, and with the one effect that is in the model
+    assert set(reply["refitted"]) == {"", "thermal_elongation"}
+    np.testing.assert_allclose(reply["refitted"]["thermal_elongation"], position, atol=1e-5)
     assert json.loads(json.dumps(reply, allow_nan=False)) == reply
 
 

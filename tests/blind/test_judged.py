@@ -48,7 +48,7 @@ def test_where_nothing_is_at_work_the_unexplained_is_a_false_alarm_too():
 
 def test_places_are_asked_of_what_was_found_rightly():
     answer = said(effect("backlash", places=[J1, J2]), effect("drift", places=[J2]), effect("geometric", places=[J2]))
-    case = record("triple", answer, ["backlash", "drift", "joint_gain"])
+    case = record("many", answer, ["backlash", "drift", "joint_gain"])
     case["truth"]["parts"]["drift"]["places"] = [J1, J2]
     found = marks(case)
     assert found["located"] == (True, False)
@@ -115,13 +115,58 @@ def test_a_failure_is_wrong_everywhere():
         (said(effect("drift"), effect("backlash")), None, False, True),
         (said(effect("drift"), flagged=True), None, False, False),
         (said(effect("drift"), flagged=True), "slip", True, False),
-        (said(effect("drift"), effect("discovered.1"), flagged=True), "slip", False, True),
+        # a law of another place or quantity is a false name, one beside the place is none
+        (
+            said(effect("drift"), effect("discovered.1", places=[L2], quantity="time"), flagged=True),
+            "slip",
+            True,
+            False,
+        ),
+        (
+            said(effect("drift"), effect("discovered.1", places=[J2], quantity="time"), flagged=True),
+            "slip",
+            False,
+            True,
+        ),
+        (said(effect("drift"), effect("discovered.1", quantity="payload"), flagged=True), "slip", False, True),
     ],
 )
 def test_sound_is_what_names_nothing_false(answer, unlisted, sound, alarm):
-    case = record("faint", answer, ["drift"], unlisted=unlisted)
+    case = record("mixed", answer, ["drift"], unlisted=unlisted, places=[J1], near=[J1, L2], quantities=["time"])
     assert marks(case) == {"sound": (sound,), "false_alarm": (alarm,)}
     assert is_miss(case) is not sound
+
+
+def test_a_place_beside_the_true_one_is_near_it():
+    true = {"unlisted": "cable", "places": [J1], "near": [J1, L2], "quantities": ["time"]}
+    for where, exact, near in ((J1, True, True), (L2, False, True), (J2, False, False)):
+        found = marks(record("unlisted", said(flagged=True, where=[where]), **true))
+        assert (found["place"], found["near_place"]) == ((exact,), (near,))
+
+
+def test_that_it_follows_nothing_is_right_only_where_it_was_called_unexplained():
+    true = {"unlisted": "coolant", "places": [J1], "quantities": ["none"]}
+    law = effect("discovered.1", quantity="none", shape="constant")
+    for answer, right in (
+        (said(flagged=True, where=[J1]), True),
+        (said(law, flagged=True), True),
+        (said(), False),
+        (said(flagged=True, where=[J1], follows=["time"]), False),
+    ):
+        assert marks(record("unlisted", answer, **true))["quantity"] == (right,)
+    # and wrong where something that was recorded is followed
+    other = {**true, "quantities": ["time"]}
+    assert marks(record("unlisted", said(flagged=True, where=[J1]), **other))["quantity"] == (False,)
+
+
+def test_beside_a_cause_the_listed_effects_are_to_be_found_too():
+    true = {"unlisted": "coolant", "places": [J1], "quantities": ["none"]}
+    found = marks(record("both", said(effect("drift"), flagged=True, where=[J1]), ["drift"], **true))
+    assert set(found.values()) == {(True,)}
+    found = marks(record("both", said(flagged=True, where=[J1]), ["drift"], **true))
+    assert (found["listed"], found["flagged"], found["right"]) == ((False,), (True,), (False,))
+    found = marks(record("both", said(effect("drift"), effect("geometric"), flagged=True), ["drift"], **true))
+    assert (found["listed"], found["not_blamed"], found["right"]) == ((True,), (False,), (False,))
 
 
 @pytest.mark.parametrize("of_kind", get_args(Kind))

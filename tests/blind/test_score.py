@@ -34,6 +34,9 @@ def test_the_score_holds_each_kind():
     assert of(found.unlisted["cable"], "place") == (1, 1)
     assert [(r.asked, r.answer, r.right) for r in found.real] == [("arm: untouched", "<geometric>", True)]
     assert found.seconds.longest == 0.5
+    # the law of the unlisted cause has its place and its quantity
+    assert (found.laws.successes, found.laws.trials) == (1, 1)
+    assert (found.worse.successes, found.worse.trials) == (0, 11)
     assert single.fresh.count == 3
     assert single.fresh.median == pytest.approx(3**-0.5)
 
@@ -44,7 +47,7 @@ def test_misses_can_be_looked_up():
     assert misses["a4"].error == "the diagnosis failed: late"
     assert (misses["a2"].truth, misses["a2"].said, misses["a2"].probability) == (("drift",), ("backlash", "drift"), 0.9)
     assert misses["a2"].wrong == ("exact", "first_named", "false_alarm")
-    assert misses["a3"].unexplained == "somewhere"
+    assert misses["a3"].unexplained == "none"
 
 
 @pytest.mark.parametrize("records", [[], trial(), [crash("single", "drift")], [record("null", said())]])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from blind_records import NOISE, crash, effect, record, said
 
-from thermal_robot.blind.shrinkage import fresh_ratio, shrinkage, spread
+from thermal_robot.blind.shrinkage import fresh_ratio, shrinkage, spread, worse
 
 
 def test_claims_are_compared_with_the_noise_taken_off():
@@ -34,6 +34,15 @@ def test_a_case_without_a_gap_or_without_an_answer_makes_no_pair():
     flat = {**case, "fresh": {"rms_before": 0.0, "rms_after": 0.0}}
     found = shrinkage([flat, crash("single", "drift"), {**case, "fresh": None}])
     assert (found.pairs, found.median_absolute_difference) == ((), None)
+
+
+def test_a_model_is_worse_than_none_where_it_names_something_and_errs_more():
+    good = record("single", said(effect("drift", shrinkage=0.9)), ["drift"])
+    bad = {**good, "fresh": {"rms_before": NOISE, "rms_after": 1.1 * NOISE}}
+    silent = {**bad, "said": said()}  # names nothing: it is the frames alone
+    scattering = {**bad, "said": said(effect("encoder_resolution", shrinkage=0.0))}
+    found = worse([good, bad, silent, scattering, crash("single", "drift"), {**good, "fresh": None}])
+    assert (found.successes, found.trials) == (1, 4)
 
 
 def test_the_spread_of_nothing_is_nothing():

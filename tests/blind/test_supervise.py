@@ -59,7 +59,7 @@ def test_who_gives_no_answer_is_replaced_and_the_next_is_asked(trial, do, why):
     replies = dict(examine(asked(trial, do, ""), trial, workers=1, timeout=1.0))
     assert replies["c0"]["error"].startswith(f"the diagnosis failed: {why}")
     assert {name: value for name, value in replies["c0"].items() if name != "error"} == {
-        "said": None, "predicted": None, "seconds": None,
+        "said": None, "predicted": None, "refitted": {}, "seconds": None,
     }  # fmt: skip
     assert replies["c1"]["error"] is None
     first, second = (pid for _, pid in told(trial))

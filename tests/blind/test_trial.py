@@ -163,7 +163,8 @@ def test_the_distance_is_that_of_a_hand_calculation(fake):
     cases = (*told("", ""), Real("r1"), Real("r2", "r1"))
     records = run_trial(cases, fake, light, workers=2)
     # distances 10 and 0 before, 3 and 4 after
-    assert records[0]["fresh"] == {"rms_before": pytest.approx(50**0.5), "rms_after": pytest.approx(12.5**0.5)}
+    fresh = {"rms_before": pytest.approx(50**0.5), "rms_after": pytest.approx(12.5**0.5), "shares": {}}
+    assert records[0]["fresh"] == fresh
     request = records[0]["said"]["was"]
     assert request == {"folder": str(fake.resolve() / "campaigns" / "c0"), "without": [], "only": []}
     real = records[2]

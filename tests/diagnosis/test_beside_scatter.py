@@ -8,7 +8,9 @@ from simulate import simulate
 
 from thermal_robot import diagnose
 from thermal_robot.diagnosis.beside_scatter import beside_scatter
+from thermal_robot.diagnosis.parts import Refused
 from thermal_robot.effects import choose
+from thermal_robot.inference import settings
 from thermal_robot.inference.fit import fit
 from thermal_robot.inference.frames import register
 from thermal_robot.inference.random_gap import random_gap
@@ -49,12 +51,12 @@ def scattering(robot, effects=()):
     return replace(plain, position=plain.position + shift - here.predicted_position + noise)
 
 
-def concluded(campaign, names):
+def concluded(campaign, names, refused=None):
     known = fit(campaign, choose(names, (), ()))
     chance = random_gap(known)
     assert chance.explains_size
     heard = []
-    return beside_scatter(known, chance, heard.append), known
+    return beside_scatter(known, chance, refused or {}, heard.append), known
 
 
 def test_scatter_explains_what_it_is_and_leaves_nothing(rv_m2):
@@ -75,3 +77,26 @@ def test_an_effect_that_is_there_stays_beside_the_scatter(rv_m2):
     last, _ = concluded(scattering(rv_m2, ["joint_offset"]), ("joint_offset", "backlash"))
     assert [effect.name for effect, _ in last.fit.effects] == ["joint_offset"]
     assert [k.component.joint for k in last.chance.kept] == [1]
+
+
+def test_what_rows_held_out_refused_is_handed_on(rv_m2):
+    last, _ = concluded(scattering(rv_m2), ("joint_offset", "backlash"), {"joint_gain": Refused(0.02, -0.01)})
+    assert last.refused["joint_gain"] == Refused(0.02, -0.01)
+    # never offered beside the scatter: nothing else can be said of it
+    assert "joint_gain" not in last.fit.families
+
+
+def test_what_the_scatter_feigned_has_a_probability_below_its_prior(rv_m2):
+    """The effects were chosen with the instrument's noise alone, of which the scatter is twenty times."""
+    last, known = concluded(scattering(rv_m2), ("joint_offset", "backlash", "joint_gain", "transmission_error"))
+    feigned = [effect.name for effect, _ in known.effects]
+    assert set(feigned) <= set(last.refused)
+    assert set(last.refused) == {"joint_offset", "backlash", "joint_gain", "transmission_error"}
+    assert all(0.0 <= p < settings.PRIOR_PROBABILITY for p in (r.probability for r in last.refused.values()))
+    assert not set(last.refused) & {effect.name for effect, _ in last.fit.effects}
+
+
+def test_of_what_stays_beside_the_scatter_nothing_is_refused(rv_m2):
+    last, _ = concluded(scattering(rv_m2, ["joint_offset"]), ("joint_offset", "backlash"))
+    assert "joint_offset" not in last.refused
+    assert last.refused["backlash"].probability < settings.PRIOR_PROBABILITY

@@ -36,9 +36,12 @@ def test_too_few_poses_are_refused(offset, rows, stated):
         diagnose(few if stated else replace(few, noise_position=None))
 
 
-def test_seven_poses_without_a_stated_noise_are_refused_without_a_warning(offset):
-    with pytest.raises(EstimationError):
-        diagnose(replace(offset.take(np.arange(7)), noise_position=None))
+def test_seven_poses_without_a_stated_noise_are_diagnosed_without_a_warning(offset):
+    """Each is held out once: six others determine the frames."""
+    found = diagnose(replace(offset.take(np.arange(7)), noise_position=None))
+    assert found.gap.held_out.folds == 7
+    low, high = found.gap.held_out.shrinkage_ci95
+    assert low <= found.gap.held_out.shrinkage <= high <= 1.0
 
 
 @pytest.mark.parametrize("rows", [8, 11, 20])
@@ -110,8 +113,9 @@ def test_joints_in_the_wrong_unit_or_order_are_not_explained(arm):
     for wrong in (np.rad2deg(campaign.q), campaign.q[:, ::-1]):
         found = diagnose(replace(campaign, q=wrong))
         assert found.unexplained.flagged
+        # a gain of minus 98 % takes degrees for radians, and most of the gap away; what is left is told by its name
         assert found.unexplained.rms > 0.1
-        assert found.gap.held_out.shrinkage < 0.3
+        assert str(found).startswith("Robot and table do not describe the same motion")
 
 
 def test_the_origin_and_the_unit_of_time_do_not_matter(rv_m2):
@@ -132,7 +136,9 @@ def test_a_fifth_of_the_rows_may_be_wrong_but_not_half(rv_m2, gross, explained):
         campaign, truth, _ = simulate(rv_m2, ["joint_offset"], seed=seed, outliers=gross)
         found = diagnose(campaign)
         if explained:
-            right += found.verdict == ("joint_offset",) and not found.unexplained.flagged
+            # so many are no gross errors of an instrument, and that is all that is said against it
+            (reason,) = found.unexplained.reasons
+            right += found.verdict == ("joint_offset",) and "rows were set aside" in reason
             assert len(set(found.outliers) ^ set(truth["outliers"])) <= 2
         else:
             right += found.unexplained.flagged
@@ -179,9 +185,23 @@ def test_a_frame_that_is_declared_known_and_wrong_is_found_with_its_size(rv_m2, 
         assert abs(estimate.value - true) < 5.0 * estimate.std
 
 
-def test_a_prior_that_rules_an_effect_out_leaves_it_to_what_contains_it(offset):
+def test_a_prior_that_rules_an_effect_out_leaves_it_to_what_contains_it(rv_m2):
+    several = simulate(rv_m2, ["joint_offset"], seed=0, places=["joint_2", "joint_3", "joint_4"])[0]
+    assert diagnose(several).verdict == ("joint_offset",)
+    assert diagnose(replace(several, priors={"joint_offset": 1e-9})).verdict == ("geometric",)
+
+
+def test_a_prior_that_rules_one_joint_out_leaves_it_to_the_placement_there(offset):
+    """One place at fault needs no geometry of thirty numbers: a zero is a turn of what carries the joint."""
     assert diagnose(offset).verdict == ("joint_offset",)
-    assert diagnose(replace(offset, priors={"joint_offset": 1e-9})).verdict == ("geometric",)
+    told = diagnose(replace(offset, priors={"joint_offset": 1e-9}))
+    assert told.verdict == ("geometric",)
+    (place,) = diagnose(offset).finding("joint_offset").locations
+    # the turn is the same before the joint and behind it
+    carriers = [s.parent_link for s in told.fit.campaign.robot.segments]
+    (joint,) = [k for k, s in enumerate(told.fit.campaign.robot.segments) if s.name == place.name]
+    (link,) = told.finding("geometric").locations
+    assert link.name in carriers[joint : joint + 2]
 
 
 def test_withholding_everything_is_refused(offset):

@@ -101,3 +101,17 @@ def test_a_remark_is_made_at_each_stage(rv_m2):
     heard = []
     examine(known(rv_m2), heard.append)
     assert len(heard) == 2
+
+
+@pytest.mark.parametrize("stated", [1.0, 2.0])
+def test_structure_below_the_stated_noise_is_looked_at(rv_m2, stated):
+    """What is smaller than the stated noise is not too large; neighbours and laws are asked all the same."""
+    for seed in range(3):
+        play = simulate(rv_m2, ["backlash"], seed=seed, noise=NOISE / 2.0, ratio=(1.2, 1.3), places=["joint_3"])[0]
+        known = fit(replace(play, noise_position=stated * NOISE), ())
+        said = examine(known).unexplained
+        assert said.flagged
+        assert not any("times the stated noise" in reason for reason in said.reasons)
+        assert said.locations[0].name == "joint_3"
+        assert said.depends_on[0].covariate == "approach.joint_3"
+        assert said.rms == pytest.approx(1.25 * np.sqrt(3.0) * NOISE / 2.0, rel=0.2)

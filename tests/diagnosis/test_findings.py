@@ -5,13 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import load_arm
+from helpers import with_law
 from simulate import simulate
 
 from thermal_robot import diagnose
 from thermal_robot.diagnosis.findings import by_share, findings, separates, titled
-from thermal_robot.diagnosis.parts import Finding
+from thermal_robot.diagnosis.parts import Finding, Refused
 from thermal_robot.effects import choose, library, random_effects
-from thermal_robot.inference.fit import fit
+from thermal_robot.effects.law import Discovered
+from thermal_robot.inference.fit import fit, refit
 from thermal_robot.inference.frames import register
 
 
@@ -47,17 +49,18 @@ def test_rows_in_another_sequence_leave_the_verdict():
 
 @pytest.fixture(scope="module")
 def offsets(rv_m2):
-    """Joint zeros at fault, found among a few candidates; time is not recorded."""
-    campaign = simulate(rv_m2, ["joint_offset"], seed=2, ratio=(4.0, 5.0))[0]
+    """Zeros of three joints at fault, found among a few candidates; time is not recorded."""
+    places = ["joint_2", "joint_3", "joint_4"]
+    campaign = simulate(rv_m2, ["joint_offset"], seed=2, ratio=(4.0, 5.0), places=places)[0]
     bare = {name: values for name, values in campaign.covariates.items() if name != "time"}
     few = choose(("joint_offset", "geometric", "drift", "instrument_scale"), (), ())
     return fit(replace(campaign, covariates=bare), few)
 
 
-def said(known, believed=None, share=0.9):
+def said(known, laws=None, refused=None, share=0.9):
     names = dict.fromkeys(known.families)
     shares = {name: (share if name == "joint_offset" else 0.01, (0.0, 1.0)) for name in names}
-    return {f.name: f for f in findings(known, shares, {}, believed or {})}
+    return {f.name: f for f in findings(known, shares, {}, laws or {}, refused or {})}
 
 
 def test_every_candidate_has_one_finding(offsets):
@@ -75,10 +78,33 @@ def test_every_candidate_has_one_finding(offsets):
         assert bool(f.parameters) == (f.status == "found")
 
 
-def test_what_is_believed_less_is_less_probable(offsets):
-    whole, half = said(offsets)["joint_offset"], said(offsets, {"joint_offset": 0.5})["joint_offset"]
-    assert half.probability == pytest.approx(0.5 * whole.probability)
-    assert half.parameters == whole.parameters
+def test_a_known_effect_is_as_probable_as_the_evidence_says(offsets):
+    """No factor, no floor: what unlisted causes do to it is in the evidence already."""
+    for name, f in said(offsets).items():
+        if f.status != "not_testable":
+            own = [b for b, family in enumerate(offsets.families) if family == name]
+            assert f.probability == offsets.explanation.probability(own)
+
+
+def test_a_law_is_as_probable_as_its_place_and_quantity(rv_m2):
+    law = Discovered("discovered.1", "joint", "joint_3", "temperature", "step", (22.0,), 1.0)
+    known = fit(with_law(rv_m2, law, [-2e-4, 2e-4], seed=3)[0], choose(("drift",), (), ()))
+    known = refit(known, {law.name: (law,)}, [law])
+    found = said(known, {law.name: 0.7})
+    assert (found[law.name].status, found[law.name].probability) == ("found", 0.7)
+    assert (found[law.name].quantity, found[law.name].shape) == ("temperature", "step")
+    assert found[law.name].describes == law.describe()
+    # a law that did not last was never a candidate of anybody's
+    assert set(said(refit(known, {law.name: (law,)}, []), {})) - {law.name} == {"drift"}
+    bare = fit(with_law(rv_m2, law, [0.0, 0.0], seed=3)[0], choose(("drift",), (), ()))
+    assert set(said(refit(bare, {law.name: (law,)}, []))) == {"drift"}
+
+
+def test_what_rows_held_out_refused_is_not_found_with_its_probability(offsets):
+    found = said(offsets, refused={"joint_gain": Refused(0.03, -0.05)})["joint_gain"]
+    assert (found.status, found.probability, found.parameters) == ("not_found", 0.03, ())
+    assert found.shrinkage is not None
+    assert found.shrinkage_ci95 is not None
 
 
 def test_a_parameter_that_the_data_do_not_determine_has_no_number(offsets, rv_m2):
@@ -89,6 +115,13 @@ def test_a_parameter_that_the_data_do_not_determine_has_no_number(offsets, rv_m2
     for name in rv_m2.joint_names[1:4]:
         assert estimates[name].identified
         assert estimates[name].std > 0.0
+
+
+def test_of_one_joint_at_fault_only_its_own_parameter_is_said(rv_m2):
+    campaign = simulate(rv_m2, ["joint_offset"], seed=2, ratio=(4.0, 5.0), places=["joint_3"])[0]
+    (own,) = said(fit(campaign, choose(("joint_offset",), (), ())))["joint_offset"].parameters
+    assert own.name.endswith("joint_3")
+    assert own.identified
 
 
 def test_titles_are_those_of_the_effects(offsets):

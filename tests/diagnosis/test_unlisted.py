@@ -12,13 +12,16 @@ from simulate import simulate
 
 from thermal_robot import CorrectedModel, diagnose
 from thermal_robot.diagnosis.examine import examine
-from thermal_robot.diagnosis.parts import Unexplained
-from thermal_robot.diagnosis.unlisted import Stage, as_laws_say, one_more_law
+from thermal_robot.diagnosis.parts import Dependence, Location, Unexplained
+from thermal_robot.diagnosis.unlisted import as_laws_say, one_more_law
 from thermal_robot.effects import choose
 from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.law import Discovered
 from thermal_robot.effects.quantities import GRAVITY, quantities
 from thermal_robot.inference import settings
+from thermal_robot.inference.discover import Discovery, discovered
+from thermal_robot.inference.discrepancy import Form
+from thermal_robot.inference.explain import Discrepancy
 from thermal_robot.inference.fit import fit
 from thermal_robot.inference.frames import register
 from thermal_robot.inference.random_gap import random_gap
@@ -221,32 +224,101 @@ def test_one_eccentric_wheel_is_no_unlisted_cause(rv_m2):
 def test_noise_is_not_worth_a_law(rv_m2):
     known = fit(simulate(rv_m2, seed=2, noise=NOISE)[0], choose(("backlash",), (), ()))
     heard = []
-    assert one_more_law(Stage(known, (), examine(known)), heard.append) is None
+    assert one_more_law(known, 1, heard.append) is None
     assert heard == ["causes that nobody listed: scan 1"]
 
 
-def test_a_law_joins_the_explanation_and_takes_its_remainder(rv_m2):
+def test_a_law_joins_the_fit_and_takes_its_remainder(rv_m2):
     law, values = CASES["step"]
     known = fit(with_law(rv_m2, law, values, seed=3)[0], choose(("joint_offset",), (), ()))
-    before = Stage(known, (), examine(known))
-    assert before.left.unexplained.flagged
-    after = one_more_law(before, lambda _: None)
-    (discovery,) = after.laws
-    assert (discovery.law.place, discovery.law.quantity) == (law.place, law.quantity)
-    assert discovery.law.name in {effect.name for effect, _ in after.fit.effects}
-    assert not after.left.unexplained.flagged
-    said = as_laws_say(before.left.unexplained, after.left.unexplained, after.laws)
-    assert (said.rms, said.p_value, said.reasons) == (
-        before.left.unexplained.rms,
-        before.left.unexplained.p_value,
-        before.left.unexplained.reasons,
-    )
+    before = examine(known).unexplained
+    assert before.flagged
+    after = one_more_law(known, 2, lambda _: None)
+    (own,) = [effect for effect, _ in after.effects if isinstance(effect, Discovered)]
+    assert (own.name, own.place, own.quantity) == ("discovered.2", law.place, law.quantity)
+    assert "discovered.2" in after.families
+    assert not examine(after).unexplained.flagged
+    said = as_laws_say(before, discovered(after), after.explanation.discrepancy)
+    assert (said.rms, said.p_value, said.reasons) == (before.rms, before.p_value, before.reasons)
     assert (said.locations[0].kind, said.locations[0].name) == (law.kind, law.place)
     assert [d.covariate for d in said.depends_on] == [law.quantity]
     assert all(0.0 <= d.p_value <= 1.0 for d in said.depends_on)
     assert all(settings.LIKELY_PLACE <= place.share <= 1.0 for place in said.locations)
 
 
+def test_a_second_law_is_looked_for_beside_the_first(rv_m2):
+    """A step in one joint and a hinge in another: after one of them the other is worth its place."""
+    (first, one), (second, two) = CASES["step"], CASES["hinge"]
+    data = with_law(rv_m2, first, one, seed=5)[0]
+    here = observe(data, Frames.declared(data))
+    moved, _ = displacement(here, [(second, np.array(two))])
+    shift = observe(data, here.frames, displacement=moved).predicted_position - here.predicted_position
+    known = fit(replace(data, position=data.position + shift), choose(("joint_offset",), (), ()))
+    alone = one_more_law(known, 1, lambda _: None)
+    both = one_more_law(alone, 2, lambda _: None)
+    laws = {effect.name: effect.place for effect, _ in both.effects if isinstance(effect, Discovered)}
+    assert set(laws) == {"discovered.1", "discovered.2"}
+    assert set(laws.values()) == {first.place, second.place}
+
+
+NONE = Discrepancy(None, 0.0, 0.0, {})
+
+
+def a_discovery(place, quantity, probability, places=None):
+    law = Discovered("discovered.1", "joint", place, quantity, "ramp", (), 1.0)
+    return Discovery(
+        law, probability, places or ((("joint", place), probability),), ((quantity, probability), ("time", 0.0))
+    )
+
+
+def test_laws_say_where_the_remainder_enters_and_what_it_follows():
+    left = Unexplained(True, 2e-4, 1e-9, ("it is large",))
+    likely, unlikely = settings.LIKELY_PLACE + 0.01, settings.LIKELY_PLACE - 0.01
+    places = ((("joint", "elbow"), 1.0 + 1e-12), (("base", "base"), likely), (("tool", "tool"), unlikely))
+    found = (a_discovery("elbow", "payload", 0.9, places), a_discovery("wrist", "speed", 0.8))
+    said = as_laws_say(left, found, NONE)
+    assert [(p.kind, p.name) for p in said.locations] == [("joint", "elbow"), ("base", "base"), ("joint", "wrist")]
+    assert max(p.share for p in said.locations) == 1.0
+    assert [d.covariate for d in said.depends_on] == ["payload", "speed"]
+    np.testing.assert_allclose([d.p_value for d in said.depends_on], [0.1, 0.2])
+
+
+def test_with_a_law_something_is_unexplained_however_little_is_left():
+    """A law describes, it does not say why."""
+    assert as_laws_say(Unexplained(False, 0.0, 0.4), (a_discovery("elbow", "payload", 0.9),), NONE).flagged
+
+
+def test_a_probability_that_rounding_lifts_above_one_leaves_a_p_value():
+    found = (a_discovery("elbow", "payload", 1.0 + 1e-12),)
+    (depends,) = as_laws_say(Unexplained(True, 1e-4, 1e-9), found, NONE).depends_on
+    assert depends.p_value == 0.0
+
+
 def test_without_laws_it_is_said_what_is_left():
-    first, left = Unexplained(True, 2e-4, 1e-9), Unexplained(True, 1e-4, 1e-6)
-    assert as_laws_say(first, left, ()) is left
+    left = Unexplained(True, 1e-4, 1e-6)
+    assert as_laws_say(left, (), NONE) is left
+
+
+def beside(anew, place):
+    """A discrepancy of one form that has three quarters of the probability."""
+    form = Form("poses, elbow", np.zeros((0, 0)), np.zeros((3, 0)), anew, place)
+    return Discrepancy(form, 4.0, 0.9, {form.name: 0.75})
+
+
+def test_what_errs_anew_in_every_pose_has_a_place_and_follows_nothing():
+    left = Unexplained(True, 1e-4, 1e-6, (), (Location("base", "base", 1.0),), (Dependence("time", 1e-6),))
+    said = as_laws_say(left, (), beside(True, ("joint", "elbow")))
+    assert said.locations == (Location("joint", "elbow", 0.75),)
+    assert said.depends_on == ()
+    assert (said.rms, said.p_value) == (left.rms, left.p_value)
+
+
+@pytest.mark.parametrize(("anew", "place"), [(False, ("joint", "elbow")), (True, ("", ""))])
+def test_what_is_smooth_or_anywhere_has_the_place_that_the_tests_found(anew, place):
+    left = Unexplained(True, 1e-4, 1e-6, (), (Location("base", "base", 1.0),), (Dependence("time", 1e-6),))
+    assert as_laws_say(left, (), beside(anew, place)) is left
+
+
+def test_where_nothing_is_left_a_discrepancy_names_no_place():
+    left = Unexplained(False, 0.0, 0.4)
+    assert as_laws_say(left, (), beside(True, ("joint", "elbow"))) is left

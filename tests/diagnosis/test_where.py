@@ -4,11 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from helpers import with_law
 from simulate import simulate
 
-from thermal_robot.diagnosis.where import locate
+from thermal_robot.diagnosis.parts import Unexplained
+from thermal_robot.diagnosis.where import locate, without_laws
 from thermal_robot.effects import choose
-from thermal_robot.inference.fit import fit
+from thermal_robot.effects.law import Discovered
+from thermal_robot.inference.fit import fit, refit
 
 
 def located(robot, name, share=1.0, **how):
@@ -71,3 +74,30 @@ def test_rows_that_were_set_aside_count_nowhere(rv_m2):
     clean, seen = (locate(f, {"backlash": 1.0})[0].axes for f in (plain, dirty))
     for axis in "xyz":
         assert seen[axis] == pytest.approx(clean[axis], abs=0.05)
+
+
+def test_what_the_known_effects_leave_has_what_the_laws_take_in_it(rv_m2):
+    """Noise apart, it is what is left once the law's effect is taken out of the model again."""
+    law = Discovered("discovered.1", "joint", "joint_3", "temperature", "step", (22.0,), 1.0)
+    data = with_law(rv_m2, law, [-4e-4, 4e-4], seed=3)[0]
+    known = fit(data, ())
+    with_it = refit(known, {law.name: (law,)}, [law])
+    left = Unexplained(False, 0.0, 0.6)
+    said = without_laws(with_it, left)
+    whole = float(np.sqrt((known.nominal.gap**2).sum(axis=1).mean()))
+    assert np.hypot(said.rms, np.sqrt(3.0) * 25e-6) == pytest.approx(whole, rel=0.05)
+    assert 0.0 <= said.p_value < 1e-6
+    # what the law leaves is added in quadrature, and tests that say more are kept
+    more = without_laws(with_it, Unexplained(True, said.rms, 1e-300, ("it is large",)))
+    assert more.rms == pytest.approx(np.sqrt(2.0) * said.rms)
+    assert more.p_value == min(1e-300, said.p_value)
+    share = 1.0 - 3.0 * 25e-6**2 / whole**2
+    for reasons, rest in ((said.reasons, ()), (more.reasons, ("it is large",))):
+        assert reasons[1:] == rest
+        assert reasons[0].startswith("a law explains ")
+        assert float(reasons[0].split()[3].rstrip("%")) == pytest.approx(100.0 * share, abs=1.0)
+
+
+def test_without_laws_the_known_effects_leave_what_the_fit_leaves(rv_m2):
+    left = Unexplained(True, 1e-4, 1e-9)
+    assert without_laws(fit(simulate(rv_m2, ["drift"], seed=3)[0], choose("drift")), left) is left

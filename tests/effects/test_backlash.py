@@ -1,5 +1,6 @@
 """Lost motion: short of where the joint was going, or where the load pushes it."""
 
+import json
 from dataclasses import replace
 
 import numpy as np
@@ -7,6 +8,7 @@ import pytest
 from helpers import SAMPLES, commanded, tool_at, tool_with
 
 from thermal_robot.effects import Backlash
+from thermal_robot.effects.catalogue import restored
 from thermal_robot.observations import observe
 
 
@@ -60,6 +62,49 @@ def test_shares_near_another_stay_shares():
         assert all(0.0 < s.held < 1.0 for s in near)
         assert min(s.held for s in near) < 0.9 < max(s.held for s in near)
     assert Backlash().nearby(1.6) == (Backlash(),)
+
+
+def test_each_joint_hangs_by_its_own_share(rv_m2):
+    approach, campaign = approached(rv_m2, seed=8)
+    here = observe(campaign)
+    largest = Backlash().variants(here)[1].largest
+    shares = tuple(np.linspace(0.2, 0.9, rv_m2.n).tolist())
+    each = Backlash(shares, largest).parameters(here)
+    for j, share in enumerate(shares):
+        alone = Backlash(share, largest).parameters(here)[j]
+        np.testing.assert_array_equal(each[j].responses[0].values, alone.responses[0].values)
+    same = Backlash((0.5,) * rv_m2.n, largest).parameters(here)
+    for one, other in zip(same, Backlash(0.5, largest).parameters(here), strict=True):
+        np.testing.assert_array_equal(one.responses[0].values, other.responses[0].values)
+    # a joint whose share is 0 goes by its approach alone, and a model with shares must know torques
+    never = Backlash((0.0,) * rv_m2.n, largest)
+    np.testing.assert_array_equal(never.parameters(here)[1].responses[0].values, -0.5 * approach[:, 1])
+    assert never.nearby(1.6) == (never,)
+    assert restored("backlash", json.dumps(Backlash(shares, largest).arguments())) == Backlash(shares, largest)
+
+
+def test_shares_move_together_and_each_alone():
+    chain = ("shoulder", "wrist", "elbow")
+    held = Backlash(held=0.5, largest=(10.0, 0.01, 5.0), chain=chain)  # the wrist is too light to hang
+    near = held.nearby(2.0)
+    together = sorted(s.held for s in near if isinstance(s.held, float))
+    assert together == pytest.approx([1 / 3, 0.5, 2 / 3])
+    own = {s.held for s in near if isinstance(s.held, tuple)}
+    moved = {tuple(np.flatnonzero(np.array(shares) != 0.5).tolist()) for shares in own}
+    assert moved == {(0,), (2,)}
+    # or one of them never hangs
+    assert {shares for shares in own if 0.0 in shares} == {(0.0, 0.5, 0.5), (0.5, 0.5, 0.0)}
+    assert len(near) == 1 + 2 + 4 + 2
+    # one that has moved alone still goes with the others, its odds by the same factor
+    apart = replace(held, held=(0.5, 0.5, 0.8))
+    odds = {round(s.held[2] / (1 - s.held[2]), 9) for s in apart.nearby(2.0) if isinstance(s.held, tuple)}
+    assert odds == {0.0, 2.0, 4.0, 8.0}
+    # or all go by one again
+    assert {s.held for s in apart.nearby(2.0) if not isinstance(s.held, tuple)} == {0.5, 0.8}
+    assert (held.apart, apart.apart) == (0, 1)
+    # where there is but one joint, its share is the only one
+    assert len(replace(held, places=("elbow",)).nearby(2.0)) == 3
+    assert len(replace(held, places=("elbow", "wrist", "shoulder")).nearby(2.0)) == len(near)
 
 
 @pytest.mark.parametrize("arm", ["ur10", "rv_m2"], indirect=True)

@@ -54,7 +54,7 @@ def test_defaults_say_that_nothing_is_known(rv_m2):
     assert plain.title == "cable drag"
     assert (plain.needs, plain.random, plain.frame, plain.contained_in) == ((), False, "", ())
     assert plain.variants(observations) == plain.nearby(1.6) == (plain,)
-    assert plain.at("joint_2") is None
+    assert plain.at("joint_2") == replace(plain, places=("joint_2",)) != plain
     assert plain.driver(observations, (), np.zeros(SAMPLES)) is None
     assert plain.arguments() == {}
 

@@ -17,12 +17,14 @@ from thermal_robot.effects import (
     JointOffset,
     Parameter,
     Response,
+    TransmissionError,
     at_base,
     at_instrument,
     at_joint,
     at_segment,
     at_tool,
     gate,
+    library,
 )
 from thermal_robot.effects.gate import checked, driver
 from thermal_robot.inference.columns import block
@@ -196,7 +198,7 @@ ASK = {
     "reads": lambda effect, seen: gate.reads(effect, seen),
     "variants": lambda effect, seen: gate.variants(effect, seen),
     "nearby": lambda effect, seen: gate.nearby(effect, 1.6),
-    "at": lambda effect, seen: gate.at(effect, "joint_2"),
+    "at": lambda effect, seen: gate.at(effect, "joint_2", seen),
     "driver": lambda effect, seen: driver(effect, seen, (GOOD,), np.zeros(SAMPLES)),
     "arguments": lambda effect, seen: gate.arguments(effect),
 }
@@ -257,10 +259,13 @@ def test_right_answers_pass_as_they_are(rv_m2, observations):
     assert gate.variants(effect, observations) == gate.nearby(effect, 1.6) == (effect,)
     assert gate.variants(spoilt("variants", [effect, other]), observations) == (effect, other)
     assert gate.nearby(spoilt("nearby", lambda own: (replace(own, share=0.8), own)), 1.6)[0].share == 0.8
-    assert gate.at(effect, "joint_2") is None
-    assert gate.at(spoilt("at", other), "joint_2") is other
+    assert gate.at(effect, "joint_2", observations) == replace(effect, places=("joint_2",))
+    assert gate.at(effect, "joint_3", observations) is None
+    assert gate.at(spoilt("at", other), "joint_2", observations) is other
+    assert gate.at(spoilt("at", None), "joint_2", observations) is None
     assert gate.arguments(JointOffset()) == {}
     assert gate.arguments(Mine(("a", 1.0))) == {"share": ("a", 1.0)}
+    assert gate.arguments(JointOffset(places=("joint_2",))) == {"places": ("joint_2",)}
 
 
 @pytest.mark.parametrize(
@@ -310,3 +315,86 @@ def test_nobody_asks_an_effect_but_the_gate():
     others = [path for path in root.rglob("*.py") if path.parent.name != "effects"]
     assert len(others) > 100
     assert {path.name: found for path in others if (found := list(asked_directly(path.read_text("utf-8"))))} == {}
+
+
+def rich(robot):
+    """Commands in all conditions that the library's effects read."""
+    from simulate import simulate
+
+    return observe(simulate(robot, samples=12, seed=4, moving=True, links=True)[0])
+
+
+JOINTS = ("joint_1", "joint_2", "joint_3", "joint_4", "joint_5")
+LINKS = ("column", "shoulder", "upper_arm", "forearm", "hand")
+PLACES = {
+    **dict.fromkeys(("joint_offset", "joint_gain", "transmission_error", "backlash", "tracking_lag"), JOINTS),
+    "joint_compliance": JOINTS,
+    **dict.fromkeys(("link_compliance", "thermal_elongation", "thermal_bending"), LINKS),
+    "geometric": ("base_link", "shoulder", "upper_arm", "forearm", "wrist", "hand"),
+}
+"""Where each effect may sit alone; those of frames and instruments are not listed."""
+
+
+@pytest.mark.parametrize("name", library())
+def test_every_effect_of_joints_or_links_may_sit_in_one_of_them(rv_m2, name):
+    seen, effect = rich(rv_m2), library()[name]
+    whole = checked(effect, seen)
+    single = gate.alone(effect, seen)
+    assert [one.places for one in single] == [(place,) for place in PLACES.get(name, ())]
+    for one in single:
+        kept = [p.place in one.places for p in whole]
+        assert [p.name for p in checked(one, seen)] == [p.name for p, keep in zip(whole, kept, strict=True) if keep]
+        np.testing.assert_array_equal(block(seen, one).columns, block(seen, effect).columns[:, :, kept])
+        # a place alone has none less, and its settings stay there
+        assert gate.alone(one, seen) == ()
+        assert {setting.places for setting in (*gate.variants(one, seen), *gate.nearby(one, 1.6))} == {one.places}
+        assert gate.at(effect, one.places[0], seen) == one
+    others = {*JOINTS, *LINKS} - set(PLACES.get(name, ()))
+    assert {gate.at(effect, place, seen) for place in others} == {None}
+
+
+def test_joints_that_are_named_exist(observations):
+    two = checked(JointOffset(places=("joint_4", "joint_2")), observations)
+    assert [p.place for p in two] == ["joint_2", "joint_4"]
+    with pytest.raises(EffectError, match="'joint_offset': places holds 'elbow', expected any of joint_1, joint_2"):
+        checked(JointOffset(places=("joint_2", "elbow")), observations)
+    with pytest.raises(EffectError, match="'joint_offset': places is 'joint_2', expected a tuple of texts"):
+        checked(JointOffset(places="joint_2"), observations)
+
+
+def test_a_model_keeps_its_joints_and_one_of_old_needs_none(rv_m2, tmp_path):
+    seen = rich(rv_m2)
+    held = tuple(
+        (setting, 1e-3 * np.arange(1.0, 1.0 + len(checked(setting, seen))))
+        for effect in (JointOffset(), TransmissionError())
+        for setting in (effect, gate.at(effect, "joint_3", seen))
+    )
+    model = CorrectedModel(rv_m2, seen.campaign.settings, seen.frames, held, "position")
+    model.save(tmp_path / "model.json")
+    again = CorrectedModel.load(tmp_path / "model.json")
+    assert [effect for effect, _ in again.effects] == [effect for effect, _ in held]
+    assert [set(entry["arguments"]) for entry in model.to_dict()["effects"]] == [
+        set(),
+        {"places"},
+        {"harmonics"},
+        {"harmonics", "places"},
+    ]
+
+
+def test_an_effect_with_a_constructor_of_its_own_may_sit_in_one_joint(observations):
+    class Built(Effect):
+        """No dataclass: it sets what it holds itself."""
+
+        name = "built"
+
+        def __init__(self, size):
+            object.__setattr__(self, "size", size)
+
+        def parameters(self, observations):
+            return tuple(replace(GOOD, size=self.size, place=joint) for joint in ("joint_2", "joint_3"))
+
+    single = gate.alone(Built(0.5), observations)
+    assert [(p.place, p.size) for one in single for p in checked(one, observations)] == [
+        ("joint_2", 0.5),
+        ("joint_3", 0.5),
+    ]

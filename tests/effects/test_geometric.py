@@ -40,18 +40,19 @@ def test_a_geometric_error_is_an_edited_urdf(arm):
     np.testing.assert_allclose(tool_with(campaign, effect, values), expected, atol=1e-12)
 
 
-@pytest.mark.parametrize("arm", ["rv_m2", "panda", "awkward"], indirect=True)
+@pytest.mark.parametrize("arm", ["rv_m2", "panda", "awkward", "coupled"], indirect=True)
 def test_it_is_drawn_against_the_position_of_the_joint_whose_placement_it_is(arm):
     observations = observe(commanded(arm))
-    movable = {s.name for s in arm.segments if s.movable}
+    moved_by = {s.name: s.joint for s in arm.segments}
     seen = set()
     for parameter in Geometric().parameters(observations):
         name = parameter.label.split(" of ")[1]
         driver = Geometric().driver(observations, [parameter], np.zeros(10))
-        if name not in movable:
+        joint = moved_by[name]
+        if joint is None:
             assert driver is None
             continue
-        assert driver[0] == f"position of {name}"
-        np.testing.assert_array_equal(driver[2], observations.q[:, arm.joint_names.index(name)])
-        seen.add(name)
+        assert driver[0] == f"position of {joint}"
+        np.testing.assert_array_equal(driver[2], observations.q[:, arm.joint_names.index(joint)])
+        seen.add(joint)
     assert seen == set(arm.joint_names)

@@ -105,3 +105,9 @@ def test_without_masses_it_is_drawn_against_what_was_fitted(rv_m2):
     name, unit, values = free.driver(observations, [parameter], 3e-4 * parameter.responses[0].values)
     assert (name, unit) == (f"fitted torque of {parameter.place}", "relative")
     assert np.abs(values).max() == pytest.approx(1.0)
+
+
+def test_a_model_of_old_says_the_shapes_joints_by_number(rv_m2):
+    free = JointCompliance().variants(observe(commanded(without_masses(rv_m2))))[0]
+    assert len(free.joints) > 1
+    assert JointCompliance(joints=free.joints, weights=free.weights) == free

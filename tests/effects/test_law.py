@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 from helpers import SAMPLES, commanded
 
-from thermal_robot import CorrectedModel
+from thermal_robot import CorrectedModel, EffectError
+from thermal_robot.effects import Backlash
 from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.gate import checked
 from thermal_robot.effects.law import PREFIX, Discovered
@@ -109,7 +110,7 @@ def test_marks_that_look_alike_in_three_digits_have_names_of_their_own(rv_m2):
 def test_it_is_described_by_place_quantity_and_shape(shape):
     law = replace(STEP, shape=shape, marks=(-350.0, 20.0))
     words = law.describe()
-    assert "at joint_3" in words
+    assert ("the zero of joint_3" if shape == "step" else "at joint_3") in words
     assert "joint joint_3" not in words
     assert ("time" in words) == (shape != "constant")
     assert ("−350 s" in words) == bool(SHAPES[shape].mark)
@@ -119,8 +120,13 @@ def test_it_is_described_by_place_quantity_and_shape(shape):
 @pytest.mark.parametrize(
     ("law", "words"),
     [
-        (STEP, "an error at joint_3 that follows time (a step at 350 s)"),
-        (replace(STEP, place="elbow"), "an error at joint elbow that follows time (a step at 350 s)"),
+        (STEP, "the zero of joint_3 jumped at time 350 s"),
+        (
+            replace(STEP, place="elbow", quantity="order", marks=(57.0,), unit=""),
+            "the zero of joint elbow jumped at order 57",
+        ),
+        (replace(STEP, quantity="joint_2", unit="rad"), "an error at joint_3 that follows joint_2 (a step at 350 rad)"),
+        (replace(STEP, kind="base"), "an error at the base that follows time (a step at 350 s)"),
         (replace(STEP, place="elbow", shape="constant"), "a constant error at joint elbow"),
         (replace(STEP, kind="base", shape="ramp"), "an error at the base that follows time (in proportion)"),
         (replace(STEP, kind="link", shape="constant"), "a constant error at the placement of joint_3"),
@@ -129,6 +135,22 @@ def test_it_is_described_by_place_quantity_and_shape(shape):
             "an error at joint_3 that follows joint_3 (harmonic of order 101)",
         ),
         (replace(STEP, shape="smooth"), "an error at joint_3 that follows time (smooth)"),
+        (
+            replace(STEP, place="elbow", shape="ramp", quantity="payload", of="backlash"),
+            "lost motion in joint elbow that changes with payload (in proportion)",
+        ),
+        (
+            replace(STEP, place="elbow", shape="ramp", of="transmission_error"),
+            "a periodic transmission error in joint elbow that changes with time (in proportion)",
+        ),
+        (
+            replace(STEP, kind="tool", shape="ramp", by="payload"),
+            "an error at the tool that follows time times payload (in proportion)",
+        ),
+        (
+            replace(STEP, quantity="since_turn.joint_3", shape="hysteresis", marks=(0.25,), unit="rad"),
+            "an error at joint_3 that follows how far it has gone since it last turned round (springs that slip)",
+        ),
     ],
 )
 def test_its_words(law, words):
@@ -169,3 +191,145 @@ def test_a_model_keeps_it_whole(observations, tmp_path, rv_m2):
     again = CorrectedModel.load(tmp_path / "model.json")
     assert again.effects[0][0] == law
     np.testing.assert_array_equal(again.predict(campaign)[0], model.predict(campaign)[0])
+
+
+COLUMNS = {
+    "time": TIME,
+    "payload": np.tile([0.0, 2.0], 5),
+    "approach.joint_3": np.tile([1.0, 1.0, -1.0, -1.0, 1.0], 2),
+    "velocity.joint_3": np.linspace(-0.4, 0.5, SAMPLES),
+    "temperature": np.linspace(20.0, 30.0, SAMPLES),
+}
+CHANGING = Discovered(place="joint_3", quantity="payload", shape="ramp", span=2.0, of="backlash")
+RICHER = {
+    "an effect that changes": CHANGING,
+    "an effect with arguments": replace(CHANGING, of="transmission_error", of_arguments='{"harmonics": [1, 3]}'),
+    "two quantities": Discovered(
+        kind="tool", place="tool", quantity="payload", shape="ramp", span=2.0, by="time", by_origin=50.0, by_span=800.0
+    ),
+    "their product": Discovered(place="joint_2", quantity="payload", shape="product", by="joint_1", span=3.0),
+    "memory": Discovered(place="joint_3", quantity="since_turn.joint_3", shape="hysteresis", marks=(0.25, 1.0)),
+    "a start": Discovered(
+        place="joint_3",
+        quantity="time",
+        shape="relaxing each",
+        marks=(90.0,),
+        span=800.0,
+        runs=("am", "pm"),
+        starts=(float(TIME[0]), float(TIME[5])),
+    ),
+    "a wave": Discovered(place="joint_3", quantity="joint_3", shape="harmonic", marks=(37.62,)),
+}
+
+
+@pytest.fixture(scope="module")
+def rich(rv_m2):
+    return observe(commanded(rv_m2, COLUMNS))
+
+
+def test_an_effect_that_changes_is_the_effect_times_the_law(rich):
+    law, twice = (displacement(rich, [(CHANGING, np.array(v))])[0].joint for v in ([5e-4, 0.0], [0.0, 5e-4]))
+    steady = displacement(rich, [(Backlash(places=("joint_3",)), np.array([5e-4]))])[0].joint
+    np.testing.assert_allclose(law, steady, atol=1e-18)
+    # as straight as the payload, which is 0 or 2 kg
+    np.testing.assert_allclose(twice, steady * (COLUMNS["payload"] / 2.0)[:, None], atol=1e-18)
+    first = checked(CHANGING, rich)[0]
+    assert (first.kind, first.place, first.unit, first.size) == ("joint", "joint_3", "rad", 5e-4)
+    assert first.label.startswith("lost motion, ")
+    assert (CHANGING.missing(rich), set(CHANGING.reads(rich))) == ((), {"payload", "approach.joint_3"})
+
+
+def test_an_effect_of_two_amplitudes_an_order_keeps_them_all(rich):
+    law = RICHER["an effect with arguments"]
+    labels = [p.label for p in checked(law, rich)]
+    assert len(labels) == 2 * 4
+    assert sum("order 3" in label for label in labels) == 4
+
+
+@pytest.mark.parametrize(("of", "words"), [("worn_belt", "no effect is named"), ("backlash", "does not take")])
+def test_an_effect_in_a_law_is_one_that_is_installed_and_takes_its_arguments(rich, of, words):
+    with pytest.raises(EffectError, match=f"{words}.*{of}|{of}.*{words}"):
+        checked(replace(CHANGING, of=of, of_arguments='{"slack": 1}'), rich)
+
+
+def test_a_straight_law_of_two_quantities_holds_each_and_their_product(rich):
+    functions, labels = RICHER["two quantities"].at_rows(rich)
+    u, v = COLUMNS["payload"] / 2.0, (TIME - 50.0) / 800.0
+    for column in (np.ones(SAMPLES), u, v, u * v):
+        left = column - functions @ np.linalg.lstsq(functions, column, rcond=None)[0]
+        assert np.abs(left).max() < 1e-12
+    assert len(set(labels)) == functions.shape[1] == 4
+    assert RICHER["two quantities"].follows == "payload * time"
+    assert CHANGING.follows == "payload"
+
+
+def test_a_product_alone_is_nothing_where_either_is(rich):
+    functions, _ = RICHER["their product"].at_rows(rich)
+    none = COLUMNS["payload"] == 0.0
+    assert not functions[none, 1].any()
+    np.testing.assert_allclose(functions[~none, 1], 2.0 * rich.q[~none, 0] / 3.0, rtol=1e-12)
+
+
+def test_memory_follows_the_distance_since_the_turn_and_needs_an_order(rich, rv_m2):
+    law = RICHER["memory"]
+    since = rich.campaign.since_turn["joint_3"]
+    np.testing.assert_array_equal(law.values(rich), since)
+    assert law.reads(rich) == ("time",)
+    assert law.missing(observe(commanded(rv_m2))) == ("since_turn.joint_3",)
+    functions, labels = law.at_rows(rich)
+    assert labels == ("constant", "at 0.25", "at 1")
+    np.testing.assert_array_equal(functions[:, 0], 1.0)
+    for slip, strain in zip(law.marks, functions[:, 1:].T, strict=True):
+        # twice its slip from the turn an element slips, whatever it was strained by before, as lost motion does
+        far = np.abs(since) >= 2.0 * slip
+        np.testing.assert_allclose(strain[far], np.sign(since[far]), atol=1e-12)
+        assert (np.abs(strain) <= 1.0).all()
+    assert checked(law, rich)[0].unit == "rad"
+
+
+@pytest.mark.parametrize("name", RICHER)
+def test_a_richer_law_is_the_same_on_rows_taken_away(rich, name):
+    law, rows = RICHER[name], np.array([8, 1, 5])
+    values = 1e-4 * (1.0 + np.arange(len(checked(law, rich))))
+    whole = displacement(rich, [(law, values)])[0]
+    part = displacement(observe(rich.campaign.take(rows)), [(law, values)])[0]
+    np.testing.assert_allclose(part.joint, whole.joint[rows], atol=1e-18)
+    np.testing.assert_allclose(part.tool, whole.tool[rows], atol=1e-18)
+    assert np.abs(whole.joint).max() + np.abs(whole.tool).max() > 5e-5
+
+
+@pytest.mark.parametrize("name", RICHER)
+def test_a_richer_law_is_kept_whole_by_a_model_and_by_a_file(rich, rv_m2, tmp_path, name):
+    law = RICHER[name]
+    values = 1e-4 * (1.0 + np.arange(len(checked(law, rich))))
+    campaign = rich.campaign
+    needs = law.reads(rich)
+    model = CorrectedModel(rv_m2, campaign.settings, Frames.declared(campaign), ((law, values),), "position", needs)
+    model.save(tmp_path / "model.json")
+    again = CorrectedModel.load(tmp_path / "model.json")
+    assert again.effects[0][0] == law
+    np.testing.assert_array_equal(again.predict(campaign)[0], model.predict(campaign)[0])
+    named = {}
+    exec(law.to_source(values, "slipping_belt"), named)
+    own, other = (displacement(rich, [(e, values)])[0] for e in (law, named["SlippingBelt"]()))
+    np.testing.assert_array_equal(own.joint, other.joint)
+    np.testing.assert_array_equal(own.tool, other.tool)
+
+
+def test_what_relaxes_knows_its_sessions_and_takes_a_new_one_for_the_last(rv_m2):
+    law = RICHER["a start"]
+    session = np.array(["pm"] * 3 + ["am"] * 3 + ["night"] * 4)  # rows may be told of any session, in any order
+    here = observe(commanded(rv_m2, COLUMNS, labels={"session": session}))
+    functions, labels = law.at_rows(here)
+    assert labels == ("constant", "at the start of am", "at the start of pm")
+    am, pm, new = session == "am", session == "pm", session == "night"
+    np.testing.assert_allclose(functions[am, 1], np.exp(-np.maximum(TIME[am] - TIME[0], 0.0) / 90.0))
+    np.testing.assert_allclose(functions[pm, 2], np.exp(-np.maximum(TIME[pm] - TIME[5], 0.0) / 90.0))
+    np.testing.assert_allclose(functions[new, 2], np.exp(-(TIME[new] - TIME[new].min()) / 90.0))
+    assert not functions[am, 2].any()
+    assert not functions[pm | new, 1].any()
+    assert law.shifted(-200.0).marks == (110.0,)
+    assert (law.follows, law.describe()) == (
+        "time",
+        "an error at joint_3 that follows time (it settles within 90 of each start)",
+    )

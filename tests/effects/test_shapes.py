@@ -13,19 +13,29 @@ MARKS = {
     "hinge": (0.7, 1.0),
     "bump": (0.7, 0.3),
     "harmonic": (2.0,),
+    "hysteresis": (0.7, 3.0),
+    "relaxing": (0.7,),
+    "relaxing each": (0.7,),
     "levels": (-2.0, 0.0, 1.0, 4.0),
     "smooth": (-1.5, 0.0, 0.4, 2.0, 3.5),
 }
 
 
 def values(name, x=X, marks=None, origin=-2.0, span=6.0):
-    return SHAPES[name].functions(x, MARKS.get(name, ()) if marks is None else marks, origin, span)
+    marks = MARKS.get(name, ()) if marks is None else marks
+    if SHAPES[name].of == "strains":  # of elements that have slipped at −2 and are pulled
+        x = np.column_stack([np.minimum((x + 2.0) / slip - 1.0, 1.0) for slip in marks])
+    if SHAPES[name].of in ("run", "runs"):  # one began at −2, the other at 1
+        begun = np.where(x < 1.0, x + 2.0, x - 1.0)[:, None]
+        x = begun if SHAPES[name].of == "run" else np.where((x[:, None] < 1.0) == [True, False], begun, np.inf)
+    return SHAPES[name].functions(x, marks, origin, span)
 
 
 @pytest.mark.parametrize("name", SHAPES)
 def test_a_shape_has_a_label_for_each_function_and_contains_a_constant(name):
     found = values(name)
-    labels = SHAPES[name].labels or MARKS[name]
+    labels = (*SHAPES[name].labels, *(MARKS[name] if SHAPES[name].each else ()))
+    labels += ("one", "other") if SHAPES[name].of == "runs" else ()
     assert found.shape == (len(X), len(labels))
     assert np.isfinite(found).all()
     # whatever the law, an offset of the place is part of it
@@ -105,6 +115,14 @@ def test_a_drag_keeps_its_sign_through_zero():
 def test_a_harmonic_repeats_after_a_turn_of_its_order():
     np.testing.assert_allclose(values("harmonic", X + np.pi), values("harmonic"), atol=1e-12)
     assert np.abs(values("harmonic", X + np.pi / 2.0) - values("harmonic")).max() > 1.0
+
+
+def test_what_relaxes_is_whole_at_its_start_and_a_third_after_its_time_constant():
+    found = values("relaxing", np.array([-2.0, -1.3, 1.0, 1.7]))
+    np.testing.assert_allclose(found[:, 1], [1.0, np.exp(-1.0), 1.0, np.exp(-1.0)], rtol=1e-12)
+    each = values("relaxing each")
+    np.testing.assert_allclose(each[:, 1] + each[:, 2], values("relaxing")[:, 1], rtol=1e-12)
+    assert not (each[:, 1] * each[:, 2]).any()
 
 
 def test_levels_are_told_by_the_nearest():

@@ -80,3 +80,24 @@ def test_it_is_drawn_against_the_links_own_temperature_or_the_robots(rv_m2):
             own = part.place == link
             assert (name, unit) == (f"temperature.{link}" if own else "temperature", "°C")
             np.testing.assert_array_equal(values, general + 7.0 * own)
+
+
+def test_between_one_for_all_and_one_each_are_small_deviations(rv_m2):
+    temperature = np.linspace(15.0, 60.0, SAMPLES)
+    campaign = commanded(rv_m2, {"temperature": temperature})
+    seen = observe(campaign)
+    each, one, pooled = (e.parameters(seen) for e in ThermalElongation().variants(seen))
+    assert len(pooled) == 1 + len(each)
+    assert (pooled[0].name, pooled[0].size) == (one[0].name, one[0].size)
+    assert all(0.0 < p.size < 0.5 * one[0].size for p in pooled[1:])
+    assert [p.place for p in pooled[1:]] == [p.place for p in each]
+    # the common coefficient and a deviation are, link by link, a coefficient each
+    setting = ThermalElongation().variants(seen)[2]
+    apart = np.linspace(-4e-6, 4e-6, len(each))
+    np.testing.assert_allclose(
+        tool_with(campaign, setting, [1.5e-5, *apart]),
+        tool_with(campaign, ThermalElongation(), 1.5e-5 + apart),
+        atol=1e-14,
+    )
+    # from any setting the same ones are compared
+    assert setting.variants(seen) == ThermalElongation().variants(seen)

@@ -7,6 +7,7 @@ import pytest
 from helpers import commanded, tool_at, tool_with
 
 from thermal_robot.effects import TransmissionError
+from thermal_robot.effects.gate import checked
 from thermal_robot.observations import observe
 
 
@@ -26,7 +27,7 @@ def test_a_transmission_error_is_periodic_in_the_joint_and_in_the_motor(arm):
 
 def test_one_wheel_alone_has_the_parameters_of_its_joint(rv_m2):
     observations = observe(commanded(rv_m2, gears={"joint_3": 50.0}))
-    whole, one = (e.parameters(observations) for e in (TransmissionError(), TransmissionError().at("joint_3")))
+    whole, one = (checked(e, observations) for e in (TransmissionError(), TransmissionError(places=("joint_3",))))
     assert [p.name for p in one] == [p.name for p in whole if p.place == "joint_3"]
     assert len(one) == 8
 

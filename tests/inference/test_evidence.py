@@ -5,67 +5,12 @@ from itertools import combinations
 
 import numpy as np
 import pytest
+from inference.densities import SPREAD, direct, seen_of, volume
 from inference.problems import columns_of, small_problem
-from scipy.linalg import null_space
 from scipy.special import logsumexp
-from scipy.stats import multivariate_normal
 
-from thermal_robot.inference.evidence import Search
+from thermal_robot.inference.evidence import Search, _gains
 from thermal_robot.inference.problem import gram
-
-SPREAD = 1.5  # of ln λ: effects of three times the stated size are no surprise
-
-
-def seen_of(linear, whitening, blocks, noise=1.0):
-    """Gap and each block's columns without what the frames take up, in units of the noise, of the prior sizes."""
-    used = whitening.weights > 0
-    root = np.sqrt(whitening.weights[used])[:, None, None] / whitening.noise[:, None]
-    away = null_space((linear.frames[used] * root).reshape(used.sum() * 3, -1).T)
-    gap = away.T @ (linear.gap[used][:, :, None] * root).ravel()
-    items = (linear.blocks[b] for b in blocks)
-    return gap / noise, [away.T @ (i.columns[used] * root * i.sizes).reshape(used.sum() * 3, -1) / noise for i in items]
-
-
-def direct(linear, whitening, found, log_prior, scales=None, noise=None):
-    """The same figure from the multivariate normal density of the gap, the frames projected out.
-
-    Differs from it by a constant: that of the density, and those of the priors of noise and scales.
-    """
-    scales, noise = scales or found.scales, noise or found.noise
-    gap, columns = seen_of(linear, whitening, found.blocks)
-    covariance = noise**2 * np.eye(len(gap))
-    for b, own in zip(found.blocks, columns, strict=True):
-        covariance += scales[b] ** 2 * own @ own.T
-    density = multivariate_normal(cov=covariance).logpdf(gap)
-    density -= 0.5 * whitening.held * (np.log(noise**2) + 1.0 / noise**2)
-    return (
-        density
-        - 0.5 * sum((np.log(s) / SPREAD) ** 2 for s in scales.values())
-        + sum(log_prior[b] for b in found.blocks)
-    )
-
-
-def volume(linear, whitening, found):
-    """What a parabola through the density's peak over the logarithms of all scales adds, over that of their prior.
-
-    Its curvature is measured on the density itself, by differences of sixth order; NaN where there is no peak.
-    """
-    count, step = len(found.blocks), 0.05
-
-    def at(move):
-        scales = {b: found.scales[b] * np.exp(m) for b, m in zip(found.blocks, move, strict=True)}
-        return direct(linear, whitening, found, (0, 0, 0), scales=scales)
-
-    def along(way):
-        weights = {0: -49 / 18, 1: 3 / 2, 2: -3 / 20, 3: 1 / 90}
-        return -sum(w * (at(k * step * way) + (at(-k * step * way) if k else 0.0)) for k, w in weights.items())
-
-    axes = np.eye(count)
-    bend = np.array([[0.25 * (along(a + b) - along(a - b)) / step**2 for b in axes] for a in axes]).reshape(
-        count, count
-    )
-    curvature = np.linalg.eigvalsh(bend) * SPREAD**2
-    return -0.5 * np.log(curvature).sum() if (curvature > 0.0).all() else np.nan
 
 
 def integrated(linear, whitening, found):
@@ -210,3 +155,52 @@ def test_a_block_of_which_the_data_see_nothing_changes_nothing_but_the_odds(pres
             assert found.noise == pytest.approx(plain.noise, rel=1e-3)
             np.testing.assert_allclose(found.values, plain.values, rtol=1e-2)
     assert set(search.run().blocks) <= {0, 1, 2}
+
+
+def gains_of(linear, whitening, beside):
+    """What each further block gains beside some: to first order, and computed exactly."""
+    search = Search(gram(linear, whitening), (0.0,) * len(linear.blocks))
+    base = search.evaluate(beside)
+    others = [b for b in range(len(linear.blocks)) if b not in beside]
+    first = {b: gain for b, gain, _ in _gains(search.gram, base, others)}
+    return [(first[b], search.evaluate((*beside, b)).log_evidence - base.log_evidence) for b in others]
+
+
+@pytest.mark.parametrize("beside", [(), (1,)], ids=["alone", "beside another"])
+def test_a_gain_to_first_order_is_the_exact_one_where_a_block_explains_little(beside):
+    """Blocks that do nothing: the integral over their size is within what the exact one's parabola misses."""
+    errors = []
+    for seed in range(20):
+        linear, whitening = small_problem(seed, rows=40, present=beside)
+        errors += np.subtract(*np.transpose(gains_of(linear, whitening, beside))).tolist()
+    assert np.abs(errors).max() < 0.3
+    assert abs(np.mean(errors)) < 0.15
+
+
+def test_a_gain_to_first_order_is_near_the_exact_one_where_a_block_explains_all():
+    """So large ones come first: they are within a tenth, or two nats, of what they gain."""
+    for seed in range(10):
+        linear, whitening = small_problem(seed, rows=40, present=(2,), noise=0.3)
+        (_, _), (_, _), (first, exact) = gains_of(linear, whitening, ())
+        assert exact > 20.0
+        assert abs(first - exact) < max(0.1 * exact, 2.0)
+
+
+def test_the_scale_of_a_gain_is_that_of_the_grid_nearest_the_best():
+    for seed in range(6):
+        linear, whitening = small_problem(seed, rows=40, present=(2,), noise=0.3)
+        search = Search(gram(linear, whitening), (0.0,) * 3)
+        ((_, _, scale),) = _gains(search.gram, search.evaluate(()), [2])
+        # half a unit of ln λ between places of the grid
+        assert abs(np.log(scale / search.evaluate((2,)).scales[2])) < 0.5
+
+
+def test_neighbours_that_come_near_the_best_are_computed_exactly():
+    """A search leaves nothing inexact that could change a probability by much."""
+    for seed in range(10):
+        linear, whitening = small_problem(seed, rows=30, present=((), (0,), (0, 2))[seed % 3])
+        search = Search(gram(linear, whitening), (-2.2,) * 3)
+        best = search.run()
+        rough = [c for c in search.seen.values() if not c.exact]
+        assert all(c.log_evidence < best.log_evidence - 2.9 for c in rough)
+        assert all(search.seen[key].blocks == key for key in search.seen)

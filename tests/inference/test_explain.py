@@ -6,6 +6,9 @@ import numpy as np
 import pytest
 from inference.problems import WIDTHS, columns_of
 
+from thermal_robot.effects import choose
+from thermal_robot.effects.law import Discovered
+from thermal_robot.inference.discrepancy import Form
 from thermal_robot.inference.explain import explain, log_odds, log_priors, settings_of_one
 from thermal_robot.inference.problem import Linear
 from thermal_robot.inference.robust import Noise
@@ -28,12 +31,20 @@ def problem(seed, present=(1,), gross=0, size=1e-3):
     return Linear(gap, frames, blocks), values, spoilt
 
 
+def explained(linear, noise=NOISE, rarity=(), **told):
+    """The explanation where each block has the prior of an effect, some less by so many natural logarithms."""
+    prior = np.full(len(linear.blocks), log_odds())
+    for b, less in dict(rarity).items():
+        prior[b] += less
+    return explain(linear, noise, log_prior=prior.tolist(), **told)
+
+
 @pytest.mark.parametrize("present", [(), (1,), (0, 2), (0, 1, 2)], ids=str)
 @pytest.mark.parametrize("gross", [0, 8])
 def test_what_is_at_work_is_chosen_and_gross_errors_are_set_aside(present, gross):
     for seed in range(5):
         linear, values, spoilt = problem(seed, present, gross)
-        found = explain(linear, NOISE)
+        found = explained(linear)
         assert found.best.blocks == present
         np.testing.assert_array_equal(found.outliers, spoilt)
         for b, true in values.items():
@@ -47,10 +58,14 @@ def test_what_is_at_work_is_chosen_and_gross_errors_are_set_aside(present, gross
 
 def test_the_remainder_is_the_gap_less_all_that_was_fitted():
     linear, _, _ = problem(1, (0, 2), 5)
-    found = explain(linear, NOISE)
+    found = explained(linear)
     moved = sum(linear.contribution(b, mean) for b, (mean, _) in found.values.items())
-    fitted = found.remainder + moved + linear.frames @ found.frame_step
-    np.testing.assert_allclose(fitted, linear.gap, rtol=0, atol=1e-15)
+    framed = (linear.gap - moved - found.remainder).ravel()
+    design = linear.frames.reshape(len(framed), -1)
+    step = np.linalg.lstsq(design, framed, rcond=None)[0]
+    np.testing.assert_allclose(design @ step, framed, rtol=0, atol=1e-14)
+    np.testing.assert_allclose(step, [0.5, -0.2], rtol=0, atol=2e-5)
+    assert np.abs(found.smooth).max() == 0.0
 
 
 def test_rows_that_may_not_be_used_do_not_matter():
@@ -58,7 +73,7 @@ def test_rows_that_may_not_be_used_do_not_matter():
     use = np.arange(ROWS) % 4 > 0
     spoilt = replace(linear, gap=linear.gap.copy())
     spoilt.gap[~use] += 1.0
-    plain, other = (explain(own, NOISE, rows=use) for own in (linear, spoilt))
+    plain, other = (explained(own, rows=use) for own in (linear, spoilt))
     np.testing.assert_array_equal(other.values[1][0], plain.values[1][0])
     assert not other.outliers.any()
     # what an explanation would say of them is said all the same
@@ -71,7 +86,7 @@ def test_settings_of_one_effect_are_never_together_and_share_its_prior():
     linear, _, _ = problem(3, (1,))
     near = replace(linear.blocks[1], columns=linear.blocks[1].columns + 1e-3 * linear.blocks[2].columns[:, :, :2])
     linear = Linear(linear.gap, linear.frames, (*linear.blocks, near))
-    found = explain(linear, NOISE, families=("a", "b", "c", "b"))
+    found = explained(linear, families=("a", "b", "c", "b"))
     assert not any({1, 3} <= set(c.blocks) for c in found.combinations)
     assert found.probability([1, 3]) == pytest.approx(1.0, abs=1e-3)
     assert found.probabilities.sum() == pytest.approx(1.0)
@@ -81,58 +96,90 @@ def test_settings_of_one_effect_are_never_together_and_share_its_prior():
 
 def test_log_priors_are_those_of_effects_and_not_of_settings():
     """However many settings an effect has, the odds that it is at work are one to nine."""
-    own = log_priors(("a", "b", "b", "b"), {})
-    odds = np.exp(own)
+    gain, lost = choose(("joint_gain", "backlash"), (), ())
+    odds = np.exp(log_priors([gain, lost, replace(lost, places=("a",)), replace(lost, places=("b",))]))
     assert odds[0] == pytest.approx(1.0 / 9.0)
     assert odds[1:].sum() == pytest.approx(odds[0])
     assert np.exp(log_odds()) == pytest.approx(1.0 / 9.0)
-    rare = log_priors(("a", "b"), {"b": -np.log(100.0)})
-    assert np.exp(rare[0] - rare[1]) == pytest.approx(100.0)
+
+
+def test_a_law_has_one_share_of_all_that_were_tried_however_many_are_compared():
+    laws = [Discovered(place=f"joint_{k}", quantity="time", tried=100.0 * k) for k in (1, 2)]
+    odds = np.exp(log_priors([*choose(("joint_gain",), (), ()), *laws]))
+    np.testing.assert_allclose(odds[0] / odds[1:], [100.0, 200.0])
+    assert np.exp(log_priors(laws[:1]))[0] == pytest.approx(odds[1])
 
 
 def test_what_was_picked_out_of_many_must_explain_more():
     linear, _, _ = problem(4, (1,))
     lost = []
-    for rarity in ({}, {"b": -np.log(1000.0)}):
-        found = explain(linear, NOISE, families=("a", "b", "c"), rarity=rarity)
+    for rarity in ({}, {1: -np.log(1000.0)}):
+        found = explained(linear, rarity=rarity)
         evidence = {c.blocks: c.log_evidence for c in found.combinations}
         lost.append((evidence[(1,)], evidence[(0, 1)], evidence[(1, 2)]))
     np.testing.assert_allclose(np.subtract(*lost), np.log(1000.0), atol=1e-2)
     # an effect that is faint is then no longer believed
     faint, _, _ = problem(4, (1,), size=5e-6)
-    chances = [explain(faint, NOISE, families="abc", rarity=r).probability([1]) for r in ({}, {"b": -20.0})]
+    chances = [explained(faint, rarity=r).probability([1]) for r in ({}, {1: -20.0})]
     assert chances[0] > 0.9 > 0.1 > chances[1]
 
 
-def test_rows_whose_remainders_are_alike_are_worth_fewer():
-    """Every row ten times over, noise and all: the columns' gain in evidence is that of the rows, not of the copies."""
-    linear, _, _ = problem(5, ())
-    rng = np.random.default_rng(5)
-    steady = columns_of(np.repeat(rng.normal(size=(8, 3, 2)), 10, axis=0), np.full(2, 1e-3))
-    shared = np.repeat(2e-5 * rng.normal(size=(8, 3)), 10, axis=0)
-    linear = Linear(linear.gap + shared, linear.frames, (steady,))
-    groups = (np.repeat(np.arange(8), 10),)
-    told, plain = explain(linear, NOISE, groups=groups), explain(linear, NOISE)
-    assert plain.design_effect == 1.0
-    assert 2.0 < told.design_effect <= 10.0
-    assert told.probability([0]) < plain.probability([0])
+def alike(copies, size, seed=5):
+    """One block of eight poses, each visited so often, that does nothing; each pose has an error of its own."""
+    linear, _, _ = problem(seed, ())
+    rng = np.random.default_rng(seed)
+    pose = np.repeat(np.arange(ROWS // copies), copies)
+    steady = columns_of(rng.normal(size=(len(linear.gap) // copies, 3, 2))[pose], np.full(2, 3e-5))
+    shared = size * rng.normal(size=(ROWS // copies, 3))[pose]
+    each = Form("poses", pose.astype(float), np.eye(3), anew=True)
+    return Linear(linear.gap + shared, linear.frames, (steady,)), each
+
+
+def test_rows_of_one_pose_that_err_alike_count_less():
+    """Ten visits a pose: what its visits share is one error and not ten that agree."""
+    beliefs = []
+    for seed in range(12):
+        linear, each = alike(10, 4e-5, seed)
+        told, plain = explained(linear, forms=(each,)), explained(linear)
+        assert told.discrepancy.form is each
+        assert told.discrepancy.probability > 0.99
+        assert 1.0 <= told.discrepancy.tau <= 4.0  # twice the noise
+        beliefs.append((plain.probability([0]), told.probability([0])))
+    plain, told = np.array(beliefs).T
+    assert np.mean(plain) > 0.5
+    assert np.mean(told) < 0.2
+
+
+def test_the_discrepancy_is_a_part_of_the_remainder_and_what_poses_share():
+    linear, each = alike(10, 2e-4)
+    found = explained(linear, forms=(each,))
+    for pose in range(8):
+        own = slice(10 * pose, 10 * pose + 10)
+        assert np.ptp(found.smooth[own], axis=0).max() < 1e-12
+        # three sigma of the mean of ten rows
+        assert np.abs(found.smooth[own][0] - found.remainder[own].mean(axis=0)).max() < 3.0 * 2e-5 / np.sqrt(10.0)
+
+
+def test_without_forms_there_is_no_discrepancy():
+    found = explained(problem(1)[0])
+    assert (found.discrepancy.form, found.discrepancy.tau, found.discrepancy.probability) == (None, 0.0, 0.0)
 
 
 def test_where_the_search_starts_does_not_matter():
     linear, _, spoilt = problem(6, (0, 2), 6)
-    plain = explain(linear, NOISE)
-    begun = explain(linear, NOISE, start=(1,), outliers=np.roll(spoilt, 1))
+    plain = explained(linear)
+    begun = explained(linear, starts=[(1,), (0, 1)], outliers=np.roll(spoilt, 1))
     assert begun.best.blocks == plain.best.blocks
     np.testing.assert_array_equal(begun.outliers, plain.outliers)
     assert begun.best.log_evidence == pytest.approx(plain.best.log_evidence, abs=1e-2)
     # a start that is not allowed is left out
-    two = explain(linear, NOISE, families=("a", "b", "a"), start=(0, 2))
+    two = explained(linear, families=("a", "b", "a"), starts=[(0, 2)])
     assert not {0, 2} <= set(two.best.blocks)
 
 
 def test_a_noise_that_is_not_stated_is_read_off_the_remainder():
     linear, _, _ = problem(7, (1,))
-    found = explain(linear, Noise())
+    found = explained(linear, Noise())
     assert found.best.blocks == (1,)
     assert (found.whitening.noise * found.best.noise)[0] == pytest.approx(2e-5, rel=0.15)
     assert found.whitening.held == 0.0

@@ -11,7 +11,7 @@ from thermal_robot.inference.evidence import Search
 from thermal_robot.inference.explain import Noise, explain
 from thermal_robot.inference.frames import register
 from thermal_robot.inference.problem import Linear, gram
-from thermal_robot.inference.refine import refined
+from thermal_robot.inference.refine import heard, refined
 from thermal_robot.observations import observe
 
 
@@ -21,13 +21,13 @@ def explained(data, names):
     variants = [effect.variants(seen) for effect in choose(names, (), ())]
     settings = [own[-1] for own in variants]
     linear = Linear(seen.gap, frame_columns(seen)[0], tuple(block(seen, s) for s in settings))
-    return seen, explain(linear, Noise(data.noise_position), start=range(len(settings)))
+    return seen, explain(linear, Noise(data.noise_position), starts=[tuple(range(len(settings)))])
 
 
 def evidence(explanation, seen, effect):
-    """Log evidence of one effect alone."""
+    """Log evidence of one effect alone, rows set aside heard."""
     linear = Linear(explanation.linear.gap, explanation.linear.frames, (block(seen, effect),))
-    return Search(gram(linear, explanation.whitening), [0.0]).evaluate((0,)).log_evidence
+    return Search(gram(linear, heard(explanation)), [0.0]).evaluate((0,)).log_evidence
 
 
 @pytest.mark.parametrize(("kind", "constant", "attribute"), [(LAG, 900.0, "lag"), (DRIFT, 0.15, "time_constant")])

@@ -1,16 +1,11 @@
-"""Noise, gross errors, and rows that are alike."""
-
-from dataclasses import replace
+"""Noise and gross errors."""
 
 import numpy as np
 import pytest
-from inference.problems import columns_of, problem_of, small_problem
+from inference.problems import small_problem
 
-from thermal_robot.effects import choose
-from thermal_robot.inference.problem import Whitening, gram
 from thermal_robot.inference.robust import (
     Noise,
-    design_effect,
     distance_limit,
     first_whitening,
     reweigh,
@@ -70,19 +65,31 @@ def test_a_remainder_of_nothing_has_the_noise_of_rounding():
     assert (robust_noise(np.zeros((20, 6))) > 0.0).all()
 
 
-def test_a_stated_noise_is_trusted_unless_the_remainder_is_well_above_it():
+def test_a_stated_noise_counts_whatever_is_left():
+    """What is more in the remainder is something else, and has a form of its own."""
     position, orientation = 2e-5, 3e-5
-    same, held = settled_noise(np.array([2.2e-5, 1e-5]), STATED, 6)
-    np.testing.assert_array_equal(same, SIGMA)
-    assert held > 0.0
-    larger, loose = settled_noise(np.array([5e-5, 3e-5]), STATED, 6)
-    np.testing.assert_array_equal(larger, np.repeat([5e-5, orientation], 3))
-    assert loose == 0.0
+    for left in ([2.2e-5, 1e-5], [5e-5, 3e-5], [1e-3, 1e-3]):
+        same, held = settled_noise(np.array(left), STATED, 6)
+        np.testing.assert_array_equal(same, SIGMA)
+        assert held > 0.0
+    half, free = settled_noise(np.array([5e-5, 4e-5]), Noise(position), 6)
+    np.testing.assert_array_equal(half, np.repeat([position, 4e-5], 3))
+    assert free == 0.0
     own, free = settled_noise(np.array([1e-5]), Noise(), 3)
     np.testing.assert_array_equal(own, [1e-5] * 3)
     assert free == 0.0
     assert STATED.parts(3) == (position,)
     assert STATED.parts(6) == (position, orientation)
+
+
+def test_where_more_than_noise_is_left_rows_are_far_only_if_far_from_the_others():
+    rng = np.random.default_rng(8)
+    rows, use = 10.0 * noise_of(rng, 400), np.ones(400, dtype=bool)
+    whitening, aside = reweigh(rows, STATED, use, 0.0, 3)
+    assert not aside.any()
+    np.testing.assert_array_equal(whitening.noise, SIGMA[:3])
+    rows[:5] += 500.0 * SIGMA[:3]
+    np.testing.assert_array_equal(np.flatnonzero(reweigh(rows, STATED, use, 0.0, 3)[1]), np.arange(5))
 
 
 def test_rows_that_are_not_used_have_no_weight_at_first():
@@ -131,51 +138,3 @@ def test_a_close_fit_is_judged_by_the_equations_that_it_leaves():
     rows[0] = 3.0 * SIGMA[:3]
     assert not reweigh(rows, STATED, use, 0.0, 3)[1].any()
     np.testing.assert_array_equal(np.flatnonzero(reweigh(rows, STATED, use, 2.0 / 3.0, 3)[1]), [0])
-
-
-@pytest.mark.parametrize("repeats", [2, 5])
-def test_rows_that_are_copies_of_each_other_are_worth_one(repeats):
-    linear, _ = small_problem(6, rows=60, present=())
-    linear = replace(linear, frames=linear.frames[:, :, :0])
-    copied = replace(
-        linear,
-        gap=np.repeat(linear.gap, repeats, axis=0),
-        frames=np.repeat(linear.frames, repeats, axis=0),
-        blocks=tuple(replace(b, columns=np.repeat(b.columns, repeats, axis=0)) for b in linear.blocks),
-    )
-    whitening = Whitening(np.ones(60 * repeats), np.ones(3), 0.0)
-    label = np.repeat(np.arange(60), repeats)
-    seen = gram(copied, whitening)
-    gap = np.repeat(np.random.default_rng(6).normal(size=(60, 3)), repeats, axis=0)
-    assert design_effect(copied, seen, gap, whitening, (label,)) == pytest.approx(repeats, rel=1e-9)
-    # the largest of several groupings counts; without one each row is worth one
-    apart = np.arange(60 * repeats)
-    assert design_effect(copied, seen, gap, whitening, (apart, label)) == pytest.approx(repeats, rel=1e-9)
-    assert design_effect(copied, seen, gap, whitening, (apart,)) == 1.0
-    assert design_effect(copied, seen, gap, whitening, ()) == 1.0
-    nothing = replace(copied, blocks=(columns_of(np.zeros((60 * repeats, 3, 2))),))
-    assert design_effect(nothing, gram(nothing, whitening), gap, whitening, (label,)) == 1.0
-
-
-def test_rows_are_worth_one_each_unless_their_remainders_are_alike(rv_m2):
-    linear, seen = problem_of(rv_m2, choose(["joint_offset", "joint_gain"]))
-    whitening = Whitening(np.ones(120), np.full(3, 25e-6), 20.0)
-    groups = (np.arange(120) // 10,)
-    independent = []
-    for seed in range(10):
-        noise = 25e-6 * np.random.default_rng(seed).normal(size=(120, 3))
-        independent.append(design_effect(linear, seen, noise, whitening, groups))
-    assert np.median(independent) == 1.0
-    assert max(independent) < 2.0
-    # columns and remainders that are the same throughout each group of ten: ten rows are worth one
-    rng = np.random.default_rng(10)
-    constant = replace(linear, blocks=(columns_of(np.repeat(rng.normal(size=(12, 3, 2)), 10, axis=0)),))
-    steady = gram(replace(constant, frames=linear.frames[:, :, :0]), whitening)
-    shared = 25e-6 * np.repeat(rng.normal(size=(12, 3)), 10, axis=0)
-    apart = (np.tile(np.arange(10), 12),)
-    flat = replace(constant, frames=linear.frames[:, :, :0])
-    assert design_effect(flat, steady, shared, whitening, groups) == pytest.approx(10.0, rel=1e-9)
-    assert design_effect(flat, steady, shared, whitening, apart) == 1.0
-    tempered = steady.tempered(10.0)
-    assert tempered.equations == steady.equations / 10.0
-    np.testing.assert_allclose(tempered.matrix, steady.matrix / 10.0)

@@ -1,4 +1,4 @@
-"""Which rows belong together: repeats of a pose, neighbours in joint space, spells of time, folds."""
+"""Which rows belong together: repeats of a pose, neighbours in joint space, spells of time, blocks."""
 
 from dataclasses import replace
 
@@ -9,7 +9,8 @@ from simulate import commands
 
 from thermal_robot.campaign import Campaign
 from thermal_robot.inference.rows import (
-    folds,
+    blocks,
+    each,
     in_a_row,
     in_order,
     near_repeats,
@@ -39,12 +40,11 @@ def test_repeats_of_a_pose_are_never_on_both_sides(arm, jitter):
     for seed in range(3):
         campaign, number = repeated(arm, jitter=jitter, seed=seed)
         for rows in (campaign, replace(campaign, covariates={"time": np.arange(120.0)[::-1]})):
-            fold, block = folds(rows)
+            block = blocks(rows)
             for pose in range(30):
-                assert len(set(fold[number == pose])) == 1
                 assert len(set(block[number == pose])) == 1
             near = cdist(rows.q, rows.q) < NEAR
-            assert (fold[:, None] == fold[None, :])[near].all()
+            assert (block[:, None] == block[None, :])[near].all()
 
 
 def test_rows_that_share_a_label_belong_together_however_far_apart(rv_m2):
@@ -59,28 +59,34 @@ def test_rows_that_share_a_label_belong_together_however_far_apart(rv_m2):
 
 
 def test_a_path_is_not_one_single_repeat(rv_m2):
-    """Samples along a path lie within a hair of each other from end to end: they still make five folds."""
+    """Samples along a path lie within a hair of each other from end to end: they still make blocks."""
     along = np.linspace(0.0, 1.0, 500)[:, None]
     ends = commands(rv_m2, 2, np.random.default_rng(2))
     path = Campaign("path", rv_m2, ends[0] + along * (ends[1] - ends[0]))
     assert np.linalg.norm(np.diff(path.q, axis=0), axis=1).max() < NEAR
-    fold, block = folds(path)
-    assert np.bincount(fold, minlength=5).min() >= 50
+    block = blocks(path)
+    assert np.bincount(block).max() <= 50
     assert len(set(block)) >= 10
 
 
 @pytest.mark.parametrize("samples", [20, 47, 120, 1000])
-def test_blocks_are_consecutive_in_time_and_of_one_fold(rv_m2, samples):
+def test_blocks_are_consecutive_in_time_and_of_one_size(rv_m2, samples):
     rng = np.random.default_rng(3)
     q = rng.uniform(-1.5, 1.5, (samples, 5))
     time = rng.permutation(samples).astype(float)
-    fold, block = folds(Campaign("long", rv_m2, q, covariates={"time": time}))
+    block = blocks(Campaign("long", rv_m2, q, covariates={"time": time}))
     order = block[np.argsort(time)]
-    assert set(fold) == set(range(5))
     assert (np.diff(order) >= 0).all()
-    assert len(set(block)) == 20
-    assert all(len(set(fold[block == b])) == 1 for b in set(block))
-    assert np.ptp(np.bincount(fold)) <= 5
+    assert set(block) == set(range(20))
+    assert np.ptp(np.bincount(block)) <= 1
+    assert set(blocks(Campaign("long", rv_m2, q), 4)) == set(range(4))
+
+
+def test_each_row_is_in_the_mask_of_its_label():
+    labels = np.array([3, 1, 3, 7, 1])
+    masks = each(labels)
+    np.testing.assert_array_equal(np.sum(masks, axis=0), np.ones(5))
+    assert [sorted(np.flatnonzero(mask)) for mask in masks] == [[1, 4], [0, 2], [3]]
 
 
 def test_spells_and_neighbourhoods_share_the_rows_out_evenly(rv_m2):
@@ -112,18 +118,18 @@ def test_rows_follow_each_other_by_the_clock_and_without_one_as_in_the_file(rv_m
     np.testing.assert_array_equal(in_order(both), np.arange(12))
 
 
-def test_of_rows_set_aside_those_with_a_neighbour_in_time_stand_in_a_row(rv_m2):
+def test_of_rows_set_aside_those_that_follow_each_other_thrice_stand_in_a_row(rv_m2):
     time = np.array([0, 6, 1, 7, 2, 8, 3, 9, 4, 10, 5, 11])
-    aside = np.isin(np.arange(12), [0, 1, 2, 9, 10])
-    # measured one after the other: rows 0, 2 at 0 and 1; rows 10, 1 at 5 and 6; row 9, at 10, is alone
+    aside = np.isin(np.arange(12), [0, 1, 2, 4, 9, 10, 11])
+    # by the clock: rows 0, 2, 4 at 0, 1, 2; rows 10, 1 at 5 and 6; rows 9, 11 at 10 and 11
     own = in_a_row(clocked(rv_m2, time=time), aside)
-    np.testing.assert_array_equal(np.flatnonzero(own), [0, 1, 2, 10])
-    # as they stand in the file: 0, 1, 2 and 9, 10
-    np.testing.assert_array_equal(in_a_row(clocked(rv_m2), aside), aside)
-    for few in ([], [3], [3, 5, 7]):
+    np.testing.assert_array_equal(np.flatnonzero(own), [0, 2, 4])
+    # as they stand in the file: 0, 1, 2; then 4 alone; 9, 10, 11
+    np.testing.assert_array_equal(np.flatnonzero(in_a_row(clocked(rv_m2), aside)), [0, 1, 2, 9, 10, 11])
+    for few in ([], [3], [3, 4], [3, 5, 7], [0, 1, 3, 4]):
         assert not in_a_row(clocked(rv_m2), np.isin(np.arange(12), few)).any()
-    # the first row does not follow the last
-    assert not in_a_row(clocked(rv_m2), np.isin(np.arange(12), [0, 11])).any()
+    # the first rows do not follow the last
+    assert not in_a_row(clocked(rv_m2), np.isin(np.arange(12), [0, 1, 11])).any()
 
 
 @on_arms
@@ -149,13 +155,12 @@ def same(labels):
     return labels[:, None] == labels[None, :]
 
 
-def test_few_rows_make_few_folds_and_boxes(rv_m2):
+def test_few_rows_make_few_blocks_and_boxes(rv_m2):
     q = commands(rv_m2, 3, np.random.default_rng(6))
-    fold, block = folds(Campaign("three", rv_m2, q))
-    assert sorted(fold) == sorted(block) == [0, 1, 2]
+    assert sorted(blocks(Campaign("three", rv_m2, q))) == [0, 1, 2]
     assert sorted(neighbourhoods(Campaign("three", rv_m2, q), 8)) == [0, 1, 2]
     alone = Campaign("one", rv_m2, q[[0, 0, 0]])
-    assert set(folds(alone)[0]) == {0}
+    assert set(blocks(alone)) == {0}
 
 
 def test_neighbourhoods_are_boxes_of_joint_space(rv_m2):

@@ -1,28 +1,36 @@
 """A choice is made again at its own exact fit until it stays."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from simulate import simulate
 from time_constants import LAG
 from time_constants import campaign as lagging
 
-from thermal_robot.effects import choose
+from thermal_robot.effects import choose, gate
+from thermal_robot.effects.joint_gain import JointGain
+from thermal_robot.effects.law import Discovered
 from thermal_robot.inference.frames import register
 from thermal_robot.inference.gauss_newton import corrected_observations
-from thermal_robot.inference.rows import row_groups
-from thermal_robot.inference.settings import NEVER
-from thermal_robot.inference.settle import settle
+from thermal_robot.inference.settle import _others, settle
 from thermal_robot.observations import observe
 
 NOISE = 25e-6  # m
 NAMES = ("joint_offset", "joint_gain", "geometric", "drift")
 
 
-def settled(campaign, names=NAMES, **told):
+class Rare(JointGain):
+    """A gain that was picked out of very many."""
+
+    share = 1e-200
+
+
+def settled(campaign, names=NAMES, effects=(), **told):
     """The explanation at its exact fit, and what was said meanwhile."""
     start, said = observe(campaign, register(campaign)), []
-    variants = {e.name: e.variants(start) for e in choose(names, (), ())}
-    return settle(start, variants, row_groups(campaign), said.append, **told), said
+    variants = {e.name: e.variants(start) for e in (*choose(names, (), ()), *effects)}
+    return settle(start, variants, said.append, **told), said
 
 
 @pytest.fixture(scope="module")
@@ -51,15 +59,28 @@ def test_it_says_what_it_does(gained):
 
 def test_where_it_starts_does_not_matter(gained):
     campaign, found, _ = gained
-    for told in ({"begin": ("joint_offset", "drift")}, {"known": found}):
+    start = observe(campaign, register(campaign))
+    begin = [choose((name,), (), ())[0].variants(start)[0] for name in ("joint_offset", "drift")]
+    for told in ({"begin": begin}, {"known": found}):
         again, _ = settled(campaign, **told)
         assert again.names == found.names
         np.testing.assert_allclose(again.held[0][1], found.held[0][1], rtol=0, atol=1e-6)
 
 
-def test_what_was_picked_out_of_many_must_explain_more(gained):
-    campaign, _, _ = gained
-    assert "joint_gain" not in settled(campaign, rarity={"joint_gain": -1e5})[0].names
+def test_what_was_picked_out_of_many_must_explain_more(rv_m2):
+    """The natural logarithm of 1e200 is 460: more than a gap of two to three times the noise can bring."""
+    campaign = simulate(rv_m2, ["joint_gain"], seed=2, ratio=(2.0, 3.0))[0]
+    assert settled(campaign)[0].names == ("joint_gain",)
+    assert "joint_gain" not in settled(campaign, ("joint_offset", "drift"), (Rare(),))[0].names
+
+
+def test_one_setting_is_never_beside_another_of_its_name(gained):
+    _, found, _ = gained
+    explanation = found.explanation
+    assert len(found.families) == len(explanation.linear.blocks)
+    for combination in explanation.combinations:
+        names = [found.families[b] for b in combination.blocks]
+        assert len(names) == len(set(names))
 
 
 def test_an_effect_that_contains_others_is_known_as_such(rv_m2):
@@ -87,7 +108,51 @@ def test_nothing_is_held_in_noise(rv_m2):
     assert not found.second_order
 
 
-def test_what_never_is_chosen_is_not_chosen_however_much_it_explains(gained):
-    campaign, _, _ = gained
-    found, _ = settled(campaign, ("joint_gain", "drift"), rarity={"joint_gain": NEVER})
-    assert "joint_gain" not in found.names
+@pytest.fixture(scope="module")
+def nominal(rv_m2):
+    campaign = simulate(rv_m2, seed=6)[0]
+    return observe(campaign, register(campaign))
+
+
+def rivals(chosen, nominal):
+    known = gate.variants(replace(chosen, places=()), nominal)
+    return list(_others(chosen, nominal, (*known, *gate.alone(known[0], nominal))))
+
+
+def test_rivals_of_a_setting_in_all_joints_are_those_of_each_alone(nominal):
+    """Of a joint's effect, constants being refined: in all joints, or in any one."""
+    joints = nominal.robot.joint_names
+    (gain,) = choose(("joint_gain",), (), ())
+    found = {setting.places for setting in rivals(gain, nominal)}
+    assert found == {(), *((j,) for j in joints)}
+
+
+def test_rivals_of_one_joint_are_all_the_others_and_one_more(nominal):
+    joints = nominal.robot.joint_names
+    (gain,) = choose(("joint_gain",), (), ())
+    found = [setting.places for setting in rivals(replace(gain, places=("joint_2",)), nominal)]
+    assert {frozenset(own) for own in found} == {
+        frozenset(),
+        *(frozenset({j}) for j in joints),
+        *(frozenset({"joint_2", j}) for j in joints),
+    }
+
+
+def test_rivals_of_two_joints_have_one_less_or_one_more(nominal):
+    joints = nominal.robot.joint_names
+    (gain,) = choose(("joint_gain",), (), ())
+    pair = ("joint_2", "joint_4")
+    found = {frozenset(setting.places) for setting in rivals(replace(gain, places=pair), nominal)}
+    assert {len(own) for own in found} == {0, 1, 3}
+    assert {own for own in found if len(own) == 3} == {frozenset({*pair, j}) for j in joints} - {frozenset(pair)}
+    assert {frozenset({j}) for j in pair} <= found
+
+
+def test_rivals_of_a_law_are_all_that_were_compared_with_it(nominal):
+    laws = [Discovered(place=f"joint_{k}", quantity="time", tried=50.0) for k in (1, 2, 3)]
+    assert list(_others(laws[1], nominal, laws)) == laws
+
+
+def test_an_effect_that_sits_in_no_joint_has_itself_alone(nominal):
+    (scale,) = choose(("instrument_scale",), (), ())
+    assert set(rivals(scale, nominal)) == {scale}

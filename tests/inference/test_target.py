@@ -148,3 +148,27 @@ def test_units_of_the_design_do_not_matter():
     units = 10.0 ** np.array([-6.0, 0.0, 3.0, 6.0])
     one, other = (Target.of(gap, d).worth(further) for d in (design, design * units))
     assert other.gain == pytest.approx(one.gain, rel=1e-6)
+
+
+@pytest.mark.parametrize("components", [1, 6])
+def test_a_seat_tells_of_many_laws_what_the_target_tells_of_each(components):
+    rng = np.random.default_rng(3)
+    gap, design, _ = drawn(rng)
+    target = Target.of(gap, design)
+    moves = rng.normal(size=(ROWS, 3, components))
+    laws = [rng.normal(size=(ROWS, k)) for k in (1, 3, 2, 3)]
+    # one law twice over, one of nothing, one that the gap follows
+    laws += [np.repeat(laws[0], 2, axis=1), np.zeros((ROWS, 1)), laws[1][:, :1]]
+    loud = Target.of(gap + 3e-5 * moves[:, :, 0] * laws[1][:, :1], design)
+    for own in (target, loud):
+        expected = [own.worth((law[:, None, :, None] * moves[:, :, None, :]).reshape(ROWS, 3, -1)).gain for law in laws]
+        np.testing.assert_allclose(own.seat(moves).gains(laws), expected, rtol=1e-9)
+    assert loud.seat(moves).gains(laws)[-1] > 10.0
+    assert target.seat(moves).gains(laws)[-2] == -np.inf
+
+
+def test_a_seat_does_not_count_what_the_design_can_do():
+    rng = np.random.default_rng(4)
+    gap, design, _ = drawn(rng)
+    target = Target.of(gap, design)
+    assert target.seat(design[:, :, :1]).gains([np.ones((ROWS, 1))])[0] == -np.inf

@@ -32,7 +32,6 @@ def test_below_the_limit_all_rows_are_there(known):
     thin, e = Thin.of(known), known.explanation
     assert thin.observations is known.corrected
     assert thin.linear is e.linear
-    assert thin.remainder is e.remainder
     # the knocked rows follow each other, scattered gross errors do not
     assert thin.changed[np.argsort(known.campaign.covariates["time"])[60:64]].all()
     assert thin.changed.sum() < e.outliers.sum()
@@ -43,10 +42,10 @@ def test_above_it_rows_are_drawn_once_and_in_order(known, thinned):
     rows = [int(np.flatnonzero((known.campaign.q == q).all(axis=1))[0]) for q in thinned.observations.q]
     assert rows == sorted(set(rows))
     e = known.explanation
-    np.testing.assert_array_equal(thinned.remainder, e.remainder[rows])
-    np.testing.assert_array_equal(thinned.linear.stack, e.linear.stack[rows])
-    np.testing.assert_array_equal(thinned.whitening.weights, e.whitening.weights[rows])
-    np.testing.assert_array_equal(thinned.whitening.noise, e.whitening.noise)
+    np.testing.assert_array_equal(thinned.linear.gap, e.linear.gap[rows])
+    np.testing.assert_array_equal(thinned.linear.frames, e.linear.frames[rows])
+    for own, whole in zip(thinned.linear.blocks, e.linear.blocks, strict=True):
+        np.testing.assert_array_equal(own.columns, whole.columns[rows])
     np.testing.assert_array_equal(thinned.changed, in_a_row(known.campaign, e.outliers)[rows])
     # the corrected model is the same: its gap at these rows is the one it had among all
     np.testing.assert_allclose(thinned.observations.gap, known.corrected.gap[rows], rtol=0, atol=1e-12)
@@ -54,14 +53,16 @@ def test_above_it_rows_are_drawn_once_and_in_order(known, thinned):
     np.testing.assert_array_equal(Thin.of(known).observations.q, thinned.observations.q)
 
 
-def test_the_rows_drawn_stand_for_all(known, thinned):
+def test_the_rows_drawn_stand_for_all(known, thinned, monkeypatch):
     clock = known.campaign.covariates["time"]
     share = np.mean(thinned.observations.campaign.covariates["time"] < np.median(clock))
     assert share == pytest.approx(0.5, abs=4.0 * 0.5 / np.sqrt(90))
-    e = known.explanation
-    sound = e.remainder[e.whitening.weights > 0]
-    own = thinned.remainder[thinned.whitening.weights > 0]
-    assert (own**2).mean() == pytest.approx((sound**2).mean(), rel=4.0 * np.sqrt(2.0 / own.size))
+    blocks = known.explanation.best.blocks
+    own = thinned.target(blocks).white
+    monkeypatch.undo()
+    sound = Thin.of(known).target(blocks).white
+    # four of its standard deviations: that of a normal law's median of |x|, 1.17/√n of it
+    assert np.median(np.abs(own)) == pytest.approx(np.median(np.abs(sound)), rel=4.0 * 1.17 / np.sqrt(own.size))
 
 
 def test_targets_hold_what_is_left_beside_some_blocks(known):

@@ -8,6 +8,7 @@ import pytest
 
 from thermal_robot import kinematics as kin
 from thermal_robot.kinematics import reference
+from thermal_robot.kinematics.model import PRISMATIC
 from thermal_robot.robot import load_robot
 
 
@@ -65,15 +66,26 @@ def test_gravity_default_is_down_in_the_root_of_the_urdf(awkward, awkward_urdf, 
     np.testing.assert_allclose(from_ground.gravity, [0.0, 0.0, -9.81])
 
 
-def test_the_moment_on_a_segment_holds_its_joint(arm, configurations):
+def test_the_moment_on_a_segment_holds_its_joint_and_those_that_mimic_it(arm, configurations):
     q = configurations(arm, 30)
     load = {"payload": np.linspace(0.0, 10.0, 30), "payload_com": np.array([0.05, -0.02, 0.1])}
     loads, torques = kin.segment_loads(arm, q, **load), kin.gravity_torques(arm, q, **load)
-    by_joint = {segment.name: s for s, segment in enumerate(arm.segments)}
+    chain, held = arm.chain, []
+    for k in chain.movable:
+        part = slice(0, 3) if chain.kinds[k] == PRISMATIC else slice(3, 6)
+        held.append(-loads[:, chain.placed.tolist().index(k), part] @ chain.axes[k])
     for j, name in enumerate(arm.joint_names):
-        axis = arm.chain.axes[arm.chain.movable[j]]
-        part = slice(0, 3) if arm.joint_types[j] == "prismatic" else slice(3, 6)
-        np.testing.assert_allclose(loads[:, by_joint[name], part] @ axis, -torques[:, j], atol=1e-9)
+        # the power of a joint is its own and that of all that follow it, each as fast as it is geared
+        follow = [speed(ElementTree.fromstring(arm.urdf), chain.names[k], name) for k in chain.movable]
+        np.testing.assert_allclose(np.array(follow) @ held, torques[:, j], atol=1e-9)
+
+
+def speed(tree, joint, driver):
+    """How fast a joint moves for a unit speed of another one, by the mimic tags alone."""
+    mimic = next(item for item in tree.findall("joint") if item.get("name") == joint).find("mimic")
+    if mimic is None:
+        return float(joint == driver)
+    return float(mimic.get("multiplier", 1.0)) * speed(tree, mimic.get("joint"), driver)
 
 
 def test_what_a_segment_carries_is_what_pinocchio_says(arm, configurations):
@@ -103,21 +115,31 @@ def test_what_a_segment_carries_is_what_pinocchio_says(arm, configurations):
 
 def whole_configurations(full, arm, q):
     """The chain's joints as given, every other one where it is held, as Pinocchio writes them."""
-    rows = []
+    rows, tree = [], ElementTree.fromstring(arm.urdf)
     for values in q:
-        row = pinocchio.neutral(full)
+        row, at = pinocchio.neutral(full), {}
         for j, name in enumerate(full.names[1:], start=1):
             joint = full.joints[j]
             low, high = full.lowerPositionLimit[joint.idx_q], full.upperPositionLimit[joint.idx_q]
             value = min(max(0.0, low), high) if joint.nq == 1 and low < high else 0.0
-            if name in arm.joint_names:
-                value = values[arm.joint_names.index(name)]
+            at[name] = values[arm.joint_names.index(name)] if name in arm.joint_names else value
+        for j, name in enumerate(full.names[1:], start=1):
+            joint, value = full.joints[j], position(tree, name, at)
             if joint.nq == 2:
                 row[joint.idx_q : joint.idx_q + 2] = np.cos(value), np.sin(value)
             elif joint.nq == 1:
                 row[joint.idx_q] = value
         rows.append(row)
     return rows
+
+
+def position(tree, joint, at):
+    """Where a joint is, by the mimic tags and where those stand that follow none."""
+    mimic = next(item for item in tree.findall("joint") if item.get("name") == joint).find("mimic")
+    if mimic is None:
+        return at[joint]
+    followed = position(tree, mimic.get("joint"), at)
+    return float(mimic.get("multiplier", 1.0)) * followed + float(mimic.get("offset", 0.0))
 
 
 def links_behind(urdf):

@@ -71,10 +71,12 @@ def test_what_hangs_is_the_sum_over_the_tree_up_to_the_next_joint_of_the_chain(a
         below.setdefault(item.parent, []).append(item)
     children = {item.name: item.child for item in tree.joints}
 
+    movable = {arm.chain.names[k] for k in arm.chain.movable}
+
     def beyond(name):
-        onward = [item for item in below.get(name, []) if item.name not in arm.joint_names]
+        onward = [item for item in below.get(name, []) if item.name not in movable]
         return mass.get(name, 0.0) + sum(beyond(item.child) for item in onward)
 
     for k, name in enumerate(arm.chain.names):
-        expected = 0.0 if name in arm.joint_names else beyond(children[name])
+        expected = 0.0 if name in movable else beyond(children[name])
         assert arm.chain.hanging[k] == pytest.approx(expected, abs=1e-9)

@@ -5,7 +5,7 @@ import os
 import pytest
 
 from thermal_robot.errors import RobotError
-from thermal_robot.kinematics.urdf import mimic_joints, nearest, parse_urdf
+from thermal_robot.kinematics.urdf import nearest, parse_urdf
 
 LIMIT = '<limit lower="-1" upper="1" effort="1" velocity="1"/>'
 
@@ -59,23 +59,6 @@ def test_what_a_library_prints_is_kept_off_the_terminal_and_the_streams_come_bac
     os.write(1, b"out")
     os.write(2, b"err")
     assert capfd.readouterr() == ("out", "err")
-
-
-@pytest.mark.parametrize(
-    ("text", "found"),
-    [
-        ('<joint name="j" type="revolute"><mimic joint="k"/></joint>', {"j"}),
-        ("<joint type='revolute' name='j'>\n<mimic joint='k' multiplier='-1'/>\n</joint>", {"j"}),
-        ('<joint name="j"></joint><joint name="k"><mimic joint="j"/></joint>', {"k"}),
-        ('<joint name="j"/><joint name="k"><mimic joint="j"/></joint>', {"k"}),
-        ('<joint name="j"><!-- <mimic joint="k"/> --></joint>', set()),
-        ('<joint name="j"><!-- -- --><mimic joint="k"/></joint>', {"j"}),
-        ('<joint_states name="j"><mimic joint="k"/></joint_states>', set()),
-        ('<joint name="j"><mimicry/></joint>', set()),
-    ],
-)
-def test_mimicking_joints_are_found_in_any_dress(text, found):
-    assert mimic_joints(f'<robot name="r">{text}</robot>') == found
 
 
 def test_the_most_similar_names_come_first():

@@ -118,7 +118,7 @@ def found():
             2.83e-5,
             2.6e-5,
             "stated",
-            HeldOut("blocked", 5, 4.15e-4, 3.05e-5, 0.9946, (0.9901, 0.9967)),
+            HeldOut("blocked", 5, 4.15e-4, 3.05e-5, 0.9946, (0.9901, 0.9967), 4.52e-4, 1.82e-4),
         ),
         effects=(THERMAL, *NOT_FOUND, *NOT_TESTABLE),
         where=Where(

@@ -81,6 +81,12 @@ def test_the_example_of_the_format_is_valid(validator):
     law["shape"] = "step"
     effect["shape"] = "step"  # an effect of the library is no law found in the data
     assert not validator.is_valid(plain)
+    del effect["shape"]
+    held_out.update(rms_before_with_aside=1.5e-4, rms_after_with_aside=None)
+    law["of"] = "backlash"
+    validator.validate(plain)
+    effect["of"] = "backlash"
+    assert not validator.is_valid(plain)
 
 
 BREAKAGES = {
@@ -96,6 +102,7 @@ BREAKAGES = {
     "an orientation that was not measured": lambda d: d["gap"].update(orientation={"rms_before": 0.1, "rms_after": 0}),
     "an orientation that is missing": lambda d: d["campaign"].update(measures="pose"),
     "no word on orientation": lambda d: d["gap"].pop("orientation"),
+    "a negative gap with rows set aside": lambda d: d["gap"]["held_out"].update(rms_after_with_aside=-1e-4),
     "no held-out interval": lambda d: d["gap"]["held_out"].pop("shrinkage_ci95"),
     "an interval of three": lambda d: d["gap"]["held_out"].update(shrinkage_ci95=[0.1, 0.2, 0.3]),
     "a shrinkage above one": lambda d: d["gap"]["held_out"].update(shrinkage=1.2),

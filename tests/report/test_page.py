@@ -206,6 +206,16 @@ def test_the_least_favourable_way_of_holding_out_is_told_first(case):
 
 
 @pytest.mark.usefixtures("no_drawing")
+def test_the_gap_with_rows_set_aside_is_told_where_there_are_any(case):
+    def page(kind):
+        return unescape(re.sub(r"<[^>]+>", "", html(case(kind))))
+
+    assert "The gap on rows held out with the 2 rows set aside in it: 452 µm → 182 µm." in page("found")
+    assert "set aside in it" not in page("nothing")
+    assert "Figures of rows held out have the noise of these rows in them." in page("nothing")
+
+
+@pytest.mark.usefixtures("no_drawing")
 def test_a_law_is_drawn_where_its_fit_is_at_hand(law_case, monkeypatch):
     drawn = []
     monkeypatch.setattr(Diagnosis, "explain", lambda self, name: drawn.append(name))

@@ -41,9 +41,11 @@ def test_how_far_and_the_noise(case):
     assert "412 µm → 28 µm" in lines[0]
     assert "415 µm → 30 µm" in lines[1]
     assert "blocked, 5 folds" in lines[1]
-    assert "99.5 %   95 % interval 99.0 to 99.7 %" in lines[2]
-    assert "26 µm; the instrument's noise as the campaign states it" in lines[3]
-    assert "1.09 times that" in " ".join(lines[3:])
+    assert lines[2].strip() == "with the 2 rows set aside in it: 452 µm → 182 µm"
+    assert "99.5 %   95 % interval 99.0 to 99.7 %" in lines[3]
+    assert "26 µm; the instrument's noise as the campaign states it" in lines[4]
+    assert "1.09 times that" in " ".join(lines[4:])
+    assert "Figures of rows held out have the noise of these rows in them." in " ".join(" ".join(lines[4:]).split())
 
 
 def test_orientation_is_told_where_it_was_measured(case):

@@ -23,6 +23,7 @@ from thermal_robot.report.words import (
     rows_in_words,
     sentences,
     verdict,
+    with_aside,
 )
 
 JOINTS = ("joint_1", "joint_2")
@@ -187,3 +188,24 @@ def test_at_most_three_likely_places_and_quantities_are_named(case):
     assert "It enters most probably at joint j0 (40.0 %), joint j1 (30.0 %) or joint j2 (20.0 %)." in said
     assert "q2" in said[-1]
     assert "q3" not in said[-1]
+
+
+def test_rows_set_aside_are_told_with_what_they_do_to_the_gap(case):
+    found = case("found")
+    assert with_aside(found) == "with the 2 rows set aside in it: 452 µm → 182 µm"
+    assert with_aside(replace(found, outliers=(17,))).startswith("with the row set aside in it: ")
+
+
+def test_without_rows_set_aside_there_is_one_gap(case):
+    found = case("found")
+    assert with_aside(replace(found, outliers=())) == ""
+    held = replace(found.gap.held_out, rms_before_with_aside=None, rms_after_with_aside=None)
+    assert with_aside(replace(found, gap=replace(found.gap, held_out=held))) == ""
+
+
+def test_a_law_that_is_the_size_of_a_known_effect_names_it(law_case):
+    (own,) = laws(law_case())
+    assert law(own) == "a law found in the data: follows time, shape: step"
+    assert (
+        law(replace(own, of="backlash")) == "a law found in the data: a backlash whose size follows time, shape: step"
+    )

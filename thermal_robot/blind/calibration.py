@@ -1,4 +1,4 @@
-"""Whether a probability means what it says: of all effects called 70 % probable, 70 % should be at work."""
+"""Whether a probability means what it says: of all effects and laws called 70 % probable, 70 % should be at work."""
 
 from __future__ import annotations
 
@@ -8,18 +8,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.blind.judged import LAW, PRESENT, Record, at_work, is_absent, ratio, said
+from thermal_robot.blind.judged import LAW, PRESENT, Record, at_work, is_absent, is_right_law, ratio, said
 from thermal_robot.blind.rate import Rate
 
-KINDS = ("single", "pair", "triple", "null", "faint")
-"""Not the hard ones: what is not at work there is in the background, so that only true effects would count."""
+KINDS = ("mixed",)
+"""Only where chance decides what is at work: where one of a kind always is, a probability has nothing to mean."""
 BINS = 10
 DOUBTFUL = (0.05, 0.95)
 
 
 @dataclass(frozen=True)
 class Bin:
-    """Effects whose probability lies from ``low`` to ``high``: how probable on average, how often at work."""
+    """Effects and laws whose probability lies from ``low`` to ``high``: how probable on average, how often at work."""
 
     low: float
     high: float
@@ -38,17 +38,17 @@ class Reliability:
 
 @dataclass(frozen=True)
 class Calibration:
-    """Over all effects, and over those of which the diagnosis was not sure."""
+    """Over all effects and laws, and over those of which the diagnosis was not sure."""
 
     all: Reliability
     doubtful: Reliability
 
 
 def calibration(records: Sequence[Record]) -> Calibration:
-    """Compare probabilities with what is true, over cases that are asked what is at work in them.
+    """Compare probabilities with what is true, over mixtures: of all effects, and of all laws.
 
-    An effect in the background, neither clearly present nor clearly absent, does not count. A discovered law counts
-    as an effect that is not at work, where all that is at work is in the library.
+    An effect in the background, neither clearly present nor clearly absent, does not count. A discovered law is right
+    where its place, or one beside it, and its quantity are those of the unlisted cause.
     """
     pairs = [pair for record in records if record["kind"] in KINDS for pair in _pairs(record)]
     p = np.array([probability for probability, _ in pairs], dtype=float)
@@ -60,9 +60,11 @@ def calibration(records: Sequence[Record]) -> Calibration:
 def _pairs(record: Record) -> Iterator[tuple[float, bool]]:
     for effect in said(record)["effects"]:
         name, probability = effect["name"], effect["probability"]
-        if probability is None or (name.startswith(LAW) and record["truth"].get("unlisted")):
+        if probability is None:
             continue
-        if name in at_work(record) or (ratio(record, name) or 0.0) >= PRESENT:
+        if name.startswith(LAW):
+            yield float(probability), is_right_law(record, effect)
+        elif name in at_work(record) or (ratio(record, name) or 0.0) >= PRESENT:
             yield float(probability), True
         elif is_absent(record, name):
             yield float(probability), False

@@ -12,13 +12,18 @@ A **record** is what is known of one case after its seal was opened, as plain JS
         "parts": {"drift": {"ratio": 3.1, "main": true, "places": [{"kind": "joint", "name": "elbow_joint"}]}, ...},
                                        ratio: what it leaves after the best rigid alignment, rms per axis over noise;
                                        places: where it sits, most first, where few places are at fault
+        "parameters": {"drift": {"translation x, base": 2e-4}},
+                                       true values by effect and by the diagnosis's name of the parameter, SI
         "places": [{"kind": "joint", "name": ...}], "quantities": ["time", "order"],
-                                       any of these is a right answer for what is unlisted, removed or hidden
+                                       any of these is a right answer for what is unlisted, removed or hidden;
+                                       quantity "none": it follows nothing that is recorded
+        "near": [{"kind": "joint", "name": ...}],    these places and those beside them
         "needs": ["temperature"],      columns that the diagnosis should ask for (hidden condition)
         "outliers": [17, 80]},
      "said": {diagnosis JSON of formats.md} | null,
-     "fresh": {"rms_before": 1.2e-4, "rms_after": 2.0e-6},   rms distance on noise-free fresh samples, m: frames alone,
-                                       and the corrected model | null
+     "fresh": {"rms_before": 1.2e-4, "rms_after": 2.0e-6,   rms distance on noise-free fresh samples, m: frames alone,
+                                       and the corrected model
+               "shares": {"drift": 0.9}} | null,            of each effect in the model, on the same samples
      "seconds": 0.4, "error": null | "the diagnosis failed: ..."}
 """
 
@@ -27,7 +32,22 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-Kind = Literal["single", "pair", "triple", "null", "hard", "faint", "removed", "hidden", "unlisted", "real"]
+Kind = Literal[
+    "single",
+    "large",
+    "visits",
+    "lags",
+    "pair",
+    "many",
+    "null",
+    "hard",
+    "mixed",
+    "removed",
+    "hidden",
+    "unlisted",
+    "both",
+    "real",
+]
 
 
 @dataclass(frozen=True)
@@ -72,11 +92,14 @@ class Case:
     hidden
         Columns (``temperature`` stands for ``temperature.<link>`` too) taken out of the table.
     ratio
-        Size of each effect: rms per axis after rigid alignment over the noise per axis, drawn evenly between the two.
+        Size of each effect: rms per axis after rigid alignment over the noise per axis, drawn between the two,
+        evenly in its logarithm.
     samples
         Number of rows, drawn between the two.
     background
         Ratio at which every other effect is present, 0 for none.
+    wants
+        What the campaign must be like, beside what its faults want: ``repeats``, ``moving``, ``sensor:air`` ...
     heavy
         Whether the noise has Student's law, with 3 to 8 degrees of freedom.
     own
@@ -94,5 +117,6 @@ class Case:
     ratio: tuple[float, float] = (2.0, 6.0)
     samples: tuple[int, int] = (75, 140)
     background: float = 0.0
+    wants: tuple[str, ...] = ()
     heavy: bool = False
     own: str = ""

@@ -3,7 +3,8 @@
 ``python -m thermal_robot.blind.examinee DIRECTORY`` reads one request a line, as JSON, and writes one reply a line::
 
     {"folder": "...", "without": ["backlash"], "only": []}
-    {"said": {diagnosis} | null, "predicted": [[x, y, z], ...] | null, "seconds": 0.4, "error": null | "..."}
+    {"said": {diagnosis} | null, "predicted": [[x, y, z], ...] | null, "refitted": {"drift+backlash": [[x, y, z], ...]},
+     "seconds": 0.4, "error": null | "..."}
 
 Before the first it writes ``{"ready": true}``. ``DIRECTORY`` is that of the trial.
 """
@@ -19,7 +20,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from thermal_robot.blind.refitted import refitted
+from thermal_robot.campaign import read_campaign
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.datasets import demo_directory
 from thermal_robot.diagnosis import Diagnosis, diagnose
@@ -61,7 +65,7 @@ class Fence:
 def answer(request: dict[str, Any]) -> dict[str, Any]:
     """Diagnose a campaign and predict its fresh samples; whatever goes wrong becomes the reply's error."""
     folder = Path(request["folder"])
-    reply: dict[str, Any] = {"said": None, "predicted": None, "seconds": None, "error": None}
+    reply: dict[str, Any] = {"said": None, "predicted": None, "refitted": {}, "seconds": None, "error": None}
     at = "diagnosis"
     try:
         # what the library does not have need not be taken out of it
@@ -73,6 +77,10 @@ def answer(request: dict[str, Any]) -> dict[str, Any]:
         at = "prediction"
         if (folder / FRESH).is_file():
             reply["predicted"] = _predict(found, folder)
+            at = "refit of its parts"
+            samples = found.model.samples(folder / FRESH)
+            parts = refitted(found, read_campaign(folder / CAMPAIGN), samples)
+            reply["refitted"] = {names: _plain(position) for names, position in parts.items()}
     except Exception as error:
         reply["error"] = f"the {at} failed: {type(error).__name__}: {error}"
     return reply
@@ -85,7 +93,12 @@ def _predict(found: Diagnosis, folder: Path) -> list[list[float]]:
     position, _ = model.predict(model.samples(folder / FRESH))
     if not np.all(np.isfinite(position)):
         raise ValueError("a predicted position is not a number")
-    return [[float(value) for value in row] for row in position]
+    return _plain(position)
+
+
+def _plain(position: NDArray[np.float64]) -> list[list[float]]:
+    """Return positions in m as plain numbers, to a nanometre."""
+    return [[float(value) for value in row] for row in position.round(9)]
 
 
 def main(arguments: Sequence[str] | None = None) -> int:

@@ -7,15 +7,18 @@ exact         found are the effects at work and no other, nothing unexplained, n
 first_named   the first effect of the verdict is at work
 false_alarm   something is found that is not at work; where nothing is, also: something is called unexplained
 sound         nothing is found that is not at work, and nothing called unexplained where all is in the library
+listed        all effects at work are found
 located       the first place of an effect that was found rightly is its first true place
 among_places  ... is one of its true places
 flagged       something is called unexplained
 not_blamed    the verdict holds no effect with probability 0.9 or more that is not at work
 place         the first place of the law that was discovered, else of the remainder, is a true one
-quantity      the same of the quantity that it follows
+near_place    ... is a true one or beside it along the chain
+quantity      the same of the quantity that it follows; rightly none where none is recorded
 named         an effect that is not testable names the column that was hidden
 asks          it does, and the advice says so too
-right         removed, unlisted: flagged and nothing blamed; hidden: that, and asked for; real: what the record says
+right         removed, unlisted: flagged and nothing blamed; both: that, and listed; hidden: that, and asked for;
+              real: what the record says
 ============= =====================================================================================================
 
 An effect that is not among the truth's but leaves 0.1 noise or more is no false alarm: it is at work. Below 0.5 it is
@@ -27,7 +30,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any
 
-Record = Mapping[str, Any]
+Plain = Mapping[str, Any]
+Record = Plain
 Marks = dict[str, tuple[bool, ...]]
 
 LAW = "discovered."
@@ -35,10 +39,12 @@ ABSENT, PRESENT = 0.1, 0.5  # × noise: what leaves less is not there, what leav
 BLAME = 0.9
 BAD = frozenset({"false_alarm"})
 """Questions to which yes is wrong."""
+KNOWN = ("single", "large", "visits", "lags", "pair", "many", "null", "hard")
+"""Kinds of which all causes are in the library."""
 HEADLINE = {
-    **dict.fromkeys(("single", "pair", "triple", "null", "hard"), "exact"),
-    "faint": "sound",
-    **dict.fromkeys(("removed", "hidden", "unlisted", "real"), "right"),
+    **dict.fromkeys(KNOWN, "exact"),
+    "mixed": "sound",
+    **dict.fromkeys(("removed", "hidden", "unlisted", "both", "real"), "right"),
 }
 """The question that decides whether a case of a kind is a miss."""
 _SILENT: dict[str, Any] = {
@@ -83,6 +89,15 @@ def first_named(record: Record) -> str | None:
 def unexplained(record: Record) -> bool:
     """Whether the diagnosis calls something unexplained."""
     return bool(said(record)["verdict"]["unexplained"])
+
+
+def corrects(record: Record) -> bool:
+    """Whether the corrected model holds anything beside the frames: an effect that is named and shrinks the gap.
+
+    Effects that scatter are named, too, but no correction takes them away: they shrink nothing at all.
+    """
+    named = set(said(record)["verdict"]["effects"])
+    return any(e["name"] in named and e.get("shrinkage") for e in said(record)["effects"])
 
 
 def is_absent(record: Record, effect: str) -> bool:
@@ -139,12 +154,17 @@ def _extra(record: Record) -> set[str]:
     return {name for name in found(record) if is_absent(record, name)}
 
 
-def _faint(record: Record) -> Marks:
-    """Judge a case whose effects may be too small to be seen: nothing else must be.
+def is_right_law(record: Record, law: Plain) -> bool:
+    """Whether a law has the place, or one beside it, and the quantity of a cause that no effect may explain."""
+    truth = record["truth"]
+    near = [_site(p) for p in truth.get("near") or truth.get("places", ())]
+    return any(_site(p) in near for p in law["locations"][:1]) and law.get("quantity") in truth.get("quantities", ())
 
-    A law counts as a name that is false even where an unlisted cause is at work.
-    """
-    extra, strange = _extra(record), unexplained(record) and not record["truth"].get("unlisted")
+
+def _mixed(record: Record) -> Marks:
+    """Judge a case whose effects may be too small to be seen: nothing else must be."""
+    right = {e["name"] for e in said(record)["effects"] if e["name"].startswith(LAW) and is_right_law(record, e)}
+    extra, strange = _extra(record) - right, unexplained(record) and not record["truth"].get("unlisted")
     return {"sound": (not extra and not strange,), "false_alarm": (bool(extra),)}
 
 
@@ -163,15 +183,22 @@ def _site(place: Mapping[str, Any]) -> tuple[str, str]:
 
 
 def _unknown(record: Record) -> Marks:
-    """Judge a case whose cause is not in the library."""
+    """Judge a case one cause of which is not in the library, or was taken from it."""
     flagged, blameless = unexplained(record), not _blamed(record)
     truth, (place, quantity) = record["truth"], answer(record)
     answers: Marks = {"flagged": (flagged,), "not_blamed": (blameless,), "right": (flagged and blameless,)}
     if truth.get("places"):
         answers["place"] = (place in [_site(p) for p in truth["places"]],)
+        answers["near_place"] = (place in [_site(p) for p in truth.get("near") or truth["places"]],)
     if truth.get("quantities"):
         answers["quantity"] = (quantity in truth["quantities"],)
     return answers
+
+
+def _both(record: Record) -> Marks:
+    """Judge a case with one or two listed effects beside a cause that is not in the library."""
+    answers, listed = _unknown(record), set(at_work(record)) <= found(record)
+    return {**answers, "listed": (listed,), "right": (listed and all(answers["right"]),)}
 
 
 def _blamed(record: Record) -> bool:
@@ -181,12 +208,15 @@ def _blamed(record: Record) -> bool:
 
 
 def answer(record: Record) -> tuple[tuple[str, str] | None, str | None]:
-    """Return where the unknown cause enters and what it follows: a discovered law's word counts before the rest's."""
+    """Return where the unknown cause enters and what it follows: a discovered law's word counts before the rest's.
+
+    Where something is called unexplained and follows nothing, that is ``none``.
+    """
     left = said(record)["unexplained"]
     laws = [e for e in said(record)["effects"] if e["name"].startswith(LAW)][:1]
     places = [_site(p) for e in (*laws, left) for p in e["locations"][:1]]
     quantities = [e["quantity"] for e in laws if e.get("quantity")] + [d["covariate"] for d in left["depends_on"][:1]]
-    return next(iter(places), None), next(iter(quantities), None)
+    return next(iter(places), None), next(iter(quantities), "none" if unexplained(record) else None)
 
 
 def _hidden(record: Record) -> Marks:
@@ -216,9 +246,10 @@ def _real(record: Record) -> Marks:
 
 
 _ASKED: dict[str, Callable[[Record], Marks]] = {
-    **dict.fromkeys(("single", "pair", "triple", "null", "hard"), _known),
-    "faint": _faint,
+    **dict.fromkeys(KNOWN, _known),
+    "mixed": _mixed,
     **dict.fromkeys(("removed", "unlisted"), _unknown),
+    "both": _both,
     "hidden": _hidden,
     "real": _real,
 }

@@ -13,15 +13,28 @@ import numpy as np
 from thermal_robot.blind.calibration import Calibration, calibration
 from thermal_robot.blind.cases import Kind
 from thermal_robot.blind.confusion import Confusion, confusion
+from thermal_robot.blind.coverage import Coverage, coverage
 from thermal_robot.blind.detection import Detection, detection
-from thermal_robot.blind.judged import BAD, HEADLINE, Record, answer, at_work, failed, found, is_miss, marks, said
+from thermal_robot.blind.judged import (
+    BAD,
+    HEADLINE,
+    KNOWN,
+    Record,
+    answer,
+    at_work,
+    failed,
+    found,
+    is_miss,
+    marks,
+    said,
+)
+from thermal_robot.blind.laws import sure_laws
 from thermal_robot.blind.rate import Rate, rate
-from thermal_robot.blind.shrinkage import Shrinkage, Spread, fresh_ratio, shrinkage, spread
+from thermal_robot.blind.shrinkage import Shrinkage, Spread, fresh_ratio, shrinkage, spread, worse
 
 SCHEMA = "thermal-robot/blind/1"
 CONFUSIONS = {"single": ("single", "null", "unlisted"), "hard": ("hard",), "removed": ("removed",)}
 """Tables of confusion, and the kinds of cases that each counts."""
-_KNOWN = ("single", "pair", "triple", "hard")
 
 
 @dataclass(frozen=True)
@@ -112,12 +125,18 @@ class Score:
     kinds
         Kind by kind; those without cases are missing.
     by_effect
-        Of cases with known effects (one, two, three, small), each counted for every effect at work: whether one at work
+        Of cases with known effects (one, two, many, small), each counted for every effect at work: whether one at work
         is named first, whether this one is found.
     by_robot
         Of the same cases and those with nothing at work.
     removed, unlisted
-        Rates by effect that was taken out of the library, and by cause that no library knows.
+        Rates by effect that was taken out of the library, and by cause that no library knows, alone or beside effects.
+    laws
+        Laws printed at 0.9 or more: how many are right.
+    worse
+        Cases whose corrected model predicts fresh samples worse than the frames alone.
+    coverage
+        How often 95 % intervals hold the truth.
     shrinkage, calibration, detection
         Claims against fresh samples, probabilities against truth, what it takes to be found.
     confusion
@@ -137,6 +156,9 @@ class Score:
     by_robot: Mapping[str, Mapping[str, Rate]]
     removed: Mapping[str, Mapping[str, Rate]]
     unlisted: Mapping[str, Mapping[str, Rate]]
+    laws: Rate
+    worse: Rate
+    coverage: Coverage
     shrinkage: Shrinkage
     calibration: Calibration
     confusion: Mapping[str, Confusion]
@@ -164,7 +186,7 @@ def score(records: Sequence[Record]) -> Score:
         A failed diagnosis counts as wrong everywhere.
     """
     of_kind = {kind: [r for r in records if r["kind"] == kind] for kind in get_args(Kind)}
-    known = [r for kind in _KNOWN for r in of_kind[kind]]
+    known = [r for kind in KNOWN for r in of_kind[kind] if at_work(r)]
     tables = {name: confusion(records, kinds) for name, kinds in CONFUSIONS.items()}
     return Score(
         cases=len(records),
@@ -173,7 +195,10 @@ def score(records: Sequence[Record]) -> Score:
         by_effect=_by_effect(known),
         by_robot=_grouped((r["robot"], r) for r in (*known, *of_kind["null"])),
         removed=_grouped((name, r) for r in of_kind["removed"] for name in at_work(r)),
-        unlisted=_grouped((str(r["truth"]["unlisted"]), r) for r in of_kind["unlisted"]),
+        unlisted=_grouped((str(r["truth"]["unlisted"]), r) for r in (*of_kind["unlisted"], *of_kind["both"])),
+        laws=sure_laws(records),
+        worse=worse(records),
+        coverage=coverage(records),
         shrinkage=shrinkage(records),
         calibration=calibration(records),
         confusion={name: table for name, table in tables.items() if table.rows},

@@ -8,7 +8,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from thermal_robot.blind.judged import Record, failed
+from thermal_robot.blind.judged import Record, corrects, failed
+from thermal_robot.blind.rate import Rate, rate
 
 _VISIBLE = 0.5  # × noise per axis: where the gap before is less, a share of it is a share of nothing
 
@@ -54,6 +55,15 @@ def fresh_ratio(record: Record) -> float | None:
     if failed(record) or not fresh or not record.get("noise"):
         return None
     return float(fresh["rms_after"]) / math.sqrt(3.0) / float(record["noise"])
+
+
+def worse(records: Sequence[Record]) -> Rate:
+    """Count corrected models that predict fresh samples worse than the frames alone, over all cases with fresh samples.
+
+    Where nothing is named that a correction could take away, the corrected model is the frames alone.
+    """
+    told = [r for r in records if not failed(r) and r.get("fresh")]
+    return rate(corrects(r) and r["fresh"]["rms_after"] > r["fresh"]["rms_before"] for r in told)
 
 
 def shrinkage(records: Sequence[Record]) -> Shrinkage:

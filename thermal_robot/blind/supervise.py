@@ -216,7 +216,7 @@ class _Shared:
 
 def no_answer(error: str) -> dict[str, Any]:
     """Return the reply that stands for one that never came."""
-    return {"said": None, "predicted": None, "seconds": None, "error": error}
+    return {"said": None, "predicted": None, "refitted": {}, "seconds": None, "error": error}
 
 
 def _end_all(threads: Sequence[threading.Thread], running: Sequence[Examinee]) -> None:

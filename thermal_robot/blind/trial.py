@@ -19,6 +19,7 @@ from typing import Any, Protocol
 
 from thermal_robot.blind.cases import Case
 from thermal_robot.blind.sealed import open_seal, seal
+from thermal_robot.blind.shares import shares
 from thermal_robot.blind.supervise import examine
 from thermal_robot.errors import ThermalRobotError
 
@@ -130,10 +131,12 @@ def join(case: Case | RealCase, answers: Mapping[str, Any], reply: Mapping[str, 
         asked |= {"robot": case.robot.name, "without": list(case.without), "hidden": list(case.hidden)}
     if reply is None:
         return {**asked, "withdrawn": answers["withdrawn"]}
-    fresh, predicted = None, reply["predicted"]
+    fresh: Plain | None = None
+    predicted = reply["predicted"]
     if predicted is not None and answers.get("fresh_position"):
         true = answers["fresh_position"]
         fresh = {"rms_before": _rms(answers["fresh_before"], true), "rms_after": _rms(predicted, true)}
+        fresh["shares"] = shares(reply["refitted"], true, answers["noise"] or 0.0)
     true_ones = {name: value for name, value in answers.items() if name not in _FRESH}
     said = {"said": reply["said"], "fresh": fresh, "seconds": reply["seconds"], "error": reply["error"]}
     return {**asked, **true_ones, **said}
@@ -257,7 +260,7 @@ def _read_replies(path: Path, made: Mapping[str, str]) -> dict[str, Plain]:
     try:
         lines = [json.loads(line) for line in complete.splitlines()]
         return {
-            line["id"]: {name: line[name] for name in ("said", "predicted", "seconds", "error")}
+            line["id"]: {name: line[name] for name in ("said", "predicted", "refitted", "seconds", "error")}
             for line in lines
             if made.get(line["id"]) == line["campaign"]
         }

@@ -5,12 +5,14 @@ from __future__ import annotations
 import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from thermal_robot.campaign.settings import STANDARD_TEMPERATURE, Settings, as_vector
+from thermal_robot.campaign.turning import since_turns
 from thermal_robot.campaign.units import Units
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot
@@ -20,7 +22,7 @@ IntArray: TypeAlias = NDArray[np.int64]
 TextArray: TypeAlias = NDArray[np.str_]
 
 _PER_SAMPLE = ("q", "position", "orientation", "simulated_position", "simulated_orientation", "rows")
-_BY_NAME = ("covariates", "labels", "missing")
+_BY_NAME = ("covariates", "labels", "missing", "travelled")
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -75,6 +77,8 @@ class Campaign:
         (N,) bool per covariate that had empty cells: true where the value was filled in.
     urdf
         The robot's reference as written in the campaign file.
+    travelled
+        Of rows taken from a larger campaign: what :attr:`since_turn` was there. Leave it out.
 
     Raises
     ------
@@ -106,6 +110,7 @@ class Campaign:
     warnings: tuple[str, ...] = ()
     missing: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
     urdf: str = ""
+    travelled: Mapping[str, FloatArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         samples = len(self.q)
@@ -126,7 +131,12 @@ class Campaign:
             if value is not None:
                 number = np.int64 if key == "rows" else np.float64
                 object.__setattr__(self, key, self._frozen(key, value, shape, number))
-        kinds: dict[str, Any] = {"covariates": np.float64, "labels": np.str_, "missing": np.bool_}
+        kinds: dict[str, Any] = {
+            "covariates": np.float64,
+            "labels": np.str_,
+            "missing": np.bool_,
+            "travelled": np.float64,
+        }
         for key, kind in kinds.items():
             arrays = {name: self._frozen(name, value, (samples,), kind) for name, value in getattr(self, key).items()}
             object.__setattr__(self, key, arrays)
@@ -165,6 +175,17 @@ class Campaign:
         """``"pose"`` where orientations were measured, otherwise ``"position"``."""
         return "position" if self.orientation is None else "pose"
 
+    @cached_property
+    def since_turn(self) -> Mapping[str, FloatArray]:
+        """(N,) by joint: signed distance from its last turning point, rad or m; empty where rows are in no order.
+
+        It follows from the order of the whole campaign's rows; those that are taken from it keep theirs. See
+        :func:`~thermal_robot.campaign.turning.since_turns`.
+        """
+        if self.travelled and {"time", "order"} & set(self.covariates):
+            return self.travelled
+        return since_turns(self.q, self.robot.joint_names, self.covariates, self.labels.get("session"))
+
     @property
     def settings(self) -> Settings:
         """What is not in the table; the chain's root and gravity as the robot has them."""
@@ -202,7 +223,8 @@ class Campaign:
             if value is not None:
                 changes[key] = _read_only(value[index])
         for key in _BY_NAME:
-            changes[key] = {name: _read_only(value[index]) for name, value in getattr(self, key).items()}
+            held = self.since_turn if key == "travelled" else getattr(self, key)
+            changes[key] = {name: _read_only(value[index]) for name, value in held.items()}
         return dataclasses.replace(self, **changes)
 
     def drop_covariate(self, name: str) -> Campaign:

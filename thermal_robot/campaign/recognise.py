@@ -126,7 +126,9 @@ def _judge(table: Table, column: str, robot: Robot) -> tuple[str, list[str]]:
 def _doubts_of_extra(column: str, robot: Robot) -> list[str]:
     """Say what is doubtful about a numeric column that the format does not define."""
     if column in robot.urdf_joints:
-        return [f"column {column!r} is a joint outside the chain: it is kept as an extra covariate only"]
+        follows = any(segment.name == column and segment.movable for segment in robot.segments)
+        which = "that mimics another" if follows else "outside the chain"
+        return [f"column {column!r} is a joint {which}: it is kept as an extra covariate only"]
     if column in names.PER_JOINT:
         meant = f"did you mean '{column}.<joint>'?"
         return [f"column {column!r} names no joint and is kept as an extra covariate; {meant}"]

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,20 +13,18 @@ from thermal_robot.diagnosis.cautions import cautions
 from thermal_robot.diagnosis.examine import Examined
 from thermal_robot.diagnosis.findings import by_share, findings, separates, titled
 from thermal_robot.diagnosis.held_out import Shrinkage
-from thermal_robot.diagnosis.parts import Gap, Rows, Unexplained
+from thermal_robot.diagnosis.numbered import numbered
+from thermal_robot.diagnosis.parts import Gap, Refused, Rows, Unexplained
 from thermal_robot.diagnosis.random_findings import random_findings
 from thermal_robot.diagnosis.result import Diagnosis
 from thermal_robot.diagnosis.schemes import worst_folds
 from thermal_robot.diagnosis.sensitivity import prior_sensitivity
-from thermal_robot.diagnosis.stand_in import stand_ins, trust
 from thermal_robot.diagnosis.where import locate
 from thermal_robot.effects import Effect, gate, random_effects
 from thermal_robot.effects.quantities import unit
-from thermal_robot.inference import settings
 from thermal_robot.inference.discover import Discovery
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.random_gap import RandomGap
-from thermal_robot.inference.rows import in_a_row
 
 
 @dataclass(frozen=True, eq=False)
@@ -45,6 +43,8 @@ class Conclusion:
         The residual of the whole fit, laws included.
     chance
         The random part of that residual that the instrument's noise does not account for.
+    refused
+        Effects that were taken out of the fit again.
     """
 
     fit: Fit
@@ -52,6 +52,7 @@ class Conclusion:
     unexplained: Unexplained
     left: Examined
     chance: RandomGap
+    refused: Mapping[str, Refused]
 
 
 def answer(
@@ -80,14 +81,17 @@ def answer(
     notes
         What was left out of the campaign, one sentence each.
     """
-    fit, campaign, remaining = last.fit, last.fit.campaign, last.left.unexplained
+    fit, shrinkage, laws = numbered(last.fit, shrinkage, last.laws)
+    last = replace(last, fit=fit, laws=laws)
+    campaign, remaining = fit.campaign, last.left.unexplained
+    refused = {name: r.share for name, r in last.refused.items() if r.share is not None}
     shares = {name: value for name, (value, _) in shrinkage.shares.items()}
     where, locations = locate(fit, shares)
-    doubts = stand_ins(fit) if remaining.flagged or last.laws else {}
     gap = _gap(last, shrinkage)
     held = [effect.name for effect, _ in fit.effects]
-    believed = trust({name: shares.get(name, 0.0) for name in held}, doubts, _left(last, gap))
-    systematic = findings(fit, shrinkage.shares, locations, believed)
+    systematic = findings(
+        fit, shrinkage.shares, locations, {d.law.name: d.probability for d in last.laws}, last.refused
+    )
     chance = [f for f in random_findings(fit, last.chance, beside_unlisted=remaining.flagged) if asked(f.name)]
     found = by_share(titled((*systematic, *chance), (*candidates, *random_effects())))
     return Diagnosis(
@@ -103,11 +107,11 @@ def answer(
         where=where,
         unexplained=last.unexplained,
         verdict=(*(f.name for f in found if f.name in held), *(f.name for f in chance if f.status == "found")),
-        probability=min(_probability(fit), *believed.values(), 1.0),
+        probability=_probability(fit),
         separates=separates(found),
         model=_model(fit),
         rows=_rows(fit, shrinkage),
-        warnings=(*campaign.warnings, *notes, *cautions(fit, candidates if narrowed else (), doubts)),
+        warnings=(*campaign.warnings, *notes, *cautions(fit, candidates if narrowed else (), refused)),
         sensitivity=prior_sensitivity(fit),
         fit=fit,
         remaining=remaining,
@@ -115,21 +119,6 @@ def answer(
         reach=float(np.linalg.norm(np.ptp(np.asarray(campaign.position), axis=0))),
         narrowed=narrowed,
     )
-
-
-def _left(last: Conclusion, gap: Gap) -> float:
-    """Share of the gap's mean square that stays unexplained.
-
-    Consecutive outliers count as unexplained: they are a change that the fit does not follow, not gross errors.
-    """
-    remaining, fit = last.left.unexplained, last.fit
-    if not remaining.flagged:
-        return 0.0
-    aside = fit.explanation.outliers
-    changed = in_a_row(fit.campaign, aside)
-    before, after = ((o.gap[:, :3] ** 2).sum(axis=1) for o in (fit.nominal, fit.corrected))
-    beside = float(after[changed].sum() / max(before[changed | ~aside].sum(), settings.TINY))
-    return min((remaining.rms / gap.rms_before) ** 2 + beside, 1.0)
 
 
 def _probability(fit: Fit) -> float:

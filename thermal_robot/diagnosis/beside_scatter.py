@@ -2,23 +2,27 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
 from thermal_robot.diagnosis.answer import Conclusion
 from thermal_robot.diagnosis.examine import Examined, examine
-from thermal_robot.diagnosis.parts import Unexplained
-from thermal_robot.inference import settings
+from thermal_robot.diagnosis.parts import Refused, Unexplained
+from thermal_robot.diagnosis.unlisted import as_laws_say
+from thermal_robot.diagnosis.where import without_laws
+from thermal_robot.effects import Effect
+from thermal_robot.inference.discover import discovered
 from thermal_robot.inference.explain import explain
 from thermal_robot.inference.fit import Fit, refit
 from thermal_robot.inference.generalised import generalised
 from thermal_robot.inference.random_gap import RandomGap, random_gap
 from thermal_robot.inference.robust import Noise
-from thermal_robot.inference.rows import row_groups
 
 
-def beside_scatter(fit: Fit, chance: RandomGap, progress: Callable[[str], None]) -> Conclusion:
+def beside_scatter(
+    fit: Fit, chance: RandomGap, refused: Mapping[str, Refused], progress: Callable[[str], None]
+) -> Conclusion:
     """Choose the systematic effects again, with the joints' scatter in the covariance of the noise.
 
     Parameters
@@ -27,26 +31,32 @@ def beside_scatter(fit: Fit, chance: RandomGap, progress: Callable[[str], None])
         Fit whose effects were chosen with the instrument's noise alone.
     chance
         The scatter, which accounts for the residual of that fit.
+    refused
+        Effects that rows held out refused.
     progress
         Called with a few words at each stage.
 
     Returns
     -------
     Conclusion
-        Without laws. Effects that the scatter had imitated are no longer in the fit.
+        Effects and laws that the scatter had imitated are no longer in the fit.
     """
-    e, campaign = fit.explanation, fit.campaign
+    e = fit.explanation
     covariance = chance.scatter.covariance(fit.corrected.joint_sensitivity)
     linear = generalised(e.linear, covariance, chance.scatter.noise)
     noise = Noise(*(float(s) for s in chance.scatter.noise[::3]))
-    again = explain(linear, noise, families=fit.families, groups=row_groups(campaign), rarity=fit.rarity)
+    again = explain(linear, noise, families=fit.families)
     kept = tuple(dict.fromkeys(fit.families[b] for b in again.best.blocks))
-    feigned = {name: settings.NEVER for name in dict.fromkeys(fit.families) if name not in kept}
-    fit = refit(fit, {}, kept, feigned, progress)
+    feigned: dict[str, tuple[Effect, ...]] = {name: () for name in dict.fromkeys(fit.families) if name not in kept}
+    own = {name: [b for b, f in enumerate(fit.families) if f == name] for name in feigned}
+    refused = {**refused, **{name: Refused(again.probability(blocks)) for name, blocks in own.items()}}
+    fit = refit(fit, feigned, [linear.blocks[b].effect for b in again.best.blocks], progress)
     chance = random_gap(fit)
     covariance = chance.scatter.covariance(fit.corrected.joint_sensitivity)[:, :3, :3]
     floor = float(np.sqrt(np.trace(covariance, axis1=1, axis2=2).mean() / 3.0))
     left = Unexplained(not chance.explains_size, 0.0, chance.p_value)
     if left.flagged:
         left = examine(fit, progress).unexplained
-    return Conclusion(fit, (), left, Examined(left, floor, "scatter"), chance)
+    laws = discovered(fit)
+    unexplained = as_laws_say(without_laws(fit, left), laws, fit.explanation.discrepancy)
+    return Conclusion(fit, laws, unexplained, Examined(left, floor, "scatter"), chance, refused)

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from types import MappingProxyType
 
 import numpy as np
 
 from thermal_robot.campaign import Campaign
-from thermal_robot.diagnosis.stand_in import StandIn
 from thermal_robot.effects import Effect
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import orthonormal, without
@@ -59,7 +59,9 @@ def contradicted(campaign: Campaign) -> list[str]:
     return found
 
 
-def cautions(fitted: Fit, considered: Sequence[Effect], doubts: Mapping[str, StandIn]) -> tuple[str, ...]:
+def cautions(
+    fitted: Fit, considered: Sequence[Effect], refused: Mapping[str, float] = MappingProxyType({})
+) -> tuple[str, ...]:
     """Return warnings about the diagnosis, one sentence each.
 
     Parameters
@@ -68,8 +70,8 @@ def cautions(fitted: Fit, considered: Sequence[Effect], doubts: Mapping[str, Sta
         The final fit.
     considered
         The effects that were considered, if the user left some out; empty otherwise.
-    doubts
-        By effect: the quantity with which its parameters change, see :func:`stand_ins`.
+    refused
+        By effect that rows held out refused: what adding it brings there, as a share of their mean square.
     """
     notes = []
     campaign, e = fitted.campaign, fitted.explanation
@@ -81,9 +83,11 @@ def cautions(fitted: Fit, considered: Sequence[Effect], doubts: Mapping[str, Sta
         notes.append(
             f"parameters of {name} cancel each other: single ones do up to {times:.0f} times what all do together"
         )
+    for name, share in refused.items():
+        notes.append(f"rows held out are predicted no better with {name} (share {share:.1%}): not reported as found")
     if considered:
         notes.append("only these effects were considered: " + ", ".join(effect.name for effect in considered))
-    return (*notes, *_changing(doubts))
+    return tuple(notes)
 
 
 def _cancelling(fitted: Fit) -> Iterator[tuple[str, float]]:
@@ -102,11 +106,3 @@ def _cancelling(fitted: Fit) -> Iterator[tuple[str, float]]:
         times = float(np.linalg.norm(moved, axis=0).max(initial=0.0)) / max(whole, settings.TINY)
         if times > settings.CANCELLING:
             yield effect.name, times
-
-
-def _changing(doubts: Mapping[str, StandIn]) -> tuple[str, ...]:
-    return tuple(
-        f"the size of {name} changes with {doubt.quantity}: it may stand in for a cause that is not listed"
-        for name, doubt in doubts.items()
-        if doubt.belief < settings.DOUBTFUL
-    )

@@ -15,10 +15,13 @@ from thermal_robot.diagnosis.examine import examine
 from thermal_robot.diagnosis.held_out import held_out
 from thermal_robot.diagnosis.result import Diagnosis, told
 from thermal_robot.diagnosis.schemes import worse_elsewhere
-from thermal_robot.diagnosis.unlisted import Stage, as_laws_say, one_more_law
+from thermal_robot.diagnosis.unlisted import as_laws_say, one_more_law
+from thermal_robot.diagnosis.where import without_laws
+from thermal_robot.diagnosis.word import worth_their_word
 from thermal_robot.effects import Effect, choose, library
 from thermal_robot.errors import CampaignError
 from thermal_robot.inference import settings
+from thermal_robot.inference.discover import discovered
 from thermal_robot.inference.fit import Fit, fit
 from thermal_robot.inference.random_gap import random_gap
 
@@ -83,34 +86,29 @@ def diagnose(
 
 
 def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
-    """Look for what the known effects leave.
+    """Let laws that nobody wrote down compete with the known effects, then ask what of the rest is random.
 
-    Scatter is asked first: where joints scatter, and that explains the size of what remains, the effects are chosen
-    again beside it, and that is the end. Otherwise, as long as what remains is not noise, one law after another joins
-    the explanation, while each is worth its place and rows of regions held out do not get worse.
+    One law after another joins the explanation, while each is worth its place and regions held out do not get worse.
     """
-    stages = [Stage(known, (), examine(known, progress))]
-    chance = random_gap(known)
-    if chance.explains_size:
-        return beside_scatter(known, chance, progress)
+    stages = [known]
     most = settings.MOST_LAWS if known.campaign.samples < settings.MANY_ROWS else 1
-    while stages[-1].left.unexplained.flagged and len(stages) <= most:
-        wider = one_more_law(stages[-1], progress)
+    while len(stages) <= most:
+        wider = one_more_law(stages[-1], len(stages), progress)
         if wider is None:
             break
         stages.append(wider)
+        if len(wider.effects) == 1 and wider.explanation.discrepancy.probability < settings.SMOOTH_PRIOR:
+            break  # one law says it all, and its rivals were compared with it
     # the first of several laws may go astray between the places that were measured, and the others set it right
-    while len(stages) > 1 and worse_elsewhere(known, stages[-1].fit):
+    while len(stages) > 1 and worse_elsewhere(known, stages[-1]):
         stages.pop()
-    last = stages[-1]
-    left = last.left.unexplained
-    return Conclusion(
-        last.fit,
-        last.laws,
-        as_laws_say(stages[0].left.unexplained, left, last.laws),
-        last.left,
-        random_gap(last.fit) if last.laws else chance,
-    )
+    fit, refused = worth_their_word(stages[-1], progress)
+    chance = random_gap(fit)
+    if chance.explains_size:
+        return beside_scatter(fit, chance, refused, progress)
+    left, laws = examine(fit, progress), discovered(fit)
+    unexplained = as_laws_say(without_laws(fit, left.unexplained), laws, fit.explanation.discrepancy)
+    return Conclusion(fit, laws, unexplained, left, chance, refused)
 
 
 def _check_priors(campaign: Campaign, known: set[str]) -> None:

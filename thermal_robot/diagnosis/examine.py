@@ -1,4 +1,4 @@
-"""Tell whether the residual is noise: five tests with Bonferroni correction; where it enters and what it follows."""
+"""Tell whether the residual is noise: tests with Bonferroni correction; where it enters and what it follows."""
 
 from __future__ import annotations
 
@@ -11,6 +11,7 @@ from scipy.special import chdtrc, fdtrc, ndtr, pdtr
 
 from thermal_robot.diagnosis.parts import Dependence, Location, Unexplained
 from thermal_robot.diagnosis.remainder import Remainder, Repeats, nearest, remainder, repeats
+from thermal_robot.diagnosis.set_aside import alike, too_many
 from thermal_robot.effects.effect import in_words
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference import settings
@@ -46,7 +47,9 @@ def examine(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Exami
     """Test whether the residual is noise.
 
     The tests are its size against the stated noise, lack of fit against repeats, correlation of neighbours, smooth laws
-    of recorded quantities, and runs of outliers.
+    of recorded quantities, and whether the rows set aside are too many, follow each other, or have something in common.
+    Only the first asks for more than the stated noise by a margin. Rows set aside count in the unexplained rms where
+    they are no gross errors.
     """
     e, left = fit.explanation, remainder(fit)
     stated, again = fit.campaign.noise_position, repeats(fit, left)
@@ -62,28 +65,31 @@ def examine(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Exami
     else:
         floor, source = rms / np.sqrt(3.0), "remainder"
     progress("remainder: size and neighbours")
-    alike, likeness = _neighbours(fit, left)
+    near, likeness = _neighbours(fit, left)
     progress("remainder: places and quantities")
     law, locations, depends, share = _scan(fit, left)
-    verdicts = [_too_large(fit, left), _lack_of_fit(left, again), alike, law, _in_a_row(fit)]
-    p_value = min(1.0, len(verdicts) * min(p for p, _ in verdicts))
-    reasons = tuple(reason for p, reason in verdicts if reason and len(verdicts) * p < settings.LEVEL)
-    flagged = bool(reasons) and rms > settings.ROUNDING
-    if flagged and source == "remainder":
-        # nothing tells the noise but the remainder itself: at most what neighbours do not have in common
-        floor *= np.sqrt(1.0 - np.clip(max(likeness, share), 0.0, 1.0))
-    beyond = np.sqrt(max(rms**2 - 3.0 * floor**2, 0.0)) if flagged else 0.0
-    if flagged and source == "remainder":
-        beyond = rms  # neither a stated noise nor repeats vouch for any of it
-    unexplained = Unexplained(
-        flagged,
-        float(beyond),
-        float(p_value),
-        reasons if flagged else (),
-        locations if flagged else (),
-        depends if flagged else (),
+    rest = [_too_large(fit, left), _lack_of_fit(left, again), near, law]
+    aside = [_in_a_row(fit), too_many(fit, left), alike(fit)]
+    count = len(rest) + len(aside)
+    p_value = min(1.0, count * min(p for p, _ in (*rest, *aside)))
+    told, of_aside = (tuple(reason for p, reason in tests if count * p < settings.LEVEL) for tests in (rest, aside))
+    flagged = bool(told or of_aside) and rms > settings.ROUNDING
+    if not flagged:
+        return Examined(Unexplained(False, 0.0, p_value), floor, source)
+    likeness = min(max(likeness, share, 0.0), 1.0)
+    # what neighbours or a law have in common is no noise, however small beside the stated one
+    beyond2 = max(rms**2 - 3.0 * floor**2, likeness * rms**2)
+    if source == "remainder":
+        # nothing tells the noise but the remainder itself: at most what neighbours do not have in common, if that
+        floor, beyond2 = floor * float(np.sqrt(1.0 - likeness)), rms**2
+    if of_aside:
+        every2 = float((fit.corrected.gap[:, :3] ** 2).sum(axis=1).mean())
+        beyond2 = max(beyond2, every2 - 3.0 * floor**2)
+    # what the rest follows is said only where the rest is no noise
+    followed = (locations, depends) if told else ((), ())
+    return Examined(
+        Unexplained(True, float(np.sqrt(beyond2)), p_value, (*told, *of_aside), *followed), float(floor), source
     )
-    return Examined(unexplained, float(floor), source)
 
 
 def _too_large(fit: Fit, left: Remainder) -> tuple[float, str]:
@@ -184,7 +190,8 @@ def _scan(fit: Fit, left: Remainder) -> tuple[tuple[float, str], tuple[Location,
 
     Returns p-value and reason, places, quantities, and the share of the residual that the best law explains.
     """
-    tested = sorted(_tests(fit.corrected, left.some(settings.ENOUGH_REMAINDER)), key=lambda t: -t.worth.gain)
+    all_tests = _tests(fit.corrected, left.some(settings.ENOUGH_REMAINDER))
+    tested = sorted((t for t in all_tests if np.isfinite(t.worth.gain)), key=lambda t: -t.worth.gain)
     if not tested:
         return (1.0, ""), (), (), 0.0
     locations = _locations(tested)[: settings.NAMED]

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
-from thermal_robot.diagnosis.parts import Estimate, Finding, Location, Status, is_frame
+from thermal_robot.diagnosis.parts import Estimate, Finding, Location, Refused, Status, is_frame
 from thermal_robot.effects import Effect, gate, library
 from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.inference import settings
@@ -23,7 +23,11 @@ Shares = dict[str, tuple[float, tuple[float, float]]]
 
 
 def findings(
-    fit: Fit, shares: Shares, locations: dict[str, tuple[Location, ...]], believed: Mapping[str, float]
+    fit: Fit,
+    shares: Shares,
+    locations: dict[str, tuple[Location, ...]],
+    laws: Mapping[str, float],
+    refused: Mapping[str, Refused],
 ) -> tuple[Finding, ...]:
     """Return a finding for every candidate; those that are not testable come last.
 
@@ -35,8 +39,10 @@ def findings(
         By effect: share of the gap on held-out rows, and its 95 % interval.
     locations
         By effect of the fit: its places.
-    believed
-        By effect of the fit: factor (0..1) on its probability, see :func:`trust`.
+    laws
+        By discovered law of the fit: probability that what it follows, where, is right.
+    refused
+        Effects that were taken out of the fit again.
     """
     e = fit.explanation
     explained = {effect.name: b for b, (effect, _) in zip(e.best.blocks, fit.effects, strict=True)}
@@ -60,39 +66,34 @@ def findings(
             Finding(
                 name,
                 status,
-                probability=e.probability(own) * believed.get(name, 1.0),
+                probability=laws.get(name, e.probability(own)),
                 shrinkage=share,
                 shrinkage_ci95=interval,
                 confounded_with=confounded,
                 locations=locations.get(name, ()),
                 parameters=_estimates(fit, explained[name]) if name in explained else (),
-                quantity=law.quantity if law else None,
+                quantity=law.follows if law else None,
                 shape=law.shape if law else None,
                 describes=law.describe() if law else None,
+                of=(law.of or None) if law else None,
             )
         )
+    result += [
+        Finding(name, "not_found", r.probability, *shares.get(name, (0.0, (0.0, 0.0)))) for name, r in refused.items()
+    ]
     result += [Finding(name, "not_testable", needs=needs) for name, needs in fit.needs.items()]
     return tuple(result)
 
 
 def titled(found: Sequence[Finding], effects: Iterable[Effect]) -> tuple[Finding, ...]:
-    """Return the findings with titles: that of the effect, or what a discovered law describes.
-
-    Of an effect that is not found no more is said than that it is as likely there as not.
-    """
+    """Return the findings with titles: that of the effect, or what a discovered law describes."""
     known = {effect.name: effect for effect in effects}
-    found = [replace(f, probability=settings.MOST_SAID) if _unsaid(f) else f for f in found]
     return tuple(
         replace(f, title=known[f.name].title, random=known[f.name].random)
         if f.name in known
         else replace(f, title=f.describes or "")
         for f in found
     )
-
-
-def _unsaid(finding: Finding) -> bool:
-    """Whether an effect is not found although it is more likely there than not, in one place or another."""
-    return finding.status == "not_found" and (finding.probability or 0.0) > settings.MOST_SAID
 
 
 def by_share(found: Sequence[Finding]) -> tuple[Finding, ...]:
@@ -140,7 +141,9 @@ def _rivals(fit: Fit, explained: dict[str, int]) -> dict[str, tuple[str, ...]]:
             both = np.array([other in h for h in held])
             instead = float(e.probabilities[absent & both].sum())
             doubtful = mass >= 1.0 - settings.SURE and instead > max(settings.RIVAL, settings.RIVAL_SHARE * mass)
-            apart = not any(frozenset((block, b)) in containing for b in own)
+            blocks = enumerate(e.linear.blocks)
+            whole = [k for k, item in blocks if item.effect.name == name and not item.effect.places]
+            apart = not all(any(frozenset((w, b)) in containing for b in own) for w in whole)
             if doubtful or (apart and any(_imitates(fit, block, b) for b in own)):
                 rivals.setdefault(name, set()).add(other)
                 rivals.setdefault(other, set()).add(name)

@@ -28,6 +28,7 @@ from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.evidence import Combination
 from thermal_robot.inference.fit import Fit
+from thermal_robot.inference.problem import Linear, whitened
 from thermal_robot.observations import Observations, observe
 
 if TYPE_CHECKING:
@@ -254,14 +255,11 @@ class _Expected:
 def _expected(fit: Fit, offered: Observations, leading: Sequence[Combination]) -> list[_Expected]:
     e = fit.explanation
     noise = e.whitening.noise * e.best.noise
-    used = np.flatnonzero(e.whitening.weights > 0)
-    # rows that are alike are worth less, as in the explanation itself
-    weight = np.sqrt(e.whitening.weights[used] / e.design_effect)[:, None] / noise
     flat = e.linear.frames.shape[2]
     index = sorted({b for combination in leading for b in combination.blocks})
     items = [e.linear.blocks[b] for b in index]
-    known = np.concatenate([e.linear.frames, *(i.columns for i in items), e.linear.gap[:, :, None]], axis=2)[used]
-    whole = (known * weight[:, :, None]).reshape(weight.size, known.shape[2])
+    # rows that are alike are worth less, as in the explanation itself
+    whole = whitened(Linear(e.linear.gap, e.linear.frames, tuple(items)), e.whitening) / e.best.noise
     gram = whole.T @ whole
     # the simulator's own tool is never refitted: its columns come last and are left out
     columns = [frame_columns(offered)[0][:, :, :flat], *(block(offered, i.effect).columns for i in items)]

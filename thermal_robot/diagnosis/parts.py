@@ -51,10 +51,12 @@ class Finding:
     status
         ``found``, ``not_found``, ``not_testable`` or ``confounded``.
     probability
-        Posterior probability that it is at work; ``None`` where it is not testable.
+        Posterior probability that it is at work; of a discovered law, that one of this quantity is at work at this
+        place. ``None`` where it is not testable.
     shrinkage, shrinkage_ci95
-        Its share of the gap's mean square on held-out rows, and the 95 % interval. For an effect of the fit it is the
-        Shapley value; for another the gain from adding it. ``None`` where it is not testable.
+        Its share of the gap's mean square on held-out rows, noise included, and the 95 % interval. For an effect of the
+        fit it is the Shapley value, and these sum to the overall shrinkage; for another the gain from adding it.
+        ``None`` where it is not testable.
     needs
         Columns or frames that would make it testable.
     confounded_with
@@ -65,6 +67,8 @@ class Finding:
         Its estimates; empty if it is not part of the fit.
     quantity, shape, describes
         Only of a discovered law: the quantity that it follows, the shape, and a sentence about it.
+    of
+        Only of a discovered law that is a known effect whose size follows the quantity: that effect's name.
     title
         The effect in plain words.
     random
@@ -83,8 +87,20 @@ class Finding:
     quantity: str | None = None
     shape: str | None = None
     describes: str | None = None
+    of: str | None = None
     title: str = ""
     random: bool = False
+
+
+@dataclass(frozen=True)
+class Refused:
+    """An effect that was taken out of the fit again: its probability, and what it brings rows held out as a share.
+
+    The share is ``None`` where it is the scatter of joints that had feigned it.
+    """
+
+    probability: float
+    share: float | None = None
 
 
 def is_frame(found: Sequence[Finding], name: str) -> bool:
@@ -98,7 +114,23 @@ def is_frame(found: Sequence[Finding], name: str) -> bool:
 
 @dataclass(frozen=True)
 class HeldOut:
-    """Shrinkage of the gap on held-out rows: rms distances in m, shares 0..1."""
+    """Shrinkage of the gap on held-out rows: rms distances in m, shares 0..1; all with the noise of the rows in it.
+
+    Frames and parameters are fitted anew without each fold. Candidates, the choice among them, the place and quantity
+    of a law, refined constants, prior scales and outliers are those of all rows.
+
+    Attributes
+    ----------
+    scheme, folds
+        How rows are held out, and how many times.
+    rms_before, rms_after
+        With the frames alone, and with the effects; outliers left out.
+    shrinkage, shrinkage_ci95
+        1 − (rms_after / rms_before)², the sum of the shares of the model's effects; with the interval in which it lies
+        on fresh rows of the same kind with the model that is saved.
+    rms_before_with_aside, rms_after_with_aside
+        The same rms with the rows set aside in it; ``None`` where that was not asked.
+    """
 
     scheme: str
     folds: int
@@ -106,6 +138,8 @@ class HeldOut:
     rms_after: float
     shrinkage: float
     shrinkage_ci95: tuple[float, float]
+    rms_before_with_aside: float | None = None
+    rms_after_with_aside: float | None = None
 
 
 @dataclass(frozen=True)
@@ -175,8 +209,8 @@ class Dependence:
     covariate
         Its name.
     p_value
-        Of an F test, after counting every quantity that was tried; where a discovered law follows it, exp(−gain), the
-        odds that the data give against that law.
+        Of an F test, after counting every quantity that was tried; where a discovered law follows it, the posterior
+        probability that it follows another one.
     """
 
     covariate: str
@@ -194,7 +228,8 @@ class Unexplained:
     rms
         Its rms distance, m. The noise is subtracted if it is stated or known from repeats. 0 if not flagged.
     p_value
-        The smallest of all tests, with Bonferroni correction.
+        The smallest of all tests, with Bonferroni correction; where laws were found, at most the posterior probability
+        that there is none.
     reasons
         One sentence for each test that failed.
     locations

@@ -21,8 +21,8 @@ def prior_sensitivity(fit: Fit) -> Sensitivity:
     combinations alone are compared.
     """
     e = fit.explanation
-    problem = e.problem.tempered(e.design_effect) if e.design_effect > 1.0 else e.problem
-    prior = log_priors(fit.families, fit.rarity)
+    problem = e.problem
+    prior = log_priors([b.effect for b in e.linear.blocks])
     chosen = {effect.name for effect, _ in fit.effects}
     found = []
     for factor in (1.0 / settings.PRIOR_FACTOR, settings.PRIOR_FACTOR):

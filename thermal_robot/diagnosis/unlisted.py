@@ -3,91 +3,40 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
-import numpy as np
-
-from thermal_robot.diagnosis.examine import Examined, examine
 from thermal_robot.diagnosis.parts import Dependence, Location, Unexplained
-from thermal_robot.effects import Effect, gate
-from thermal_robot.effects.law import PREFIX, Discovered
+from thermal_robot.effects.law import PREFIX
 from thermal_robot.inference import settings
-from thermal_robot.inference.discover import Discovery, discover
+from thermal_robot.inference.discover import Discovery, candidates, worthwhile
+from thermal_robot.inference.explain import Discrepancy
 from thermal_robot.inference.fit import Fit, refit
-from thermal_robot.inference.laws import of_quantity
 
 
-@dataclass(frozen=True, eq=False)
-class Stage:
-    """One step of the search for laws.
+def one_more_law(fit: Fit, number: int, progress: Callable[[str], None]) -> Fit | None:
+    """Let laws that nobody wrote down compete with all known effects for a place in the fit.
 
-    Attributes
-    ----------
-    fit
-        The fit with known effects and the laws so far.
-    laws
-        The discovered laws in that fit, in the order of their discovery.
-    left
-        Its residual.
+    Returns ``None`` if no law is worth its place.
     """
-
-    fit: Fit
-    laws: tuple[Discovery, ...]
-    left: Examined
-
-
-def one_more_law(stage: Stage, progress: Callable[[str], None]) -> Stage | None:
-    """Add the best further law, or refine one that is already in the fit with more knots.
-
-    Returns ``None`` if no law is worth its parameters.
-    """
-    fit, found = stage.fit, stage.laws
-    number = 1 + max((int(d.law.name.removeprefix(PREFIX)) for d in found), default=0)
     progress(f"causes that nobody listed: scan {number}")
-    discovery = discover(fit, number)
-    if discovery is None:
+    laws = candidates(fit, number)
+    begin = worthwhile(fit, laws) if laws else None
+    if begin is None:
         return None
-    again = next((d for d in found if _same(d.law, discovery.law)), None)
-    if again is not None:  # its shape was too simple
-        values = again.law.values(fit.corrected)
-        finer = of_quantity(again.law, np.zeros(1) if values is None else values, knots=settings.FINER_KNOTS)
-        if again.law in (finer, discovery.law) or finer.shape == "levels":
-            return None
-        discovery = replace(discovery, law=finer)
-    law = discovery.law
-    begin = tuple(dict.fromkeys((*discovery.beside, law.name)))
-    alone = _alone(fit, law)
-    wider = refit(fit, {law.name: (law,), **alone}, begin, {law.name: discovery.rarity}, progress)
-    held = {effect.name for effect, _ in wider.effects}
-    singles = [variants[-1] for variants in alone.values()]
-    if law.name not in held and not any(effect in singles for effect, _ in wider.effects):
-        return None
-    known = {d.law.name: d for d in (*found, discovery)}
-    return Stage(wider, tuple(d for name, d in known.items() if name in held), examine(wider, progress))
+    name = f"{PREFIX}{number}"
+    wider = refit(fit, {name: laws}, begin, progress)
+    return wider if any(effect.name == name for effect, _ in wider.effects) else None
 
 
-def _alone(fit: Fit, law: Discovered) -> dict[str, tuple[Effect, ...]]:
-    """Return by name the settings of known effects that compete with a law of one joint's own position.
+def as_laws_say(left: Unexplained, found: Sequence[Discovery], discrepancy: Discrepancy) -> Unexplained:
+    """Return the residual of the known effects with the places and quantities of the laws that explain it.
 
-    Such an effect has parameters for every joint. If a single joint is at fault, the parameters of the sound joints
-    count against it, and the law wins although the effect is the cause. The settings returned here therefore include
-    the effect in this joint alone.
+    Where no law does, and the discrepancy errs anew at one place in every pose or visit, that is the place, and nothing
+    that was recorded is followed.
     """
-    if law.kind != "joint" or law.quantity != law.place:
-        return {}
-    own = {name: (variants, gate.at(variants[0], law.place)) for name, variants in fit.variants.items()}
-    return {name: (*known, single) for name, (known, single) in own.items() if single and single not in known}
-
-
-def _same(law: Discovered, other: Discovered) -> bool:
-    """Whether two laws follow the same quantity at the same place; harmonics of different order do not."""
-    if law.shape == other.shape == "harmonic" and law.marks != other.marks:
-        return False
-    return (law.kind, law.place, law.quantity) == (other.kind, other.place, other.quantity)
-
-
-def as_laws_say(first: Unexplained, left: Unexplained, found: Sequence[Discovery]) -> Unexplained:
-    """Return the residual of the known effects with the places and quantities of the laws that explain it."""
+    form = discrepancy.form
+    if not found and left.flagged and form is not None and form.anew and form.place[0]:
+        return replace(left, locations=(Location(*form.place, discrepancy.forms[form.name]),), depends_on=())
     if not found:
         return left
     places: dict[tuple[str, str], float] = {}
@@ -95,13 +44,14 @@ def as_laws_say(first: Unexplained, left: Unexplained, found: Sequence[Discovery
     for discovery in found:
         for place, probability in discovery.places:
             places.setdefault(place, probability)
-        for quantity, _ in discovery.quantities[:1]:
-            followed.setdefault(quantity, float(np.exp(-discovery.gain)))
+        for quantity, probability in discovery.quantities[:1]:
+            followed.setdefault(quantity, max(1.0 - probability, 0.0))
     locations = tuple(
         Location(kind, name, min(p, 1.0)) for (kind, name), p in places.items() if p >= settings.LIKELY_PLACE
     )
     return replace(
-        first,
+        left,
+        flagged=True,
         locations=locations,
         depends_on=tuple(Dependence(name, p) for name, p in followed.items()),
     )

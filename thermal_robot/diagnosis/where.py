@@ -3,20 +3,49 @@
 from __future__ import annotations
 
 from collections import defaultdict
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.diagnosis.parts import Location, Where
+from thermal_robot.diagnosis.parts import Location, Unexplained, Where
 from thermal_robot.effects.channel import by_place, column
+from thermal_robot.effects.law import PREFIX
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference.algebra import orthonormal, without
 from thermal_robot.inference.columns import Block
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.laws import smooth_columns
+from thermal_robot.inference.settings import TINY
 from thermal_robot.observations import Observations
 
 Array = NDArray[np.float64]
+
+
+def without_laws(fit: Fit, left: Unexplained) -> Unexplained:
+    """Return what the known effects of a fit leave, given what the whole fit leaves, its laws included.
+
+    What the laws do to the target is added in quadrature, with the unknown frames projected out. The p-value is at most
+    the posterior probability that none of a law's rivals is at work.
+    """
+    e, laws = fit.explanation, {name for name in fit.families if name.startswith(PREFIX)}
+    blocks = [b for b in e.best.blocks if fit.families[b] in laws]
+    if not blocks:
+        return left
+    kept = ~e.outliers
+    moved = np.sum([e.linear.contribution(b, e.values[b][0])[kept] for b in blocks], axis=0)
+    frames = e.linear.frames[kept].reshape(moved.size, -1)
+    moved = without(moved.ravel(), orthonormal(frames)).reshape(moved.shape)[:, :3]
+    chance = [1.0 - e.probability([b for b, f in enumerate(fit.families) if f == fit.families[own]]) for own in blocks]
+    taken2 = float((moved**2).sum(axis=1).mean())
+    rest2 = float((fit.corrected.gap[kept, :3] ** 2).sum(axis=1).mean())
+    what = "a law explains" if len(blocks) == 1 else f"{len(blocks)} laws explain"
+    return replace(
+        left,
+        rms=float(np.sqrt(left.rms**2 + taken2)),
+        p_value=max(min(left.p_value, *chance), 0.0),
+        reasons=(f"{what} {taken2 / max(taken2 + rest2, TINY):.0%} of what the known effects leave", *left.reasons),
+    )
 
 
 def locate(fit: Fit, shrinkage: dict[str, float]) -> tuple[Where, dict[str, tuple[Location, ...]]]:

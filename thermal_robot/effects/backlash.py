@@ -33,16 +33,21 @@ class Backlash(Effect):
     Attributes
     ----------
     held
-        Share of the joint's largest torque above which gravity wins; 0 where it never does.
+        Share of the joint's largest torque above which gravity wins; 0 where it never does. One for all joints, or one
+        for each joint of the chain, as each has its own friction.
     largest
         Each joint's largest torque in the campaign, N·m: a model goes by this, whatever it is asked to predict.
+    chain
+        Names of these joints.
     """
 
-    held: float = 0.0
+    held: float | tuple[float, ...] = 0.0
     largest: tuple[float, ...] = ()
+    chain: tuple[str, ...] = ()
 
     name: ClassVar[str] = "backlash"
     title: ClassVar[str] = "lost motion in the joints"
+    singular: ClassVar[str] = "lost motion"
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return the approach columns, unless at least one of them varies."""
@@ -53,7 +58,7 @@ class Backlash(Effect):
         """Return the approach columns of the chain's joints that were recorded, and what torques are read from."""
         columns = (f"approach.{joint}" for joint in observations.robot.joint_names)
         recorded = tuple(column for column in columns if column in observations.covariates)
-        return (*recorded, *torque_columns(observations)) if self.held else recorded
+        return (*recorded, *torque_columns(observations)) if np.any(self.held) else recorded
 
     def variants(self, observations: Observations) -> tuple[Effect, ...]:
         """Friction always wins, or gravity does above 0.5, 0.7 and 0.9 of a joint's largest torque."""
@@ -61,14 +66,38 @@ class Backlash(Effect):
         if torque is None or not np.any(np.ptp(torque, axis=0) > 1e-9):
             return (self,)
         largest = tuple(np.abs(torque).max(axis=0).tolist())
-        return (self, *(replace(self, held=share, largest=largest) for share in (0.5, 0.7, 0.9)))
+        hangs = replace(self, largest=largest, chain=observations.robot.joint_names)
+        return (self, *(replace(hangs, held=share) for share in (0.5, 0.7, 0.9)))
+
+    @property
+    def apart(self) -> int:
+        """Joints whose share is not that of most."""
+        shares = [s for j, s in enumerate(np.broadcast_to(self.held, len(self.largest)).tolist()) if self._may_hang(j)]
+        return len(shares) - max(map(shares.count, shares), default=0)
 
     def nearby(self, factor: float) -> tuple[Effect, ...]:
-        """Shares whose odds are larger and smaller by a factor."""
-        if not self.held:
+        """Shares whose odds are larger and smaller by a factor, of all joints together and of each.
+
+        Besides, one joint that never hangs, and where shares differ, that of one for all.
+        """
+        shares = np.broadcast_to(self.held, len(self.largest))
+        which = [j for j, share in enumerate(shares) if share > 0.0 and self._may_hang(j)]
+        if not which:
             return (self,)
-        odds = (self.held / (1.0 - self.held) * share for share in (1.0, factor, 1.0 / factor))
-        return (self, *(replace(self, held=o / (1.0 + o)) for o in list(odds)[1:]))
+        own = [j for j in which if self.chain and self.chain[j] in (self.places or self.chain)]
+        found: list[Effect] = [self, *(replace(self, held=float(shares[j])) for j in own if self.apart)]
+        odds = [shares * by / (1.0 - shares + shares * by) for by in (factor, 1.0 / factor)]
+        if len(own) > 1:
+            # before all together: of equals the first is taken, and the other joints stay
+            found += [self._with(j, float(share)) for j in own for share in (0.0, *(moved[j] for moved in odds))]
+        for moved in odds:
+            found.append(replace(self, held=tuple(moved.tolist()) if isinstance(self.held, tuple) else float(moved[0])))
+        return tuple(found)
+
+    def _with(self, j: int, share: float) -> Effect:
+        """Return the effect with another share of one joint's largest torque."""
+        shares = np.broadcast_to(self.held, len(self.largest))
+        return replace(self, held=tuple(np.where(np.arange(len(shares)) == j, share, shares).tolist()))
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """One lost motion a joint whose direction of approach is recorded; rad or m."""
@@ -93,7 +122,12 @@ class Backlash(Effect):
     def _side(self, observations: Observations, j: int, approach: Array) -> Array:
         """(N,) on which side of its play a joint stands."""
         torque = observations.torque
-        if not self.held or torque is None or self.largest[j] < _HANGS * max(self.largest):
+        held = self.held[j] if isinstance(self.held, tuple) else self.held
+        if not held or torque is None or not self._may_hang(j):
             return approach
-        heavy = np.abs(torque[:, j]) > self.held * self.largest[j]
+        heavy = np.abs(torque[:, j]) > held * self.largest[j]
         return np.where(heavy, np.sign(torque[:, j]), approach)
+
+    def _may_hang(self, j: int) -> bool:
+        """Whether a joint carries enough to hang at all."""
+        return self.largest[j] >= _HANGS * max(self.largest)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import difflib
+import json
 import warnings
 from collections.abc import Iterable
+from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 
 from thermal_robot.effects.backlash import Backlash
@@ -92,6 +94,25 @@ def _refuse(effect: Effect, known: dict[str, Effect]) -> None:
         raise EffectError(f"{effect.name!r} is random; only {' and '.join(RANDOM)} are told from scatter")
     if effect.name in known or effect.name in RANDOM:
         raise EffectError(f"there are two effects named {effect.name!r}")
+
+
+@cache
+def restored(name: str, arguments: str) -> Effect:
+    """Return an effect of the library by its name and its arguments, JSON text.
+
+    Raises
+    ------
+    EffectError
+        If no effect of that name is installed, or it does not take these arguments.
+    """
+    known = library()
+    if name not in known:
+        raise EffectError(f"no effect is named {name!r} here")
+    try:
+        plain = json.loads(arguments)
+        return type(known[name])(**{k: tuple(v) if isinstance(v, list) else v for k, v in plain.items()})
+    except (TypeError, ValueError, AttributeError) as error:
+        raise EffectError(f"effect {name!r} does not take the arguments {arguments}: {error}") from error
 
 
 def choose(

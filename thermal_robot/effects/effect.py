@@ -23,8 +23,9 @@ A new effect is a file like this one::
 
 Register it under the entry point group ``thermal_robot.effects`` or pass it to :func:`thermal_robot.diagnose`. What
 others want to know of it stands in the same class, each with a default: ``title`` (in plain words), ``frame`` and
-``contained_in`` (what it cannot be told from), ``missing`` and ``reads`` (columns), ``variants``, ``nearby`` and ``at``
-(settings), ``driver`` (what it is drawn against).
+``contained_in`` (what it cannot be told from), ``missing`` and ``reads`` (columns), ``variants`` and ``nearby``
+(settings), ``driver`` (what it is drawn against). Every effect has the argument ``places`` besides its own: only the
+parameters in these joints or links are kept, by the gate.
 
 Nobody asks an effect directly: :mod:`thermal_robot.effects.gate` does, checks the answer, and names the effect where it
 breaks the contract or raises.
@@ -32,9 +33,10 @@ breaks the contract or raises.
 
 from __future__ import annotations
 
+import copy
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
@@ -134,12 +136,23 @@ class Parameter:
 
 @dataclass(frozen=True)
 class Effect(ABC):
-    """Base of all effects; see the module's docstring for how to write one."""
+    """Base of all effects; see the module's docstring for how to write one.
+
+    Attributes
+    ----------
+    places
+        Names of the joints or links whose parameters are kept; empty for all parameters. One place at fault needs few
+        parameters, and those of the sound places would count against it.
+    """
+
+    places: tuple[str, ...] = field(default=(), kw_only=True)
 
     name: ClassVar[str] = ""
     """By which it is asked for and reported."""
     title: ClassVar[str] = ""
     """What it is in plain words, for a sentence; the name with spaces where a class states none."""
+    singular: ClassVar[str] = ""
+    """What it is in a single joint, for a sentence; the title where a class states none."""
     needs: ClassVar[tuple[str, ...]] = ()
     """Covariates without which the effect is not testable."""
     random: ClassVar[bool] = False
@@ -151,10 +164,12 @@ class Effect(ABC):
     arms only, the class says so."""
 
     def __init_subclass__(cls, **options: Any) -> None:
-        """Give a class with a name of its own, but no title, one."""
+        """Give a class with a name of its own, but no title, one; the same for its singular."""
         super().__init_subclass__(**options)
         if "name" in vars(cls) and "title" not in vars(cls):
             cls.title = str(cls.name).replace("_", " ")
+        if "name" in vars(cls) and "singular" not in vars(cls):
+            cls.singular = cls.title
 
     @abstractmethod
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
@@ -163,6 +178,16 @@ class Effect(ABC):
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return what the campaign lacks for this effect to be testable; empty when it can be tested."""
         return tuple(need for need in self.needs if not observations.varies(need))
+
+    @property
+    def share(self) -> float | None:
+        """Of the prior probability of its name; ``None`` where all settings of a name have the same share."""
+        return None
+
+    @property
+    def apart(self) -> int:
+        """How many constants stand apart from a common one: each has its price where constants are refined."""
+        return 0
 
     def reads(self, observations: Observations) -> tuple[str, ...]:
         """Return the covariates that its responses were read from: whoever predicts must know them, too."""
@@ -184,9 +209,14 @@ class Effect(ABC):
         """
         return (self,)
 
-    def at(self, joint: str) -> Effect | None:
-        """Return the effect in one joint alone; ``None`` where it has no such setting."""
-        return None
+    def at(self, place: str) -> Effect | None:
+        """Return the effect in one joint or link alone; ``None`` where it is to have no such setting.
+
+        Whether it has parameters there, the gate looks up (:func:`thermal_robot.effects.gate.at`).
+        """
+        alone = copy.copy(self)
+        object.__setattr__(alone, "places", (place,))
+        return alone
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
         """Return what drives the effect at one place, to draw it against.
@@ -208,8 +238,8 @@ class Effect(ABC):
         return None
 
     def arguments(self) -> dict[str, Any]:
-        """Return the constructor's arguments, for saving."""
-        return asdict(self)
+        """Return the constructor's arguments, for saving; ``places`` only where it is set."""
+        return {name: value for name, value in asdict(self).items() if name != "places" or value}
 
 
 def in_words(kind: str, place: str) -> str:

@@ -39,7 +39,7 @@ def checked(effect: Effect, observations: Observations) -> tuple[Parameter, ...]
     tuple of Parameter
         Each with a name of its own, a known kind of place, a place of that kind that the robot has (or none), a
         positive size, and responses of finite values in a channel and at an index that the robot has, of that
-        channel's shape (see :class:`Response`).
+        channel's shape (see :class:`Response`). Where the effect names ``places``, only those there.
 
     Raises
     ------
@@ -62,7 +62,7 @@ def checked(effect: Effect, observations: Observations) -> tuple[Parameter, ...]
         if problem:
             raise EffectError(f"effect {effect.name!r}, parameter {parameter.name!r}: {problem}")
         names.add(parameter.name)
-    return tuple(answer)
+    return _kept(effect, tuple(answer), observations.robot)
 
 
 def driver(effect: Effect, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
@@ -138,15 +138,37 @@ def nearby(effect: Effect, factor: float) -> tuple[Effect, ...]:
     return answer
 
 
-def at(effect: Effect, joint: str) -> Effect | None:
-    """Return an effect in one joint alone (:meth:`Effect.at`); ``None`` where it has no such setting.
+def at(effect: Effect, place: str, observations: Observations) -> Effect | None:
+    """Return an effect in one joint or link alone (:meth:`Effect.at`); ``None`` where it has no parameters there.
 
     Raises
     ------
     EffectError
-        If it is something else than an effect of this one's name.
+        If it is something else than an effect of this one's name, or the effect breaks the contract otherwise.
     """
-    answer = _asked(effect, "at", joint)
+    return _at(effect, place) if place in places_of(checked(effect, observations)) else None
+
+
+def alone(effect: Effect, observations: Observations) -> tuple[Effect, ...]:
+    """Return the settings of an effect in each single joint or link; empty where it has parameters in one or none.
+
+    Raises
+    ------
+    EffectError
+        As :func:`at`.
+    """
+    places = places_of(checked(effect, observations))
+    single = (_at(effect, place) for place in places)
+    return tuple(setting for setting in single if setting is not None) if len(places) > 1 else ()
+
+
+def places_of(parameters: Sequence[Parameter]) -> tuple[str, ...]:
+    """Return the joints and links that parameters sit in, in their order, each once."""
+    return tuple(dict.fromkeys(p.place for p in parameters if p.kind in ("joint", "link") and p.place))
+
+
+def _at(effect: Effect, place: str) -> Effect | None:
+    answer = _asked(effect, "at", place)
     if answer is None or _is_setting(effect, answer):
         return answer  # type: ignore[no-any-return]
     raise EffectError(
@@ -181,6 +203,17 @@ def _asked(effect: Effect, question: str, *about: Any) -> Any:
         return getattr(effect, question)(*about)
     except Exception as error:  # somebody else's code may raise anything
         raise EffectError(f"effect {effect.name!r}: {question}() raised {error!r}") from error
+
+
+def _kept(effect: Effect, parameters: tuple[Parameter, ...], robot: Robot) -> tuple[Parameter, ...]:
+    """Return the parameters in the joints and links that the effect names; all where it names none."""
+    if not effect.places:
+        return parameters
+    known = dict.fromkeys((*robot.joint_names, *places_of(parameters)))
+    for place in _texts(effect, "places is", effect.places):
+        if place not in known:
+            raise EffectError(f"effect {effect.name!r}: places holds {place!r}, expected any of {', '.join(known)}")
+    return tuple(p for p in parameters if p.kind in ("joint", "link") and p.place in effect.places)
 
 
 def _texts(effect: Effect, what: str, answer: Any) -> tuple[str, ...]:

@@ -45,6 +45,6 @@ class Geometric(Effect):
         )
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
-        """Return the position of the joint whose placement it is."""
-        segment = observations.robot.segments[parameters[0].responses[0].index]
-        return position_of(observations, segment.name) if segment.movable else None
+        """Return the position of the joint whose placement it is, or of the one that it mimics."""
+        joint = observations.robot.segments[parameters[0].responses[0].index].joint
+        return position_of(observations, joint) if joint else None

@@ -54,6 +54,7 @@ class JointCompliance(Effect):
 
     name: ClassVar[str] = "joint_compliance"
     title: ClassVar[str] = "joints that yield to load"
+    singular: ClassVar[str] = "a yielding to load"
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return what would give torques, where neither these nor the shape of gravity's vary."""

@@ -23,6 +23,7 @@ class JointGain(Effect):
 
     name: ClassVar[str] = "joint_gain"
     title: ClassVar[str] = "joint gain errors"
+    singular: ClassVar[str] = "a gain error"
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """One gain error a joint; dimensionless."""

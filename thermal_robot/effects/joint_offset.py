@@ -26,6 +26,7 @@ class JointOffset(Effect):
 
     name: ClassVar[str] = "joint_offset"
     title: ClassVar[str] = "joint zero offsets"
+    singular: ClassVar[str] = "a zero offset"
     contained_in: ClassVar[tuple[str, ...]] = ("geometric",)
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:

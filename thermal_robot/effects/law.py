@@ -8,7 +8,11 @@ from textwrap import fill
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
+from numpy.typing import NDArray
 
+from thermal_robot.campaign.units import SI
+from thermal_robot.effects import gate
+from thermal_robot.effects.catalogue import restored
 from thermal_robot.effects.effect import (
     TWIST,
     Array,
@@ -22,7 +26,7 @@ from thermal_robot.effects.effect import (
     at_tool,
     in_words,
 )
-from thermal_robot.effects.quantities import driving, quantity, unit
+from thermal_robot.effects.quantities import CLOCK, TURN, driving, quantity, strains, unit
 from thermal_robot.effects.shapes import SHAPES
 
 if TYPE_CHECKING:
@@ -39,6 +43,10 @@ class Discovered(Effect):
     The functions φ_k belong to its shape (:mod:`thermal_robot.effects.shapes`). In a joint f is an angle (or a
     displacement); at the base, the tool or a segment it is a twist, six such laws in the place's own frame. Expected
     size 0.3 mrad in a joint, 0.1 mm and 0.1 mrad elsewhere.
+
+    A law may depend on a second quantity y: then each φ_k stands beside φ_k·v with v = (y − by_origin) / by_span, so
+    that a straight law holds 1, u, v and u·v. It may be the size of a known effect that follows x: then the φ_k
+    multiply the unit response of each of the effect's parameters in that joint, of the effect's own expected size.
 
     Attributes
     ----------
@@ -58,6 +66,16 @@ class Discovered(Effect):
         Whether orientation was measured: without it a turn of the tool shows nothing.
     labels
         Names of the levels, where the quantity is a label such as the session.
+    runs
+        Sessions between which it steps in time, or in each of which it relaxes anew; empty elsewhere.
+    starts
+        When those began in which it relaxes, s; one start where there are no sessions.
+    by, by_origin, by_span
+        The second quantity, and what it is counted from and in; empty where there is none.
+    of, of_arguments
+        Name of the known effect that changes with the quantity, and its arguments as JSON text; empty where none does.
+    tried
+        Among how many laws it was picked.
     """
 
     title: ClassVar[str] = "an unlisted law"
@@ -72,17 +90,86 @@ class Discovered(Effect):
     unit: str = ""
     turns: bool = True
     labels: tuple[str, ...] = ()
+    runs: tuple[str, ...] = ()
+    starts: tuple[float, ...] = ()
+    by: str = ""
+    by_origin: float = 0.0
+    by_span: float = 1.0
+    of: str = ""
+    of_arguments: str = "{}"
+    tried: float = 1.0
+
+    @property
+    def share(self) -> float:
+        """Of the prior probability of a law: one of all that were tried."""
+        return 1.0 / self.tried
+
+    @property
+    def follows(self) -> str:
+        """What it follows, as a diagnosis reports it: the quantity, or the product of two."""
+        return f"{self.quantity} * {self.by}" if self.by else self.quantity
+
+    @property
+    def modulated(self) -> Effect | None:
+        """The known effect that changes with the quantity, in the law's joint; ``None`` where there is none."""
+        return restored(self.of, self.of_arguments).at(self.place) if self.of else None
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
-        """Return the quantity unless the campaign has it."""
-        return () if self.values(observations) is not None else (self.quantity,)
+        """Return the quantities that the campaign lacks, and what the effect in the law lacks."""
+        lacking: tuple[str, ...] = () if self.values(observations) is not None else (self.quantity,)
+        if self.by and quantity(observations, self.by) is None:
+            lacking += (self.by,)
+        return lacking + (gate.missing(self.modulated, observations) if self.modulated else ())
 
     def reads(self, observations: Observations) -> tuple[str, ...]:
-        """Return the column that it follows."""
-        return (self.quantity,) if self.quantity in observations.covariates else ()
+        """Return the columns that it follows, what tells the order of moves, and what the effect in the law reads."""
+        names = [self.quantity, self.by]
+        if self.quantity.startswith(TURN):
+            names += [next((name for name in CLOCK if name in observations.covariates), "")]
+        if self.modulated:
+            names += gate.reads(self.modulated, observations)
+        return tuple(name for name in dict.fromkeys(names) if name in observations.covariates)
 
     def values(self, observations: Observations) -> Array | None:
-        """Return the (N,) quantity, as this law counts it."""
+        """Return the (N,) quantity, as this law counts it; of the shape ``product``, that of the two."""
+        first = self._first(observations)
+        if self.shape != "product" or first is None:
+            return first
+        second = quantity(observations, self.by)
+        return None if second is None else first * second
+
+    def _followed(self, observations: Observations) -> Array | None:
+        """Return what the shape is of, at the rows; ``None`` where the campaign cannot tell."""
+        of, clock = SHAPES[self.shape].of, self.values(observations)
+        if of == "quantity" or clock is None:
+            return clock
+        if of == "strains":
+            return strains(observations, self.quantity.removeprefix(TURN), self.marks)
+        since, run = self._since_start(observations, clock)
+        return (
+            since[:, None]
+            if of == "run"
+            else np.where(run[:, None] == np.arange(len(self.runs)), since[:, None], np.inf)
+        )
+
+    def _since_start(self, observations: Observations, clock: Array) -> tuple[Array, NDArray[np.int64]]:
+        """(N,) time since the row's session began, and the number of that session.
+
+        A session that was not there began with the first of its rows, and is taken for the last; a row of none belongs
+        to the last that had begun.
+        """
+        starts, rows = np.array(self.starts), observations.campaign.labels.get("session")
+        run = np.clip(np.searchsorted(np.sort(starts), clock, side="right") - 1, 0, len(starts) - 1)
+        run = np.argsort(starts)[run]
+        began = starts[run]
+        for label in np.unique(rows) if rows is not None and self.runs else ():
+            own = rows == label
+            known = label in self.runs
+            run[own] = self.runs.index(label) if known else int(starts.argmax())
+            began[own] = starts[run[own]] if known else clock[own].min()
+        return np.maximum(clock - began, 0.0), run
+
+    def _first(self, observations: Observations) -> Array | None:
         campaign = observations.campaign
         if self.shape == "constant":
             return np.zeros(campaign.samples)
@@ -96,24 +183,42 @@ class Discovered(Effect):
         return quantity(observations, self.quantity)
 
     def functions(self, values: Array) -> tuple[Array, tuple[str, ...]]:
-        """Return (N, K) the functions φ at values of the quantity, and a name for each."""
+        """Return (N, K) the functions φ at values of what the shape is of, and a name for each."""
         shape = SHAPES[self.shape]
-        if shape.labels:
-            labels = shape.labels
-        elif self.labels:
-            labels = tuple(f"at {self.labels[int(mark)]}" for mark in self.marks)
-        else:
+        labels = shape.labels
+        if shape.each and self.labels:
+            labels += tuple(f"at {self.labels[int(mark)]}" for mark in self.marks)
+        elif shape.each:
             # as many digits as tell the marks apart
             digits = next(d for d in range(3, 18) if len({f"{m:.{d}g}" for m in self.marks}) == len(set(self.marks)))
-            labels = tuple(f"at {self._marked(mark, digits)}" for mark in self.marks)
+            labels += tuple(f"at {self._marked(mark, digits)}" for mark in self.marks)
+        if shape.of == "runs":
+            labels += tuple(f"at the start of {run}" for run in self.runs)
         return shape.functions(values, self.marks, self.origin, self.span), labels
 
-    def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
-        """Return one parameter a function and component; rad or m."""
-        robot, values = observations.robot, self.values(observations)
+    def at_rows(self, observations: Observations) -> tuple[Array, tuple[str, ...]] | None:
+        """Return the (N, K) functions at the rows, and a name for each; ``None`` where the campaign cannot tell."""
+        values = self._followed(observations)
         if values is None:
-            return ()
+            return None
         functions, labels = self.functions(values)
+        if not self.by or self.shape == "product":
+            return functions, labels
+        second = quantity(observations, self.by)
+        if second is None:
+            return None
+        v = (second - self.by_origin) / self.by_span
+        return np.column_stack([functions, functions * v[:, None]]), (*labels, *(f"{n}, × {self.by}" for n in labels))
+
+    def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
+        """Return one parameter a function and component; rad or m, or the unit of the effect in the law."""
+        robot, rows = observations.robot, self.at_rows(observations)
+        if rows is None:
+            return ()
+        functions, labels = rows
+        if self.modulated is not None:
+            whole = gate.checked(self.modulated, observations)
+            return tuple(_times(p, f, n) for f, n in zip(functions.T, labels, strict=True) for p in whole)
         found = []
         if self.kind == "joint":
             j = robot.joint_names.index(self.place)
@@ -136,10 +241,16 @@ class Discovered(Effect):
         if not shape.mark:
             return (self,)
         shift = (factor - 1.0) * 0.04 * self.span
-        moved = [replace(self, marks=(self.marks[0] + s, *self.marks[1:])) for s in (0.0, shift, -shift)]
+        moved = [self, self.shifted(shift), self.shifted(-shift)]
         if shape.width:
             moved += [replace(self, marks=(self.marks[0], self.marks[1] * f)) for f in (factor, 1.0 / factor)]
         return tuple(moved)
+
+    def shifted(self, by: float) -> Discovered:
+        """Return the same law with its mark moved; a step does not stay between sessions, a time stays above 0."""
+        if self.starts:
+            return replace(self, marks=(abs(self.marks[0] + by), *self.marks[1:]))
+        return replace(self, marks=(self.marks[0] + by, *self.marks[1:]), runs=())
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
         """Return the quantity that it follows."""
@@ -167,10 +278,21 @@ class Discovered(Effect):
         at = {"joint": in_words("joint", self.place), "link": f"the placement of {self.place}"}.get(
             self.kind, f"the {self.kind}"
         )
-        if self.shape == "constant":
-            return f"a constant error at {at}"
         mark = self.marks[0] if self.marks else 0.0
         how = SHAPES[self.shape].words.format(mark=self._marked(mark), order=mark)
+        if self.shape == "harmonic" and self.unit == SI.length:
+            how = f"a wave of {2.0 * np.pi / mark:.4g} {self.unit}"
+        if self.modulated is not None:
+            return f"{self.modulated.singular} in {at} that changes with {self.quantity} ({how})"
+        if self.shape == "constant":
+            return f"a constant error at {at}"
+        if self.by:
+            return f"an error at {at} that follows {self.quantity} times {self.by} ({how})"
+        if (self.kind, self.shape) == ("joint", "step") and self.quantity in CLOCK:
+            between = f", between session {self.runs[0]} and {self.runs[1]}" if self.runs else ""
+            return f"the zero of {at} jumped at {self.quantity} {_whole(mark)} {self.unit}".rstrip() + between
+        if self.quantity.startswith(TURN):
+            return f"an error at {at} that follows how far it has gone since it last turned round ({how})"
         return f"an error at {at} that follows {self.quantity} ({how})"
 
     def _marked(self, mark: float, digits: int = 3) -> str:
@@ -184,6 +306,20 @@ class Discovered(Effect):
         segments = observations.robot.segments
         s = next(s for s, segment in enumerate(segments) if segment.name == self.place)
         return lambda twist: at_segment(s, twist), segments[s].parent_link
+
+
+def _whole(mark: float) -> str:
+    """Return a time or an order without an exponent."""
+    return (f"{mark:.0f}" if abs(mark) >= 1000.0 else f"{mark:.4g}").replace("-", "−")
+
+
+def _times(parameter: Parameter, function: Array, label: str) -> Parameter:
+    """Return a parameter whose unit response is multiplied by an (N,) function."""
+    responses = tuple(
+        replace(r, values=r.values * (function if r.channel == "joint" else function[:, None]))
+        for r in parameter.responses
+    )
+    return replace(parameter, label=f"{parameter.label}, {label}", responses=responses)
 
 
 def _literal(value: object) -> str:

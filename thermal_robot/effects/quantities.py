@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
 
+from thermal_robot.campaign.turning import strained
 from thermal_robot.campaign.units import SI, unit_of
 from thermal_robot.effects.effect import Array, Driver
 
@@ -17,18 +19,23 @@ GRAVITY = ("gravity.x", "gravity.y", "gravity.z")
 """Components of gravity's direction in the tool frame."""
 REACH = ("reach.x", "reach.y", "reach.z")
 """Where the tool frame is in the root frame, m: what leans on the base."""
+TURN = "since_turn."
+"""Before a joint's name: signed distance from its last turning point, rad or m (:attr:`Campaign.since_turn`)."""
+CLOCK = ("time", "order")
+"""What tells when."""
 
 
 def unit(robot: Robot, name: str) -> str:
     """Return the unit of a quantity's values, SI; empty where it has none, or none that is known."""
-    return unit_of(name, robot) or (SI.length if name in REACH else "")
+    return unit_of(name.removeprefix(TURN), robot) or (SI.length if name in REACH else "")
 
 
 def quantities(observations: Observations) -> dict[str, Array]:
     """Return what a remainder might follow, by name, (N,) each; only what varies.
 
     Recorded covariates first, the row's number where neither time nor order is recorded, the session as its number in
-    the alphabet, then each joint's position, gravity's direction in the tool frame and the tool's place.
+    the alphabet, then each joint's position, gravity's direction in the tool frame and the tool's place. What a joint
+    remembers (:data:`TURN`) is not among them: it bears on that joint alone.
     """
     recorded = [name for name in observations.covariates if observations.varies(name)]
     names = [*recorded, *([] if {"time", "order"} & set(recorded) else ["order"]), "session"]
@@ -49,12 +56,25 @@ def quantity(observations: Observations, name: str) -> Array | None:
         return np.asarray(observations.commanded.tool_rotation[:, :, GRAVITY.index(name)] @ down)
     if name in REACH:
         return np.asarray(observations.commanded.tool_position[:, REACH.index(name)])
+    if name.startswith(TURN):
+        return observations.campaign.since_turn.get(name.removeprefix(TURN))
     if name == "order":
         return np.arange(observations.campaign.samples, dtype=float)
     labels = observations.campaign.labels.get(name)
     if labels is None or len(set(labels.tolist())) < 2:
         return None
     return np.unique(labels, return_inverse=True)[1].astype(float)
+
+
+def strains(observations: Observations, joint: str, slips: Sequence[float]) -> Array | None:
+    """Return (N, K) strains of a joint's elements as shares of what makes them slip, −1 to 1; ``None`` without order.
+
+    See :func:`thermal_robot.campaign.turning.since_turns`.
+    """
+    past = observations.campaign.since_turn
+    if joint not in past:
+        return None
+    return np.column_stack([past[strained(joint, slip)] / slip for slip in slips])
 
 
 def driving(observations: Observations, name: str) -> Driver | None:

@@ -1,24 +1,29 @@
 """The shapes of laws that nobody wrote down, one entry each: functions of a quantity, their names, their words.
 
-========= ======================================================= ==========================
-shape     φ_k(x), with u = (x − origin) / span                    marks
-========= ======================================================= ==========================
-constant  1
-ramp      1, u
-quadratic 1, u, u²
-step      x ≤ m, x > m                                            where it steps
-slide     ½ (1 ∓ tanh((x − m) / w))                               middle, width
-hinge     1, max(x − m, 0) / span, or on the other side           where it bends, side ±1
-bump      1, exp(−½ ((x − m) / w)²)                               middle, width
-drag      1, x / span, sign(x)                                    of a quantity with a sign
-harmonic  1, sin(k x), cos(k x)                                   order k
-levels    x = m_k                                                 the levels
-smooth    natural cubic splines that are 1 at one knot, 0 at all  the knots
-          others
-========= ======================================================= ==========================
+========== ======================================================= ==========================
+shape      φ_k(x), with u = (x − origin) / span                    marks
+========== ======================================================= ==========================
+constant   1
+ramp       1, u
+quadratic  1, u, u²
+step       x ≤ m, x > m                                            where it steps
+slide      ½ (1 ∓ tanh((x − m) / w))                               middle, width
+hinge      1, max(x − m, 0) / span, or on the other side           where it bends, side ±1
+bump       1, exp(−½ ((x − m) / w)²)                               middle, width
+drag       1, x / span, sign(x)                                    of a quantity with a sign
+harmonic   1, sin(k x), cos(k x)                                   order k
+product    1, x / span                                             x the product of two quantities
+hysteresis 1, x_k: how far elements are strained, −1 to 1          how far each goes till it slips
+levels     x = m_k                                                 the levels
+relaxing   1, exp(−x / τ), x the time since each session began    τ
+relaxing   1, the same for each session with a size of its own     τ
+each
+smooth     natural cubic splines that are 1 at one knot, 0 at all  the knots
+           others
+========== ======================================================= ==========================
 
 Splines: Hastie, Tibshirani and Friedman, *The Elements of Statistical Learning*, 2009, 5.2.1; beyond the outer knots
-they run straight.
+they run straight. Hysteresis: stop operators of Prandtl and Ishlinskii (:mod:`thermal_robot.campaign.turning`).
 """
 
 from __future__ import annotations
@@ -31,8 +36,10 @@ import numpy as np
 
 from thermal_robot.effects.effect import Array
 
+_SHORTEST = 1e-6  # of the range: what settles within less is settled at once
+
 Functions = Callable[[Array, tuple[float, ...], float, float], Array]
-"""(N, K) of the (N,) quantity, the marks, origin and span."""
+"""(N, K) of what the shape is of, (N,) or (N, K), the marks, origin and span."""
 
 
 @dataclass(frozen=True)
@@ -44,7 +51,7 @@ class Shape:
     functions
         The φ of the table above.
     labels
-        A name for each; empty where each is a value at one of the marks.
+        A name for each, but for those that belong to one of the marks each.
     words
         The shape in a sentence; ``{mark}`` stands for its first mark with the quantity's unit, ``{order}`` without.
     mark
@@ -52,6 +59,11 @@ class Shape:
         passes a row, ``gradual`` where they change smoothly; empty where it is not to be moved.
     width
         Whether the second mark is a width, to be refined, too.
+    each
+        Whether there is a function for each mark, after those that ``labels`` names.
+    of
+        What the functions are of: the (N,) ``quantity``; the (N, K) ``strains`` of elements of slips as marked; the
+        (N, 1) time since the ``run`` began, or since each of the ``runs`` began, infinite in the others (N, R).
     """
 
     functions: Functions
@@ -59,6 +71,8 @@ class Shape:
     words: str
     mark: Literal["", "sudden", "gradual"] = ""
     width: bool = False
+    each: bool = False
+    of: Literal["quantity", "strains", "run", "runs"] = "quantity"
 
 
 def _constant(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
@@ -103,6 +117,18 @@ def _harmonic(x: Array, marks: tuple[float, ...], origin: float, span: float) ->
     return np.column_stack([np.ones_like(x), np.sin(marks[0] * x), np.cos(marks[0] * x)])
 
 
+def _hysteresis(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
+    return np.column_stack([np.ones(len(x)), x])
+
+
+def _relaxing(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
+    return np.column_stack([np.ones(len(x)), np.exp(-x / max(abs(marks[0]), _SHORTEST * span))])
+
+
+def _product(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
+    return np.column_stack([np.ones_like(x), x / span])
+
+
 def _levels(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
     return np.asarray(np.eye(len(marks))[np.abs(x[:, None] - np.array(marks)).argmin(axis=1)])
 
@@ -129,7 +155,13 @@ SHAPES: dict[str, Shape] = {
     "bump": Shape(_bump, ("constant", "height"), "a bump at {mark}", "gradual", width=True),
     "drag": Shape(_drag, ("constant", "slope over the range", "of its sign"), "its slope and its sign"),
     "harmonic": Shape(_harmonic, ("constant", "sine", "cosine"), "harmonic of order {order:g}"),
-    "levels": Shape(_levels, (), "a value at each of its levels"),
-    "smooth": Shape(_smooth, (), "smooth"),
+    "product": Shape(_product, ("constant", "at the largest product"), "in proportion to the product"),
+    "hysteresis": Shape(_hysteresis, ("constant",), "springs that slip", each=True, of="strains"),
+    "relaxing": Shape(
+        _relaxing, ("constant", "at the start"), "it settles within {mark} of each start", "gradual", of="run"
+    ),
+    "relaxing each": Shape(_relaxing, ("constant",), "it settles within {mark} of each start", "gradual", of="runs"),
+    "levels": Shape(_levels, (), "a value at each of its levels", each=True),
+    "smooth": Shape(_smooth, (), "smooth", each=True),
 }
 """Every shape by its name."""

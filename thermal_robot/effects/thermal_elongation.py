@@ -15,18 +15,20 @@ from thermal_robot.effects.quantities import driving
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
 
+_SIZE = 1.5e-5  # 1/K
 _LAGS = (600.0, 1500.0, 3600.0)
+_SPREAD = 0.3  # of the common coefficient: steel and aluminium lie 30 % below and above their mean
 
 
 @dataclass(frozen=True)
 class ThermalElongation(Effect):
     """Every segment lengthens with its link's temperature: Δl_s = α_s l_s (T_link − T_reference).
 
-    Equation 5 of Kluz et al. (2018) with a coefficient of its own for each segment, or a common one for all, along the
-    virtual prismatic joint of their Eqs 6-8. Expected size 1.5e-5 /K (steel 1.2e-5, aluminium 2.3e-5). Where one
-    sensor reads the air or a place on the robot, the links follow it with a time constant:
-    dT_link/dt = (T_recorded − T_link) / lag, minutes to an hour for a cast link (mass · heat capacity / surface · film
-    coefficient: 600 to 3600 s).
+    Equation 5 of Kluz et al. (2018) with a coefficient of its own for each segment, a common one for all, or a common
+    one with a smaller deviation for each (partial pooling), along the virtual prismatic joint of their Eqs 6-8.
+    Expected size 1.5e-5 /K (steel 1.2e-5, aluminium 2.3e-5). Where one sensor reads the air or a place on the robot,
+    the links follow it with a time constant: dT_link/dt = (T_recorded − T_link) / lag, minutes to an hour for a cast
+    link (mass · heat capacity / surface · film coefficient: 600 to 3600 s).
 
     Where the temperature rises steadily with time it resembles :class:`Drift`, but moves the tool by an amount
     that depends on the pose; at constant temperature it is contained in :class:`Geometric`. A lag shows only where the
@@ -36,6 +38,8 @@ class ThermalElongation(Effect):
     ----------
     common
         Whether all segments have one coefficient, which few data can tell better than one each.
+    spread
+        Of the common coefficient: expected deviation of each segment's own from it; 0 where they do not deviate.
     lag
         Time constant, s; 0 for a link that has the recorded temperature.
     times, temperatures
@@ -47,6 +51,7 @@ class ThermalElongation(Effect):
     lag: float = 0.0
     times: tuple[float, ...] = ()
     temperatures: tuple[float, ...] = ()
+    spread: float = 0.0
 
     name: ClassVar[str] = "thermal_elongation"
     title: ClassVar[str] = "thermal elongation of the links"
@@ -60,13 +65,14 @@ class ThermalElongation(Effect):
         return (*_columns(observations), "time") if self.lag else _columns(observations)
 
     def variants(self, observations: Observations) -> tuple[Effect, ...]:
-        """Return a coefficient a link, one for all, and one for all with a lag of 10, 25 and 60 minutes."""
-        plain = (replace(self, common=False), replace(self, common=True))
+        """Return a coefficient a link, one for all, one for all with a deviation a link, and lags of 10 to 60 min."""
+        one = replace(self, common=True, spread=0.0)
+        plain = (replace(one, common=False), one, replace(one, spread=_SPREAD))
         # a sensor on each link knows its temperature; where but some have one, nothing says what the rest follow
         if not observations.varies("time") or _columns(observations) != ("temperature",):
             return plain
         record = History.of(observations.covariates["time"], observations.covariates["temperature"])
-        lagged = replace(self, common=True, times=record.times, temperatures=record.temperatures)
+        lagged = replace(one, times=record.times, temperatures=record.temperatures)
         return (*plain, *(replace(lagged, lag=lag) for lag in _LAGS))
 
     def nearby(self, factor: float) -> tuple[Effect, ...]:
@@ -77,7 +83,7 @@ class ThermalElongation(Effect):
         return (*lags, replace(self, common=not self.common))
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
-        """One coefficient of expansion a segment, or one for all; 1/K."""
+        """One coefficient of expansion a segment, or one for all, with the segments' deviations from it; 1/K."""
         responses = {}
         for s, segment in enumerate(observations.robot.segments):
             temperature = self._temperature(observations, segment.parent_link)
@@ -86,15 +92,16 @@ class ThermalElongation(Effect):
             along = np.concatenate([segment.direction, np.zeros(3)]) * segment.length
             twist = (temperature - observations.campaign.reference_temperature)[:, None] * along
             responses[s] = at_segment(s, twist)
-        if self.common:
-            return (Parameter("strain per kelvin", "1/K", 1.5e-5, "link", "", tuple(responses.values())),)
+        one = (Parameter("strain per kelvin", "1/K", _SIZE, "link", "", tuple(responses.values())),)
+        if self.common and not self.spread:
+            return one
+        label, size = ("deviation", self.spread * _SIZE) if self.common else ("strain per kelvin", _SIZE)
         segments = observations.robot.segments
-        return tuple(
-            Parameter(
-                f"strain per kelvin of {segments[s].name}", "1/K", 1.5e-5, "link", segments[s].parent_link, (response,)
-            )
+        each = tuple(
+            Parameter(f"{label} of {segments[s].name}", "1/K", size, "link", segments[s].parent_link, (response,))
             for s, response in responses.items()
         )
+        return (*one, *each) if self.common else each
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
         """Return the temperature that was recorded of the link, or of the robot."""

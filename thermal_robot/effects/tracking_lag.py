@@ -39,6 +39,7 @@ class TrackingLag(Effect):
 
     name: ClassVar[str] = "tracking_lag"
     title: ClassVar[str] = "joints that trail their command"
+    singular: ClassVar[str] = "a trailing of the command"
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return the velocity columns, unless at least one of them varies."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -27,24 +27,19 @@ class TransmissionError(Effect):
     ----------
     harmonics
         Orders a turn of the wheel, on either side.
-    joints
-        Names of those whose gears err; empty for all. One wheel that is off needs four amplitudes, and those of a
-        dozen others that are sound would count against it.
     """
 
     harmonics: tuple[int, ...] = (1, 2)
-    joints: tuple[str, ...] = ()
 
     name: ClassVar[str] = "transmission_error"
     title: ClassVar[str] = "periodic transmission errors"
+    singular: ClassVar[str] = "a periodic transmission error"
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """Two amplitudes a joint and order; rad. Prismatic joints have a period only with a ratio in rad/m."""
         robot, gears = observations.robot, observations.campaign.gears
         found = []
         for j, (joint, kind) in enumerate(zip(robot.joint_names, robot.joint_types, strict=True)):
-            if self.joints and joint not in self.joints:
-                continue
             orders = [float(k) for k in self.harmonics] if kind != "prismatic" else []
             orders += [k * float(gears[joint]) for k in self.harmonics] if joint in gears else []
             own = unit(robot, joint)
@@ -59,7 +54,3 @@ class TransmissionError(Effect):
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
         """Return the joint's own position."""
         return position_of(observations, parameters[0].place)
-
-    def at(self, joint: str) -> TransmissionError:
-        """Return the effect of one joint's gears."""
-        return replace(self, joints=(joint,))

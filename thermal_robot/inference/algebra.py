@@ -59,4 +59,5 @@ def ridge(products: Array, flat: int, prior: Array) -> Array:
     own = np.diag(matrix)[:flat]
     matrix[np.diag_indices(len(matrix))] += np.concatenate([settings.FRAME_PRIOR * own + settings.TINY, prior])
     length = np.sqrt(np.diag(matrix))
-    return np.asarray(np.linalg.solve(matrix / np.outer(length, length), products[:-1, -1] / length) / length)
+    scaled = matrix / np.outer(length, length) + settings.FRAME_PRIOR * np.eye(len(matrix))
+    return np.asarray(np.linalg.solve(scaled, products[:-1, -1] / length) / length)

@@ -1,22 +1,24 @@
-"""Unlisted causes: laws of places and quantities that compete with the known effects in one comparison."""
+"""Unlisted causes: the laws that are worth comparing with the known effects, and what the comparison says of them."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.effects import Effect
 from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block
-from thermal_robot.inference.evidence import Combination, Search
-from thermal_robot.inference.explain import log_odds, log_priors, settings_of_one
+from thermal_robot.inference.discrepancy import forms
+from thermal_robot.inference.explain import explain, log_priors
 from thermal_robot.inference.fit import Fit
-from thermal_robot.inference.laws import CLOCK
-from thermal_robot.inference.problem import Linear, Whitening, contained, gram
-from thermal_robot.inference.scan import Scanned, scan, shaped
+from thermal_robot.inference.problem import Linear
+from thermal_robot.inference.robust import Noise
+from thermal_robot.inference.scan import Scanned, Seats, scan, shaped
+from thermal_robot.inference.target import Target
 from thermal_robot.inference.thin import Thin
 
 Array = NDArray[np.float64]
@@ -24,195 +26,143 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Discovery:
-    """The law that the data speak for, with its rivals.
+    """A law of a fit, with its rivals.
 
     Attributes
     ----------
     law
         What it is.
-    beside
-        Names of the known effects that stay beside it.
-    rarity
-        Log prior odds of having been picked out of all the laws that were tried; below zero.
-    gain
-        Log evidence over the best combination without a law.
+    probability
+        That a law of this quantity at this place is at work.
     places
-        (kind, name) with the posterior probability of each.
+        (kind, name) with the posterior probability of each, most probable first.
     quantities
-        The same of each quantity.
+        The same of what is followed.
     """
 
     law: Discovered
-    beside: tuple[str, ...]
-    rarity: float
-    gain: float
+    probability: float
     places: tuple[tuple[tuple[str, str], float], ...]
     quantities: tuple[tuple[str, float], ...]
 
 
-def discover(fit: Fit, number: int) -> Discovery | None:
-    """Scan every place and quantity for a law; ``None`` where none is worth its place.
+def candidates(fit: Fit, number: int) -> tuple[Discovered, ...]:
+    """Return the laws that may be worth their place, best first.
 
-    Two remainders are scanned: that of the explanation, and that of the frames alone. Known effects may have absorbed
-    part of an unlisted cause, which then shows in the second only. The best candidates compete with the known effects
-    in one comparison, so that effects that merely stood in for a law are dropped again.
+    Several remainders are scanned: that of the explanation, and unless one effect leaves but noise, that of the laws
+    alone and that without each of the effects. Known effects may have absorbed an unlisted cause, which then shows only
+    where they are left out.
 
     Parameters
     ----------
     fit
-        An explanation that leaves a remainder.
+        An explanation.
     number
         Of the law: it is called ``discovered.<number>``.
     """
-    e, thin = fit.explanation, Thin.of(fit)
-    after = thin.target(e.best.blocks)
-    before = thin.target(b for b in e.best.blocks if fit.families[b].startswith(PREFIX))
-    found, tried = scan(thin.observations, [after, before])
-    candidates: list[Scanned] = []
-    for target, own in zip((after, before), found, strict=True):
-        for item in _with_joints(own):
-            best = shaped(thin.observations, target, item.law)
-            if best.gain > 0.0:
-                candidates.append(best)
-    laws = list(dict.fromkeys(c.law for c in sorted(candidates, key=lambda c: -c.gain)))
-    # the first of each remainder, in turn
-    chosen = _in_turn([[c.law for c in _of(candidates, own)] for own in found], laws)[: settings.COMPARED_LAWS]
-    if not chosen:
-        return None
-    return _compare(fit, thin, [replace(law, name=f"{PREFIX}{number}") for law in chosen], tried)
+    thin = Thin.of(fit)
+    remainders = list(dict.fromkeys(_remainders(fit)))
+    targets = [thin.target(blocks) for blocks in remainders]
+    if fit.explanation.outliers.any():
+        targets += [thin.target(blocks, sound=True) for blocks in remainders[:2]]
+    found, _ = scan(thin.observations, targets, [effect for own in fit.variants.values() for effect in own[:1]])
+    offered = [_offered(thin, target, own) for target, own in zip(targets, found, strict=True)]
+    chosen: list[Discovered] = []
+    for k in range(max(map(len, offered), default=0)):  # the first of each remainder, in turn
+        chosen += [own[k] for own in offered if k < len(own)]
+    named = (replace(law, name=f"{PREFIX}{number}") for law in chosen)
+    return tuple(dict.fromkeys(named))[: settings.COMPARED_LAWS]
+
+
+def _remainders(fit: Fit) -> Iterator[tuple[int, ...]]:
+    """Yield the blocks of the explanation that are taken out of each remainder that is scanned."""
+    best = fit.explanation.best.blocks
+    laws = tuple(b for b in best if fit.families[b].startswith(PREFIX))
+    effects = [b for b in best if b not in laws]
+    yield best
+    if len(effects) > 1 or fit.explanation.discrepancy.probability > settings.SMOOTH_PRIOR:
+        yield laws
+    if 2 < len(effects) <= settings.LEFT_OUT or (len(effects) == 2 and laws):
+        yield from (tuple(b for b in best if b != out) for out in effects)
+
+
+def _offered(thin: Thin, target: Target, own: Sequence[Scanned]) -> list[Discovered]:
+    """Return the best laws of a remainder in their best shapes, each with the number that it was picked among.
+
+    The best shape at a segment is also tried in the joint behind it, which is simpler.
+    """
+    first = [(item, shaped(thin.observations, target, item.law)) for item in _with_joints(own)]
+    joints = thin.observations.robot.joint_names
+    at_links = [(item, s) for item, s in first if s.law.kind == "link" and s.law.place in joints]
+    if at_links:
+        simpler = [replace(s.law, kind="joint") for _, s in at_links]
+        gains = Seats(thin.observations, [target]).gains(simpler)[0]
+        first += [
+            (item, replace(s, law=law, gain=float(gain)))
+            for (item, s), law, gain in zip(at_links, simpler, gains, strict=True)
+        ]
+    worth = [(s.gain - float(np.log(item.tried * s.tried)), item, s) for item, s in first]
+    worth.sort(key=lambda entry: -entry[0])
+    return [replace(s.law, tried=float(item.tried * s.tried)) for gain, item, s in worth if gain > -settings.RUNG_REACH]
 
 
 def _with_joints(own: Sequence[Scanned]) -> list[Scanned]:
     """Return the best candidates; where one is at a segment, also the law of the joint behind it, which is simpler."""
     first = list(own[: settings.SHAPED])
-    simpler = {(i.law.place, i.law.quantity) for i in first if i.law.kind == "link"}
+    simpler = {(i.law.place, i.law.follows) for i in first if i.law.kind == "link"}
     return first + [
-        i for i in own[settings.SHAPED :] if i.law.kind == "joint" and (i.law.place, i.law.quantity) in simpler
+        i for i in own[settings.SHAPED :] if i.law.kind == "joint" and (i.law.place, i.law.follows) in simpler
     ]
 
 
-def _of(candidates: Sequence[Scanned], own: Sequence[Scanned]) -> list[Scanned]:
-    places = {(i.law.kind, i.law.place, i.law.quantity) for i in _with_joints(own)}
-    mine = [c for c in candidates if (c.law.kind, c.law.place, c.law.quantity) in places]
-    return sorted(mine, key=lambda c: -c.gain)
+def worthwhile(fit: Fit, laws: Sequence[Discovered]) -> tuple[Effect, ...] | None:
+    """Compare laws with the known effects where the fit is linear; return what is then the best, with a law in it.
 
-
-def _in_turn(lists: Sequence[Sequence[Discovered]], everything: Sequence[Discovered]) -> list[Discovered]:
-    longest = max((len(own) for own in lists), default=0)
-    turns = [own[k] for k in range(longest) for own in lists if k < len(own)]
-    return list(dict.fromkeys([*turns, *everything]))
-
-
-def _compare(fit: Fit, thin: Thin, laws: Sequence[Discovered], tried: int) -> Discovery | None:
-    """Search over known effects and one law at a time; effects that are no longer needed beside the law are dropped."""
-    e = fit.explanation
-    known = len(e.linear.blocks)
-    problem = gram(_with(thin, laws), _all_rows(fit, thin))
-    rarity = -float(np.log(tried))
-    families = [*fit.families, *(law.name for law in laws)]
-    prior = log_priors(fit.families, fit.rarity)
-    # a change that is one in time and in another quantity happened in time
-    prior += [log_odds() + rarity + (settings.IN_TIME if law.quantity in CLOCK else 0.0) for law in laws]
-    search = Search(problem, prior, contained(problem) | settings_of_one(families))
-    plain = search.evaluate(e.best.blocks)
-    best = plain
-    for k in range(known, known + len(laws)):
-        start = search.evaluate((*e.best.blocks, k), plain)
-        best = max(best, start, search.evaluate((k,), start), key=lambda c: c.log_evidence)
-    best = _climb(search, best, known)
-    inside = [k for k in best.blocks if k >= known]
-    if not inside:
-        return None
-    without = _climb(search, plain, known, barred=frozenset(range(known, known + len(laws))))
-    gain = best.log_evidence - without.log_evidence
-    if gain < settings.LEAST_GAIN:
-        return None
-    places, followed = _pooled(fit, search, laws)
-    return Discovery(
-        laws[inside[0] - known],
-        tuple(dict.fromkeys(fit.families[b] for b in best.blocks if b < known)),
-        rarity,
-        float(gain),
-        places,
-        followed,
-    )
-
-
-def _pooled(
-    fit: Fit, search: Search, laws: Sequence[Discovered]
-) -> tuple[tuple[tuple[tuple[str, str], float], ...], tuple[tuple[str, float], ...]]:
-    """Return the places and the quantities of laws with their posterior probabilities, most probable first."""
-    known = len(fit.explanation.linear.blocks)
-    places: dict[tuple[str, str], float] = {}
-    followed: dict[str, float] = {}
-    for combination, w in zip(*search.probabilities(), strict=True):
-        for law in (laws[k - known] for k in combination.blocks if k >= known):
-            place = where(fit, law)
-            places[place] = places.get(place, 0.0) + float(w)
-            followed[law.quantity] = followed.get(law.quantity, 0.0) + float(w)
-    return (
-        tuple(sorted(places.items(), key=lambda item: -item[1])),
-        tuple(sorted(followed.items(), key=lambda item: -item[1])),
-    )
-
-
-def instead(fit: Fit, name: str) -> tuple[Discovered, float] | None:
-    """Return the law that could best take a known effect's place, and its gain in log evidence over that effect.
-
-    Where an unlisted cause is at work already, one more place costs a law only the choice of that place.
+    ``None`` where no law is worth its place. The search starts from the explanation, from the explanation with each of
+    the laws, and from each law alone.
     """
-    e = fit.explanation
-    rest = tuple(b for b in e.best.blocks if fit.families[b] != name)
     thin = Thin.of(fit)
-    target = thin.target(rest)
-    found, _ = scan(thin.observations, [target])
-    laws = [shaped(thin.observations, target, item.law).law for item in _with_joints(found[0])[: settings.RIVAL_LAWS]]
-    if not laws:
+    blocks = (*thin.linear.blocks, *(block(thin.observations, law) for law in laws))
+    linear = Linear(thin.linear.gap, thin.linear.frames, blocks)
+    known, best = len(thin.linear.blocks), fit.explanation.best.blocks
+    before = tuple(b for b in best if fit.families[b].startswith(PREFIX))
+    new = range(known, len(blocks))
+    found = explain(
+        linear,
+        Noise(fit.campaign.noise_position, fit.campaign.noise_orientation),
+        families=[b.effect.name for b in blocks],
+        log_prior=log_priors([b.effect for b in blocks]),
+        starts=[best, *((*best, k) for k in new), *((*before, k) for k in new)],
+        forms=forms(thin.observations),
+    )
+    if not set(found.best.blocks) & set(new):
         return None
-    known = len(e.linear.blocks)
-    problem = gram(_with(thin, laws), thin.whitening)
-    places = fit.campaign.robot.n + len(fit.campaign.robot.segments)
-    prior = [*log_priors(fit.families, fit.rarity), *[-float(np.log(places))] * len(laws)]
-    search = Search(problem.tempered(e.design_effect), prior)
-    now = search.evaluate(e.best.blocks).log_evidence
-    gains = [search.evaluate((*rest, known + k)).log_evidence - now for k in range(len(laws))]
-    best = int(np.argmax(gains))
-    return laws[best], gains[best]
+    return tuple(blocks[b].effect for b in found.best.blocks)
 
 
-def _climb(search: Search, best: Combination, known: int, barred: frozenset[int] = frozenset()) -> Combination:
-    """Add or drop one block, or exchange one law for another, while the evidence grows."""
-    count = len(search.gram.slices)
-    while True:
-        around = [(*best.blocks, b) for b in range(count) if b not in best.blocks and b not in barred]
-        around += [tuple(b for b in best.blocks if b != out) for out in best.blocks]
-        laws = [b for b in best.blocks if b >= known]
-        around += [
-            (*(b for b in best.blocks if b != out), new) for out in laws for new in range(known, count) if new != out
-        ]
-        tried = [search.evaluate(blocks, best) for blocks in around if search.allowed(blocks)]
-        better = max(tried, key=lambda c: c.log_evidence, default=best)
-        if better.log_evidence <= best.log_evidence + settings.BETTER:
-            return best
-        best = better
+def discovered(fit: Fit) -> tuple[Discovery, ...]:
+    """Return the laws of a fit with the probabilities of their places and quantities among all that were compared."""
+    e = fit.explanation
+    laws = {b: item.effect for b, item in enumerate(e.linear.blocks) if isinstance(item.effect, Discovered)}
+    found = []
+    for b in e.best.blocks:
+        if b in laws:
+            rivals = {k: law for k, law in laws.items() if law.name == laws[b].name}
+            places: dict[tuple[str, str], float] = {}
+            followed: dict[str, float] = {}
+            same = 0.0
+            for combination, w in zip(e.combinations, e.probabilities, strict=True):
+                for law in (rivals[k] for k in combination.blocks if k in rivals):
+                    place = where(fit, law)
+                    places[place] = places.get(place, 0.0) + float(w)
+                    followed[law.follows] = followed.get(law.follows, 0.0) + float(w)
+                    same += float(w) * ((place, law.follows) == (where(fit, laws[b]), laws[b].follows))
+            found.append(Discovery(laws[b], min(same, 1.0), _sorted(places), _sorted(followed)))
+    return tuple(found)
 
 
-def _with(thin: Thin, laws: Sequence[Discovered]) -> Linear:
-    """Return the problem with further blocks for laws."""
-    linear = thin.linear
-    return Linear(linear.gap, linear.frames, (*linear.blocks, *(block(thin.observations, law) for law in laws)))
-
-
-def _all_rows(fit: Fit, thin: Thin) -> Whitening:
-    """Weigh every row, those set aside by their distance: under another explanation they may be sound."""
-    stated = (fit.campaign.noise_position, fit.campaign.noise_orientation)
-    noise = thin.whitening.noise.copy()
-    for part, sigma in enumerate(stated[: len(noise) // 3]):
-        if sigma is not None:
-            noise[3 * part : 3 * part + 3] = np.minimum(noise[3 * part : 3 * part + 3], settings.STATED_REACH * sigma)
-    distance2 = ((thin.remainder / thin.whitening.noise) ** 2).sum(axis=1) / thin.linear.measures
-    weights = np.where(thin.changed, 1.0, np.minimum(1.0, settings.FAR / np.maximum(distance2, settings.TINY)))
-    return Whitening(weights, noise, thin.whitening.held)
+def _sorted(found: dict) -> tuple:  # type: ignore[type-arg]
+    return tuple(sorted(found.items(), key=lambda item: -item[1]))
 
 
 def where(fit: Fit, law: Discovered) -> tuple[str, str]:

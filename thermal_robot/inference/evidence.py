@@ -24,6 +24,7 @@ from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
 
 Array = NDArray[np.float64]
+UNDETERMINED = "the measurements do not determine anything: too few, or all alike"
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,12 +39,13 @@ class Gram:
         Where each block's D_b columns stand; blocks are reduced to what the data can see of them.
     bases
         Per block, (P_b, D_b): parameter values, in prior sizes, of a unit of each reduced column.
-    projector
-        (f, P) what the frames take up of each parameter's column.
     equations
         n: scalar equations with weight, less the rank of the frames.
     noise_dof
         How firmly the whitening noise is held (degrees of freedom); 0 where it is not known.
+    offset
+        Log evidence that all combinations share: −½ log of the determinants of the rows' covariance and of the frames,
+        and the log prior of that covariance.
     """
 
     matrix: Array
@@ -51,19 +53,9 @@ class Gram:
     total: float
     slices: tuple[slice, ...]
     bases: tuple[Array, ...]
-    projector: Array
     equations: float
     noise_dof: float
-
-    def tempered(self, design_effect: float) -> Gram:
-        """Return the problem as if every ``design_effect`` rows were one: what correlated rows are worth."""
-        return replace(
-            self,
-            matrix=self.matrix / design_effect,
-            vector=self.vector / design_effect,
-            total=self.total / design_effect,
-            equations=self.equations / design_effect,
-        )
+    offset: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,6 +78,8 @@ class Combination:
         Their posterior covariance.
     effective
         How many parameters the data determine.
+    exact
+        Whether all scales are at their most probable values; else those of one block alone, and there are no values.
     """
 
     blocks: tuple[int, ...]
@@ -95,6 +89,7 @@ class Combination:
     values: Array
     covariance: Array
     effective: float
+    exact: bool = True
 
 
 @dataclass(eq=False)
@@ -116,24 +111,39 @@ class Search:
     exclusive: frozenset[frozenset[int]] = frozenset()
     seen: dict[tuple[int, ...], Combination] = field(default_factory=dict)
 
-    def allowed(self, blocks: tuple[int, ...]) -> bool:
+    def __post_init__(self) -> None:
+        """List what each block excludes."""
+        self._apart: dict[int, set[int]] = {}
+        for a, b in self.exclusive:
+            self._apart.setdefault(a, set()).add(b)
+            self._apart.setdefault(b, set()).add(a)
+
+    def allowed(self, blocks: Sequence[int]) -> bool:
         """Tell whether no two of the blocks exclude each other."""
-        return not any(pair <= set(blocks) for pair in self.exclusive)
+        whole = set(blocks)
+        return not any(self._apart.get(b, whole - whole) & whole for b in blocks)
 
     def evaluate(self, blocks: Sequence[int], start: Combination | None = None) -> Combination:
         """Return the combination's evidence, computed once."""
         key = tuple(sorted(blocks))
-        if key not in self.seen:
-            found = _evidence(self.gram, key, sum(self.log_prior[b] for b in key), start)
-            if not np.isfinite(found.log_evidence):
-                raise EstimationError("the measurements do not determine anything: too few, or all alike")
-            self.seen[key] = found
+        known = self.seen.get(key)
+        if known is None or not known.exact:
+            self.seen[key] = self._computed(key, known or start)
         return self.seen[key]
+
+    def _computed(self, key: tuple[int, ...], start: Combination | None) -> Combination:
+        try:
+            return evidence(self.gram, key, sum(self.log_prior[b] for b in key), start)
+        except EstimationError:
+            if not key:
+                raise
+            # rounding hides what blocks so nearly alike bring
+            return replace(self.evaluate(()), blocks=key, log_evidence=-np.inf)
 
     def run(self, start: Sequence[int] = ()) -> Combination:
         """Climb from a combination by adding, dropping and swapping blocks until nothing is better.
 
-        Every neighbour of the best combination is evaluated, so that its probability is against all of them.
+        Every neighbour of the best combination is weighed, so that its probability is against all of them.
         """
         best = self._climb(start, frozenset())
         large = {b for pair in self.exclusive for b in pair if self._width(b) == max(map(self._width, pair))}
@@ -141,7 +151,36 @@ class Search:
             # several smaller effects may suffice where one that contains them all came first
             best = max(best, self._climb((), frozenset(large)), key=lambda c: c.log_evidence)
             best = self._climb(best.blocks, frozenset())
+        while (missed := self._missed(best) or self._simpler(best)) is not None:
+            best = self._climb(missed.blocks, frozenset())
         return best
+
+    def _simpler(self, best: Combination) -> Combination | None:
+        """Let another setting of one block stand in for a further block; return what is better, if any is.
+
+        A setting that does more, such as in one joint more, is worth its price only once what it replaces is gone.
+        """
+        whole = set(best.blocks)
+        for seen in list(self.seen.values()):
+            (gone, new) = (whole - set(seen.blocks), set(seen.blocks) - whole)
+            near = seen.log_evidence > best.log_evidence - settings.DETOUR
+            if not (near and len(gone) == len(new) == 1 and new & self._apart.get(min(gone), set())):
+                continue
+            for other in set(seen.blocks) - new:
+                found = self.evaluate([b for b in seen.blocks if b != other], best)
+                if found.log_evidence > best.log_evidence + settings.BETTER:
+                    return found
+        return None
+
+    def _missed(self, best: Combination) -> Combination | None:
+        """Compute exactly what was weighed on the way and comes near the best; return one that is better, if any is."""
+        near = [c.blocks for c in self.seen.values() if not c.exact and self._near(c, best)]
+        found = max((self.evaluate(blocks) for blocks in near), key=lambda c: c.log_evidence, default=best)
+        return found if found.log_evidence > best.log_evidence + settings.BETTER else None
+
+    @staticmethod
+    def _near(one: Combination, best: Combination) -> bool:
+        return one.log_evidence > best.log_evidence - settings.NEARLY
 
     def _width(self, block: int) -> int:
         return int(self.gram.slices[block].stop - self.gram.slices[block].start)
@@ -149,18 +188,43 @@ class Search:
     def _climb(self, start: Sequence[int], barred: frozenset[int]) -> Combination:
         best = max(self.evaluate(()), self.evaluate(start), key=lambda c: c.log_evidence)
         while True:
-            around = [self.evaluate(n, best) for n in self._neighbours(best.blocks) if not barred & set(n)]
-            better = max(around, key=lambda c: c.log_evidence, default=best)
-            if better.log_evidence <= best.log_evidence + settings.BETTER:
+            around = [c for c in self._neighbours(best) if not barred & set(c.blocks)]
+            around.sort(key=lambda c: -c.log_evidence)
+            close = [c.blocks for c in around if self._near(c, best)]
+            better = best
+            for k in range(0, len(close), settings.AT_ONCE):
+                some = (self.evaluate(blocks, best) for blocks in close[k : k + settings.AT_ONCE])
+                better = max((better, *some), key=lambda c: c.log_evidence)
+                if better.log_evidence > best.log_evidence + settings.BETTER:
+                    break
+            else:
                 return best
             best = better
 
-    def _neighbours(self, blocks: tuple[int, ...]) -> list[tuple[int, ...]]:
-        others = [b for b in range(len(self.gram.slices)) if b not in blocks]
-        found = [(*blocks, b) for b in others]
-        found += [tuple(c for c in blocks if c != b) for b in blocks]
-        found += [(*(c for c in blocks if c != b), a) for b in blocks for a in others]
-        return [f for f in dict.fromkeys(tuple(sorted(f)) for f in found) if self.allowed(f)]
+    def _neighbours(self, best: Combination) -> list[Combination]:
+        """Return the combinations with one block more, less or another; those with a new one to first order."""
+        without = [self.evaluate([c for c in best.blocks if c != b], best) for b in best.blocks]
+        bases = [c for c in (best, *without) if np.isfinite(c.log_evidence)]
+        added = [c for base in bases for c in self._with_one_more(base, best)]
+        return [*without, *added]
+
+    def _with_one_more(self, base: Combination, best: Combination) -> list[Combination]:
+        others = [b for b in range(len(self.gram.slices)) if b not in best.blocks]
+        keys = {b: tuple(sorted((*base.blocks, b))) for b in others}
+        barred = set().union(*(self._apart.get(b, ()) for b in base.blocks))
+        new = [b for b in others if b not in barred and keys[b] not in self.seen]
+        for b, gain, scale in _gains(self.gram, base, new):
+            self.seen[keys[b]] = Combination(
+                keys[b],
+                base.log_evidence + gain + self.log_prior[b],
+                base.noise,
+                {**base.scales, b: scale},
+                base.values,
+                base.covariance,
+                base.effective,
+                exact=False,
+            )
+        return [self.seen[keys[b]] for b in others if keys[b] in self.seen]
 
     def probabilities(self) -> tuple[list[Combination], Array]:
         """Return the combinations seen, most probable first, with their posterior probabilities."""
@@ -168,6 +232,55 @@ class Search:
         log = np.array([c.log_evidence for c in order])
         weight = np.exp(log - log[0])
         return order, weight / weight.sum()
+
+
+def _gains(gram: Gram, base: Combination, blocks: Sequence[int]) -> list[tuple[int, float, float]]:
+    """Return for each block what adding it gains in log evidence, its scale integrated out, and its best scale.
+
+    Scales of the others stay. In the eigenvectors of the block's own information beside the others, w, with the vector
+    c there, and with the noise s'² that it leaves,
+
+        (n + ν) s'² = ν + Q − Σ c² λ²/(s'² + λ² w) ,
+        gain(λ) = −½ Σ log(1 + λ² w/s'²) − ½ (n + ν) log(s'²/s₀²) ,
+
+    Q = y'y − b'θ, and s₀ the same without the block.
+    """
+    spans = [np.arange(gram.slices[b].start, gram.slices[b].stop) for b in base.blocks]
+    used = np.concatenate([*spans, np.zeros(0, dtype=int)])
+    variance = base.noise**2
+    left = gram.vector - gram.matrix[:, used] @ base.values
+    log_scale = np.array(settings.SCALE_GRID)
+    square = np.exp(2.0 * log_scale)[:, None]
+    prior = -0.5 * (log_scale / settings.SIZE_SPREAD) ** 2
+    norm = np.log((log_scale[1] - log_scale[0]) / (np.sqrt(2.0 * np.pi) * settings.SIZE_SPREAD))
+    freedom = gram.equations + gram.noise_dof
+    rest = (gram.noise_dof + gram.total - float(gram.vector[used] @ base.values)) / freedom
+    rest = max(rest, settings.LEAST_VARIANCE * variance)
+    result = []
+    for alike in _by_width(gram, blocks):
+        own = np.array([np.arange(gram.slices[b].start, gram.slices[b].stop) for b in alike])
+        cross = gram.matrix[own[:, :, None], used]
+        inside = gram.matrix[own[:, :, None], own[:, None, :]]
+        value, vector = np.linalg.eigh(inside - cross @ (base.covariance / variance) @ cross.transpose(0, 2, 1))
+        value = np.maximum(value, 0.0)[:, None, :]
+        along = ((vector.transpose(0, 2, 1) @ left[own][:, :, None])[:, :, 0] ** 2)[:, None, :]
+        left_over = np.full((len(alike), len(log_scale)), rest)
+        for _ in range(settings.NOISE_ROUNDS):
+            taken = (along * square / (left_over[:, :, None] + square * value)).sum(axis=2) / freedom
+            left_over = np.maximum(rest - taken, settings.LEAST_VARIANCE * rest)
+        log = -0.5 * np.log1p(square * value / left_over[:, :, None]).sum(axis=2) + prior
+        log -= 0.5 * freedom * np.log(left_over / rest)
+        top = log.max(axis=1)
+        gain = top + np.log(np.exp(log - top[:, None]).sum(axis=1)) + norm
+        result += list(zip(alike, gain.tolist(), np.exp(log_scale[log.argmax(axis=1)]).tolist(), strict=True))
+    return result
+
+
+def _by_width(gram: Gram, blocks: Sequence[int]) -> list[list[int]]:
+    widths: dict[int, list[int]] = {}
+    for b in blocks:
+        widths.setdefault(gram.slices[b].stop - gram.slices[b].start, []).append(b)
+    return list(widths.values())
 
 
 @dataclass(eq=False)
@@ -196,21 +309,21 @@ class _Posterior:
         size = len(vector)
         if not size:
             return cls(np.zeros(0), np.zeros((0, 0)), 0.0, np.zeros(len(scale)), np.zeros(len(scale)))
-        diagonal = np.diag_indices(size)
+        tight = 1.0 / scale[owner] ** 2
         precision = matrix / variance
-        precision[diagonal] += 1.0 / scale[owner] ** 2
+        precision.ravel()[:: size + 1] += tight
         factor, failed = dpotrf(precision, lower=1, clean=1)
         if failed:
-            raise EstimationError("the measurements do not determine anything: too few, or all alike")
+            raise EstimationError(UNDETERMINED)
         lower, _ = dpotri(factor, lower=1)
         covariance = lower + lower.T  # above the diagonal it is zero
-        covariance[diagonal] *= 0.5
+        covariance.ravel(order="K")[:: size + 1] *= 0.5
         values = covariance @ vector / variance
-        well = 1.0 - np.diag(covariance) / scale[owner] ** 2
+        well = 1.0 - covariance.ravel(order="K")[:: size + 1] * tight
         return cls(
             values,
             covariance,
-            float(2.0 * np.log(np.diag(factor)).sum() + 2.0 * np.log(scale[owner]).sum()),
+            float(2.0 * np.log(factor.ravel(order="K")[:: size + 1]).sum() - np.log(tight).sum()),
             np.bincount(owner, values**2, len(scale)) / scale**2,
             np.bincount(owner, well, len(scale)).astype(float),
         )
@@ -218,10 +331,25 @@ class _Posterior:
     def step(self, log_scale: Array) -> Array:
         """Return the Newton step of ln λ, its curvature held positive."""
         slope = self.fitted - self.determined - log_scale / settings.SIZE_SPREAD**2
-        return np.clip(slope / (self.fitted + self.determined + 1.0 / settings.SIZE_SPREAD**2), -1.0, 1.0)
+        return np.minimum(
+            np.maximum(slope / (self.fitted + self.determined + 1.0 / settings.SIZE_SPREAD**2), -1.0), 1.0
+        )
 
 
-def _evidence(gram: Gram, blocks: tuple[int, ...], prior: float, start: Combination | None) -> Combination:
+def evidence(gram: Gram, blocks: tuple[int, ...], prior: float, start: Combination | None) -> Combination:
+    """Return one combination with noise and scales at their most probable values.
+
+    Parameters
+    ----------
+    gram
+        The problem.
+    blocks
+        That are in it.
+    prior
+        Their log prior odds.
+    start
+        A combination like it, from whose noise and scales the iteration starts.
+    """
     spans = [np.arange(gram.slices[b].start, gram.slices[b].stop) for b in blocks]
     used = np.concatenate([*spans, np.zeros(0, dtype=int)])
     owner = np.repeat(np.arange(len(blocks)), [len(span) for span in spans])
@@ -241,15 +369,18 @@ def _evidence(gram: Gram, blocks: tuple[int, ...], prior: float, start: Combinat
             break
         variance, scale = target, scale * np.exp(step)
     quadratic = gram.total - vector @ found.values
-    log_evidence = (
+    log_evidence = float(
         -0.5 * ((equations + held) * np.log(variance) + held / variance + found.log_det + quadratic / variance)
         - 0.5 * float(((np.log(scale) / settings.SIZE_SPREAD) ** 2).sum())
         + _log_volume(owner, scale, found.values, found.covariance)
         + prior
+        + gram.offset
     )
+    if not np.isfinite(log_evidence):
+        raise EstimationError(UNDETERMINED)
     scales = dict(zip(blocks, scale.tolist(), strict=True))
     return Combination(
-        blocks, float(log_evidence), float(np.sqrt(variance)), scales, found.values, found.covariance, effective
+        blocks, log_evidence, float(np.sqrt(variance)), scales, found.values, found.covariance, effective
     )
 
 

@@ -3,18 +3,41 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.effects import Effect
 from thermal_robot.inference import settings
-from thermal_robot.inference.evidence import Combination, Gram, Search
-from thermal_robot.inference.problem import Linear, Whitening, contained, frame_step, gram, parameter_values
-from thermal_robot.inference.robust import Noise, design_effect, distance_limit, first_whitening, reweigh
+from thermal_robot.inference.discrepancy import Form
+from thermal_robot.inference.evidence import Combination, Gram
+from thermal_robot.inference.ladder import PLAIN, Ladder, Rung
+from thermal_robot.inference.problem import Linear, Whitening, discrepancy_mean, frame_step, parameter_values
+from thermal_robot.inference.robust import Noise, distance_limit, first_whitening, reweigh
 
 Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Discrepancy:
+    """What no effect accounts for.
+
+    Attributes
+    ----------
+    form, tau
+        Beside the best combination: which, and its rms over the noise; ``None`` and 0 where there is none.
+    probability
+        That there is any.
+    forms
+        Probability of each form by its name, those of the forms that are not in question left out.
+    """
+
+    form: Form | None
+    tau: float
+    probability: float
+    forms: Mapping[str, float]
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,14 +54,16 @@ class Explanation:
         All that were compared, most probable first.
     values
         Per block of the best combination: mean and covariance of its parameters.
-    frame_step
-        (f,) step of the frames that goes with it.
     remainder
         (N, m) residual: gap less effects and frames, for all rows, used or not.
+    smooth
+        (N, m) posterior mean of the discrepancy, a part of the residual.
     outliers
         (N,) True for rows set aside.
-    design_effect
-        How many rows count as one independent row.
+    discrepancy
+        What no effect accounts for.
+    forms
+        Of the discrepancy that were considered.
     """
 
     linear: Linear
@@ -48,14 +73,16 @@ class Explanation:
     combinations: Sequence[Combination]
     probabilities: Array
     values: dict[int, tuple[Array, Array]]
-    frame_step: Array
     remainder: Array
+    smooth: Array
     outliers: NDArray[np.bool_]
-    design_effect: float
+    discrepancy: Discrepancy
+    forms: Sequence[Form]
 
     def far(self, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """(N,) True for those of the given rows whose residual is larger than noise allows."""
-        distance2 = ((self.remainder / (self.whitening.noise * self.best.noise)) ** 2).sum(axis=1)
+        beyond = self.whitening.noise * self.best.noise * np.hypot(1.0, self.discrepancy.tau)
+        distance2 = ((self.remainder / beyond) ** 2).sum(axis=1)
         return np.asarray(rows & (distance2 > distance_limit(self.linear.measures, len(rows))))
 
     def probability(self, blocks: Sequence[int]) -> float:
@@ -70,12 +97,12 @@ def explain(
     *,
     rows: NDArray[np.bool_] | None = None,
     families: Sequence[str] = (),
-    start: Sequence[int] = (),
+    starts: Sequence[Sequence[int]] = (),
     outliers: NDArray[np.bool_] | None = None,
-    groups: Sequence[NDArray[np.int64]] = (),
-    rarity: Mapping[str, float] | None = None,
+    forms: Sequence[Form] = (),
+    log_prior: Sequence[float] | None = None,
 ) -> Explanation:
-    """Find the most probable combination of blocks together with outliers and noise.
+    """Find the most probable combination of blocks together with outliers, noise and what no block accounts for.
 
     Parameters
     ----------
@@ -88,12 +115,12 @@ def explain(
     families
         Name of the effect that each block belongs to: blocks of one effect are settings that exclude each other and
         share its prior probability.
-    start, outliers
-        Where the search starts: blocks and rows set aside.
-    groups
-        Labels (N,) of rows that belong together, several groupings: see :func:`design_effect`.
-    rarity
-        By family: added to its log prior odds, below zero for one that was picked out of many.
+    starts, outliers
+        Where the search starts: combinations of blocks, and rows set aside.
+    forms
+        Of the discrepancy that is considered; none where nothing but noise may remain.
+    log_prior
+        Log prior odds of each block; see :func:`log_priors`, by which those of the blocks' effects are taken if absent.
 
     Returns
     -------
@@ -101,40 +128,110 @@ def explain(
         Robust: rows further than noise allows from the explanation are set aside, and rows in the tail weigh less
         (Huber).
     """
-    measures, samples = linear.measures, len(linear.gap)
+    samples = len(linear.gap)
     use = np.ones(samples, dtype=bool) if rows is None else rows
     aside = np.zeros(samples, dtype=bool) if outliers is None else outliers & use
     families = families or [str(k) for k in range(len(linear.blocks))]
-    log_prior = log_priors(families, rarity or {})
-    rivals = settings_of_one(families)
-    whitening = first_whitening(linear, noise, use & ~aside)
-    history: list[tuple[tuple[int, ...], bytes]] = []
-    seed = tuple(start)
+    log_prior = log_priors([b.effect for b in linear.blocks]) if log_prior is None else log_prior
+    asked = _Asked(linear, families, log_prior, settings_of_one(families))
+    # effects that are far off, and gross errors, are settled first, beside a noise that is free
+    whitening = replace(first_whitening(linear, noise, use & ~aside), held=0.0)
+    beside: Sequence[Form] = ()
+    seeds = [tuple(start) for start in starts]
+    history: list[tuple[object, ...]] = []
     while True:
-        problem = gram(linear, whitening)
-        search = Search(problem, log_prior, contained(problem) | rivals)
-        best = search.run(seed if search.allowed(seed) else ())
-        values = parameter_values(linear, problem, best)
-        remainder = _remainder(linear, values)
-        step = frame_step(linear, whitening, remainder)
-        remainder = remainder - linear.frames @ step
-        state = (best.blocks, np.packbits(whitening.weights > 0).tobytes())
-        if state in history or len(history) >= settings.FIRST_ROUNDS:
-            break
+        found = _Round.of(asked, whitening, beside, seeds)
+        state = (*found.state, np.packbits(whitening.weights > 0).tobytes())
+        if history and (state in history or len(history) >= settings.FIRST_ROUNDS):
+            return found.told(aside)
         history.append(state)
-        leverage = (best.effective + linear.frames.shape[2]) / max(problem.equations + linear.frames.shape[2], 1)
-        whitening, aside = reweigh(remainder, noise, use, min(leverage, settings.MOST_LEVERAGE), measures)
-        seed = best.blocks
-    worth = design_effect(linear, problem, remainder, whitening, groups)
-    if worth > 1.0:
-        search = Search(problem.tempered(worth), log_prior, contained(problem) | rivals)
-        best = search.run(best.blocks)
-        values = parameter_values(linear, problem, best)
-        remainder = _remainder(linear, values)
-        step = frame_step(linear, whitening, remainder)
-        remainder = remainder - linear.frames @ step
-    compared, probabilities = search.probabilities()
-    return Explanation(linear, whitening, problem, best, compared, probabilities, values, step, remainder, aside, worth)
+        whitening, aside = reweigh(found.rough, noise, use, found.leverage, linear.measures)
+        seeds = [found.best.blocks]
+        beside = found.ladder.in_question(found.best) if len(history) > 1 else forms
+
+
+@dataclass(frozen=True, eq=False)
+class _Asked:
+    """What stays the same in all rounds."""
+
+    linear: Linear
+    families: Sequence[str]
+    log_prior: Sequence[float]
+    rivals: frozenset[frozenset[int]]
+
+
+@dataclass(frozen=True, eq=False)
+class _Round:
+    """One search with given weights: the best combination, the discrepancy beside it, and what both leave."""
+
+    asked: _Asked
+    ladder: Ladder
+    rung: Rung
+    best: Combination
+    remainder: Array
+    smooth: Array
+
+    @classmethod
+    def of(
+        cls, asked: _Asked, whitening: Whitening, beside: Sequence[Form], seeds: Sequence[tuple[int, ...]]
+    ) -> _Round:
+        ladder = Ladder(asked.linear, whitening, list(beside), asked.log_prior, asked.rivals)
+        ladder.run(seeds)
+        rung, best = ladder.consensus(asked.families)
+        white = ladder.whitened_at(rung)
+        remainder = _left(asked.linear, white, parameter_values(asked.linear, ladder.beside(rung).gram, best))
+        return cls(asked, ladder, rung, best, remainder, discrepancy_mean(white, remainder))
+
+    @property
+    def form(self) -> Form | None:
+        return self.ladder.forms[self.rung[0]] if self.rung[0] >= 0 else None
+
+    @property
+    def state(self) -> tuple[object, ...]:
+        return self.best.blocks, self.form and self.form.name, self.rung[1]
+
+    @property
+    def rough(self) -> Array:
+        """(N, m) what neither effects nor a smooth discrepancy follow; one that is anew hides no gross error."""
+        return self.remainder if self.form is None or self.form.anew else self.remainder - self.smooth
+
+    @property
+    def leverage(self) -> float:
+        """Share of the equations that effects, frames and a smooth discrepancy take up."""
+        flat, smooth = self.asked.linear.frames.shape[2], self.ladder.whitened_at(self.rung).smooth
+        followed = self.best.effective + flat
+        if smooth is not None and self.form is not None and not self.form.anew:
+            followed += smooth.degrees
+        equations = self.ladder.beside(self.rung).gram.equations + flat
+        return float(min(followed / max(equations, 1), settings.MOST_LEVERAGE))
+
+    def told(self, aside: NDArray[np.bool_]) -> Explanation:
+        """Return the explanation.
+
+        Values are those that correct best: beside a smooth discrepancy, which is no part of the correction, effects are
+        fitted as if there were none, at a noise that holds it.
+        """
+        linear, ladder = self.asked.linear, self.ladder
+        rung = self.rung if self.form is None or self.form.anew else PLAIN
+        search, white = ladder.beside(rung), ladder.whitened_at(rung)
+        best = search.evaluate(self.best.blocks)
+        values = parameter_values(linear, search.gram, best)
+        compared, probabilities = ladder.probabilities()
+        odds = ladder.forms_in_question()
+        return Explanation(
+            linear,
+            white,
+            search.gram,
+            best,
+            compared,
+            probabilities,
+            values,
+            _left(linear, white, values),
+            self.smooth,
+            aside,
+            Discrepancy(self.form, self.rung[1], 1.0 - odds.get("", 0.0), odds),
+            ladder.in_question(self.best),
+        )
 
 
 def log_odds() -> float:
@@ -148,11 +245,15 @@ def settings_of_one(families: Sequence[str]) -> frozenset[frozenset[int]]:
     return frozenset(frozenset((a, b)) for a, b in pairs if families[a] == families[b])
 
 
-def log_priors(families: Sequence[str], rarity: Mapping[str, float]) -> list[float]:
-    """Return the log prior odds of each block: settings of one effect share its own."""
-    return [log_odds() - float(np.log(list(families).count(f))) + rarity.get(f, 0.0) for f in families]
+def log_priors(effects: Sequence[Effect]) -> list[float]:
+    """Return the log prior odds of each setting of an effect: it has its share of those of its name."""
+    names = [effect.name for effect in effects]
+    shares = [1.0 / names.count(e.name) if e.share is None else e.share for e in effects]
+    return [log_odds() + float(np.log(share)) for share in shares]
 
 
-def _remainder(linear: Linear, values: dict[int, tuple[Array, Array]]) -> Array:
+def _left(linear: Linear, whitening: Whitening, values: dict[int, tuple[Array, Array]]) -> Array:
+    """(N, m) gap less effects and frames."""
     moved = (linear.contribution(b, mean) for b, (mean, _) in values.items())
-    return linear.gap - sum(moved, np.zeros_like(linear.gap))
+    left = linear.gap - sum(moved, np.zeros_like(linear.gap))
+    return np.asarray(left - linear.frames @ frame_step(linear, whitening, left))

@@ -16,7 +16,6 @@ from thermal_robot.inference.columns import frame_columns
 from thermal_robot.inference.explain import Explanation
 from thermal_robot.inference.frames import register
 from thermal_robot.inference.problem import Linear
-from thermal_robot.inference.rows import row_groups
 from thermal_robot.inference.settle import Settled, settle
 from thermal_robot.observations import Observations, observe
 
@@ -47,8 +46,6 @@ class Fit:
         Effects that cannot be tested, and what they would need.
     variants
         By name: the variants of each effect that were compared.
-    rarity
-        By name of a law that was discovered: what being picked out of many costs its log prior odds.
     """
 
     campaign: Campaign
@@ -60,7 +57,6 @@ class Fit:
     families: tuple[str, ...]
     needs: dict[str, tuple[str, ...]]
     variants: dict[str, tuple[Effect, ...]]
-    rarity: dict[str, float]
 
 
 def fit(campaign: Campaign, effects: Sequence[Effect], progress: Callable[[str], None] = lambda _: None) -> Fit:
@@ -89,46 +85,46 @@ def fit(campaign: Campaign, effects: Sequence[Effect], progress: Callable[[str],
     _require_enough(campaign)
     nominal = observe(campaign, register(campaign))
     needs = {e.name: missing for e in effects if (missing := gate.missing(e, nominal))}
-    variants = {e.name: gate.variants(e, nominal) for e in effects if e.name not in needs}
-    groups = row_groups(campaign)
-    settled = settle(nominal, variants, groups, progress)
+    variants = {e.name: _settings(e, nominal) for e in effects if e.name not in needs}
+    settled = settle(nominal, variants, progress)
     if settled.second_order:
         # a container fits large errors of the effects inside it before they are linear: let those try without it
         inside = {n: v for n, v in variants.items() if n not in settled.containers}
-        apart = settle(nominal, inside, groups, progress)
+        apart = settle(nominal, inside, progress)
         if apart.noise <= settings.NO_WORSE * settled.noise:
-            again = settle(apart.observations, variants, groups, progress, apart)
+            again = settle(apart.observations, variants, progress, apart)
             settled = settled if set(again.names) & settled.containers else again
-    return _fitted(campaign, settled, needs, variants, {})
+    return _fitted(campaign, settled, needs, variants)
+
+
+def _settings(effect: Effect, observations: Observations) -> tuple[Effect, ...]:
+    """Return the settings of an effect that are compared, in all its joints and in each alone."""
+    known = gate.variants(effect, observations)
+    return tuple(dict.fromkeys((*known, *gate.alone(known[0], observations))))
 
 
 def refit(
     known: Fit,
-    laws: Mapping[str, tuple[Effect, ...]],
-    begin: Sequence[str],
-    rarity: Mapping[str, float],
+    variants: Mapping[str, tuple[Effect, ...]],
+    begin: Sequence[Effect],
     progress: Callable[[str], None] = lambda _: None,
 ) -> Fit:
-    """Fit again with laws that were discovered among the effects to choose from.
+    """Fit again with other settings to choose from, such as laws that were discovered.
 
     Parameters
     ----------
     known
         The fit that left a remainder.
-    laws
-        By name: variants of each law.
+    variants
+        By name: settings that replace those of the fit, or join them; none takes the effect out.
     begin
-        Names of the effects and laws with which the search starts.
-    rarity
-        By name: see :class:`Fit`.
+        Settings with which the search starts.
     progress
         Called with a few words at each stage.
     """
-    variants = {**known.variants, **laws}
-    whole = {**known.rarity, **rarity}
-    groups = row_groups(known.campaign)
-    settled = settle(known.nominal, variants, groups, progress, begin=begin, rarity=whole)
-    return _fitted(known.campaign, settled, known.needs, variants, whole)
+    whole = {name: own for name, own in {**known.variants, **variants}.items() if own}
+    settled = settle(known.nominal, whole, progress, begin=begin)
+    return _fitted(known.campaign, settled, known.needs, whole)
 
 
 def _fitted(
@@ -136,15 +132,12 @@ def _fitted(
     settled: Settled,
     needs: dict[str, tuple[str, ...]],
     variants: dict[str, tuple[Effect, ...]],
-    rarity: dict[str, float],
 ) -> Fit:
     explanation = settled.explanation
     nominal = observe(campaign, register(campaign, ~explanation.outliers))
     before = Linear(nominal.gap, frame_columns(nominal)[0], ())
     corrected = settled.observations if settled.held else nominal
-    return Fit(
-        campaign, nominal, before, corrected, explanation, settled.held, settled.families, needs, variants, rarity
-    )
+    return Fit(campaign, nominal, before, corrected, explanation, settled.held, settled.families, needs, variants)
 
 
 def _require_enough(campaign: Campaign) -> None:

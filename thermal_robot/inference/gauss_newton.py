@@ -55,22 +55,36 @@ def gauss_newton(
     state = np.concatenate([*(values for _, values in held), np.zeros(0)])
     used = np.flatnonzero(whitening.weights > 0)
     root = (np.sqrt(whitening.weights[used])[:, None] / (whitening.noise * best.noise)).ravel()
+    smooth = whitening.smooth
 
-    def pairs() -> list[tuple[Effect, Array]]:
+    def pairs(state: Array) -> list[tuple[Effect, Array]]:
         return list(zip(effects, np.split(state, ends), strict=True)) if effects else []
 
-    observations = corrected_observations(campaign, frames, pairs())
+    def white(columns: Array) -> Array:
+        flat = columns[used].reshape(len(root), -1) * root[:, None]
+        return flat if smooth is None else smooth.whitened(flat)
+
+    def left(observations: Observations, state: Array) -> float:
+        return float((white(observations.gap[:, :, None]) ** 2).sum() + ((state / prior) ** 2).sum())
+
+    observations = corrected_observations(campaign, frames, pairs(state))
+    cost = left(observations, state)
     for _ in range(settings.FIT_STEPS):
         flat, names = frame_columns(observations)
         columns = [block(observations, effect).columns for effect in effects]
-        design = np.concatenate([flat, *columns], axis=2)[used].reshape(len(root), -1) * root[:, None]
-        step, size = _ridge_step(design, observations.gap[used].ravel() * root, state, prior)
-        frames = moved(frames, step[: len(names)], names)
-        state = state + step[len(names) :]
-        observations = corrected_observations(campaign, frames, pairs())
+        stack = white(np.concatenate([flat, *columns, observations.gap[:, :, None]], axis=2))
+        step, size = _ridge_step(stack[:, :-1], stack[:, -1], state, prior)
+        for part in settings.STEP_PARTS:
+            tried = moved(frames, part * step[: len(names)], names), state + part * step[len(names) :]
+            there = corrected_observations(campaign, tried[0], pairs(tried[1]))
+            if (after := left(there, tried[1])) <= cost or size < settled:
+                break
+        else:
+            break
+        (frames, state), observations, cost = tried, there, after
         if size < settled:
             break
-    return observations, pairs()
+    return observations, pairs(state)
 
 
 def _ridge_step(design: Array, gap: Array, state: Array, prior: Array) -> tuple[Array, float]:

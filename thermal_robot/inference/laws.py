@@ -8,14 +8,26 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.campaign.turning import SLIPS
 from thermal_robot.effects.law import Discovered
-from thermal_robot.effects.quantities import quantities, unit
+from thermal_robot.effects.quantities import CLOCK, TURN, quantities, unit
 from thermal_robot.inference import settings
 from thermal_robot.observations import Observations
 
 Array = NDArray[np.float64]
 
-CLOCK = ("time", "order")
+__all__ = [
+    "CLOCK",
+    "harmonics",
+    "hystereses",
+    "law_of",
+    "laws",
+    "of_quantity",
+    "relaxing",
+    "shapes",
+    "smooth_columns",
+    "straight",
+]
 
 
 def laws(observations: Observations, kinds: Sequence[str], names: Iterable[str] | None = None) -> list[Discovered]:
@@ -40,20 +52,34 @@ def laws(observations: Observations, kinds: Sequence[str], names: Iterable[str] 
         "link": tuple(s.name for s in robot.segments[1:] if s.movable),
     }
     known = quantities(observations)
+    # knots and levels are the same wherever it enters
+    follow = {
+        n: law_of(observations, Discovered(turns=turns), n, known[n]) for n in (known if names is None else names)
+    }
     found = []
     for kind in kinds:
         for place in places[kind]:
             plain = Discovered(kind=kind, place=place, turns=turns)
             if kind == "link":
                 found.append(replace(plain, shape="constant", quantity="none"))
-            for name in known if names is None else names:
-                law = replace(plain, quantity=name, unit=unit(robot, name), labels=_labels(observations, name))
-                law = of_quantity(law, known[name])
+            for name, followed in follow.items():
+                law = replace(followed, kind=kind, place=place)
                 found.append(law)
                 if kind == "joint" and name == place and law.shape == "smooth":
                     # five knots do not follow a wheel that turns more than once
                     found += [replace(law, shape="harmonic", marks=(k,)) for k in harmonics(observations, place)]
     return found
+
+
+def law_of(observations: Observations, plain: Discovered, name: str, values: Array) -> Discovered:
+    """Return a law as a smooth one of a quantity (N,), or one of its levels."""
+    law = replace(plain, quantity=name, unit=unit(observations.robot, name), labels=_labels(observations, name))
+    return of_quantity(law, values)
+
+
+def straight(law: Discovered) -> Discovered:
+    """Return a law as a straight line; one of labels as it is, since nothing lies between these."""
+    return law if law.labels else replace(law, shape="ramp", marks=())
 
 
 def harmonics(observations: Observations, joint: str) -> tuple[float, ...]:
@@ -84,31 +110,85 @@ def of_quantity(law: Discovered, values: Array, knots: int = settings.KNOTS) -> 
 def shapes(
     law: Discovered, values: Array, jumps: bool = True, orders: Sequence[float] = settings.HARMONICS
 ) -> list[Discovered]:
-    """Return a law in its own shape, and in all simpler shapes that may suffice.
+    """Return a law in its own shape, as a smooth one, and in all simpler shapes that may suffice, each once.
 
     Always: straight, quadratic, and hinges at quantiles of the quantity. With ``jumps`` also steps and bumps: of
     positions, gravity and the clock, as nothing jumps at a temperature. Of a velocity also its sign. Of a joint's own
-    position also harmonics of the given orders.
+    position also harmonics of the given orders. Of two quantities their product alone. Of what a joint remembers
+    elements that slip.
     """
-    if law.shape in ("constant", "levels"):
-        return [law, replace(law, shape="ramp", marks=())] if law.shape == "levels" and len(law.marks) > 2 else [law]
-    found = [law, replace(law, shape="ramp", marks=()), replace(law, shape="quadratic", marks=())]
+    if law.shape == "constant":
+        return [law]
+    law = replace(of_quantity(law, values), runs=(), starts=()) if law.starts else law
+    if law.by:
+        return list(dict.fromkeys([law, *_of_two(law, values)]))
+    smooth = of_quantity(law, values)
+    found = [law, smooth] if law.labels or len(smooth.marks) < 3 else [law, smooth, straight(law)]
+    if smooth.shape == "levels":
+        return list(dict.fromkeys(found))
+    found.append(replace(law, shape="quadratic", marks=()))
     middle = np.quantile(values, np.linspace(settings.INNER_MARKS, 1.0 - settings.INNER_MARKS, settings.MARKS))
+    if law.quantity.startswith(TURN):
+        return list(dict.fromkeys([*found, *hystereses(law, values)]))
     if jumps:
-        found += [replace(law, shape="step", marks=(float(m),)) for m in middle]
-        found += [replace(law, shape="slide", marks=(float(m), settings.SLIDE_WIDTH * law.span)) for m in middle[::2]]
+        found += _jumps(law, middle)
     found += [replace(law, shape="hinge", marks=(float(m), side)) for m in middle[2:-2:2] for side in (1.0, -1.0)]
-    if jumps:
-        found += [
-            replace(law, shape="bump", marks=(float(m), w * law.span))
-            for m in middle[1:-1:2]
-            for w in settings.BUMP_WIDTHS
-        ]
     if law.quantity.startswith("velocity."):
         found.append(replace(law, shape="drag", marks=()))
-    if law.quantity == law.place and law.kind == "joint":
+    if law.quantity == law.place and law.kind == "joint" and not law.of:
         found += [replace(law, shape="harmonic", marks=(k,)) for k in orders]
-    return found
+    return list(dict.fromkeys(found))
+
+
+def _jumps(law: Discovered, middle: Array) -> list[Discovered]:
+    found = [replace(law, shape="step", marks=(float(m),)) for m in middle]
+    found += [replace(law, shape="slide", marks=(float(m), settings.SLIDE_WIDTH * law.span)) for m in middle[::2]]
+    widths = [w * law.span for w in settings.BUMP_WIDTHS]
+    return found + [replace(law, shape="bump", marks=(float(m), w)) for m in middle[1:-1:2] for w in widths]
+
+
+def _of_two(law: Discovered, values: Array) -> list[Discovered]:
+    """Return a straight law of two quantities, 1, u, v and u·v, as one of their product (N,) alone."""
+    largest = float(np.abs(values).max())
+    return [replace(law, shape="product", span=largest)] if largest > 0.0 else []
+
+
+def hystereses(law: Discovered, values: Array) -> list[Discovered]:
+    """Return a law of a joint's memory as elements that slip: over the whole range, coarsely first, or some neighbours.
+
+    One that slips between two of the grid is nearly a sum of these two.
+
+    Parameters
+    ----------
+    law
+        Of the distance (N,) from the joint's last turning point.
+    values
+        That distance, rad or m: which slips show, it tells.
+    """
+    least, most = (share * float(np.abs(values).max()) for share in settings.SLIP_SHARES)
+    slips = tuple(r for r in SLIPS if least <= r <= most)
+    whole = [slips[::step] for step in settings.SLIP_STEPS]
+    few = [slips[k : k + n] for n in settings.SLIPS_TOGETHER for k in range(len(slips) - n + 1)]
+    return [replace(law, shape="hysteresis", marks=marks) for marks in dict.fromkeys([*whole, *few]) if marks]
+
+
+def relaxing(observations: Observations, law: Discovered) -> list[Discovered]:
+    """Return a law of the clock as one that relaxes after each start: of one size, and of one each.
+
+    A session begins with its first row; where there are none, the campaign does.
+    """
+    clock, rows = law.values(observations), observations.campaign.labels.get("session")
+    if clock is None or not np.ptp(clock) > 0.0:
+        return []
+    span = float(np.ptp(clock))
+    law = replace(law, labels=(), runs=(), origin=float(clock.min()), span=span)
+    if rows is None or len(set(rows)) < 2:
+        found = [replace(law, shape="relaxing", starts=(law.origin,))]
+    else:
+        runs = tuple(np.unique(rows).tolist())
+        starts = tuple(float(clock[rows == run].min()) for run in runs)
+        found = [replace(law, shape=shape, runs=runs, starts=starts) for shape in ("relaxing", "relaxing each")]
+    return [replace(one, marks=(share * span,)) for one in found for share in settings.RELAXED_WITHIN]
 
 
 def smooth_columns(values: Array) -> Array:

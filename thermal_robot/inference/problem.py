@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg import block_diag
 
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import solve, whitener
 from thermal_robot.inference.columns import Block
+from thermal_robot.inference.discrepancy import Smooth
 from thermal_robot.inference.evidence import Combination, Gram
 
 Array = NDArray[np.float64]
@@ -62,45 +63,90 @@ class Whitening:
     noise
         (m,) one sigma: m for the first three, rad for the rest.
     held
-        Degrees of freedom of the prior on the noise; 0 where none is stated, or the residual is well above it.
+        Degrees of freedom of the prior on the noise; 0 where none is stated.
+    smooth
+        The correlated part of the rows' covariance, where there is a discrepancy.
     """
 
     weights: Array
     noise: Array
     held: float
+    smooth: Smooth | None = None
 
 
 def gram(linear: Linear, whitening: Whitening) -> Gram:
     """Form the normal equations, project the frames out, and reduce each block to what the data determine of it."""
-    stack, flat = whitened(linear, whitening), linear.frames.shape[2]
+    stack = whitened(linear, whitening)
+    return normal_equations(linear, whitening, stack.T @ stack, len(stack))
+
+
+def normal_equations(
+    linear: Linear, whitening: Whitening, full: Array, equations: int, like: Gram | None = None
+) -> Gram:
+    """Project the frames out of the products of all columns, and reduce each block.
+
+    Parameters
+    ----------
+    linear, whitening
+        The problem.
+    full
+        (f + P + 1, f + P + 1) products of the whitened columns.
+    equations
+        Number of whitened rows.
+    like
+        A problem whose reduction of the blocks is taken over; each block is reduced anew where there is none.
+    """
+    flat = linear.frames.shape[2]
     sizes = np.concatenate([*(b.sizes for b in linear.blocks), [1.0]])
-    full = stack.T @ stack
     cross = full[:flat, flat:] * sizes
     known = whitener(full[:flat, :flat])
-    projector = known @ (known.T @ cross)
-    rest = full[flat:, flat:] * np.outer(sizes, sizes) - cross.T @ projector
+    along = known.T @ cross
+    rest = full[flat:, flat:] * np.outer(sizes, sizes) - along.T @ along
     rest = 0.5 * (rest + rest.T)
+    bases, slices = (like.bases, like.slices) if like else _reduction(linear, rest, np.diag(full)[flat:] * sizes**2)
+    reduction = _block_diagonal(bases)
+    log_det = _log_det(full[:flat, :flat], known.shape[1])
+    return Gram(
+        reduction.T @ rest[:-1, :-1] @ reduction,
+        reduction.T @ rest[:-1, -1],
+        float(rest[-1, -1]),
+        slices,
+        bases,
+        equations - known.shape[1],
+        whitening.held,
+        -0.5 * (log_det + (whitening.smooth.log_det if whitening.smooth else 0.0)),
+    )
+
+
+def _reduction(linear: Linear, rest: Array, before: Array) -> tuple[tuple[Array, ...], tuple[slice, ...]]:
+    """Return for each block the directions that the data see, and where they stand among all of them."""
     bases, slices, start, parameter = [], [], 0, 0
     for item in linear.blocks:
         own = slice(parameter, parameter + len(item.sizes))
         value, vector = np.linalg.eigh(rest[own, own])
         # what is left of an exact alias of the frames is rounding of what it was before they were projected out
-        before = float((np.diag(full)[flat:][own] * item.sizes**2).max(initial=0.0))
-        seen = value > max(settings.INFORMATION_FLOOR, settings.PROJECTED_FLOOR * before)
+        longest = float(before[own].max(initial=0.0))
+        seen = value > max(settings.INFORMATION_FLOOR, settings.PROJECTED_FLOOR * longest)
         bases.append(vector[:, seen])
         slices.append(slice(start, start + int(seen.sum())))
         start, parameter = start + int(seen.sum()), own.stop
-    reduction = block_diag(*bases) if bases else np.zeros((0, 0))
-    return Gram(
-        reduction.T @ rest[:-1, :-1] @ reduction,
-        reduction.T @ rest[:-1, -1],
-        float(rest[-1, -1]),
-        tuple(slices),
-        tuple(bases),
-        (projector[:, :-1] / sizes[:-1]) if flat else np.zeros((0, len(sizes) - 1)),
-        len(stack) - known.shape[1],
-        whitening.held,
-    )
+    return tuple(bases), tuple(slices)
+
+
+def _block_diagonal(bases: Sequence[Array]) -> Array:
+    result = np.zeros((sum(len(b) for b in bases), sum(b.shape[1] for b in bases)))
+    row, column = 0, 0
+    for basis in bases:
+        result[row : row + len(basis), column : column + basis.shape[1]] = basis
+        row, column = row + len(basis), column + basis.shape[1]
+    return result
+
+
+def _log_det(matrix: Array, rank: int) -> float:
+    """Return the logarithm of the product of the largest ``rank`` eigenvalues."""
+    if not rank:
+        return 0.0
+    return float(np.log(np.linalg.eigvalsh(matrix)[-rank:]).sum())
 
 
 def whitened(linear: Linear, whitening: Whitening) -> Array:
@@ -108,18 +154,8 @@ def whitened(linear: Linear, whitening: Whitening) -> Array:
     used = np.flatnonzero(whitening.weights > 0)
     stack = linear.stack[used]
     stack *= (np.sqrt(whitening.weights[used])[:, None] / whitening.noise)[:, :, None]
-    return stack.reshape(-1, stack.shape[2])
-
-
-def scores(linear: Linear, whitening: Whitening, problem: Gram, remainder: Array) -> Array:
-    """(rows, D) score of each row: its share in the slope of the log likelihood by the reduced columns."""
-    used = np.flatnonzero(whitening.weights > 0)
-    left = remainder[used] * (whitening.weights[used][:, None] / whitening.noise**2)
-    raw = np.einsum("nmk,nm->nk", linear.stack[used][:, :, :-1], left)
-    flat = linear.frames.shape[2]
-    own = raw[:, flat:] - raw[:, :flat] @ problem.projector
-    sizes = [b.sizes[:, None] * basis for b, basis in zip(linear.blocks, problem.bases, strict=True)]
-    return np.asarray(own @ block_diag(*sizes)) if sizes else np.zeros((len(used), 0))
+    flat = stack.reshape(-1, stack.shape[2])
+    return flat if whitening.smooth is None else whitening.smooth.whitened(flat)
 
 
 def contained(problem: Gram) -> frozenset[frozenset[int]]:
@@ -163,11 +199,19 @@ def parameter_values(linear: Linear, problem: Gram, found: Combination) -> dict[
 
 def frame_step(linear: Linear, whitening: Whitening, remainder: Array) -> Array:
     """(f,) step of the unknown frames that fits the remainder, by least squares over the rows with weight."""
-    if not linear.frames.shape[2]:
+    flat = linear.frames.shape[2]
+    if not flat:
         return np.zeros(0)
+    stack = whitened(Linear(remainder, linear.frames, ()), replace(whitening, smooth=None))
+    products = stack.T @ stack if whitening.smooth is None else whitening.smooth.products(stack)
+    return solve(products[:flat, :flat], products[:flat, flat])
+
+
+def discrepancy_mean(whitening: Whitening, remainder: Array) -> Array:
+    """(N, m) posterior mean of the discrepancy in a remainder; zero where there is none."""
+    if whitening.smooth is None:
+        return np.zeros_like(remainder)
     used = np.flatnonzero(whitening.weights > 0)
-    weight = whitening.weights[used][:, None] / whitening.noise**2
-    flat = linear.frames[used]
-    matrix = np.einsum("nmf,nm,nmg->fg", flat, weight, flat, optimize=True)
-    vector = np.einsum("nmf,nm->f", flat, weight * remainder[used])
-    return solve(matrix, vector)
+    root = np.sqrt(whitening.weights[used])
+    left = (remainder[used] / whitening.noise * root[:, None]).ravel()
+    return np.asarray(whitening.smooth.mean(left) * whitening.noise)

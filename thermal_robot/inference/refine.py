@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +12,9 @@ from thermal_robot.effects import Effect, gate
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import Block, block
 from thermal_robot.inference.evidence import Combination, Gram, Search
-from thermal_robot.inference.explain import Explanation
-from thermal_robot.inference.problem import Linear, gram, parameter_values
+from thermal_robot.inference.explain import Explanation, log_odds
+from thermal_robot.inference.problem import Linear, Whitening, gram, parameter_values
+from thermal_robot.inference.robust import tail_weight
 from thermal_robot.observations import Observations
 
 Array = NDArray[np.float64]
@@ -22,7 +24,8 @@ def refined(explanation: Explanation, observations: Observations, factor: float)
     """Move the constants of chosen effects to where the evidence is largest, one effect after another.
 
     An effect's settings nearby are tried. Where none is better by 0.1 nat they move closer, the logarithm of their
-    factor halved, until a parabola through them promises no more. Outliers, weights and other effects stay.
+    factor halved, until a parabola through them promises no more. Weights and other effects stay; rows set aside are
+    heard, with the weight of their distance, as a constant that is off puts aside just the rows that tell of it.
 
     Parameters
     ----------
@@ -38,6 +41,7 @@ def refined(explanation: Explanation, observations: Observations, factor: float)
     list
         The chosen effects in their order, their constants moved, with their (P,) values, SI.
     """
+    explanation = replace(explanation, whitening=heard(explanation))
     blocks = [explanation.linear.blocks[b] for b in explanation.best.blocks]
     values = [explanation.values[b][0] for b in explanation.best.blocks]
     for place, item in enumerate(blocks):
@@ -49,6 +53,16 @@ def refined(explanation: Explanation, observations: Observations, factor: float)
     return [(item.effect, mean) for item, mean in zip(blocks, values, strict=True)]
 
 
+def heard(explanation: Explanation) -> Whitening:
+    """Return the whitening in which rows set aside have a weight; what rows have in common is known of the others."""
+    whitening, aside = explanation.whitening, explanation.outliers
+    if whitening.smooth is not None or not aside.any():
+        return whitening
+    noise = whitening.noise * explanation.best.noise
+    distance2 = ((explanation.remainder / noise) ** 2).sum(axis=1)
+    return replace(whitening, weights=np.where(aside, tail_weight(distance2, len(noise)), whitening.weights))
+
+
 def _moved(
     explanation: Explanation, observations: Observations, blocks: Sequence[Block], place: int, factor: float
 ) -> Block:
@@ -56,7 +70,8 @@ def _moved(
     item, before, after = blocks[place], blocks[:place], blocks[place + 1 :]
 
     def evidence(own: Block) -> float:
-        return _evaluated(explanation, [*before, own, *after])[2].log_evidence
+        # one that stands apart is as rare as an effect
+        return _evaluated(explanation, [*before, own, *after])[2].log_evidence + log_odds() * own.effect.apart
 
     own = evidence(item)
     for _ in range(settings.REFINED_TRIES):
@@ -80,5 +95,4 @@ def _evaluated(explanation: Explanation, blocks: Sequence[Block]) -> tuple[Linea
     """Evaluate these blocks together and no others."""
     linear = Linear(explanation.linear.gap, explanation.linear.frames, tuple(blocks))
     problem = gram(linear, explanation.whitening)
-    tempered = problem.tempered(explanation.design_effect)
-    return linear, problem, Search(tempered, [0.0] * len(blocks)).evaluate(range(len(blocks)))
+    return linear, problem, Search(problem, [0.0] * len(blocks)).evaluate(range(len(blocks)))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,8 +9,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from thermal_robot.inference import settings
-from thermal_robot.inference.evidence import Gram
-from thermal_robot.inference.problem import Linear, Whitening, scores
+from thermal_robot.inference.problem import Linear, Whitening
 
 Array = NDArray[np.float64]
 
@@ -44,19 +42,14 @@ def robust_noise(remainder: Array, leverage: float = 0.0) -> Array:
 
 
 def settled_noise(measured: Array, noise: Noise, measures: int) -> tuple[Array, float]:
-    """Return the noise of each component, never below what is stated, and the degrees of freedom of its prior.
+    """Return the noise of each component, and the degrees of freedom of its prior.
 
-    The stated noise counts. Where the residual is well above it, the residual sets the scale by which effects are
-    judged, and the prior has no weight.
+    The noise that is stated counts; what is more in the residual is something else. Where none is stated it is what
+    the residual shows.
     """
     stated = noise.parts(measures)
-    sigma = np.array(
-        [
-            m if g is None else max(g, m if m > settings.NOISE_SLACK * g else g)
-            for g, m in zip(stated, measured, strict=True)
-        ]
-    )
-    firm = all(g is not None and s <= g for g, s in zip(stated, sigma, strict=True))
+    sigma = np.array([m if g is None else g for g, m in zip(stated, measured, strict=True)])
+    firm = all(g is not None for g in stated)
     return np.repeat(sigma, 3), settings.GIVEN_NOISE_DOF if firm else 0.0
 
 
@@ -92,39 +85,20 @@ def reweigh(
     aside
         (N,) rows set aside.
     """
-    sigma, held = settled_noise(robust_noise(remainder[use], leverage), noise, measures)
-    distance2 = ((remainder / sigma) ** 2).sum(axis=1) / (1.0 - leverage)
+    measured = robust_noise(remainder[use], leverage)
+    sigma, held = settled_noise(measured, noise, measures)
+    # where more is left than noise, a row is far only if it is far from the others
+    scale = np.where(np.repeat(measured, 3) > settings.NOISE_SLACK * sigma, np.repeat(measured, 3), sigma)
+    distance2 = ((remainder / scale) ** 2).sum(axis=1) / (1.0 - leverage)
     aside = use & (distance2 > distance_limit(measures, int(use.sum())))
     if aside.sum() > settings.MOST_OUTLIERS * use.sum():
         worst = np.argsort(np.where(use, -distance2, np.inf))[: int(settings.MOST_OUTLIERS * use.sum())]
         aside = np.isin(np.arange(len(use)), worst) & aside
-    bend = float(chdtri(measures, settings.BEND_LEVEL))
-    weights = np.where(use & ~aside, np.minimum(1.0, np.sqrt(bend / np.maximum(distance2, settings.TINY))), 0.0)
+    weights = np.where(use & ~aside, tail_weight(distance2, measures), 0.0)
     return Whitening(weights, sigma, held), aside
 
 
-def design_effect(
-    linear: Linear, problem: Gram, remainder: Array, whitening: Whitening, groups: Sequence[NDArray[np.int64]]
-) -> float:
-    """Return the design effect: how many rows are worth one independent row (Kish, *Survey Sampling*, 1965).
-
-    Residuals of rows that belong together may be correlated. The design effect is the variance of the scores summed
-    within groups, over what it would be if rows were independent. The largest over the groupings counts; it is 1 where
-    chance alone could give as much.
-    """
-    if not groups or not problem.slices or not problem.slices[-1].stop:
-        return 1.0
-    used = np.flatnonzero(whitening.weights > 0)
-    each = scores(linear, whitening, problem, remainder)
-    alone = (each**2).sum(axis=0) + settings.TINY
-    value = np.linalg.eigvalsh(problem.matrix / np.sqrt(np.outer(np.diag(problem.matrix), np.diag(problem.matrix))))
-    independent = value.sum() ** 2 / (value**2).sum()
-    worst = 1.0
-    for labels in groups:
-        kept = labels[used]
-        together = np.stack([np.bincount(kept, column) for column in each.T], axis=1)
-        ratio = float(np.mean((together**2).sum(axis=0) / alone))
-        pairs = float((np.bincount(kept).astype(float) ** 2).sum()) / len(used) - 1.0
-        chance = np.sqrt(2.0 * max(pairs, 0.0) / (len(used) * independent))
-        worst = max(worst, ratio if ratio > 1.0 + settings.DESIGN_SIGMAS * chance else 1.0)
-    return worst
+def tail_weight(distance2: Array, measures: int) -> Array:
+    """Return the weight of rows at a squared distance in units of the noise: less in the tail (Huber 1964)."""
+    bend = float(chdtri(measures, settings.BEND_LEVEL))
+    return np.asarray(np.minimum(1.0, np.sqrt(bend / np.maximum(distance2, settings.TINY))))

@@ -50,14 +50,12 @@ def in_order(campaign: Campaign) -> Labels:
 
 
 def in_a_row(campaign: Campaign, aside: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """(N,) those rows set aside whose neighbour in time is set aside, too: a change, and not gross errors."""
+    """(N,) those rows set aside that follow each other in time, three or more: a change, and not gross errors."""
     order = in_order(campaign)
     own = aside[order]
-    beside = np.zeros_like(own)
-    beside[1:] |= own[:-1]
-    beside[:-1] |= own[1:]
+    run = np.cumsum(np.diff(own, prepend=False))  # odd within runs
     result = np.zeros_like(own)
-    result[order] = own & beside
+    result[order] = own & (np.bincount(run, minlength=1)[run] >= settings.RUN)
     return result
 
 
@@ -86,17 +84,10 @@ def neighbourhoods(campaign: Campaign, count: int) -> Labels:
     return labels
 
 
-def folds(
-    campaign: Campaign, count: int = settings.FOLDS, blocks_a_fold: int = settings.BLOCKS_A_FOLD
-) -> tuple[Labels, Labels]:
-    """Assign rows to the folds of a hold-out, in blocks of consecutive measurements; near-repeats stay together.
+def blocks(campaign: Campaign, count: int = settings.BLOCKS) -> Labels:
+    """(N,) label 0..B−1 of one of at most ``count`` blocks of consecutive measurements; near-repeats stay together.
 
-    Returns
-    -------
-    fold
-        (N,) fold of each row.
-    block
-        (N,) block of each row: the unit that a bootstrap resamples.
+    A block is what a hold-out holds out at a time, and what its figures' uncertainty is told by.
     """
     cluster = near_repeats(campaign)
     rank = np.empty(campaign.samples)
@@ -108,10 +99,13 @@ def folds(
     ahead = np.empty(len(order))
     ahead[order] = np.cumsum(sizes[order]) - sizes[order]
     count = min(count, len(order))
-    blocks = min(count * blocks_a_fold, len(order))
-    block = np.minimum(ahead * blocks // campaign.samples, blocks - 1).astype(np.int64)[cluster]
-    block = np.unique(block, return_inverse=True)[1].astype(np.int64)
-    return block % count, block
+    block = np.minimum(ahead * count // campaign.samples, count - 1).astype(np.int64)[cluster]
+    return np.unique(block, return_inverse=True)[1].astype(np.int64)
+
+
+def each(labels: Labels) -> list[NDArray[np.bool_]]:
+    """Return for each label, in order, a mask (N,) of its rows."""
+    return [labels == label for label in np.unique(labels)]
 
 
 def repeated_poses(campaign: Campaign) -> NDArray[np.int64]:

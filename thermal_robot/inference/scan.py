@@ -1,20 +1,23 @@
-"""Scan of places and quantities: which law, entering where, explains a remainder best."""
+"""Scan of places, quantities and kinds of law: which law, entering where, explains a remainder best."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.effects import Effect
 from thermal_robot.effects.law import Discovered
-from thermal_robot.effects.quantities import GRAVITY, quantities
+from thermal_robot.effects.quantities import CLOCK, GRAVITY, quantities, unit
 from thermal_robot.effects.shapes import SHAPES
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block
-from thermal_robot.inference.laws import CLOCK, harmonics, laws, shapes
-from thermal_robot.inference.target import Target
+from thermal_robot.inference.grammar import memory, modulated, products
+from thermal_robot.inference.laws import harmonics, laws, relaxing, shapes, straight
+from thermal_robot.inference.periodogram import independent, orders, peak
+from thermal_robot.inference.target import Alike, Seat, Target
 from thermal_robot.observations import Observations
 
 Array = NDArray[np.float64]
@@ -22,72 +25,295 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True, eq=False)
 class Scanned:
-    """One candidate: the law, and the log evidence that it gains over noise (Bayes information criterion)."""
+    """One candidate among many.
+
+    Attributes
+    ----------
+    law
+        What it is.
+    gain
+        Log evidence that it gains over noise (Bayes information criterion).
+    tried
+        Among how many it was picked: the kinds of law, times the laws of its kind. One over it is its share of the
+        prior, and these shares sum to one over all that was tried.
+    """
 
     law: Discovered
     gain: float
+    tried: float = 1.0
+
+    @property
+    def worth(self) -> float:
+        """Log evidence that is left once the choice is paid for."""
+        return self.gain - float(np.log(self.tried))
 
 
-def scan(observations: Observations, targets: Sequence[Target]) -> tuple[list[list[Scanned]], int]:
-    """Return, for every target, all candidates, best first; and how many were tried.
+class Seats:
+    """What laws do to some targets, the columns of each place and the functions of each quantity computed once."""
 
-    A law at a segment has six components, so that only the quantities that gain most elsewhere are tried there.
+    def __init__(self, observations: Observations, targets: Sequence[Target]) -> None:
+        self.observations, self.targets = observations, targets
+        self._seats: dict[tuple[object, ...], tuple[Seat, ...]] = {}
+        self._functions: dict[tuple[object, ...], Array] = {}
+
+    def seen_from(self, law: Discovered) -> tuple[Seat, ...]:
+        """Return the targets as they are seen from a law's place, or from the known effect in it."""
+        place = (law.kind, law.place, law.turns, law.of, law.of_arguments)
+        if place not in self._seats:
+            moves = block(self.observations, _steady(law)).columns
+            self._seats[place] = tuple(target.seat(moves) for target in self.targets)
+        return self._seats[place]
+
+    def functions(self, law: Discovered) -> Array:
+        """Return a law's (N, K) functions of what it follows, wherever it enters."""
+        # all that the functions hang on
+        followed = (
+            *(law.quantity, law.shape, law.marks, law.origin, law.span, law.labels, law.runs, law.starts),
+            *(law.by, law.by_origin, law.by_span),
+        )
+        if followed not in self._functions:
+            rows = law.at_rows(self.observations)
+            self._functions[followed] = np.zeros((len(self.observations.q), 0)) if rows is None else rows[0]
+        return self._functions[followed]
+
+    def gains(self, candidates: Sequence[Discovered]) -> Array:
+        """Return (targets, C) the log evidence that each law gains."""
+        found = np.zeros((len(self.targets), len(candidates)))
+        together: dict[tuple[Seat, ...], list[int]] = {}
+        for i, law in enumerate(candidates):
+            together.setdefault(self.seen_from(law), []).append(i)
+        for seats, which in together.items():
+            functions = Alike.of([self.functions(candidates[i]) for i in which])
+            for t, seat in enumerate(seats):
+                found[t, which] = seat.gains(functions)
+        return found
+
+
+def scan(
+    observations: Observations, targets: Sequence[Target], effects: Iterable[Effect] | None = None
+) -> tuple[list[list[Scanned]], int]:
+    """Return, for every target, the candidates, best first; and how many laws were tried.
+
+    Tried are a smooth and a straight law of each quantity at each place; a wave of any order in each joint; what each
+    joint remembers of its moves; known effects whose size in one joint changes with a quantity; products of two
+    quantities. A law at a segment has six components, so that only the quantities that gain most elsewhere are tried
+    there. Candidates are ordered by :attr:`Scanned.worth`, the leading ones by that of their best shape. Left out of
+    the answer are laws that are no better than what they contain: an effect that changes than the effect itself in that
+    joint, a product than one of its quantities.
+
+    Parameters
+    ----------
+    observations
+        Where the targets come from.
+    targets
+        Remainders of the gap.
+    effects
+        Known effects that may change, in their settings; the library where absent.
     """
-    found: list[list[Scanned]] = [[] for _ in targets]
+    seats = Seats(observations, targets)
+    kinds = _candidates(seats, effects)
+    grids = _grids(observations)
+    waves = round(sum(independent(grid) for grid in grids.values()))
+    filled = sum(map(bool, (*kinds.values(), grids)))
+    gains = {kind: seats.gains(own) for kind, own in kinds.items()}
+    steady = list(dict.fromkeys(map(_steady, kinds["modulated"])))
+    itself = dict(zip(steady, seats.gains(steady).T, strict=True))
+    found = []
+    for t in range(len(targets)):
+        own = {
+            kind: [Scanned(law, float(g), filled * len(made)) for law, g in zip(made, gains[kind][t], strict=True)]
+            for kind, made in kinds.items()
+        }
+        own["free wave"] = _free_waves(seats, t, grids, filled * waves)
+        own["modulated"] = [item for item in own["modulated"] if item.worth > itself[_steady(item.law)][t]]
+        found.append(_best(own, seats, t))
+    return found, sum(map(len, kinds.values())) + waves
+
+
+def _candidates(seats: Seats, effects: Iterable[Effect] | None) -> dict[str, list[Discovered]]:
+    """Return the laws that are tried, by kind, but for waves of any order."""
+    observations = seats.observations
     first = laws(observations, ("joint", "base", "tool"))
-    _measure(observations, first, targets, found)
-    telling: dict[str, float] = {}
-    for own in found:
-        for item in own:
-            telling[item.law.quantity] = max(telling.get(item.law.quantity, -np.inf), item.gain)
-    names = sorted(telling, key=lambda name: -telling[name])[: settings.LINK_QUANTITIES]
-    second = laws(observations, ("link",), names)
-    _measure(observations, second, targets, found)
-    for own in found:
-        own.sort(key=lambda item: -item.gain)
-    return found, len(first) + len(second)
+    plain = [law for law in first if law.shape != "harmonic"]
+    plain += [straight(law) for law in plain if law.shape == "smooth"]
+    telling = _telling(plain, seats.gains(plain))
+    leading = sorted(telling, key=lambda name: -telling[name])[: settings.LINK_QUANTITIES]
+    return {
+        "plain": plain + laws(observations, ("link",), leading),
+        "wave": [law for law in first if law.shape == "harmonic"],
+        "memory": memory(observations),
+        "modulated": modulated(observations, effects),
+        "product": products(observations, ("joint", "base", "tool")),
+    }
 
 
 def shaped(observations: Observations, target: Target, law: Discovered) -> Scanned:
-    """Return a law in the shape that gains most log evidence."""
-    values = quantities(observations).get(law.quantity)
-    jumps = law.quantity in (*CLOCK, *GRAVITY, *observations.robot.joint_names)
-    orders = harmonics(observations, law.place) if law.kind == "joint" else settings.HARMONICS
-    candidates = [law] if values is None else shapes(law, values, jumps, orders)
+    """Return a law in the shape that is worth most: in gain of log evidence, less what the choice of a shape costs.
 
-    def measured(candidate: Discovered) -> Scanned:
-        return Scanned(candidate, target.worth(block(observations, candidate).columns).gain)
+    Each kind of shape has the same share of the prior, which the places of its marks divide: ``tried`` counts shapes.
+    """
+    seats = Seats(observations, [target])
+    measured = _measured(seats, 0, law)
+    first: dict[str, Scanned] = {}
+    for item in sorted(measured, key=lambda item: -item.gain):
+        first.setdefault(item.law.shape, item)
+    # between the marks that were tried one may lie that makes another shape the best
+    moved = {"sudden": _timed, "gradual": _refined}
+    moves = [(moved.get(SHAPES[shape].mark), item) for shape, item in first.items()]
+    return max((move(item, seats) if move else item for move, item in moves), key=lambda item: item.worth)
 
-    best = max(map(measured, candidates), key=lambda item: item.gain)
-    return best if SHAPES[best.law.shape].mark != "gradual" else _refined(best, measured)
+
+def _measured(seats: Seats, t: int, law: Discovered) -> list[Scanned]:
+    """Return a law in every shape that it may have."""
+    observations = seats.observations
+    whole = replace(law, shape="product") if law.by else law
+    values = None if law.quantity == "none" else whole.values(observations)
+    jumps = law.quantity in (*CLOCK, *GRAVITY, *observations.robot.joint_names) and not law.of
+    waves = harmonics(observations, law.place) if law.kind == "joint" else settings.HARMONICS
+    candidates = [law] if values is None else shapes(law, values, jumps, waves)
+    if law.quantity in CLOCK and law.quantity in observations.covariates and not law.of and not law.by:
+        candidates += relaxing(observations, law)
+    names = [candidate.shape for candidate in candidates]
+    gains = seats.seen_from(law)[t].gains([seats.functions(candidate) for candidate in candidates])
+    return [
+        Scanned(candidate, float(gain), len(set(names)) * names.count(candidate.shape))
+        for candidate, gain in zip(candidates, gains, strict=True)
+    ]
 
 
-def _refined(best: Scanned, measured: Callable[[Discovered], Scanned]) -> Scanned:
+def _refined(best: Scanned, seats: Seats) -> Scanned:
     """Move marks and widths in ever smaller steps while that gains."""
-    step, law = settings.MARK_STEP, best.law
+    step = settings.MARK_STEP
     for _ in range(settings.MARK_ROUNDS):
         law, (mark, *width) = best.law, best.law.marks
-        near = [replace(law, marks=(mark + s * step * law.span, *width)) for s in (1, -1)]
+        near = [law.shifted(s * step * law.span) for s in (1, -1)]
         if SHAPES[law.shape].width:
             near += [
                 replace(law, marks=(mark, width[0] * f))
                 for f in (1.0 + settings.WIDTH_STEP * step, 1.0 / (1.0 + settings.WIDTH_STEP * step))
             ]
-        better = max(map(measured, near), key=lambda item: item.gain)
-        if better.gain > best.gain:
-            best = better
+        gains = seats.gains(near)[0]
+        if gains.max() > best.gain:
+            best = replace(best, law=near[int(gains.argmax())], gain=float(gains.max()))
         else:
             step /= 2.0
     return best
 
 
-def _measure(
-    observations: Observations,
-    candidates: Sequence[Discovered],
-    targets: Sequence[Target],
-    found: list[list[Scanned]],
-) -> None:
-    for law in candidates:
-        columns = block(observations, law).columns
-        for target, own in zip(targets, found, strict=True):
-            own.append(Scanned(law, target.worth(columns).gain))
+def _timed(best: Scanned, seats: Seats) -> Scanned:
+    """Move a sudden mark to the best of the gaps between values near it.
+
+    A mark may lie anywhere in the range, so that each gap has its share of the prior: a break between two sessions has
+    more than the seconds between two rows.
+    """
+    law, followed = best.law, best.law.values(seats.observations)
+    values = np.unique(followed if followed is not None else np.zeros(1))
+    gaps, widths = 0.5 * (values[1:] + values[:-1]), np.diff(values)
+    beside = -(-len(gaps) // settings.MARKS)
+    middle = int(np.searchsorted(gaps, law.marks[0]))
+    near = range(max(middle - beside, 0), min(middle + beside + 1, len(gaps)))
+    moved = [_between_runs(replace(law, marks=(float(gaps[k]),)), seats.observations) for k in near]
+    shapes_tried = best.tried / settings.MARKS
+    tried = [shapes_tried * float(np.ptp(values) / widths[k]) for k in near]
+    found = [Scanned(*item) for item in zip(moved, map(float, seats.gains(moved)[0]), tried, strict=True)]
+    return max(found, key=lambda item: item.worth)
+
+
+def _between_runs(law: Discovered, observations: Observations) -> Discovered:
+    """Return a step in time with the sessions between which it lies, if all rows before it belong to others."""
+    clock, runs = law.values(observations), observations.campaign.labels.get("session")
+    if law.quantity not in CLOCK or clock is None or runs is None:
+        return law
+    late = clock > law.marks[0]
+    if not late.any() or late.all() or set(runs[late]) & set(runs[~late]):
+        return law
+    last, first = np.flatnonzero(~late)[clock[~late].argmax()], np.flatnonzero(late)[clock[late].argmin()]
+    return replace(law, runs=(str(runs[last]), str(runs[first])))
+
+
+def _steady(law: Discovered) -> Discovered:
+    """Return the known effect in a law, or its place, without what it follows."""
+    return Discovered(
+        kind=law.kind,
+        place=law.place,
+        quantity="none",
+        shape="constant",
+        turns=law.turns,
+        of=law.of,
+        of_arguments=law.of_arguments,
+    )
+
+
+def _telling(candidates: Sequence[Discovered], gains: Array) -> dict[str, float]:
+    """Return by quantity the most that it gains in any target, at any place."""
+    found: dict[str, float] = {}
+    for law, own in zip(candidates, gains.T, strict=True):
+        found[law.quantity] = max(found.get(law.quantity, -np.inf), float(own.max()))
+    return found
+
+
+def _grids(observations: Observations) -> dict[str, Array]:
+    """Return by joint the orders of its waves that are tried; joints that do not move are left out."""
+    robot = observations.robot
+    every = {
+        joint: orders(observations.q[:, j], robot.joint_types[j] == "prismatic")
+        for j, joint in enumerate(robot.joint_names)
+    }
+    return {joint: grid for joint, grid in every.items() if len(grid)}
+
+
+def _free_waves(seats: Seats, t: int, grids: Mapping[str, Array], tried: int) -> list[Scanned]:
+    """Return the best wave of each joint."""
+    observations, found = seats.observations, []
+    for joint, grid in grids.items():
+        q = observations.q[:, observations.robot.joint_names.index(joint)]
+        plain = Discovered(place=joint, quantity=joint, shape="harmonic", unit=unit(observations.robot, joint))
+        plain = replace(plain, origin=float(q.min()), span=float(np.ptp(q)))
+        seat = seats.seen_from(plain)[t]
+        law = replace(plain, marks=(peak(seat, q, grid),))
+        found.append(Scanned(law, float(seat.gains([seats.functions(law)])[0]), tried))
+    return found
+
+
+def _break(seats: Seats, t: int, levels: Scanned) -> Scanned | None:
+    """Return the best step in time between two sessions that follow each other, at the place of a law of sessions."""
+    observations = seats.observations
+    known = quantities(observations)
+    clock = next((name for name in CLOCK if name in known), None)
+    if clock is None:
+        return None
+    law = replace(levels.law, quantity=clock, shape="step", labels=())
+    ends = [float(known[clock][observations.campaign.labels["session"] == run].max()) for run in levels.law.labels]
+    steps = [_between_runs(replace(law, marks=(end,)), observations) for end in sorted(ends)[:-1]]
+    steps = [step for step in steps if step.runs]
+    if not steps:
+        return None
+    gains = seats.seen_from(law)[t].gains([seats.functions(step) for step in steps])
+    return Scanned(steps[int(gains.argmax())], float(gains.max()))
+
+
+def _best(own: Mapping[str, list[Scanned]], seats: Seats, t: int) -> list[Scanned]:
+    """Return all that is better than what it contains, sorted; of a smooth and a straight law the better one."""
+    single: dict[tuple[str, str, str], Scanned] = {}
+    for item in (*own["plain"], *own["memory"]):
+        key = (item.law.kind, item.law.place, item.law.quantity)
+        if key not in single or item.worth > single[key].worth:
+            single[key] = item
+    for key in [key for key in single if key[2] == "session"]:
+        step = _break(seats, t, single[key])
+        if step is not None and step.gain > single[key].gain - settings.REFINED_GAIN:
+            # one step in time explains as much: nothing is known of the session beside when it was
+            del single[key]
+    alone = {key: item.worth for key, item in single.items()}
+    for key in sorted(alone, key=lambda key: -alone[key])[: settings.SHAPED]:
+        # a step is no smooth law; a product of the clock with anything would stand in for it
+        best = max(item.worth for item in _measured(seats, t, single[key].law))
+        alone[key] = max(alone[key], best - float(np.log(single[key].tried)))
+    inside = [
+        max(alone.get((i.law.kind, i.law.place, name), -np.inf) for name in (i.law.quantity, i.law.by))
+        for i in own["product"]
+    ]
+    products = [item for item, least in zip(own["product"], inside, strict=True) if item.worth > least]
+    others = [*own["wave"], *own["free wave"], *own["modulated"], *products]
+    ranked = [*((item, alone[key]) for key, item in single.items()), *((item, item.worth) for item in others)]
+    return [item for item, _ in sorted(ranked, key=lambda pair: -pair[1])]

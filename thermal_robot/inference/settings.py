@@ -1,6 +1,6 @@
 """Every number that was chosen in the inference and the diagnosis: its value, its unit, and why that one.
 
-One was learnt from the cases that score the program, and says so (BESIDE_UNLISTED). What is known of one effect stands
+What is known of one effect stands
 in that effect's file.
 """
 
@@ -12,17 +12,41 @@ PRIOR_PROBABILITY = 0.1
 """That an effect is at work, random ones included: of sixteen effects one or two are then expected."""
 SIZE_SPREAD = 1.5
 """Standard deviation of ln λ: an effect three times larger or smaller than stated is no surprise."""
-NEVER = -1e9
-"""Log prior odds of an effect that scatter had feigned: more than any data can outweigh."""
 GIVEN_NOISE_DOF = 20.0
 """Degrees of freedom that a stated noise is worth: it is trusted to about 15 %, as data sheets are."""
 NOISE_SLACK = 1.3
 """Times a stated noise: a remainder above it is no longer that noise (two sigma of those 15 %)."""
 MISTRUST = 5.0
 """Largest penalty, natural logarithm, for calling a stated noise wrong: e⁵, about 1 in 150."""
-BESIDE_UNLISTED = 0.85
-"""Floor of what is believed of an effect beside an unlisted cause. It was read off the faint cases of a blind trial of
-version 0.1, and other simulations contradict it: a floor, not a measurement."""
+SMOOTH_PRIOR = 0.5
+"""That something smooth is at work that no effect and no law accounts for: as likely as not."""
+TAUS = tuple(2.0 ** (k / 4) for k in range(-4, 25))
+"""Rms of a discrepancy over the noise: below the first it is noise, above the last a mistake. In quarters of an octave:
+beside a hundred independent errors a size a factor of two off costs 20 nats."""
+TAU_STEPS = (4, 2, 1)
+"""Of that grid: steps in which the best size is looked for."""
+LENGTHS = (1.4, 2.8)
+"""Length scales of the discrepancy at the tool, in standard deviations of the inputs times the root of their number."""
+LANDMARKS = 100
+"""Rows that stand for all in a discrepancy of very many (Nyström): smooth functions need no more."""
+NYSTROM_FLOOR, SMOOTH_FLOOR = 1e-6, 1e-9
+"""Of the largest eigenvalue, and of the noise's variance: directions of a discrepancy below are rounding."""
+COSINES = 5
+"""Functions of each quantity in the discrepancy of places: with amplitudes 1/k² further ones bring 1 %."""
+ERROR_AT_JOINT, ERROR_ELSEWHERE = 3e-4, 1e-4
+"""rad, and m and rad: sizes of errors in a joint and in a twist elsewhere, in proportion; those of discovered laws."""
+LEVER = 0.3
+"""m: a discrepancy of the tool turns it by what moves it over this length."""
+STARTS = 3
+"""Combinations, the best of those that a search starts from, beside which each form of a discrepancy is tried."""
+SCATTERING = 3
+"""Joints at most that err anew in every pose or visit beside each other."""
+PARTS = tuple(2.0 ** (k / 2) for k in range(-3, 4))
+"""Rms of a further joint over that of those before it, in halves of an octave."""
+FORM_REACH = 20.0
+"""Log evidence below the best at which a form of the discrepancy is given up while a fit settles."""
+RUNG_REACH = 5.4
+"""Log evidence below the best at which a size of a discrepancy still counts: 1 in 200, four sizes an octave."""
 
 # --- rounding ---
 
@@ -46,15 +70,14 @@ CLOSEST = 1e-7
 LARGEST_CLUSTER = 0.1
 """Of all rows: a larger cluster is a path, not a repeated pose."""
 FOLDS = 5
-"""A fifth of the rows is held out at a time: the usual compromise between bias and variance."""
-BLOCKS_A_FOLD = 4
-"""Blocks of consecutive rows in each fold: the units of the bootstrap, twenty in all."""
+"""Regions of joint space that are held out in turn; of temperature and of reach the outermost fifth is."""
+BLOCKS = 20
+"""Blocks of consecutive rows that are held out in turn: a fit then lacks a twentieth of the rows, as good as none, and
+twenty values tell the spread of a figure to a sixth."""
 ROWS_A_GROUP = 5
 """Rows that one spell of time or neighbourhood of poses holds in a campaign of few rows."""
 MOST_GROUPS = 60
 """Such groups at most: a design effect is then known to a fifth."""
-DESIGN_SIGMAS = 4.0
-"""Standard deviations of chance by which residuals of a group must be correlated before rows count for less."""
 GROSS_LEVEL = 0.01
 """Chance that noise alone sets any row of a campaign aside."""
 GROSS_FACTOR = 1.5
@@ -69,10 +92,8 @@ NO_DISTANCE = 1e-12
 """m: added to that scale, for rows that fit exactly."""
 CAUCHY_ROUNDS = 4
 """Rounds of weights and noise in a scan: they settle to a per cent."""
-FAR = 9.0
-"""Mean squared distance, in squares of the noise, from which a row set aside weighs less in a comparison of laws."""
-STATED_REACH = 2.0
-"""Times the stated noise: no larger noise is assumed when laws are compared, as it would hide what they explain."""
+RUN = 3
+"""Rows set aside one after another that are a change: of five gross errors in a hundred, three are so once in 170."""
 FEW_ASIDE = 0.05
 """Of all rows: fewer that follow each other may be one lapse of the instrument."""
 
@@ -91,14 +112,25 @@ SPARE_EQUATIONS = 6
 EVIDENCE_STEPS, EVIDENCE_SETTLED, LEAST_VARIANCE = 40, 1e-3, 1e-12
 """Newton steps of scales and noise at most, the change of a logarithm at which they end, and the smallest variance, in
 squares of the noise: what fits better is rounding."""
+SCALE_GRID = tuple(np.linspace(-6.0, 6.0, 25))
+"""ln λ at which a block that might be added is weighed: four standard deviations of its prior, in thirds of one."""
+NEARLY, AT_ONCE = 3.0, 8
+"""Log evidence below the best down to which neighbours are computed exactly, and how many before one is taken."""
+DETOUR = 20.0
+"""Log evidence below the best down to which another setting of one block is tried in place of two: what a second block
+costs and may have brought."""
+NOISE_ROUNDS = 6
+"""Rounds in which the noise that a further block leaves settles."""
 FLATTEST_PEAK = 0.5
 """Curvature of a peak over ln λ, that of the prior being 1: of a flatter one a parabola is up to 0.9 nat off."""
 FIRST_ROUNDS = 8
 """Rounds of choice, outliers and noise at most: they settle after two or three."""
-MOST_LEVERAGE = 0.9
+MOST_LEVERAGE = 0.999
 """Largest leverage, the share of the equations that a fit takes up, with which its residual tells the noise."""
 FIT_STEPS = 12
 """Gauss-Newton steps at most: quadratic convergence needs four."""
+STEP_PARTS = tuple(0.25**k for k in range(4))
+"""Of a Gauss-Newton step: how much of it is taken, the first that betters the fit; where none does, it ends there."""
 REVISIONS = 3
 """Times that a choice is made again at its own exact fit."""
 MANY_ROWS = 5000
@@ -122,8 +154,8 @@ ENOUGH_ROWS = 1500
 """Rows that are scanned for laws, of very many: a law that explains a hundredth of the remainder is then seen."""
 ENOUGH_REMAINDER = 2000
 """The same for the tests of the remainder."""
-DRAW_SEED, TEST_SEED, BOOTSTRAP_SEED = 61, 17, 20180901
-"""Of the rows drawn for a scan, for a test, and of the bootstrap: the same campaign always gets the same answer."""
+DRAW_SEED, TEST_SEED = 61, 17
+"""Of the rows drawn for a scan, and for a test: the same campaign always gets the same answer."""
 
 # --- the linear problem ---
 
@@ -140,8 +172,8 @@ CONTAINED, CONTAINED_LEFT = 1e-3, 0.5
 
 # --- laws that nobody wrote down ---
 
-KNOTS, FINER_KNOTS = 5, 9
-"""Of a smooth law (Harrell 2001: five suffice for most), and of one for which they did not."""
+KNOTS = 5
+"""Of a smooth law: five suffice for most (Harrell 2001)."""
 FEW_LEVELS = 6
 """A quantity with no more values than this is one of levels."""
 OUTER_KNOTS = 0.02
@@ -160,23 +192,35 @@ LINK_QUANTITIES = 6
 """A segment has six components: only so many quantities that speak elsewhere are tried there."""
 SHAPED = 6
 """Candidates of each remainder whose shape is looked at."""
+LEFT_OUT = 4
+"""Effects of an explanation, up to which a law is looked for in the remainder without each of them."""
 COMPARED_LAWS = 8
 """Candidates that are compared jointly with the known effects."""
-IN_TIME = float(np.log(3.0))
-"""Log prior odds of the clock over another quantity that explains the same: changes happen in time."""
-LEAST_GAIN = 6.0
-"""Log evidence that a law must gain over none: 1 in 400."""
 MOST_LAWS = 4
 """Laws of one campaign: a fifth no longer helps anybody to find the cause."""
-RIVAL_LAWS = 3
-"""Laws that are tried in an effect's own place."""
-RIVALLED_EFFECTS = 4
-"""Effects, of the largest share, for which a law is looked for in their place."""
 FEWEST_LEFT = 5
 """Equations that must be left beside a law for a test of it."""
 LAW_FLOOR = 1e-6
 """Of the largest eigenvalue of a law's scaled Gram matrix: a direction below it is nearly a sum of the others, and
 would yet be counted as a parameter."""
+HIGHEST_ORDER, SHORTEST_PERIOD = 200.0, 0.004
+"""Orders a turn up to which waves of a joint are looked for: twice the ratio of common gears; and the shortest wave
+of one that slides, m: a fine ball screw's lead."""
+LOWEST_ORDER = 0.5
+"""Turns of the joint that the longest wave takes, inverted: a longer one is a bend, which smooth laws tell."""
+ORDER_STEP, ORDER_CHUNK, ORDER_ZOOMS = 0.125, 256, 4
+"""Of the width of a peak, 2π over the joint's range: an eighth costs 1 % of a peak's height; orders that are measured
+at a time; and rounds in which the best one is refined, each eight times finer."""
+LATTICE = 1e-3
+"""Of their spacing: positions that lie on a lattice to within this cannot tell an order from its alias."""
+SLIP_SHARES = (0.03, 1.0)
+"""Of the longest way between two turns: how far the first and the last element goes before it slips; one below is lost
+motion, one above a spring that never slips."""
+SLIP_STEPS, SLIPS_TOGETHER = (4, 2, 1), (1, 2, 4)
+"""Of the grid of slips, four a factor of two: every which ones are tried over the whole range, and how many that stand
+side by side: one element, one between two, several alike."""
+RELAXED_WITHIN = (0.02, 0.06, 0.2)
+"""Of the campaign's time: time constants from which a joint that relaxes after each start is refined; 3 times apart."""
 SPLINE_FLOOR = 1e-8
 """Of the largest singular value: functions of a quantity below it are no functions of their own."""
 NAMED = 5
@@ -206,6 +250,14 @@ CLIPPED = 4.0
 """Sigmas at which rows are clipped when neighbours are compared: no two rows decide it."""
 NEIGHBOURS, FEWEST_NEIGHBOURS = 3, 20
 """Neighbours of each row in joint space, and the rows below which there are no neighbours."""
+SPOILT = 0.03
+"""Of all rows: as many an instrument spoils where its noise is clean; a tracker's lost beams are fewer."""
+HEAVY_SIGMAS = 4.0
+"""Standard deviations of chance by which a kurtosis must exceed the normal one to speak of heavy tails."""
+FEWEST_ASIDE = 3
+"""Rows set aside below which nothing can be said of what they have in common: two are always side by side."""
+ASIDE_MARKS = 24
+"""Of the rows set aside, between whose values ranges are tried: a twentieth of them is not missed."""
 
 # --- scatter ---
 
@@ -279,10 +331,6 @@ SURE, RIVAL, RIVAL_SHARE = 0.75, 0.2, 0.8
 third share of the explanations without it."""
 EXACT_LEVEL = 0.01
 """Chance that noise makes an exact alias look like none."""
-EXCLUDED = 1e-3
-"""Probability below which an effect is not chosen anew in a fold."""
-RESAMPLES = 2000
-"""Of the bootstrap: ends of a 95 % interval are then known to a tenth of its width."""
 INTERVAL = (0.025, 0.975)
 """Quantiles of every interval."""
 FOLD_ROUNDS = 3
@@ -295,16 +343,12 @@ FRAME_PRIOR = 1e-12
 """Of a frame's own information, added to it, so that what nothing determines stays where it is."""
 PRIOR_FACTOR, COMPARED = 3.0, 8
 """Factor of all prior sizes, down and up, under which the verdict is weighed again, and among how many explanations."""
-DOUBTFUL = 0.5
-"""Belief below which an effect is said to stand in for something else."""
 CANCELLING = 5.0
 """Times the sum of an effect's parts: single ones that are larger cancel each other."""
 CONTRADICTED = 0.01
 """rad or m: no servo that has settled is as far from its command."""
 STATED_TOO_LARGE = 0.5
 """Of the stated noise: less that remains says that it is stated too large."""
-MOST_BELIEF = 50.0
-"""Log odds, natural logarithm: beyond, a probability is 0 or 1 in double precision."""
 MATERIAL_PLACE, MOST_PLACES = 0.03, 8
 """Of an effect's work: a place with less is not drawn; and how many are."""
 LINE_POINTS, ROUGH, DENSE_POINTS, ROWS_A_POINT = 25, 0.01, 400, 10
@@ -314,8 +358,8 @@ ROWS_ALIKE = 8
 """Rows that are taken together when asking whether an error follows a quantity."""
 PURE = 1e-6
 """Of a unit twist, m or rad: with less of one kind it is all of the other."""
-MOST_SAID = 0.5
-"""Probability that an effect outside the most probable explanation is said to have at most: found it would be more."""
+UNHEARD = 1e-2
+"""Of the noise's variance: what rows have in common below it is left out where rows are held out."""
 
 # --- what to measure next ---
 

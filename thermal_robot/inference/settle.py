@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,7 +11,9 @@ from numpy.typing import NDArray
 from thermal_robot.effects import Effect, gate
 from thermal_robot.effects.apply import displacement
 from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import orthonormal, without
 from thermal_robot.inference.columns import block, frame_columns
+from thermal_robot.inference.discrepancy import forms
 from thermal_robot.inference.explain import Explanation, explain
 from thermal_robot.inference.gauss_newton import gauss_newton
 from thermal_robot.inference.problem import Linear, contained
@@ -56,9 +58,12 @@ class Settled:
     @property
     def containers(self) -> set[str]:
         """Effects of the explanation that contain others."""
-        slices, pairs = self.explanation.problem.slices, contained(self.explanation.problem)
-        larger = {max(pair, key=lambda b: slices[b].stop - slices[b].start) for pair in pairs}
-        return {self.families[b] for b in larger} & set(self.names)
+        slices, found = self.explanation.problem.slices, set()
+        for pair in contained(self.explanation.problem):
+            smaller, larger = sorted(pair, key=lambda b: slices[b].stop - slices[b].start)
+            if self.families[smaller] != self.families[larger]:
+                found.add(self.families[larger])
+        return found & set(self.names)
 
     @property
     def second_order(self) -> bool:
@@ -70,11 +75,9 @@ class Settled:
 def settle(
     start: Observations,
     variants: dict[str, tuple[Effect, ...]],
-    groups: Sequence[NDArray[np.int64]],
     progress: Callable[[str], None],
     known: Settled | None = None,
-    begin: Sequence[str] = (),
-    rarity: Mapping[str, float] | None = None,
+    begin: Sequence[Effect] = (),
 ) -> Settled:
     """Choose effects, refine their constants, refit exactly, and choose again there, until the choice stays.
 
@@ -84,21 +87,20 @@ def settle(
         Where the first choice is linearised.
     variants
         By name: settings of each effect among which to choose.
-    groups
-        Groupings of rows: see :func:`~thermal_robot.inference.robust.design_effect`.
     progress
         Called with a few words at each stage.
     known
         An explanation from which to start, with its outliers.
     begin
-        Names of effects with which the search starts, where none is known.
-    rarity
-        By name: log prior odds lost to having been picked out of many.
+        Settings of effects with which the search starts, where none is known.
     """
-    campaign, observations, variants = start.campaign, start, dict(variants)
+    campaign, observations, whole = start.campaign, start, dict(variants)
+    whole.update({e.name: tuple(dict.fromkeys((*whole.get(e.name, ()), e))) for e in begin})
+    variants = dict(whole)
     noise = Noise(campaign.noise_position, campaign.noise_orientation)
     held: list[tuple[Effect, Array]] = []
     outliers = None
+    alive: set[str] = set()
     if known is not None:
         held, outliers = list(known.held), known.explanation.outliers
         variants.update({effect.name: (effect,) for effect, _ in held})
@@ -106,16 +108,17 @@ def settle(
     revisions = 1 if many else settings.REVISIONS
     for revision in range(revisions + 1):
         progress("combinations of effects" if revision == 0 else f"exact fit, revision {revision}")
-        candidates, families = _listed(variants)
+        candidates, families = _listed(variants, observations)
         chosen = [candidates.index(effect) for effect, _ in held]
-        start_at = chosen if revision or not begin else [families.index(name) for name in begin]
+        start_at = chosen if revision or not begin else [candidates.index(effect) for effect in begin]
         blocks = tuple(block(observations, c) for c in candidates)
         moved_by = (blocks[b].columns @ v for b, (_, v) in zip(chosen, held, strict=True))
         linear = Linear(
             observations.gap + sum(moved_by, np.zeros_like(observations.gap)), frame_columns(observations)[0], blocks
         )
+        beside = [form for form in forms(observations) if not alive or form.name in alive]
         explanation = explain(
-            linear, noise, families=families, start=start_at, outliers=outliers, groups=groups, rarity=rarity
+            linear, noise, families=families, starts=[tuple(start_at)], outliers=outliers, forms=beside
         )
         factor = settings.REFINEMENT ** (1 / 2**revision)
         held = [(candidates[b], explanation.values[b][0]) for b in explanation.best.blocks]
@@ -126,12 +129,57 @@ def settle(
         observations, held = gauss_newton(campaign, observations.frames, explanation, held, least)
         if last:
             break
-        outliers = explanation.outliers
+        outliers, alive = explanation.outliers, {form.name for form in explanation.forms}
         for effect, _ in held:
-            variants[effect.name] = gate.nearby(effect, factor)
+            near = gate.nearby(effect, factor)
+            variants[effect.name] = tuple(dict.fromkeys((*near, *_others(effect, start, whole[effect.name]))))
     return Settled(observations, explanation, tuple(held), families)
 
 
-def _listed(variants: dict[str, tuple[Effect, ...]]) -> tuple[list[Effect], tuple[str, ...]]:
-    listed = [setting for own in variants.values() for setting in own]
+def _others(chosen: Effect, observations: Observations, settings_of: Sequence[Effect]) -> Iterator[Effect]:
+    """Yield what stays a rival of a setting while its constants are refined.
+
+    One joint more or less, other joints, all joints, and its joint in other settings; of a law, all that were compared
+    with it.
+    """
+    if chosen.share is not None:
+        yield from settings_of
+        return
+    every = [alone.places[0] for alone in gate.alone(replace(chosen, places=()), observations)]
+    if chosen.places:
+        yield from (replace(chosen, places=(*chosen.places, j)) for j in every if j not in chosen.places)
+    if len(chosen.places) > 1:
+        yield from (replace(chosen, places=tuple(k for k in chosen.places if k != j)) for j in chosen.places)
+    yield replace(chosen, places=())
+    yield from gate.alone(replace(chosen, places=()), observations)
+    for joint in chosen.places:
+        for setting in settings_of:
+            alone = gate.at(setting, joint, observations)
+            if alone is not None and not setting.places:
+                yield alone
+
+
+def _listed(
+    variants: dict[str, tuple[Effect, ...]], observations: Observations
+) -> tuple[list[Effect], tuple[str, ...]]:
+    """List all settings but those of single places of which the data see nothing beside the frames."""
+    frames = frame_columns(observations)[0]
+    basis = orthonormal(frames.reshape(frames.shape[0] * frames.shape[1], frames.shape[2]))
+    names, moves = observations.robot.joint_names, observations.joint_sensitivity[:, : frames.shape[1]]
+    flat = moves.reshape(-1, len(names))
+    left = np.linalg.norm(without(flat, basis), axis=0)
+    hidden = {
+        n for n, seen in zip(names, left > settings.ALIAS * np.linalg.norm(flat, axis=0), strict=True) if not seen
+    }
+    segments = observations.robot.segments
+    # before the first joint a segment is the base, behind the last one the tool
+    hidden |= {s.parent_link for s in segments} - {s.parent_link for s in segments[1:] if s.movable}
+    every = [setting for own in variants.values() for setting in own]
+    listed = [e for e in every if not (hidden & set(e.places) and _constant(e, observations))]
     return listed, tuple(setting.name for setting in listed)
+
+
+def _constant(effect: Effect, observations: Observations) -> bool:
+    """Whether an effect displaces each place by the same in all rows."""
+    responses = [r for p in gate.checked(effect, observations) for r in p.responses]
+    return all(r.values.ndim == (0 if r.channel == "joint" else 1) for r in responses)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -104,3 +105,102 @@ class Target:
             1.0 - (rest / (freedom - k)) / (total / freedom),
             float(0.5 * freedom * np.log(total / rest) - 0.5 * k * np.log(freedom)),
         )
+
+    def seat(self, moves: Array) -> Seat:
+        """Return the target seen from a place whose d components move the gap by (N, m, d) a unit."""
+        own = moves * self.root[:, :, None]
+        basis = self.basis.reshape(*self.root.shape, -1)
+        return Seat(
+            np.einsum("nmd,nme->nde", own, own),
+            np.einsum("nmr,nmd->rdn", basis, own),
+            np.einsum("nm,nmd->nd", self.white.reshape(self.root.shape), own),
+            float(self.white @ self.white),
+            self.freedom,
+        )
+
+
+@dataclass(frozen=True, eq=False)
+class Alike:
+    """Functions of laws, those of as many functions together: what all targets ask of them is computed once.
+
+    Attributes
+    ----------
+    laws
+        How many there are.
+    stacks
+        Which C laws have K functions each, these (C, N, K), and their products (C, N, K, K).
+    """
+
+    laws: int
+    stacks: tuple[tuple[list[int], Array, Array], ...]
+
+    @classmethod
+    def of(cls, laws: Sequence[Array]) -> Alike:
+        """Put together laws, each with its (N, K) functions."""
+        stacks = []
+        for width in {law.shape[1] for law in laws}:
+            which = [i for i, law in enumerate(laws) if law.shape[1] == width]
+            functions = np.stack([laws[i] for i in which])
+            stacks.append((which, functions, functions[:, :, :, None] * functions[:, :, None, :]))
+        return cls(len(laws), tuple(stacks))
+
+
+@dataclass(frozen=True, eq=False)
+class Seat:
+    """A target seen from one place: what many laws there need, summed over the components of a row once.
+
+    A law's columns are the products of the place's d components with K functions of a quantity. Their Gram matrix
+    without the design is then Σ_n φ_k φ_l W_n less that of their part in the design.
+
+    Attributes
+    ----------
+    weight
+        (N, d, d) sum of products of the components, in units of the noise.
+    design
+        (r, d, N) the same with the design's orthonormal basis.
+    remainder
+        (N, d) the same with the residual.
+    total, freedom
+        The residual's sum of squares and degrees of freedom.
+    """
+
+    weight: Array
+    design: Array
+    remainder: Array
+    total: float
+    freedom: int
+
+    def gains(self, laws: Sequence[Array] | Alike) -> Array:
+        """Return the log evidence that laws gain (:attr:`Worth.gain`), each with its (N, K) functions."""
+        alike = laws if isinstance(laws, Alike) else Alike.of(laws)
+        found = np.full(alike.laws, -np.inf)
+        for which, functions, products in alike.stacks:
+            found[which] = self._alike(functions, products)
+        return found
+
+    def _alike(self, functions: Array, products: Array) -> Array:
+        """(C,) the same of C laws of K functions each, (C, N, K), and these functions' products (C, N, K, K)."""
+        laws, rows, k = functions.shape
+        r, d, _ = self.design.shape
+        summed = products.reshape(laws, rows, k * k).transpose(0, 2, 1) @ self.weight.reshape(rows, d * d)
+        whole = summed.reshape(laws, k, k, d, d).transpose(0, 1, 3, 2, 4).reshape(laws, k * d, k * d)
+        seen = (self.design.reshape(r * d, rows) @ functions).reshape(laws, r, d, k)
+        inside = seen.transpose(0, 1, 3, 2).reshape(laws, r, k * d)
+        gram = whole - inside.transpose(0, 2, 1) @ inside
+        vector = (functions.transpose(0, 2, 1) @ self.remainder).reshape(laws, k * d)
+        explained, rank = _explained(gram, vector, np.einsum("cii->ci", whole))
+        rest = np.maximum(self.total - explained, settings.TINY)
+        gain = 0.5 * self.freedom * np.log(self.total / rest) - 0.5 * rank * np.log(self.freedom)
+        return np.where((rank == 0) | (self.freedom - rank < settings.FEWEST_LEFT), -np.inf, gain)
+
+
+def _explained(gram: Array, vector: Array, whole: Array) -> tuple[Array, Array]:
+    """(C,) sums of squares that columns explain, and their ranks, from (C, K, K), (C, K) and squared lengths (C, K)."""
+    own = np.einsum("cii->ci", gram)
+    # what is left of an exact alias of the design is rounding, no column
+    kept = own > settings.ALIAS**2 * whole
+    length = np.where(kept, np.sqrt(np.where(kept, own, 1.0)), np.inf)
+    value, axes = np.linalg.eigh(gram / (length[:, :, None] * length[:, None, :]))
+    seen = value > settings.LAW_FLOOR * np.maximum(value.max(axis=1, initial=1.0), 1.0)[:, None]
+    along = np.einsum("cki,ck->ci", axes, vector / length)
+    return (np.where(seen, along**2 / np.where(seen, value, 1.0), 0.0)).sum(axis=1), seen.sum(axis=1)

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from thermal_robot.inference import settings
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.gauss_newton import corrected_observations
-from thermal_robot.inference.problem import Linear, Whitening
+from thermal_robot.inference.problem import Linear
 from thermal_robot.inference.rows import in_a_row
 from thermal_robot.inference.target import Target
 from thermal_robot.observations import Observations
@@ -28,17 +28,13 @@ class Thin:
     observations
         Of the corrected model, at these rows.
     linear
-        The problem there, whitening its weights and noise.
-    remainder
-        (M, m) what the explanation leaves.
+        The problem there.
     changed
         (M,) rows that were set aside and follow each other in time.
     """
 
     observations: Observations
     linear: Linear
-    whitening: Whitening
-    remainder: Array
     changed: NDArray[np.bool_]
 
     @classmethod
@@ -46,7 +42,7 @@ class Thin:
         """Return the rows of a fit."""
         e = fit.explanation
         if fit.campaign.samples <= settings.ENOUGH_ROWS:
-            return cls(fit.corrected, e.linear, e.whitening, e.remainder, in_a_row(fit.campaign, e.outliers))
+            return cls(fit.corrected, e.linear, in_a_row(fit.campaign, e.outliers))
         drawn = np.random.default_rng(settings.DRAW_SEED).choice(
             fit.campaign.samples, settings.ENOUGH_ROWS, replace=False
         )
@@ -58,12 +54,20 @@ class Thin:
                 e.linear.frames[rows],
                 tuple(replace(b, columns=b.columns[rows]) for b in e.linear.blocks),
             ),
-            replace(e.whitening, weights=e.whitening.weights[rows]),
-            e.remainder[rows],
             in_a_row(fit.campaign, e.outliers)[rows],
         )
 
-    def target(self, blocks: Iterable[int]) -> Target:
-        """Return the residual once the frames and some blocks are projected out."""
+    def target(self, blocks: Iterable[int], *, sound: bool = False) -> Target:
+        """Return the residual once the frames and some blocks are projected out.
+
+        Rows far from the rest weigh little, unless they follow each other, or all but the farthest few are taken for
+        ``sound``: what is large in few rows looks like gross errors until its law is known.
+        """
         columns = [self.linear.blocks[b].columns for b in blocks]
-        return Target.of(self.linear.gap, np.concatenate([self.linear.frames, *columns], axis=2), self.changed)
+        design = np.concatenate([self.linear.frames, *columns], axis=2)
+        first = Target.of(self.linear.gap, design, self.changed)
+        if not sound:
+            return first
+        distance = np.linalg.norm(first.white.reshape(first.root.shape) / first.root, axis=1)
+        near = distance <= np.quantile(distance, 1.0 - settings.FEW_ASIDE)
+        return Target.of(self.linear.gap, design, near | self.changed)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -24,17 +25,18 @@ ELONGATION = "elongation of "
 
 @dataclass(frozen=True, eq=False)
 class AugmentedModel:
-    """A Pinocchio model of the chain with n movable joints and S virtual prismatic ones; the world is the root frame.
+    """A Pinocchio model of the chain with M movable joints and S virtual prismatic ones; the world is the root frame.
 
-    It knows positions only: it carries no masses, for which ``robot.model`` is there.
+    It knows positions only: it carries no masses, for which ``robot.model`` is there. A joint that mimics another has
+    a coordinate in the model, which this class fills in: M = n unless there are such joints.
 
     Parameters
     ----------
     model
-        ``pinocchio.Model`` with n + S joints of one coordinate each; a continuous joint is a revolute one without
+        ``pinocchio.Model`` with M + S joints of one coordinate each; a continuous joint is a revolute one without
         limits. The links of the chain are frames of type ``BODY`` with their own names.
     joints
-        (n,) columns of the movable joints in a configuration, rad or m.
+        (n,) columns of the driving joints in a configuration, rad or m.
     elongations
         (S,) columns of the virtual joints, m; their joints are called ``"elongation of <segment>"``.
     segments
@@ -43,6 +45,8 @@ class AugmentedModel:
         For every segment of the robot, with a length or not, the joint whose placement it is.
     tool
         Number of the tool's frame.
+    coupling, offset
+        (M + S, M + S) and (M + S,): a configuration, from one in which the mimicking joints are zero.
     """
 
     model: pin.Model
@@ -51,6 +55,8 @@ class AugmentedModel:
     segments: tuple[str, ...]
     placements: tuple[int, ...]
     tool: int
+    coupling: Array
+    offset: Array
 
     def configurations(self, q: ArrayLike, elongations: ArrayLike = 0.0) -> Array:
         """Write joint positions and elongations as the model does.
@@ -65,7 +71,7 @@ class AugmentedModel:
         Returns
         -------
         ndarray
-            (N, n + S).
+            (N, M + S).
 
         Raises
         ------
@@ -79,9 +85,9 @@ class AugmentedModel:
         wanted = (len(rows), len(self.elongations))
         if grown.shape not in ((), wanted[1:], wanted):
             raise RobotError(f"elongations of shape {grown.shape} do not fit: expected {wanted[1:]} or {wanted}")
-        out = np.empty((len(rows), self.model.nq))
+        out = np.zeros((len(rows), self.model.nq))
         out[:, self.joints], out[:, self.elongations] = rows, grown
-        return out
+        return out @ self.coupling.T + self.offset
 
     def tool_poses(self, q: ArrayLike, elongations: ArrayLike = 0.0) -> Array:
         """Pose (N, 4, 4) of the tool frame in the root frame, m; arguments as for :meth:`configurations`."""
@@ -92,13 +98,16 @@ class AugmentedModel:
         return np.array(poses).reshape(-1, 4, 4)
 
     def jacobians(self, q: ArrayLike, elongations: ArrayLike = 0.0) -> Array:
-        """Twist (N, 6, n + S) of the tool, linear rows first, in root axes, for a unit speed of each coordinate."""
+        """Twist (N, 6, M + S) of the tool, linear rows first, in root axes, for a unit speed of each coordinate.
+
+        The column of a joint that others mimic holds what they do with it; their own are zero.
+        """
         data, model = self.model.createData(), self.model
         found = [
             pin.computeFrameJacobian(model, data, row, self.tool, pin.LOCAL_WORLD_ALIGNED)
             for row in self.configurations(q, elongations)
         ]
-        return np.array(found).reshape(-1, 6, model.nv)
+        return np.array(found).reshape(-1, 6, model.nv) @ self.coupling
 
 
 def growing(robot: Robot) -> tuple[int, ...]:
@@ -154,7 +163,7 @@ def augmented_model(robot: Robot) -> AugmentedModel:
     ----------
     robot
         The robot. Placements are those of its Pinocchio model, so that the batch functions can be checked against it;
-        of its ``chain`` only the names are read, and of its segments the directions.
+        of its ``chain`` only names and coupling are read, and of its segments the directions.
 
     Returns
     -------
@@ -187,22 +196,41 @@ def augmented_model(robot: Robot) -> AugmentedModel:
                 offset, here = pin.SE3.Identity(), pin.SE3.Identity()
         model.addFrame(pin.Frame(link, parent, 0, offset, pin.FrameType.BODY))
     names = tuple(robot.segments[s].name for s in growing(robot))
+    joints = _columns(model, robot.joint_names)
     return AugmentedModel(
         model,
-        np.array([model.joints[model.getJointId(name)].idx_q for name in robot.joint_names]),
-        np.array([model.joints[model.getJointId(ELONGATION + name)].idx_q for name in names], dtype=np.int64),
+        joints,
+        _columns(model, [ELONGATION + name for name in names]),
         names,
         tuple(placements[segment.index] for segment in robot.segments),
         model.getFrameId(robot.tool_frame, pin.FrameType.BODY),
+        *_coupled(model, robot, joints),
     )
+
+
+def _columns(model: pin.Model, names: Sequence[str]) -> NDArray[np.int64]:
+    return np.array([model.joints[model.getJointId(name)].idx_q for name in names], dtype=np.int64)
+
+
+def _coupled(model: pin.Model, robot: Robot, joints: NDArray[np.int64]) -> tuple[Array, Array]:
+    """Write the robot's coupling for the coordinates of the model, virtual joints included."""
+    movable = _columns(model, [robot.chain.names[k] for k in robot.chain.movable])
+    matrix, offset = np.eye(model.nq), np.zeros(model.nq)
+    matrix[movable] = 0.0
+    matrix[np.ix_(movable, joints)] = robot.chain.coupling.matrix
+    offset[movable] = robot.chain.coupling.offset
+    return matrix, offset
 
 
 def _add_movable(model: pin.Model, parent: int, robot: Robot, name: str, placement: pin.SE3) -> int:
     joint = robot.model.joints[robot.model.getJointId(name)]
     # A continuous joint has two coordinates in Pinocchio, its cosine and sine; here it has one.
     one = joint if joint.nq == 1 else pin.JointModelRevoluteUnaligned(unit_motion(robot.model, joint)[3:])
-    j, free = robot.joint_names.index(name), np.full(1, np.inf)
-    low, high = robot.lower[j : j + 1], robot.upper[j : j + 1]
+    free = np.full(1, np.inf)
+    low, high = -free, free
+    if name in robot.joint_names:
+        j = robot.joint_names.index(name)
+        low, high = robot.lower[j : j + 1], robot.upper[j : j + 1]
     added: int = model.addJoint(parent, one, placement, name, free, free, low, high)
     return added
 

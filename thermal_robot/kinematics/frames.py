@@ -33,7 +33,7 @@ class Displacement:
 
     The displaced tool pose is ``exp(base) · Π_k [P_k · exp(segment_k) · motion_k(q_k + joint_k)] ·
     exp(tool)``; every array may have a row for each configuration or be one row for all. Twists are ordered
-    (linear m, angular rad).
+    (linear m, angular rad). A joint that mimics another follows it where that one really is: ``q + joint``.
 
     Parameters
     ----------
@@ -99,7 +99,8 @@ def chain_frames(robot: Robot, q: ArrayLike, displacement: Displacement | None =
     joint_of = {int(k): j for j, k in enumerate(chain.movable)}
     turns = skew(chain.axes)
     for part in chunks(rows):
-        joints = np.ascontiguousarray((q[part] + moved.joint[part if len(moved.joint) > 1 else slice(None)]).T)
+        driving = q[part] + moved.joint[part if len(moved.joint) > 1 else slice(None)]
+        joints = np.ascontiguousarray(chain.coupling.positions(driving).T)
         rotation, position = moved.start(part)
         for k in range(len(chain.names)):
             rotation, position = _compose(rotation, position, chain.rotations[k], chain.translations[k])

@@ -28,7 +28,7 @@ def gravity_torques(
     """Torque or force of each joint that holds the arm and its payload still.
 
     It is the gradient of the potential energy by the joint positions: ``pinocchio.computeGeneralizedGravity``
-    with the payload as a point mass.
+    with the payload as a point mass. A joint that others mimic holds them, too.
 
     Parameters
     ----------
@@ -59,8 +59,8 @@ def gravity_torques(
     # From the tool inwards: what a joint carries is what the next one carries plus its own bodies.
     mass, moment = _at_the_tool(frames, payload, payload_com)
 
-    torques = np.empty((rows, robot.n))
-    for j in range(robot.n - 1, -1, -1):
+    torques = np.empty((rows, len(chain.movable)))
+    for j in range(len(chain.movable) - 1, -1, -1):
         k = chain.movable[j]
         last = k + 1 == len(chain.names)
         body_rotation, body_position = (tool_rotation, tool_position) if last else (rotations[k + 1], positions[k + 1])
@@ -73,7 +73,7 @@ def gravity_torques(
             torques[:, j] = -np.einsum("in,in->n", axis, np.cross(lever, robot.gravity[:, None], axis=0))
         else:
             torques[:, j] = -mass * (robot.gravity @ axis)
-    return torques
+    return torques @ chain.coupling.matrix
 
 
 def segment_loads(
@@ -144,16 +144,17 @@ def static_regressor(robot: Robot, q: ArrayLike, *, frames: ChainFrames | None =
     Returns
     -------
     ndarray
-        (N, n, n, 4): joint, body, then its mass and first moment (x, y, z) in the frame of the element after the
-        joint (the tool frame for the last).
+        (N, n, M, 4): joint, body (one behind each of the M movable joints, mimicking ones too), then its mass and
+        first moment (x, y, z) in the frame of the element after that joint (the tool frame for the last).
     """
     frames = chain_frames(robot, q) if frames is None else frames
     chain, rows = robot.chain, len(frames.tool_position)
-    regressor = np.zeros((rows, robot.n, robot.n, 4))
+    bodies = len(chain.movable)
+    regressor = np.zeros((rows, bodies, bodies, 4))
     for j, k in enumerate(chain.movable):
         axis = frames.rotations[:, k] @ chain.axes[k]
         turn = -np.cross(robot.gravity, axis)  # −g · (axis × lever) = turn · lever
-        for b in range(j, robot.n):
+        for b in range(j, bodies):
             after = chain.movable[b] + 1
             last = after == len(chain.names)
             rotation = frames.tool_rotation if last else frames.rotations[:, after]
@@ -163,7 +164,8 @@ def static_regressor(robot: Robot, q: ArrayLike, *, frames: ChainFrames | None =
                 regressor[:, j, b, 1:] = np.einsum("nim,ni->nm", rotation, turn)
             else:
                 regressor[:, j, b, 0] = -axis @ robot.gravity
-    return regressor
+    driven = chain.coupling.matrix.T @ regressor.reshape(rows, bodies, -1)
+    return np.asarray(driven.reshape(rows, robot.n, bodies, 4))
 
 
 def _rows_last(frames: ChainFrames) -> tuple[Array, Array, Array, Array]:

@@ -38,7 +38,8 @@ def frame_jacobians(
     Returns
     -------
     ndarray
-        (N, 6, n), linear rows first: ``LOCAL_WORLD_ALIGNED`` in Pinocchio.
+        (N, 6, n), linear rows first: ``LOCAL_WORLD_ALIGNED`` in Pinocchio. The column of a joint that others mimic
+        holds what they do with it.
 
     Raises
     ------
@@ -51,7 +52,7 @@ def frame_jacobians(
     rows = positions.shape[-1]
     jacobians = np.empty((rows, 6, robot.n))
     for part in chunks(rows):
-        block = np.zeros((6, robot.n, part.stop - part.start))
+        block = np.zeros((6, len(chain.movable), part.stop - part.start))
         for j, k in enumerate(chain.movable):
             axis = chain.axes[k] @ rotations[k, ..., part]
             if chain.kinds[k] == REVOLUTE:
@@ -59,7 +60,7 @@ def frame_jacobians(
                 block[3:, j] = axis
             else:
                 block[:3, j] = axis
-        jacobians[part] = np.moveaxis(block, -1, 0)
+        jacobians[part] = np.moveaxis(chain.coupling.matrix.T @ block, -1, 0)
     return jacobians
 
 

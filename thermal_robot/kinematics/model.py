@@ -10,7 +10,9 @@ from numpy.typing import NDArray
 
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics.hanging import hanging_masses
-from thermal_robot.kinematics.urdf import mimic_joints, nearest, parse_urdf
+from thermal_robot.kinematics.held import held_configuration, held_position
+from thermal_robot.kinematics.mimic import Coupling, common_limits, couple, followed, mimics
+from thermal_robot.kinematics.urdf import nearest, parse_urdf
 
 Array = NDArray[np.float64]
 
@@ -28,7 +30,8 @@ FIXED, REVOLUTE, PRISMATIC = 0, 1, 2
 class Chain:
     """Constant arrays of the chain, taken once from Pinocchio.
 
-    It has K elements (URDF joints, fixed ones too), n movable joints and S segments.
+    It has K elements (URDF joints, fixed ones too), M movable joints and S segments. Of the movable joints n drive and
+    the others mimic one: M = n unless the URDF has ``<mimic>`` tags.
 
     Parameters
     ----------
@@ -43,13 +46,15 @@ class Chain:
     axes
         (K, 3) unit axis of motion in the element's frame; zero for a fixed one.
     movable
-        (n,) elements of the movable joints.
+        (M,) elements of the movable joints, mimicking ones too.
+    coupling
+        Positions of the movable joints from those of the driving ones.
     placed
         (S,) segments: elements of the movable joints, and of fixed frames that have a length.
     masses
-        (n,) kg carried by each movable joint up to the next one, held branches included.
+        (M,) kg carried by each movable joint up to the next one, held branches included.
     mass_centres
-        (n, 3) m: centre of these masses in the frame of the element *after* the joint (the tool frame for the
+        (M, 3) m: centre of these masses in the frame of the element *after* the joint (the tool frame for the
         last), which is fixed to the same body.
     hanging, hanging_centres
         (K,) kg and (K, 3) m: the part of a body's mass that lies beyond a fixed element, and its centre in the
@@ -63,6 +68,7 @@ class Chain:
     kinds: NDArray[np.int64]
     axes: Array
     movable: NDArray[np.int64]
+    coupling: Coupling
     placed: NDArray[np.int64]
     masses: Array
     mass_centres: Array
@@ -77,15 +83,16 @@ class ChainModel:
     Parameters
     ----------
     model
-        ``pinocchio.Model`` reduced to the movable joints of the chain; its gravity is set.
+        ``pinocchio.Model`` reduced to the M movable joints of the chain, mimicking ones too; its gravity is set.
     root_frame
         Name of the link in which poses are expressed.
     gravity
         (3,) m/s² in the root frame.
-    joint_types
-        ``revolute``, ``continuous`` or ``prismatic`` for each movable joint.
+    joint_names, joint_types
+        Name, and ``revolute``, ``continuous`` or ``prismatic``, of each driving joint.
     lower, upper
-        (n,) limits in rad or m; infinite where there is none.
+        (n,) limits in rad or m of the driving joints, narrowed to those of the joints that mimic them; infinite
+        where there is none.
     chain
         Constant arrays for the batch functions.
     urdf_links, urdf_joints
@@ -95,6 +102,7 @@ class ChainModel:
     model: pin.Model
     root_frame: str
     gravity: Array
+    joint_names: tuple[str, ...]
     joint_types: tuple[str, ...]
     lower: Array
     upper: Array
@@ -112,7 +120,8 @@ def build_chain_model(
 ) -> ChainModel:
     """Read a URDF and keep the chain from the root frame to the tool frame; every other joint is held.
 
-    A joint is held at 0, or at the limit nearest to 0.
+    A joint is held at 0, or at the limit nearest to 0; one that mimics another, where that one takes it. A joint of
+    the chain that mimics one outside is held with it.
 
     Parameters
     ----------
@@ -129,18 +138,26 @@ def build_chain_model(
     ------
     RobotError
         If the text is not a URDF, a link is unknown, the tool is not below the root frame, or the chain holds
-        no movable joint or one that is not revolute, continuous or prismatic.
+        no movable joint or one that is not revolute, continuous or prismatic, or if a joint of the chain mimics
+        one that does not exist, that has no single position, or in the end itself.
     """
     full = parse_urdf(urdf, source)
     links = {frame.name: i for i, frame in enumerate(full.frames) if frame.type == pin.FrameType.BODY}
     root = _find_link(full, links, root_frame, "root frame") if root_frame is not None else _root_link(links)
     tool = _find_link(full, links, tool_frame, "tool frame")
     elements = _elements_between(full, root, tool)
-    joint_types = _joint_types(full, elements, mimic_joints(urdf))
+    joint_types = _joint_types(full, elements)
 
-    held = _held_configuration(full)
+    # a fixed joint stays where it is, whatever it is said to mimic
+    found = {name: mimic for name, mimic in mimics(urdf).items() if full.existJointName(name)}
+    ends = followed(found, _joint_names(full), [full.frames[e].name for e in elements])
+    held = held_configuration(full, ends)
     in_chain = {full.frames[e].parentJoint for e in elements if full.frames[e].type == pin.FrameType.JOINT}
     model = _reduced(full, [j for j in range(1, full.njoints) if j not in in_chain], held)
+    names = tuple(model.names)[1:]
+    coupling = couple(names, ends, {name: held_position(full, held, name) for name in names if name in ends})
+    if not len(coupling.driving):
+        raise RobotError("the chain has no movable joint between its root frame and its tool frame")
 
     data = full.createData()
     pin.framesForwardKinematics(full, data, held)
@@ -149,11 +166,21 @@ def build_chain_model(
         gravity = root_rotation.T @ np.array([0.0, 0.0, -STANDARD_GRAVITY])
     model.gravity.linear = root_rotation @ gravity
 
-    lower, upper = _limits(model, joint_types)
-    chain = _chain_arrays(full, model, elements, held)
+    lower, upper = common_limits(coupling, names, *_limits(model, joint_types))
+    chain = _chain_arrays(full, model, elements, held, coupling)
     _freeze(gravity, lower, upper)
-    name = full.frames[root].name
-    return ChainModel(model, name, gravity, joint_types, lower, upper, chain, tuple(links), _joint_names(full))
+    return ChainModel(
+        model,
+        full.frames[root].name,
+        gravity,
+        tuple(names[j] for j in coupling.driving),
+        tuple(joint_types[j] for j in coupling.driving),
+        lower,
+        upper,
+        chain,
+        tuple(links),
+        _joint_names(full),
+    )
 
 
 def leaf_links(urdf: str, source: str = "the robot description") -> tuple[str, ...]:
@@ -184,18 +211,10 @@ def _reduced(full: pin.Model, held_joints: list[int], held: Array) -> pin.Model:
     return model
 
 
-def _chain_arrays(full: pin.Model, model: pin.Model, elements: list[int], held: Array) -> Chain:
+def _chain_arrays(full: pin.Model, model: pin.Model, elements: list[int], held: Array, coupling: Coupling) -> Chain:
     frames = [full.frames[e] for e in elements]
     placements = [_placement(full, e) for e in elements]
-    kinds = np.zeros(len(elements), dtype=np.int64)
-    axes = np.zeros((len(elements), 3))
-    for k, frame in enumerate(frames):
-        if frame.type == pin.FrameType.JOINT:
-            motion = unit_motion(full, full.joints[frame.parentJoint])
-            kinds[k] = PRISMATIC if np.any(motion[:3]) else REVOLUTE
-            axes[k] = motion[:3] + motion[3:]
-            if not np.isclose(np.linalg.norm(axes[k]), 1.0):
-                raise RobotError(f"the axis of joint {frame.name!r} has no direction", name=frame.name)
+    kinds, axes = _kinds_and_axes(full, frames)
     movable = np.flatnonzero(kinds)
     masses = np.array([model.inertias[j].mass for j in range(1, model.njoints)])
     centres = np.empty((len(movable), 3))
@@ -212,8 +231,32 @@ def _chain_arrays(full: pin.Model, model: pin.Model, elements: list[int], held: 
     names = tuple(frame.name for frame in frames)
     parents = tuple(full.frames[frame.parentFrame].name for frame in frames)
     return Chain(
-        names, parents, rotations, translations, kinds, axes, movable, placed, masses, centres, hanging, hanging_centres
+        names,
+        parents,
+        rotations,
+        translations,
+        kinds,
+        axes,
+        movable,
+        coupling,
+        placed,
+        masses,
+        centres,
+        hanging,
+        hanging_centres,
     )
+
+
+def _kinds_and_axes(full: pin.Model, frames: list[pin.Frame]) -> tuple[NDArray[np.int64], Array]:
+    kinds, axes = np.zeros(len(frames), dtype=np.int64), np.zeros((len(frames), 3))
+    for k, frame in enumerate(frames):
+        if frame.type == pin.FrameType.JOINT:
+            motion = unit_motion(full, full.joints[frame.parentJoint])
+            kinds[k] = PRISMATIC if np.any(motion[:3]) else REVOLUTE
+            axes[k] = motion[:3] + motion[3:]
+            if not np.isclose(np.linalg.norm(axes[k]), 1.0):
+                raise RobotError(f"the axis of joint {frame.name!r} has no direction", name=frame.name)
+    return kinds, axes
 
 
 def _placement(model: pin.Model, element: int) -> pin.SE3:
@@ -249,18 +292,13 @@ def _elements_between(model: pin.Model, root: int, tool: int) -> list[int]:
     return elements[::-1]
 
 
-def _joint_types(model: pin.Model, elements: list[int], mimic: set[str]) -> tuple[str, ...]:
+def _joint_types(model: pin.Model, elements: list[int]) -> tuple[str, ...]:
     types = []
     for element in elements:
         frame = model.frames[element]
         if frame.type != pin.FrameType.JOINT:
             continue
         kind = model.joints[frame.parentJoint].shortname()
-        if frame.name in mimic:
-            raise RobotError(
-                f"joint {frame.name!r} of the chain mimics another joint, which is not supported",
-                name=frame.name,
-            )
         if kind.startswith("JointModelRUB") or kind == "JointModelRevoluteUnboundedUnaligned":
             types.append("continuous")
         elif kind.startswith("JointModelR"):
@@ -278,8 +316,6 @@ def _joint_types(model: pin.Model, elements: list[int], mimic: set[str]) -> tupl
                 "only revolute, continuous, prismatic and fixed joints are supported",
                 name=frame.name,
             )
-    if not types:
-        raise RobotError("the chain has no movable joint between its root frame and its tool frame")
     return tuple(types)
 
 
@@ -287,16 +323,6 @@ def _joint_names(model: pin.Model) -> tuple[str, ...]:
     """Names of all joints of the URDF; the frame that Pinocchio puts first is the world, and no joint."""
     kinds = (pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT)
     return tuple(frame.name for i, frame in enumerate(model.frames) if i > 0 and frame.type in kinds)
-
-
-def _held_configuration(model: pin.Model) -> Array:
-    q = np.asarray(pin.neutral(model), dtype=float)
-    for joint in model.joints:
-        if joint.nq == 1:
-            low, high = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
-            if low < high:
-                q[joint.idx_q] = min(max(0.0, low), high)
-    return q
 
 
 def _limits(model: pin.Model, joint_types: tuple[str, ...]) -> tuple[Array, Array]:

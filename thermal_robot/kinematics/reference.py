@@ -1,7 +1,8 @@
 """The batch functions once more, by a loop over Pinocchio itself: slow, and the oracle of the tests.
 
 Arguments, results, shapes and frames are those of the functions of the same names in
-:mod:`thermal_robot.kinematics`. Nothing is shared with them but the names of the chain's elements.
+:mod:`thermal_robot.kinematics`. Nothing is shared with them but the names of the chain's elements and
+which joint mimics which.
 """
 
 from __future__ import annotations
@@ -22,7 +23,7 @@ Array = NDArray[np.float64]
 
 
 def to_pinocchio(robot: Robot, q: ArrayLike) -> Array:
-    """Write configurations as Pinocchio does: a continuous joint is its cosine and sine.
+    """Write configurations as Pinocchio does: mimicking joints too, a continuous joint as its cosine and sine.
 
     Parameters
     ----------
@@ -36,11 +37,10 @@ def to_pinocchio(robot: Robot, q: ArrayLike) -> Array:
     ndarray
         (N, nq).
     """
-    rows = np.atleast_2d(np.asarray(q, dtype=float))
+    rows = robot.chain.coupling.positions(np.atleast_2d(np.asarray(q, dtype=float)))
     columns = []
-    for joint, kind in enumerate(robot.joint_types):
-        position = rows[:, joint]
-        columns += [np.cos(position), np.sin(position)] if kind == "continuous" else [position]
+    for joint, position in zip(list(robot.model.joints)[1:], rows.T, strict=True):
+        columns += [np.cos(position), np.sin(position)] if joint.nq == 2 else [position]
     return np.column_stack(columns)
 
 
@@ -71,12 +71,11 @@ def frame_jacobians(robot: Robot, q: ArrayLike, *, point: ArrayLike = (0.0, 0.0,
     """Geometric Jacobian (N, 6, n) by Pinocchio; see :func:`thermal_robot.kinematics.frame_jacobians`."""
     model, frame = _with_point(robot.model.copy(), _tool(robot).parentJoint, _tool(robot).placement, point)
     data, to_root = model.createData(), _to_root_axes(robot)
-    return np.array(
-        [
-            to_root @ pin.computeFrameJacobian(model, data, configuration, frame, pin.LOCAL_WORLD_ALIGNED)
-            for configuration in to_pinocchio(robot, q)
-        ]
-    )
+    each = [
+        to_root @ pin.computeFrameJacobian(model, data, configuration, frame, pin.LOCAL_WORLD_ALIGNED)
+        for configuration in to_pinocchio(robot, q)
+    ]
+    return np.array(each) @ robot.chain.coupling.matrix
 
 
 def placement_sensitivities(robot: Robot, q: ArrayLike, *, point: ArrayLike = (0.0, 0.0, 0.0)) -> Array:
@@ -104,13 +103,13 @@ def gravity_torques(
     configurations = to_pinocchio(robot, q)
     payloads = np.broadcast_to(np.asarray(0.0 if payload is None else payload, dtype=float), len(configurations))
     tool = _tool(robot)
-    out = np.empty((len(configurations), robot.n))
+    out = np.empty((len(configurations), robot.model.nv))
     for i, (configuration, mass) in enumerate(zip(configurations, payloads, strict=True)):
         model = robot.model.copy()
         body = pin.Inertia(float(mass), np.asarray(payload_com, dtype=float), np.zeros((3, 3)))
         model.appendBodyToJoint(tool.parentJoint, body, tool.placement)
         out[i] = pin.computeGeneralizedGravity(model, model.createData(), configuration)
-    return out
+    return out @ robot.chain.coupling.matrix
 
 
 def _frames_by_pinocchio(robot: Robot, configuration: Array) -> list[pin.SE3]:

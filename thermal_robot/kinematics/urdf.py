@@ -43,15 +43,9 @@ def parse_urdf(urdf: str, source: str) -> pin.Model:
         raise RobotError(f"{source} {_why_not_urdf(urdf, said, str(error))}", name=source) from error
 
 
-def mimic_joints(urdf: str) -> set[str]:
-    """Names of the joints that carry a ``<mimic>`` tag, which Pinocchio's default parsing drops.
-
-    By pattern and not by an XML parser: many URDF files in use have undeclared namespaces, which urdfdom
-    accepts and parsers refuse.
-    """
-    joints = re.findall(r"<joint\b([^>]*[^/])>(.*?)</joint>", _without_comments(urdf), flags=re.DOTALL)
-    named = ((re.search(r"\bname\s*=\s*[\"']([^\"']*)", attributes), body) for attributes, body in joints)
-    return {match.group(1) for match, body in named if match and re.search(r"<mimic\b", body)}
+def without_comments(urdf: str) -> str:
+    """Blank the comments, keeping their lines: urdfdom takes ``--`` within them, which XML forbids."""
+    return re.sub(r"<!--.*?-->", lambda comment: "\n" * comment[0].count("\n"), urdf, flags=re.DOTALL)
 
 
 def nearest(name: str, known: Iterable[str]) -> tuple[str, ...]:
@@ -64,7 +58,7 @@ def nearest(name: str, known: Iterable[str]) -> tuple[str, ...]:
 
 
 def _why_not_urdf(urdf: str, said: list[str], error: str) -> str:
-    text = _without_comments(urdf.strip())
+    text = without_comments(urdf.strip())
     if not text.strip():
         return "is empty"
     if "<xacro:" in text:
@@ -86,11 +80,6 @@ def _root_tag(text: str) -> str:
     parser.StartElementHandler = lambda tag, _: tags.append(tag)
     parser.Parse(text.encode(), True)
     return tags[0]
-
-
-def _without_comments(urdf: str) -> str:
-    """Blank the comments, keeping their lines: urdfdom takes ``--`` within them, which XML forbids."""
-    return re.sub(r"<!--.*?-->", lambda comment: "\n" * comment[0].count("\n"), urdf, flags=re.DOTALL)
 
 
 @contextlib.contextmanager

@@ -15,7 +15,7 @@ from thermal_robot.report.plots_overview import overview
 from thermal_robot.report.plots_remainder import plot_remainder
 from thermal_robot.report.plots_where import plot_where
 from thermal_robot.report.plots_which import plot_which
-from thermal_robot.report.words import campaign, laws, noise_of, rows_in_words, sentences, verdict
+from thermal_robot.report.words import campaign, laws, noise_of, rows_in_words, sentences, verdict, with_aside
 
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.result import Diagnosis
@@ -73,8 +73,11 @@ def _whole(diagnosis: Diagnosis, generated: str | None) -> Iterator[str]:
     held = diagnosis.gap.held_out
     yield paragraph(
         "The gap is the distance between measured and predicted pose. Shrinkage is the share of its mean square that "
-        f"the correction removes on rows that were not used for the fit ({held.scheme}, {held.folds} folds)."
+        f"the correction removes on rows that were not used for the fit ({held.scheme}, {held.folds} folds). "
+        "Figures of rows held out have the noise of these rows in them."
     )
+    if told := with_aside(diagnosis):
+        yield paragraph(f"The gap on rows held out {told}.")
     for scheme in diagnosis.gap.schemes[:1]:
         before, after = units.together((scheme.rms_before, scheme.rms_after), "m")
         yield paragraph(f"Held out by {scheme.name} ({scheme.held_out}), the least favourable way: {before} → {after}.")

@@ -20,6 +20,7 @@ from thermal_robot.report.words import (
     rows_in_words,
     sentences,
     verdict,
+    with_aside,
 )
 
 if TYPE_CHECKING:
@@ -92,6 +93,8 @@ def _how_far(diagnosis: Diagnosis) -> Iterator[str]:
     wide = max(len(cell) for line in lines for cell in line[1:3])
     for name, first, second, note in lines:
         yield f"  {name:{_NAME}}{first:>{wide}} → {second:<{wide}}   {note}".rstrip()
+    if told := with_aside(diagnosis):
+        yield _wrap(told, f"  {'':{_NAME}}")
     shrinkage = f"{units.percent(held.shrinkage)}   95 % interval {_bounds(held.shrinkage_ci95)}"
     yield f"  {'shrinkage, held out':{_NAME}}{shrinkage}"
     for scheme in gap.schemes[:1]:
@@ -99,7 +102,10 @@ def _how_far(diagnosis: Diagnosis) -> Iterator[str]:
         worst = f"{pair[0]} → {pair[1]}, held out by {scheme.name}: {scheme.held_out}"
         yield _wrap(worst, f"  {'least favourable':{_NAME}}")
     yield _wrap(noise(diagnosis, floor), f"  {'noise floor':{_NAME}}")
-    yield _wrap("Shrinkage is the share of the gap's mean square that the correction removes.")
+    yield _wrap(
+        "Shrinkage is the share of the gap's mean square that the correction removes. Figures of rows held out "
+        "have the noise of these rows in them."
+    )
 
 
 def _bounds(bounds: tuple[float, float] | None) -> str:

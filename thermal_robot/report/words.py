@@ -129,6 +129,15 @@ def noise(diagnosis: Diagnosis, floor: str) -> str:
     return "; ".join(p for p in parts if p)
 
 
+def with_aside(diagnosis: Diagnosis) -> str:
+    """Say what the rows set aside do to the gap on rows held out; empty where there are none."""
+    held, count = diagnosis.gap.held_out, len(diagnosis.outliers)
+    if not count or held.rms_before_with_aside is None or held.rms_after_with_aside is None:
+        return ""
+    before, after = units.together((held.rms_before_with_aside, held.rms_after_with_aside), "m")
+    return f"with the {'row' if count == 1 else f'{count} rows'} set aside in it: {before} → {after}"
+
+
 def noise_of(diagnosis: Diagnosis) -> str:
     """Say the same of a diagnosis that stands alone, in the unit that suits the gap."""
     gap = diagnosis.gap
@@ -152,7 +161,8 @@ def law(finding: Finding) -> str:
     """Describe a law that was discovered in the data; empty for an effect of the library."""
     if not finding.quantity:
         return ""
-    return f"a law found in the data: follows {finding.quantity}" + (
+    what = f"a {finding.of} whose size follows" if finding.of else "follows"
+    return f"a law found in the data: {what} {finding.quantity}" + (
         f", shape: {finding.shape}" if finding.shape else ""
     )
 

@@ -7,6 +7,7 @@ from thermal_robot import kinematics as kin
 from thermal_robot.assembly.thermal import displacement, elongation, segment_names, sensitivity
 from thermal_robot.assembly.thermal.elongation import lengths
 from thermal_robot.errors import RobotError
+from thermal_robot.kinematics.model import PRISMATIC
 
 # Table 2, row 1 with its own q3, and row 2; Δl of the paper's section 3.
 Q = np.array([[0.5235, 0.8726, -1.3965, -1.0471, 0.0], [1.3963, 0.3839, -1.2217, -0.7330, 0.0]])
@@ -44,8 +45,10 @@ def test_elongations_by_name_by_row_and_over_time_agree(rv_m2):
 def test_an_even_warming_keeps_the_arms_shape(arm, configurations):
     # Every length times 1 + χΔT moves the tool point away from the root by χΔT of its distance; strokes do not grow.
     q = configurations(arm, 50)
-    strokes = np.array([kind == "prismatic" for kind in arm.joint_types]) * q
-    places = kin.tool_poses(arm, q)[:, :3, 3] - np.einsum("nij,nj->ni", kin.frame_jacobians(arm, q)[:, :3], strokes)
+    frames, places, chain = kin.chain_frames(arm, q), kin.tool_poses(arm, q)[:, :3, 3], arm.chain
+    for k, stroke in zip(chain.movable, chain.coupling.positions(q).T, strict=True):
+        if chain.kinds[k] == PRISMATIC:
+            places = places - stroke[:, None] * (frames.rotations[:, k] @ chain.axes[k])
     grown = elongation(arm, 23.0, coefficients=1.2e-5)
     np.testing.assert_allclose(displacement(arm, q, grown), 3.6e-5 * places, rtol=0.0, atol=1e-15)
     per_kelvin = sensitivity(arm, q, coefficients=1.2e-5)

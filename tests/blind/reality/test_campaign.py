@@ -34,7 +34,7 @@ def test_a_campaign_can_be_read_and_holds_what_was_asked(case, tmp_path):
     assert set(answers["truth"]["effects"]) == {"drift", "backlash"}
     for part in answers["truth"]["parts"].values():
         assert 2.0 <= part["ratio"] <= 6.0
-    assert np.shape(answers["fresh_position"]) == (100, 3)
+    assert np.shape(answers["fresh_position"]) == (1000, 3)
     text = "".join(path.read_text() for path in sorted(tmp_path.iterdir()))
     assert "drift" not in text
     assert "backlash" not in text
@@ -100,8 +100,8 @@ def test_motors_wheels_come_with_the_ratio_that_shows_them(case, tmp_path):
         if len(stated) > 1:
             break
     assert () in stated
-    assert len(stated) == 2
-    assert stated - {()} <= {(51.0,), (80.0,), (101.0,)}
+    [(ratio,)] = stated - {()}
+    assert 30.0 <= ratio <= 160.0
 
 
 def test_a_case_that_no_draw_can_show_is_withdrawn_and_says_why(case, tmp_path):

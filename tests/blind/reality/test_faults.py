@@ -59,7 +59,7 @@ def test_stands_settle_in_minutes_to_a_day_and_no_two_alike(setting):
 def test_links_grow_along_themselves(ur10, setting, gauge):
     """Tool displacement of growth equals the sum of segment vectors times their strain."""
     values = np.full((len(ur10.segments), 1), 12e-6)
-    moved = gauge.place([(FAULTS["thermal_elongation"], values)]) - gauge.sound
+    moved = place(setting, [(FAULTS["thermal_elongation"], values)], gauge.target)[0] - gauge.sound
     expected = np.zeros_like(moved)
     for s, k in enumerate(ur10.segments):
         chain = ur10.chain[: k + 1]

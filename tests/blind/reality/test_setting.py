@@ -69,7 +69,7 @@ def test_one_that_is_measured_in_passing_goes_the_way_of_its_speed(days):
 
 
 def test_a_repeated_pose_is_the_same_command(days):
-    for day in days(repeats=5):
+    for day in days(visits=(5, 5)):
         visits = np.bincount(day.pose)
         assert (visits == 5).all()
         for pose in range(len(visits)):
@@ -103,3 +103,22 @@ def test_payloads_are_nothing_half_and_all_of_what_suits(days):
         heaviest = day.payload.max()
         assert set(day.payload) == {0.0, round(heaviest / 2, 2), heaviest}
         assert 0.5 <= heaviest <= 8.0
+
+
+def test_the_day_is_spent_twice_on_poses_to_measure_and_on_others(ur10):
+    day = draw_setting(ur10, 12, np.random.default_rng(4), fresh=30, visits=(2, 3))
+    assert (day.samples, day.given.sum(), day.given[0]) == (42, 12, True)
+    for rows in (np.flatnonzero(day.given), np.flatnonzero(~day.given)):
+        np.testing.assert_array_equal(day.before[rows], np.append(rows[:1], rows[:-1]))
+        moves = np.diff(day.q[rows], axis=0, prepend=day.q[rows][:1])
+        np.testing.assert_array_equal(day.approach[rows], np.sign(moves))
+    # rows to predict are poses that were never measured
+    assert not set(day.pose[day.given]) & set(day.pose[~day.given])
+
+
+def test_the_air_grows_as_damp_in_many_rows_as_in_few():
+    from thermal_robot.blind.reality.setting import humidity
+
+    ends = [np.std([humidity(n, np.random.default_rng(s))[-1] for s in range(300)]) for n in (60, 1100)]
+    # standard deviations of 300 draws are sure to 4 %
+    assert ends[0] == pytest.approx(ends[1], rel=0.25)

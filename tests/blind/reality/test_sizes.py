@@ -21,7 +21,7 @@ def test_every_fault_moves_the_target_as_far_as_it_is_told(name, ur10):
         80,
         rng,
         moving="moving" in fault.wants,
-        repeats=4 if "repeats" in fault.wants else 1,
+        visits=(4, 4) if "repeats" in fault.wants else (1, 1),
         sensor="links",
         sessions="sessions" in fault.wants,
     )
@@ -108,7 +108,7 @@ def test_places_come_with_what_each_does_alone_largest_first(gauge):
         ("tracking_lag", {}, False),
         ("tracking_lag", {"moving": True}, True),
         ("excess_repeatability", {}, False),
-        ("excess_repeatability", {"repeats": 4}, True),
+        ("excess_repeatability", {"visits": (4, 4)}, True),
         ("thermal_bending", {"sensor": "air"}, False),
         ("thermal_bending", {"sensor": "links"}, True),
         ("remounted_target", {}, False),
@@ -128,9 +128,9 @@ def test_faults_at_once_are_one_robot(setting, gauge):
     rng = np.random.default_rng(9)
     pair = [(FAULTS[name], 0.1 * FAULTS[name].draw(setting, rng)) for name in ("joint_gain", "thermal_elongation")]
     alone = sum(gauge.moved(fault, values) for fault, values in pair)
-    both = (gauge.place(pair) - gauge.sound).ravel()
+    both = (place(setting, pair, gauge.target)[0] - gauge.sound).ravel()
     np.testing.assert_allclose(both, alone, atol=1e-3 * np.abs(both).max())
     pose = from_vector(np.array([[1.0, 2.0, 0.5, 0.2, -0.3, 1.0]]))[0]
     seen, turned = place(setting, pair, gauge.target, pose)
-    np.testing.assert_allclose(seen, gauge.place(pair) @ pose[:3, :3].T + pose[:3, 3], atol=1e-12)
+    np.testing.assert_allclose(seen, place(setting, pair, gauge.target)[0] @ pose[:3, :3].T + pose[:3, 3], atol=1e-12)
     np.testing.assert_allclose(turned.transpose(0, 2, 1) @ turned, np.tile(np.eye(3), (90, 1, 1)), atol=1e-12)

@@ -44,7 +44,9 @@ def rail():
 
 @pytest.fixture(scope="module")
 def day(rail):
-    return draw_setting(World(rail.urdf, "tip"), 20, np.random.default_rng(2), moving=True, sensor="links", repeats=4)
+    return draw_setting(
+        World(rail.urdf, "tip"), 20, np.random.default_rng(2), moving=True, sensor="links", visits=(4, 4)
+    )
 
 
 @pytest.fixture(scope="module")

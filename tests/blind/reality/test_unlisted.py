@@ -29,7 +29,7 @@ def err(setting):
 def test_they_are_in_no_library():
     assert not set(library()) & set(UNLISTED)
     assert not set(FAULTS) & set(UNLISTED)
-    assert len(UNLISTED) == 12
+    assert len(UNLISTED) == 12 + 7 + 6
 
 
 def test_a_belt_slips_once_and_stays(err, setting):
@@ -118,6 +118,15 @@ def test_a_pedestal_rocks_away_from_where_the_arm_leans(setting, body):
     lean = setting.poses[:, :2, 3]
     top = body.base[:, :2, 2]  # where the pedestal's upright points
     assert ((lean * top).sum(axis=1) > 0).all()
+    # twice the load leans twice as far, so that the product of load and place is an answer
+    light, heavy = (setting.world.sound(setting.samples) for _ in range(2))
+    one = np.tile([1.0, 0.0], setting.samples)[: setting.samples]
+    UNLISTED["soft_pedestal"].act(light, replace(setting, payload=one), np.array([[1e-4, 1.0]]))
+    UNLISTED["soft_pedestal"].act(heavy, replace(setting, payload=1.0 - one), np.array([[1e-4, 1.0]]))
+    ratio = np.linalg.norm(light.base[:, :2, 2], axis=1) / np.linalg.norm(heavy.base[:, :2, 2], axis=1)
+    np.testing.assert_allclose(ratio, np.where(one, 2.0, 0.5), rtol=1e-6)
+    told = UNLISTED["soft_pedestal"].quantities(setting, [("base", "base")])
+    assert {"payload * reach.x", "reach.y * payload"} <= set(told)
 
 
 def test_a_bolt_tilts_a_link_across_its_axis_once(setting, body):
@@ -140,7 +149,11 @@ def test_what_a_cause_follows_is_a_column_that_can_be_asked_for(name, setting):
     places = fault.places(setting)
     where = [places[p] for p in np.flatnonzero(np.abs(values[:, 0]) > 0)] or places[:1]
     columns = {*setting.world.names, "time", "order", "session", "payload", "speed", "humidity", "motor_temperature"}
+    columns |= {"temperature", *(f"temperature.{link}" for link in setting.world.links)}
+    columns |= {f"{column}.{joint}" for column in ("approach", "torque", "since_turn") for joint in setting.world.names}
     derived = {f"{name}.{axis}" for name in ("gravity", "reach") for axis in "xyz"}
-    assert set(fault.quantities(setting, where)) <= columns | derived
+    said = {part for quantity in fault.quantities(setting, where) for part in quantity.split(" * ")}
+    assert said
+    assert said <= columns | derived or said == {"none"}
     if fault.few and places[0][0] == "joint":  # frames would hide the first and the last
         assert not values[[0, -1], 0].any()

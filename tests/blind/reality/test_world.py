@@ -1,5 +1,7 @@
 """The robot in MuJoCo: Pinocchio's where nothing is wrong, textbook statics where something yields."""
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -7,7 +9,7 @@ pytest.importorskip("mujoco", reason='the blind trial needs "thermal-robot[blind
 
 from conftest import AWKWARD
 
-from thermal_robot.blind.plan import ROBOTS
+from thermal_robot.blind.plan import PARALLELOGRAMS, ROBOTS
 from thermal_robot.blind.reality import World
 from thermal_robot.blind.reality.world import cross_axes
 from thermal_robot.kinematics import gravity_torques, tool_poses
@@ -128,3 +130,59 @@ def test_motions_of_base_and_target_are_made_one_after_the_other(ur10):
 def test_cross_axes_are_across(direction):
     axes = np.array([np.array(direction) / np.linalg.norm(direction), *cross_axes(np.array(direction))])
     np.testing.assert_allclose(axes @ axes.T, np.eye(3), atol=1e-15)
+
+
+@pytest.fixture(scope="module")
+def parallelograms():
+    return World(Path(PARALLELOGRAMS[1]).read_text(), PARALLELOGRAMS[2])
+
+
+def test_a_passive_joint_follows_its_driver_and_has_no_command(parallelograms):
+    world = parallelograms
+    assert world.names == ("swing", "upper", "fore", "turn")
+    assert [j.name for j in world.moving] == ["swing", "upper", "upper_bar", "fore", "fore_bar", "turn"]
+    q = drawn(world, 20, 3)
+    poses, _ = world.poses(q, np.zeros(20), world.sound(20))
+    # two parallelograms keep the flange level, whatever upper arm and forearm do
+    np.testing.assert_allclose(poses[:, 2, 2], -1.0, atol=1e-12)
+    np.testing.assert_allclose(poses[:, 2, :2], 0.0, atol=1e-12)
+    # the far end of a bar moves as if upper arm and forearm turned about the ground
+    reach = 0.28 + 1.0 * np.sin(q[:, 1]) + 1.05 * np.cos(q[:, 2]) + 0.18
+    np.testing.assert_allclose(np.hypot(poses[:, 0, 3], poses[:, 1, 3]), np.abs(reach), atol=1e-9)
+
+
+def test_an_error_of_a_driver_moves_its_follower_and_so_does_its_spring(parallelograms):
+    world = parallelograms
+    q, load = drawn(world, 15, 4), np.full(15, 5.0)
+    wrong = world.sound(15)
+    wrong.joints[:, 1] = 1e-3
+    shifted = q + np.array([0.0, 1e-3, 0.0, 0.0])
+    sound = world.sound(15)
+    np.testing.assert_allclose(world.poses(q, load, wrong)[0], world.poses(shifted, load, sound)[0], atol=1e-12)
+    soft = world.sound(15)
+    soft.springs[1] = 1e-6
+    yielded, torque = world.poses(q, load, soft)
+    settled = q - np.outer(1e-6 * torque[:, 1], [0.0, 1.0, 0.0, 0.0])
+    np.testing.assert_allclose(yielded, world.poses(settled, load, sound)[0], atol=1e-9)
+
+
+def test_what_holds_a_driver_is_what_its_motion_lifts(parallelograms):
+    """Virtual work: the torque of each command is the slope of the weight's energy by it."""
+    import mujoco
+
+    world = parallelograms
+    q, load, step = drawn(world, 6, 5), np.full(6, 4.0), 1e-6
+    _, torque = world.poses(q, load, world.sound(6))
+    model = world.compile(False, None)
+    model.body_mass[model.body("payload").id] = 4.0
+    data = mujoco.MjData(model)
+
+    def energy(command):
+        data.qpos[world.address(model)] = world.coupling @ command + world.rest
+        mujoco.mj_kinematics(model, data)
+        return 9.81 * float(model.body_mass @ data.xipos[:, 2])
+
+    for row in range(6):
+        slope = [(energy(q[row] + d) - energy(q[row] - d)) / (2 * step) for d in step * np.eye(world.n)]
+        np.testing.assert_allclose(torque[row], slope, rtol=1e-5, atol=1e-4)
+    model.body_mass[model.body("payload").id] = 0.0

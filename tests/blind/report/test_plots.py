@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from blind_records import trial
+from blind_records import effect, record, said, trial
 from matplotlib.patches import Rectangle
 
 from thermal_robot.blind.report.plots import calibration_figure, confusion_figure, shrinkage_figure
@@ -12,6 +12,12 @@ from thermal_robot.blind.score import score
 @pytest.fixture(scope="module")
 def plain():
     return score(trial()).to_dict()
+
+
+@pytest.fixture(scope="module")
+def calibrated():
+    found = said(effect("drift", 0.64), effect("backlash", 0.21), effect("joint_gain", 0.02), effect("geometric", 0.66))
+    return score([record("mixed", found, ["drift"]), record("mixed", found, ["geometric"])]).to_dict()
 
 
 def test_the_heat_map_holds_the_counts(plain):
@@ -32,7 +38,8 @@ def test_the_heat_map_holds_the_counts(plain):
     assert len(confusion_figure(plain, "nowhere").axes[0].patches) == 0
 
 
-def test_the_reliability_diagram_holds_the_bins(plain):
+def test_the_reliability_diagram_holds_the_bins(calibrated):
+    plain = calibrated
     upper, lower = calibration_figure(plain).axes
     points = next(line for line in upper.lines if line.get_marker() == "o")
     bins = [b for b in plain["calibration"]["all"]["bins"] if b["present"]["trials"]]
@@ -55,7 +62,8 @@ def test_the_shrinkage_figure_holds_the_pairs(plain):
     assert names == ["known effect at work (7)", "cause withheld (3)", "real campaign (1)"]
 
 
-def test_the_bars_of_the_reliability_diagram_are_the_intervals(plain):
+def test_the_bars_of_the_reliability_diagram_are_the_intervals(calibrated):
+    plain = calibrated
     upper, _ = calibration_figure(plain).axes
     bins = [b["present"] for b in plain["calibration"]["all"]["bins"] if b["present"]["trials"]]
     bars = [line.get_ydata() for line in upper.lines if len(set(line.get_xdata())) == 1 and len(line.get_xdata()) == 2]

@@ -68,6 +68,16 @@ def test_figures_without_cases_are_not_told():
     assert facts(score([]).to_dict()) == ()
 
 
+def test_laws_harm_and_intervals_are_told_with_their_rates():
+    rate = {"successes": 19, "trials": 20, "value": 0.95, "interval": (0.764, 0.991)}
+    none = {"successes": 0, "trials": 0, "value": None, "interval": None}
+    plain = score([]).to_dict()
+    plain |= {"laws": rate, "worse": none, "coverage": {"parameters": rate, "shrinkage": none, "shares": rate}}
+    said = dict(facts(plain))
+    assert list(said) == ["laws printed at 90 % and more", "95 % intervals of parameters", "95 % intervals of shares"]
+    assert said["laws printed at 90 % and more"] == "19 of 20 right: 95.0 %, 95 % interval 76.4 to 99.1 %"
+
+
 def test_a_miss_tells_what_was_true_and_what_was_said():
     case = {"truth": ("drift",), "said": ("backlash",), "unexplained": "j1, time", "probability": 0.93, "error": None}
     assert miss(case) == ("drift", "backlash + unexplained (j1, time); 93.0 %")

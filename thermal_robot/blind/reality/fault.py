@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -40,6 +40,9 @@ class Fault:
         Whether it scatters anew at every visit.
     also
         Names of other effects that do part of it by definition, each with the columns of the values that do.
+    known_as
+        (setting, values) → true parameters by the names that the diagnosis has for them, in its units and with its
+        signs, where formats.md leaves no doubt what is meant.
     fixed
         Columns of the values that are no size (a phase, a time constant), each with the settings that span it.
     """
@@ -52,6 +55,7 @@ class Fault:
     wants: tuple[str, ...] = ()
     quantities: Callable[[Setting, Sequence[Place]], Sequence[str]] = lambda setting, places: ()
     random: bool = False
+    known_as: Callable[[Setting, Array], Mapping[str, float]] = lambda setting, values: {}
     also: tuple[tuple[str, tuple[int, ...]], ...] = ()
     fixed: tuple[tuple[int, tuple[float, ...]], ...] = ()
 
@@ -83,6 +87,19 @@ def clock(setting: Setting, places: Sequence[Place]) -> list[str]:
     return ["time", "order"]
 
 
+def each_joint(label: str, of: Callable[[Array], Array]) -> Callable[[Setting, Array], Mapping[str, float]]:
+    """Return one parameter a joint, its value a function of the (n, D) values."""
+    return lambda setting, values: {
+        f"{label}, {name}": float(value) for name, value in zip(setting.world.names, of(values), strict=True)
+    }
+
+
+def twist(where: str) -> Callable[[Setting, Array], Mapping[str, float]]:
+    """Return the components of a twist in the first row of the values: translation, then rotation."""
+    names = [f"{kind} {axis}, {where}" for kind in ("translation", "rotation") for axis in "xyz"]
+    return lambda setting, values: dict(zip(names, values[0].tolist(), strict=True))
+
+
 def some(
     size: float,
     numbers: int = 1,
@@ -111,3 +128,34 @@ def some(
         return np.abs(values) if positive else values
 
     return draw
+
+
+Number = Callable[[Setting, int, np.random.Generator], float]
+"""Draws a number for a joint, by its index."""
+
+
+def one(*numbers: Number) -> Callable[[Setting, np.random.Generator], Array]:
+    """Draw one joint, never the first or the last, and numbers for it; the first one is its size."""
+
+    def draw(setting: Setting, rng: np.random.Generator) -> Array:
+        values = np.zeros((setting.world.n, len(numbers)))
+        j = int(rng.integers(1, setting.world.n - 1))
+        values[j] = [number(setting, j, rng) for number in numbers]
+        return values
+
+    return draw
+
+
+def milli(setting: Setting, j: int, rng: np.random.Generator) -> float:
+    """Return a thousandth, of either sign."""
+    return float(rng.choice([-1e-3, 1e-3]))
+
+
+def part(low: float, high: float) -> Number:
+    """Draw a number between two."""
+    return lambda setting, j, rng: float(rng.uniform(low, high))
+
+
+def within(low: float, high: float) -> Number:
+    """Draw a position of the joint between two quantiles of where it goes."""
+    return lambda setting, j, rng: float(np.quantile(setting.q[:, j], rng.uniform(low, high)))

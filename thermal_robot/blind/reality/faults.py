@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.blind.reality import gears
-from thermal_robot.blind.reality.fault import Fault, clock, joints, own_position, segments, some
+from thermal_robot.blind.reality.fault import Fault, clock, each_joint, joints, own_position, segments, some, twist
 from thermal_robot.blind.reality.setting import Setting
 from thermal_robot.blind.reality.world import Body
 
@@ -58,6 +58,22 @@ def _draw_creep(setting: Setting, rng: np.random.Generator) -> Array:
     return np.append(1e-4 * rng.normal(size=6), np.exp(rng.uniform(*np.log(_SETTLES))))[None]
 
 
+def _strains(setting: Setting, values: Array) -> dict[str, float]:
+    """Only where each link's temperature is recorded: another sensor's kelvin is not the link's."""
+    if setting.sensor != "links":
+        return {}
+    world = setting.world
+    placed = zip(world.segments, values[:, 0], strict=True)
+    joints = ((world.chain[k], float(value)) for k, value in placed)
+    return {f"strain per kelvin of {joint.name}, {joint.parent}": value for joint, value in joints}
+
+
+def _crept(setting: Setting, values: Array) -> dict[str, float]:
+    """How far the base has gone in the last row that was measured."""
+    last = setting.time[setting.given][-1] - setting.time[0]
+    return dict(twist("base")(setting, values[:, :6] * -np.expm1(-last / values[0, 6])))
+
+
 def _scale(body: Body, setting: Setting, values: Array) -> None:
     body.scale += float(values[0, 0])
 
@@ -80,10 +96,32 @@ def _all_segments(size: float, spread: tuple[float, float], numbers: int = 1) ->
 FAULTS: dict[str, Fault] = {
     fault.name: fault
     for fault in (
-        Fault("base_frame", _rigid, _misplaced("base"), lambda s: [("base", "base")], wants=("base_known",)),
+        Fault(
+            "base_frame",
+            _rigid,
+            _misplaced("base"),
+            lambda s: [("base", "base")],
+            wants=("base_known",),
+            known_as=twist("base"),
+        ),
         Fault("tool_frame", _rigid, _misplaced("tool"), lambda s: [("tool", "tool")], wants=("tool_known",)),
-        Fault("joint_offset", some(1e-3, first=False, last=False), gears.offset, joints, few=True),
-        Fault("joint_gain", some(1e-3, last=False), gears.gain, joints, few=True, quantities=own_position),
+        Fault(
+            "joint_offset",
+            some(1e-3, first=False, last=False),
+            gears.offset,
+            joints,
+            few=True,
+            known_as=each_joint("zero offset", lambda values: values[:, 0]),
+        ),
+        Fault(
+            "joint_gain",
+            some(1e-3, last=False),
+            gears.gain,
+            joints,
+            few=True,
+            quantities=own_position,
+            known_as=each_joint("gain error", lambda values: values[:, 0]),
+        ),
         Fault(
             "transmission_error",
             gears.draw_wheels,
@@ -91,6 +129,7 @@ FAULTS: dict[str, Fault] = {
             joints,
             few=True,
             quantities=own_position,
+            known_as=gears.harmonics,
             fixed=((3, (0.0, np.pi / 4)), (4, (1.0,))),
         ),
         Fault(
@@ -100,6 +139,7 @@ FAULTS: dict[str, Fault] = {
             joints,
             few=True,
             quantities=lambda s, places: [f"approach.{name}" for _, name in places],
+            known_as=each_joint("lost motion", lambda values: 2.0 * np.abs(values[:, 0])),
             fixed=((1, (_HOLDS,)), (2, (0.05,))),
         ),
         Fault(
@@ -108,6 +148,7 @@ FAULTS: dict[str, Fault] = {
             gears.springs,
             joints,
             quantities=lambda s, places: ["payload", *s.world.names],
+            known_as=each_joint("compliance", lambda values: np.abs(values[:, 0])),
         ),
         Fault(
             "tracking_lag",
@@ -119,6 +160,7 @@ FAULTS: dict[str, Fault] = {
             quantities=lambda s, places: [f"velocity.{n}" for _, n in places] + [f"approach.{n}" for _, n in places],
             # a step of dry friction against the way is what formats.md calls lost motion
             also=(("backlash", (1,)),),
+            known_as=gears.lags,
             fixed=((2, (0.0, 1.0)),),
         ),
         Fault(
@@ -142,6 +184,7 @@ FAULTS: dict[str, Fault] = {
             segments,
             wants=("temperature",),
             quantities=lambda s, places: ["temperature", *(f"temperature.{link}" for link in s.world.links)],
+            known_as=_strains,
         ),
         Fault(
             "thermal_bending",
@@ -157,10 +200,25 @@ FAULTS: dict[str, Fault] = {
             _creep,
             lambda s: [("base", "base")],
             quantities=clock,
+            known_as=_crept,
             fixed=((6, (1e3, 5e3, 1e6)),),
         ),
-        Fault("instrument_scale", lambda s, rng: np.array([[rng.choice([-1e-4, 1e-4])]]), _scale, lambda s: []),
-        Fault("encoder_resolution", some(2e-4, last=False, positive=True), gears.ticks, joints, few=True, random=True),
+        Fault(
+            "instrument_scale",
+            lambda s, rng: np.array([[rng.choice([-1e-4, 1e-4])]]),
+            _scale,
+            lambda s: [],
+            known_as=lambda s, values: {"scale error, instrument": float(values[0, 0])},
+        ),
+        Fault(
+            "encoder_resolution",
+            some(2e-4, last=False, positive=True),
+            gears.ticks,
+            joints,
+            few=True,
+            random=True,
+            known_as=each_joint("step", lambda values: np.abs(values[:, 0])),
+        ),
         Fault(
             "excess_repeatability",
             some(1e-4, last=False, positive=True),
@@ -169,6 +227,7 @@ FAULTS: dict[str, Fault] = {
             few=True,
             wants=("repeats",),
             random=True,
+            known_as=each_joint("standard deviation", lambda values: np.abs(values[:, 0])),
         ),
     )
 }

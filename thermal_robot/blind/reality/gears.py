@@ -20,6 +20,7 @@ that is run in; above one where the gear holds by itself, as worm gears do. Even
 _PLAYS = 0.25  # least share of rows in which the way of arrival decides
 _ALIKE = 0.2  # scatter of friction among gears of one make, of its logarithm
 _SOFT = (0.02, 0.1)  # of friction: films of grease are thin
+_RATIOS = (30.0, 160.0)  # of gears, harmonic drives' among them
 _DELAY = (5e-4, 8e-3)  # s: half a cycle of a controller at 1 kHz, a whole one at 125 Hz
 _DRAG = (2e-5, 2e-4)
 """rad (m): what a loop without integral part leaves of dry friction, 1 to 10 N·m against 5e4 N·m/rad."""
@@ -53,12 +54,24 @@ def draw_wheels(setting: Setting, rng: np.random.Generator) -> Array:
 
     A joint that slides has no disc of its own, only its motor has: its ratio is in rad/m.
     """
-    ratio = float(rng.choice([51.0, 80.0, 101.0])) if rng.random() < 0.2 else 1.0
+    ratio = round(float(rng.uniform(*_RATIOS)), 2) if rng.random() < 0.2 else 1.0
     values = some(1e-3, 5, last=False, turning=ratio == 1.0)(setting, rng)
     values[:, 2] *= rng.choice([0.0, 0.6])
     values[:, 3] = rng.uniform(0, np.pi)
     values[:, 4] = ratio
     return values
+
+
+def harmonics(setting: Setting, values: Array) -> dict[str, float]:
+    """Fourier's amplitudes of :func:`wheels`: a disc off by e adds eᵏ/k of order k, an oval one nearly order 2."""
+    found = {}
+    for name, (across, along, oval, phase, ratio) in zip(setting.world.names, values, strict=True):
+        disc = complex(along, -across)
+        second = disc**2 / 2.0 + oval * np.exp(2j * phase)
+        for order, amplitude in ((ratio, disc), (2.0 * ratio, second)):
+            found[f"sine, order {order:g}, {name}"] = float(amplitude.real)
+            found[f"cosine, order {order:g}, {name}"] = float(amplitude.imag)
+    return found
 
 
 def play(body: Body, setting: Setting, values: Array) -> None:
@@ -100,7 +113,7 @@ def ratings(setting: Setting) -> Array:
     world, carried = setting.world, float(setting.payload.max())
     held = []
     for k, joint in enumerate(world.chain):
-        if joint.movable:
+        if joint.commanded:
             arm, out = world.tree.carried(joint.child), float(sum(np.linalg.norm(j.xyz) for j in world.chain[k + 1 :]))
             lift = joint.kind == "prismatic"
             held.append(_GRAVITY * (arm + carried if lift else (arm / 2.0 + carried) * out))
@@ -132,6 +145,14 @@ def servo(body: Body, setting: Setting, values: Array) -> None:
     delay, friction, loop = values.T
     late = -setting.velocity * delay + setting.acceleration * (1.0 + loop**2) / 2.0 * delay**2
     body.joints += late - friction * setting.approach
+
+
+def lags(setting: Setting, values: Array) -> dict[str, float]:
+    """Delay, friction and what acceleration does, of each joint."""
+    delay, friction, loop = values.T
+    names = setting.world.names
+    each = (("delay", delay), ("friction", friction), ("effect of acceleration", (1.0 + loop**2) / 2.0 * delay**2))
+    return {f"{label}, {name}": float(v) for label, of in each for name, v in zip(names, of, strict=True)}
 
 
 def draw_servo(setting: Setting, rng: np.random.Generator) -> Array:

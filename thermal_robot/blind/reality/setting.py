@@ -14,6 +14,7 @@ Array = NDArray[np.float64]
 
 _WIDEST = 2.4  # rad: cables keep a real robot from its whole range
 _SHARE = 0.75
+_WANDERS = 9.0  # %
 
 
 @dataclass
@@ -24,6 +25,9 @@ class Setting:
     ----------
     world
         The robot.
+    given
+        (N,) whether a row is measured; the others are commands of which a prediction is asked: the same day over again,
+        spent on other poses.
     q, velocity, acceleration
         (N, n) joint positions at the instant of measurement, and how they change there (zero where it stands still).
     time
@@ -53,6 +57,7 @@ class Setting:
     """
 
     world: World
+    given: NDArray[np.bool_]
     q: Array
     velocity: Array
     acceleration: Array
@@ -75,14 +80,26 @@ class Setting:
         """N."""
         return len(self.time)
 
+    @property
+    def before(self) -> NDArray[np.int64]:
+        """(N,) where the robot came from: the row before among those that are measured, or among the others.
+
+        The first one's is itself.
+        """
+        before = np.empty(self.samples, dtype=np.int64)
+        for rows in (np.flatnonzero(self.given), np.flatnonzero(~self.given)):
+            before[rows] = np.append(rows[:1], rows[:-1])
+        return before
+
 
 def draw_setting(
     world: World,
     samples: int,
     rng: np.random.Generator,
     *,
+    fresh: int = 0,
     moving: bool = False,
-    repeats: int = 1,
+    visits: tuple[int, int] = (1, 1),
     sensor: str | None = None,
     sessions: bool = False,
 ) -> Setting:
@@ -93,42 +110,44 @@ def draw_setting(
     world
         The robot.
     samples
-        Number of rows.
+        Number of rows that are measured.
     rng
         Everything follows from it.
+    fresh
+        Number of rows to be predicted, scattered among them.
     moving
         Whether poses are measured in passing.
-    repeats
-        How often each pose is measured.
+    visits
+        How often each pose is measured, drawn between the two for each, in mixed order.
     sensor
         See :class:`Setting`; drawn where absent.
     sessions
         Whether the robot is switched off for a while, once or twice.
     """
-    q, label = _visits(world, samples, repeats, rng)
+    given, q, label = _visits(world, samples, fresh, visits, rng)
+    samples += fresh
     time, session = _clock(samples, sessions, rng)
     heaviest = _heaviest(world)
     payload = rng.choice([0.0, heaviest / 2, heaviest], samples).round(2)
     speed = rng.choice([0.1, 0.3, 0.6, 1.0], samples)
     velocity, acceleration = np.zeros_like(q), np.zeros_like(q)
-    approach = np.sign(np.diff(q, axis=0, prepend=q[:1]))
     if moving:
         velocity = rng.uniform(0.05, 0.8, q.shape) * rng.choice([-1.0, 1.0], q.shape) * speed[:, None]
         acceleration = rng.normal(0.0, 1.5, q.shape) * speed[:, None]
-        approach = np.sign(velocity)
     air = hall(time, rng)
     links = warmed(world, time, air, session, rng)
-    extra = {"humidity": np.round(45.0 + np.cumsum(rng.normal(0.0, 0.6, samples)), 1)} if rng.random() < 0.5 else {}
+    extra = {"humidity": humidity(samples, rng)} if rng.random() < 0.5 else {}
     sensor = sensor or str(rng.choice(["robot", "links", "air"], p=[0.45, 0.4, 0.15]))
     links = _as_sensed(sensor, time, air, links, rng)
     poses, torque = world.poses(q, payload, world.sound(samples))
-    return Setting(
+    setting = Setting(
         world=world,
+        given=given,
         q=q,
         velocity=velocity,
         acceleration=acceleration,
         time=time,
-        approach=approach,
+        approach=np.sign(velocity),
         payload=payload,
         air=air,
         links=links,
@@ -141,18 +160,31 @@ def draw_setting(
         torque=torque,
         poses=poses,
     )
+    if not moving:
+        setting.approach = np.sign(q - q[setting.before])
+    return setting
+
+
+def humidity(samples: int, rng: np.random.Generator) -> Array:
+    """(N,) % of the hall's air: it wanders by some 9 % in a day, however many rows that has."""
+    return np.round(45.0 + np.cumsum(rng.normal(0.0, _WANDERS / np.sqrt(samples), samples)), 1)
 
 
 def _visits(
-    world: World, samples: int, repeats: int, rng: np.random.Generator
-) -> tuple[Array, NDArray[np.int64] | None]:
-    """(N, n) commands in the order in which they are visited, and which pose each is where poses are repeated."""
-    poses = -(-samples // repeats)
-    q = _commands(world, poses, rng)
-    if repeats == 1:
-        return q, None
-    label = rng.permuted(np.repeat(np.arange(poses), repeats))[:samples]
-    return q[label], label
+    world: World, samples: int, fresh: int, visits: tuple[int, int], rng: np.random.Generator
+) -> tuple[NDArray[np.bool_], Array, NDArray[np.int64] | None]:
+    """(N,) rows that are measured, (N, n) commands in the order of visits, and which pose each is if some are repeated.
+
+    The first row is measured: from it drift counts. What is to be predicted is never a pose that was measured.
+    """
+    given = np.zeros(samples + fresh, dtype=bool)
+    given[np.append(0, 1 + rng.permutation(samples + fresh - 1)[: samples - 1])] = True
+    times = rng.integers(visits[0], visits[1] + 1, samples)
+    label = np.empty(samples + fresh, dtype=np.int64)
+    label[given] = rng.permuted(np.repeat(np.arange(samples), times)[:samples])
+    label[~given] = np.arange(samples, samples + fresh)
+    q = _commands(world, samples + fresh, rng)[label]
+    return given, q, None if visits == (1, 1) else label
 
 
 def _clock(samples: int, sessions: bool, rng: np.random.Generator) -> tuple[Array, NDArray[np.int64] | None]:
@@ -182,10 +214,10 @@ def _commands(world: World, count: int, rng: np.random.Generator) -> Array:
     """(count, n) within a share of the limits; the third of the poses that is nearest to the root is left out."""
     lower, upper = np.maximum(world.lower, -_WIDEST), np.minimum(world.upper, _WIDEST)
     middle, half = (lower + upper) / 2, _SHARE * (upper - lower) / 2
-    drawn = rng.uniform(middle - half, middle + half, (4 * count + 60, world.n))
+    drawn = rng.uniform(middle - half, middle + half, (2 * count + 60, world.n))
     place = world.poses(drawn, np.zeros(len(drawn)), world.sound(len(drawn)))[0][:, :3, 3]
     reach = np.linalg.norm(place, axis=1)
-    usable = drawn[reach > np.quantile(reach, 0.3)]
+    usable = drawn[reach >= np.quantile(reach, 0.3)]
     return np.asarray(usable[:count])
 
 

@@ -2,47 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.blind.reality.fault import Fault, Place, clock, joints, own_position
+from thermal_robot.blind.reality.elusive import ELUSIVE
+from thermal_robot.blind.reality.fault import Fault, Place, clock, joints, milli, one, own_position, part, within
+from thermal_robot.blind.reality.interplay import INTERPLAY
 from thermal_robot.blind.reality.setting import Setting
 from thermal_robot.blind.reality.world import Body
 
 Array = NDArray[np.float64]
-Draw = Callable[[Setting, np.random.Generator], Array]
 
 GRAVITY = ("gravity.x", "gravity.y", "gravity.z")
 """Gravity's direction in the tool frame: a quantity that nobody records and anybody can compute."""
 REACH = ("reach.x", "reach.y")
 """Where the tool is, from which the moment on a pedestal follows."""
-
-
-def _one(*numbers: Callable[[Setting, int, np.random.Generator], float]) -> Draw:
-    """Draw one joint, never the first or the last, and numbers for it; the first one is its size."""
-
-    def draw(setting: Setting, rng: np.random.Generator) -> Array:
-        values = np.zeros((setting.world.n, len(numbers)))
-        j = int(rng.integers(1, setting.world.n - 1))
-        values[j] = [number(setting, j, rng) for number in numbers]
-        return values
-
-    return draw
-
-
-def _milli(setting: Setting, j: int, rng: np.random.Generator) -> float:
-    return float(rng.choice([-1e-3, 1e-3]))
-
-
-def _part(low: float, high: float) -> Callable[[Setting, int, np.random.Generator], float]:
-    return lambda setting, j, rng: float(rng.uniform(low, high))
-
-
-def _within(low: float, high: float) -> Callable[[Setting, int, np.random.Generator], float]:
-    """A position of the joint between two quantiles of where it goes."""
-    return lambda setting, j, rng: float(np.quantile(setting.q[:, j], rng.uniform(low, high)))
+MOMENT = tuple(f"{a} * {b}" for place in REACH for a, b in (("payload", place), (place, "payload")))
+"""That moment: the load times where it is, in either order."""
 
 
 def _slip(body: Body, setting: Setting, values: Array) -> None:
@@ -156,22 +134,20 @@ def _tilt(setting: Setting, rng: np.random.Generator) -> Array:
 UNLISTED: dict[str, Fault] = {
     fault.name: fault
     for fault in (
-        Fault("slip", _one(_milli, _part(0.35, 0.65)), _slip, joints, few=True, quantities=clock, fixed=((1, (0.5,)),)),
+        Fault("slip", one(milli, part(0.35, 0.65)), _slip, joints, few=True, quantities=clock, fixed=((1, (0.5,)),)),
         Fault(
             "cable_pull",
-            _one(_milli, _within(0.35, 0.75)),
+            one(milli, within(0.35, 0.75)),
             _cable,
             joints,
             few=True,
             quantities=own_position,
             fixed=((1, (0.0,)),),
         ),
-        Fault(
-            "hose", _one(_milli, _within(0.3, 0.7)), _hose, joints, few=True, quantities=_before, fixed=((1, (0.0,)),)
-        ),
+        Fault("hose", one(milli, within(0.3, 0.7)), _hose, joints, few=True, quantities=_before, fixed=((1, (0.0,)),)),
         Fault(
             "hot_motor",
-            _one(_milli),
+            one(milli),
             _hot_motor,
             joints,
             few=True,
@@ -183,7 +159,7 @@ UNLISTED: dict[str, Fault] = {
             lambda s, rng: np.array([[1e-4, rng.uniform(0.2, 0.6)]]),
             _pedestal,
             _base,
-            quantities=lambda s, places: [*s.world.names[:3], "payload", *REACH],
+            quantities=lambda s, places: [*s.world.names[:3], "payload", *REACH, *MOMENT],
             fixed=((1, (0.4,)),),
         ),
         Fault(
@@ -213,7 +189,7 @@ UNLISTED: dict[str, Fault] = {
         ),
         Fault(
             "damaged_teeth",
-            _one(_milli, _within(0.25, 0.75), _part(0.2, 0.4)),
+            one(milli, within(0.25, 0.75), part(0.2, 0.4)),
             _tooth,
             joints,
             few=True,
@@ -222,7 +198,7 @@ UNLISTED: dict[str, Fault] = {
         ),
         Fault(
             "speed_droop",
-            _one(_milli),
+            one(milli),
             _droop,
             joints,
             few=True,
@@ -239,7 +215,7 @@ UNLISTED: dict[str, Fault] = {
         ),
         Fault(
             "relaxing_joint",
-            _one(_milli, _part(0.03, 0.1)),
+            one(milli, part(0.03, 0.1)),
             _brake,
             joints,
             few=True,
@@ -247,6 +223,8 @@ UNLISTED: dict[str, Fault] = {
             quantities=lambda s, places: ["time", "order", "session"],
             fixed=((1, (0.05,)),),
         ),
+        *INTERPLAY,
+        *ELUSIVE,
     )
 }
-"""Twelve kinds by name."""
+"""Twelve kinds of one quantity at one place, and those of the two other modules, by name."""

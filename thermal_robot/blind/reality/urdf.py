@@ -14,7 +14,10 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Joint:
-    """One joint of the tree: ``origin`` (xyz, rpy) in its parent link, unit ``axis`` in its own frame, limits, type."""
+    """One joint of the tree: ``origin`` (xyz, rpy) in its parent link, unit ``axis`` in its own frame, limits, type.
+
+    ``mimic`` is the joint that it follows, with multiplier and offset; ``None`` for one that is commanded itself.
+    """
 
     name: str
     kind: str
@@ -25,11 +28,17 @@ class Joint:
     axis: Array
     lower: float
     upper: float
+    mimic: tuple[str, float, float] | None = None
 
     @property
     def movable(self) -> bool:
         """Whether it moves at all."""
         return self.kind in ("revolute", "continuous", "prismatic")
+
+    @property
+    def commanded(self) -> bool:
+        """Whether it is commanded itself, instead of following another one or standing still."""
+        return self.movable and self.mimic is None
 
     @property
     def held(self) -> float:
@@ -62,7 +71,7 @@ class Tree:
 
 
 def read(text: str) -> Tree:
-    """Read URDF text; mimic tags, meshes and everything that has no part in statics are passed over."""
+    """Read URDF text; meshes and everything that has no part in statics are passed over."""
     text = re.sub(r"<\?xml[^>]*\?>", "", text)
     robot = ElementTree.fromstring(text.strip())
     mass, centre = {}, {}
@@ -85,7 +94,7 @@ def read(text: str) -> Tree:
 
 def _joint(node: ElementTree.Element) -> Joint:
     axis = _numbers(node.find("axis"), "xyz") if node.find("axis") is not None else np.array([1.0, 0, 0])
-    limit, kind = node.find("limit"), node.attrib["type"]
+    limit, mimic, kind = node.find("limit"), node.find("mimic"), node.attrib["type"]
     bounded = limit is not None and kind in ("revolute", "prismatic")
     parent, child = node.find("parent"), node.find("child")
     assert parent is not None  # a URDF joint has both
@@ -100,7 +109,12 @@ def _joint(node: ElementTree.Element) -> Joint:
         axis=axis / max(float(np.linalg.norm(axis)), 1e-12),
         lower=float(limit.get("lower", 0.0)) if bounded and limit is not None else -np.inf,
         upper=float(limit.get("upper", 0.0)) if bounded and limit is not None else np.inf,
+        mimic=None if mimic is None else _coupling(mimic),
     )
+
+
+def _coupling(node: ElementTree.Element) -> tuple[str, float, float]:
+    return node.attrib["joint"], float(node.get("multiplier", 1.0)), float(node.get("offset", 0.0))
 
 
 def _numbers(node: ElementTree.Element | None, name: str) -> Array:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from copy import copy
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
@@ -18,6 +18,7 @@ NODES = 3  # hinges into which a beam's bending is lumped
 _SHORTEST = 1e-6  # m
 _SETTLED = 1e-13  # rad
 _ROUNDS = 60
+_ROTOR = 1.0  # kg m², kg: MuJoCo wants inertia in every freedom; where nothing is accelerated it plays no part
 
 
 @dataclass
@@ -55,6 +56,19 @@ class Body:
     tool: Array
     scale: float = 0.0
 
+    def take(self, rows: NDArray[np.int64]) -> Body:
+        """Return the same over some of the rows."""
+        placements = self.placements if self.placements.ndim == 2 else self.placements[rows]
+        return replace(
+            self,
+            joints=self.joints[rows],
+            bow=self.bow[rows],
+            growth=self.growth[rows],
+            placements=placements,
+            base=self.base[rows],
+            tool=self.tool[rows],
+        )
+
     def move(self, where: str, twists: Array) -> None:
         """Move the ``base`` (in its own frame) or the ``tool`` by (N, 6) translations (m) and rotation vectors."""
         motion = from_vector(twists)
@@ -79,9 +93,12 @@ class World:
     Attributes
     ----------
     joints
-        The n movable joints of the chain.
+        The n joints of the chain that are commanded.
     chain
-        All its joints, fixed ones too.
+        All its joints, fixed ones and those that follow another one too.
+    coupling, rest
+        (m, n) and (m,) where the m movable joints of the chain stand, those that follow another one among them:
+        coupling · q + rest.
     segments
         Indices into ``chain`` of placements with a length, S of them.
     slides
@@ -92,20 +109,37 @@ class World:
         self.tree = read(urdf)
         self.tool_frame = tool_frame
         self.chain = self.tree.chain(tool_frame)
-        self.joints: tuple[Joint, ...] = tuple(j for j in self.chain if j.movable)
+        self.joints: tuple[Joint, ...] = tuple(j for j in self.chain if j.commanded)
+        self.moving = tuple(j for j in self.chain if j.movable)
         self.names = tuple(j.name for j in self.joints)
         self.slides = np.array([j.kind == "prismatic" for j in self.joints])
         self.segments = tuple(k for k, j in enumerate(self.chain) if np.linalg.norm(j.xyz) > _SHORTEST)
         self.links = tuple(self.chain[k].parent for k in self.segments)
         self.lower = np.array([j.lower for j in self.joints])
         self.upper = np.array([j.upper for j in self.joints])
+        self.coupling, self.rest = self._coupling()
         self._com = payload_com
-        self._sound: tuple[mujoco.MjModel, bool] | None = None
+        self._sound: dict[bool, mujoco.MjModel] = {}
 
     @property
     def n(self) -> int:
-        """Number of movable joints."""
+        """Number of joints that are commanded."""
         return len(self.joints)
+
+    def _coupling(self) -> tuple[Array, Array]:
+        joints = {j.name: j for j in self.tree.joints}
+        coupling, rest = np.zeros((len(self.moving), self.n)), np.zeros(len(self.moving))
+        for row, joint in enumerate(self.moving):
+            factor = 1.0
+            while joint.mimic is not None:  # one may follow one that follows another
+                driver, multiplier, offset = joint.mimic
+                rest[row] += factor * offset
+                factor, joint = factor * multiplier, joints[driver]
+            if joint.name in self.names:
+                coupling[row, self.names.index(joint.name)] = factor
+            else:
+                rest[row] += factor * joint.held
+        return coupling, rest
 
     def sound(self, samples: int) -> Body:
         """Return the state of a robot without fault."""
@@ -128,18 +162,19 @@ class World:
         """
         bending = bool(np.any(body.beams) or np.any(body.bow))
         # a copy: rows stretch it
-        model = copy(self._compile(bending, body.placements if body.placements.ndim == 2 else None))
+        model = copy(self.compile(bending, body.placements if body.placements.ndim == 2 else None))
         data = mujoco.MjData(model)
         tool = model.body(f"link:{self.tool_frame}").id
         carried = model.body("payload").id
-        address = [int(model.joint(name).qposadr[0]) for name in self.names]
+        address = self.address(model)
         steps = [self._steps(model, k, bending) for k in self.segments]
         rest = model.body_pos.copy()
-        nodes = self._nodes(model) if bending else np.zeros((0, 2, NODES), dtype=int)
-        pieces = np.array([np.linalg.norm(self.chain[k].xyz) for k in self.segments])[: len(nodes)] / NODES
-        compliance, free = np.zeros(model.nv), np.zeros(model.nv)
-        compliance[address] = body.springs
-        compliance[nodes] = (body.beams[: len(nodes)] * pieces[:, None])[:, :, None]
+        nodes = self.nodes(model) if bending else np.zeros((0, 2, NODES), dtype=int)
+        pieces = self.pieces[: len(nodes)]
+        free, compliance = np.zeros(model.nv), np.zeros((model.nv, model.nv))
+        # a spring turns a joint, and with it all that follow it
+        compliance[np.ix_(address, address)] = (self.coupling * body.springs) @ self.coupling.T
+        compliance[nodes, nodes] = (body.beams[: len(nodes)] * pieces[:, None])[:, :, None]
         poses, torque = np.tile(np.eye(4), (len(q), 1, 1)), np.zeros((len(q), self.n))
         heaviness = np.nan
         each = body.placements if body.placements.ndim == 3 else None
@@ -153,17 +188,27 @@ class World:
                 model.body_pos[ids] = rest[ids] * (1.0 + body.growth[i, s])
             if each is not None:
                 self._place(model, each[i])
-            free[address] = q[i] + body.joints[i]
+            free[address] = self.coupling @ (q[i] + body.joints[i]) + self.rest
             free[nodes] = (body.bow[i, : len(nodes)] * pieces[:, None])[:, :, None]
-            torque[i] = _settle(model, data, free, compliance)[address]
+            torque[i] = _settle(model, data, free, compliance)[address] @ self.coupling
             poses[i, :3, :3] = data.xmat[tool].reshape(3, 3)
             poses[i, :3, 3] = data.xpos[tool]
         return poses, torque
 
-    def _compile(self, bending: bool, placements: Array | None) -> mujoco.MjModel:
+    @property
+    def pieces(self) -> Array:
+        """(S,) length of the pieces of each segment's beam, m."""
+        return np.array([np.linalg.norm(self.chain[k].xyz) for k in self.segments]) / NODES
+
+    def address(self, model: mujoco.MjModel) -> list[int]:
+        """Return where the m movable joints of the chain stand among the coordinates."""
+        return [int(model.joint(joint.name).qposadr[0]) for joint in self.moving]
+
+    def compile(self, bending: bool, placements: Array | None) -> mujoco.MjModel:
+        """Build the robot: ``bending`` with beams for links, ``placements`` as in :class:`Body` or ``None``."""
         plain = placements is None or not placements.any()
-        if plain and self._sound is not None and self._sound[1] == bending:
-            return self._sound[0]
+        if plain and bending in self._sound:
+            return self._sound[bending]
         spec = mujoco.MjSpec()
         spec.compiler.degree = False
         spec.compiler.fusestatic = False
@@ -187,14 +232,14 @@ class World:
             if joint.movable and k is not None:
                 slide = joint.kind == "prismatic"
                 kind = mujoco.mjtJoint.mjJNT_SLIDE if slide else mujoco.mjtJoint.mjJNT_HINGE
-                body.add_joint(name=joint.name, type=kind, axis=joint.axis)
+                body.add_joint(name=joint.name, type=kind, axis=joint.axis, armature=_ROTOR)
             elif joint.movable and joint.held:
                 self._hold(body, joint, rotation)
             bodies[joint.child] = body
         self._mass(bodies[self.tool_frame].add_body(name="payload"), 0.0, np.array(self._com))
         model = spec.compile()
         if plain:
-            self._sound = (model, bending)
+            self._sound[bending] = model
         return model
 
     def _body(self, parent: mujoco.MjsBody, link: str, offset: Array, rotation: Array) -> mujoco.MjsBody:
@@ -224,7 +269,8 @@ class World:
             parent = parent.add_body(name=f"{joint.name}/{node}", pos=step)
             self._mass(parent, 0.0, np.zeros(3))
             for axis, vector in enumerate((first, second)):
-                parent.add_joint(name=f"{joint.name}/{node}/{axis}", type=mujoco.mjtJoint.mjJNT_HINGE, axis=vector)
+                name, kind = f"{joint.name}/{node}/{axis}", mujoco.mjtJoint.mjJNT_HINGE
+                parent.add_joint(name=name, type=kind, axis=vector, armature=_ROTOR)
         return parent
 
     def _steps(self, model: mujoco.MjModel, k: int, bending: bool) -> list[int]:
@@ -232,7 +278,7 @@ class World:
         names = [f"{joint.name}/{node}" for node in range(NODES)] if bending else []
         return [int(model.body(name).id) for name in (*names, f"link:{joint.child}")]
 
-    def _nodes(self, model: mujoco.MjModel) -> NDArray[np.int64]:
+    def nodes(self, model: mujoco.MjModel) -> NDArray[np.int64]:
         """(S, 2, NODES) addresses of the hinges of the beams."""
         return np.array(
             [
@@ -255,13 +301,13 @@ class World:
 
 def _settle(model: mujoco.MjModel, data: mujoco.MjData, free: Array, compliance: Array) -> Array:
     """Let joints yield from where they are free until springs balance gravity; return what holds them, N·m."""
-    held, yields = np.zeros(model.nv), bool(np.any(compliance))
+    held, yields = np.zeros(model.nv), bool(compliance.any())
     data.qpos[:] = free
     for _ in range(_ROUNDS):
         mujoco.mj_kinematics(model, data)
         mujoco.mj_comPos(model, data)
         mujoco.mj_rne(model, data, 0, held)
-        settled = free - compliance * held
+        settled = free - compliance @ held
         change = float(np.abs(settled - data.qpos).max())
         data.qpos[:] = settled
         if not yields or change < _SETTLED:

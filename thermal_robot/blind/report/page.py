@@ -16,7 +16,7 @@ from thermal_robot.report.html_parts import bullets, document, figure, paragraph
 Plain = Mapping[str, Any]
 
 _CARDS = ("single", "null", "removed", "unlisted")
-_ASKED = ("exact", "right", "first_named", "found", "false_alarm", "place", "quantity")
+_ASKED = ("exact", "right", "first_named", "found", "false_alarm", "place", "near_place", "quantity")
 
 
 def html(score: Plain, generated: str) -> str:
@@ -43,7 +43,7 @@ def _whole(score: Plain, generated: str) -> Iterator[str]:
     if score["confusion"]:
         yield section("What was named", *_confusions(score))
     yield from _one_by_one(score)
-    said = "How often effects were at work against how probable they were said to be"
+    said = "How often effects and laws were true against how probable they were said to be"
     yield section("Probabilities", figure(calibration_figure(score), said))
     power = figure(power_figure(score), "Share of effects found, by size and by number of rows")
     yield section("What it takes to be found", power, *_needed(score["detection"]["curve"]))
@@ -75,7 +75,7 @@ def _confusions(score: Plain) -> Iterator[str]:
 
 def _one_by_one(score: Plain) -> Iterator[str]:
     groups = (
-        ("By effect, where one, two or three are at work", score["by_effect"]),
+        ("By effect, where one or several are at work", score["by_effect"]),
         ("By robot, the same cases and those with nothing at work", score["by_robot"]),
         ("Effect taken out of the library, by effect", score["removed"]),
         ("Cause that no library knows, by cause", score["unlisted"]),

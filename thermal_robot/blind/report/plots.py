@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 from matplotlib.patches import Rectangle
 from matplotlib.ticker import FuncFormatter
 
+from thermal_robot.blind.judged import KNOWN
 from thermal_robot.blind.report.words import effect
 from thermal_robot.report import units
 from thermal_robot.report.drawing import (
@@ -38,8 +39,8 @@ _HEADINGS = {
 _DARK = 0.55  # share of a row above which its number is written in the colour of the paper
 _LEAST = 1e-4  # of the gap: what is less is drawn at the edge
 _GROUPS = {
-    "known effect at work": (AFTER, "o", ("single", "pair", "triple", "null", "hard", "faint")),
-    "cause withheld": (THIRD, "^", ("removed", "hidden", "unlisted")),
+    "known effect at work": (AFTER, "o", (*KNOWN, "mixed")),
+    "cause withheld": (THIRD, "^", ("removed", "hidden", "unlisted", "both")),
     "real campaign": (BEFORE, "s", ("real",)),
 }
 

@@ -12,6 +12,14 @@ from thermal_robot.report import units
 WIDTH = 100
 _ANSWERS = ("nothing", "unexplained", "failed")
 _SHORT = {"nothing": "n", "unexplained": "u", "failed": "f"}
+_ASKED = ("exact", "right", "first_named", "found", "false_alarm", "place", "near_place", "quantity")
+_HEADS = {
+    "exact": "exact",
+    "first_named": "named first",
+    "right": "right",
+    "near_place": "or beside",
+    "quantity": "what it follows",
+}
 _TABLES = {
     "single": "one effect, nothing, or a cause that no library knows",
     "hard": "one small effect, few rows",
@@ -37,7 +45,7 @@ def text(score: Plain) -> str:
     blocks = [
         [_heading(score)],
         [f"{'HOW OFTEN':<64}{'share':>8}   95 % interval", *_kinds(score["kinds"])],
-        ["BY EFFECT, where one, two or three are at work", *_groups(score["by_effect"])],
+        ["BY EFFECT, where one or several are at work", *_groups(score["by_effect"])],
         ["BY ROBOT, the same cases and those with nothing at work", *_groups(score["by_robot"])],
         ["EFFECT TAKEN OUT OF THE LIBRARY, by effect", *_groups(score["removed"])],
         ["CAUSE THAT NO LIBRARY KNOWS, by cause", *_groups(score["unlisted"])],
@@ -77,11 +85,10 @@ def _groups(groups: Mapping[str, Plain]) -> Iterator[str]:
     if not groups:
         return
     first = next(iter(groups.values()))
-    asked = [q for q in ("exact", "right", "first_named", "found", "false_alarm", "place", "quantity") if q in first]
-    heads = {"exact": "exact", "first_named": "named first", "right": "right"}
+    asked = [q for q in _ASKED if q in first]
     wide = max(len(name) for name in groups)
     column = 17
-    yield f"  {'':{wide}}" + "".join(f"{heads.get(q, question(q)):>{column}}" for q in asked)
+    yield f"  {'':{wide}}" + "".join(f"{_HEADS.get(q, question(q)):>{column}}" for q in asked)
     for name, rates in groups.items():
         yield f"  {name:{wide}}" + "".join(f"{_share(rates.get(q)):>{column}}" for q in asked).rstrip()
 

@@ -9,14 +9,18 @@ from thermal_robot.report import units
 
 KINDS = {
     "single": "one effect",
+    "large": "one large effect",
+    "visits": "encoder steps, poses visited 2 to 5 times",
+    "lags": "one large effect with a lag",
     "pair": "two effects",
-    "triple": "three effects",
+    "many": "three to five effects",
     "null": "nothing but noise",
     "hard": "one small effect, few rows",
-    "faint": "effects by chance, hardly to be seen",
+    "mixed": "effects and causes by chance, of any size",
     "removed": "effect taken out of the library",
     "hidden": "condition not recorded",
     "unlisted": "cause that no library knows",
+    "both": "such a cause beside one or two effects",
     "real": "real campaigns",
 }
 QUESTIONS = {
@@ -29,7 +33,9 @@ QUESTIONS = {
     "flagged": "called unexplained",
     "not_blamed": "no innocent effect named as 90 % probable",
     "place": "where it enters",
-    "quantity": "what it follows",
+    "near_place": "there or beside it",
+    "listed": "all listed effects found",
+    "quantity": "what it follows, or rightly nothing",
     "named": "named what must be recorded",
     "asks": "advised to record it",
     "right": "right",
@@ -39,6 +45,7 @@ _OF_KIND = {
     ("null", "exact"): "nothing found, nothing unexplained",
     ("removed", "right"): "called unexplained, none innocent named",
     ("unlisted", "right"): "called unexplained, none innocent named",
+    ("both", "right"): "listed ones found, the rest unexplained",
     ("hidden", "right"): "unexplained, nobody blamed, told to record it",
     ("real", "right"): "right, by the rule of each question",
 }
@@ -114,7 +121,7 @@ def facts(score: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
     )
     said = []
     if all_["trials"]:
-        said.append(("calibration error", f"{units.percent(all_['error'])} over {all_['trials']} effects"))
+        said.append(("calibration error", f"{units.percent(all_['error'])} over {all_['trials']} effects and laws"))
     if sure["trials"]:
         between = f"{units.percent(sure['error'])} over the {sure['trials']} that are 5 to 95 % probable"
         said.append(("calibration error where in doubt", between))
@@ -123,12 +130,30 @@ def facts(score: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
             f"{units.percent(gap['median_absolute_difference'])} of the gap in the median, {len(gap['pairs'])} cases"
         )
         said.append(("shrinkage claimed against reached", f"apart by {apart}"))
+    said += _rates(score)
     if time["median"] is not None:
         spent = (
             f"{time['median']:.2f} s in the median, 95 % within {time['q95']:.2f} s, longest {time['longest']:.2f} s"
         )
         said.append(("time of a diagnosis", spent))
     return tuple(said)
+
+
+def _rates(score: Mapping[str, Any]) -> list[tuple[str, str]]:
+    """Return laws that were sure, models that do harm, and intervals that hold."""
+    held = score["coverage"]
+    rates = (
+        ("laws printed at 90 % and more", score["laws"], "right"),
+        ("corrected model worse than none", score["worse"], "on fresh samples"),
+        ("95 % intervals of parameters", held["parameters"], "hold the truth"),
+        ("95 % intervals of the shrinkage", held["shrinkage"], "hold that on fresh samples"),
+        ("95 % intervals of shares", held["shares"], "hold those on fresh samples"),
+    )
+    return [
+        (name, f"{count(rate)} {what}: {units.percent(rate['value'])}, 95 % interval {interval(rate)}")
+        for name, rate, what in rates
+        if rate["trials"]
+    ]
 
 
 def miss(case: Mapping[str, Any]) -> tuple[str, str]:

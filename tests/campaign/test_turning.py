@@ -1,0 +1,105 @@
+"""How far a joint has gone since it turned round: by hand, against a walk row by row, and with rows taken away."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+from helpers import commanded
+
+from thermal_robot.campaign.turning import SLIPS, since_turns, strained
+
+
+def along(path, **columns):
+    q = np.array(path, dtype=float)[:, None]
+    columns = {name: np.array(values, dtype=float) for name, values in columns.items()}
+    return since_turns(q, ("elbow",), columns or {"order": np.arange(float(len(q)))}, None)["elbow"].tolist()
+
+
+def test_distance_counts_from_the_last_turn_with_its_sign():
+    assert along([0.0, 1.0, 3.0, 2.0, 0.5, 0.75]) == [0.0, 1.0, 3.0, -1.0, -2.5, 0.25]
+
+
+def test_a_joint_that_rests_has_not_turned():
+    assert along([0.0, 2.0, 2.0, 3.0, 3.0, 1.0, 1.0]) == [0.0, 2.0, 2.0, 3.0, 3.0, -2.0, -2.0]
+    assert along([1.0, 1.0, 1.0]) == [0.0, 0.0, 0.0]
+    assert along([1.0, 1.0, 0.5]) == [0.0, 0.0, -0.5]
+
+
+def test_rows_count_in_the_order_of_the_clock():
+    assert along([3.0, 0.0, 2.0, 1.0], time=[20.0, 0.0, 30.0, 10.0]) == [3.0, 0.0, -1.0, 1.0]
+    # the time tells, where there is an order, too
+    assert along([3.0, 0.0], time=[20.0, 0.0], order=[0.0, 1.0]) == [3.0, 0.0]
+
+
+def test_nothing_is_remembered_between_sessions():
+    q = np.array([[0.0], [10.0], [1.0], [9.0], [2.0], [7.0]])
+    found = since_turns(q, ("elbow",), {"order": np.arange(6.0)}, np.array(list("ababab")))
+    assert found["elbow"].tolist() == [0.0, 0.0, 1.0, -1.0, 2.0, -3.0]
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_it_is_what_a_walk_from_row_to_row_finds(seed):
+    path = np.random.default_rng(seed).normal(size=60).round(1)
+    last, way, expected = path[0], 0.0, [0.0]
+    for before, now in pairwise(path):
+        step = np.sign(now - before)
+        if step * way < 0.0:
+            last = before
+        way = step or way
+        expected.append(now - last)
+    np.testing.assert_allclose(along(path), expected, atol=1e-12)
+
+
+def strains(path):
+    path = np.array(path, dtype=float)[:, None]
+    found = since_turns(path, ("elbow",), {"order": np.arange(float(len(path)))}, None)
+    return np.column_stack([found[strained("elbow", slip)] for slip in SLIPS])
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_an_element_is_strained_by_what_play_of_its_width_does_not_follow(seed):
+    """The stop operator is the input less the play operator's output."""
+    path = np.random.default_rng(seed).uniform(-2.0, 2.0, 80)
+    plays = np.full((len(path), len(SLIPS)), path[0])
+    for row in range(1, len(path)):
+        plays[row] = np.maximum(path[row] - SLIPS, np.minimum(path[row] + SLIPS, plays[row - 1]))
+    np.testing.assert_allclose(strains(path), path[:, None] - plays, atol=1e-12)
+
+
+def test_it_does_not_matter_how_fast_or_in_how_many_steps_a_joint_goes():
+    path = np.random.default_rng(5).uniform(-2.0, 2.0, 40)
+    finer = np.interp(np.linspace(0, 39, 39 * 4 + 1), np.arange(40), path)
+    np.testing.assert_allclose(strains(finer)[::4], strains(path), atol=1e-12)
+
+
+def test_a_loop_that_is_closed_is_forgotten():
+    path = [0.0, 1.5, -0.7, 0.9, 0.3]
+    loop = [0.0, 1.5, -0.7, 0.5, 0.1, 0.4, 0.1, 0.5, 0.9, 0.3]
+    np.testing.assert_allclose(strains(loop)[-1], strains(path)[-1], atol=1e-12)
+
+
+def test_elements_slip_at_their_strain_and_start_slack():
+    found = strains([0.2, 5.2, 5.2, 5.1])
+    np.testing.assert_array_equal(found[0], 0.0)
+    np.testing.assert_allclose(found[1], SLIPS)
+    np.testing.assert_allclose(found[2], SLIPS)
+    np.testing.assert_allclose(found[3], np.maximum(np.array(SLIPS) - 0.1, -np.array(SLIPS)))
+
+
+def test_rows_in_no_order_have_no_past(rv_m2):
+    assert commanded(rv_m2).since_turn == {}
+    assert commanded(rv_m2, {"time": np.zeros(10)}).since_turn == {}
+
+
+def test_rows_that_are_taken_keep_their_past(rv_m2):
+    whole = commanded(rv_m2, {"time": np.arange(10.0)[::-1]})
+    rows = np.array([7, 2, 5])
+    part = whole.take(rows)
+    assert set(part.since_turn) > set(rv_m2.joint_names)
+    for joint in whole.since_turn:
+        np.testing.assert_array_equal(part.since_turn[joint], whole.since_turn[joint][rows])
+        np.testing.assert_array_equal(part.take([1]).since_turn[joint], whole.since_turn[joint][[2]])
+    # other commands have another past
+    moved = replace(whole, q=whole.q[::-1])
+    assert not np.array_equal(moved.since_turn["joint_2"], whole.since_turn["joint_2"])

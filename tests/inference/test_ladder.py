@@ -1,0 +1,307 @@
+"""One evidence: of every combination beside every discrepancy, and the sum over them."""
+
+from dataclasses import replace
+from itertools import combinations, permutations
+
+import numpy as np
+import pytest
+from inference.densities import dense, direct, volume
+from inference.problems import small_problem
+from scipy.special import logsumexp
+
+from thermal_robot.inference import settings
+from thermal_robot.inference.discrepancy import Form
+from thermal_robot.inference.ladder import PLAIN, Ladder
+
+PRIOR = (-1.0, -2.0, -0.5)
+CHOSEN = [c for size in range(4) for c in combinations(range(3), size)]
+
+
+def two_forms(rows, seed=0):
+    """One that is the same matrix for all rows, few functions; one of a matrix each, more functions than rows."""
+    rng = np.random.default_rng(seed)
+    narrow = Form("narrow", rng.normal(size=(rows, 3)), np.eye(3))
+    wide = Form("wide", rng.normal(size=(rows, 40)), rng.normal(size=(rows, 3, 2)))
+    return [narrow, wide]
+
+
+def inside(form, whitening):
+    """Dense covariance of a form, weighed, of the rows in use, in units of the noise."""
+    root = np.repeat(np.sqrt(whitening.weights), 3)
+    used = root > 0.0
+    return (root[:, None] * dense(form, whitening.noise) * root)[np.ix_(used, used)]
+
+
+def drawn(seed, rows=24, present=(1,), tau=0.0, which=0):
+    """A small problem with a discrepancy of known form and size, and the ladder on it."""
+    linear, whitening = small_problem(seed, rows=rows, present=present)
+    whitening = replace(whitening, weights=np.where(whitening.weights > 0, 1.0, 0.0))
+    offered = two_forms(rows, seed)
+    if tau:
+        rng = np.random.default_rng([seed, 5])
+        covariance = dense(offered[which], whitening.noise)
+        value, vector = np.linalg.eigh(covariance)
+        error = tau * (vector * np.sqrt(np.maximum(value, 0.0))) @ rng.normal(size=3 * rows)
+        linear = replace(linear, gap=linear.gap + error.reshape(rows, 3))
+    return linear, whitening, Ladder(linear, whitening, offered, PRIOR)
+
+
+def belief(ladder):
+    """Probability that there is a discrepancy; those of all forms and of none are one."""
+    odds = ladder.forms_in_question()
+    assert sum(odds.values()) == pytest.approx(1.0)
+    return 1.0 - odds.get("", 0.0)
+
+
+def rungs(ladder):
+    return [PLAIN, *((k, tau) for k in range(len(ladder.forms)) for tau in settings.TAUS)]
+
+
+def test_evidence_beside_a_discrepancy_is_the_density_of_the_gap():
+    """Of all combinations and rungs, weights included, but for one constant and the prior odds of rungs."""
+    for seed in range(3):
+        linear, whitening = small_problem(seed, rows=12, present=(1,))
+        offered = two_forms(12, seed)
+        ladder = Ladder(linear, whitening, offered, PRIOR)
+        ours, theirs = [], []
+        for rung in (PLAIN, (0, 0.5), (0, 8.0), (1, 1.0), (1, 16.0)):
+            form, tau = rung
+            beside = None if form < 0 else tau**2 * inside(offered[form], whitening)
+            for blocks in CHOSEN:
+                found = ladder.beside(rung).evaluate(blocks)
+                # two forms share what a discrepancy is given, and so do the sizes of each
+                odds = np.log(0.5) if form < 0 else np.log(0.5 / (2 * len(settings.TAUS)))
+                density = direct(linear, whitening, found, PRIOR, beside=beside)
+                theirs.append(density + volume(linear, whitening, found, beside=beside) + odds)
+                ours.append(found.log_evidence)
+        off = np.subtract(ours, theirs)
+        # a peak over ln λ that is flatter than a parabola can tell is bounded: its density has no such volume
+        peaked = np.isfinite(off)
+        assert peaked.sum() > 0.8 * len(off)
+        near = np.abs(off - np.median(off[peaked])) < 1e-5
+        assert near[peaked].mean() > 0.9
+        assert (off[peaked] - np.median(off[peaked])).max() < 0.6
+
+
+def test_an_evidence_from_the_columns_of_its_blocks_alone_is_that_of_the_whole_problem():
+    for seed in range(3):
+        _, _, ladder = drawn(seed, tau=2.0)
+        for rung in ((0, 0.5), (0, 4.0), (1, 2.0), (1, 64.0)):
+            for blocks in CHOSEN:
+                whole = ladder.beside(rung).evaluate(blocks).log_evidence
+                assert ladder._beside(rung, blocks) == pytest.approx(whole, abs=1e-6)
+
+
+def test_the_best_size_beside_a_combination_is_found_from_both_sides():
+    for seed in range(4):
+        for tau in (0.1, 1.0, 30.0):
+            _, _, ladder = drawn(seed, tau=tau, which=seed % 2)
+            for form in (0, 1):
+                every = [ladder._beside((form, t), (1,)) for t in settings.TAUS]
+                rung, log = ladder._size(form, (1,))
+                assert log == max(every)
+                assert rung == (form, settings.TAUS[int(np.argmax(every))])
+
+
+def everything(ladder):
+    """Log evidence of all combinations beside all rungs, each computed."""
+    return {
+        (rung, blocks): ladder.beside(rung).evaluate(blocks).log_evidence for rung in rungs(ladder) for blocks in CHOSEN
+    }
+
+
+@pytest.mark.parametrize("tau", [0.0, 0.7, 4.0])
+@pytest.mark.parametrize("present", [(), (1,), (0, 2)], ids=str)
+def test_summed_probabilities_are_those_of_all_combinations_and_discrepancies(present, tau):
+    """What the search leaves out of the sum, rungs 4 nats below the best, changes none by more than some hundredths."""
+    for seed in range(6):
+        linear, whitening, ladder = drawn(seed, present=present, tau=tau)
+        ladder.run()
+        compared, chances = ladder.probabilities()
+        assert chances.sum() == pytest.approx(1.0)
+        assert (np.diff(chances) <= 0.0).all()
+        log = everything(Ladder(linear, whitening, ladder.forms, PRIOR))
+        total = logsumexp(list(log.values()))
+        for b in range(3):
+            ours = sum(p for c, p in zip(compared, chances, strict=True) if b in c.blocks)
+            brute = np.exp(logsumexp([v for (_, blocks), v in log.items() if b in blocks]) - total)
+            assert ours == pytest.approx(brute, abs=0.04)
+        brute = 1.0 - np.exp(logsumexp([v for (rung, _), v in log.items() if rung == PLAIN]) - total)
+        assert belief(ladder) == pytest.approx(brute, abs=0.04)
+
+
+@pytest.mark.parametrize("tau", [0.0, 2.0, 20.0])
+def test_the_search_finds_the_best_combination_beside_the_best_discrepancy(tau):
+    for seed in range(6):
+        linear, whitening, ladder = drawn(seed, present=((), (0,), (0, 2))[seed % 3], tau=tau, which=seed % 2)
+        _, best = ladder.run()
+        log = everything(Ladder(linear, whitening, ladder.forms, PRIOR))
+        assert best.log_evidence == pytest.approx(max(log.values()), abs=1e-2)
+
+
+def test_where_the_search_starts_and_in_which_order_does_not_matter():
+    starts = [(0,), (1, 2), (2,)]
+    for seed in range(4):
+        answers = set()
+        for order in permutations(starts):
+            _, _, ladder = drawn(seed, present=(0, 2), tau=3.0)
+            rung, best = ladder.run(order)
+            answers.add((rung, best.blocks, round(best.log_evidence, 2)))
+        _, _, ladder = drawn(seed, present=(0, 2), tau=3.0)
+        rung, best = ladder.run()
+        answers.add((rung, best.blocks, round(best.log_evidence, 2)))
+        assert len(answers) == 1, answers
+
+
+def test_a_start_that_is_not_allowed_is_left_out():
+    linear, whitening = small_problem(1, rows=24, present=(0, 2))
+    ladder = Ladder(linear, whitening, [], PRIOR, frozenset({frozenset({0, 2})}))
+    ladder.run([(0, 2), (1,)])
+    assert not any({0, 2} <= set(blocks) for search in ladder.searches.values() for blocks in search.seen)
+
+
+@pytest.mark.parametrize("which", [0, 1], ids=["one matrix", "by row"])
+def test_form_and_size_of_a_discrepancy_are_told(which):
+    sizes, beliefs = [], []
+    for seed in range(10):
+        _, _, ladder = drawn(seed, rows=40, tau=4.0, which=which)
+        (form, tau), best = ladder.run()
+        assert best.blocks == (1,)
+        beliefs.append(belief(ladder))
+        sizes.append(tau if form == which else np.nan)
+    assert min(beliefs) > 0.99
+    assert np.isfinite(sizes).mean() >= 0.9
+    assert 2.0 < np.nanmedian(sizes) < 8.0
+
+
+def test_without_forms_it_is_a_search_without_a_discrepancy():
+    linear, whitening = small_problem(2, rows=24, present=(1,))
+    ladder = Ladder(linear, whitening, [], PRIOR)
+    rung, best = ladder.run()
+    assert (rung, best.blocks) == (PLAIN, (1,))
+    assert belief(ladder) == 0.0
+    assert list(ladder.searches) == [PLAIN]
+    assert ladder.in_question(best) == ()
+
+
+def test_the_consensus_is_the_best_setting_of_the_most_probable_name():
+    """Two settings of one name, each less probable than another effect, are more probable together."""
+    linear, whitening = small_problem(3, rows=24, present=())
+    ladder = Ladder(linear, whitening, [], PRIOR)
+    search = ladder.searches[PLAIN]
+    for blocks, log in {(0,): 0.0, (1,): -0.3, (2,): -0.5}.items():
+        search.seen[blocks] = replace(search.evaluate(blocks), log_evidence=log)
+    assert ladder.probabilities()[0][0].blocks == (0,)
+    assert ladder.consensus(["a", "b", "b"])[1].blocks == (1,)
+    assert ladder.consensus(["a", "b", "c"])[1].blocks == (0,)
+
+
+def test_the_consensus_sums_over_discrepancies():
+    linear, whitening, _ = drawn(4, present=())
+    ladder = Ladder(linear, whitening, two_forms(24), PRIOR)
+    beside = {PLAIN: -0.2, (0, 1.0): -0.3, (1, 2.0): -0.4}
+    for rung, log in beside.items():
+        search = ladder.beside(rung)
+        search.seen = {(1,): replace(search.evaluate((1,)), log_evidence=log)}
+    other = ladder.beside((0, 2.0))
+    other.seen = {(0,): replace(other.evaluate((0,)), log_evidence=0.0)}
+    rung, best = ladder.consensus(["a", "b", "c"])
+    assert (rung, best.blocks) == (PLAIN, (1,))
+
+
+def test_forms_that_are_out_of_the_question_are_told():
+    """A discrepancy of one form, twenty times the noise: the other is no rival, and that there is none even less."""
+    _, _, ladder = drawn(5, rows=40, tau=20.0, which=0)
+    rung, best = ladder.run()
+    assert rung[0] == 0
+    assert [form.name for form in ladder.in_question(best)] == ["narrow"]
+    # where nothing is there, each remains in question
+    _, _, ladder = drawn(5, rows=40)
+    _, best = ladder.run()
+    assert [form.name for form in ladder.in_question(best)] == ["narrow", "wide"]
+
+
+def test_blocks_that_contain_each_other_are_apart_beside_every_discrepancy():
+    linear, whitening = small_problem(6, rows=24, present=(2,))
+    part = replace(linear.blocks[0], columns=linear.blocks[2].columns[:, :, :1])
+    offered = two_forms(24)
+    error = 4.0 * offered[0].functions @ np.random.default_rng(6).normal(size=(3, 3)) * whitening.noise
+    linear = replace(linear, gap=linear.gap + error, blocks=(part, *linear.blocks[1:]))
+    ladder = Ladder(linear, whitening, offered, PRIOR)
+    ladder.run()
+    assert len(ladder.searches) > 1
+    for search in ladder.searches.values():
+        assert not search.allowed((0, 2))
+        assert not any({0, 2} <= set(blocks) for blocks in search.seen)
+
+
+SCATTERED = ("joint_2", "joint_4")
+
+
+def scattering(places, seed, rows=60, tau=6.0, present=()):
+    """Rows of which several joints, or one, err anew by so many times the noise; five joints on offer."""
+    rng = np.random.default_rng([seed, 9])
+    linear, whitening = small_problem(seed, rows=rows, present=present)
+    whitening = replace(whitening, weights=np.ones(rows))
+    offered, gap, each = [], linear.gap, np.arange(rows, dtype=float)
+    for k in range(1, 6):
+        moves = rng.normal(size=(rows, 3, 1))
+        name = f"joint_{k}"
+        offered.append(Form(f"poses, {name}", each, moves, True, ("joint", name)))
+        if name in places:
+            gap = gap + tau * (moves @ rng.normal(size=(rows, 1, 1)))[:, :, 0]
+    return Ladder(replace(linear, gap=gap), whitening, offered, PRIOR)
+
+
+@pytest.mark.parametrize("places", [SCATTERED, SCATTERED[:1]], ids=["two joints", "one joint"])
+def test_joints_that_scatter_are_told_whether_one_or_two(places):
+    for seed in range(5):
+        ladder = scattering(places, seed)
+        rung, best = ladder.run()
+        assert set(ladder.forms[rung[0]].name.split(", ")[1:]) == set(places)
+        assert ladder.forms[rung[0]].several == (len(places) > 1)
+        assert best.blocks == ()
+        assert belief(ladder) > 0.999
+        # what was put together is no form to start with: single ones are
+        assert not any(form.several for form in ladder.in_question(best))
+        assert {f"poses, {name}" for name in places} <= {form.name for form in ladder.in_question(best)}
+
+
+def test_joints_that_scatter_are_told_beside_an_effect():
+    """They are put together beside the best combination and beside none, once each, and no trial is kept."""
+    for seed in range(5):
+        ladder = scattering(SCATTERED, seed, present=(1,))
+        rung, best = ladder.run()
+        assert set(ladder.forms[rung[0]].name.split(", ")[1:]) == set(SCATTERED)
+        assert best.blocks == (1,)
+        joined = [form for form in ladder.forms if form.several]
+        assert 1 <= len(joined) <= 2 * (settings.SCATTERING - 1)
+        assert len(ladder.forms) == 5 + len(joined)
+        asked = {r[0] for r in (*ladder.searches, *(r for r, _ in ladder._quick))}
+        assert asked <= {-1, *range(len(ladder.forms))}
+
+
+def test_an_evidence_beside_several_joints_is_that_of_their_joined_covariance():
+    """Beside one joint and beside two, after others were tried and taken out again: against the gap's density."""
+    ladder = scattering(SCATTERED, 2, rows=30, present=(1,))
+    rung, _ = ladder.run()
+    assert ladder.forms[rung[0]].several
+    one = ladder.forms.index(next(form for form in ladder.forms if form.name == "poses, joint_2"))
+    linear, whitening = ladder.linear, ladder.whitening
+    off = []
+    for number, tau in (rung, (one, 1.0), (one, 8.0)):
+        form = ladder.forms[number]
+        covariance = tau**2 * inside(replace(form, functions=np.eye(30)), whitening)
+        alone = Ladder(linear, whitening, [form], PRIOR)
+        for blocks in CHOSEN:
+            found = alone.beside((0, tau)).evaluate(blocks)
+            less_prior = found.log_evidence - alone._priors[0, tau]
+            ours = ladder._beside((number, tau), blocks) - ladder._priors[number, tau]
+            assert ours == pytest.approx(less_prior, abs=1e-6)
+            density = direct(linear, whitening, found, PRIOR, beside=covariance)
+            density += volume(linear, whitening, found, beside=covariance)
+            off.append(less_prior - density)
+    off = np.array(off)[np.isfinite(off)]
+    assert len(off) > 0.8 * 3 * len(CHOSEN)
+    assert np.mean(np.abs(off - np.median(off)) < 1e-5) > 0.9
+    assert (off - np.median(off)).max() < 0.6

@@ -1,0 +1,94 @@
+"""Waves of any order: the periodogram is a least-squares fit of each order, and its peak is the order put in."""
+
+from time import process_time
+
+import numpy as np
+import pytest
+
+from thermal_robot.inference.periodogram import independent, orders, peak, periodogram
+from thermal_robot.inference.target import Target
+
+ROWS = 90
+
+
+def drawn(seed, reach=3.0, order=None, size=0.0):
+    """Positions of a joint, its moves, what a design leaves of a wave and noise, and that seen from the joint."""
+    rng = np.random.default_rng(seed)
+    q = rng.uniform(-reach / 2, reach / 2, ROWS)
+    moves, design = rng.normal(size=(ROWS, 3, 1)), rng.normal(size=(ROWS, 3, 5))
+    gap = 1e-5 * rng.normal(size=(ROWS, 3))
+    if order is not None:
+        gap = gap + size * np.cos(order * q + rng.uniform(0.0, 6.0))[:, None] * moves[:, :, 0]
+    target = Target.of(gap, design)
+    return q, moves, target, target.seat(moves)
+
+
+def wave(q, order):
+    return np.column_stack([np.ones_like(q), np.sin(order * q), np.cos(order * q)])
+
+
+def test_each_order_gains_what_its_fit_gains():
+    q, moves, target, seat = drawn(0)
+    grid = orders(q)
+    gains = periodogram(seat, q, grid)
+    for k in range(0, len(grid), 37):
+        alone = target.worth(moves * wave(q, grid[k])[:, None, :]).gain
+        assert gains[k] == pytest.approx(alone, rel=1e-6, abs=1e-6)
+
+
+def test_what_the_design_can_do_is_no_wave():
+    q, moves, target, _ = drawn(1)
+    order = 7.3
+    whole = Target.of(target.white.reshape(ROWS, 3), moves * wave(q, order)[:, None, 1:])
+    assert periodogram(whole.seat(moves), q, np.array([order]))[0] == -np.inf
+    assert np.isfinite(periodogram(whole.seat(moves), q, np.array([order + 2.0]))[0])
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_the_peak_is_the_order_that_was_put_in(seed):
+    order = float(np.random.default_rng([seed, 1]).uniform(1.0, 199.0))
+    q, moves, target, seat = drawn(seed, order=order, size=2e-4)
+    found = peak(seat, q, orders(q))
+    assert abs(found - order) < 0.02
+    assert target.worth(moves * wave(q, found)[:, None, :]).gain >= (
+        target.worth(moves * wave(q, order)[:, None, :]).gain - 1e-3
+    )
+
+
+def test_a_slide_is_searched_down_to_the_lead_of_a_screw():
+    rng = np.random.default_rng(3)
+    for period in (0.005, 0.02, 0.11):
+        q, _, _, seat = drawn(int(1e4 * period), reach=0.8, order=2.0 * np.pi / period, size=2e-4)
+        found = peak(seat, q, orders(q, slides=True))
+        assert 2.0 * np.pi / found == pytest.approx(period, rel=1e-3)
+    assert len(orders(np.zeros(ROWS))) == 0
+    assert independent(orders(np.zeros(ROWS))) == 0.0
+    # twice as far, twice as many orders can be told apart
+    near, far = (independent(orders(r * rng.uniform(0.0, 1.0, 4000))) for r in (1.5, 3.0))
+    assert far == pytest.approx(2.0 * near, rel=0.02)
+
+
+def test_positions_on_a_lattice_know_no_order_above_its_half():
+    lattice = np.deg2rad(10.0) * np.random.default_rng(0).integers(-9, 10, ROWS)
+    assert 17.0 < orders(lattice).max() <= 18.0
+    assert orders(lattice + 1e-3 * np.random.default_rng(1).normal(size=ROWS)).max() > 199.0
+
+
+def test_in_noise_the_choice_of_an_order_is_paid_for():
+    """Of sixty periodograms of noise not one gains more than its share of the orders allows."""
+    worths = []
+    for seed in range(60):
+        q, moves, target, seat = drawn(100 + seed)
+        grid = orders(q)
+        best = target.worth(moves * wave(q, peak(seat, q, grid))[:, None, :]).gain
+        worths.append(best - np.log(independent(grid)))
+    assert max(worths) < 2.0
+    assert np.median(worths) < -2.0
+
+
+def test_six_joints_take_little_time():
+    q, _, _, seat = drawn(5, reach=4.8)
+    start = process_time()
+    for _ in range(6):
+        peak(seat, q, orders(q))
+    assert process_time() - start < 0.15

@@ -1,0 +1,292 @@
+"""One walk over folds: what a linear model leaves on rows held out, with any of its effects left out.
+
+A fold is any set of rows. Frames and parameters are fitted to the other rows, and predict those of the fold. Everything
+comes from sums of products of the model's columns, so that a fold, or an effect left out, costs one small solution.
+
+What a figure of held-out rows may be off by is told by the jackknife over blocks of consecutive rows (Efron and Stein,
+*Annals of Statistics* 9, 1981): the whole walk is repeated without one block, fits included. A fit without a fold and a
+block is found to first order: θ(−fold, −block) = θ(−fold) + θ(−block) − θ.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import stdtrit
+
+from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import ridge
+from thermal_robot.inference.explain import Explanation
+from thermal_robot.inference.problem import Linear, Whitening, whitened
+from thermal_robot.inference.rows import each
+
+Array = NDArray[np.float64]
+Labels = NDArray[np.int64]
+Rows = NDArray[np.bool_]
+
+
+@dataclass(frozen=True, eq=False)
+class Model:
+    """A linear model whose frames and parameters can be fitted to any rows.
+
+    Attributes
+    ----------
+    linear
+        Gap, frames and the blocks of the model, K columns in all.
+    scales
+        Per block: prior standard deviation of its parameters, in their expected sizes.
+    whitening
+        Weights and noise of all rows; a fit to some rows whitens those alone.
+    variance
+        Of the noise, in squares of the whitening noise: priors count against it.
+    kept
+        (N,) rows on which the model is judged.
+    block
+        (N,) block of consecutive rows that each belongs to, 0..B−1.
+    seen
+        Sums of products by the rows that they are over.
+    """
+
+    linear: Linear
+    scales: tuple[float, ...]
+    whitening: Whitening
+    variance: float
+    kept: Rows
+    block: Labels
+    seen: dict[bytes, Array] = field(default_factory=dict, repr=False)
+
+    @classmethod
+    def of(cls, explanation: Explanation, block: Labels, further: Mapping[int, float] | None = None) -> Model:
+        """Return the model of an explanation: its effects, prior scales, weights and noise; outliers do not judge it.
+
+        ``further`` blocks, with the scale of each, come after its own.
+        """
+        e = explanation
+        scales = {**{b: e.best.scales[b] for b in e.best.blocks}, **(further or {})}
+        linear = Linear(e.linear.gap, e.linear.frames, tuple(e.linear.blocks[b] for b in scales))
+        return cls(linear, tuple(scales.values()), e.whitening, e.best.noise**2, ~e.outliers, block)
+
+    def bare(self, linear: Linear) -> Model:
+        """Return the model of another linearisation without effects: its frames alone."""
+        return replace(self, linear=Linear(linear.gap, linear.frames, ()), scales=(), seen={})
+
+    @cached_property
+    def flat(self) -> int:
+        """Number of columns of the frames; they have no prior."""
+        return int(self.linear.frames.shape[2])
+
+    @cached_property
+    def spans(self) -> tuple[NDArray[np.int64], ...]:
+        """Per block: the numbers of its columns."""
+        ends = self.flat + np.cumsum([0, *(len(b.sizes) for b in self.linear.blocks)])
+        return tuple(np.arange(a, b) for a, b in pairwise(ends))
+
+    @cached_property
+    def tight(self) -> Array:
+        """(K − flat,) one over the prior variance of each parameter, SI."""
+        own = [(b.sizes * scale) ** -2.0 for b, scale in zip(self.linear.blocks, self.scales, strict=True)]
+        return np.concatenate([*own, np.zeros(0)])
+
+    @cached_property
+    def _white(self) -> tuple[Rows, Array, Array, Array]:
+        """Which rows have weight, their columns whitened as if independent, and U and d of what they have in common."""
+        used, smooth = self.whitening.weights > 0, self.whitening.smooth
+        stack = whitened(self.linear, replace(self.whitening, smooth=None))
+        if smooth is None:
+            return used, stack, np.zeros((len(stack), 0)), np.zeros(0)
+        return used, stack, *smooth.eigen(settings.UNHEARD)
+
+    def products(self, rows: Rows) -> Array:
+        """(K + 1, K + 1) Xᵀ V⁻¹ X of the columns and the gap over some rows, V their own covariance; computed once.
+
+        Where rows have a smooth discrepancy in common, V = 1 + U d Uᵀ with U on these rows alone (Woodbury).
+        """
+        key = rows.tobytes()
+        if key not in self.seen:
+            used, stack, basis, variance = self._white
+            picked = np.repeat(rows[used], self.linear.measures)
+            stack, basis = stack[picked], basis[picked]
+            products = stack.T @ stack
+            if len(variance):
+                along = basis.T @ stack
+                products = products - along.T @ np.linalg.solve(np.diag(1.0 / variance) + basis.T @ basis, along)
+            self.seen[key] = products
+        return self.seen[key]
+
+    @cached_property
+    def whole(self) -> Array:
+        """(K + 1, K + 1) the same over all rows."""
+        return self.products(np.ones(len(self.block), dtype=bool))
+
+    def determines(self, rows: Rows) -> bool:
+        """Tell whether some rows determine as much of the frames as all rows do."""
+        return self._rank(self.products(rows)) >= self._rank(self.whole)
+
+    def _rank(self, products: Array) -> int:
+        frames = products[: self.flat, : self.flat]
+        # a column of the rows held out alone leaves a rounding error of either sign
+        length = np.sqrt(np.maximum(np.diag(frames), 0.0)) + np.sqrt(settings.TINY)
+        value = np.linalg.eigvalsh(frames / np.outer(length, length)) if self.flat else np.zeros(0)
+        return int((value > settings.FRAME_DETERMINED).sum())
+
+    def columns(self, chosen: Sequence[int]) -> NDArray[np.int64]:
+        """(k + 1,) numbers of the columns of the frames and of some blocks, and of the gap."""
+        return np.concatenate([np.arange(self.flat), *(self.spans[b] for b in chosen), [len(self.whole) - 1]]).astype(
+            np.int64
+        )
+
+    def fits(self, rows: Sequence[Rows], chosen: Sequence[int]) -> list[Array]:
+        """Fit the frames and some blocks to each set of rows: (k + 1,) each, −θ and 1.
+
+        What the blocks leave on all rows counts as noise against the priors.
+        """
+        picked = self.columns(chosen)
+        square, tight = np.ix_(picked, picked), self.tight[picked[self.flat : -1] - self.flat]
+        equations = max(int((self.whitening.weights > 0).sum()) * self.linear.measures, 1)
+        whole, variance = self.whole[square], self.variance
+        for _ in range(settings.FOLD_ROUNDS):
+            signed = _signed(whole, self.flat, variance * tight)
+            variance = max(float(signed @ whole @ signed) / equations, self.variance)
+        solved: dict[bytes, Array] = {}
+        for used in rows:
+            if used.tobytes() not in solved:
+                solved[used.tobytes()] = _signed(self.products(used)[square], self.flat, variance * tight)
+        return [solved[used.tobytes()] for used in rows]
+
+
+def _signed(products: Array, flat: int, tight: Array) -> Array:
+    return np.append(-ridge(products, flat, tight), 1.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Squares:
+    """Sums of squared distances of the rows held out, m².
+
+    Attributes
+    ----------
+    total
+        Over all of them.
+    without
+        (B,) of the walk that is repeated without each block.
+    """
+
+    total: float
+    without: Array
+
+    def __add__(self, other: Squares) -> Squares:
+        """Add two sums over the same walk."""
+        return Squares(self.total + other.total, self.without + other.without)
+
+    def __sub__(self, other: Squares) -> Squares:
+        """Take the sums of another model from these: what it gains."""
+        return self + -1.0 * other
+
+    def __rmul__(self, factor: float) -> Squares:
+        """Weigh the sums."""
+        return Squares(factor * self.total, factor * self.without)
+
+
+@dataclass(frozen=True, eq=False)
+class Walk:
+    """A model fitted without each fold, and what it leaves there.
+
+    Attributes
+    ----------
+    model
+        The model.
+    tests
+        Per fold: (N,) the rows that it holds out.
+    """
+
+    model: Model
+    tests: tuple[Rows, ...]
+
+    @classmethod
+    def over(cls, model: Model, tests: Sequence[Rows]) -> Walk:
+        """Walk over folds; left out are those without rows, and those without which the frames are not determined."""
+        kept = [t for t in tests if (t & model.kept).any() and (~t).sum() > 1]
+        return cls(model, tuple(t for t in kept if model.determines(~t)))
+
+    @property
+    def rows(self) -> int:
+        """How many rows are held out, one in two folds counted twice."""
+        return int(sum((test & self.model.kept).sum() for test in self.tests))
+
+    @property
+    def rows_without(self) -> NDArray[np.int64]:
+        """(B,) how many without each block."""
+        held = np.sum(self.tests, axis=0) * self.model.kept
+        return np.asarray(held.sum() - np.bincount(self.model.block, held))
+
+    @cached_property
+    def _blocks(self) -> list[Rows]:
+        return each(self.model.block)
+
+    @cached_property
+    def _shared(self) -> Array:
+        """(F, B) share of each block's rows on which the fit of each fold rests."""
+        return np.array([[(own & ~test).sum() / own.sum() for own in self._blocks] for test in self.tests])
+
+    def squares(self, chosen: Sequence[int]) -> Squares:
+        """Return the sums of squares that a model with some of the blocks leaves on the rows held out."""
+        model, picked, folds = self.model, self.model.columns(chosen), len(self.tests)
+        every = np.ones(len(model.block), dtype=bool)
+        rows = [*(~test for test in self.tests), *(~own for own in self._blocks), every]
+        found = np.stack(model.fits(rows, chosen))
+        fits, moved = found[:folds], found[folds:-1] - found[-1]
+        total, without = 0.0, np.zeros(len(moved))
+        for test, fit, shared in zip(self.tests, fits, self._shared, strict=True):
+            judged = test & model.kept
+            place = model.linear.stack[judged, :3][:, :, picked]
+            total += float(((place @ fit) ** 2).sum())
+            each_without = ((place @ (fit + shared[:, None] * moved).T) ** 2).sum(axis=1)
+            each_without[np.arange(len(each_without)), model.block[judged]] = 0.0
+            without += each_without.sum(axis=0)
+        return Squares(total, without)
+
+    def residuals(self, chosen: Sequence[int]) -> Array:
+        """(H, m) what is left of each row held out by a model with some of the blocks, fold after fold, m and rad."""
+        picked = self.model.columns(chosen)
+        fits = self.model.fits([~test for test in self.tests], chosen)
+        stack = self.model.linear.stack
+        left = [stack[test][:, :, picked] @ fit for test, fit in zip(self.tests, fits, strict=True)]
+        return np.concatenate(left)
+
+    @property
+    def numbers(self) -> NDArray[np.int64]:
+        """(H,) the number of each row held out, fold after fold, outliers too."""
+        return np.concatenate([np.flatnonzero(test) for test in self.tests])
+
+
+def share(part: Squares, whole: Squares) -> tuple[float, tuple[float, float]]:
+    """Return what part a sum of squares is of another, 0 of nothing, with a 95 % interval.
+
+    The interval is that of Student's law about ln(1 − part/whole), with the jackknife's variance: one minus a share is
+    a ratio of mean squares, so that its logarithm is nearly normal. It is exact neither for a handful of blocks nor
+    where a single row holds most of the sum.
+    """
+    if whole.total <= 0.0:
+        return 0.0, (0.0, 0.0)
+    value = part.total / whole.total
+    each = part.without / np.maximum(whole.without, settings.TINY)
+    count = len(each)
+    if count < 2:
+        return value, (-np.inf, 1.0)
+    wide = float(stdtrit(count - 1, settings.INTERVAL[1]))
+    if value >= 1.0 or each.max() >= 1.0:
+        half = wide * deviation(each)
+        return value, (value - half, value + half)
+    half = wide * deviation(np.log1p(-each))
+    wider = float(np.expm1(half))
+    return value, (value - (1.0 - value) * wider, value + (1.0 - value) * wider / (1.0 + wider))
+
+
+def deviation(values: Array) -> float:
+    """Return the standard deviation of a figure from its (B,) values without each block (jackknife)."""
+    count = len(values)
+    return float(np.sqrt((count - 1) / count * ((values - values.mean()) ** 2).sum()))

@@ -1,0 +1,56 @@
+"""What rows held out refuse: an effect that predicts them worse, and a law that does not predict them better."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from scipy.special import expit
+
+from thermal_robot.diagnosis.earned import Earned, earned
+from thermal_robot.diagnosis.held_out import held_out
+from thermal_robot.diagnosis.parts import Refused
+from thermal_robot.effects.law import PREFIX
+from thermal_robot.inference.explain import log_odds
+from thermal_robot.inference.fit import Fit, refit
+
+
+def worth_their_word(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, Refused]]:
+    """Take effects and laws out of a fit one after another, the worst first, until all that stay earn their word.
+
+    A law stays if it predicts rows held out better (:func:`~thermal_robot.diagnosis.earned.earned`) and the interval of
+    its share is above zero, a known effect unless it predicts them worse.
+
+    Returns
+    -------
+    fit
+        With what is left of it.
+    refused
+        By name of a known effect: its probability by its prior and the rows held out alone, and its share there.
+    """
+    refused: dict[str, Refused] = {}
+    while True:
+        judged = {name: e for name, e in earned(fit).items() if e.harms or (name.startswith(PREFIX) and not e.helps)}
+        if not judged and any(effect.name.startswith(PREFIX) for effect, _ in fit.effects):
+            shares = held_out(fit).shares
+            judged = {
+                name: e for name, e in earned(fit).items() if name.startswith(PREFIX) and shares[name][1][0] <= 0.0
+            }
+        if not judged:
+            return fit, refused
+        worst = min(judged, key=lambda name: judged[name].blocked.share)
+        progress(f"rows held out refuse {worst}")
+        if not worst.startswith(PREFIX):
+            refused[worst] = _refused(fit, judged[worst])
+        fit = refit(fit, {worst: ()}, [effect for effect, _ in fit.effects if effect.name != worst], progress)
+
+
+def _refused(fit: Fit, judged: Earned) -> Refused:
+    """Return what rows held out say of an effect: its probability, from its prior and their likelihood, and its share.
+
+    The probability is at most the prior's: blocks of rows that speak for an effect do not outweigh what refuses it.
+    """
+    equations = fit.explanation.problem.equations
+    against = min(judged.blocked.share, 0.0)
+    said = judged.blocked if judged.blocked.share <= 0.0 else judged.hardest
+    return Refused(float(expit(log_odds() - 0.5 * equations * np.log1p(-against))), said.share)

@@ -1,0 +1,376 @@
+"""What no effect and no law accounts for: a smooth discrepancy in the rows' covariance (Kennedy and O'Hagan 2001).
+
+The whitened gap is y = F f + X θ + δ + e with e ~ N(0, s²) and δ ~ N(0, s² τ² K). K has one of several forms, each of
+mean one on its diagonal, so that τ is the discrepancy's rms over the noise:
+
+* ``tool``: the target moves by a smooth function of all joint positions and conditions together;
+* ``places``: each joint, the base and the tool err by a sum of smooth functions of single quantities,
+  K = Σ_p J_p k_p J_pᵀ;
+* ``poses``: what a pose brings, anew for each pose and the same at every visit, to the target or in one joint; or what
+  a visit brings, in one joint.
+
+Sources: M. C. Kennedy, A. O'Hagan, *J. R. Statist. Soc. B* 63 (2001), eq. 4; low rank: Rasmussen and Williams,
+*Gaussian Processes for Machine Learning*, 2006, 8.1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg.lapack import dpotrf, dpotri, dpotrs, dtrtrs
+
+from thermal_robot.effects.quantities import quantities
+from thermal_robot.inference import settings
+from thermal_robot.inference.grouped import Grouped
+from thermal_robot.inference.rows import repeated_poses
+from thermal_robot.observations import Observations
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Form:
+    """One form of the discrepancy: K = B Bᵀ over all rows, B the products of functions and moves.
+
+    Attributes
+    ----------
+    name
+        Which one, such as ``tool`` with its length scale, or ``poses`` with a joint.
+    anew
+        Whether each pose or visit brings its own, so that nothing is smooth.
+    place
+        Kind and name of the place where it enters, the first of several joints; empty where it may be anywhere.
+    several
+        Whether several joints err in it.
+    functions
+        (N, k) smooth functions of what is commanded and recorded; of a form that is anew, (N,) the number of the pose
+        or visit.
+    moves
+        (N, m, c) how far a unit of each of c components moves the target, root frame axes, m and rad; (m, c) where that
+        is the same for all rows: K is then a product of one matrix of the rows and one of the components.
+    """
+
+    name: str
+    functions: Array
+    moves: Array
+    anew: bool = False
+    place: tuple[str, str] = ("", "")
+    several: bool = False
+
+    def beside(self, other: Form, part: float) -> Form:
+        """Return the form with that of another joint beside it, whose rms is a part of that of all so far."""
+        length = [np.sqrt((form.moves**2).sum(axis=2).mean()) for form in (self, other)]
+        moves = np.concatenate([self.moves, other.moves * (part * length[0] / max(length[1], settings.TINY))], axis=2)
+        return replace(self, name=f"{self.name}, {other.place[1]}", moves=moves, several=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """B of the rows in use, never written out: B = functions × moves, row by row.
+
+    Attributes
+    ----------
+    functions
+        (n, k), square roots of the rows' weights included.
+    moves
+        (n, m, c) in units of the noise; (m, c) where all rows have the same.
+    """
+
+    functions: Array
+    moves: Array
+
+    def adjoint(self, stack: Array) -> Array:
+        """Bᵀ times (n, m, s): (c k, s)."""
+        carried = np.moveaxis(np.matmul(np.swapaxes(self.moves, -1, -2), stack), 1, 0)
+        return np.asarray(np.matmul(self.functions.T, carried).reshape(-1, stack.shape[2]))
+
+    def times(self, inner: Array) -> Array:
+        """B times (c k, s): (n, m, s)."""
+        carried = np.matmul(
+            self.functions, inner.reshape(self.moves.shape[-1], self.functions.shape[1], inner.shape[1])
+        )
+        return np.asarray(np.matmul(self.moves, np.moveaxis(carried, 0, 1)))
+
+    @property
+    def wide(self) -> bool:
+        """Whether B has more columns than rows."""
+        rows, count = self.functions.shape
+        return bool(rows * self.moves.shape[-2] <= count * self.moves.shape[-1])
+
+    def own(self) -> Array:
+        """B Bᵀ (n m, n m) where B is wide, else BᵀB (c k, c k)."""
+        rows, count = self.functions.shape
+        moves = np.broadcast_to(self.moves, (rows, *self.moves.shape[-2:]))
+        m, c = moves.shape[1:]
+        if self.wide:
+            flat = moves.reshape(-1, c)
+            return np.asarray(np.repeat(np.repeat(self.functions @ self.functions.T, m, 0), m, 1) * (flat @ flat.T))
+        pairs = np.einsum("nac,nad->cdn", moves, moves, optimize=True)
+        found = np.empty((c, count, c, count))
+        for i in range(c):
+            for j in range(i, c):
+                found[i, :, j] = (self.functions * pairs[i, j][:, None]).T @ self.functions
+                found[j, :, i] = found[i, :, j].T
+        return found.reshape(c * count, c * count)
+
+
+@dataclass(frozen=True, eq=False)
+class Smooth:
+    """The correlated part of the rows' covariance, in units of the noise: 1 + τ²BBᵀ on the rows in use.
+
+    Attributes
+    ----------
+    spectrum
+        The form, on the rows in use.
+    tau
+        τ.
+    """
+
+    spectrum: Spectrum | Grouped
+    tau: float
+
+    def products(self, stack: Array) -> Array:
+        """Return Sᵀ (1 + τ²BBᵀ)⁻¹ S of (E, K) columns S."""
+        return self.spectrum.products(self.tau, self.spectrum.along(stack), stack.T @ stack)
+
+    def whitened(self, stack: Array) -> Array:
+        """Return (1 + τ²BBᵀ)^(−½) times (E, K) columns; dearer than :meth:`products`."""
+        return self.spectrum.whitened(self.tau, stack)
+
+    def eigen(self, floor: float) -> tuple[Array, Array]:
+        """Return U (E, r), orthonormal, and d (r,) with τ²BBᵀ = U diag(d) Uᵀ; what lies below a floor is left out."""
+        return self.spectrum.eigen(self.tau, floor)
+
+    @property
+    def log_det(self) -> float:
+        """log|1 + τ²BBᵀ|."""
+        return self.spectrum.log_det(self.tau)
+
+    @property
+    def degrees(self) -> float:
+        """How many equations the discrepancy follows: the trace of its smoother."""
+        return self.spectrum.degrees(self.tau)
+
+    def mean(self, left: Array) -> Array:
+        """(N, m) posterior mean of the discrepancy, in units of the noise.
+
+        Given the (E,) residual of the rows in use, whitened by weights and noise alone.
+        """
+        return self.spectrum.mean(self.tau, left)
+
+
+@dataclass(frozen=True, eq=False)
+class Spectrum:
+    """One form on the rows in use, ready for every size τ: one Cholesky factor a size, and no (E, M) array.
+
+    With S the columns of the problem: where B has fewer columns than rows, by Woodbury's identity,
+    Sᵀ(1 + τ²BBᵀ)⁻¹S = SᵀS − τ² (BᵀS)ᵀ (1 + τ²BᵀB)⁻¹ BᵀS, and log|1 + τ²BBᵀ| = log|1 + τ²BᵀB|.
+
+    Attributes
+    ----------
+    axes
+        (m, m) orthonormal: components in which the parts are apart; one part has all of them where moves differ by row.
+    parts, everywhere
+        B on the rows in use, and on all rows without weights; one for each component, or one for all.
+    own
+        Of each part: :meth:`Part.own`.
+    """
+
+    axes: Array
+    parts: tuple[Part, ...]
+    everywhere: tuple[Part, ...]
+    own: tuple[Array, ...]
+    factors: dict[tuple[float, int], Array] = field(default_factory=dict)
+    vectors: dict[int, tuple[Array, Array]] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, form: Form, weights: Array, noise: Array) -> Spectrum:
+        """Scale a form to a mean of one on its diagonal, in units of the noise."""
+        used = np.flatnonzero(weights > 0)
+        moves = form.moves / noise[:, None]
+        weight = (form.functions**2).sum(axis=1) if moves.ndim == 3 else (form.functions**2).sum(axis=1).mean()
+        square = (moves**2).sum(axis=-1)
+        mean = (square * weight[:, None]).mean() if moves.ndim == 3 else square.mean() * weight
+        moves = moves / np.sqrt(max(float(mean), settings.TINY))
+        functions = form.functions[used] * np.sqrt(weights[used])[:, None]
+        if moves.ndim == 3:
+            axes, each = np.eye(len(noise)), [(moves[used], moves)]
+        else:
+            value, axes = np.linalg.eigh(moves @ moves.T)
+            each = [(root, root) for root in np.sqrt(np.maximum(value, 0.0))[:, None, None]]
+        parts = tuple(Part(functions, near) for near, _ in each)
+        everywhere = tuple(Part(form.functions, far) for _, far in each)
+        return cls(axes, parts, everywhere, tuple(part.own() for part in parts))
+
+    def along(self, stack: Array) -> list[Array]:
+        """Return BᵀS of each part, or, where B is wide, the part's rows of S."""
+        rows = zip(self.parts, self.apart(stack), strict=True)
+        return [r.reshape(-1, stack.shape[1]) if part.wide else part.adjoint(r) for part, r in rows]
+
+    def apart(self, stack: Array) -> list[Array]:
+        """Split (E, K) columns into those of each part, (n, m, K)."""
+        rows = stack.reshape(-1, len(self.axes), stack.shape[1])
+        if len(self.parts) == 1:
+            return [rows]
+        return [np.einsum("a,nak->nk", axis, rows)[:, None] for axis in self.axes.T]
+
+    def joined(self, rows: list[Array]) -> Array:
+        """Put back together what :meth:`apart` split: (n, m, K)."""
+        if len(self.parts) == 1:
+            return rows[0]
+        return np.asarray(np.einsum("aj,jnk->nak", self.axes, np.array([r[:, 0] for r in rows])))
+
+    def factor(self, tau: float, k: int) -> Array:
+        """Cholesky factor of 1 + τ² times a part's own matrix, made once."""
+        if (tau, k) not in self.factors:
+            matrix = self.own[k] * tau**2
+            matrix.ravel()[:: len(matrix) + 1] += 1.0
+            self.factors[tau, k] = dpotrf(matrix.T, lower=1, clean=0, overwrite_a=1)[0]
+        return self.factors[tau, k]
+
+    def decomposed(self, k: int) -> tuple[Array, Array]:
+        """Eigenvalues and vectors of a part's own matrix, made once."""
+        if k not in self.vectors:
+            value, vector = np.linalg.eigh(self.own[k])
+            self.vectors[k] = np.maximum(value, 0.0), vector
+        return self.vectors[k]
+
+    def log_det(self, tau: float) -> float:
+        """log|1 + τ²BBᵀ|."""
+        factors = [self.factor(tau, k) for k in range(len(self.parts))]
+        return float(sum(2.0 * np.log(np.diag(factor)).sum() for factor in factors))
+
+    def products(self, tau: float, along: list[Array], plain: Array) -> Array:
+        """Return Sᵀ(1 + τ²BBᵀ)⁻¹S, from :meth:`along` and SᵀS."""
+        found = plain.copy()
+        for k, (part, own) in enumerate(zip(self.parts, along, strict=True)):
+            solved, _ = dtrtrs(self.factor(tau, k), own, lower=1)
+            within = solved.T @ solved
+            found -= own.T @ own - within if part.wide else tau**2 * within
+        return found
+
+    def whitened(self, tau: float, stack: Array) -> Array:
+        """Return (1 + τ²BBᵀ)^(−½) times (E, K) columns."""
+        found = []
+        for k, (part, rows) in enumerate(zip(self.parts, self.apart(stack), strict=True)):
+            value, vector = self.decomposed(k)
+            power = np.expm1(-0.5 * np.log1p(tau**2 * value))
+            flat = rows.reshape(-1, rows.shape[2])
+            if part.wide:
+                found.append((flat + vector @ (power[:, None] * (vector.T @ flat))).reshape(rows.shape))
+            else:
+                over = power / np.maximum(value, settings.SMOOTH_FLOOR)
+                found.append(rows + part.times(vector @ (over[:, None] * (vector.T @ part.adjoint(rows)))))
+        return self.joined(found).reshape(stack.shape)
+
+    def eigen(self, tau: float, floor: float) -> tuple[Array, Array]:
+        """Return U (E, r), orthonormal, and d (r,) with τ²BBᵀ = U diag(d) Uᵀ; what lies below a floor is left out."""
+        found, variance = [], []
+        m = len(self.axes)
+        for k, part in enumerate(self.parts):
+            value, vector = self.decomposed(k)
+            heard = tau**2 * value > floor
+            own = vector[:, heard]
+            if not part.wide:
+                rows = part.times(own / np.sqrt(value[heard]))
+                own = rows.reshape(len(rows) * rows.shape[1], rows.shape[2])
+            if len(self.parts) > 1:
+                own = (own[:, None, :] * self.axes[None, :, k, None]).reshape(len(own) * m, own.shape[1])
+            found.append(own)
+            variance.append(tau**2 * value[heard])
+        return np.concatenate(found, axis=1), np.concatenate(variance)
+
+    def degrees(self, tau: float) -> float:
+        """Trace of the smoother."""
+        factors = [self.factor(tau, k) for k in range(len(self.parts))]
+        return float(sum(len(f) - np.trace(dpotri(f, lower=1)[0]) for f in factors))
+
+    def mean(self, tau: float, left: Array) -> Array:
+        """(N, m) posterior mean given the (E,) residual of the rows in use, in units of the noise."""
+        found = []
+        for k, (part, everywhere, rows) in enumerate(
+            zip(self.parts, self.everywhere, self.apart(left[:, None]), strict=True)
+        ):
+            along = rows.reshape(-1, 1) if part.wide else part.adjoint(rows)
+            solved = dpotrs(self.factor(tau, k), along, lower=1)[0]
+            inner = part.adjoint(solved.reshape(rows.shape)) if part.wide else solved
+            found.append(everywhere.times(tau**2 * inner))
+        return self.joined(found)[:, :, 0]
+
+
+def decomposed(form: Form, weights: Array, noise: Array) -> Spectrum | Grouped:
+    """Make a form ready for every size: scaled to a mean of one on K's diagonal, in units of the noise."""
+    if not form.anew:
+        return Spectrum.of(form, weights, noise)
+    moves = np.broadcast_to(form.moves, (len(form.functions), *form.moves.shape[-2:]))
+    return Grouped.of(moves, form.functions.astype(np.int64), weights, noise)
+
+
+def forms(observations: Observations) -> tuple[Form, ...]:
+    """Return the forms of the discrepancy that a campaign allows."""
+    measures = 6 if observations.campaign.measures == "pose" else 3
+    units = np.diag([settings.LEVER] * 3 + [1.0] * 3)[:measures, :measures]
+    lengths = zip(settings.LENGTHS, _together(observations), strict=True)
+    found = [Form(f"tool, {length:g}", functions, units) for length, functions in lengths]
+    functions = np.concatenate([_spectral(values) for values in quantities(observations).values()], axis=1)
+    found.append(Form("places", functions, _moves(observations, measures)))
+    found += _at_one_place(observations, "places", functions, measures, anew=False)
+    pose = repeated_poses(observations.campaign)
+    each, repeated = pose.astype(float), int(pose.max()) + 1 < len(pose)
+    if observations.campaign.noise_position is not None or repeated:
+        found.append(Form("poses", each, units, anew=True))
+        found += _at_one_place(observations, "poses", each, measures, anew=True)
+    if repeated:
+        found += _at_one_place(observations, "visits", np.arange(len(pose), dtype=float), measures, anew=True)
+    return tuple(found)
+
+
+def _at_one_place(observations: Observations, what: str, functions: Array, measures: int, *, anew: bool) -> list[Form]:
+    """Return a form for each joint that moves, and one for the base, with the same functions (N, k)."""
+    moves, names = observations.joint_sensitivity[:, :measures], observations.robot.joint_names
+    seen = [j for j in range(moves.shape[2]) if np.ptp(observations.q[:, j]) > 0.0]
+    found = [Form(f"{what}, {names[j]}", functions, moves[:, :, [j]], anew, ("joint", names[j])) for j in seen]
+    base = observations.base_sensitivity[:, :measures]
+    return [*found, Form(f"{what}, base", functions, base, anew, ("base", "base"))]
+
+
+def _together(observations: Observations) -> list[Array]:
+    """(N, M) features of a squared exponential of all joint positions and conditions, for each length scale.
+
+    Low rank by Nyström's method with rows evenly drawn as landmarks.
+    """
+    campaign = observations.campaign
+    varying = [observations.covariates[c] for c in observations.covariates if observations.varies(c)]
+    inputs = np.column_stack([campaign.q, *varying])
+    inputs = inputs[:, np.ptp(inputs, axis=0) > 0.0]
+    inputs = (inputs - inputs.mean(axis=0)) / inputs.std(axis=0)
+    landmarks = inputs[np.unique(np.linspace(0, len(inputs) - 1, settings.LANDMARKS).astype(int))]
+    square = _distance2(inputs, landmarks), _distance2(landmarks, landmarks)
+    result = []
+    for length in settings.LENGTHS:
+        cross, own = (np.exp(-0.5 * d / (length**2 * max(inputs.shape[1], 1))) for d in square)
+        value, vector = np.linalg.eigh(own)
+        seen = value > settings.NYSTROM_FLOOR * value[-1]
+        result.append(cross @ (vector[:, seen] / np.sqrt(value[seen])))
+    return result
+
+
+def _distance2(a: Array, b: Array) -> Array:
+    return np.asarray(((a[:, None, :] - b[None, :, :]) ** 2).sum(axis=2))
+
+
+def _moves(observations: Observations, measures: int) -> Array:
+    """(N, m, c) what a unit error in each joint, and in each component at the base and the tool, does to the target."""
+    joints = observations.joint_sensitivity[:, :measures] * settings.ERROR_AT_JOINT
+    base = observations.base_sensitivity[:, :measures] * settings.ERROR_ELSEWHERE
+    tool = observations.tool_sensitivity[:, :measures, :measures] * settings.ERROR_ELSEWHERE
+    return np.concatenate([joints, base, tool], axis=2)
+
+
+def _spectral(values: Array) -> Array:
+    """(N, K) cosines of a quantity over its range, their amplitudes those of an integrated Wiener process (1/k²)."""
+    u = (values - values.min()) / max(float(np.ptp(values)), settings.TINY)
+    order = np.arange(1, min(settings.COSINES, len(np.unique(values)) - 1) + 1)
+    return np.asarray(np.cos(np.pi * order * u[:, None]) / order**2)

@@ -1,0 +1,103 @@
+"""A discrepancy that is anew in each pose or visit: the rows of one have it in common, and no others."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.inference import settings
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Grouped:
+    """1 + τ²BBᵀ where B has c columns for each of G groups of rows: all is done group by group.
+
+    With M_g = Σ over the group's rows of their movesᵀ moves (c, c), by Woodbury's identity
+    Sᵀ(1 + τ²BBᵀ)⁻¹S = SᵀS − τ² Σ_g (BᵀS)_gᵀ (1 + τ²M_g)⁻¹ (BᵀS)_g, and log|1 + τ²BBᵀ| = Σ_g log|1 + τ²M_g|.
+
+    Attributes
+    ----------
+    moves
+        (n, m, c) of the rows in use, in units of the noise, square roots of the weights included.
+    group
+        (n,) number of the group of each row in use.
+    everywhere, groups
+        (N, m, c) without weights, and (N,), of all rows.
+    value, vector
+        (G, c) and (G, c, c): eigenvalues and vectors of every M_g.
+    """
+
+    moves: Array
+    group: NDArray[np.int64]
+    everywhere: Array
+    groups: NDArray[np.int64]
+    value: Array = field(repr=False)
+    vector: Array = field(repr=False)
+
+    @classmethod
+    def of(cls, moves: Array, groups: NDArray[np.int64], weights: Array, noise: Array) -> Grouped:
+        """Scale moves (N, m, c) to a mean square of one a component, in units of the noise, and decompose all M_g."""
+        everywhere = moves / noise[:, None]
+        everywhere = everywhere / np.sqrt(max(float((everywhere**2).sum(axis=2).mean()), settings.TINY))
+        used = np.flatnonzero(weights > 0)
+        own = everywhere[used] * np.sqrt(weights[used])[:, None, None]
+        count = int(groups.max(initial=-1)) + 1
+        inside = np.zeros((count, own.shape[2], own.shape[2]))
+        np.add.at(inside, groups[used], own.transpose(0, 2, 1) @ own)
+        value, vector = np.linalg.eigh(inside)
+        return cls(own, groups[used], everywhere, groups, np.maximum(value, 0.0), vector)
+
+    def along(self, stack: Array) -> list[Array]:
+        """Return BᵀS in the eigenvectors of every group: one array (G c, K)."""
+        rows = stack.reshape(len(self.moves), self.moves.shape[1], stack.shape[1])
+        each = self.moves.transpose(0, 2, 1) @ rows
+        summed = np.zeros((len(self.value), *each.shape[1:]))
+        np.add.at(summed, self.group, each)
+        turned = self.vector.transpose(0, 2, 1) @ summed
+        return [np.asarray(turned.reshape(turned.shape[0] * turned.shape[1], turned.shape[2]))]
+
+    def products(self, tau: float, along: list[Array], plain: Array) -> Array:
+        """Return Sᵀ(1 + τ²BBᵀ)⁻¹S, from :meth:`along` and SᵀS."""
+        weight = tau**2 / (1.0 + tau**2 * self.value.ravel())
+        return np.asarray(plain - along[0].T @ (weight[:, None] * along[0]))
+
+    def log_det(self, tau: float) -> float:
+        """log|1 + τ²BBᵀ|."""
+        return float(np.log1p(tau**2 * self.value).sum())
+
+    def degrees(self, tau: float) -> float:
+        """Trace of the smoother."""
+        return float((tau**2 * self.value / (1.0 + tau**2 * self.value)).sum())
+
+    def whitened(self, tau: float, stack: Array) -> Array:
+        """Return (1 + τ²BBᵀ)^(−½) times (E, K) columns."""
+        value = self.value.ravel()
+        power = np.expm1(-0.5 * np.log1p(tau**2 * value)) / np.maximum(value, settings.SMOOTH_FLOOR)
+        return np.asarray(
+            stack + self._back(self.moves, self.group, power[:, None] * self.along(stack)[0], stack.shape)
+        )
+
+    def mean(self, tau: float, left: Array) -> Array:
+        """(N, m) posterior mean given the (E,) residual of the rows in use, in units of the noise."""
+        weight = tau**2 / (1.0 + tau**2 * self.value.ravel())
+        inner = weight[:, None] * self.along(left[:, None])[0]
+        rows = len(self.groups), self.everywhere.shape[1]
+        return self._back(self.everywhere, self.groups, inner, (rows[0] * rows[1], 1)).reshape(rows)
+
+    def eigen(self, tau: float, floor: float) -> tuple[Array, Array]:
+        """Return U (E, r), orthonormal, and d (r,) with τ²BBᵀ = U diag(d) Uᵀ; what lies below a floor is left out."""
+        value = self.value.ravel()
+        heard = np.flatnonzero(tau**2 * value > floor)
+        unit = np.zeros((len(value), len(heard)))
+        unit[heard, np.arange(len(heard))] = 1.0 / np.sqrt(value[heard])
+        size = (len(self.moves) * self.moves.shape[1], len(heard))
+        return self._back(self.moves, self.group, unit, size), tau**2 * value[heard]
+
+    def _back(self, moves: Array, group: NDArray[np.int64], inner: Array, shape: tuple[int, ...]) -> Array:
+        """Return B times (G c, K) in the eigenvectors of the groups."""
+        turned = self.vector @ inner.reshape(*self.value.shape, inner.shape[1])
+        return np.asarray((moves @ turned[group]).reshape(shape))

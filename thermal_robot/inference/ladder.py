@@ -1,0 +1,288 @@
+"""One evidence: combinations of effects, searched beside every size and form of a discrepancy, and summed over them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.errors import EstimationError
+from thermal_robot.inference import settings
+from thermal_robot.inference.discrepancy import Form, Smooth, Spectrum, decomposed
+from thermal_robot.inference.evidence import Combination, Gram, Search, evidence
+from thermal_robot.inference.grouped import Grouped
+from thermal_robot.inference.problem import Linear, Whitening, contained, normal_equations, whitened
+
+Array = NDArray[np.float64]
+Rung = tuple[int, float]
+"""Number of the form and τ; (−1, 0) where there is no discrepancy."""
+PLAIN: Rung = (-1, 0.0)
+
+
+@dataclass(eq=False)
+class Ladder:
+    """Evaluates combinations of blocks beside discrepancies of several forms and sizes.
+
+    Parameters
+    ----------
+    linear, whitening
+        The problem; its whitening without a discrepancy.
+    forms
+        Of the discrepancy; none where none is to be considered.
+    log_prior
+        Log prior odds of each block.
+    exclusive
+        Pairs of blocks that must not be together, beside those of which one contains the other.
+    """
+
+    linear: Linear
+    whitening: Whitening
+    forms: list[Form]
+    log_prior: Sequence[float]
+    exclusive: frozenset[frozenset[int]] = frozenset()
+    searches: dict[Rung, Search] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """Decompose the forms once for all sizes."""
+        w = self.whitening
+        self._stack = whitened(self.linear, w)
+        self._products, self._equations = self._stack.T @ self._stack, len(self._stack)
+        plain = normal_equations(self.linear, w, self._products, self._equations)
+        self._pairs = contained(plain) | self.exclusive
+        share = settings.SMOOTH_PRIOR if self.forms else 0.0
+        ends = np.cumsum([self.linear.frames.shape[2], *(len(block.sizes) for block in self.linear.blocks)])
+        self._spans = [np.arange(a, b) for a, b in pairwise(ends)]
+        self._quick: dict[tuple[Rung, tuple[int, ...]], float] = {}
+        self._priors = {PLAIN: float(np.log1p(-share))}
+        self._joined = False
+        self._sizes: dict[int, float] = {}
+        given, self.forms = self.forms, []
+        self._spectra: list[Spectrum | Grouped] = []
+        self._along: list[list[Array]] = []
+        for form in given:
+            self._consider(form, float(np.log(share / len(given))))
+        self.searches[PLAIN] = self._search(PLAIN, plain)
+
+    def _consider(self, form: Form, log_prior: float) -> int:
+        """Add a form, which shares its prior among all sizes; return its number."""
+        self.forms.append(form)
+        spectrum = decomposed(form, self.whitening.weights, self.whitening.noise)
+        self._spectra.append(spectrum)
+        self._along.append(spectrum.along(self._stack))
+        number, each = len(self.forms) - 1, log_prior - float(np.log(len(settings.TAUS)))
+        self._priors |= {(number, tau): each for tau in settings.TAUS}
+        return number
+
+    def whitened_at(self, rung: Rung) -> Whitening:
+        """Return the whitening with the discrepancy of a rung."""
+        form, tau = rung
+        return self.whitening if form < 0 else replace(self.whitening, smooth=Smooth(self._spectra[form], tau))
+
+    def beside(self, rung: Rung) -> Search:
+        """Return the search beside one discrepancy, made once."""
+        if rung not in self.searches:
+            white, products = self.whitened_at(rung), self._left(rung, np.arange(len(self._products)))
+            plain = self.searches[PLAIN].gram
+            self.searches[rung] = self._search(
+                rung, normal_equations(self.linear, white, products, self._equations, like=plain)
+            )
+        return self.searches[rung]
+
+    def _search(self, rung: Rung, problem: Gram) -> Search:
+        offset = problem.offset + self._priors[rung]
+        return Search(replace(problem, offset=offset), self.log_prior, self._pairs)
+
+    def run(self, starts: Sequence[tuple[int, ...]] = ()) -> tuple[Rung, Combination]:
+        """Climb over combinations and discrepancies until neither betters the other, from several starts."""
+        first = self.beside(PLAIN)
+        allowed = dict.fromkeys([*(s for s in starts if first.allowed(s)), ()])
+        begin = sorted((first.evaluate(s) for s in allowed), key=lambda c: -c.log_evidence)
+        rung, best = PLAIN, first.run(begin[0].blocks)
+        seeds = [c.blocks for c in begin[: settings.STARTS]]
+        while True:
+            tried = dict.fromkeys([best.blocks, *seeds])
+            found = [(*self._size(k, blocks), blocks) for k in range(len(self.forms)) for blocks in tried]
+            seeds = []
+            other = max(found, key=lambda item: item[1], default=(rung, -np.inf, ()))
+            nearby = self._climbed(other, best) or self._beside_others(best) or self._several_joints(rung, best)
+            if nearby is None:
+                return rung, best
+            rung, best = nearby
+
+    def _several_joints(self, rung: Rung, best: Combination) -> tuple[Rung, Combination] | None:
+        """Let several joints err in every pose or visit, one after another; return what is better, if any is.
+
+        Once beside the best combination and once beside none, so that neither has the sizes that suit the other.
+        """
+        if self._joined or rung[0] < 0 or not self.forms[rung[0]].anew:
+            return None
+        self._joined = True
+        single = [k for k, f in enumerate(self.forms) if f.anew and f.place[0] == "joint"]
+        if not single:
+            return None
+        tried = [(*self._joined_beside(blocks, single), blocks) for blocks in {best.blocks, ()}]
+        return self._climbed(max(tried, key=lambda item: item[1]), best)
+
+    def _climbed(
+        self, found: tuple[Rung, float, tuple[int, ...]], best: Combination
+    ) -> tuple[Rung, Combination] | None:
+        """Climb where a size promises more than the best; return what is better, if anything is, rounding aside."""
+        rung, promised, blocks = found
+        if promised > best.log_evidence + settings.BETTER:
+            nearby = self.beside(rung).run(blocks)
+            if nearby.log_evidence > best.log_evidence + settings.BETTER:
+                return rung, nearby
+        return None
+
+    def _joined_beside(self, blocks: tuple[int, ...], single: Sequence[int]) -> tuple[Rung, float]:
+        found = max((self._size(k, blocks) for k in single), key=lambda item: item[1])
+        for _ in range(settings.SCATTERING - 1):
+            further = self._one_more_joint(found[0], blocks, single)
+            if further is None or further[1] <= found[1]:
+                break
+            found = further
+        return found
+
+    def _one_more_joint(self, rung: Rung, blocks: tuple[int, ...], single: Sequence[int]) -> tuple[Rung, float] | None:
+        form = self.forms[rung[0]]
+        others = [self.forms[k] for k in single if self.forms[k].functions is form.functions]
+        others = [f for f in others if f.place[1] not in form.name.split(", ")]
+        if not others:
+            return None
+        prior = float(self._priors[rung] + np.log(len(settings.TAUS)) - np.log(len(others) * len(settings.PARTS)))
+        tried = []
+        for other in others:
+            for part in settings.PARTS:
+                further = form.beside(other, part)
+                # the joints so far stay as they are
+                tau = min(settings.TAUS, key=lambda t: abs(t - rung[1] * float(np.hypot(1.0, part))))
+                tried.append((self._beside((self._consider(further, prior), tau), blocks), tau, further))
+                self._forget()
+        _, tau, best = max(tried, key=lambda item: item[0])
+        return self._size(self._consider(best, prior), blocks, tau)
+
+    def _forget(self) -> None:
+        """Take the last form out again."""
+        number = len(self.forms) - 1
+        del self.forms[number], self._spectra[number], self._along[number]
+        self._quick = {key: log for key, log in self._quick.items() if key[0][0] != number}
+
+    def _size(self, form: int, blocks: tuple[int, ...], start: float = 1.0) -> tuple[Rung, float]:
+        """Return the most probable size of a form beside one combination, with the log evidence; it has one peak."""
+        k = settings.TAUS.index(self._sizes.get(form, start))
+        best = self._beside((form, settings.TAUS[k]), blocks)
+        for step in settings.TAU_STEPS:
+            for sign in (step, -step):
+                while 0 <= k + sign < len(settings.TAUS):
+                    other = self._beside((form, settings.TAUS[k + sign]), blocks)
+                    if other <= best:
+                        break
+                    k, best = k + sign, other
+        self._sizes[form] = settings.TAUS[k]
+        return (form, settings.TAUS[k]), best
+
+    def _beside(self, rung: Rung, blocks: tuple[int, ...]) -> float:
+        """Return the log evidence of one combination beside one discrepancy, from the columns of its blocks alone."""
+        key = rung, tuple(sorted(blocks))
+        if key not in self._quick:
+            flat, white = self.linear.frames.shape[2], self.whitened_at(rung)
+            picked = np.concatenate([np.arange(flat), *(self._spans[b] for b in key[1]), [len(self._products) - 1]])
+            problem = normal_equations(
+                Linear(self.linear.gap, self.linear.frames, tuple(self.linear.blocks[b] for b in key[1])),
+                white,
+                self._left(rung, picked.astype(int)),
+                self._equations,
+            )
+            prior = self._priors[rung] + sum(self.log_prior[b] for b in key[1])
+            try:
+                self._quick[key] = evidence(problem, tuple(range(len(blocks))), prior, None).log_evidence
+            except EstimationError:  # what so large a discrepancy leaves is rounding
+                self._quick[key] = -np.inf
+        return self._quick[key]
+
+    def _left(self, rung: Rung, picked: NDArray[np.int64]) -> Array:
+        """Return the products of some columns, whitened by the discrepancy of a rung."""
+        along = [own[:, picked] for own in self._along[rung[0]]]
+        return self._spectra[rung[0]].products(rung[1], along, self._products[np.ix_(picked, picked)])
+
+    def in_question(self, best: Combination) -> tuple[Form, ...]:
+        """Return the forms beside which the best combination is not out of the question."""
+        near = {r[0] for (r, blocks), log in self._quick.items() if blocks == best.blocks and self._close(log, best)}
+        single = [form for form in self.forms if not form.several]
+        several = any(self.forms[k].several for k in near)
+        return tuple(f for k, f in enumerate(single) if k in near or (several and f.anew))
+
+    @staticmethod
+    def _close(log_evidence: float, best: Combination) -> bool:
+        return log_evidence > best.log_evidence - settings.FORM_REACH
+
+    def _beside_others(self, best: Combination) -> tuple[Rung, Combination] | None:
+        """Weigh the neighbours beside all discrepancies that count; return what is better than the best, if any is."""
+        near = [r for (r, blocks), log in self._quick.items() if blocks == best.blocks and self._counts(log, best)]
+        for other in dict.fromkeys((PLAIN, *near)):
+            if self._counts(self.beside(other).evaluate(best.blocks).log_evidence, best):
+                nearby = self.beside(other).run(best.blocks)
+                if nearby.log_evidence > best.log_evidence + settings.BETTER:
+                    return other, nearby
+        return None
+
+    @staticmethod
+    def _counts(log_evidence: float, best: Combination) -> bool:
+        return log_evidence > best.log_evidence - settings.RUNG_REACH
+
+    def consensus(self, families: Sequence[str]) -> tuple[Rung, Combination]:
+        """Return the best combination of the most probable set of names, settings and discrepancies summed over."""
+        compared, probabilities = self.probabilities()
+        mass: dict[frozenset[str], float] = {}
+        for combination, p in zip(compared, probabilities, strict=True):
+            names = frozenset(families[b] for b in combination.blocks)
+            mass[names] = mass.get(names, 0.0) + float(p)
+        chosen = max(mass, key=lambda names: mass[names])
+        held = [
+            (rung, c)
+            for rung, search in self.searches.items()
+            for c in search.seen.values()
+            if frozenset(families[b] for b in c.blocks) == chosen
+        ]
+        rung, best = max(held, key=lambda item: item[1].log_evidence)
+        return rung, self.beside(rung).evaluate(best.blocks)
+
+    def probabilities(self) -> tuple[list[Combination], Array]:
+        """Return all combinations seen beside all discrepancies, most probable first, with their probabilities."""
+        masses = [(mass, c) for _, own in self._masses().items() for mass, c in own]
+        masses.sort(key=lambda item: -item[0])
+        weight = np.exp(np.array([mass for mass, _ in masses]) - masses[0][0])
+        return [c for _, c in masses], weight / weight.sum()
+
+    def forms_in_question(self) -> dict[str, float]:
+        """Return the posterior probability of each form by its name, and by an empty name that of none."""
+        held = {rung: np.array([mass for mass, _ in own]) for rung, own in self._masses().items()}
+        top = max(own.max() for own in held.values())
+        mass: dict[str, float] = {}
+        for rung, own in held.items():
+            name = self.forms[rung[0]].name if rung[0] >= 0 else ""
+            mass[name] = mass.get(name, 0.0) + float(np.exp(own - top).sum())
+        return {name: m / sum(mass.values()) for name, m in mass.items()}
+
+    def _masses(self) -> dict[Rung, list[tuple[float, Combination]]]:
+        """Return beside each discrepancy searched all combinations, with the log evidence of the sizes it stands for.
+
+        A sum over all sizes by those that were computed: each stands for those that are nearer to it than to another.
+        """
+        seen = {rung: list(search.seen.values()) for rung, search in self.searches.items()}
+        best = max((c for own in seen.values() for c in own), key=lambda c: c.log_evidence)
+        computed: dict[int, list[int]] = {}
+        for (form, tau), blocks in self._quick:
+            if blocks == best.blocks and form >= 0:
+                computed.setdefault(form, []).append(settings.TAUS.index(tau))
+        stands = {PLAIN: 0.0}
+        for form, sizes in computed.items():
+            sizes.sort()
+            between = [0.5 * (a + b) for a, b in pairwise(sizes)]
+            ends = [sizes[0] - 0.5, *between, sizes[-1] + 0.5]
+            for k, (a, b) in zip(sizes, pairwise(ends), strict=True):
+                stands[form, settings.TAUS[k]] = float(np.log(b - a))
+        return {rung: [(c.log_evidence + stands.get(rung, 0.0), c) for c in own] for rung, own in seen.items()}
