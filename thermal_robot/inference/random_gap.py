@@ -93,7 +93,14 @@ def random_gap(fit: Fit) -> RandomGap:
     freedom = round(e.best.effective) + e.linear.frames.shape[2]
     for _ in range(settings.SCATTER_PASSES):
         scatter = variance_components(
-            gap, sensitivity, noise, pose, stated=held, freedom=freedom, weights=used.astype(float)
+            gap,
+            sensitivity,
+            noise,
+            pose,
+            stated=held,
+            freedom=freedom,
+            weights=used.astype(float),
+            start=_in_joints(fit),
         )
         if not any(c.chosen for c in scatter.components):
             break
@@ -106,6 +113,15 @@ def random_gap(fit: Fit) -> RandomGap:
     laws, steps, kept = _judge(fit, scatter, gap[used], pose, used, noise)
     p_value, explains = _chance_of_size(scatter, kept, gap[used], sensitivity[used], noise, held, freedom)
     return RandomGap(tuple(kept), explains, p_value, scatter, steps, laws, _note(scatter, laws, kept))
+
+
+def _in_joints(fit: Fit) -> list[tuple[str, int]]:
+    """Return the kind and the joints of a discrepancy that is anew in every pose or visit."""
+    form, names = fit.explanation.discrepancy.form, fit.campaign.robot.joint_names
+    if form is None or not form.anew or form.place[0] != "joint":
+        return []
+    what, *joints = form.name.split(", ")
+    return [("visit" if what == "visits" else "pose", names.index(joint)) for joint in joints]
 
 
 def _refitted(fit: Fit, scatter: Scatter, used: NDArray[np.bool_]) -> Array:

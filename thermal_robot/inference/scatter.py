@@ -105,6 +105,7 @@ def variance_components(
     stated: bool | Sequence[bool] = True,
     freedom: int = 0,
     weights: Array | None = None,
+    start: Sequence[Component] = (),
 ) -> Scatter:
     """Estimate variance components: how much each joint scatters, and how much the instrument.
 
@@ -131,6 +132,8 @@ def variance_components(
         Number of parameters that were fitted before.
     weights
         (N,) of each row, 0 for rows to leave out.
+    start
+        Components with which the search begins a second time; those that are not asked for are left out.
 
     Returns
     -------
@@ -159,10 +162,10 @@ def variance_components(
     rows = independent_rows(
         remainder[kept] / noise, sensitivity[kept, : len(noise)] / scale, labels, weights[kept], freedom
     )
-    search = _Search(Likelihood(rows, held)).run()
+    search = _Search(Likelihood(rows, held)).run(start)
     heavy = Likelihood(rows, held, settings.TAILS)
     if heavy.fit(search.chosen).value > search.best.value + settings.WORTH_TAILS:
-        search = _Search(heavy).run()
+        search = _Search(heavy).run(start)
     notes = [] if rows.contrasts else ["without repeats, what comes anew at each visit counts as the pose's"]
     if len(kept) < int((weights > 0).sum()):
         notes.append(f"{len(kept)} rows drawn at random stand for all")
@@ -240,7 +243,16 @@ class _Search:
         seen = np.flatnonzero(self.rows.lever > settings.LEVER_FLOOR * self.rows.lever.max(initial=0.0))
         return tuple((kind, int(j)) for kind in self.kinds for j in seen if (kind, int(j)) not in self.chosen)
 
-    def run(self) -> _Search:
+    def run(self, start: Sequence[Component] = ()) -> _Search:
+        """Climb from nothing and from a start; of one variance alone, what visits have in common may pass for it."""
+        within = self._candidates()
+        for begin in dict.fromkeys(((), tuple(c for c in start if c in within))):
+            before, self.chosen = self.chosen, begin
+            self._climb()
+            self.chosen = max(before, self.chosen, key=lambda found: self._fit(found)[1])
+        return self
+
+    def _climb(self) -> None:
         while len(self.chosen) < settings.MOST_COMPONENTS:
             candidates = self._candidates()
             if not candidates:
@@ -257,7 +269,6 @@ class _Search:
             self.chosen = best
         while self._revised():
             pass
-        return self
 
     def _revised(self) -> bool:
         """Leave one component out, or move it to the other kind; keep the best of these sets if it is better."""
