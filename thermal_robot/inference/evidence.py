@@ -22,40 +22,10 @@ from scipy.linalg.lapack import dpotrf, dpotri
 
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
+from thermal_robot.inference.gram import Gram
 
 Array = NDArray[np.float64]
 UNDETERMINED = "the measurements do not determine anything: too few, or all alike"
-
-
-@dataclass(frozen=True, eq=False)
-class Gram:
-    """Normal equations of a linear problem after the frames are projected out, whitened, in units of prior sizes.
-
-    Attributes
-    ----------
-    matrix, vector, total
-        G (D, D), b (D,), y'y.
-    slices
-        Where each block's D_b columns stand; blocks are reduced to what the data can see of them.
-    bases
-        Per block, (P_b, D_b): parameter values, in prior sizes, of a unit of each reduced column.
-    equations
-        n: scalar equations with weight, less the rank of the frames.
-    noise_dof
-        How firmly the whitening noise is held (degrees of freedom); 0 where it is not known.
-    offset
-        Log evidence that all combinations share: −½ log of the determinants of the rows' covariance and of the frames,
-        and the log prior of that covariance.
-    """
-
-    matrix: Array
-    vector: Array
-    total: float
-    slices: tuple[slice, ...]
-    bases: tuple[Array, ...]
-    equations: float
-    noise_dof: float
-    offset: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)

@@ -46,8 +46,7 @@ class Grouped:
         used = np.flatnonzero(weights > 0)
         own = everywhere[used] * np.sqrt(weights[used])[:, None, None]
         count = int(groups.max(initial=-1)) + 1
-        inside = np.zeros((count, own.shape[2], own.shape[2]))
-        np.add.at(inside, groups[used], own.transpose(0, 2, 1) @ own)
+        inside = _summed(groups[used], own.transpose(0, 2, 1) @ own, count)
         value, vector = np.linalg.eigh(inside)
         return cls(own, groups[used], everywhere, groups, np.maximum(value, 0.0), vector)
 
@@ -55,8 +54,7 @@ class Grouped:
         """Return BᵀS in the eigenvectors of every group: one array (G c, K)."""
         rows = stack.reshape(len(self.moves), self.moves.shape[1], stack.shape[1])
         each = self.moves.transpose(0, 2, 1) @ rows
-        summed = np.zeros((len(self.value), *each.shape[1:]))
-        np.add.at(summed, self.group, each)
+        summed = _summed(self.group, each, len(self.value))
         turned = self.vector.transpose(0, 2, 1) @ summed
         return [np.asarray(turned.reshape(turned.shape[0] * turned.shape[1], turned.shape[2]))]
 
@@ -101,3 +99,13 @@ class Grouped:
         """Return B times (G c, K) in the eigenvectors of the groups."""
         turned = self.vector @ inner.reshape(*self.value.shape, inner.shape[1])
         return np.asarray((moves @ turned[group]).reshape(shape))
+
+
+def _summed(group: NDArray[np.int64], each: Array, count: int) -> Array:
+    """(count, ...) sums of what belongs to each group."""
+    found = np.zeros((count, *each.shape[1:]))
+    order = np.argsort(group, kind="stable")
+    first = np.flatnonzero(np.diff(group[order], prepend=-1))
+    if len(first):
+        found[group[order][first]] = np.add.reduceat(each[order], first, axis=0)
+    return found

@@ -12,7 +12,8 @@ from numpy.typing import NDArray
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
 from thermal_robot.inference.discrepancy import Form, Smooth, Spectrum, decomposed
-from thermal_robot.inference.evidence import Combination, Gram, Search, evidence
+from thermal_robot.inference.evidence import Combination, Search, evidence
+from thermal_robot.inference.gram import Gram
 from thermal_robot.inference.grouped import Grouped
 from thermal_robot.inference.problem import Linear, Whitening, contained, normal_equations, whitened
 
@@ -61,17 +62,20 @@ class Ladder:
         self._sizes: dict[int, float] = {}
         given, self.forms = self.forms, []
         self._spectra: list[Spectrum | Grouped] = []
-        self._along: list[list[Array]] = []
+        self._along: list[list[Array] | None] = []
         for form in given:
             self._consider(form, float(np.log(share / len(given))))
         self.searches[PLAIN] = self._search(PLAIN, plain)
 
-    def _consider(self, form: Form, log_prior: float) -> int:
-        """Add a form, which shares its prior among all sizes; return its number."""
+    def _consider(self, form: Form, log_prior: float, *, once: bool = False) -> int:
+        """Add a form, which shares its prior among all sizes; return its number.
+
+        What is asked once needs no products with all columns.
+        """
         self.forms.append(form)
         spectrum = decomposed(form, self.whitening.weights, self.whitening.noise)
         self._spectra.append(spectrum)
-        self._along.append(spectrum.along(self._stack))
+        self._along.append(None if once else spectrum.along(self._stack))
         number, each = len(self.forms) - 1, log_prior - float(np.log(len(settings.TAUS)))
         self._priors |= {(number, tau): each for tau in settings.TAUS}
         return number
@@ -159,7 +163,7 @@ class Ladder:
                 further = form.beside(other, part)
                 # the joints so far stay as they are
                 tau = min(settings.TAUS, key=lambda t: abs(t - rung[1] * float(np.hypot(1.0, part))))
-                tried.append((self._beside((self._consider(further, prior), tau), blocks), tau, further))
+                tried.append((self._beside((self._consider(further, prior, once=True), tau), blocks), tau, further))
                 self._forget()
         _, tau, best = max(tried, key=lambda item: item[0])
         return self._size(self._consider(best, prior), blocks, tau)
@@ -195,6 +199,7 @@ class Ladder:
                 white,
                 self._left(rung, picked.astype(int)),
                 self._equations,
+                like=self.searches[PLAIN].gram.some(key[1]),
             )
             prior = self._priors[rung] + sum(self.log_prior[b] for b in key[1])
             try:
@@ -205,8 +210,9 @@ class Ladder:
 
     def _left(self, rung: Rung, picked: NDArray[np.int64]) -> Array:
         """Return the products of some columns, whitened by the discrepancy of a rung."""
-        along = [own[:, picked] for own in self._along[rung[0]]]
-        return self._spectra[rung[0]].products(rung[1], along, self._products[np.ix_(picked, picked)])
+        known, spectrum = self._along[rung[0]], self._spectra[rung[0]]
+        along = spectrum.along(self._stack[:, picked]) if known is None else [own[:, picked] for own in known]
+        return spectrum.products(rung[1], along, self._products[np.ix_(picked, picked)])
 
     def in_question(self, best: Combination) -> tuple[Form, ...]:
         """Return the forms beside which the best combination is not out of the question."""

@@ -13,7 +13,8 @@ from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import solve, whitener
 from thermal_robot.inference.columns import Block
 from thermal_robot.inference.discrepancy import Smooth
-from thermal_robot.inference.evidence import Combination, Gram
+from thermal_robot.inference.evidence import Combination
+from thermal_robot.inference.gram import Gram
 
 Array = NDArray[np.float64]
 

@@ -1,0 +1,57 @@
+"""A linear problem as the evidence sees it: products of its columns, the unknown frames projected out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Gram:
+    """Normal equations of a linear problem after the frames are projected out, whitened, in units of prior sizes.
+
+    Attributes
+    ----------
+    matrix, vector, total
+        G (D, D), b (D,), y'y.
+    slices
+        Where each block's D_b columns stand; blocks are reduced to what the data can see of them.
+    bases
+        Per block, (P_b, D_b): parameter values, in prior sizes, of a unit of each reduced column.
+    equations
+        n: scalar equations with weight, less the rank of the frames.
+    noise_dof
+        How firmly the whitening noise is held (degrees of freedom); 0 where it is not known.
+    offset
+        Log evidence that all combinations share: −½ log of the determinants of the rows' covariance and of the frames,
+        and the log prior of that covariance.
+    """
+
+    matrix: Array
+    vector: Array
+    total: float
+    slices: tuple[slice, ...]
+    bases: tuple[Array, ...]
+    equations: float
+    noise_dof: float
+    offset: float = 0.0
+
+    def some(self, blocks: Sequence[int]) -> Gram:
+        """Return the problem of some of the blocks alone."""
+        widths = [self.bases[b].shape[1] for b in blocks]
+        ends = np.cumsum([0, *widths])
+        used = np.concatenate([*(np.arange(self.slices[b].start, self.slices[b].stop) for b in blocks), np.zeros(0)])
+        own = used.astype(int)
+        return replace(
+            self,
+            matrix=self.matrix[np.ix_(own, own)],
+            vector=self.vector[own],
+            slices=tuple(slice(a, b) for a, b in pairwise(ends.tolist())),
+            bases=tuple(self.bases[b] for b in blocks),
+        )
