@@ -1,12 +1,11 @@
 """An effect that is at work helps on rows held out; what was picked from noise does not, or even harms."""
 
-import time
 from dataclasses import replace
 
 import numpy as np
 import pytest
 from diagnosis.simulated import forced
-from simulate import demo, simulate
+from simulate import simulate
 
 from thermal_robot.diagnosis.earned import earned
 from thermal_robot.effects import choose
@@ -89,13 +88,3 @@ def test_of_two_effects_each_is_asked_beside_the_other(rv_m2):
 
 def test_nothing_found_earns_nothing(rv_m2):
     assert earned(fit(simulate(rv_m2, seed=2)[0], ())) == {}
-
-
-def test_it_takes_no_time():
-    found = fit(demo()[0], choose((), (), ()))
-    took = []
-    for _ in range(5):
-        start = time.perf_counter()
-        earned(found)
-        took.append(time.perf_counter() - start)
-    assert min(took) < 0.05

@@ -1,7 +1,5 @@
 """Waves of any order: the periodogram is a least-squares fit of each order, and its peak is the order put in."""
 
-from time import process_time
-
 import numpy as np
 import pytest
 
@@ -84,11 +82,3 @@ def test_in_noise_the_choice_of_an_order_is_paid_for():
         worths.append(best - np.log(independent(grid)))
     assert max(worths) < 2.0
     assert np.median(worths) < -2.0
-
-
-def test_six_joints_take_little_time():
-    q, _, _, seat = drawn(5, reach=4.8)
-    start = process_time()
-    for _ in range(6):
-        peak(seat, q, orders(q))
-    assert process_time() - start < 0.15

@@ -2,11 +2,9 @@
 
 from dataclasses import replace
 from itertools import pairwise
-from time import process_time
 
 import numpy as np
 import pytest
-from conftest import load_arm
 from helpers import NOISE, with_law
 from simulate import simulate
 
@@ -318,20 +316,6 @@ def test_gains_in_a_scan_are_those_of_one_law_alone(rv_m2):
     assert {bool(i.law.of) for i in found} == {True, False}
     for item in found[::7]:
         assert item.gain == pytest.approx(target.worth(block(here, item.law).columns).gain, rel=1e-6, abs=1e-6)
-
-
-def test_a_scan_of_a_hundred_rows_is_quick():
-    """Six joints and fifteen quantities; the bound is four times what it takes on one idle core."""
-    data = simulate(load_arm("ur10"), samples=100, seed=1)[0]
-    few = {k: v for k, v in data.covariates.items() if not k.startswith("approach")}
-    here, target = seen(replace(data, covariates=few))
-    scan(here, [target, target])
-    took = []
-    for _ in range(3):
-        start = process_time()
-        scan(here, [target, target])
-        took.append(process_time() - start)
-    assert min(took) < 0.7
 
 
 def in_sessions(robot, joint, zeros, seed=3):
