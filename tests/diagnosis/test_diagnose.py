@@ -163,8 +163,9 @@ def test_what_is_not_identified_has_no_number(cases):
 @on_arms
 def test_an_offset_of_the_first_joint_is_never_a_number_with_an_unknown_base(arm, cases):
     offsets = next(c for c in cases if c.name == "joint_offset").found.finding("joint_offset").parameters
-    first = next(p for p in offsets if p.name.endswith(f", {arm.joint_names[0]}"))
-    assert (first.value, first.std, first.identified) == (None, None, False)
+    # where some joints alone are at fault, it is not among them
+    first = [p for p in offsets if p.name.endswith(f", {arm.joint_names[0]}")]
+    assert all((p.value, p.std, p.identified) == (None, None, False) for p in first)
     assert any(p.identified for p in offsets)
 
 
