@@ -1,4 +1,4 @@
-"""Which rows belong together: repeats of a pose, neighbours in joint space, spells of time, blocks."""
+"""Which rows belong together: repeats of a pose, neighbours in joint space, blocks."""
 
 from dataclasses import replace
 
@@ -16,8 +16,6 @@ from thermal_robot.inference.rows import (
     near_repeats,
     neighbourhoods,
     repeated_poses,
-    row_groups,
-    spells,
 )
 from thermal_robot.inference.settings import NEAR
 
@@ -89,13 +87,9 @@ def test_each_row_is_in_the_mask_of_its_label():
     assert [sorted(np.flatnonzero(mask)) for mask in masks] == [[1, 4], [0, 2], [3]]
 
 
-def test_spells_and_neighbourhoods_share_the_rows_out_evenly(rv_m2):
+def test_neighbourhoods_share_the_rows_out_evenly(rv_m2):
     rng = np.random.default_rng(4)
-    time = rng.permutation(200).astype(float)
-    campaign = Campaign("rows", rv_m2, rng.uniform(-1, 1, (200, 5)), covariates={"time": time})
-    label = spells(campaign, 10)
-    assert (np.bincount(label) == 20).all()
-    assert (np.diff(label[np.argsort(time)]) >= 0).all()
+    campaign = Campaign("rows", rv_m2, rng.uniform(-1, 1, (200, 5)))
     boxes = neighbourhoods(campaign, 16)
     assert np.ptp(np.bincount(boxes)) <= 1
     inside = np.mean([campaign.q[boxes == b].var(axis=0).sum() for b in range(16)])
@@ -174,11 +168,3 @@ def test_neighbourhoods_are_boxes_of_joint_space(rv_m2):
     high = np.array([q[boxes == b].max(axis=0) for b in range(16)])
     apart = (low[:, None] > high[None, :]) | (high[:, None] < low[None, :])
     assert (apart.any(axis=2) | np.eye(16, dtype=bool)).all()
-
-
-@pytest.mark.parametrize(("samples", "count"), [(7, 2), (100, 20), (2000, 60)])
-def test_groups_in_which_remainders_may_be_alike_hold_a_few_rows_each(rv_m2, samples, count):
-    q = np.random.default_rng(8).uniform(-1.0, 1.0, (samples, 5))
-    groups = row_groups(Campaign("groups", rv_m2, q))
-    assert [len(set(labels)) for labels in groups] == [count, count]
-    assert all(np.ptp(np.bincount(labels)) <= samples / count for labels in groups)

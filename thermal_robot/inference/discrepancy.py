@@ -20,6 +20,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotrf, dpotri, dpotrs, dtrtrs
+from scipy.spatial.distance import cdist
 
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference import settings
@@ -42,8 +43,8 @@ class Form:
         Whether each pose or visit brings its own, so that nothing is smooth.
     place
         Kind and name of the place where it enters, the first of several joints; empty where it may be anywhere.
-    several
-        Whether several joints err in it.
+    further
+        Names of the joints that err beside the first.
     functions
         (N, k) smooth functions of what is commanded and recorded; of a form that is anew, (N,) the number of the pose
         or visit.
@@ -57,13 +58,25 @@ class Form:
     moves: Array
     anew: bool = False
     place: tuple[str, str] = ("", "")
-    several: bool = False
+    further: tuple[str, ...] = ()
+
+    @property
+    def several(self) -> bool:
+        """Whether several joints err in it."""
+        return bool(self.further)
+
+    @property
+    def joints(self) -> tuple[str, ...]:
+        """Names of the joints that err in it; empty where it enters elsewhere."""
+        kind, name = self.place
+        return (name, *self.further) if kind == "joint" else ()
 
     def beside(self, other: Form, part: float) -> Form:
         """Return the form with that of another joint beside it, whose rms is a part of that of all so far."""
         length = [np.sqrt((form.moves**2).sum(axis=2).mean()) for form in (self, other)]
         moves = np.concatenate([self.moves, other.moves * (part * length[0] / max(length[1], settings.TINY))], axis=2)
-        return replace(self, name=f"{self.name}, {other.place[1]}", moves=moves, several=True)
+        joint = other.place[1]
+        return replace(self, name=f"{self.name}, {joint}", moves=moves, further=(*self.further, joint))
 
 
 @dataclass(frozen=True, eq=False)
@@ -347,7 +360,7 @@ def _together(observations: Observations) -> list[Array]:
     inputs = inputs[:, np.ptp(inputs, axis=0) > 0.0]
     inputs = (inputs - inputs.mean(axis=0)) / inputs.std(axis=0)
     landmarks = inputs[np.unique(np.linspace(0, len(inputs) - 1, settings.LANDMARKS).astype(int))]
-    square = _distance2(inputs, landmarks), _distance2(landmarks, landmarks)
+    square = [cdist(points, landmarks, "sqeuclidean") for points in (inputs, landmarks)]
     result = []
     for length in settings.LENGTHS:
         cross, own = (np.exp(-0.5 * d / (length**2 * max(inputs.shape[1], 1))) for d in square)
@@ -355,10 +368,6 @@ def _together(observations: Observations) -> list[Array]:
         seen = value > settings.NYSTROM_FLOOR * value[-1]
         result.append(cross @ (vector[:, seen] / np.sqrt(value[seen])))
     return result
-
-
-def _distance2(a: Array, b: Array) -> Array:
-    return np.asarray(((a[:, None, :] - b[None, :, :]) ** 2).sum(axis=2))
 
 
 def _moves(observations: Observations, measures: int) -> Array:

@@ -124,7 +124,7 @@ class Ladder:
         if self._joined or rung[0] < 0 or not self.forms[rung[0]].anew:
             return None
         self._joined = True
-        single = [k for k, f in enumerate(self.forms) if f.anew and f.place[0] == "joint"]
+        single = [k for k, f in enumerate(self.forms) if f.anew and f.joints]
         if not single:
             return None
         tried = [(*self._joined_beside(blocks, single), blocks) for blocks in {best.blocks, ()}]
@@ -135,11 +135,11 @@ class Ladder:
     ) -> tuple[Rung, Combination] | None:
         """Climb where a size promises more than the best; return what is better, if anything is, rounding aside."""
         rung, promised, blocks = found
-        if promised > best.log_evidence + settings.BETTER:
-            nearby = self.beside(rung).run(blocks)
-            if nearby.log_evidence > best.log_evidence + settings.BETTER:
-                return rung, nearby
-        return None
+        return self._better(rung, blocks, best) if promised > best.log_evidence + settings.BETTER else None
+
+    def _better(self, rung: Rung, blocks: tuple[int, ...], best: Combination) -> tuple[Rung, Combination] | None:
+        nearby = self.beside(rung).run(blocks)
+        return (rung, nearby) if nearby.log_evidence > best.log_evidence + settings.BETTER else None
 
     def _joined_beside(self, blocks: tuple[int, ...], single: Sequence[int]) -> tuple[Rung, float]:
         found = max((self._size(k, blocks) for k in single), key=lambda item: item[1])
@@ -153,7 +153,7 @@ class Ladder:
     def _one_more_joint(self, rung: Rung, blocks: tuple[int, ...], single: Sequence[int]) -> tuple[Rung, float] | None:
         form = self.forms[rung[0]]
         others = [self.forms[k] for k in single if self.forms[k].functions is form.functions]
-        others = [f for f in others if f.place[1] not in form.name.split(", ")]
+        others = [f for f in others if f.place[1] not in form.joints]
         if not others:
             return None
         prior = float(self._priors[rung] + np.log(len(settings.TAUS)) - np.log(len(others) * len(settings.PARTS)))
@@ -229,10 +229,9 @@ class Ladder:
         """Weigh the neighbours beside all discrepancies that count; return what is better than the best, if any is."""
         near = [r for (r, blocks), log in self._quick.items() if blocks == best.blocks and self._counts(log, best)]
         for other in dict.fromkeys((PLAIN, *near)):
-            if self._counts(self.beside(other).evaluate(best.blocks).log_evidence, best):
-                nearby = self.beside(other).run(best.blocks)
-                if nearby.log_evidence > best.log_evidence + settings.BETTER:
-                    return other, nearby
+            counts = self._counts(self.beside(other).evaluate(best.blocks).log_evidence, best)
+            if counts and (found := self._better(other, best.blocks, best)):
+                return found
         return None
 
     @staticmethod
@@ -258,7 +257,7 @@ class Ladder:
 
     def probabilities(self) -> tuple[list[Combination], Array]:
         """Return all combinations seen beside all discrepancies, most probable first, with their probabilities."""
-        masses = [(mass, c) for _, own in self._masses().items() for mass, c in own]
+        masses = [(mass, c) for own in self._masses().values() for mass, c in own]
         masses.sort(key=lambda item: -item[0])
         weight = np.exp(np.array([mass for mass, _ in masses]) - masses[0][0])
         return [c for _, c in masses], weight / weight.sum()

@@ -118,10 +118,10 @@ def random_gap(fit: Fit) -> RandomGap:
 def _in_joints(fit: Fit) -> list[tuple[str, int]]:
     """Return the kind and the joints of a discrepancy that is anew in every pose or visit."""
     form, names = fit.explanation.discrepancy.form, fit.campaign.robot.joint_names
-    if form is None or not form.anew or form.place[0] != "joint":
+    if form is None or not form.anew:
         return []
-    what, *joints = form.name.split(", ")
-    return [("visit" if what == "visits" else "pose", names.index(joint)) for joint in joints]
+    kind = "visit" if form.name.startswith("visits") else "pose"
+    return [(kind, names.index(joint)) for joint in form.joints]
 
 
 def _refitted(fit: Fit, scatter: Scatter, used: NDArray[np.bool_]) -> Array:

@@ -1,4 +1,4 @@
-"""Which rows belong together: repeats of a pose, neighbours in joint space, and spells of time."""
+"""Which rows belong together: repeats of a pose and neighbours in joint space."""
 
 from __future__ import annotations
 
@@ -59,13 +59,6 @@ def in_a_row(campaign: Campaign, aside: NDArray[np.bool_]) -> NDArray[np.bool_]:
     return result
 
 
-def spells(campaign: Campaign, count: int) -> Labels:
-    """(N,) label of one of ``count`` uninterrupted spells of equal length."""
-    labels = np.empty(campaign.samples, dtype=np.int64)
-    labels[in_order(campaign)] = np.arange(campaign.samples) * count // campaign.samples
-    return labels
-
-
 def neighbourhoods(campaign: Campaign, count: int) -> Labels:
     """(N,) label of one of about ``count`` boxes of joint space with equally many rows (median splits)."""
     labels = np.zeros(campaign.samples, dtype=np.int64)
@@ -121,9 +114,3 @@ def repeated_poses(campaign: Campaign) -> NDArray[np.int64]:
     empty = label == ""
     number[empty] = number.max() + 1 + np.arange(int(empty.sum()))
     return np.asarray(number)
-
-
-def row_groups(campaign: Campaign) -> tuple[NDArray[np.int64], ...]:
-    """Return the groupings within which residuals may be correlated: spells of time and neighbourhoods of poses."""
-    count = min(max(campaign.samples // settings.ROWS_A_GROUP, 2), settings.MOST_GROUPS)
-    return spells(campaign, count), neighbourhoods(campaign, count)

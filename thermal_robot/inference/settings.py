@@ -74,10 +74,6 @@ FOLDS = 5
 BLOCKS = 20
 """Blocks of consecutive rows that are held out in turn: a fit then lacks a twentieth of the rows, as good as none, and
 twenty values tell the spread of a figure to a sixth."""
-ROWS_A_GROUP = 5
-"""Rows that one spell of time or neighbourhood of poses holds in a campaign of few rows."""
-MOST_GROUPS = 60
-"""Such groups at most: a design effect is then known to a fifth."""
 GROSS_LEVEL = 0.01
 """Chance that noise alone sets any row of a campaign aside."""
 GROSS_FACTOR = 1.5
