@@ -267,8 +267,7 @@ def share(part: Squares, whole: Squares) -> tuple[float, tuple[float, float]]:
     """Return what part a sum of squares is of another, 0 of nothing, with a 95 % interval.
 
     The interval is that of Student's law about ln(1 − part/whole), with the jackknife's variance: one minus a share is
-    a ratio of mean squares, so that its logarithm is nearly normal. It is exact neither for a handful of blocks nor
-    where a single row holds most of the sum.
+    a ratio of mean squares, so that its logarithm is nearly normal. It is not exact for a handful of blocks.
     """
     if whole.total <= 0.0:
         return 0.0, (0.0, 0.0)
@@ -277,13 +276,27 @@ def share(part: Squares, whole: Squares) -> tuple[float, tuple[float, float]]:
     count = len(each)
     if count < 2:
         return value, (-np.inf, 1.0)
-    wide = float(stdtrit(count - 1, settings.INTERVAL[1]))
     if value >= 1.0 or each.max() >= 1.0:
-        half = wide * deviation(each)
+        half = _half(each)
         return value, (value - half, value + half)
-    half = wide * deviation(np.log1p(-each))
+    half = _half(np.log1p(-each))
     wider = float(np.expm1(half))
     return value, (value - (1.0 - value) * wider, value + (1.0 - value) * wider / (1.0 + wider))
+
+
+def _half(values: Array) -> float:
+    """Return half the width of a 95 % interval of a figure from its (B,) values without each block.
+
+    Degrees of freedom by Satterthwaite (*Biometrics Bulletin* 2, 1946): a variance told by B values of kurtosis κ has
+    2 B/(κ − 1). A normal law's are about B; where a block or two make up most of the variance, few.
+    """
+    count, apart = len(values), (values - values.mean()) ** 2
+    if not apart.any():
+        return 0.0
+    apart /= apart.max()
+    kurtosis = count * float((apart**2).sum()) / float(apart.sum()) ** 2
+    freedom = min(count - 1.0, 2.0 * count / max(kurtosis - 1.0, settings.TINY))
+    return float(stdtrit(freedom, settings.INTERVAL[1])) * deviation(values)
 
 
 def deviation(values: Array) -> float:

@@ -15,6 +15,7 @@ from thermal_robot.effects.torque import torque_columns
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
 
+_SHARES = (0.2, 0.35, 0.5, 0.7, 0.9)  # their odds grow by about two
 _HANGS = 0.02  # of the largest torque of any joint: what is lighter, friction holds
 
 
@@ -61,13 +62,13 @@ class Backlash(Effect):
         return (*recorded, *torque_columns(observations)) if np.any(self.held) else recorded
 
     def variants(self, observations: Observations) -> tuple[Effect, ...]:
-        """Friction always wins, or gravity does above 0.5, 0.7 and 0.9 of a joint's largest torque."""
+        """Friction always wins, or gravity does above some share of a joint's largest torque."""
         torque = observations.torque
         if torque is None or not np.any(np.ptp(torque, axis=0) > 1e-9):
             return (self,)
         largest = tuple(np.abs(torque).max(axis=0).tolist())
         hangs = replace(self, largest=largest, chain=observations.robot.joint_names)
-        return (self, *(replace(hangs, held=share) for share in (0.5, 0.7, 0.9)))
+        return tuple(replace(hangs, held=share) for share in (0.0, *_SHARES))
 
     @property
     def apart(self) -> int:
@@ -78,13 +79,13 @@ class Backlash(Effect):
     def nearby(self, factor: float) -> tuple[Effect, ...]:
         """Shares whose odds are larger and smaller by a factor, of all joints together and of each.
 
-        Besides, one joint that never hangs, and where shares differ, that of one for all.
+        Besides, one joint that never hangs, or alone does, and where shares differ, that of one for all.
         """
         shares = np.broadcast_to(self.held, len(self.largest))
-        which = [j for j, share in enumerate(shares) if share > 0.0 and self._may_hang(j)]
-        if not which:
-            return (self,)
-        own = [j for j in which if self.chain and self.chain[j] in (self.places or self.chain)]
+        able = [j for j in range(len(shares)) if self._may_hang(j) and self.chain[j] in (self.places or self.chain)]
+        own = [j for j in able if shares[j] > 0.0]
+        if not own:
+            return (self, *(self._with(j, share) for j in able for share in _SHARES if len(able) > 1))
         found: list[Effect] = [self, *(replace(self, held=float(shares[j])) for j in own if self.apart)]
         odds = [shares * by / (1.0 - shares + shares * by) for by in (factor, 1.0 / factor)]
         if len(own) > 1:

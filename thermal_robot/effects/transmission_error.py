@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -27,21 +27,30 @@ class TransmissionError(Effect):
     ----------
     harmonics
         Orders a turn of the wheel, on either side.
+    side
+        Whose wheels err: ``joint``, ``motor``, or ``both``.
     """
 
     harmonics: tuple[int, ...] = (1, 2)
+    side: str = "both"
 
     name: ClassVar[str] = "transmission_error"
     title: ClassVar[str] = "periodic transmission errors"
     singular: ClassVar[str] = "a periodic transmission error"
+
+    def variants(self, observations: Observations) -> tuple[Effect, ...]:
+        """Wheels of either side err, or of both, where the ratio of a motor is stated."""
+        if not set(observations.campaign.gears) & set(observations.robot.joint_names):
+            return (self,)
+        return (self, replace(self, side="joint"), replace(self, side="motor"))
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """Two amplitudes a joint and order; rad. Prismatic joints have a period only with a ratio in rad/m."""
         robot, gears = observations.robot, observations.campaign.gears
         found = []
         for j, (joint, kind) in enumerate(zip(robot.joint_names, robot.joint_types, strict=True)):
-            orders = [float(k) for k in self.harmonics] if kind != "prismatic" else []
-            orders += [k * float(gears[joint]) for k in self.harmonics] if joint in gears else []
+            orders = [float(k) for k in self.harmonics] if kind != "prismatic" and self.side != "motor" else []
+            orders += [k * float(gears[joint]) for k in self.harmonics] if joint in gears and self.side != "joint" else []
             own = unit(robot, joint)
             for order in orders:
                 angle = order * observations.q[:, j]

@@ -84,6 +84,7 @@ class Search:
     def __post_init__(self) -> None:
         """List what each block excludes."""
         self._apart: dict[int, set[int]] = {}
+        self._expanded: set[tuple[int, ...]] = set()
         for a, b in self.exclusive:
             self._apart.setdefault(a, set()).add(b)
             self._apart.setdefault(b, set()).add(a)
@@ -121,9 +122,25 @@ class Search:
             # several smaller effects may suffice where one that contains them all came first
             best = max(best, self._climb((), frozenset(large)), key=lambda c: c.log_evidence)
             best = self._climb(best.blocks, frozenset())
-        while (missed := self._missed(best) or self._simpler(best)) is not None:
+        while (missed := self._missed(best) or self._simpler(best) or self._beside_a_tie(best)) is not None:
             best = self._climb(missed.blocks, frozenset())
         return best
+
+    def _beside_a_tie(self, best: Combination) -> Combination | None:
+        """Weigh the neighbours of what is nearly as probable as the best, too; return what is better, if any is.
+
+        Two effects that stand in for two others are told only so: with one of them exchanged there is little to choose.
+        """
+        near = [c for c in self.seen.values() if c.exact and self._near(c, best) and c.blocks != best.blocks]
+        near = [c for c in near if len(c.blocks) == len(best.blocks)]
+        for tie in sorted(near, key=lambda c: -c.log_evidence)[: settings.TIES]:
+            if tie.blocks in self._expanded:
+                continue
+            self._expanded.add(tie.blocks)
+            found = max((self.evaluate(c.blocks, tie) for c in self._promising(tie)), key=lambda c: c.log_evidence)
+            if found.log_evidence > best.log_evidence + settings.BETTER:
+                return found
+        return None
 
     def _simpler(self, best: Combination) -> Combination | None:
         """Let another setting of one block stand in for a further block; return what is better, if any is.
@@ -158,9 +175,7 @@ class Search:
     def _climb(self, start: Sequence[int], barred: frozenset[int]) -> Combination:
         best = max(self.evaluate(()), self.evaluate(start), key=lambda c: c.log_evidence)
         while True:
-            around = [c for c in self._neighbours(best) if not barred & set(c.blocks)]
-            around.sort(key=lambda c: -c.log_evidence)
-            close = [c.blocks for c in around if self._near(c, best)]
+            close = [c.blocks for c in self._promising(best, barred)]
             better = best
             for k in range(0, len(close), settings.AT_ONCE):
                 some = (self.evaluate(blocks, best) for blocks in close[k : k + settings.AT_ONCE])
@@ -171,12 +186,20 @@ class Search:
                 return best
             best = better
 
-    def _neighbours(self, best: Combination) -> list[Combination]:
-        """Return the combinations with one block more, less or another; those with a new one to first order."""
+    def _promising(self, best: Combination, barred: frozenset[int] = frozenset()) -> list[Combination]:
+        """Return the combinations with one block more, less or another that may be better, the best first.
+
+        Those with a new block are known to first order, which tells too little where the others are stretched to do
+        what the new one would do: the best one in place of each block is among them, however little it promises.
+        """
         without = [self.evaluate([c for c in best.blocks if c != b], best) for b in best.blocks]
         bases = [c for c in (best, *without) if np.isfinite(c.log_evidence)]
-        added = [c for base in bases for c in self._with_one_more(base, best)]
-        return [*without, *added]
+        found: dict[tuple[int, ...], Combination] = {c.blocks: c for c in without if self._near(c, best)}
+        for base in bases:
+            added = [c for c in self._with_one_more(base, best) if not barred & set(c.blocks)]
+            added.sort(key=lambda c: -c.log_evidence)
+            found |= {c.blocks: c for k, c in enumerate(added) if k == 0 or self._near(c, best)}
+        return sorted(found.values(), key=lambda c: -c.log_evidence)
 
     def _with_one_more(self, base: Combination, best: Combination) -> list[Combination]:
         others = [b for b in range(len(self.gram.slices)) if b not in best.blocks]

@@ -217,6 +217,7 @@ class _Round:
         search, white = ladder.beside(rung), ladder.whitened_at(rung)
         best = search.evaluate(self.best.blocks)
         values = parameter_values(linear, search.gram, best)
+        ladder.weigh_pairs(self.rung, self.best)
         compared, probabilities = ladder.probabilities()
         odds = ladder.forms_in_question()
         return Explanation(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -237,6 +237,30 @@ class Ladder:
     @staticmethod
     def _counts(log_evidence: float, best: Combination) -> bool:
         return log_evidence > best.log_evidence - settings.RUNG_REACH
+
+    def weigh_pairs(self, rung: Rung, best: Combination) -> None:
+        """Weigh two changes of the best combination together, where each by itself is in doubt.
+
+        Of two effects in doubt that have nothing to do with each other, both may be at work. Left out, each would take
+        from the probability of the other.
+        """
+        search = self.beside(rung)
+        own = set(best.blocks)
+        near = []
+        for c in search.seen.values():
+            gone, new = own - set(c.blocks), set(c.blocks) - own
+            lost = best.log_evidence - c.log_evidence
+            if (gone or new) and max(len(gone), len(new)) == 1 and lost < settings.PAIR_REACH:
+                near.append((lost, gone, new))
+        near.sort(key=lambda item: item[0])
+        pairs = [
+            (a[0] + b[0], tuple(sorted((own - a[1] - b[1]) | a[2] | b[2])))
+            for a, b in combinations(near, 2)
+            if a[0] + b[0] < settings.PAIR_REACH and not a[1] & b[1] and not a[2] & b[2]
+        ]
+        for _, blocks in sorted(pairs)[: settings.PAIRS]:
+            if search.allowed(blocks):
+                search.evaluate(blocks, best)
 
     def consensus(self, families: Sequence[str]) -> tuple[Rung, Combination]:
         """Return the best combination of the most probable set of names, settings and discrepancies summed over."""

@@ -112,6 +112,11 @@ SCALE_GRID = tuple(np.linspace(-6.0, 6.0, 25))
 """ln λ at which a block that might be added is weighed: four standard deviations of its prior, in thirds of one."""
 NEARLY, AT_ONCE = 3.0, 8
 """Log evidence below the best down to which neighbours are computed exactly, and how many before one is taken."""
+PAIR_REACH, PAIRS = 6.0, 60
+"""Log evidence that two changes of the best combination may lose together to be weighed together: 1 in 400; and how
+many such pairs at most."""
+TIES = 3
+"""Combinations as near, and of as many blocks, whose neighbours are weighed beside those of the best."""
 DETOUR = 20.0
 """Log evidence below the best down to which another setting of one block is tried in place of two: what a second block
 costs and may have brought."""
