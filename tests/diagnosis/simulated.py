@@ -8,10 +8,10 @@ import numpy as np
 
 from thermal_robot.diagnosis.one_walk import Model
 from thermal_robot.inference.columns import Block
-from thermal_robot.inference.evidence import Search
 from thermal_robot.inference.explain import explain, log_odds
 from thermal_robot.inference.problem import Linear, gram
 from thermal_robot.inference.robust import Noise
+from thermal_robot.inference.search import Search
 
 WIDTHS = (1, 1, 2, 3, 5, 6, 12)
 FRESH = 30

@@ -376,8 +376,8 @@ def test_a_model_keeps_its_joints_and_one_of_old_needs_none(rv_m2, tmp_path):
     assert [set(entry["arguments"]) for entry in model.to_dict()["effects"]] == [
         set(),
         {"places"},
-        {"harmonics"},
-        {"harmonics", "places"},
+        {"harmonics", "side"},
+        {"harmonics", "places", "side"},
     ]
 
 

@@ -9,8 +9,8 @@ from inference.densities import SPREAD, direct, seen_of, volume
 from inference.problems import columns_of, small_problem
 from scipy.special import logsumexp
 
-from thermal_robot.inference.evidence import Search, _gains
 from thermal_robot.inference.problem import gram
+from thermal_robot.inference.search import Search
 
 
 def integrated(linear, whitening, found):
@@ -109,27 +109,6 @@ def test_scales_and_noise_are_the_most_probable_ones(present):
                     assert direct(linear, whitening, c, (0, 0, 0), scales=other) < best
 
 
-def test_probabilities_sum_to_one_and_favour_the_truth():
-    for seed in range(10):
-        linear, whitening = small_problem(seed, rows=30, present=(1,))
-        search = Search(gram(linear, whitening), (-2.2,) * 3)
-        best = search.run()
-        order, probability = search.probabilities()
-        assert probability.sum() == pytest.approx(1.0, abs=1e-12)
-        assert (np.diff(probability) <= 0).all()
-        assert order[0] is best
-        assert best.blocks == (1,)
-
-
-def test_the_search_finds_the_best_of_all_combinations():
-    for seed in range(10):
-        linear, whitening = small_problem(seed, present=((), (0,), (0, 2), (0, 1, 2))[seed % 4])
-        search = Search(gram(linear, whitening), (-2.2,) * 3)
-        best = search.run()
-        _, _, found = all_combinations(linear, whitening, (-2.2,) * 3)
-        assert best.log_evidence == pytest.approx(max(c.log_evidence for c in found), abs=1e-3)
-
-
 def test_a_column_of_noise_lowers_the_evidence_on_average():
     gained = []
     for seed in range(40):
@@ -155,52 +134,3 @@ def test_a_block_of_which_the_data_see_nothing_changes_nothing_but_the_odds(pres
             assert found.noise == pytest.approx(plain.noise, rel=1e-3)
             np.testing.assert_allclose(found.values, plain.values, rtol=1e-2)
     assert set(search.run().blocks) <= {0, 1, 2}
-
-
-def gains_of(linear, whitening, beside):
-    """What each further block gains beside some: to first order, and computed exactly."""
-    search = Search(gram(linear, whitening), (0.0,) * len(linear.blocks))
-    base = search.evaluate(beside)
-    others = [b for b in range(len(linear.blocks)) if b not in beside]
-    first = {b: gain for b, gain, _ in _gains(search.gram, base, others)}
-    return [(first[b], search.evaluate((*beside, b)).log_evidence - base.log_evidence) for b in others]
-
-
-@pytest.mark.parametrize("beside", [(), (1,)], ids=["alone", "beside another"])
-def test_a_gain_to_first_order_is_the_exact_one_where_a_block_explains_little(beside):
-    """Blocks that do nothing: the integral over their size is within what the exact one's parabola misses."""
-    errors = []
-    for seed in range(20):
-        linear, whitening = small_problem(seed, rows=40, present=beside)
-        errors += np.subtract(*np.transpose(gains_of(linear, whitening, beside))).tolist()
-    assert np.abs(errors).max() < 0.3
-    assert abs(np.mean(errors)) < 0.15
-
-
-def test_a_gain_to_first_order_is_near_the_exact_one_where_a_block_explains_all():
-    """So large ones come first: they are within a tenth, or two nats, of what they gain."""
-    for seed in range(10):
-        linear, whitening = small_problem(seed, rows=40, present=(2,), noise=0.3)
-        (_, _), (_, _), (first, exact) = gains_of(linear, whitening, ())
-        assert exact > 20.0
-        assert abs(first - exact) < max(0.1 * exact, 2.0)
-
-
-def test_the_scale_of_a_gain_is_that_of_the_grid_nearest_the_best():
-    for seed in range(6):
-        linear, whitening = small_problem(seed, rows=40, present=(2,), noise=0.3)
-        search = Search(gram(linear, whitening), (0.0,) * 3)
-        ((_, _, scale),) = _gains(search.gram, search.evaluate(()), [2])
-        # half a unit of ln λ between places of the grid
-        assert abs(np.log(scale / search.evaluate((2,)).scales[2])) < 0.5
-
-
-def test_neighbours_that_come_near_the_best_are_computed_exactly():
-    """A search leaves nothing inexact that could change a probability by much."""
-    for seed in range(10):
-        linear, whitening = small_problem(seed, rows=30, present=((), (0,), (0, 2))[seed % 3])
-        search = Search(gram(linear, whitening), (-2.2,) * 3)
-        best = search.run()
-        rough = [c for c in search.seen.values() if not c.exact]
-        assert all(c.log_evidence < best.log_evidence - 2.9 for c in rough)
-        assert all(search.seen[key].blocks == key for key in search.seen)

@@ -1,12 +1,14 @@
 """Effects, outliers and noise are found together, and each from the rows that may speak."""
 
 from dataclasses import replace
+from itertools import combinations
 
 import numpy as np
 import pytest
 from inference.problems import WIDTHS, columns_of
 
 from thermal_robot.effects import choose
+from thermal_robot.effects.backlash import Backlash
 from thermal_robot.effects.law import Discovered
 from thermal_robot.inference.discrepancy import Form
 from thermal_robot.inference.explain import explain, log_odds, log_priors, settings_of_one
@@ -95,12 +97,32 @@ def test_settings_of_one_effect_are_never_together_and_share_its_prior():
 
 
 def test_log_priors_are_those_of_effects_and_not_of_settings():
-    """However many settings an effect has, the odds that it is at work are one to nine."""
+    """However many settings of an effect are listed, the odds that it is at work are one to nine, or a little less."""
     gain, lost = choose(("joint_gain", "backlash"), (), ())
-    odds = np.exp(log_priors([gain, lost, replace(lost, places=("a",)), replace(lost, places=("b",))]))
-    assert odds[0] == pytest.approx(1.0 / 9.0)
-    assert odds[1:].sum() == pytest.approx(odds[0])
     assert np.exp(log_odds()) == pytest.approx(1.0 / 9.0)
+    joints = ("a", "b", "c", "d")
+    everywhere, alone = lost, [replace(lost, places=(j,)) for j in joints]
+    several = [replace(lost, places=own) for k in (2, 3, 4) for own in combinations(joints, k)]
+    odds = np.exp(log_priors([gain, everywhere, *alone, *several]))
+    assert odds[0] == pytest.approx(1.0 / 9.0)
+    assert 0.9 * odds[0] < odds[1:].sum() <= odds[0]
+    # in all as likely as in one; which one, nobody knows
+    assert odds[1] == pytest.approx(odds[2:6].sum())
+    np.testing.assert_allclose(odds[2:6], odds[2])
+    assert odds[6:12].sum() == pytest.approx(0.5 * odds[1])
+    # what else is listed changes nothing
+    fewer = np.exp(log_priors([gain, everywhere, *alone, several[0]]))
+    np.testing.assert_allclose(fewer, odds[:7])
+
+
+def test_settings_of_the_same_places_share_by_their_weight():
+    hangs = Backlash(largest=(1.0, 1.0, 1.0), chain=("a", "b", "c"))
+    shares = [replace(hangs, held=held) for held in (0.0, 0.2, 0.5, (0.5, 0.5, 0.0))]
+    odds = np.exp(log_priors(shares))
+    assert odds.sum() == pytest.approx(1.0 / 9.0)
+    assert odds[1] == pytest.approx(odds[2])
+    assert odds[0] > odds[1]
+    assert odds[3] == pytest.approx(odds[2] / 9.0)
 
 
 def test_a_law_has_one_share_of_all_that_were_tried_however_many_are_compared():

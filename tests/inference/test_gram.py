@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from inference.problems import small_problem
 
-from thermal_robot.inference.evidence import Search
 from thermal_robot.inference.problem import Linear, gram
+from thermal_robot.inference.search import Search
 
 
 @pytest.mark.parametrize("blocks", [(), (1,), (0, 2), (2, 0)], ids=str)

@@ -9,8 +9,9 @@ from simulate import simulate
 
 from thermal_robot import diagnose
 from thermal_robot.effects import choose
-from thermal_robot.inference.evidence import Combination, Search
+from thermal_robot.inference.evidence import Combination
 from thermal_robot.inference.problem import Linear, contained, frame_step, gram, parameter_values, whitened
+from thermal_robot.inference.search import Search
 
 
 def flat(linear, whitening, columns):

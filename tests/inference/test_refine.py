@@ -7,11 +7,11 @@ from time_constants import DRIFT, LAG, campaign
 
 from thermal_robot.effects import choose
 from thermal_robot.inference.columns import block, frame_columns
-from thermal_robot.inference.evidence import Search
 from thermal_robot.inference.explain import Noise, explain
 from thermal_robot.inference.frames import register
 from thermal_robot.inference.problem import Linear, gram
 from thermal_robot.inference.refine import heard, refined
+from thermal_robot.inference.search import Search
 from thermal_robot.observations import observe
 
 

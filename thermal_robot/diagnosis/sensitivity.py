@@ -8,9 +8,9 @@ import numpy as np
 
 from thermal_robot.diagnosis.parts import Sensitivity
 from thermal_robot.inference import settings
-from thermal_robot.inference.evidence import Search
 from thermal_robot.inference.explain import log_priors
 from thermal_robot.inference.fit import Fit
+from thermal_robot.inference.search import Search
 
 
 def prior_sensitivity(fit: Fit) -> Sensitivity:

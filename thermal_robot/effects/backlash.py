@@ -71,6 +71,11 @@ class Backlash(Effect):
         return tuple(replace(hangs, held=share) for share in (0.0, *_SHARES))
 
     @property
+    def weight(self) -> float:
+        """Friction always wins as likely as not, whatever the number of shares that are tried."""
+        return 1.0 / len(_SHARES) if np.any(self.held) else 1.0
+
+    @property
     def apart(self) -> int:
         """Joints whose share is not that of most."""
         shares = [s for j, s in enumerate(np.broadcast_to(self.held, len(self.largest)).tolist()) if self._may_hang(j)]
@@ -82,7 +87,7 @@ class Backlash(Effect):
         Besides, one joint that never hangs, or alone does, and where shares differ, that of one for all.
         """
         shares = np.broadcast_to(self.held, len(self.largest))
-        able = [j for j in range(len(shares)) if self._may_hang(j) and self.chain[j] in (self.places or self.chain)]
+        able = [j for j, joint in enumerate(self.chain) if self._may_hang(j) and joint in (self.places or self.chain)]
         own = [j for j in able if shares[j] > 0.0]
         if not own:
             return (self, *(self._with(j, share) for j in able for share in _SHARES if len(able) > 1))

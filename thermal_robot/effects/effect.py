@@ -185,6 +185,11 @@ class Effect(ABC):
         return None
 
     @property
+    def weight(self) -> float:
+        """How probable it is beside other settings of the same places."""
+        return 1.0
+
+    @property
     def apart(self) -> int:
         """How many constants stand apart from a common one: each has its price where constants are refined."""
         return 0

@@ -39,10 +39,11 @@ class TransmissionError(Effect):
     singular: ClassVar[str] = "a periodic transmission error"
 
     def variants(self, observations: Observations) -> tuple[Effect, ...]:
-        """Wheels of either side err, or of both, where the ratio of a motor is stated."""
-        if not set(observations.campaign.gears) & set(observations.robot.joint_names):
-            return (self,)
-        return (self, replace(self, side="joint"), replace(self, side="motor"))
+        """All orders, or one alone; where the ratio of a motor is stated, wheels of both sides, or of one."""
+        stated = set(observations.campaign.gears) & set(observations.robot.joint_names)
+        sides = [replace(self, side=side) for side in ("joint", "motor")] if stated else [self]
+        alone = [replace(own, harmonics=(k,)) for own in sides for k in self.harmonics if len(self.harmonics) > 1]
+        return tuple(dict.fromkeys((self, *sides, *alone)))
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """Two amplitudes a joint and order; rad. Prismatic joints have a period only with a ratio in rad/m."""
@@ -50,7 +51,9 @@ class TransmissionError(Effect):
         found = []
         for j, (joint, kind) in enumerate(zip(robot.joint_names, robot.joint_types, strict=True)):
             orders = [float(k) for k in self.harmonics] if kind != "prismatic" and self.side != "motor" else []
-            orders += [k * float(gears[joint]) for k in self.harmonics] if joint in gears and self.side != "joint" else []
+            orders += (
+                [k * float(gears[joint]) for k in self.harmonics] if joint in gears and self.side != "joint" else []
+            )
             own = unit(robot, joint)
             for order in orders:
                 angle = order * observations.q[:, j]

@@ -61,6 +61,11 @@ class Form:
     further: tuple[str, ...] = ()
 
     @property
+    def words(self) -> frozenset[str]:
+        """What it is: the words of its name, as several joints have no order."""
+        return frozenset(self.name.split(", "))
+
+    @property
     def several(self) -> bool:
         """Whether several joints err in it."""
         return bool(self.further)

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from math import comb
 
 import numpy as np
 from numpy.typing import NDArray
@@ -100,7 +101,9 @@ def explain(
     families: Sequence[str] = (),
     starts: Sequence[Sequence[int]] = (),
     outliers: NDArray[np.bool_] | None = None,
+    known: Whitening | None = None,
     forms: Sequence[Form] = (),
+    among: int = 0,
     log_prior: Sequence[float] | None = None,
 ) -> Explanation:
     """Find the most probable combination of blocks together with outliers, noise and what no block accounts for.
@@ -118,8 +121,12 @@ def explain(
         share its prior probability.
     starts, outliers
         Where the search starts: combinations of blocks, and rows set aside.
+    known
+        Weights and noise to start with, where an explanation like this one is known.
     forms
         Of the discrepancy that is considered; none where nothing but noise may remain.
+    among
+        Number of forms of which these are left, if they are not all.
     log_prior
         Log prior odds of each block; see :func:`log_priors`, by which those of the blocks' effects are taken if absent.
 
@@ -134,10 +141,11 @@ def explain(
     aside = np.zeros(samples, dtype=bool) if outliers is None else outliers & use
     families = families or [str(k) for k in range(len(linear.blocks))]
     log_prior = log_priors([b.effect for b in linear.blocks]) if log_prior is None else log_prior
-    asked = _Asked(linear, families, log_prior, settings_of_one(families))
+    asked = _Asked(linear, families, log_prior, settings_of_one(families), max(among, len(forms)))
     # effects that are far off, and gross errors, are settled first, beside a noise that is free
-    whitening = replace(first_whitening(linear, noise, use & ~aside), held=0.0)
-    beside: Sequence[Form] = ()
+    first = known is None
+    whitening = known or replace(first_whitening(linear, noise, use & ~aside), held=0.0)
+    beside: Sequence[Form] = () if first else forms
     seeds = [tuple(start) for start in starts]
     history: list[tuple[object, ...]] = []
     while True:
@@ -148,7 +156,8 @@ def explain(
         history.append(state)
         whitening, aside = reweigh(found.rough, noise, use, found.leverage, linear.measures)
         seeds = [found.best.blocks]
-        beside = found.ladder.in_question(found.best) if len(history) > 1 else forms
+        beside = forms if first else found.ladder.in_question(found.best)
+        first = False
 
 
 @dataclass(frozen=True, eq=False)
@@ -159,6 +168,7 @@ class _Asked:
     families: Sequence[str]
     log_prior: Sequence[float]
     rivals: frozenset[frozenset[int]]
+    forms: int
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,7 +186,7 @@ class _Round:
     def of(
         cls, asked: _Asked, whitening: Whitening, beside: Sequence[Form], seeds: Sequence[tuple[int, ...]]
     ) -> _Round:
-        ladder = Ladder(asked.linear, whitening, list(beside), asked.log_prior, asked.rivals)
+        ladder = Ladder(asked.linear, whitening, list(beside), asked.log_prior, asked.rivals, asked.forms)
         ladder.run(seeds)
         rung, best = ladder.consensus(asked.families)
         white = ladder.whitened_at(rung)
@@ -189,7 +199,7 @@ class _Round:
 
     @property
     def state(self) -> tuple[object, ...]:
-        return self.best.blocks, self.form and self.form.name, self.rung[1]
+        return self.best.blocks, self.form and self.form.words
 
     @property
     def rough(self) -> Array:
@@ -248,10 +258,32 @@ def settings_of_one(families: Sequence[str]) -> frozenset[frozenset[int]]:
 
 
 def log_priors(effects: Sequence[Effect]) -> list[float]:
-    """Return the log prior odds of each setting of an effect: it has its share of those of its name."""
-    names = [effect.name for effect in effects]
-    shares = [1.0 / names.count(e.name) if e.share is None else e.share for e in effects]
+    """Return the log prior odds of each setting of an effect: it has its share of those of its name.
+
+    An effect is as likely in all its places as in one of them, in two half as likely, in three half of that; places are
+    alike, and settings of the same places share by their weight. What is listed beside a setting in other places does
+    not change its share.
+    """
+    shares = []
+    for effect in effects:
+        same = [other for other in effects if other.name == effect.name]
+        single = {other.places[0] for other in same if len(other.places) == 1}
+        own = _weight(effect)
+        alike = sum(_weight(other) for other in same if set(other.places) == set(effect.places)) / own
+        count = len(effect.places)
+        if effect.share is not None:
+            shares.append(effect.share)
+        elif single:
+            among = comb(max(len(single), count), count)
+            shares.append(settings.IN_ALL * settings.ONE_MORE ** max(count - 1, 0) / among / alike)
+        else:
+            shares.append(own / sum(map(_weight, same)))
     return [log_odds() + float(np.log(share)) for share in shares]
+
+
+def _weight(effect: Effect) -> float:
+    """How probable a setting is beside others of its places: a constant that stands apart is as rare as an effect."""
+    return effect.weight * float(np.exp(log_odds() * effect.apart))
 
 
 def _left(linear: Linear, whitening: Whitening, values: dict[int, tuple[Array, Array]]) -> Array:

@@ -12,10 +12,11 @@ from numpy.typing import NDArray
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
 from thermal_robot.inference.discrepancy import Form, Smooth, Spectrum, decomposed
-from thermal_robot.inference.evidence import Combination, Search, evidence
+from thermal_robot.inference.evidence import Combination, evidence
 from thermal_robot.inference.gram import Gram
 from thermal_robot.inference.grouped import Grouped
 from thermal_robot.inference.problem import Linear, Whitening, contained, normal_equations, whitened
+from thermal_robot.inference.search import Search
 
 Array = NDArray[np.float64]
 Rung = tuple[int, float]
@@ -37,6 +38,8 @@ class Ladder:
         Log prior odds of each block.
     exclusive
         Pairs of blocks that must not be together, beside those of which one contains the other.
+    asked
+        Of how many forms these are left: each keeps its share of the prior. All are there where absent.
     """
 
     linear: Linear
@@ -44,6 +47,7 @@ class Ladder:
     forms: list[Form]
     log_prior: Sequence[float]
     exclusive: frozenset[frozenset[int]] = frozenset()
+    asked: int = 0
     searches: dict[Rung, Search] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -52,8 +56,10 @@ class Ladder:
         self._stack = whitened(self.linear, w)
         self._products, self._equations = self._stack.T @ self._stack, len(self._stack)
         plain = normal_equations(self.linear, w, self._products, self._equations)
-        self._pairs = contained(plain) | self.exclusive
-        share = settings.SMOOTH_PRIOR if self.forms else 0.0
+        inside = contained(plain)
+        self._pairs = inside | self.exclusive
+        self._containers = frozenset(self._container(plain, pair) for pair in inside - self.exclusive) - {-1}
+        share = settings.SMOOTH_PRIOR if self.forms or self.asked else 0.0
         ends = np.cumsum([self.linear.frames.shape[2], *(len(block.sizes) for block in self.linear.blocks)])
         self._spans = [np.arange(a, b) for a, b in pairwise(ends)]
         self._quick: dict[tuple[Rung, tuple[int, ...]], float] = {}
@@ -64,7 +70,7 @@ class Ladder:
         self._spectra: list[Spectrum | Grouped] = []
         self._along: list[list[Array] | None] = []
         for form in given:
-            self._consider(form, float(np.log(share / len(given))))
+            self._consider(form, float(np.log(share / max(self.asked, len(given)))))
         self.searches[PLAIN] = self._search(PLAIN, plain)
 
     def _consider(self, form: Form, log_prior: float, *, once: bool = False) -> int:
@@ -79,6 +85,13 @@ class Ladder:
         number, each = len(self.forms) - 1, log_prior - float(np.log(len(settings.TAUS)))
         self._priors |= {(number, tau): each for tau in settings.TAUS}
         return number
+
+    @staticmethod
+    def _container(plain: Gram, pair: frozenset[int]) -> int:
+        """Return the larger of two blocks of which one contains the other; −1 where the data hardly see the smaller."""
+        small, large = sorted(pair, key=lambda b: plain.slices[b].stop - plain.slices[b].start)
+        own = plain.slices[small]
+        return large if float(np.trace(plain.matrix[own, own])) > settings.CONTAINS else -1
 
     def whitened_at(self, rung: Rung) -> Whitening:
         """Return the whitening with the discrepancy of a rung."""
@@ -97,14 +110,14 @@ class Ladder:
 
     def _search(self, rung: Rung, problem: Gram) -> Search:
         offset = problem.offset + self._priors[rung]
-        return Search(replace(problem, offset=offset), self.log_prior, self._pairs)
+        return Search(replace(problem, offset=offset), self.log_prior, self._pairs, self._containers)
 
     def run(self, starts: Sequence[tuple[int, ...]] = ()) -> tuple[Rung, Combination]:
         """Climb over combinations and discrepancies until neither betters the other, from several starts."""
         first = self.beside(PLAIN)
         allowed = dict.fromkeys([*(s for s in starts if first.allowed(s)), ()])
         begin = sorted((first.evaluate(s) for s in allowed), key=lambda c: -c.log_evidence)
-        rung, best = PLAIN, first.run(begin[0].blocks)
+        rung, best = PLAIN, first.climb(begin[0].blocks)
         seeds = [c.blocks for c in begin[: settings.STARTS]]
         while True:
             tried = dict.fromkeys([best.blocks, *seeds])
@@ -112,6 +125,7 @@ class Ladder:
             seeds = []
             other = max(found, key=lambda item: item[1], default=(rung, -np.inf, ()))
             nearby = self._climbed(other, best) or self._beside_others(best) or self._several_joints(rung, best)
+            nearby = nearby or self._further(rung, best)
             if nearby is None:
                 return rung, best
             rung, best = nearby
@@ -138,8 +152,13 @@ class Ladder:
         return self._better(rung, blocks, best) if promised > best.log_evidence + settings.BETTER else None
 
     def _better(self, rung: Rung, blocks: tuple[int, ...], best: Combination) -> tuple[Rung, Combination] | None:
-        nearby = self.beside(rung).run(blocks)
+        nearby = self.beside(rung).climb(blocks)
         return (rung, nearby) if nearby.log_evidence > best.log_evidence + settings.BETTER else None
+
+    def _further(self, rung: Rung, best: Combination) -> tuple[Rung, Combination] | None:
+        """Look beside the discrepancy for what single steps miss; return it, if anything is better."""
+        found = self.beside(rung).run(best.blocks)
+        return (rung, found) if found.log_evidence > best.log_evidence + settings.BETTER else None
 
     def _joined_beside(self, blocks: tuple[int, ...], single: Sequence[int]) -> tuple[Rung, float]:
         found = max((self._size(k, blocks) for k in single), key=lambda item: item[1])
@@ -215,8 +234,15 @@ class Ladder:
         return spectrum.products(rung[1], along, self._products[np.ix_(picked, picked)])
 
     def in_question(self, best: Combination) -> tuple[Form, ...]:
-        """Return the forms beside which the best combination is not out of the question."""
-        near = {r[0] for (r, blocks), log in self._quick.items() if blocks == best.blocks and self._close(log, best)}
+        """Return the forms that may be at work beside the best combination.
+
+        One whose most probable size is the smallest is noise, and one that is far less probable is out of the question.
+        """
+        peaks: dict[int, tuple[float, float]] = {}
+        for ((form, tau), blocks), log in self._quick.items():
+            if blocks == best.blocks and form >= 0:
+                peaks[form] = max(peaks.get(form, (-np.inf, 0.0)), (log, tau))
+        near = {form for form, (log, tau) in peaks.items() if tau > settings.TAUS[0] and self._close(log, best)}
         single = [form for form in self.forms if not form.several]
         several = any(self.forms[k].several for k in near)
         return tuple(f for k, f in enumerate(single) if k in near or (several and f.anew))
@@ -229,9 +255,10 @@ class Ladder:
         """Weigh the neighbours beside all discrepancies that count; return what is better than the best, if any is."""
         near = [r for (r, blocks), log in self._quick.items() if blocks == best.blocks and self._counts(log, best)]
         for other in dict.fromkeys((PLAIN, *near)):
-            counts = self._counts(self.beside(other).evaluate(best.blocks).log_evidence, best)
-            if counts and (found := self._better(other, best.blocks, best)):
-                return found
+            if self._counts(self.beside(other).evaluate(best.blocks).log_evidence, best):
+                nearby = self.beside(other).weigh(best.blocks)
+                if nearby.log_evidence > best.log_evidence + settings.BETTER:
+                    return self._better(other, nearby.blocks, best)
         return None
 
     @staticmethod

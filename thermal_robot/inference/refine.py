@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from thermal_robot.effects import Effect, gate
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import Block, block
-from thermal_robot.inference.evidence import Combination, Search
+from thermal_robot.inference.evidence import Combination
 from thermal_robot.inference.explain import Explanation, log_odds
 from thermal_robot.inference.gram import Gram
 from thermal_robot.inference.problem import Linear, Whitening, gram, parameter_values
 from thermal_robot.inference.robust import tail_weight
+from thermal_robot.inference.search import Search
 from thermal_robot.observations import Observations
 
 Array = NDArray[np.float64]

@@ -10,6 +10,11 @@ import numpy as np
 
 PRIOR_PROBABILITY = 0.1
 """That an effect is at work, random ones included: of sixteen effects one or two are then expected."""
+IN_ALL, ONE_MORE = 1.0 / 3.0, 0.5
+"""Share of an effect's probability that it is in all its places, and that it is in one; each further one halves it, so
+that all shares sum to one."""
+LEADING_PLACES = 4
+"""Places at most in which an effect is tried together once it was found in all: those that do most, as fitted."""
 SIZE_SPREAD = 1.5
 """Standard deviation of ln λ: an effect three times larger or smaller than stated is no surprise."""
 GIVEN_NOISE_DOF = 20.0
@@ -115,16 +120,20 @@ NEARLY, AT_ONCE = 3.0, 8
 PAIR_REACH, PAIRS = 6.0, 60
 """Log evidence that two changes of the best combination may lose together to be weighed together: 1 in 400; and how
 many such pairs at most."""
+LOOKED_BEYOND = 4
+"""First blocks beside which a second one is tried, where one alone brings nothing: those that promise most."""
 TIES = 3
 """Combinations as near, and of as many blocks, whose neighbours are weighed beside those of the best."""
-DETOUR = 20.0
-"""Log evidence below the best down to which another setting of one block is tried in place of two: what a second block
-costs and may have brought."""
+DETOUR, DETOUR_FROM = 20.0, 60.0
+"""Log evidence below the best down to which another setting of one block is tried in place of several: what they cost
+and may have brought. And that to first order, which tells less than the exact one, from which that is computed."""
+NARROW = 6
+"""Columns up to which blocks of different width are weighed in one array: wider ones would fill it with zeros."""
 NOISE_ROUNDS = 6
 """Rounds in which the noise that a further block leaves settles."""
 FLATTEST_PEAK = 0.5
 """Curvature of a peak over ln λ, that of the prior being 1: of a flatter one a parabola is up to 0.9 nat off."""
-FIRST_ROUNDS = 8
+FIRST_ROUNDS = 5
 """Rounds of choice, outliers and noise at most: they settle after two or three."""
 MOST_LEVERAGE = 0.999
 """Largest leverage, the share of the equations that a fit takes up, with which its residual tells the noise."""
@@ -170,6 +179,8 @@ INFORMATION_FLOOR = 1e-5
 """Squared length of a column, in units of the noise, below which the data do not see it."""
 CONTAINED, CONTAINED_LEFT = 1e-3, 0.5
 """A block is contained in another that leaves less of it than this share, or this squared length in noise."""
+CONTAINS = 25.0
+"""Squared length, in noise and at its expected size, from which what is contained is seen at all: five sigma."""
 
 # --- laws that nobody wrote down ---
 

@@ -12,11 +12,11 @@ from thermal_robot.effects import Effect, gate
 from thermal_robot.effects.apply import displacement
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import orthonormal, without
-from thermal_robot.inference.columns import block, frame_columns
+from thermal_robot.inference.columns import Block, block, frame_columns
 from thermal_robot.inference.discrepancy import forms
 from thermal_robot.inference.explain import Explanation, explain
 from thermal_robot.inference.gauss_newton import gauss_newton
-from thermal_robot.inference.problem import Linear, contained
+from thermal_robot.inference.problem import Linear, Whitening, contained
 from thermal_robot.inference.refine import refined
 from thermal_robot.inference.robust import Noise
 from thermal_robot.observations import Observations
@@ -100,7 +100,8 @@ def settle(
     noise = Noise(campaign.noise_position, campaign.noise_orientation)
     held: list[tuple[Effect, Array]] = []
     outliers = None
-    alive: set[str] = set()
+    weighed: Whitening | None = None
+    alive: set[str] | None = None
     if known is not None:
         held, outliers = list(known.held), known.explanation.outliers
         variants.update({effect.name: (effect,) for effect, _ in held})
@@ -108,17 +109,24 @@ def settle(
     revisions = 1 if many else settings.REVISIONS
     for revision in range(revisions + 1):
         progress("combinations of effects" if revision == 0 else f"exact fit, revision {revision}")
-        candidates, families = _listed(variants, observations)
+        blocks = tuple(_listed(variants, observations, (*begin, *(effect for effect, _ in held))))
+        candidates, families = [b.effect for b in blocks], tuple(b.effect.name for b in blocks)
         chosen = [candidates.index(effect) for effect, _ in held]
         start_at = chosen if revision or not begin else [candidates.index(effect) for effect in begin]
-        blocks = tuple(block(observations, c) for c in candidates)
         moved_by = (blocks[b].columns @ v for b, (_, v) in zip(chosen, held, strict=True))
         linear = Linear(
             observations.gap + sum(moved_by, np.zeros_like(observations.gap)), frame_columns(observations)[0], blocks
         )
-        beside = [form for form in forms(observations) if not alive or form.name in alive]
+        every = forms(observations)
         explanation = explain(
-            linear, noise, families=families, starts=[tuple(start_at)], outliers=outliers, forms=beside
+            linear,
+            noise,
+            families=families,
+            starts=[tuple(start_at)],
+            outliers=outliers,
+            known=weighed,
+            forms=[form for form in every if alive is None or form.name in alive],
+            among=len(every),
         )
         factor = settings.REFINEMENT ** (1 / 2**revision)
         held = [(candidates[b], explanation.values[b][0]) for b in explanation.best.blocks]
@@ -130,39 +138,54 @@ def settle(
         if last:
             break
         outliers, alive = explanation.outliers, {form.name for form in explanation.forms}
-        for effect, _ in held:
-            near = gate.nearby(effect, factor)
+        weighed = replace(explanation.whitening, smooth=None)
+        for (effect, _), b in zip(held, explanation.best.blocks, strict=True):
+            near = (*gate.nearby(effect, factor), *_leading(effect, blocks[b], explanation.values[b][0]))
             variants[effect.name] = tuple(dict.fromkeys((*near, *_others(effect, start, whole[effect.name]))))
     return Settled(observations, explanation, tuple(held), families)
+
+
+def _leading(chosen: Effect, item: Block, values: Array) -> Iterator[Effect]:
+    """Yield a setting in all places in those alone that do most, as fitted: in the two, three and more of them."""
+    if chosen.places or chosen.share is not None:
+        return
+    every = gate.places_of(item.parameters)
+    of = np.array([parameter.place for parameter in item.parameters])
+    moved = [float(np.linalg.norm(item.columns[:, :, of == place] @ values[of == place])) for place in every]
+    most = sorted(every, key=lambda place: -moved[every.index(place)])
+    for count in range(2, min(len(every), settings.LEADING_PLACES + 1)):
+        yield replace(chosen, places=tuple(place for place in every if place in most[:count]))
 
 
 def _others(chosen: Effect, observations: Observations, settings_of: Sequence[Effect]) -> Iterator[Effect]:
     """Yield what stays a rival of a setting while its constants are refined.
 
-    One joint more or less, other joints, all joints, and its joint in other settings; of a law, all that were compared
-    with it.
+    One place more, less or another, other places alone, all places, and its places, and each of them, in other settings;
+    of a law, all that were compared with it.
     """
     if chosen.share is not None:
         yield from settings_of
         return
     every = [alone.places[0] for alone in gate.alone(replace(chosen, places=()), observations)]
-    if chosen.places:
-        yield from (replace(chosen, places=(*chosen.places, j)) for j in every if j not in chosen.places)
-    if len(chosen.places) > 1:
-        yield from (replace(chosen, places=tuple(k for k in chosen.places if k != j)) for j in chosen.places)
+    own = set(chosen.places)
+    fewer = [own - {place} for place in chosen.places] if len(own) > 1 else []
+    more = [kept | {place} for kept in (own, *fewer) for place in every if own and place not in own]
+    for places in (*more, *fewer):
+        yield replace(chosen, places=tuple(place for place in every if place in places))
     yield replace(chosen, places=())
     yield from gate.alone(replace(chosen, places=()), observations)
-    for joint in chosen.places:
-        for setting in settings_of:
-            alone = gate.at(setting, joint, observations)
-            if alone is not None and not setting.places:
-                yield alone
+    for setting in (setting for setting in settings_of if not setting.places):
+        yield replace(setting, places=chosen.places)
+        yield from (alone for place in chosen.places if (alone := gate.at(setting, place, observations)) is not None)
 
 
 def _listed(
-    variants: dict[str, tuple[Effect, ...]], observations: Observations
-) -> tuple[list[Effect], tuple[str, ...]]:
-    """List all settings but those of single places of which the data see nothing beside the frames."""
+    variants: dict[str, tuple[Effect, ...]], observations: Observations, kept: Sequence[Effect]
+) -> Iterator[Block]:
+    """Yield all settings but those with a place of which the data see nothing, or nothing beside the frames.
+
+    What is kept stays in any case.
+    """
     frames = frame_columns(observations)[0]
     basis = orthonormal(frames.reshape(frames.shape[0] * frames.shape[1], frames.shape[2]))
     names, moves = observations.robot.joint_names, observations.joint_sensitivity[:, : frames.shape[1]]
@@ -175,8 +198,19 @@ def _listed(
     # before the first joint a segment is the base, behind the last one the tool
     hidden |= {s.parent_link for s in segments} - {s.parent_link for s in segments[1:] if s.movable}
     every = [setting for own in variants.values() for setting in own]
-    listed = [e for e in every if not (hidden & set(e.places) and _constant(e, observations))]
-    return listed, tuple(setting.name for setting in listed)
+    for setting in every:
+        if setting in kept or not (hidden & set(setting.places) and _constant(setting, observations)):
+            item = block(observations, setting)
+            if setting in kept or _sees(item):
+                yield item
+
+
+def _sees(item: Block) -> bool:
+    """Whether the data see something of each place of a setting in several places."""
+    length = np.linalg.norm(item.columns, axis=(0, 1)) * item.sizes
+    of = np.array([parameter.place for parameter in item.parameters])
+    places = item.effect.places if len(item.effect.places) > 1 else ()
+    return all(length[of == place].max(initial=0.0) > settings.ALIAS * length.max() for place in places)
 
 
 def _constant(effect: Effect, observations: Observations) -> bool:

@@ -1,0 +1,145 @@
+"""The search finds the best of all combinations, wherever it starts and whatever hides it."""
+
+from itertools import combinations
+
+import numpy as np
+import pytest
+from inference.problems import columns_of, small_problem
+
+from thermal_robot.inference.problem import Linear, Whitening, contained, gram
+from thermal_robot.inference.search import Search, _gains
+
+
+def best_of_all(search, most=3):
+    """Log evidence of the best of all allowed combinations, each computed from scratch."""
+    alone = Search(search.gram, search.log_prior, search.exclusive)
+    every = range(len(search.gram.slices))
+    chosen = (c for size in range(most + 1) for c in combinations(every, size))
+    return max(alone.evaluate(c).log_evidence for c in chosen if alone.allowed(c))
+
+
+def test_probabilities_sum_to_one_and_favour_the_truth():
+    for seed in range(10):
+        linear, whitening = small_problem(seed, rows=30, present=(1,))
+        search = Search(gram(linear, whitening), (-2.2,) * 3)
+        best = search.run()
+        order, probability = search.probabilities()
+        assert probability.sum() == pytest.approx(1.0, abs=1e-12)
+        assert (np.diff(probability) <= 0).all()
+        assert order[0] is best
+        assert best.blocks == (1,)
+
+
+def test_the_search_finds_the_best_of_all_combinations():
+    for seed in range(10):
+        linear, whitening = small_problem(seed, present=((), (0,), (0, 2), (0, 1, 2))[seed % 4])
+        search = Search(gram(linear, whitening), (-2.2,) * 3)
+        best = search.run()
+        assert best.log_evidence == pytest.approx(best_of_all(search), abs=1e-3)
+
+
+def gains_of(linear, whitening, beside):
+    """What each further block gains beside some: to first order, and computed exactly."""
+    search = Search(gram(linear, whitening), (0.0,) * len(linear.blocks))
+    base = search.evaluate(beside)
+    others = [b for b in range(len(linear.blocks)) if b not in beside]
+    first = {b: gain for b, gain, _ in _gains(search.gram, base, others)}
+    return [(first[b], search.evaluate((*beside, b)).log_evidence - base.log_evidence) for b in others]
+
+
+@pytest.mark.parametrize("beside", [(), (1,)], ids=["alone", "beside another"])
+def test_a_gain_to_first_order_is_the_exact_one_where_a_block_explains_little(beside):
+    """Blocks that do nothing: the integral over their size is within what the exact one's parabola misses."""
+    errors = []
+    for seed in range(20):
+        linear, whitening = small_problem(seed, rows=40, present=beside)
+        errors += np.subtract(*np.transpose(gains_of(linear, whitening, beside))).tolist()
+    assert np.abs(errors).max() < 0.3
+    assert abs(np.mean(errors)) < 0.15
+
+
+def test_a_gain_to_first_order_is_near_the_exact_one_where_a_block_explains_all():
+    """So large ones come first: they are within a tenth, or two nats, of what they gain."""
+    for seed in range(10):
+        linear, whitening = small_problem(seed, rows=40, present=(2,), noise=0.3)
+        (_, _), (_, _), (first, exact) = gains_of(linear, whitening, ())
+        assert exact > 20.0
+        assert abs(first - exact) < max(0.1 * exact, 2.0)
+
+
+def test_the_scale_of_a_gain_is_that_of_the_grid_nearest_the_best():
+    for seed in range(6):
+        linear, whitening = small_problem(seed, rows=40, present=(2,), noise=0.3)
+        search = Search(gram(linear, whitening), (0.0,) * 3)
+        ((_, _, scale),) = _gains(search.gram, search.evaluate(()), [2])
+        # half a unit of ln λ between places of the grid
+        assert abs(np.log(scale / search.evaluate((2,)).scales[2])) < 0.5
+
+
+def test_neighbours_that_come_near_the_best_are_computed_exactly():
+    """A search leaves nothing inexact that could change a probability by much."""
+    for seed in range(10):
+        linear, whitening = small_problem(seed, rows=30, present=((), (0,), (0, 2))[seed % 3])
+        search = Search(gram(linear, whitening), (-2.2,) * 3)
+        best = search.run()
+        rough = [c for c in search.seen.values() if not c.exact]
+        assert all(c.log_evidence < best.log_evidence - 2.9 for c in rough)
+        assert all(search.seen[key].blocks == key for key in search.seen)
+
+
+def alike(seed, rows=25, count=7):
+    """Blocks of one column that much resemble each other, as those of a robot do; two or three of them are present."""
+    rng = np.random.default_rng(seed)
+    common = rng.normal(size=(rows, 3, 3))
+    columns = [0.35 * rng.normal(size=(rows, 3)) + common @ rng.normal(size=3) for _ in range(count)]
+    blocks = tuple(columns_of(c[:, :, None], np.ones(1)) for c in columns)
+    gap = rng.normal(size=(rows, 3))
+    for b in rng.permutation(count)[: rng.integers(2, 4)]:
+        gap = gap + blocks[b].columns @ rng.choice([-1.0, 1.0], 1)
+    linear = Linear(gap, rng.normal(size=(rows, 3, 2)), blocks)
+    return Search(gram(linear, Whitening(np.ones(rows), np.ones(3), 20.0)), (-2.2,) * count)
+
+
+def test_blocks_that_resemble_each_other_do_not_lead_astray():
+    """From nothing, or from a wrong combination: two that stand in for two others are left again."""
+    for seed in range(40):
+        best = best_of_all(alike(seed), most=4)
+        for start in ((), (0, 1), (4, 5, 6)):
+            assert alike(seed).run(start).log_evidence > best - 0.5
+
+
+def test_smaller_blocks_are_found_inside_one_that_contains_them():
+    """Two single columns, each of another block, against one of six columns that holds both: it comes first."""
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        parts = rng.normal(size=(30, 3, 6))
+        blocks = [columns_of(parts), *(columns_of(parts[:, :, [k]]) for k in range(6))]
+        gap = parts @ [1.0, 0.0, 0.0, 1.5, 0.0, 0.0] + 0.1 * rng.normal(size=(30, 3))
+        linear = Linear(gap, np.zeros((30, 3, 0)), tuple(blocks))
+        problem = gram(linear, Whitening(np.ones(30), np.full(3, 0.1), 20.0))
+        inside = contained(problem)
+        assert inside == {frozenset({0, k}) for k in range(1, 7)}
+        search = Search(problem, (-2.2,) * 7, inside, frozenset({0}))
+        assert search.run((0,)).blocks == (1, 4)
+
+
+def test_what_is_stretched_to_stand_in_for_another_does_not_hide_it():
+    """Beside a block blown up to thirty times its size, what the missing one gains is hardly seen to first order."""
+    rng = np.random.default_rng(3)
+    one = rng.normal(size=(40, 3, 1))
+    near = one + 0.02 * rng.normal(size=(40, 3, 6))
+    gap = one @ [1.0] + near @ (0.3 * rng.normal(size=6)) + 0.05 * rng.normal(size=(40, 3))
+    blocks = (columns_of(near, np.full(6, 0.3)), columns_of(one))
+    search = Search(
+        gram(Linear(gap, np.zeros((40, 3, 0)), blocks), Whitening(np.ones(40), np.full(3, 0.05), 20.0)), (-2.2,) * 2
+    )
+    assert search.run().log_evidence == pytest.approx(best_of_all(search, 2), abs=1e-3)
+
+
+def test_every_neighbour_of_a_combination_is_weighed():
+    search = alike(5)
+    found = search.weigh((0, 1))
+    seen = {c for c in search.seen if len(set(c) ^ {0, 1}) == 1}
+    assert {(0,), (1,), *(tuple(sorted((0, 1, k))) for k in range(2, 7))} <= seen
+    exact = Search(search.gram, search.log_prior)
+    assert found.log_evidence >= max(exact.evaluate(c).log_evidence for c in ((0, 1), (0,), (1,)))

@@ -1,0 +1,300 @@
+"""The search for the best combination of blocks: neighbours weighed to first order, the near ones exactly.
+
+A search climbs from a combination by adding, dropping and exchanging blocks. What a climb by single steps misses is
+looked for on purpose: two exchanges of which each alone brings nothing, one block that contains several smaller ones,
+and another setting of one block in place of two blocks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.errors import EstimationError
+from thermal_robot.inference import settings
+from thermal_robot.inference.evidence import Combination, evidence
+from thermal_robot.inference.gram import Gram
+
+Array = NDArray[np.float64]
+
+
+@dataclass(eq=False)
+class Search:
+    """Evaluates combinations, each once, and keeps them all.
+
+    Parameters
+    ----------
+    gram
+        The problem.
+    log_prior
+        Log prior odds of each block.
+    exclusive
+        Pairs of blocks that must not be together.
+    containers
+        Blocks that can do all that a block of another effect can do.
+    """
+
+    gram: Gram
+    log_prior: Sequence[float]
+    exclusive: frozenset[frozenset[int]] = frozenset()
+    containers: frozenset[int] = frozenset()
+    seen: dict[tuple[int, ...], Combination] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        """List what each block excludes."""
+        self._apart: dict[int, set[int]] = {}
+        self._expanded: set[tuple[int, ...]] = set()
+        for a, b in self.exclusive:
+            self._apart.setdefault(a, set()).add(b)
+            self._apart.setdefault(b, set()).add(a)
+
+    def allowed(self, blocks: Sequence[int]) -> bool:
+        """Tell whether no two of the blocks exclude each other."""
+        whole = set(blocks)
+        return not any(self._apart.get(b, whole - whole) & whole for b in blocks)
+
+    def evaluate(self, blocks: Sequence[int], start: Combination | None = None) -> Combination:
+        """Return the combination's evidence, computed once."""
+        key = tuple(sorted(blocks))
+        known = self.seen.get(key)
+        if known is None or not known.exact:
+            self.seen[key] = self._computed(key, known or start)
+        return self.seen[key]
+
+    def _computed(self, key: tuple[int, ...], start: Combination | None) -> Combination:
+        try:
+            return evidence(self.gram, key, sum(self.log_prior[b] for b in key), start)
+        except EstimationError:
+            if not key:
+                raise
+            # rounding hides what blocks so nearly alike bring
+            return replace(self.evaluate(()), blocks=key, log_evidence=-np.inf)
+
+    def run(self, start: Sequence[int] = ()) -> Combination:
+        """Climb from a combination, and look on purpose for what single steps miss, until nothing is better.
+
+        Every neighbour of the best combination is weighed, so that its probability is against all of them.
+        """
+        best = self.climb(start)
+        while (better := self._simpler(best) or self._smaller(best) or self._two_at_once(best)) is not None:
+            best = self.climb(better.blocks)
+        return best
+
+    def climb(self, start: Sequence[int] = ()) -> Combination:
+        """Add, drop and exchange blocks until nothing is better, neighbours of near ties included."""
+        best = self._climb(start, frozenset())
+        while (better := self._missed(best) or self._beside_a_tie(best)) is not None:
+            best = self._climb(better.blocks, frozenset())
+        return best
+
+    def _smaller(self, best: Combination) -> Combination | None:
+        """Climb without one that contains others, which may suffice where it came first; return what is better."""
+        for large in self.containers & set(best.blocks):
+            barred = frozenset(b for b in self._apart[large] | {large} if self._width(b) >= self._width(large))
+            found = self._climb([b for b in best.blocks if b != large], barred)
+            if found.log_evidence > best.log_evidence + settings.BETTER:
+                return found
+        return None
+
+    def _two_at_once(self, best: Combination) -> Combination | None:
+        """Add two blocks, or put two in place of one; return what is better, if any is.
+
+        Of blocks that resemble each other one alone may bring nothing, and with a second one all.
+        """
+        without = [self.evaluate([c for c in best.blocks if c != b], best) for b in best.blocks]
+        for base in (best, *without):
+            if not np.isfinite(base.log_evidence):
+                continue
+            first = sorted(self._with_one_more(base, best), key=lambda c: -c.log_evidence)[: settings.LOOKED_BEYOND]
+            for one in first:
+                beyond = self._with_one_more(self.evaluate(one.blocks, base), best)
+                two = max(beyond, key=lambda c: c.log_evidence, default=best)
+                if self._near(two, best):
+                    found = self.evaluate(two.blocks, one if one.exact else base)
+                    if found.log_evidence > best.log_evidence + settings.BETTER:
+                        return found
+        return None
+
+    def _beside_a_tie(self, best: Combination) -> Combination | None:
+        """Weigh the neighbours of what is nearly as probable as the best, too; return what is better, if any is.
+
+        Two effects that stand in for two others are told only so: with one of them exchanged there is little to choose.
+        """
+        near = [c for c in self.seen.values() if c.exact and self._near(c, best) and c.blocks != best.blocks]
+        near = [c for c in near if len(c.blocks) == len(best.blocks)]
+        for tie in sorted(near, key=lambda c: -c.log_evidence)[: settings.TIES]:
+            if tie.blocks in self._expanded:
+                continue
+            self._expanded.add(tie.blocks)
+            found = max((self.evaluate(c.blocks, tie) for c in self._promising(tie)), key=lambda c: c.log_evidence)
+            if found.log_evidence > best.log_evidence + settings.BETTER:
+                return found
+        return None
+
+    def weigh(self, blocks: Sequence[int]) -> Combination:
+        """Weigh every neighbour of a combination; return the best of them and it."""
+        own = self.evaluate(blocks)
+        near = [self.evaluate(c.blocks, own) for c in self._promising(own)]
+        return max((own, *near), key=lambda c: c.log_evidence)
+
+    def _simpler(self, best: Combination) -> Combination | None:
+        """Let another setting of one block stand in for further blocks; return what is better, if any is.
+
+        A setting that does more, such as in one joint more, is worth its price only once what it replaces is gone.
+        """
+        for b in best.blocks:
+            for setting in self._apart.get(b, ()):
+                # what it contains goes with the one that it replaces
+                others = [c for c in best.blocks if c != b and c not in self._apart[setting]]
+                key = tuple(sorted((*others, setting)))
+                known = self.seen.get(key)
+                if known and known.log_evidence < best.log_evidence - settings.DETOUR_FROM:
+                    continue
+                found = self.evaluate(key, best)
+                if found.log_evidence > best.log_evidence - settings.DETOUR:
+                    found = self._fewer(found, setting)
+                if found.log_evidence > best.log_evidence + settings.BETTER:
+                    return found
+        return None
+
+    def _fewer(self, found: Combination, kept: int) -> Combination:
+        """Drop blocks as long as that is better, all but one of them."""
+        while True:
+            without = [self.evaluate([c for c in found.blocks if c != b], found) for b in found.blocks if b != kept]
+            best = max(without, key=lambda c: c.log_evidence, default=found)
+            if best.log_evidence <= found.log_evidence:
+                return found
+            found = best
+
+    def _missed(self, best: Combination) -> Combination | None:
+        """Compute exactly what was weighed on the way and comes near the best; return one that is better, if any is."""
+        near = [c.blocks for c in self.seen.values() if not c.exact and self._near(c, best)]
+        found = max((self.evaluate(blocks) for blocks in near), key=lambda c: c.log_evidence, default=best)
+        return found if found.log_evidence > best.log_evidence + settings.BETTER else None
+
+    @staticmethod
+    def _near(one: Combination, best: Combination) -> bool:
+        return one.log_evidence > best.log_evidence - settings.NEARLY
+
+    def _width(self, block: int) -> int:
+        return int(self.gram.slices[block].stop - self.gram.slices[block].start)
+
+    def _climb(self, start: Sequence[int], barred: frozenset[int]) -> Combination:
+        best = max(self.evaluate(()), self.evaluate(start), key=lambda c: c.log_evidence)
+        while True:
+            close = [c.blocks for c in self._promising(best, barred)]
+            better = best
+            for k in range(0, len(close), settings.AT_ONCE):
+                some = (self.evaluate(blocks, best) for blocks in close[k : k + settings.AT_ONCE])
+                better = max((better, *some), key=lambda c: c.log_evidence)
+                if better.log_evidence > best.log_evidence + settings.BETTER:
+                    break
+            else:
+                return best
+            best = better
+
+    def _promising(self, best: Combination, barred: frozenset[int] = frozenset()) -> list[Combination]:
+        """Return the combinations with one block more, less or another that may be better, the best first.
+
+        Those with a new block are known to first order, which tells too little where the others are stretched to do
+        what the new one would do: the best one in place of each block is among them, however little it promises.
+        """
+        without = [self.evaluate([c for c in best.blocks if c != b], best) for b in best.blocks]
+        bases = [c for c in (best, *without) if np.isfinite(c.log_evidence)]
+        found: dict[tuple[int, ...], Combination] = {c.blocks: c for c in without if self._near(c, best)}
+        for base in bases:
+            added = [c for c in self._with_one_more(base, best) if not barred & set(c.blocks)]
+            added.sort(key=lambda c: -c.log_evidence)
+            found |= {c.blocks: c for k, c in enumerate(added) if k == 0 or self._near(c, best)}
+        return sorted(found.values(), key=lambda c: -c.log_evidence)
+
+    def _with_one_more(self, base: Combination, best: Combination) -> list[Combination]:
+        others = [b for b in range(len(self.gram.slices)) if b not in best.blocks]
+        keys = {b: tuple(sorted((*base.blocks, b))) for b in others}
+        barred = set().union(*(self._apart.get(b, ()) for b in base.blocks))
+        new = [b for b in others if b not in barred and keys[b] not in self.seen]
+        for b, gain, scale in _gains(self.gram, base, new):
+            self.seen[keys[b]] = Combination(
+                keys[b],
+                base.log_evidence + gain + self.log_prior[b],
+                base.noise,
+                {**base.scales, b: scale},
+                base.values,
+                base.covariance,
+                base.effective,
+                exact=False,
+            )
+        return [self.seen[keys[b]] for b in others if keys[b] in self.seen]
+
+    def probabilities(self) -> tuple[list[Combination], Array]:
+        """Return the combinations seen, most probable first, with their posterior probabilities."""
+        order = sorted(self.seen.values(), key=lambda c: -c.log_evidence)
+        log = np.array([c.log_evidence for c in order])
+        weight = np.exp(log - log[0])
+        return order, weight / weight.sum()
+
+
+def _gains(gram: Gram, base: Combination, blocks: Sequence[int]) -> list[tuple[int, float, float]]:
+    """Return for each block what adding it gains in log evidence, its scale integrated out, and its best scale.
+
+    Scales of the others stay. In the eigenvectors of the block's own information beside the others, w, with the vector
+    c there, and with the noise s'² that it leaves,
+
+        (n + ν) s'² = ν + Q − Σ c² λ²/(s'² + λ² w) ,
+        gain(λ) = −½ Σ log(1 + λ² w/s'²) − ½ (n + ν) log(s'²/s₀²) ,
+
+    Q = y'y − b'θ, and s₀ the same without the block.
+    """
+    spans = [np.arange(gram.slices[b].start, gram.slices[b].stop) for b in base.blocks]
+    used = np.concatenate([*spans, np.zeros(0, dtype=int)])
+    variance = base.noise**2
+    left = gram.vector - gram.matrix[:, used] @ base.values
+    log_scale = np.array(settings.SCALE_GRID)
+    square = np.exp(2.0 * log_scale)[:, None]
+    prior = -0.5 * (log_scale / settings.SIZE_SPREAD) ** 2
+    norm = np.log((log_scale[1] - log_scale[0]) / (np.sqrt(2.0 * np.pi) * settings.SIZE_SPREAD))
+    freedom = gram.equations + gram.noise_dof
+    rest = (gram.noise_dof + gram.total - float(gram.vector[used] @ base.values)) / freedom
+    rest = max(rest, settings.LEAST_VARIANCE * variance)
+    parts = []
+    for alike in _by_width(gram, blocks):
+        own = np.array([np.arange(gram.slices[b].start, gram.slices[b].stop) for b in alike])
+        cross = gram.matrix[own[:, :, None], used]
+        inside = gram.matrix[own[:, :, None], own[:, None, :]]
+        value, vector = np.linalg.eigh(inside - cross @ (base.covariance / variance) @ cross.transpose(0, 2, 1))
+        along = (vector.transpose(0, 2, 1) @ left[own][:, :, None])[:, :, 0] ** 2
+        parts.append((alike, np.maximum(value, 0.0), along))
+    result = []
+    for alike, value, along in _padded(parts):
+        left_over = np.full((len(alike), len(log_scale)), rest)
+        for _ in range(settings.NOISE_ROUNDS):
+            taken = (along[:, None] * square / (left_over[:, :, None] + square * value[:, None])).sum(axis=2) / freedom
+            left_over = np.maximum(rest - taken, settings.LEAST_VARIANCE * rest)
+        log = -0.5 * np.log1p(square * value[:, None] / left_over[:, :, None]).sum(axis=2) + prior
+        log -= 0.5 * freedom * np.log(left_over / rest)
+        top = log.max(axis=1)
+        gain = top + np.log(np.exp(log - top[:, None]).sum(axis=1)) + norm
+        result += list(zip(alike, gain.tolist(), np.exp(log_scale[log.argmax(axis=1)]).tolist(), strict=True))
+    return result
+
+
+def _padded(parts: Sequence[tuple[list[int], Array, Array]]) -> Iterator[tuple[list[int], Array, Array]]:
+    """Yield narrow blocks together, with zeros that bring nothing, and wide ones as they are: it is done at once."""
+    narrow = [part for part in parts if part[1].shape[1] <= settings.NARROW]
+    yield from (part for part in parts if part[1].shape[1] > settings.NARROW)
+    if narrow:
+        wide = max(value.shape[1] for _, value, _ in narrow)
+        value, along = (
+            np.concatenate([np.pad(part[k], ((0, 0), (0, wide - part[k].shape[1]))) for part in narrow]) for k in (1, 2)
+        )
+        yield [b for part in narrow for b in part[0]], value, along
+
+
+def _by_width(gram: Gram, blocks: Sequence[int]) -> list[list[int]]:
+    widths: dict[int, list[int]] = {}
+    for b in blocks:
+        widths.setdefault(gram.slices[b].stop - gram.slices[b].start, []).append(b)
+    return list(widths.values())
