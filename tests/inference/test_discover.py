@@ -10,8 +10,9 @@ from simulate import simulate
 from thermal_robot.effects import choose
 from thermal_robot.effects.law import Discovered
 from thermal_robot.inference import settings
-from thermal_robot.inference.discover import candidates, discovered, where, worthwhile
+from thermal_robot.inference.discover import candidates, discovered, listed, where, worthwhile
 from thermal_robot.inference.fit import fit, refit
+from thermal_robot.inference.thin import Thin
 
 LISTED = ("joint_offset", "joint_gain", "backlash")
 STEP = Discovered(place="joint_3", quantity="time", shape="step", marks=(3600.0,))
@@ -140,6 +141,20 @@ def test_repeats_of_few_poses_make_no_law_of_what_a_pose_brings(rv_m2):
         if best is not None:
             worth.append((seed, [(e.name, getattr(e, "quantity", "")) for e in best]))
     assert worth == []
+
+
+def test_what_a_known_effect_and_a_zero_do_is_no_law(rv_m2):
+    """Two levels by the direction of approach are lost motion and a zero; without one of the two they are a law."""
+    campaign, _, _ = simulate(rv_m2, ["backlash"], seed=4, noise=NOISE)
+    levels = Discovered(
+        place="joint_3", quantity="approach.joint_3", shape="levels", marks=(-1.0, 1.0), origin=-1.0, span=2.0
+    )
+    thin = Thin.of(known(campaign))
+    assert listed(thin, levels)
+    assert not listed(thin, replace(levels, place="joint_2"))
+    assert not listed(thin, replace(STEP, span=3600.0))
+    for fewer in (("joint_offset", "joint_gain"), ("joint_gain", "backlash")):
+        assert not listed(Thin.of(known(campaign, fewer)), levels)
 
 
 @pytest.mark.parametrize("seed", [1, 3])

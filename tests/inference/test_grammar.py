@@ -37,6 +37,9 @@ def test_every_effect_that_varies_in_a_joint_may_change_there(here):
     joints = here.robot.joint_names
     assert pairs == {(of, j) for of in varying for j in joints} - {("joint_compliance", "joint_1")}
     assert {law.quantity for law in found if law.place == "joint_3"} == {*conditions(here, "joint_3"), "joint_3"}
+    # lost motion times the direction of approach is a zero that is off
+    follows = {law.quantity for law in found if (law.of, law.place) == ("backlash", "joint_3")}
+    assert follows == {*conditions(here, "joint_3"), "joint_3"} - {"approach.joint_3"}
     assert len(found) == len(set(found))
     for law in found:
         assert (law.kind, law.shape) == ("joint", "ramp")

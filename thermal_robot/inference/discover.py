@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import islice
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,6 +12,7 @@ from numpy.typing import NDArray
 from thermal_robot.effects import Effect
 from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import orthonormal, without
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.discrepancy import forms
 from thermal_robot.inference.explain import explain, log_priors
@@ -18,6 +20,7 @@ from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.problem import Linear
 from thermal_robot.inference.robust import Noise
 from thermal_robot.inference.scan import Scanned, Seats, scan, shaped
+from thermal_robot.inference.settle import constant
 from thermal_robot.inference.target import Target
 from thermal_robot.inference.thin import Thin
 
@@ -70,8 +73,27 @@ def candidates(fit: Fit, number: int) -> tuple[Discovered, ...]:
     chosen: list[Discovered] = []
     for k in range(max(map(len, offered), default=0)):  # the first of each remainder, in turn
         chosen += [own[k] for own in offered if k < len(own)]
-    named = (replace(law, name=f"{PREFIX}{number}") for law in chosen)
-    return tuple(dict.fromkeys(named))[: settings.COMPARED_LAWS]
+    named = dict.fromkeys(replace(law, name=f"{PREFIX}{number}") for law in chosen)
+    return tuple(islice((law for law in named if not listed(thin, law)), settings.COMPARED_LAWS))
+
+
+def listed(thin: Thin, law: Discovered) -> bool:
+    """Whether a known effect in that joint, with a zero that is off, does exactly what a law does: then it is none."""
+    if law.kind != "joint":
+        return False
+    own = [item for item in thin.linear.blocks if item.effect.places == (law.place,)]
+    free = [item.columns for item in own if constant(item.effect, thin.observations)] + [thin.linear.frames]
+    columns = _flat(block(thin.observations, law).columns)
+    length = np.linalg.norm(columns, axis=0).max()
+    for item in own:
+        basis = orthonormal(_flat(np.concatenate([item.columns, *free], axis=2)))
+        if np.linalg.norm(without(columns, basis), axis=0).max() < settings.ALIAS * length:
+            return True
+    return False
+
+
+def _flat(columns: Array) -> Array:
+    return columns.reshape(-1, columns.shape[2])
 
 
 def _remainders(fit: Fit) -> Iterator[tuple[int, ...]]:

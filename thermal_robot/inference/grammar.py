@@ -30,7 +30,8 @@ def modulated(observations: Observations, effects: Iterable[Effect] | None = Non
     """Return laws of known effects whose size in one joint changes with a condition or with the joint's position.
 
     An effect whose response is the same in all rows, such as a zero that is off, is left out: times a law it is a plain
-    law of that joint. So is an effect that is not installed, as a saved law could not be read.
+    law of that joint. So is what drives the effect itself: lost motion times the direction of approach is a zero that
+    is off. An effect that is not installed is left out, too, as a saved law could not be read.
 
     Parameters
     ----------
@@ -50,7 +51,7 @@ def modulated(observations: Observations, effects: Iterable[Effect] | None = Non
         setting = gate.variants(effect, observations)[0] if effects is None else effect
         arguments = {k: v for k, v in gate.arguments(setting).items() if k != "places"}
         for joint in _changing(setting, observations):
-            names = [*conditions(observations, joint), joint]
+            names = [*(n for n in conditions(observations, joint) if n != _driver(setting, observations, joint)), joint]
             plain = [follow[name] for name in names if name in known]
             text = json.dumps(arguments)
             found += [replace(law, place=joint, of=effect.name, of_arguments=text) for law in plain]
@@ -61,6 +62,13 @@ def _changing(effect: Effect, observations: Observations) -> tuple[str, ...]:
     """Return the joints in which an effect's response differs between rows."""
     own = [p for p in gate.checked(effect, observations) if p.kind == "joint"]
     return gate.places_of([p for p in own if any(np.ptp(r.values, axis=0).any() for r in _rows(p))])
+
+
+def _driver(effect: Effect, observations: Observations, joint: str) -> str:
+    """Return the name of the quantity that drives an effect in a joint; empty where nothing that is recorded does."""
+    own = [p for p in gate.checked(effect, observations) if p.kind == "joint" and p.place == joint]
+    driver = gate.driver(effect, observations, own, np.zeros(observations.campaign.samples))
+    return driver[0] if driver else ""
 
 
 def _rows(parameter: Parameter) -> Iterator[Response]:

@@ -212,7 +212,7 @@ class Search:
         return sorted(found.values(), key=lambda c: -c.log_evidence)
 
     def _with_one_more(self, base: Combination, best: Combination) -> list[Combination]:
-        others = [b for b in range(len(self.gram.slices)) if b not in best.blocks]
+        others = [b for b in range(len(self.gram.slices)) if b not in best.blocks and b not in base.blocks]
         keys = {b: tuple(sorted((*base.blocks, b))) for b in others}
         barred = set().union(*(self._apart.get(b, ()) for b in base.blocks))
         new = [b for b in others if b not in barred and keys[b] not in self.seen]
@@ -287,9 +287,8 @@ def _padded(parts: Sequence[tuple[list[int], Array, Array]]) -> Iterator[tuple[l
     yield from (part for part in parts if part[1].shape[1] > settings.NARROW)
     if narrow:
         wide = max(value.shape[1] for _, value, _ in narrow)
-        value, along = (
-            np.concatenate([np.pad(part[k], ((0, 0), (0, wide - part[k].shape[1]))) for part in narrow]) for k in (1, 2)
-        )
+        padded = [[np.pad(a, ((0, 0), (0, wide - a.shape[1]))) for a in part[1:]] for part in narrow]
+        value, along = (np.concatenate(arrays) for arrays in zip(*padded, strict=True))
         yield [b for part in narrow for b in part[0]], value, along
 
 

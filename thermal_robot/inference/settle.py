@@ -160,8 +160,8 @@ def _leading(chosen: Effect, item: Block, values: Array) -> Iterator[Effect]:
 def _others(chosen: Effect, observations: Observations, settings_of: Sequence[Effect]) -> Iterator[Effect]:
     """Yield what stays a rival of a setting while its constants are refined.
 
-    One place more, less or another, other places alone, all places, and its places, and each of them, in other settings;
-    of a law, all that were compared with it.
+    One place more, less or another, other places alone, and all places; its places, and each of them, in other
+    settings. Of a law, all that were compared with it.
     """
     if chosen.share is not None:
         yield from settings_of
@@ -199,7 +199,7 @@ def _listed(
     hidden |= {s.parent_link for s in segments} - {s.parent_link for s in segments[1:] if s.movable}
     every = [setting for own in variants.values() for setting in own]
     for setting in every:
-        if setting in kept or not (hidden & set(setting.places) and _constant(setting, observations)):
+        if setting in kept or not (hidden & set(setting.places) and constant(setting, observations)):
             item = block(observations, setting)
             if setting in kept or _sees(item):
                 yield item
@@ -213,7 +213,7 @@ def _sees(item: Block) -> bool:
     return all(length[of == place].max(initial=0.0) > settings.ALIAS * length.max() for place in places)
 
 
-def _constant(effect: Effect, observations: Observations) -> bool:
+def constant(effect: Effect, observations: Observations) -> bool:
     """Whether an effect displaces each place by the same in all rows."""
     responses = [r for p in gate.checked(effect, observations) for r in p.responses]
     return all(r.values.ndim == (0 if r.channel == "joint" else 1) for r in responses)
