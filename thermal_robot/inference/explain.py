@@ -219,13 +219,17 @@ class _Round:
     def told(self, aside: NDArray[np.bool_]) -> Explanation:
         """Return the explanation.
 
-        Values are those that correct best: beside a smooth discrepancy, which is no part of the correction, effects are
-        fitted as if there were none, at a noise that holds it.
+        Settings and values are those that correct best: beside a smooth discrepancy, which is no part of the
+        correction, the effects are fitted as if there were none, at a noise that holds it.
         """
         linear, ladder = self.asked.linear, self.ladder
         rung = self.rung if self.form is None or self.form.anew else PLAIN
         search, white = ladder.beside(rung), ladder.whitened_at(rung)
-        best = search.evaluate(self.best.blocks)
+        best = (
+            search.evaluate(self.best.blocks)
+            if rung == self.rung
+            else search.set_best(self.best.blocks, self.asked.families)
+        )
         values = parameter_values(linear, search.gram, best)
         ladder.weigh_pairs(self.rung, self.best)
         compared, probabilities = ladder.probabilities()

@@ -79,7 +79,8 @@ class Search:
         Every neighbour of the best combination is weighed, so that its probability is against all of them.
         """
         best = self.climb(start)
-        while (better := self._simpler(best) or self._smaller(best) or self._two_at_once(best)) is not None:
+        detours = (self._simpler, self._smaller, self._two_at_once, self._missed)
+        while (better := next((found for detour in detours if (found := detour(best))), None)) is not None:
             best = self.climb(better.blocks)
         return best
 
@@ -228,6 +229,19 @@ class Search:
                 exact=False,
             )
         return [self.seen[keys[b]] for b in others if keys[b] in self.seen]
+
+    def set_best(self, blocks: Sequence[int], families: Sequence[str]) -> Combination:
+        """Return the best settings of the same effects, changed one after another."""
+        best = self.evaluate(blocks)
+        while True:
+            names = {families[b]: b for b in best.blocks}
+            swaps = [(names[f], b) for b, f in enumerate(families) if f in names and b != names[f]]
+            tried = [tuple(sorted((set(best.blocks) - {old}) | {new})) for old, new in swaps]
+            near = (self.evaluate(c, best) for c in tried if self.allowed(c))
+            found = max(near, key=lambda c: c.log_evidence, default=best)
+            if found.log_evidence <= best.log_evidence + settings.BETTER:
+                return best
+            best = found
 
     def probabilities(self) -> tuple[list[Combination], Array]:
         """Return the combinations seen, most probable first, with their posterior probabilities."""

@@ -13,10 +13,10 @@ from thermal_robot.effects.apply import displacement
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import orthonormal, without
 from thermal_robot.inference.columns import Block, block, frame_columns
-from thermal_robot.inference.discrepancy import forms
+from thermal_robot.inference.discrepancy import Form, forms
 from thermal_robot.inference.explain import Explanation, explain
 from thermal_robot.inference.gauss_newton import gauss_newton
-from thermal_robot.inference.problem import Linear, Whitening, contained
+from thermal_robot.inference.problem import Linear, contained
 from thermal_robot.inference.refine import refined
 from thermal_robot.inference.robust import Noise
 from thermal_robot.observations import Observations
@@ -99,11 +99,9 @@ def settle(
     variants = dict(whole)
     noise = Noise(campaign.noise_position, campaign.noise_orientation)
     held: list[tuple[Effect, Array]] = []
-    outliers = None
-    weighed: Whitening | None = None
-    alive: set[str] | None = None
+    before: Explanation | None = None
     if known is not None:
-        held, outliers = list(known.held), known.explanation.outliers
+        held = list(known.held)
         variants.update({effect.name: (effect,) for effect, _ in held})
     many = campaign.samples > settings.MANY_ROWS
     revisions = 1 if many else settings.REVISIONS
@@ -113,21 +111,9 @@ def settle(
         candidates, families = [b.effect for b in blocks], tuple(b.effect.name for b in blocks)
         chosen = [candidates.index(effect) for effect, _ in held]
         start_at = chosen if revision or not begin else [candidates.index(effect) for effect in begin]
-        moved_by = (blocks[b].columns @ v for b, (_, v) in zip(chosen, held, strict=True))
-        linear = Linear(
-            observations.gap + sum(moved_by, np.zeros_like(observations.gap)), frame_columns(observations)[0], blocks
-        )
-        every = forms(observations)
-        explanation = explain(
-            linear,
-            noise,
-            families=families,
-            starts=[tuple(start_at)],
-            outliers=outliers,
-            known=weighed,
-            forms=[form for form in every if alive is None or form.name in alive],
-            among=len(every),
-        )
+        linear = _at(observations, blocks, chosen, held)
+        outliers = known.explanation.outliers if known else None
+        explanation = _explained(linear, noise, families, tuple(start_at), forms(observations), before, outliers)
         factor = settings.REFINEMENT ** (1 / 2**revision)
         held = [(candidates[b], explanation.values[b][0]) for b in explanation.best.blocks]
         finer = refined(explanation, observations, factor) if revision < revisions else held
@@ -137,12 +123,44 @@ def settle(
         observations, held = gauss_newton(campaign, observations.frames, explanation, held, least)
         if last:
             break
-        outliers, alive = explanation.outliers, {form.name for form in explanation.forms}
-        weighed = replace(explanation.whitening, smooth=None)
+        before = explanation
         for (effect, _), b in zip(held, explanation.best.blocks, strict=True):
-            near = (*gate.nearby(effect, factor), *_leading(effect, blocks[b], explanation.values[b][0]))
-            variants[effect.name] = tuple(dict.fromkeys((*near, *_others(effect, start, whole[effect.name]))))
+            leading = _leading(effect, blocks[b], explanation.values[b][0])
+            others = _others(effect, start, whole[effect.name])
+            variants[effect.name] = tuple(dict.fromkeys((*gate.nearby(effect, factor), *leading, *others)))
     return Settled(observations, explanation, tuple(held), families)
+
+
+def _explained(
+    linear: Linear,
+    noise: Noise,
+    families: Sequence[str],
+    start: tuple[int, ...],
+    every: Sequence[Form],
+    before: Explanation | None,
+    outliers: NDArray[np.bool_] | None,
+) -> Explanation:
+    """Explain a problem: where one like it was explained before, from its weights, beside what it left in question."""
+    alive = {form.name for form in before.forms} if before else {form.name for form in every}
+    return explain(
+        linear,
+        noise,
+        families=families,
+        starts=[start],
+        outliers=before.outliers if before else outliers,
+        known=replace(before.whitening, smooth=None) if before else None,
+        forms=[form for form in every if form.name in alive],
+        among=len(every),
+    )
+
+
+def _at(
+    observations: Observations, blocks: Sequence[Block], chosen: Sequence[int], held: Sequence[tuple[Effect, Array]]
+) -> Linear:
+    """Return the linear problem at the exact model: its gap, and what the effects that it holds have moved."""
+    moved = (blocks[b].columns @ values for b, (_, values) in zip(chosen, held, strict=True))
+    gap = observations.gap + sum(moved, np.zeros_like(observations.gap))
+    return Linear(gap, frame_columns(observations)[0], tuple(blocks))
 
 
 def _leading(chosen: Effect, item: Block, values: Array) -> Iterator[Effect]:
