@@ -193,7 +193,8 @@ def _others(chosen: Effect, observations: Observations, settings_of: Sequence[Ef
     yield replace(chosen, places=())
     yield from gate.alone(replace(chosen, places=()), observations)
     for setting in (setting for setting in settings_of if not setting.places):
-        yield replace(setting, places=chosen.places)
+        if set(chosen.places) <= set(gate.places_of(gate.checked(setting, observations))):
+            yield replace(setting, places=chosen.places)
         yield from (alone for place in chosen.places if (alone := gate.at(setting, place, observations)) is not None)
 
 
