@@ -145,3 +145,18 @@ def test_a_share_lies_within_its_interval_and_nothing_is_known_exactly():
 
 def test_one_block_tells_no_interval():
     assert share(Squares(1.0, np.ones(1)), Squares(2.0, np.ones(1)))[1] == (-np.inf, 1.0)
+
+
+def test_an_interval_is_wider_where_one_block_makes_up_the_spread():
+    """The jackknife's variance is then told by one value: less is known of it than of one that twenty tell."""
+    even = np.tile([-1.0, 1.0], 10)
+    single = np.where(np.arange(20) == 0, 1.0, 0.0)
+    wide = []
+    for moved in (even, single):
+        moved = moved - moved.mean()
+        moved *= 0.01 / np.sqrt((moved**2).sum())
+        part = Squares(0.5, 0.5 + moved)
+        value, (low, high) = share(part, Squares(1.0, np.ones(20)))
+        assert low < value < high
+        wide.append(high - low)
+    assert wide[1] > 1.5 * wide[0]

@@ -52,3 +52,20 @@ def test_it_is_drawn_against_the_joints_own_position(rv_m2):
         order = float(parameter.label.split()[-1])
         shape = np.sin if parameter.label.startswith("sine") else np.cos
         np.testing.assert_allclose(parameter.responses[0].values, shape(order * values), atol=1e-15)
+
+
+def test_wheels_of_either_side_and_single_orders_are_settings(rv_m2):
+    """Without a stated ratio there is one side; each setting has just the orders of its wheels."""
+
+    def orders(effect, here):
+        found = {p.label.split()[-1] for p in checked(effect, here) if p.place == "joint_3"}
+        return frozenset(int(order) for order in found)
+
+    plain = observe(commanded(rv_m2))
+    assert {orders(e, plain) for e in TransmissionError().variants(plain)} == {
+        frozenset(own) for own in ((1, 2), (1,), (2,))
+    }
+    geared = observe(commanded(rv_m2, gears={"joint_3": 50.0}))
+    found = [orders(e, geared) for e in TransmissionError().variants(geared)]
+    both = ((1, 2, 50, 100), (1, 2), (50, 100), (1,), (2,), (50,), (100,))
+    assert found == [frozenset(own) for own in both]

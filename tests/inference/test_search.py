@@ -1,5 +1,6 @@
 """The search finds the best of all combinations, wherever it starts and whatever hides it."""
 
+from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
@@ -143,3 +144,25 @@ def test_every_neighbour_of_a_combination_is_weighed():
     assert {(0,), (1,), *(tuple(sorted((0, 1, k))) for k in range(2, 7))} <= seen
     exact = Search(search.gram, search.log_prior)
     assert found.log_evidence >= max(exact.evaluate(c).log_evidence for c in ((0, 1), (0,), (1,)))
+
+
+def test_the_best_settings_of_the_same_effects_are_found():
+    for seed in range(10):
+        search, families = alike(seed), ("a", "a", "a", "b", "b", "b", "c")
+        best = search.set_best((0, 3), families)
+        every = [search.evaluate((i, j)).log_evidence for i in (0, 1, 2) for j in (3, 4, 5)]
+        assert {families[b] for b in best.blocks} == {"a", "b"}
+        # no other setting of one of the two is better
+        beside = [c for c in search.seen.values() if c.exact and len(set(c.blocks) & set(best.blocks)) == 1]
+        same = [c for c in beside if {families[b] for b in c.blocks} == {"a", "b"}]
+        assert best.log_evidence >= max(c.log_evidence for c in same) - 1e-2
+        assert best.log_evidence >= search.evaluate((0, 3)).log_evidence
+        assert best.log_evidence <= max(every) + 1e-9
+
+
+def test_what_rounding_hides_has_nothing_added_to_it():
+    search = alike(2)
+    hidden = replace(search.evaluate(()), blocks=(0,), log_evidence=-np.inf)
+    search.seen[(0,)] = hidden
+    assert search._with_one_more(hidden, search.evaluate(())) == []
+    assert np.isfinite(search.run().log_evidence)

@@ -1,6 +1,7 @@
 """A choice is made again at its own exact fit until it stays."""
 
 from dataclasses import replace
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -11,9 +12,10 @@ from time_constants import campaign as lagging
 from thermal_robot.effects import choose, gate
 from thermal_robot.effects.joint_gain import JointGain
 from thermal_robot.effects.law import Discovered
+from thermal_robot.inference.columns import block
 from thermal_robot.inference.frames import register
 from thermal_robot.inference.gauss_newton import corrected_observations
-from thermal_robot.inference.settle import _others, settle
+from thermal_robot.inference.settle import _leading, _others, settle
 from thermal_robot.observations import observe
 
 NOISE = 25e-6  # m
@@ -158,3 +160,24 @@ def test_rivals_of_a_law_are_all_that_were_compared_with_it(nominal):
 def test_an_effect_that_sits_in_no_joint_has_itself_alone(nominal):
     (scale,) = choose(("instrument_scale",), (), ())
     assert set(rivals(scale, nominal)) == {scale}
+
+
+def test_an_effect_in_all_joints_is_tried_in_those_that_do_most(nominal):
+    joints = nominal.robot.joint_names
+    (offset,) = choose(("joint_offset",), (), ())
+    values = 1e-4 * np.array([0.0, 5.0, 0.1, 4.0, 0.0])
+    found = [e.places for e in _leading(offset, block(nominal, offset), values)]
+    assert [len(own) for own in found] == [2, 3, 4]
+    assert found[0] == (joints[1], joints[3])
+    assert all(set(a) < set(b) for a, b in pairwise(found))
+    assert list(_leading(replace(offset, places=("joint_2",)), block(nominal, offset), values)) == []
+
+
+def test_places_stay_with_the_settings_that_have_them(nominal):
+    """Elongations of one link each are named by links, those common to all by joints besides."""
+    (warm,) = choose(("thermal_elongation",), (), ())
+    known = gate.variants(warm, nominal)
+    for setting in (alone for whole in known for alone in gate.alone(whole, nominal)):
+        for other in _others(setting, nominal, known):
+            assert set(other.places) <= set(gate.places_of(gate.checked(replace(other, places=()), nominal)))
+            gate.checked(other, nominal)

@@ -181,7 +181,7 @@ class Effect(ABC):
 
     @property
     def share(self) -> float | None:
-        """Of the prior probability of its name; ``None`` where all settings of a name have the same share."""
+        """Of the prior probability of its name; ``None`` where it goes by places and weight."""
         return None
 
     @property
@@ -191,7 +191,7 @@ class Effect(ABC):
 
     @property
     def apart(self) -> int:
-        """How many constants stand apart from a common one: each has its price where constants are refined."""
+        """How many constants stand apart from a common one: each has its price."""
         return 0
 
     def reads(self, observations: Observations) -> tuple[str, ...]:

@@ -50,10 +50,9 @@ class TransmissionError(Effect):
         robot, gears = observations.robot, observations.campaign.gears
         found = []
         for j, (joint, kind) in enumerate(zip(robot.joint_names, robot.joint_types, strict=True)):
-            orders = [float(k) for k in self.harmonics] if kind != "prismatic" and self.side != "motor" else []
-            orders += (
-                [k * float(gears[joint]) for k in self.harmonics] if joint in gears and self.side != "joint" else []
-            )
+            turns = [1.0] if kind != "prismatic" and self.side != "motor" else []
+            turns += [float(gears[joint])] if joint in gears and self.side != "joint" else []
+            orders = [ratio * k for ratio in turns for k in self.harmonics]
             own = unit(robot, joint)
             for order in orders:
                 angle = order * observations.q[:, j]

@@ -268,21 +268,29 @@ def log_priors(effects: Sequence[Effect]) -> list[float]:
     alike, and settings of the same places share by their weight. What is listed beside a setting in other places does
     not change its share.
     """
-    shares = []
+    single: dict[str, set[str]] = {effect.name: set() for effect in effects}
     for effect in effects:
-        same = [other for other in effects if other.name == effect.name]
-        single = {other.places[0] for other in same if len(other.places) == 1}
-        own = _weight(effect)
-        alike = sum(_weight(other) for other in same if set(other.places) == set(effect.places)) / own
-        count = len(effect.places)
-        if effect.share is not None:
-            shares.append(effect.share)
-        elif single:
-            among = comb(max(len(single), count), count)
-            shares.append(settings.IN_ALL * settings.ONE_MORE ** max(count - 1, 0) / among / alike)
-        else:
-            shares.append(own / sum(map(_weight, same)))
+        single[effect.name].update(effect.places if len(effect.places) == 1 else ())
+    kin = [(e.name, frozenset(e.places if single[e.name] else ())) for e in effects]
+    own = [_weight(effect) for effect in effects]
+    alike: dict[tuple[str, frozenset[str]], float] = {}
+    for key, weight in zip(kin, own, strict=True):
+        alike[key] = alike.get(key, 0.0) + weight
+    shares = [
+        _share_of_places(len(key[1]), len(single[key[0]])) * weight / alike[key]
+        if effect.share is None
+        else effect.share
+        for effect, key, weight in zip(effects, kin, own, strict=True)
+    ]
     return [log_odds() + float(np.log(share)) for share in shares]
+
+
+def _share_of_places(count: int, among: int) -> float:
+    """Return the share of an effect's probability that it is in just so many given places; all of it where it has none.
+
+    No places are all of them.
+    """
+    return settings.IN_ALL * settings.ONE_MORE ** max(count - 1, 0) / comb(max(among, count), count) if among else 1.0
 
 
 def _weight(effect: Effect) -> float:

@@ -51,7 +51,8 @@ def modulated(observations: Observations, effects: Iterable[Effect] | None = Non
         setting = gate.variants(effect, observations)[0] if effects is None else effect
         arguments = {k: v for k, v in gate.arguments(setting).items() if k != "places"}
         for joint in _changing(setting, observations):
-            names = [*(n for n in conditions(observations, joint) if n != _driver(setting, observations, joint)), joint]
+            driver = _driver(setting, observations, joint)
+            names = [*(name for name in conditions(observations, joint) if name != driver), joint]
             plain = [follow[name] for name in names if name in known]
             text = json.dumps(arguments)
             found += [replace(law, place=joint, of=effect.name, of_arguments=text) for law in plain]

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations, pairwise
 
@@ -38,8 +38,8 @@ class Ladder:
         Log prior odds of each block.
     exclusive
         Pairs of blocks that must not be together, beside those of which one contains the other.
-    asked
-        Of how many forms these are left: each keeps its share of the prior. All are there where absent.
+    among
+        Number of forms of which these are left, if they are not all: each keeps its share of the prior.
     """
 
     linear: Linear
@@ -47,7 +47,7 @@ class Ladder:
     forms: list[Form]
     log_prior: Sequence[float]
     exclusive: frozenset[frozenset[int]] = frozenset()
-    asked: int = 0
+    among: int = 0
     searches: dict[Rung, Search] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -58,8 +58,8 @@ class Ladder:
         plain = normal_equations(self.linear, w, self._products, self._equations)
         inside = contained(plain)
         self._pairs = inside | self.exclusive
-        self._containers = frozenset(self._container(plain, pair) for pair in inside - self.exclusive) - {-1}
-        share = settings.SMOOTH_PRIOR if self.forms or self.asked else 0.0
+        self._containers = frozenset(self._containing(plain, inside - self.exclusive))
+        share = settings.SMOOTH_PRIOR if self.forms or self.among else 0.0
         ends = np.cumsum([self.linear.frames.shape[2], *(len(block.sizes) for block in self.linear.blocks)])
         self._spans = [np.arange(a, b) for a, b in pairwise(ends)]
         self._quick: dict[tuple[Rung, tuple[int, ...]], float] = {}
@@ -70,7 +70,7 @@ class Ladder:
         self._spectra: list[Spectrum | Grouped] = []
         self._along: list[list[Array] | None] = []
         for form in given:
-            self._consider(form, float(np.log(share / max(self.asked, len(given)))))
+            self._consider(form, float(np.log(share / max(self.among, len(given)))))
         self.searches[PLAIN] = self._search(PLAIN, plain)
 
     def _consider(self, form: Form, log_prior: float, *, once: bool = False) -> int:
@@ -87,11 +87,13 @@ class Ladder:
         return number
 
     @staticmethod
-    def _container(plain: Gram, pair: frozenset[int]) -> int:
-        """Return the larger of two blocks of which one contains the other; −1 where the data hardly see the smaller."""
-        small, large = sorted(pair, key=lambda b: plain.slices[b].stop - plain.slices[b].start)
-        own = plain.slices[small]
-        return large if float(np.trace(plain.matrix[own, own])) > settings.CONTAINS else -1
+    def _containing(plain: Gram, inside: frozenset[frozenset[int]]) -> Iterator[int]:
+        """Yield the larger block of each pair of which one contains the other, where the data see the smaller."""
+        for pair in inside:
+            small, large = sorted(pair, key=lambda b: plain.slices[b].stop - plain.slices[b].start)
+            own = plain.slices[small]
+            if float(np.trace(plain.matrix[own, own])) > settings.CONTAINS:
+                yield large
 
     def whitened_at(self, rung: Rung) -> Whitening:
         """Return the whitening with the discrepancy of a rung."""

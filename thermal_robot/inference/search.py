@@ -105,10 +105,7 @@ class Search:
 
         Of blocks that resemble each other one alone may bring nothing, and with a second one all.
         """
-        without = [self.evaluate([c for c in best.blocks if c != b], best) for b in best.blocks]
-        for base in (best, *without):
-            if not np.isfinite(base.log_evidence):
-                continue
+        for base in self._bases(best):
             first = sorted(self._with_one_more(base, best), key=lambda c: -c.log_evidence)[: settings.LOOKED_BEYOND]
             for one in first:
                 beyond = self._with_one_more(self.evaluate(one.blocks, base), best)
@@ -130,7 +127,7 @@ class Search:
             if tie.blocks in self._expanded:
                 continue
             self._expanded.add(tie.blocks)
-            found = max((self.evaluate(c.blocks, tie) for c in self._promising(tie)), key=lambda c: c.log_evidence)
+            found = self.weigh(tie.blocks)
             if found.log_evidence > best.log_evidence + settings.BETTER:
                 return found
         return None
@@ -203,16 +200,21 @@ class Search:
         Those with a new block are known to first order, which tells too little where the others are stretched to do
         what the new one would do: the best one in place of each block is among them, however little it promises.
         """
-        without = [self.evaluate([c for c in best.blocks if c != b], best) for b in best.blocks]
-        bases = [c for c in (best, *without) if np.isfinite(c.log_evidence)]
-        found: dict[tuple[int, ...], Combination] = {c.blocks: c for c in without if self._near(c, best)}
+        bases = self._bases(best)
+        found = {c.blocks: c for c in bases[1:] if self._near(c, best)}
         for base in bases:
             added = [c for c in self._with_one_more(base, best) if not barred & set(c.blocks)]
             added.sort(key=lambda c: -c.log_evidence)
             found |= {c.blocks: c for k, c in enumerate(added) if k == 0 or self._near(c, best)}
         return sorted(found.values(), key=lambda c: -c.log_evidence)
 
+    def _bases(self, best: Combination) -> list[Combination]:
+        """Return the combination, and what it is without each of its blocks: to these others are added."""
+        return [best, *(self.evaluate([c for c in best.blocks if c != b], best) for b in best.blocks)]
+
     def _with_one_more(self, base: Combination, best: Combination) -> list[Combination]:
+        if not np.isfinite(base.log_evidence):  # rounding hides what it leaves
+            return []
         others = [b for b in range(len(self.gram.slices)) if b not in best.blocks and b not in base.blocks]
         keys = {b: tuple(sorted((*base.blocks, b))) for b in others}
         barred = set().union(*(self._apart.get(b, ()) for b in base.blocks))

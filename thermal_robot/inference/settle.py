@@ -100,6 +100,7 @@ def settle(
     noise = Noise(campaign.noise_position, campaign.noise_orientation)
     held: list[tuple[Effect, Array]] = []
     before: Explanation | None = None
+    outliers = known.explanation.outliers if known else None
     if known is not None:
         held = list(known.held)
         variants.update({effect.name: (effect,) for effect, _ in held})
@@ -112,8 +113,7 @@ def settle(
         chosen = [candidates.index(effect) for effect, _ in held]
         start_at = chosen if revision or not begin else [candidates.index(effect) for effect in begin]
         linear = _at(observations, blocks, chosen, held)
-        outliers = known.explanation.outliers if known else None
-        explanation = _explained(linear, noise, families, tuple(start_at), forms(observations), before, outliers)
+        explanation = _explanation(linear, noise, families, tuple(start_at), forms(observations), before, outliers)
         factor = settings.REFINEMENT ** (1 / 2**revision)
         held = [(candidates[b], explanation.values[b][0]) for b in explanation.best.blocks]
         finer = refined(explanation, observations, factor) if revision < revisions else held
@@ -131,7 +131,7 @@ def settle(
     return Settled(observations, explanation, tuple(held), families)
 
 
-def _explained(
+def _explanation(
     linear: Linear,
     noise: Noise,
     families: Sequence[str],
