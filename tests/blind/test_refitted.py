@@ -1,5 +1,7 @@
 """Every subset of a model fitted alone: the whole is the model, none is the frames."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from simulate import simulate
@@ -55,8 +57,20 @@ def test_every_subset_is_there_and_more_effects_err_less(case):
 
 
 def test_a_model_without_effects_has_no_parts(case):
-    from dataclasses import replace
-
     found, campaign, samples, _, _ = case
     bare = replace(found, model=replace(found.model, effects=()))
     assert refitted(bare, campaign, samples) == {}
+
+
+def test_known_frames_are_not_fitted(case):
+    """Without effects and without unknown frames nothing is fitted: the nominal robot predicts."""
+    _, campaign, samples, _, _ = case
+    frames = register(campaign)
+    inside = (campaign.position - frames.base[:3, 3]) @ frames.base[:3, :3]
+    declared = {"base_known": True, "tool_known": True, "target": frames.tool[:3, 3]}
+    known = replace(campaign, position=inside, **declared)
+    asked = replace(samples, **declared)
+    found = diagnose(known, only=("drift", "joint_gain"))
+    assert found.model.effects
+    predicted = refitted(found, known, asked)[""]
+    np.testing.assert_allclose(predicted, observe(asked).predicted_position, atol=1e-12)

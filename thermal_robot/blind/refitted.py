@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from thermal_robot.campaign import Campaign
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.diagnosis import Diagnosis
-from thermal_robot.effects.apply import displacement
 from thermal_robot.inference.columns import block, frame_columns
+from thermal_robot.inference.frames import register
 from thermal_robot.observations import Observations, observe
 
 Array = NDArray[np.float64]
@@ -25,10 +25,10 @@ _ROUNDS = 3  # after which noise and fit agree to a per cent
 def refitted(found: Diagnosis, campaign: Campaign, samples: Campaign) -> dict[str, Array]:
     """Predict samples with every subset of the effects of a model, frames and effects fitted anew for each.
 
-    Linear about the corrected model, by least squares on the positions of the rows that were not set aside, with the
-    settings of the whole diagnosis (time constants, places, quantities) and each effect's parameters held to the size
-    that they have in it, the more so the more a subset leaves: what it leaves counts as noise. So the held-out shares
-    of a diagnosis are defined, too.
+    Of a part of the effects linear about the nominal robot, by least squares on the rows that were not set aside, with
+    the settings of the whole diagnosis (time constants, places, quantities) and each effect's parameters held to the
+    size that they have in it, the more so the more a subset leaves: what it leaves counts as noise, of positions and of
+    orientations apart. So the held-out shares of a diagnosis are defined, too. All effects together are the model.
 
     Parameters
     ----------
@@ -48,29 +48,22 @@ def refitted(found: Diagnosis, campaign: Campaign, samples: Campaign) -> dict[st
     model = found.model
     if not 0 < len(model.effects) <= MOST:
         return {}
-    given, asked = _corrected(model, campaign), _corrected(model, _measured(samples, model))
     kept = ~np.isin(campaign.rows, found.rows.rows[found.rows.outliers])
-    noise = max(found.gap.noise_floor, 1e-9) / np.sqrt(3.0)
+    frames = register(campaign, kept)
+    given = observe(campaign, frames)
+    asked = observe(_measured(samples, model), frames)
     columns, fresh, tight, slices = _design(model, given, asked)
-    flat = columns[kept].reshape(-1, columns.shape[2])
-    values = np.concatenate([np.zeros(slices[0].start), *(v for _, v in model.effects)])
-    whole = given.gap[kept, :3].ravel() + flat @ values
-    best, base = _position(asked), asked.frames.base[:3, :3]
-    predicted = {}
-    for size in range(len(slices) + 1):
+    left = found.rows.remainder[kept]
+    noise = np.maximum(np.sqrt((left.reshape(len(left), -1, 3) ** 2).mean(axis=(0, 2))), 1e-9)
+    nominal, base = asked.predicted_position, frames.base[:3, :3]
+    predicted = {"+".join(effect.name for effect, _ in model.effects): model.predict(samples)[0]}
+    for size in range(len(slices)):
         for chosen in combinations(range(len(slices)), size):
             used = np.concatenate([np.arange(slices[0].start), *(np.r_[slices[k]] for k in chosen)]).astype(int)
-            fitted = np.zeros(len(values))
-            fitted[used] = _ridge(flat[:, used], whole, noise, tight[used])
+            fitted = _ridge(columns[kept][:, :, used], given.gap[kept], noise, tight[used])
             names = "+".join(model.effects[k][0].name for k in chosen)
-            predicted[names] = best + (fresh @ (fitted - values)) @ base.T
+            predicted[names] = nominal + fresh[:, :, used] @ fitted @ base.T
     return predicted
-
-
-def _corrected(model: CorrectedModel, campaign: Campaign) -> Observations:
-    """Observe with the whole model; only what the model reads is there to be read."""
-    moved, instrument = displacement(observe(campaign, model.frames), model.effects)
-    return observe(campaign, model.frames, displacement=moved, instrument=instrument)
 
 
 def _measured(samples: Campaign, model: CorrectedModel) -> Campaign:
@@ -81,15 +74,10 @@ def _measured(samples: Campaign, model: CorrectedModel) -> Campaign:
     return replace(samples, covariates=read, position=np.zeros((count, 3)), orientation=turned)
 
 
-def _position(observed: Observations) -> Array:
-    shift = 0.0 if observed.instrument is None else observed.instrument
-    return np.asarray(observed.predicted_position + shift)
-
-
 def _design(
     model: CorrectedModel, given: Observations, asked: Observations
 ) -> tuple[Array, Array, Array, tuple[slice, ...]]:
-    """(N, 3, K) and (M, 3, K) columns of frames and effects, (K,) one over what holds each, and each effect's columns.
+    """(N, m, K) and (M, 3, K) columns of frames and effects, (K,) one over what holds each, and each effect's columns.
 
     A parameter is held to the rms of its effect's parameters, in units of their expected sizes.
     """
@@ -104,19 +92,24 @@ def _design(
         tight.append(1.0 / (own.sizes * max(scale, 1e-6)))
         slices.append(slice(start, start + len(values)))
         start += len(values)
-    columns, fresh = np.concatenate(here, axis=2)[:, :3], np.concatenate(there, axis=2)[:, :3]
+    columns, fresh = np.concatenate(here, axis=2), np.concatenate(there, axis=2)[:, :3]
     return columns, fresh, np.concatenate(tight), tuple(slices)
 
 
-def _ridge(columns: Array, gap: Array, noise: float, tight: Array) -> Array:
-    """Least squares with a row for each parameter that is held, noise and remainder found together."""
+def _ridge(columns: Array, gap: Array, noise: Array, tight: Array) -> Array:
+    """Least squares with a row for each parameter that is held; noise and remainder of each kind found together.
+
+    (N, m, K) columns and (N, m) gap; (m/3,) noise of positions and orientations, m and rad.
+    """
     rows = np.diag(tight)[tight > 0]
-    level = noise
+    level = np.maximum(np.sqrt((gap.reshape(len(gap), -1, 3) ** 2).mean(axis=(0, 2))), noise)
     for _ in range(_ROUNDS):
-        both = np.vstack([columns, level * rows])
+        each = np.repeat(level, 3)
+        both = np.vstack([(columns / each[:, None]).reshape(gap.size, columns.shape[2]), rows])
         size = np.linalg.norm(both, axis=0)
         size[size == 0.0] = 1.0
-        padded = np.concatenate([gap, np.zeros(len(rows))])
+        padded = np.concatenate([(gap / each).ravel(), np.zeros(len(rows))])
         fitted = np.linalg.lstsq(both / size, padded, rcond=1e-10)[0] / size
-        level = max(float(np.sqrt(np.mean((gap - columns @ fitted) ** 2))), noise)
+        left = (gap - columns @ fitted).reshape(len(gap), -1, 3)
+        level = np.maximum(np.sqrt((left**2).mean(axis=(0, 2))), noise)
     return np.asarray(fitted)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from math import factorial
 
@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 from thermal_robot.diagnosis.one_walk import Model, Squares, Walk, share
 from thermal_robot.diagnosis.parts import HeldOut
 from thermal_robot.errors import EstimationError
+from thermal_robot.inference.columns import block as columns
 from thermal_robot.inference.explain import Explanation
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.problem import Linear
@@ -69,7 +70,8 @@ def held_out(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Shri
     if count < 2:
         raise EstimationError("all rows repeat one pose: nothing can be held out, and nothing told about the robot")
     progress(f"held out: {count} blocks, one at a time")
-    return shrinkage(fit.explanation, fit.before, fit.families, block)
+    before = replace(fit.before, blocks=tuple(columns(fit.nominal, effect) for effect, _ in fit.effects))
+    return shrinkage(fit.explanation, before, fit.families, block)
 
 
 def shrinkage(explanation: Explanation, before: Linear, families: Sequence[str], block: Labels) -> Shrinkage:
@@ -80,7 +82,7 @@ def shrinkage(explanation: Explanation, before: Linear, families: Sequence[str],
     explanation
         Linearised at the corrected model.
     before
-        The problem at the nominal robot, of which only gap and frames are read.
+        The problem at the nominal robot with the blocks of the explanation's best combination, in their order.
     families
         Name of the effect that each block of the explanation belongs to.
     block
@@ -103,7 +105,8 @@ class _Walks:
     Attributes
     ----------
     before, after
-        The walks; that of the model has every effect that is asked about.
+        The walks: of the nominal robot with a part of the model's effects, and of the model with every effect that is
+        asked about.
     numbers
         Per effect of the walk: its block in the explanation.
     players
@@ -130,21 +133,25 @@ class _Walks:
                     taken.add(families[b])
                     further[b] = found.scales[b]
         model = Model.of(explanation, block, further)
-        plain, walk = (Walk.over(m, each(block)) for m in (model.bare(before), model))
-        return cls(plain, walk, (*best, *further), tuple(range(len(best))))
+        parts = model.partial(before, [explanation.values[b][0] for b in best])
+        part, whole = (Walk.over(m, each(block)) for m in (parts, model))
+        return cls(part, whole, (*best, *further), tuple(range(len(best))))
 
     def left(self, chosen: Sequence[int]) -> Squares:
         key = tuple(sorted(chosen))
         if key not in self.seen:
-            self.seen[key] = self.after.squares(key) if key else self.before.squares(())
+            self.seen[key] = self._walk(key).squares(key)
         return self.seen[key]
+
+    def _walk(self, chosen: Sequence[int]) -> Walk:
+        return self.after if chosen and set(self.players) <= set(chosen) else self.before
 
     def gain(self, chosen: Sequence[int], more: Sequence[int]) -> Squares:
         return self.left(chosen) - self.left((*chosen, *more))
 
     def distances(self, chosen: Sequence[int]) -> Array:
         """(N,) distance of each row from its prediction while held out, m, outliers too; NaN where it never was."""
-        walk = self.after if chosen else self.before
+        walk = self._walk(chosen)
         distance = np.full(len(walk.model.block), np.nan)
         distance[walk.numbers] = np.linalg.norm(walk.residuals(chosen)[:, :3], axis=1)
         return distance

@@ -48,6 +48,9 @@ class Model:
         (N,) rows on which the model is judged.
     block
         (N,) block of consecutive rows that each belongs to, 0..B−1.
+    apart
+        Whether positions and orientations each count by what is left of them, as where frames are registered; not in
+        the ratio of their noise.
     seen
         Sums of products by the rows that they are over.
     """
@@ -58,6 +61,7 @@ class Model:
     variance: float
     kept: Rows
     block: Labels
+    apart: bool = False
     seen: dict[bytes, Array] = field(default_factory=dict, repr=False)
 
     @classmethod
@@ -71,9 +75,21 @@ class Model:
         linear = Linear(e.linear.gap, e.linear.frames, tuple(e.linear.blocks[b] for b in scales))
         return cls(linear, tuple(scales.values()), e.whitening, e.best.noise**2, ~e.outliers, block)
 
-    def bare(self, linear: Linear) -> Model:
-        """Return the model of another linearisation without effects: its frames alone."""
-        return replace(self, linear=Linear(linear.gap, linear.frames, ()), scales=(), seen={})
+    def partial(self, nominal: Linear, values: Sequence[Array]) -> Model:
+        """Return the model for fits of a part of its effects: linearised at the nominal robot, with a block for each.
+
+        Each is held to the size of its ``values`` in the whole model. Such a fit leaves much, and whatever it is counts
+        as noise: a smooth discrepancy is small beside it, and how positions compare with orientations is not what the
+        noise says. At the corrected robot frames that are aliases could seem apart, and would stretch without measure.
+        """
+        sizes = [float(np.sqrt(np.mean((v / b.sizes) ** 2))) for v, b in zip(values, nominal.blocks, strict=True)]
+        scales = tuple(max(size, settings.LEAST_HELD) for size in sizes)
+        whitening = replace(self.whitening, smooth=None)
+        return replace(self, linear=nominal, scales=scales, whitening=whitening, apart=True, seen={})
+
+    def bare(self, nominal: Linear) -> Model:
+        """Return the model of the nominal robot: its frames alone."""
+        return self.partial(Linear(nominal.gap, nominal.frames, ()), ())
 
     @cached_property
     def flat(self) -> int:
@@ -102,25 +118,30 @@ class Model:
         return used, stack, *smooth.eigen(settings.UNHEARD)
 
     def products(self, rows: Rows) -> Array:
-        """(K + 1, K + 1) Xᵀ V⁻¹ X of the columns and the gap over some rows, V their own covariance; computed once.
+        """(G, K + 1, K + 1) Xᵀ V⁻¹ X of the columns and the gap over some rows, V their own covariance; computed once.
 
-        Where rows have a smooth discrepancy in common, V = 1 + U d Uᵀ with U on these rows alone (Woodbury).
+        G is two where positions and orientations count apart, else one. Where rows have a smooth discrepancy in common,
+        V = 1 + U d Uᵀ with U on these rows alone (Woodbury).
         """
         key = rows.tobytes()
         if key not in self.seen:
             used, stack, basis, variance = self._white
             picked = np.repeat(rows[used], self.linear.measures)
             stack, basis = stack[picked], basis[picked]
+            if self.apart:
+                each_row = stack.reshape(-1, self.linear.measures // 3, 3, stack.shape[1])
+                self.seen[key] = np.einsum("ngak,ngal->gkl", each_row, each_row, optimize=True)
+                return self.seen[key]
             products = stack.T @ stack
             if len(variance):
                 along = basis.T @ stack
                 products = products - along.T @ np.linalg.solve(np.diag(1.0 / variance) + basis.T @ basis, along)
-            self.seen[key] = products
+            self.seen[key] = products[None]
         return self.seen[key]
 
     @cached_property
     def whole(self) -> Array:
-        """(K + 1, K + 1) the same over all rows."""
+        """(G, K + 1, K + 1) the same over all rows."""
         return self.products(np.ones(len(self.block), dtype=bool))
 
     def determines(self, rows: Rows) -> bool:
@@ -128,7 +149,7 @@ class Model:
         return self._rank(self.products(rows)) >= self._rank(self.whole)
 
     def _rank(self, products: Array) -> int:
-        frames = products[: self.flat, : self.flat]
+        frames = products.sum(axis=0)[: self.flat, : self.flat]
         # a column of the rows held out alone leaves a rounding error of either sign
         length = np.sqrt(np.maximum(np.diag(frames), 0.0)) + np.sqrt(settings.TINY)
         value = np.linalg.eigvalsh(frames / np.outer(length, length)) if self.flat else np.zeros(0)
@@ -136,9 +157,9 @@ class Model:
 
     def columns(self, chosen: Sequence[int]) -> NDArray[np.int64]:
         """(k + 1,) numbers of the columns of the frames and of some blocks, and of the gap."""
-        return np.concatenate([np.arange(self.flat), *(self.spans[b] for b in chosen), [len(self.whole) - 1]]).astype(
-            np.int64
-        )
+        return np.concatenate(
+            [np.arange(self.flat), *(self.spans[b] for b in chosen), [self.whole.shape[1] - 1]]
+        ).astype(np.int64)
 
     def fits(self, rows: Sequence[Rows], chosen: Sequence[int]) -> list[Array]:
         """Fit the frames and some blocks to each set of rows: (k + 1,) each, −θ and 1.
@@ -146,21 +167,29 @@ class Model:
         What the blocks leave on all rows counts as noise against the priors.
         """
         picked = self.columns(chosen)
-        square, tight = np.ix_(picked, picked), self.tight[picked[self.flat : -1] - self.flat]
-        equations = max(int((self.whitening.weights > 0).sum()) * self.linear.measures, 1)
-        whole, variance = self.whole[square], self.variance
+        square, tight = (
+            np.ix_(np.arange(len(self.whole)), picked, picked),
+            self.tight[picked[self.flat : -1] - self.flat],
+        )
+        whole = self.whole[square]
+        equations = max(int((self.whitening.weights > 0).sum()) * self.linear.measures, 1) / len(whole)
+        # the gap of the nominal robot is what registration leaves
+        begin = whole[:, -1, -1] / equations if self.apart else 0.0
+        variance = np.maximum(begin, np.full(len(whole), self.variance))
         for _ in range(settings.FOLD_ROUNDS):
-            signed = _signed(whole, self.flat, variance * tight)
-            variance = max(float(signed @ whole @ signed) / equations, self.variance)
+            signed = _signed(whole, variance, self.flat, tight)
+            variance = np.maximum(np.einsum("i,gij,j->g", signed, whole, signed) / equations, self.variance)
         solved: dict[bytes, Array] = {}
         for used in rows:
             if used.tobytes() not in solved:
-                solved[used.tobytes()] = _signed(self.products(used)[square], self.flat, variance * tight)
+                solved[used.tobytes()] = _signed(self.products(used)[square], variance, self.flat, tight)
         return [solved[used.tobytes()] for used in rows]
 
 
-def _signed(products: Array, flat: int, tight: Array) -> Array:
-    return np.append(-ridge(products, flat, tight), 1.0)
+def _signed(products: Array, variance: Array, flat: int, tight: Array) -> Array:
+    # in units of the first variance, so that one kind alone is not rescaled
+    weighted = np.einsum("g,gij->ij", variance[0] / variance, products)
+    return np.append(-ridge(weighted, flat, variance[0] * tight), 1.0)
 
 
 @dataclass(frozen=True, eq=False)

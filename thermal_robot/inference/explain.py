@@ -20,6 +20,7 @@ from thermal_robot.inference.problem import Linear, Whitening, discrepancy_mean,
 from thermal_robot.inference.robust import Noise, distance_limit, first_whitening, reweigh
 
 Array = NDArray[np.float64]
+NOTHING = np.zeros(0)
 
 
 @dataclass(frozen=True)
@@ -53,7 +54,7 @@ class Explanation:
     best
         The most probable combination.
     combinations, probabilities
-        All that were compared, most probable first.
+        All that were compared, most probable first, without their values.
     values
         Per block of the best combination: mean and covariance of its parameters.
     remainder
@@ -158,6 +159,7 @@ def explain(
         seeds = [found.best.blocks]
         beside = forms if first else found.ladder.in_question(found.best)
         first = False
+        del found  # before the next one takes as much memory
 
 
 @dataclass(frozen=True, eq=False)
@@ -239,7 +241,7 @@ class _Round:
             white,
             search.gram,
             best,
-            compared,
+            [replace(c, values=NOTHING, covariance=NOTHING) for c in compared],
             probabilities,
             values,
             _left(linear, white, values),

@@ -42,11 +42,15 @@ class Linear:
         """Components a row: 3 for positions, 6 for poses."""
         return int(self.gap.shape[1])
 
+    @property
+    def columns(self) -> list[Array]:
+        """(N, m, ·) frames, each block's columns, gap."""
+        return [self.frames, *(b.columns for b in self.blocks), self.gap[:, :, None]]
+
     @cached_property
     def stack(self) -> Array:
-        """(N, m, f + P + 1) frames, all blocks' columns, gap."""
-        columns = [self.frames, *(b.columns for b in self.blocks), self.gap[:, :, None]]
-        return np.concatenate(columns, axis=2)
+        """(N, m, f + P + 1) all columns in one array."""
+        return np.concatenate(self.columns, axis=2)
 
     def contribution(self, block: int, values: Array) -> Array:
         """(N, m) what a block's parameter values do to the gap."""
@@ -153,7 +157,8 @@ def _log_det(matrix: Array, rank: int) -> float:
 def whitened(linear: Linear, whitening: Whitening) -> Array:
     """(rows·m, f + P + 1) frames, parameters and gap of the rows with weight, in units of noise."""
     used = np.flatnonzero(whitening.weights > 0)
-    stack = linear.stack[used]
+    # of a large campaign this is the largest array there is: it is not kept
+    stack = np.concatenate([columns[used] for columns in linear.columns], axis=2)
     stack *= (np.sqrt(whitening.weights[used])[:, None] / whitening.noise)[:, :, None]
     flat = stack.reshape(-1, stack.shape[2])
     return flat if whitening.smooth is None else whitening.smooth.whitened(flat)

@@ -345,6 +345,8 @@ EXACT_LEVEL = 0.01
 """Chance that noise makes an exact alias look like none."""
 INTERVAL = (0.025, 0.975)
 """Quantiles of every interval."""
+LEAST_HELD = 1e-6
+"""Of an effect's expected size: to less its parameters are not held where it is fitted without others."""
 FOLD_ROUNDS = 3
 """Rounds of noise in the fit of a subset of effects: what a subset leaves out is noise to it."""
 COLDEST = 0.01
