@@ -156,7 +156,8 @@ def coverage(rows, campaigns):
         if not e.best.blocks:
             continue
         block = np.arange(rows) * 20 // rows
-        found = shrinkage(e, linear, [str(k) for k in range(len(WIDTHS))], block)
+        own = replace(linear, blocks=tuple(linear.blocks[b] for b in e.best.blocks))
+        found = shrinkage(e, own, [str(k) for k in range(len(WIDTHS))], block)
         real, parts = on_fresh(e, block, fresh)
         low, high = found.overall.shrinkage_ci95
         total.append(low <= real <= high)
