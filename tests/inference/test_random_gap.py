@@ -74,7 +74,9 @@ def test_errors_of_a_pose_that_follow_no_steps_are_no_encoder():
         seen, (steps, _) = gap_of(visited(name, seed, 3, 160, 3.0, stepped=False)[0])
         assert steps.status == "not_found"
         assert not seen.explains_size
-        assert seen.steps == {load_arm(name).joint_names[1]: 1.0}
+        (factor,) = seen.steps.values()
+        assert factor < np.log(1e-3)
+        assert seen.stepped < 0.5
 
 
 def test_the_error_of_a_pose_varies_as_its_variance_says(rv_m2):

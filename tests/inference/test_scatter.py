@@ -125,6 +125,19 @@ def test_two_joints_at_once(robot):
     assert right >= 18
 
 
+def test_three_joints_that_scatter_are_no_larger_noise():
+    """Each along an axis of its own: beside a noise that has swallowed two of them neither brings much alone."""
+    right = 0
+    for seed in range(10):
+        rng = np.random.default_rng(seed)
+        sensitivity = np.eye(3) * rng.uniform(0.5, 1.5, (100, 1, 3))
+        moved = np.einsum("nij,nj->ni", sensitivity, rng.normal(size=(100, 3)) * [5.0, 3.0, 3.0])
+        scatter = variance_components(NOISE * (moved + rng.normal(size=(100, 3))), sensitivity, np.full(3, NOISE))
+        right += found(scatter) == {("pose", 0), ("pose", 1), ("pose", 2)}
+        assert scatter.noise[0] < 1.3 * NOISE
+    assert right == 10
+
+
 def test_a_few_gross_errors_left_in(robot):
     right = 0
     for seed in range(20):

@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from thermal_robot.inference.steps import followed, period
+from thermal_robot.blind.calibration import reliability
+from thermal_robot.inference.steps import followed, period, stepped
 
 STEP = 1e-3  # rad
 
@@ -17,6 +18,11 @@ def sawtooth(command, step=STEP):
     return np.round(command / step) * step - command
 
 
+def weights(sigma, rows):
+    """One over the variance of errors that steps make beside a noise."""
+    return np.full(rows, 1.0 / (sigma**2 + STEP**2 / 12.0))
+
+
 @pytest.mark.parametrize("rows", [120, 200])
 @pytest.mark.parametrize("noise", [0.0, 0.1])
 def test_the_period_of_a_sawtooth_is_found(rows, noise):
@@ -25,35 +31,45 @@ def test_the_period_of_a_sawtooth_is_found(rows, noise):
         spread = max(noise * STEP, 1e-3 * STEP)
         errors = sawtooth(command) + spread * rng.normal(size=rows)
         # the size of so few errors says the step to about 10 %
-        found = period(errors, np.full(rows, 1.0 / (spread**2 + STEP**2 / 12.0)), command, 1.1 * STEP)
-        assert found.p_value < 1e-3
-        assert found.visible
+        found = period(errors, weights(spread, rows), command, 1.1 * STEP)
+        assert found.log_factor > np.log(1e4)
         # over three radians a thousandth of the step is a third of a period
         assert found.step == pytest.approx(STEP, rel=1e-3)
 
 
 def test_normal_errors_have_no_steps_and_are_refuted():
-    chances = []
     for seed in range(100):
         rng, command = np.random.default_rng(seed), commands(seed, 200)
-        errors = STEP / np.sqrt(12.0) * rng.normal(size=200)
-        found = period(errors, np.full(200, 12.0 / STEP**2), command, STEP)
-        assert found.visible
+        found = period(STEP / np.sqrt(12.0) * rng.normal(size=200), weights(0.0, 200), command, STEP)
         assert found.step == pytest.approx(STEP)
-        chances.append(found.p_value)
-    assert np.mean(np.array(chances) > 0.01) > 0.98
+        assert found.log_factor < np.log(1e-4)
 
 
-def test_where_steps_would_not_be_seen_noise_finds_none():
-    """Errors of which most are the instrument's; what a periodogram says of chance is a little too cautious."""
-    chances = []
+def test_a_bayes_factor_is_as_often_right_as_it_says():
+    """Of errors that have steps or have none, as often: of those called 80 % probable to have steps, 80 % have."""
+    rng, said, true = np.random.default_rng(0), [], []
+    for seed in range(600):
+        rows, ratio = (
+            int(rng.integers(40, 90)),
+            rng.uniform(0.8, 2.0),
+        )  # from steps that can hardly be seen to plain ones
+        command, sigma = commands(seed, rows), STEP / np.sqrt(12.0)
+        errors = sawtooth(command) if seed % 2 else sigma * rng.normal(size=rows)
+        noise = sigma / ratio
+        factor = period(errors + noise * rng.normal(size=rows), weights(noise, rows), command, STEP).log_factor
+        said.append(1.0 / (1.0 + np.exp(-factor)))
+        true.append(seed % 2)
+    found = reliability(np.array(said), np.array(true, dtype=bool))
+    assert found.error < 0.07  # of perfect probabilities in ten bins of sixty: 0.03
+
+
+def test_where_steps_would_not_be_seen_nothing_is_said():
+    """Errors of which most are the instrument's."""
     for seed in range(200):
         rng, command = np.random.default_rng(seed), commands(seed, 40)
-        found = period(STEP * rng.normal(size=40), np.full(40, 1.0 / STEP**2), command, STEP)
-        assert not found.visible
-        chances.append(found.p_value)
-    assert np.mean(np.array(chances) < 0.05) <= 0.05 + 4.0 * np.sqrt(0.05 * 0.95 / 200)
-    assert np.mean(np.array(chances) < 0.5) > 0.1
+        for errors in (np.zeros(40), sawtooth(command)):
+            found = period(errors + STEP * rng.normal(size=40), weights(STEP, 40), command, STEP)
+            assert abs(found.log_factor) < 1.0
 
 
 def test_a_ripple_on_errors_of_another_kind_is_no_step():
@@ -62,23 +78,37 @@ def test_a_ripple_on_errors_of_another_kind_is_no_step():
         rng, command = np.random.default_rng(seed), commands(seed, 600)
         errors = 1.0 / np.sqrt(12.0) * rng.normal(size=600) * STEP + 0.35 * sawtooth(command)
         found = period(errors, np.full(600, 12.0 / STEP**2 / 1.12), command, STEP)
-        assert (found.visible, found.p_value) == (True, 1.0)
+        assert found.log_factor < np.log(1e-4)
+
+
+def test_a_joint_is_an_encoders_as_its_steps_say():
+    """Nothing seen leaves the odds of the causes; what is seen counts, but steps may hide."""
+    once, again = (stepped([0.0], again=repeats) for repeats in (False, True))
+    assert once == pytest.approx(1.0 / 3.0)  # an encoder, wear, and what nobody recorded
+    assert 0.9 < again < 0.95
+    assert stepped([6.0], again=False) > 0.99
+    for repeats in (False, True):
+        refuted = stepped([-30.0], again=repeats)
+        assert refuted == pytest.approx(stepped([-300.0], again=repeats))
+        assert 0.01 < refuted < 0.5
+    # one joint whose steps are plain speaks for another whose steps are hidden
+    assert stepped([30.0, -30.0], again=False) > 0.99
 
 
 def test_a_step_far_from_what_the_size_says_is_not_looked_for():
     command = commands(0)
     errors, weight = sawtooth(command), np.full(150, 12.0 / STEP**2)
-    assert period(errors, weight, command, STEP).p_value < 1e-6
+    assert period(errors, weight, command, STEP).log_factor > 20.0
     for other in (STEP / 1.6, 1.6 * STEP):
-        assert period(errors, weight, command, other).p_value > 1e-6
+        assert period(errors, weight, command, other).log_factor < 0.0
 
 
 def test_too_many_or_no_periods_say_nothing():
     command = commands(1)
     fine = period(sawtooth(command), np.full(150, 1.0), command, 1e-7)
-    assert (fine.step, fine.p_value, fine.visible) == (1e-7, None, False)
+    assert (fine.step, fine.log_factor) == (1e-7, 0.0)
     still = period(sawtooth(command), np.full(150, 1.0), np.full(150, 0.3), STEP)
-    assert (still.p_value, still.visible) == (None, False)
+    assert still.log_factor == 0.0
 
 
 def recorded(rng, rows=120):

@@ -92,7 +92,7 @@ def answer(
     systematic = findings(
         fit, shrinkage.shares, locations, {d.law.name: d.probability for d in last.laws}, last.refused
     )
-    chance = [f for f in random_findings(fit, last.chance, beside_unlisted=remaining.flagged) if asked(f.name)]
+    chance = [f for f in random_findings(fit, last.chance) if asked(f.name)]
     found = by_share(titled((*systematic, *chance), (*candidates, *random_effects())))
     return Diagnosis(
         campaign=campaign.name,

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
-from thermal_robot.diagnosis.parts import Estimate, Finding, Location, Status
+from thermal_robot.diagnosis.parts import Estimate, Finding, Location
 from thermal_robot.effects import random_effects
 from thermal_robot.effects.quantities import unit
 from thermal_robot.effects.random_effect import RandomEffect
@@ -15,7 +13,7 @@ from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.random_gap import Kept, RandomGap
 
 
-def random_findings(fit: Fit, chance: RandomGap, *, beside_unlisted: bool = False) -> tuple[Finding, ...]:
+def random_findings(fit: Fit, chance: RandomGap) -> tuple[Finding, ...]:
     """Return a finding for every random effect.
 
     None shrinks the gap, as a correction predicts a mean and leaves scatter. Scatter between poses (encoder steps) and
@@ -28,59 +26,34 @@ def random_findings(fit: Fit, chance: RandomGap, *, beside_unlisted: bool = Fals
         Fit of frames and systematic effects.
     chance
         The random part of its residual.
-    beside_unlisted
-        Whether an unlisted cause is at work. It may be what makes the error differ from pose to pose, so that an
-        encoder is named only where its steps are seen.
     """
-    found = tuple(_finding(fit, chance, effect) for effect in random_effects())
-    seen = any(p < settings.LEVEL for p in chance.steps.values())
-    if seen or not beside_unlisted:
-        return found
-    return tuple(_doubted(f) if f.confounded_with or _is_of_poses(f) else f for f in found)
-
-
-def _is_of_poses(finding: Finding) -> bool:
-    components = {effect.name: effect.component for effect in random_effects()}
-    return finding.status == "found" and components[finding.name] == "pose"
-
-
-def _doubted(finding: Finding) -> Finding:
-    """Withdraw a finding: an unlisted cause, known to be there, explains the scatter as well.
-
-    The scatter is then no evidence for the effect (explaining away): its probability is at most the prior's.
-    """
-    return replace(
-        finding,
-        status="not_found",
-        probability=min(finding.probability or 0.0, settings.PRIOR_PROBABILITY),
-        locations=(),
-        parameters=(),
-        confounded_with=(),
-    )
+    return tuple(_finding(fit, chance, effect) for effect in random_effects())
 
 
 def _finding(fit: Fit, chance: RandomGap, effect: RandomEffect) -> Finding:
-    scatter, kind = chance.scatter, effect.component
+    scatter, kind, own = chance.scatter, effect.component, chance.kept_of(effect.component)
     if effect.needs and kind not in scatter.kinds:
         return Finding(effect.name, "not_testable", needs=effect.needs)
-    own, probability = [k for k in chance.kept if k.component.kind == kind], scatter.probability.get(kind, 0.0)
+    probability = scatter.probability.get(kind, 0.0)
     if probability < settings.SCATTER_SURE or not own:
-        # what follows a law, or has no steps, is not this effect
+        # what follows a law is not this effect
         refuted = probability >= settings.SCATTER_SURE and scatter.chosen(kind)
         return Finding(effect.name, "not_found", 0.0 if refuted else probability, 0.0, (0.0, 0.0))
+    probability *= chance.stepped if kind == "pose" else 1.0
+    others = tuple(e.name for e in random_effects() if e.component not in scatter.kinds)
+    likely = probability >= settings.SCATTER_SURE
+    if not likely and not (others and probability >= settings.PRIOR_PROBABILITY):
+        return Finding(effect.name, "not_found", probability, 0.0, (0.0, 0.0))
     names, lever = fit.campaign.robot.joint_names, fit.corrected.joint_sensitivity[:, :3]
     moved = np.array([k.component.sigma**2 * (lever[:, :, k.component.joint] ** 2).mean() for k in own])
     order = np.argsort(-moved)
-    doubtful = all(k.doubtful for k in own)
-    status: Status = "confounded" if doubtful else "found"
-    others = tuple(e.name for e in random_effects() if e.component not in scatter.kinds)
     return Finding(
         effect.name,
-        status,
+        "found" if likely else "confounded",
         probability,
         0.0,
         (0.0, 0.0),
-        confounded_with=others if doubtful else (),
+        confounded_with=() if likely else others,
         locations=tuple(Location("joint", names[own[k].component.joint], float(moved[k] / moved.sum())) for k in order),
         parameters=tuple(_estimate(fit, own[k], effect) for k in order),
     )

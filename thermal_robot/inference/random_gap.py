@@ -18,18 +18,17 @@ from thermal_robot.inference.problem import Linear
 from thermal_robot.inference.robust import distance_limit
 from thermal_robot.inference.rows import repeated_poses
 from thermal_robot.inference.scatter import JointScatter, Scatter, enough_rows, joint_errors, variance_components
-from thermal_robot.inference.steps import Steps, followed, period
+from thermal_robot.inference.steps import followed, period, stepped
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Kept:
-    """A component that counts as scatter, the step that an encoder would have, and whether it may as well be wear."""
+    """A component that counts as scatter, and the step that an encoder would have, rad or m."""
 
     component: JointScatter
     step: float
-    doubtful: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,14 +40,16 @@ class RandomGap:
     kept
         The components of the scatter that are scatter.
     explains_size
-        Whether scatter explains the size of the remainder: no more is left than instrument and scatter allow. Scatter
-        that may as well be a systematic effect does not count.
+        Whether scatter explains the size of the remainder: no more is left than instrument and scatter allow. What
+        poses bring counts where it is more probably an encoder's than not.
     p_value
         Of the χ² test that no more is left.
     scatter
         The variances behind it.
     steps
-        By joint: p-value that its errors do not follow steps of the command; only where that could be asked.
+        By joint: logarithm of the Bayes factor of steps of the command against errors that follow nothing.
+    stepped
+        Probability that what poses bring is due to such steps.
     laws
         By joint: the quantity that its errors follow, so that they are no scatter but what no known effect explains.
     note
@@ -60,8 +61,13 @@ class RandomGap:
     p_value: float
     scatter: Scatter
     steps: Mapping[str, float]
+    stepped: float
     laws: Mapping[str, str]
     note: str = ""
+
+    def kept_of(self, kind: str) -> list[Kept]:
+        """Return the kept components of one kind."""
+        return [k for k in self.kept if k.component.kind == kind]
 
 
 def random_gap(fit: Fit) -> RandomGap:
@@ -69,8 +75,7 @@ def random_gap(fit: Fit) -> RandomGap:
 
     What a systematic effect leaves may look like scatter of a joint. If a joint's errors follow a smooth law of a
     recorded quantity, they are no scatter. Errors of an encoder are a sawtooth of the command with the period √12 σ.
-    Without repeats only that period separates an encoder's steps from wear; where it is not seen, the component is
-    marked doubtful.
+    Without repeats only that period separates an encoder's steps from wear.
 
     Parameters
     ----------
@@ -80,7 +85,7 @@ def random_gap(fit: Fit) -> RandomGap:
     Returns
     -------
     RandomGap
-        Without repeats the two kinds are one, and a component whose steps are not seen is doubtful.
+        Without repeats the two kinds are one.
     """
     e, observed = fit.explanation, fit.corrected
     gap, sensitivity = observed.gap, observed.joint_sensitivity
@@ -111,8 +116,12 @@ def random_gap(fit: Fit) -> RandomGap:
             break  # most rows lie beyond any scatter: robot and table do not belong together
         used = within & asked
     laws, steps, kept = _judge(fit, scatter, gap[used], pose, used, noise)
-    p_value, explains = _chance_of_size(scatter, kept, gap[used], sensitivity[used], noise, held, freedom)
-    return RandomGap(tuple(kept), explains, p_value, scatter, steps, laws, _note(scatter, laws, kept))
+    own = [steps[fit.campaign.robot.joint_names[k.component.joint]] for k in kept if k.component.kind == "pose"]
+    likely = stepped(own, again=len(scatter.kinds) > 1)
+    real = tuple(k.component for k in kept if k.component.kind == "visit" or likely >= settings.SCATTER_SURE)
+    p_value, explains = _chance_of_size(scatter, real, gap[used], sensitivity[used], noise, held, freedom)
+    note = _note(scatter, laws, bool(own) and likely < settings.SCATTER_SURE)
+    return RandomGap(tuple(kept), explains, p_value, scatter, steps, likely, laws, note)
 
 
 def _in_joints(fit: Fit) -> list[tuple[str, int]]:
@@ -167,12 +176,12 @@ class _Mean:
 def _judge(
     fit: Fit, scatter: Scatter, gap: Array, pose: NDArray[np.int64], used: NDArray[np.bool_], noise: Array
 ) -> tuple[dict[str, str], dict[str, float], list[Kept]]:
-    """Sort the chosen components: those that follow a law, those with an encoder's steps, and other scatter."""
+    """Sort the chosen components: those that follow a law, and scatter; with what speaks for steps of each joint."""
     names, sensitivity = fit.campaign.robot.joint_names, fit.corrected.joint_sensitivity
     recorded = {name: values[used] for name, values in quantities(fit.corrected).items()}
     number = np.unique(pose[used], return_inverse=True)[1].ravel()
     laws: dict[str, str] = {}
-    chances: dict[str, float] = {}
+    factors: dict[str, float] = {}
     kept: list[Kept] = []
     for c in (c for c in scatter.components if c.chosen):
         if c.kind == "visit":
@@ -191,17 +200,12 @@ def _judge(
         if law:
             laws[names[c.joint]] = law
             continue
-        steps = Steps(np.sqrt(settings.FLAT) * c.sigma, None, False)
+        step = float(np.sqrt(settings.FLAT) * c.sigma)
         if c.kind == "pose":
-            steps = period(errors, weight, command, steps.step)
-        p = steps.p_value
-        if p is not None:
-            chances[names[c.joint]] = p
-        if steps.visible and p is not None and p > settings.REFUTED:
-            continue  # what differs from pose to pose without steps is no encoder's
-        doubtful = len(scatter.kinds) == 1 and (p is None or p > settings.LEVEL)
-        kept.append(Kept(c, float(steps.step), doubtful))
-    return laws, chances, kept
+            seen = period(errors, weight, command, step)
+            step, factors[names[c.joint]] = seen.step, seen.log_factor
+        kept.append(Kept(c, step))
+    return laws, factors, kept
 
 
 def _pose_errors(
@@ -228,7 +232,7 @@ def _pose_errors(
 
 def _chance_of_size(
     scatter: Scatter,
-    kept: list[Kept],
+    real: tuple[JointScatter, ...],
     gap: Array,
     sensitivity: Array,
     noise: Array,
@@ -237,8 +241,6 @@ def _chance_of_size(
 ) -> tuple[float, bool]:
     """Test the remainder in the rows' whole covariance by χ²; heavy tails reduce its degrees of freedom."""
     parts = np.repeat(held, 3)
-    # what may as well be a systematic effect that is not known must not explain the size away
-    real = tuple(k.component for k in kept) if any(not k.doubtful for k in kept) else ()
     known = Scatter(scatter.kinds, real, scatter.probability, np.where(parts, noise, scatter.noise))
     distance2 = _distance2(known, gap, sensitivity, known.noise)
     left = max(gap.size - freedom, 1)
@@ -251,12 +253,12 @@ def _chance_of_size(
     return p, bool(real) and (p > settings.LEVEL or ratio2 < settings.MATERIAL_SCALE**2)
 
 
-def _note(scatter: Scatter, laws: Mapping[str, str], kept: list[Kept]) -> str:
+def _note(scatter: Scatter, laws: Mapping[str, str], doubtful: bool) -> str:
     if laws:
         joint, quantity = next(iter(laws.items()))
         return f"what looks like scatter of {joint} follows {quantity}: it is no scatter"
-    if kept and all(k.doubtful for k in kept):
+    if doubtful and len(scatter.kinds) == 1:
         return "the scatter shows no steps: repeats of each pose (column pose) would tell wear from what a pose brings"
-    if not kept and scatter.chosen("pose"):
-        return "joints err from pose to pose without steps or a law: repeats of each pose would tell wear from that"
+    if doubtful:
+        return "joints err from pose to pose without the steps of an encoder, and follow nothing that was recorded"
     return scatter.note

@@ -225,8 +225,8 @@ class _Search:
         return self.fits[key]
 
     def _volume(self, fitted: Fitted) -> float:
-        """Logarithm of posterior over prior width of the components' logarithmic standard deviations."""
-        width = 0.5 * np.sqrt(2.0 * np.pi * np.diag(fitted.spread)[self.likelihood.nuisances :])
+        """Logarithm of posterior over prior width of the logarithmic standard deviations, but the instrument's."""
+        width = 0.5 * np.sqrt(2.0 * np.pi * np.diag(fitted.spread)[len(self.likelihood.stated) :])
         return float(np.minimum(np.log(width / (0.5 * np.ptp(np.log(settings.VARIANCE_GRID)))), 0.0).sum())
 
     def _prior(self, components: tuple[Component, ...]) -> float:
@@ -244,13 +244,25 @@ class _Search:
         return tuple((kind, int(j)) for kind in self.kinds for j in seen if (kind, int(j)) not in self.chosen)
 
     def run(self, start: Sequence[Component] = ()) -> _Search:
-        """Climb from nothing and from a start; of one variance alone, what visits have in common may pass for it."""
+        """Climb from nothing, from a start, and where a joint scatters beside too large a noise down from all joints.
+
+        Of one variance alone, what visits have in common may pass for it; several that scatter alike may pass for a
+        larger noise, beside which none of them alone brings much.
+        """
         within = self._candidates()
         for begin in dict.fromkeys(((), tuple(c for c in start if c in within))):
-            before, self.chosen = self.chosen, begin
-            self._climb()
-            self.chosen = max(before, self.chosen, key=lambda found: self._fit(found)[1])
+            self._begun(begin)
+        stated = np.array(self.likelihood.stated)
+        inflated = np.exp(0.5 * self.best.logs[: len(stated)])[stated] > settings.NOISE_SLACK
+        for kind in dict.fromkeys(kind for kind, _ in self.chosen) if inflated.any() else ():
+            own = tuple(c for c in within if c[0] == kind)
+            self._begun(own + tuple(c for c in self.chosen if c not in own))
         return self
+
+    def _begun(self, begin: tuple[Component, ...]) -> None:
+        before, self.chosen = self.chosen, begin
+        self._climb()
+        self.chosen = max(before, self.chosen, key=lambda found: self._fit(found)[1])
 
     def _climb(self) -> None:
         while len(self.chosen) < settings.MOST_COMPONENTS:

@@ -317,10 +317,15 @@ SCATTER_PASSES = 3
 """Times that rows set aside, frames and scatter are settled together."""
 SCATTER_LAW_SHARE = 0.15
 """Of a scatter that a smooth law must explain to make it none."""
-REFUTED = 0.01
-"""p-value above which errors that could show their steps have none."""
-STEPPED = 0.4
-"""Of the height that steps of the whole scatter would have: below, it is not made of steps."""
+STEPS_HIDDEN = 0.05
+"""Chance that an encoder's steps stay hidden where they should show: another joint may err beside, or the gear divides
+them otherwise. No errors speak more than e³ against steps."""
+RIVALS_ONCE, RIVALS_AGAIN = 2.0, 0.1
+"""Prior odds of other causes against an encoder, in a joint that errs anew from pose to pose: of poses measured once,
+wear and what nobody recorded, each as probable; of what later visits find again, a ripple of the gear too fine for its
+period to be looked for."""
+STEP_SURE = 3.0
+"""Logarithm of a Bayes factor, 20 to 1, from which a step is measured by its period, no more by the errors' size."""
 BAND = 1.35
 """The step is looked for within this factor of what the scatter's size says: its 99.9 % interval with 30 poses."""
 STEP_CELL = 0.1
@@ -329,10 +334,8 @@ MOST_CELLS = 2_000_000
 """Cells of a periodogram: a second of time, 50 MB."""
 FLAT = 12.0
 """Square of a step over the variance of the errors that rounding to it makes: those of an even distribution."""
-SAWTOOTH_POWER = 0.3
-"""Share of half a sawtooth's power in its first harmonic: 6/π² of it, halved by the periodogram's definition."""
-HEIGHT_SIGMAS = 1.6
-"""Sigmas, each √½, that the root of an expected height must stand above chance for steps to be called visible."""
+SAWTOOTH_POWER = 0.6
+"""Share of a sawtooth's variance in its first harmonic, 6/π²."""
 
 # --- findings ---
 

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import expit, i0e, logsumexp
 
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import without
@@ -54,22 +55,21 @@ class Steps:
     ----------
     step
         Period of the errors along the command, rad or m; where none is seen, that which their size implies.
-    p_value
-        Of the hypothesis that there is no period; ``None`` where there are too many to search.
-    visible
-        Whether steps would be seen if all of the errors came from them.
+    log_factor
+        Natural logarithm of the Bayes factor of steps against errors without a period; 0 where it cannot be asked.
     """
 
     step: float
-    p_value: float | None
-    visible: bool
+    log_factor: float
 
 
 def period(errors: Array, weight: Array, command: Array, step: float) -> Steps:
     """Look for the period with which errors repeat along the command, as those of an encoder do.
 
-    The size of the errors implies a step, and the periodogram (Scargle 1982) is searched near it. At a frequency that
-    the errors do not have, its height is exponentially distributed: this gives the p-value.
+    The size of the errors implies a step, and the periodogram P (Scargle 1982) is searched near it. With a share ρ of
+    the errors' variance in a wave of unknown phase, the likelihood ratio at one frequency, averaged over phases, is
+    (1 - ρ)^(-K/2) exp(-K ρ/(1 - ρ)) I₀(√(2 ρ K P)/(1 - ρ)) (Bretthorst, *Bayesian Spectrum Analysis*, 1988, ch. 2, with
+    a known amplitude). The Bayes factor is its mean over the frequencies near that of the implied step.
 
     Parameters
     ----------
@@ -86,20 +86,33 @@ def period(errors: Array, weight: Array, command: Array, step: float) -> Steps:
     cell = settings.STEP_CELL / highest  # rounding the command to it costs 3 % of the height
     place = np.round((command - command.min()) / cell).astype(np.int64)
     if place.max() > settings.MOST_CELLS:
-        return Steps(step, None, False)
+        return Steps(step, 0.0)
     size = weight * (errors - float(weight @ errors / weight.sum()))
     length = int(next_fast_len(2 * int(place.max()) + 2, real=True))
     frequency = np.arange(length // 2 + 1) / (length * cell)
-    power = np.abs(rfft(np.bincount(place, size, length))) ** 2 / float((size**2).sum())
     near = (frequency > highest / settings.BAND**2) & (frequency < highest)
     if not near.any():
-        return Steps(step, None, False)
-    best = int(np.argmax(np.where(near, power, -1.0)))
-    tried = int(near.sum())
-    p = float(-np.expm1(tried * np.log1p(-np.exp(-power[best]))))
-    # the first harmonic holds 6/π² of a sawtooth's power; the root of a height is normal with variance 1/2
-    expected = settings.SAWTOOTH_POWER * float((weight * step**2 / settings.FLAT).sum())
-    seen = np.sqrt(expected) > np.sqrt(np.log(tried) - np.log(settings.REFUTED)) + settings.HEIGHT_SIGMAS
-    if power[best] < settings.STEPPED * expected:
-        p = 1.0 if seen else p  # a ripple on errors of another kind
-    return Steps(float(1.0 / frequency[best]) if p < settings.LEVEL else step, p, bool(seen))
+        return Steps(step, 0.0)
+    frequency, count = frequency[near], len(errors)
+    power = np.abs(rfft(np.bincount(place, size, length))[near]) ** 2 / float((size**2).sum())
+    share = settings.SAWTOOTH_POWER * float(np.minimum(weight * step**2 / settings.FLAT, 1.0).mean())
+    reach = np.sqrt(2.0 * share * count * power) / (1.0 - share)
+    level = -0.5 * count * np.log1p(-share) - count * share / (1.0 - share)
+    factor = float(level + logsumexp(np.log(i0e(reach)) + reach) - np.log(len(power)))
+    sure = factor > settings.STEP_SURE
+    return Steps(float(1.0 / frequency[np.argmax(power)]) if sure else step, factor)
+
+
+def stepped(log_factors: Sequence[float], *, again: bool) -> float:
+    """Return the probability that joints which err anew from pose to pose do so by the steps of their encoders.
+
+    Parameters
+    ----------
+    log_factors
+        Of each joint: see :class:`Steps`.
+    again
+        Whether later visits of a pose find the same error, so that wear is none.
+    """
+    hidden = np.log(settings.STEPS_HIDDEN)
+    seen = np.logaddexp(np.log1p(-settings.STEPS_HIDDEN) + np.asarray(log_factors, dtype=float), hidden).sum()
+    return float(expit(seen - np.log(settings.RIVALS_AGAIN if again else settings.RIVALS_ONCE)))
