@@ -51,7 +51,10 @@ def test_links_lag_only_behind_a_general_temperature_with_a_time():
         ({k: v for k, v in links.items() if k != "time"}, {0.0}),
     ):
         settings = ThermalElongation().variants(observe(replace(data, covariates=covariates)))
-        assert {s.lag for s in settings} == lags
+        # with every lag as without: a coefficient a link, one for all, and one with deviations
+        shared = {(False, 0.0), (True, 0.0), (True, 0.3)}
+        assert {(s.lag, s.common, s.spread) for s in settings} == {(lag, *own) for lag in lags for own in shared}
+        assert len(settings) == len(set(settings))
         assert {s.reads(observe(replace(data, covariates=links))) for s in settings if s.lag} <= {
             ("temperature", "time")
         }
@@ -60,11 +63,16 @@ def test_links_lag_only_behind_a_general_temperature_with_a_time():
 def test_only_a_lag_may_be_refined():
     assert ThermalElongation().nearby(1.6) == (ThermalElongation(),)
     lagging = ThermalElongation(common=True, lag=1500.0, times=(0.0, 1.0), temperatures=(20.0, 21.0))
-    assert {(s.lag, s.common) for s in lagging.nearby(2.0)} == {
-        (1500.0, True),
-        (3000.0, True),
-        (750.0, True),
-        (1500.0, False),
+    assert {(s.lag, s.common, s.spread) for s in lagging.nearby(2.0)} == {
+        (1500.0, True, 0.0),
+        (3000.0, True, 0.0),
+        (750.0, True, 0.0),
+        (1500.0, False, 0.0),
+        (1500.0, True, 0.3),
+    }
+    alone = replace(lagging, common=False, places=("forearm",))
+    assert {(s.lag, s.common, s.places) for s in alone.nearby(2.0)} == {
+        (lag, False, ("forearm",)) for lag in (750.0, 1500.0, 3000.0)
     }
 
 

@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 
 _SIZE = 1.5e-5  # 1/K
 _LAGS = (600.0, 1500.0, 3600.0)
+_SHORTEST, _LONGEST = 300.0, 7200.0  # s, twice below and above those of cast links
 _SPREAD = 0.3  # of the common coefficient: steel and aluminium lie 30 % below and above their mean
 
 
@@ -65,22 +66,28 @@ class ThermalElongation(Effect):
         return (*_columns(observations), "time") if self.lag else _columns(observations)
 
     def variants(self, observations: Observations) -> tuple[Effect, ...]:
-        """Return a coefficient a link, one for all, one for all with a deviation a link, and lags of 10 to 60 min."""
+        """Return a coefficient a link, one for all, one for all with a deviation a link; the same with lags.
+
+        A lag of 10 to 60 min is tried with each of the three: with the wrong one it may be worse than none.
+        """
         one = replace(self, common=True, spread=0.0)
         plain = (replace(one, common=False), one, replace(one, spread=_SPREAD))
         # a sensor on each link knows its temperature; where but some have one, nothing says what the rest follow
         if not observations.varies("time") or _columns(observations) != ("temperature",):
             return plain
         record = History.of(observations.covariates["time"], observations.covariates["temperature"])
-        lagged = replace(one, times=record.times, temperatures=record.temperatures)
-        return (*plain, *(replace(lagged, lag=lag) for lag in _LAGS))
+        told = [replace(own, times=record.times, temperatures=record.temperatures) for own in plain]
+        return (*plain, *(replace(own, lag=lag) for own in told for lag in _LAGS))
 
     def nearby(self, factor: float) -> tuple[Effect, ...]:
-        """Return lags longer and shorter by a factor, and this one with a coefficient a link."""
+        """Return lags longer and shorter by a factor, within 5 min to 2 h, and this one with coefficients shared otherwise."""
         if not self.lag:
             return (self,)
-        lags = (replace(self, lag=self.lag * share) for share in (1.0, factor, 1.0 / factor))
-        return (*lags, replace(self, common=not self.common))
+        near = (float(np.clip(self.lag * share, _SHORTEST, _LONGEST)) for share in (1.0, factor, 1.0 / factor))
+        lags = (replace(self, lag=lag) for lag in near)
+        # what is common to all links is in none of them alone
+        shared = () if self.places else ((False, 0.0), (True, 0.0), (True, _SPREAD))
+        return tuple(dict.fromkeys((*lags, *(replace(self, common=one, spread=apart) for one, apart in shared))))
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """One coefficient of expansion a segment, or one for all, with the segments' deviations from it; 1/K."""
