@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 from scipy.optimize import minimize_scalar
 from scipy.stats import multivariate_normal, multivariate_t
 
@@ -186,3 +187,21 @@ def test_a_stated_noise_is_held_near_where_few_rows_speak_and_given_up_where_man
             assert stated.logs[0] == pytest.approx(free.logs[0], abs=0.02)
         # to call it wrong costs no more than e⁵
         assert free.value - 5.0 - 1e-3 <= stated.value <= free.value
+
+
+@pytest.mark.parametrize("size", [0.0, 0.3, 1.0, 5.0])
+def test_what_a_variance_costs_is_the_mean_of_its_likelihood_over_the_grid(size):
+    """Of a joint that scatters plainly, hardly, and not at all; nothing else is moved, so that the sum is exact."""
+    ends = np.log(VARIANCE_GRID[[0, -1]])
+    for seed in range(4):
+        values, columns, number = drawn(seed, repeats=1, poses=60, visit=0.0, pose=size, common=0.0)
+        law = Likelihood(rows_of(values, columns, number), (True,))
+        fitted = law.fit((POSE,))
+        factor, group = law._factors((POSE,))
+        counted = np.arange(group.max() + 1)[:, None] == group
+
+        def likelihood(log, law=law, fitted=fitted, factor=factor, counted=counted):
+            return np.exp(law._at(np.array([fitted.logs[0], log]), factor, counted)[0] - fitted.value)
+
+        mean = quad(likelihood, *ends, limit=200)[0] / np.ptp(ends)
+        assert law.log_widths(fitted, (POSE,)) == pytest.approx(np.log(mean), abs=0.35)

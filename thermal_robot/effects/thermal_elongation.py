@@ -80,7 +80,7 @@ class ThermalElongation(Effect):
         return (*plain, *(replace(own, lag=lag) for own in told for lag in _LAGS))
 
     def nearby(self, factor: float) -> tuple[Effect, ...]:
-        """Return lags longer and shorter by a factor, within 5 min to 2 h, and this one with coefficients shared otherwise."""
+        """Return lags longer and shorter by a factor, of 5 min to 2 h, and other ways to share the coefficients."""
         if not self.lag:
             return (self,)
         near = (float(np.clip(self.lag * share, _SHORTEST, _LONGEST)) for share in (1.0, factor, 1.0 / factor))

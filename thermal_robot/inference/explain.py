@@ -279,7 +279,7 @@ def log_priors(effects: Sequence[Effect]) -> list[float]:
     for key, weight in zip(kin, own, strict=True):
         alike[key] = alike.get(key, 0.0) + weight
     shares = [
-        _share_of_places(len(key[1]), len(single[key[0]])) * weight / alike[key]
+        share_of_places(len(key[1]), len(single[key[0]])) * weight / alike[key]
         if effect.share is None
         else effect.share
         for effect, key, weight in zip(effects, kin, own, strict=True)
@@ -287,7 +287,7 @@ def log_priors(effects: Sequence[Effect]) -> list[float]:
     return [log_odds() + float(np.log(share)) for share in shares]
 
 
-def _share_of_places(count: int, among: int) -> float:
+def share_of_places(count: int, among: int) -> float:
     """Return the share of an effect's probability that it is in just so many given places; all of it where it has none.
 
     No places are all of them.

@@ -12,6 +12,7 @@ from scipy.special import logsumexp
 
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
+from thermal_robot.inference.explain import share_of_places
 from thermal_robot.inference.scatter_likelihood import Component, Fitted, IndependentRows, Likelihood, independent_rows
 
 Array = NDArray[np.float64]
@@ -221,22 +222,18 @@ class _Search:
         key = frozenset(components)
         if key not in self.fits:
             fitted = self.likelihood.fit(components)
-            self.fits[key] = fitted, fitted.value + self._volume(fitted) + self._prior(components), components
+            widths = self.likelihood.log_widths(fitted, components)
+            self.fits[key] = fitted, fitted.value + widths + self._prior(components), components
         return self.fits[key]
 
-    def _volume(self, fitted: Fitted) -> float:
-        """Logarithm of posterior over prior width of the logarithmic standard deviations, but the instrument's."""
-        width = 0.5 * np.sqrt(2.0 * np.pi * np.diag(fitted.spread)[len(self.likelihood.stated) :])
-        return float(np.minimum(np.log(width / (0.5 * np.ptp(np.log(settings.VARIANCE_GRID)))), 0.0).sum())
-
     def _prior(self, components: tuple[Component, ...]) -> float:
-        """Log prior: of each kind being there at all, and of each further joint as one of n."""
-        n, total = self.rows.columns.shape[2], 0.0
+        """Log prior of joints, for each kind: that of an effect of joints (:func:`share_of_places`)."""
+        n, at_work = self.rows.columns.shape[2], settings.PRIOR_PROBABILITY
+        total = 0.0
         for kind in self.kinds:
             joints = sum(k == kind for k, _ in components)
-            total += np.log(
-                settings.PRIOR_PROBABILITY if joints else 1.0 - settings.PRIOR_PROBABILITY
-            ) - joints * np.log(n)
+            share = share_of_places(joints, n) + (settings.IN_ALL if joints == n else 0.0)
+            total += np.log(at_work * share if joints else 1.0 - at_work)
         return float(total)
 
     def _candidates(self) -> tuple[Component, ...]:
@@ -252,11 +249,10 @@ class _Search:
         within = self._candidates()
         for begin in dict.fromkeys(((), tuple(c for c in start if c in within))):
             self._begun(begin)
-        stated = np.array(self.likelihood.stated)
-        inflated = np.exp(0.5 * self.best.logs[: len(stated)])[stated] > settings.NOISE_SLACK
-        for kind in dict.fromkeys(kind for kind, _ in self.chosen) if inflated.any() else ():
-            own = tuple(c for c in within if c[0] == kind)
-            self._begun(own + tuple(c for c in self.chosen if c not in own))
+        noises = zip(self.best.logs, self.likelihood.stated, strict=False)
+        if any(stated and log > 2.0 * np.log(settings.NOISE_SLACK) for log, stated in noises):
+            for kind in dict.fromkeys(kind for kind, _ in self.chosen):
+                self._begun(tuple(dict.fromkeys([c for c in within if c[0] == kind] + list(self.chosen))))
         return self
 
     def _begun(self, begin: tuple[Component, ...]) -> None:
@@ -295,7 +291,7 @@ class _Search:
 
     def result(self, noise: Array, note: str) -> Scatter:
         fitted, log_posterior, order = self._fit(self.chosen)
-        none = self._fit(())
+        none, smallest = self._fit(()), np.log(settings.VARIANCE_GRID[0])
         candidates = self._candidates()
         screened = (
             self.likelihood.screen(fitted, candidates) if candidates else np.zeros((len(settings.VARIANCE_GRID), 0))
@@ -305,8 +301,8 @@ class _Search:
         components = []
         for kind in self.kinds:
             for j, lever in enumerate(self.rows.lever):
-                if (kind, j) in order:
-                    place = self.likelihood.nuisances + order.index((kind, j))
+                place = self.likelihood.nuisances + order.index((kind, j)) if (kind, j) in order else -1
+                if place >= 0 and fitted.logs[place] > smallest:
                     ends = np.exp(0.5 * np.array([fitted.logs[place], *self._interval(fitted, order, place)])) / lever
                     rest = tuple(c for c in self.chosen if c != (kind, j))
                     without = self._fit(rest)

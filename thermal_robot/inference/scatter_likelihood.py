@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import gammaln
+from scipy.special import gammaln, logsumexp
 
 from thermal_robot.inference import settings
 
@@ -156,6 +156,26 @@ class Likelihood:
             if gain < settings.SCATTER_SETTLED:
                 break
         return Fitted(logs, value, covariance, np.asarray(np.linalg.inv(information), dtype=float))
+
+    def log_widths(self, fitted: Fitted, components: tuple[Component, ...]) -> float:
+        """Return the logarithm of posterior over prior width, summed over all variances but the instrument's.
+
+        A priori the logarithm of each is anywhere on the grid. Laplace's width where the data determine it; where they
+        but bound it, the mean of the likelihood over the grid, as what is far below the noise is seen by nothing.
+        """
+        grid, total = np.log(settings.VARIANCE_GRID)[::2], 0.0
+        factor, group = self._factors(components)
+        counted = np.arange(group.max() + 1)[:, None] == group
+        for k in range(len(self.stated), len(fitted.logs)):
+            deviation = float(np.sqrt(fitted.spread[k, k]))
+            if deviation < settings.BOUNDED and fitted.logs[k] > grid[0]:
+                total += np.log(min(np.sqrt(2.0 * np.pi) * deviation / np.ptp(grid), 1.0))
+                continue
+            others = np.tile(fitted.logs, (len(grid), 1))
+            others[:, k] = grid
+            values = [self._at(logs, factor, counted)[0] - fitted.value for logs in others]
+            total += min(float(logsumexp(values)) - np.log(len(grid)), 0.0)
+        return float(total)
 
     def screen(self, base: Fitted, candidates: tuple[Component, ...]) -> Array:
         """(G, C) posterior density with one more component of each variance of the grid, all else in proportion.

@@ -301,6 +301,8 @@ LOG_VARIANCE = (-12.0, 14.0)
 """Range of the logarithm of a variance, in squares of the noise."""
 VARIANCE_GRID = np.exp(np.linspace(np.log(1e-2), np.log(1e4), 22))
 """Variances of a component that are compared, in squares of the noise: a tenth to a hundred times its sigma."""
+BOUNDED = 1.0
+"""Standard deviation of the logarithm of a variance from which the data but bound it: its likelihood has no peak."""
 MEDIAN_SQUARE = 0.455
 """Median of χ² with one degree of freedom: turns the median of squares into a variance."""
 SCATTER_RIDGE = 1e-3
