@@ -170,19 +170,19 @@ def contained(problem: Gram) -> frozenset[frozenset[int]]:
     The two are confounded and never named together. The smaller is preferred where it suffices; otherwise the larger
     stands for both.
     """
-    pairs = set()
     matrix, slices = problem.matrix, problem.slices
-    total = [float(np.trace(matrix[s, s])) for s in slices]
+    sizes = np.array([s.stop - s.start for s in slices], dtype=int)
+    owner = np.repeat(np.arange(len(slices)), sizes)
+    total = np.bincount(owner, np.diag(matrix), len(slices))
+    enough = np.maximum(settings.CONTAINED * total, settings.CONTAINED_LEFT)
+    pairs = set()
     for large, outer in enumerate(slices):
-        size = outer.stop - outer.start
-        smaller = [k for k, inner in enumerate(slices) if 0 < inner.stop - inner.start < size]
-        if not smaller:
+        smaller = (sizes > 0) & (sizes < sizes[large])
+        if not smaller.any():
             continue
         inside = ((matrix[:, outer] @ whitener(matrix[outer, outer])) ** 2).sum(axis=1)
-        for small in smaller:
-            left = total[small] - float(inside[slices[small]].sum())
-            if left < max(settings.CONTAINED * total[small], settings.CONTAINED_LEFT):
-                pairs.add(frozenset((small, large)))
+        left = total - np.bincount(owner, inside, len(slices))
+        pairs |= {frozenset((int(small), large)) for small in np.flatnonzero(smaller & (left < enough))}
     return frozenset(pairs)
 
 
