@@ -53,14 +53,14 @@ def refitted(found: Diagnosis, campaign: Campaign, samples: Campaign) -> dict[st
     given = observe(campaign, frames)
     asked = observe(_measured(samples, model), frames)
     columns, fresh, tight, slices = _design(model, given, asked)
-    left = found.rows.remainder[kept]
+    columns, gap, left = columns[kept], given.gap[kept], found.rows.remainder[kept]
     noise = np.maximum(np.sqrt((left.reshape(len(left), -1, 3) ** 2).mean(axis=(0, 2))), 1e-9)
     nominal, base = asked.predicted_position, frames.base[:3, :3]
     predicted = {"+".join(effect.name for effect, _ in model.effects): model.predict(samples)[0]}
     for size in range(len(slices)):
         for chosen in combinations(range(len(slices)), size):
             used = np.concatenate([np.arange(slices[0].start), *(np.r_[slices[k]] for k in chosen)]).astype(int)
-            fitted = _ridge(columns[kept][:, :, used], given.gap[kept], noise, tight[used])
+            fitted = _ridge(columns[:, :, used], gap, noise, tight[used])
             names = "+".join(model.effects[k][0].name for k in chosen)
             predicted[names] = nominal + fresh[:, :, used] @ fitted @ base.T
     return predicted

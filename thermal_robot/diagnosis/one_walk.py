@@ -167,11 +167,9 @@ class Model:
         What the blocks leave on all rows counts as noise against the priors.
         """
         picked = self.columns(chosen)
-        square, tight = (
-            np.ix_(np.arange(len(self.whole)), picked, picked),
-            self.tight[picked[self.flat : -1] - self.flat],
-        )
-        whole = self.whole[square]
+        tight = self.tight[picked[self.flat : -1] - self.flat]
+        own = (slice(None), picked[:, None], picked)
+        whole = self.whole[own]
         equations = max(int((self.whitening.weights > 0).sum()) * self.linear.measures, 1) / len(whole)
         # the gap of the nominal robot is what registration leaves
         begin = whole[:, -1, -1] / equations if self.apart else 0.0
@@ -182,7 +180,7 @@ class Model:
         solved: dict[bytes, Array] = {}
         for used in rows:
             if used.tobytes() not in solved:
-                solved[used.tobytes()] = _signed(self.products(used)[square], variance, self.flat, tight)
+                solved[used.tobytes()] = _signed(self.products(used)[own], variance, self.flat, tight)
         return [solved[used.tobytes()] for used in rows]
 
 
