@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
+from scipy.special import erf
 
 from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, at_joint
 from thermal_robot.effects.quantities import driving, unit
@@ -17,6 +18,9 @@ if TYPE_CHECKING:
 
 _SHARES = (0.2, 0.35, 0.5, 0.7, 0.9)  # their odds grow by about two
 _HANGS = 0.02  # of the largest torque of any joint: what is lighter, friction holds
+_SOFT = 0.05  # of friction: how far a film of grease lets a tooth lie between its two sides
+_SHARPEST, _SOFTEST = 0.005, 0.3  # nothing below is seen, nothing above is dry friction
+_STANDS = 0.1  # of the rows: where friction wins in fewer, play that hangs to one side is an offset to the data
 
 
 @dataclass(frozen=True)
@@ -24,9 +28,11 @@ class Backlash(Effect):
     """Every joint stops short by half its play: q_actual = q_command − ½ b_j · side_j; rad or m.
 
     side is ``approach.<joint>``: +1 where the joint was increasing, −1 where it was decreasing, 0 where that is not
-    known. Where gravity outweighs friction, the joint hangs on its teeth, however it came: side is the sign of the
-    torque τ_j that holds it, wherever |τ_j| > held · max|τ_j|. A joint that never carries more than 2 % of the robot's
-    largest torque never hangs. Expected size 0.5 mrad (about two minutes of arc, a worn gear of an industrial joint).
+    known. Where gravity outweighs friction F_j = held · max|τ_j|, the joint hangs on its teeth, however it came: side
+    is the sign of the torque τ_j that holds it. Near |τ_j| = F_j it changes gradually, over a share of friction:
+    side = ½ (1 + a) erf((τ + F)/(soft F)) + ½ (1 − a) erf((τ − F)/(soft F)), a the approach. A joint that never carries
+    more than 2 % of the robot's largest torque never hangs. Expected size 0.5 mrad (about two minutes of arc, a worn
+    gear of an industrial joint).
 
     Only poses that are reached from both sides show it. Where torque decides always, it is nearly
     :class:`JointCompliance`, from which only a jump at zero torque tells it.
@@ -40,11 +46,18 @@ class Backlash(Effect):
         Each joint's largest torque in the campaign, N·m: a model goes by this, whatever it is asked to predict.
     chain
         Names of these joints.
+    soft
+        Share of friction over which teeth change sides; 0 where they do at once.
+    steady
+        Each joint's torque, N·m, that all but a tenth of the rows exceed, to one side; 0 where the side changes. With
+        less friction the joint always lies on that side: an offset, that is left to it.
     """
 
     held: float | tuple[float, ...] = 0.0
     largest: tuple[float, ...] = ()
     chain: tuple[str, ...] = ()
+    soft: float = 0.0
+    steady: tuple[float, ...] = ()
 
     name: ClassVar[str] = "backlash"
     title: ClassVar[str] = "lost motion in the joints"
@@ -67,7 +80,10 @@ class Backlash(Effect):
         if torque is None or not np.any(np.ptp(torque, axis=0) > 1e-9):
             return (self,)
         largest = tuple(np.abs(torque).max(axis=0).tolist())
-        hangs = replace(self, largest=largest, chain=observations.robot.joint_names)
+        one_sided = (torque > 0.0).all(axis=0) | (torque < 0.0).all(axis=0)
+        steady = tuple(np.where(one_sided, np.quantile(np.abs(torque), _STANDS, axis=0), 0.0).tolist())
+        chain = observations.robot.joint_names
+        hangs = replace(self, largest=largest, chain=chain, soft=_SOFT, steady=steady)
         return tuple(replace(hangs, held=share) for share in (0.0, *_SHARES))
 
     @property
@@ -84,7 +100,8 @@ class Backlash(Effect):
     def nearby(self, factor: float) -> tuple[Effect, ...]:
         """Shares whose odds are larger and smaller by a factor, of all joints together and of each.
 
-        Besides, one joint that never hangs, or alone does, and where shares differ, that of one for all.
+        Besides, teeth that change sides over more or less of friction, one joint that never hangs, or alone does, and
+        where shares differ, that of one for all.
         """
         shares = np.broadcast_to(self.held, len(self.largest))
         able = [j for j, joint in enumerate(self.chain) if self._may_hang(j) and joint in (self.places or self.chain)]
@@ -98,7 +115,8 @@ class Backlash(Effect):
             found += [self._with(j, float(share)) for j in own for share in (0.0, *(moved[j] for moved in odds))]
         for moved in odds:
             found.append(replace(self, held=tuple(moved.tolist()) if isinstance(self.held, tuple) else float(moved[0])))
-        return tuple(found)
+        films = (float(np.clip(self.soft * by, _SHARPEST, _SOFTEST)) for by in (factor, 1.0 / factor) if self.soft)
+        return (*found, *(replace(self, soft=film) for film in films))
 
     def _with(self, j: int, share: float) -> Effect:
         """Return the effect with another share of one joint's largest torque."""
@@ -131,8 +149,12 @@ class Backlash(Effect):
         held = self.held[j] if isinstance(self.held, tuple) else self.held
         if not held or torque is None or not self._may_hang(j):
             return approach
-        heavy = np.abs(torque[:, j]) > held * self.largest[j]
-        return np.where(heavy, np.sign(torque[:, j]), approach)
+        friction = held * self.largest[j]
+        if self.steady and friction < self.steady[j]:
+            return np.zeros_like(approach)
+        film = max(self.soft, 1e-9) * friction
+        up, down = (erf((torque[:, j] + side * friction) / film) for side in (1.0, -1.0))
+        return np.asarray(0.5 * ((1.0 + approach) * up + (1.0 - approach) * down))
 
     def _may_hang(self, j: int) -> bool:
         """Whether a joint carries enough to hang at all."""

@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 _SIZE = 1.5e-5  # 1/K
 _LAGS = (600.0, 1500.0, 3600.0)
-_SHORTEST, _LONGEST = 300.0, 7200.0  # s, twice below and above those of cast links
+_SHORTEST, _LONGEST = 300.0, 10800.0  # s: walls of 2 mm, and castings of 20 mm in still air
 _SPREAD = 0.3  # of the common coefficient: steel and aluminium lie 30 % below and above their mean
 
 
@@ -80,7 +80,7 @@ class ThermalElongation(Effect):
         return (*plain, *(replace(own, lag=lag) for own in told for lag in _LAGS))
 
     def nearby(self, factor: float) -> tuple[Effect, ...]:
-        """Return lags longer and shorter by a factor, of 5 min to 2 h, and other ways to share the coefficients."""
+        """Return lags longer and shorter by a factor, of 5 min to 3 h, and other ways to share the coefficients."""
         if not self.lag:
             return (self,)
         near = (float(np.clip(self.lag * share, _SHORTEST, _LONGEST)) for share in (1.0, factor, 1.0 / factor))

@@ -56,8 +56,13 @@ def refined(explanation: Explanation, observations: Observations, factor: float)
 
 
 def heard(explanation: Explanation) -> Whitening:
-    """Return the whitening in which rows set aside have a weight; what rows have in common is known of the others."""
-    whitening, aside = explanation.whitening, explanation.outliers
+    """Return the whitening in which rows set aside have a weight; what rows have in common is known of the others.
+
+    What is anew in every pose counts for nothing: a constant that is a little off leaves just that.
+    """
+    whitening, aside, form = explanation.whitening, explanation.outliers, explanation.discrepancy.form
+    if form is not None and form.anew:
+        whitening = replace(whitening, smooth=None)
     if whitening.smooth is not None or not aside.any():
         return whitening
     noise = whitening.noise * explanation.best.noise
