@@ -69,12 +69,12 @@ def on_fresh(explanation, block, fresh):
 
 
 def forced(known, item):
-    """The same fit, said to hold one block more and no discrepancy, whatever the evidence."""
+    """The same fit, said to hold one block more and no discrepancy, whatever the evidence: it alone was compared."""
     e, white = known.explanation, replace(known.explanation.whitening, smooth=None)
     linear = replace(e.linear, blocks=(*(e.linear.blocks[b] for b in e.best.blocks), item))
     problem = gram(linear, white)
     best = Search(problem, [0.0] * len(linear.blocks)).evaluate(range(len(linear.blocks)))
     effects = (*known.effects, (item.effect, np.zeros(item.columns.shape[2])))
-    return replace(
-        known, explanation=replace(e, linear=linear, whitening=white, problem=problem, best=best), effects=effects
-    )
+    given = {"linear": linear, "whitening": white, "problem": problem, "best": best}
+    said = replace(e, **given, combinations=[best], probabilities=np.ones(1))
+    return replace(known, explanation=said, effects=effects, families=tuple(b.effect.name for b in linear.blocks))

@@ -10,7 +10,7 @@ from simulate import simulate
 
 from thermal_robot.diagnosis import word
 from thermal_robot.diagnosis.earned import Earned, Gained, earned
-from thermal_robot.diagnosis.word import worth_their_word
+from thermal_robot.diagnosis.word import in_question, worth_their_word
 from thermal_robot.effects import choose
 from thermal_robot.effects.law import Discovered
 from thermal_robot.inference import settings
@@ -123,3 +123,38 @@ def test_the_more_rows_held_out_suffer_the_less_probable_it_is(rv_m2, monkeypatc
     # a twentieth of the mean square over some three hundred equations: eight nats less than its prior odds
     assert said[2] < 1e-3 * settings.PRIOR_PROBABILITY
     assert np.isfinite(said).all()
+
+
+def test_what_is_little_more_probable_than_nothing_stays_in_question(rv_m2):
+    """Gains of about a third of the noise: of some the data are sure, others are as well not there."""
+    sure, open_ = 0, 0
+    for seed in range(12):
+        data = simulate(rv_m2, ["joint_gain"], seed=seed, samples=75, ratio=(0.35, 0.35))[0]
+        known = fit(data, choose(("joint_gain",), (), ()))
+        odds, heard = in_question(known), []
+        left, refused = worth_their_word(known, heard.append)
+        if not known.effects:
+            assert odds == {}
+            continue
+        p = known.explanation.probability(range(len(known.families)))
+        # of one effect alone the odds are those of its probability
+        assert (p / (1.0 - p) < 9.0) == bool(odds)
+        if odds:
+            assert odds["joint_gain"] == pytest.approx(p / (1.0 - p), rel=1e-6)
+            assert left.effects == ()
+            if heard[0] == "joint_gain stays in question":
+                assert refused["joint_gain"].probability == pytest.approx(p)
+                open_ += 1
+        else:
+            sure += names(left) == ["joint_gain"]
+    assert min(sure, open_) >= 2, (sure, open_)
+
+
+def test_two_that_one_of_is_at_work_are_not_in_question(rv_m2):
+    """Where either explains what the other does, each is improbable by itself and nothing in its place is worse."""
+    data = simulate(rv_m2, ["joint_compliance"], seed=4, samples=75, ratio=(4.0, 4.0))[0]
+    known = fit(data, choose(("joint_compliance", "link_compliance"), (), ()))
+    assert len(known.effects) == 1
+    assert in_question(known) == {}
+    both = known.explanation.probability(range(len(known.families)))
+    assert both == pytest.approx(1.0, abs=1e-6)

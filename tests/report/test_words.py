@@ -22,6 +22,7 @@ from thermal_robot.report.words import (
     places,
     rows_in_words,
     sentences,
+    told_as,
     verdict,
     with_aside,
 )
@@ -39,7 +40,15 @@ def several(count, identified=True):
 
 
 def test_every_status_has_words(case):
-    assert {f.status for kind in ("found", "confounded") for f in case(kind).effects} == set(STATUS)
+    shown = {told_as(f) for kind in ("found", "confounded") for f in case(kind).effects}
+    assert {*shown, "in_question"} == set(STATUS)
+
+
+def test_what_is_not_found_and_yet_probable_is_in_question():
+    for probability, told in ((0.7, "in_question"), (0.3, "not_found"), (None, "not_found")):
+        assert told_as(Finding("joint_gain", "not_found", probability)) == told
+    assert told_as(Finding("joint_gain", "found", 0.95)) == "found"
+    assert told_as(Finding("joint_gain", "confounded", 0.6)) == "confounded"
 
 
 def test_lists_are_cut_and_say_how_many_are_missing():

@@ -11,6 +11,7 @@ from thermal_robot.diagnosis.earned import Earned, earned
 from thermal_robot.diagnosis.held_out import held_out
 from thermal_robot.diagnosis.parts import Refused
 from thermal_robot.effects.law import PREFIX
+from thermal_robot.inference import settings
 from thermal_robot.inference.explain import log_odds
 from thermal_robot.inference.fit import Fit, refit
 
@@ -19,14 +20,16 @@ def worth_their_word(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, di
     """Take effects and laws out of a fit one after another, the worst first, until all that stay earn their word.
 
     A law stays if it predicts rows held out better (:func:`~thermal_robot.diagnosis.earned.earned`) and the interval of
-    its share is above zero, a known effect unless it predicts them worse.
+    its share is above zero, a known effect unless it predicts them worse, or is less than nine times as probable as
+    nothing in its place.
 
     Returns
     -------
     fit
         With what is left of it.
     refused
-        By name of a known effect: its probability by its prior and the rows held out alone, and its share there.
+        By name of a known effect: its probability by its prior and the rows held out alone, and its share there; of one
+        in question, its probability.
     """
     refused: dict[str, Refused] = {}
     while True:
@@ -36,13 +39,38 @@ def worth_their_word(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, di
             judged = {
                 name: e for name, e in earned(fit).items() if name.startswith(PREFIX) and shares[name][1][0] <= 0.0
             }
-        if not judged:
+        faint = {} if judged else in_question(fit)
+        if not judged and not faint:
             return fit, refused
-        worst = min(judged, key=lambda name: judged[name].blocked.share)
-        progress(f"rows held out refuse {worst}")
+        if judged:
+            worst = min(judged, key=lambda name: judged[name].blocked.share)
+            progress(f"rows held out refuse {worst}")
+        else:
+            worst = min(faint, key=lambda name: faint[name])
+            progress(f"{worst} stays in question")
         if not worst.startswith(PREFIX):
-            refused[worst] = _refused(fit, judged[worst])
+            refused[worst] = _refused(fit, judged[worst]) if judged else Refused(_probability(fit, worst))
         fit = refit(fit, {worst: ()}, [effect for effect, _ in fit.effects if effect.name != worst], progress)
+
+
+def in_question(fit: Fit) -> dict[str, float]:
+    """Return by name the known effects of a fit that are little more probable than nothing in their place: the odds.
+
+    What others could do in its place does not count here: two of which one is at work are told as confounded.
+    """
+    e = fit.explanation
+    masses: dict[frozenset[str], float] = {}
+    for combination, probability in zip(e.combinations, e.probabilities, strict=True):
+        names = frozenset(fit.families[b] for b in combination.blocks)
+        masses[names] = masses.get(names, 0.0) + float(probability)
+    best = frozenset(fit.families[b] for b in e.best.blocks)
+    known = [name for name in best if not name.startswith(PREFIX)]
+    odds = {name: masses[best] / max(masses.get(best - {name}, 0.0), settings.TINY) for name in known}
+    return {name: value for name, value in odds.items() if value < settings.NAMING_ODDS}
+
+
+def _probability(fit: Fit, name: str) -> float:
+    return fit.explanation.probability([b for b, family in enumerate(fit.families) if family == name])
 
 
 def _refused(fit: Fit, judged: Earned) -> Refused:

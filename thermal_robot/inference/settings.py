@@ -1,7 +1,6 @@
 """Every number that was chosen in the inference and the diagnosis: its value, its unit, and why that one.
 
-What is known of one effect stands
-in that effect's file.
+What is known of one effect stands in that effect's file.
 """
 
 import numpy as np
@@ -51,7 +50,7 @@ PARTS = tuple(2.0 ** (k / 2) for k in range(-3, 4))
 FORM_REACH = 20.0
 """Log evidence below the best at which a form of the discrepancy is given up while a fit settles."""
 RUNG_REACH = 5.4
-"""Log evidence below the best at which a size of a discrepancy still counts: 1 in 200, four sizes an octave."""
+"""The same at which a size of one still counts: 1 in 200, four sizes an octave."""
 
 # --- rounding ---
 
@@ -343,6 +342,8 @@ SAWTOOTH_POWER = 0.6
 
 DETERMINED = 0.5
 """A parameter is identified when the data leave less than half of its prior's standard deviation."""
+NAMING_ODDS = 9.0
+"""Of an effect against nothing in its place, to be named: who takes a gear apart for it is then wrong once in ten."""
 SURE, RIVAL, RIVAL_SHARE = 0.75, 0.2, 0.8
 """An effect less probable than the first has rivals: effects at least as probable as the second, and present in the
 third share of the explanations without it."""

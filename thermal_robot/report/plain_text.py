@@ -19,6 +19,7 @@ from thermal_robot.report.words import (
     places,
     rows_in_words,
     sentences,
+    told_as,
     verdict,
     with_aside,
 )
@@ -116,7 +117,7 @@ def _which(diagnosis: Diagnosis) -> Iterator[str]:
     wide = max([len(f.name) for f in diagnosis.effects], default=0)
     yield f"    {'':{wide}}{'probability':>13}   share of the gap, on rows held out (95 %)"
     for status, heading in STATUS.items():
-        group = [f for f in diagnosis.effects if f.status == status]
+        group = [f for f in diagnosis.effects if told_as(f) == status]
         if group:
             yield f"  {heading}"
         elif status == "found":

@@ -16,12 +16,14 @@ if TYPE_CHECKING:
 STATUS = {
     "found": "found",
     "confounded": "cannot be told apart",
+    "in_question": "in question",
     "not_found": "not found",
     "not_testable": "not testable with these data",
 }
 _ALL_UP_TO = 7
 _MOST = 6
 _NEGLIGIBLE = 0.005  # share of the gap that is not worth a line
+_MORE_LIKELY = 0.5
 _UNLIKELY = 0.02  # probability of a place that is not worth naming
 _SOURCES = {
     "stated": "the instrument's noise as the campaign states it",
@@ -33,6 +35,12 @@ _SOURCES = {
 
 NO_BREAK = "\u00a0"
 _TOGETHER = re.compile(r"(?<=\d) (?=(%|[mµn]?m\b|[mµ]?rad\b))|(?<=\bp) (?=[<=])|(?<=[<>=]) (?=\d)")
+
+
+def told_as(finding: Finding) -> str:
+    """Return the status under which a finding is shown: not found, yet more probable than not, it is in question."""
+    doubtful = finding.status == "not_found" and (finding.probability or 0.0) >= _MORE_LIKELY
+    return "in_question" if doubtful else finding.status
 
 
 @dataclass(frozen=True)
