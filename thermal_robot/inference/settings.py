@@ -343,7 +343,7 @@ SAWTOOTH_POWER = 0.6
 DETERMINED = 0.5
 """A parameter is identified when the data leave less than half of its prior's standard deviation."""
 NAMING_ODDS = 9.0
-"""Of an effect against nothing in its place, to be named: who takes a gear apart for it is then wrong once in ten."""
+"""Of an effect against nothing in its place: who takes a gear apart for what is named is then wrong once in ten."""
 SURE, RIVAL, RIVAL_SHARE = 0.75, 0.2, 0.8
 """An effect less probable than the first has rivals: effects at least as probable as the second, and present in the
 third share of the explanations without it."""
@@ -385,8 +385,7 @@ UNHEARD = 1e-2
 
 LEADING, MOST_LEADING = 0.01, 4
 """Probability of an explanation that is to be told apart, and how many are."""
-LEAST_LEADING = 1e-3
-"""Explanations that are less probable are not worth a measurement."""
+LEAST_LEADING = 1e-3  # explanations that are less probable are not worth a measurement
 DECIDED, WORTHWHILE = 0.9, 1.0
 """An explanation so probable is decided where further samples would bring less than so many nats for any rival."""
 WIDE = 2.4
