@@ -152,15 +152,12 @@ def test_teeth_change_sides_over_a_share_of_friction(rv_m2):
     """At friction a tooth lies in the middle; a film's width to either side it lies nearly at one, however it came."""
     approach, campaign = approached(rv_m2, seed=8)
     here, j = observe(campaign), 1
-    load = here.torque[:, j]
-    order = np.argsort(np.abs(load))
-    sides = {}
+    load, largest = here.torque[:, j], np.abs(here.torque).max(axis=0)
+    # friction is the torque of one row in the middle, which thus stands just where its teeth change sides
+    middle = np.argsort(np.abs(load))[len(load) // 2]
+    friction, sides = np.abs(load[middle]), {}
     for soft in (0.0, 0.05, 0.2):
-        # friction is the torque of one row in the middle, which thus stands just where its teeth change sides
-        middle = order[len(order) // 2]
-        effect = Backlash(float(np.abs(load[middle]) / np.abs(load).max()), (0.0, float(np.abs(load).max())), soft=soft)
-        effect = replace(effect, largest=tuple(np.abs(here.torque).max(axis=0).tolist()))
-        friction = np.abs(load[middle])
+        effect = Backlash(float(friction / largest[j]), tuple(largest.tolist()), soft=soft)
         sides[soft] = -2.0 * effect.parameters(here)[j].responses[0].values
         against = approach[:, j] * np.sign(load) < 0.0
         far = np.abs(np.abs(load) - friction) > 2.0 * soft * friction

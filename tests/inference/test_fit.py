@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from simulate import simulate
 from time_constants import DRIFT, LAG, NOISE, campaign
 
 from thermal_robot import diagnose
@@ -29,6 +30,24 @@ def test_what_was_chosen_is_what_was_fitted():
     known = fit(campaign("rv_m2", 1, DRIFT, 0.4, 20.0), choose((), ()))
     blocks = [known.explanation.linear.blocks[b] for b in known.explanation.best.blocks]
     assert [b.effect for b in blocks] == [effect for effect, _ in known.effects]
+
+
+def test_effects_and_sets_of_effects_share_one_probability(rv_m2):
+    """Of two effects four sets are possible, and each effect is in two of them; faint ones leave all four some."""
+    names = ["drift", "joint_gain"]
+    data = simulate(rv_m2, names, seed=3, samples=60, ratio=(0.3, 0.3))[0]
+    known = fit(data, choose(names, (), ()))
+    sets = [set(), {"drift"}, {"joint_gain"}, set(names)]
+    each = [known.probability_of_just(one) for one in sets]
+    assert sum(each) == pytest.approx(1.0, abs=1e-9)
+    assert min(each) > 0.0
+    for name in names:
+        assert known.probability(name) == pytest.approx(
+            sum(p for one, p in zip(sets, each, strict=True) if name in one)
+        )
+        effects = {known.explanation.linear.blocks[b].effect.name for b in known.blocks_of(name)}
+        assert effects == {name}
+    assert known.names_of(known.explanation.best) == {effect.name for effect, _ in known.effects}
 
 
 @pytest.mark.slow

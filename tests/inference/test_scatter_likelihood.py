@@ -197,8 +197,7 @@ def test_what_a_variance_costs_is_the_mean_of_its_likelihood_over_the_grid(size)
         values, columns, number = drawn(seed, repeats=1, poses=60, visit=0.0, pose=size, common=0.0)
         law = Likelihood(rows_of(values, columns, number), (True,))
         fitted = law.fit((POSE,))
-        factor, group = law._factors((POSE,))
-        counted = np.arange(group.max() + 1)[:, None] == group
+        factor, counted = law._factors((POSE,))
 
         def likelihood(log, law=law, fitted=fitted, factor=factor, counted=counted):
             return np.exp(law._at(np.array([fitted.logs[0], log]), factor, counted)[0] - fitted.value)

@@ -49,10 +49,8 @@ def test_a_bayes_factor_is_as_often_right_as_it_says():
     """Of errors that have steps or have none, as often: of those called 80 % probable to have steps, 80 % have."""
     rng, said, true = np.random.default_rng(0), [], []
     for seed in range(600):
-        rows, ratio = (
-            int(rng.integers(40, 90)),
-            rng.uniform(0.8, 2.0),
-        )  # from steps that can hardly be seen to plain ones
+        # from steps that can hardly be seen to plain ones
+        rows, ratio = int(rng.integers(40, 90)), rng.uniform(0.8, 2.0)
         command, sigma = commands(seed, rows), STEP / np.sqrt(12.0)
         errors = sawtooth(command) if seed % 2 else sigma * rng.normal(size=rows)
         noise = sigma / ratio

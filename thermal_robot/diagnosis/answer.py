@@ -107,7 +107,7 @@ def answer(
         where=where,
         unexplained=last.unexplained,
         verdict=(*(f.name for f in found if f.name in held), *(f.name for f in chance if f.status == "found")),
-        probability=_probability(fit),
+        probability=fit.probability_of_just({effect.name for effect, _ in fit.effects}),
         separates=separates(found),
         model=_model(fit),
         rows=_rows(fit, shrinkage),
@@ -119,13 +119,6 @@ def answer(
         reach=float(np.linalg.norm(np.ptp(np.asarray(campaign.position), axis=0))),
         narrowed=narrowed,
     )
-
-
-def _probability(fit: Fit) -> float:
-    """Posterior probability of exactly this set of effects, summed over the settings of nonlinear arguments."""
-    e, chosen = fit.explanation, {effect.name for effect, _ in fit.effects}
-    same = [{fit.families[b] for b in c.blocks} == chosen for c in e.combinations]
-    return min(float(e.probabilities[same].sum()), 1.0)
 
 
 def _gap(last: Conclusion, shrinkage: Shrinkage) -> Gap:

@@ -48,7 +48,7 @@ def beside_scatter(
     again = explain(linear, noise, families=fit.families)
     kept = tuple(dict.fromkeys(fit.families[b] for b in again.best.blocks))
     feigned: dict[str, tuple[Effect, ...]] = {name: () for name in dict.fromkeys(fit.families) if name not in kept}
-    own = {name: [b for b, f in enumerate(fit.families) if f == name] for name in feigned}
+    own = {name: fit.blocks_of(name) for name in feigned}
     refused = {**refused, **{name: Refused(again.probability(blocks)) for name, blocks in own.items()}}
     fit = refit(fit, feigned, [linear.blocks[b].effect for b in again.best.blocks], progress)
     chance = random_gap(fit)

@@ -51,7 +51,7 @@ def findings(
     for name in dict.fromkeys(fit.families):
         if name.startswith(PREFIX) and name not in explained:
             continue  # a law that did not last was never a candidate of anybody's
-        own = [b for b, f in enumerate(fit.families) if f == name]
+        own = fit.blocks_of(name)
         status: Status = "found" if name in explained else "not_found"
         confounded = rivals.get(name, ())
         if not confounded and name not in explained and all(_within_frames(fit, b) for b in own):
@@ -128,7 +128,7 @@ def _rivals(fit: Fit, explained: dict[str, int]) -> dict[str, tuple[str, ...]]:
     as the smaller one is preferred where it suffices.
     """
     e: Explanation = fit.explanation
-    held = [{fit.families[b] for b in c.blocks} for c in e.combinations]
+    held = [fit.names_of(c) for c in e.combinations]
     containing = contained(e.problem)
     rivals: dict[str, set[str]] = {}
     for name, block in explained.items():
@@ -137,7 +137,7 @@ def _rivals(fit: Fit, explained: dict[str, int]) -> dict[str, tuple[str, ...]]:
         for other in dict.fromkeys(fit.families):
             if other in explained:
                 continue
-            own = [b for b, f in enumerate(fit.families) if f == other]
+            own = fit.blocks_of(other)
             both = np.array([other in h for h in held])
             instead = float(e.probabilities[absent & both].sum())
             doubtful = mass >= 1.0 - settings.SURE and instead > max(settings.RIVAL, settings.RIVAL_SHARE * mass)

@@ -209,7 +209,7 @@ def _range(campaign: Campaign) -> tuple[Array, Array]:
 
 
 def _effects(fit: Fit, combination: Combination) -> Effects:
-    return tuple(sorted(fit.families[b] for b in combination.blocks))
+    return tuple(sorted(fit.names_of(combination)))
 
 
 def _leading(fit: Fit) -> tuple[list[Combination], Array]:

@@ -31,7 +31,7 @@ def prior_sensitivity(fit: Fit) -> Sensitivity:
         log, same = [], []
         for combination in e.combinations[: settings.COMPARED]:
             log.append(search.evaluate(combination.blocks).log_evidence)
-            same.append({fit.families[b] for b in combination.blocks} == chosen)
+            same.append(fit.names_of(combination) == chosen)
         weight = np.exp(np.array(log) - max(log))
         found.append(float(weight[np.array(same)].sum() / weight.sum()))
     return Sensitivity(*found)

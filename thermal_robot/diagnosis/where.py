@@ -36,7 +36,7 @@ def without_laws(fit: Fit, left: Unexplained) -> Unexplained:
     moved = np.sum([e.linear.contribution(b, e.values[b][0])[kept] for b in blocks], axis=0)
     frames = e.linear.frames[kept].reshape(moved.size, -1)
     moved = without(moved.ravel(), orthonormal(frames)).reshape(moved.shape)[:, :3]
-    chance = [1.0 - e.probability([b for b, f in enumerate(fit.families) if f == fit.families[own]]) for own in blocks]
+    chance = [1.0 - fit.probability(fit.families[own]) for own in blocks]
     taken2 = float((moved**2).sum(axis=1).mean())
     rest2 = float((fit.corrected.gap[kept, :3] ** 2).sum(axis=1).mean())
     what = "a law explains" if len(blocks) == 1 else f"{len(blocks)} laws explain"

@@ -49,7 +49,7 @@ def worth_their_word(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, di
             worst = min(faint, key=lambda name: faint[name])
             progress(f"{worst} stays in question")
         if not worst.startswith(PREFIX):
-            refused[worst] = _refused(fit, judged[worst]) if judged else Refused(_probability(fit, worst))
+            refused[worst] = _refused(fit, judged[worst]) if judged else Refused(fit.probability(worst))
         fit = refit(fit, {worst: ()}, [effect for effect, _ in fit.effects if effect.name != worst], progress)
 
 
@@ -58,19 +58,13 @@ def in_question(fit: Fit) -> dict[str, float]:
 
     What others could do in its place does not count here: two of which one is at work are told as confounded.
     """
-    e = fit.explanation
-    masses: dict[frozenset[str], float] = {}
-    for combination, probability in zip(e.combinations, e.probabilities, strict=True):
-        names = frozenset(fit.families[b] for b in combination.blocks)
-        masses[names] = masses.get(names, 0.0) + float(probability)
-    best = frozenset(fit.families[b] for b in e.best.blocks)
-    known = [name for name in best if not name.startswith(PREFIX)]
-    odds = {name: masses[best] / max(masses.get(best - {name}, 0.0), settings.TINY) for name in known}
-    return {name: value for name, value in odds.items() if value < settings.NAMING_ODDS}
-
-
-def _probability(fit: Fit, name: str) -> float:
-    return fit.explanation.probability([b for b, family in enumerate(fit.families) if family == name])
+    best = fit.names_of(fit.explanation.best)
+    whole, found = fit.probability_of_just(best), {}
+    for name in (n for n in best if not n.startswith(PREFIX)):
+        odds = whole / max(fit.probability_of_just(best - {name}), settings.TINY)
+        if odds < settings.NAMING_ODDS:
+            found[name] = odds
+    return found
 
 
 def _refused(fit: Fit, judged: Earned) -> Refused:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass
 
 import numpy as np
@@ -13,6 +13,7 @@ from thermal_robot.effects import Effect, gate
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import frame_columns
+from thermal_robot.inference.evidence import Combination
 from thermal_robot.inference.explain import Explanation
 from thermal_robot.inference.frames import register
 from thermal_robot.inference.problem import Linear
@@ -57,6 +58,23 @@ class Fit:
     families: tuple[str, ...]
     needs: dict[str, tuple[str, ...]]
     variants: dict[str, tuple[Effect, ...]]
+
+    def blocks_of(self, name: str) -> list[int]:
+        """Return the blocks of one effect: its settings."""
+        return [b for b, family in enumerate(self.families) if family == name]
+
+    def names_of(self, combination: Combination) -> frozenset[str]:
+        """Return the effects of a combination of blocks."""
+        return frozenset(self.families[b] for b in combination.blocks)
+
+    def probability(self, name: str) -> float:
+        """Posterior probability that an effect is at work, in whatever setting."""
+        return self.explanation.probability(self.blocks_of(name))
+
+    def probability_of_just(self, names: Set[str]) -> float:
+        """Posterior probability of exactly this set of effects, summed over their settings."""
+        e = self.explanation
+        return min(float(e.probabilities[[self.names_of(c) == names for c in e.combinations]].sum()), 1.0)
 
 
 def fit(campaign: Campaign, effects: Sequence[Effect], progress: Callable[[str], None] = lambda _: None) -> Fit:

@@ -228,8 +228,7 @@ class _Search:
 
     def _prior(self, components: tuple[Component, ...]) -> float:
         """Log prior of joints, for each kind: that of an effect of joints (:func:`share_of_places`)."""
-        n, at_work = self.rows.columns.shape[2], settings.PRIOR_PROBABILITY
-        total = 0.0
+        n, at_work, total = self.rows.columns.shape[2], settings.PRIOR_PROBABILITY, 0.0
         for kind in self.kinds:
             joints = sum(k == kind for k, _ in components)
             share = share_of_places(joints, n) + (settings.IN_ALL if joints == n else 0.0)
@@ -292,6 +291,7 @@ class _Search:
     def result(self, noise: Array, note: str) -> Scatter:
         fitted, log_posterior, order = self._fit(self.chosen)
         none, smallest = self._fit(()), np.log(settings.VARIANCE_GRID[0])
+        places = {c: k for k, c in enumerate(order, self.likelihood.nuisances) if fitted.logs[k] > smallest}
         candidates = self._candidates()
         screened = (
             self.likelihood.screen(fitted, candidates) if candidates else np.zeros((len(settings.VARIANCE_GRID), 0))
@@ -301,12 +301,12 @@ class _Search:
         components = []
         for kind in self.kinds:
             for j, lever in enumerate(self.rows.lever):
-                place = self.likelihood.nuisances + order.index((kind, j)) if (kind, j) in order else -1
-                if place >= 0 and fitted.logs[place] > smallest:
+                place = places.get((kind, j))
+                if place is not None:
                     ends = np.exp(0.5 * np.array([fitted.logs[place], *self._interval(fitted, order, place)])) / lever
                     rest = tuple(c for c in self.chosen if c != (kind, j))
-                    without = self._fit(rest)
-                    factor = (log_posterior - self._prior(self.chosen)) - (without[1] - self._prior(rest))
+                    without = self._fit(rest)[1] - self._prior(rest)
+                    factor = log_posterior - self._prior(self.chosen) - without
                     components.append(_estimate(kind, j, ends, factor, True))
                 elif (kind, j) in candidates:
                     k = candidates.index((kind, j))

@@ -129,8 +129,7 @@ class Likelihood:
 
     def fit(self, components: tuple[Component, ...], start: Array | None = None, held: int | None = None) -> Fitted:
         """Find the largest posterior density by Fisher's scoring on logarithms of variances, one of them held."""
-        factor, group = self._factors(components)
-        counted = np.arange(group.max() + 1)[:, None] == group
+        factor, counted = self._factors(components)
         logs = self._start(len(components)) if start is None else start.copy()
         free = np.arange(len(logs)) != held
         value, slope, information, covariance = self._at(logs, factor, counted)
@@ -164,8 +163,7 @@ class Likelihood:
         but bound it, the mean of the likelihood over the grid, as what is far below the noise is seen by nothing.
         """
         grid, total = np.log(settings.VARIANCE_GRID)[::2], 0.0
-        factor, group = self._factors(components)
-        counted = np.arange(group.max() + 1)[:, None] == group
+        factor, counted = self._factors(components)
         for k in range(len(self.stated), len(fitted.logs)):
             deviation = float(np.sqrt(fitted.spread[k, k]))
             if deviation < settings.BOUNDED and fitted.logs[k] > grid[0]:
@@ -220,8 +218,12 @@ class Likelihood:
             ]
         )
 
-    def _factors(self, components: tuple[Component, ...]) -> tuple[Array, NDArray[np.int64]]:
-        """(R, m, F) columns whose outer products, times the variance of their group, add up to the covariance."""
+    def _factors(self, components: tuple[Component, ...]) -> tuple[Array, NDArray[np.bool_]]:
+        """Return what adds up to the covariance.
+
+        (R, m, F) columns whose outer products, times the variance of their group, do so; and (groups, F) which of them
+        each group counts.
+        """
         rows = self.rows
         count, m = rows.values.shape
         often = np.sqrt(rows.repeats)[:, None, None]
@@ -234,7 +236,8 @@ class Likelihood:
             column = rows.columns[:, :, joint : joint + 1]
             parts.append(column * often if kind == "pose" else column)
             groups.append(np.array([self.nuisances + k]))
-        return np.concatenate(parts, axis=2), np.concatenate(groups)
+        group = np.concatenate(groups)
+        return np.concatenate(parts, axis=2), np.arange(group.max() + 1)[:, None] == group
 
     def _at(self, logs: Array, factor: Array, counted: NDArray[np.bool_]) -> tuple[float, Array, Array, Array]:
         """Posterior density, its slope, Fisher's information, and the rows' covariances."""

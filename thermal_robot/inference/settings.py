@@ -319,8 +319,7 @@ SCATTER_PASSES = 3
 SCATTER_LAW_SHARE = 0.15
 """Of a scatter that a smooth law must explain to make it none."""
 STEPS_HIDDEN = 0.05
-"""Chance that an encoder's steps stay hidden where they should show: another joint may err beside, or the gear divides
-them otherwise. No errors speak more than e³ against steps."""
+"""Chance that steps stay hidden where they should show, as another joint errs too: nothing speaks e³ against them."""
 RIVALS_ONCE, RIVALS_AGAIN = 2.0, 0.1
 """Prior odds of other causes against an encoder, in a joint that errs anew from pose to pose: of poses measured once,
 wear and what nobody recorded, each as probable; of what later visits find again, a ripple of the gear too fine for its
@@ -385,7 +384,8 @@ UNHEARD = 1e-2
 
 LEADING, MOST_LEADING = 0.01, 4
 """Probability of an explanation that is to be told apart, and how many are."""
-LEAST_LEADING = 1e-3  # explanations that are less probable are not worth a measurement
+LEAST_LEADING = 1e-3
+"""Explanations that are less probable are not worth a measurement."""
 DECIDED, WORTHWHILE = 0.9, 1.0
 """An explanation so probable is decided where further samples would bring less than so many nats for any rival."""
 WIDE = 2.4
