@@ -10,6 +10,7 @@ from thermal_robot.report.words import (
     NO_BREAK,
     STATUS,
     bound,
+    by_status,
     campaign,
     in_words,
     law,
@@ -49,6 +50,18 @@ def test_what_is_not_found_and_yet_probable_is_in_question():
         assert told_as(Finding("joint_gain", "not_found", probability)) == told
     assert told_as(Finding("joint_gain", "found", 0.95)) == "found"
     assert told_as(Finding("joint_gain", "confounded", 0.6)) == "confounded"
+
+
+def test_what_is_in_question_is_shown_between_what_was_found_and_what_was_not(case):
+    diagnosis = case("confounded")
+    doubtful = Finding("joint_gain", "not_found", 0.7)
+    shown = by_status(replace(diagnosis, effects=(*diagnosis.effects[::-1], doubtful)))
+    assert sorted(f.name for f in shown) == sorted(f.name for f in (*diagnosis.effects, doubtful))
+    ranks = [list(STATUS).index(told_as(f)) for f in shown]
+    assert ranks == sorted(ranks)
+    before, after = shown[: shown.index(doubtful)], shown[shown.index(doubtful) + 1 :]
+    assert {f.status for f in before} == {"found", "confounded"}
+    assert {f.status for f in after} == {"not_found", "not_testable"}
 
 
 def test_lists_are_cut_and_say_how_many_are_missing():

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thermal_robot.report import units
-from thermal_robot.report.words import STATUS, law, needs, parameters, places, told_as
+from thermal_robot.report.words import STATUS, by_status, law, needs, parameters, places, told_as
 
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.parts import Finding
@@ -53,8 +53,7 @@ def effects_table(diagnosis: Diagnosis) -> str:
     """Show every candidate: status, probability, share, and below it what is known of it."""
     head = "<th>effect</th><th>status</th><th class=tr-n>probability</th>"
     head += "<th class=tr-n>share of the gap, on rows held out (95 %)</th>"
-    ordered = [f for status in STATUS for f in diagnosis.effects if told_as(f) == status]
-    body = "".join(_effect(f, diagnosis) for f in ordered)
+    body = "".join(_effect(f, diagnosis) for f in by_status(diagnosis))
     return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
 
 

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 from thermal_robot.report import units
 from thermal_robot.report.drawing import AFTER, FAINT, INK, MUTED, SMALL, Drawing, note, plain, tidy, title
-from thermal_robot.report.words import needs
+from thermal_robot.report.words import by_status, needs
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -29,8 +29,8 @@ def plot_which(diagnosis: Diagnosis) -> Figure:
     Returns
     -------
     Figure
-        Filled: found; hatched: cannot be told apart from another; pale: not found. What is not testable says
-        why.
+        Filled: found; hatched: cannot be told apart from another; pale: in question, then not found. What is not
+        testable says why.
     """
     figure = Drawing(7.6, 1.3 + 0.27 * max(len(diagnosis.effects), 3))
     axes = figure.subplots()
@@ -41,7 +41,7 @@ def plot_which(diagnosis: Diagnosis) -> Figure:
 
 def draw_which(axes: Axes, diagnosis: Diagnosis, *, brief: bool = False) -> None:
     """Draw the candidates into a panel, ``brief`` where there is no room to say what an effect would need."""
-    ordered = [f for status in (*_LOOK, "not_testable") for f in diagnosis.effects if f.status == status]
+    ordered = by_status(diagnosis)
     if not ordered:
         note(axes, "No effect was tried.")
         return

@@ -43,6 +43,11 @@ def told_as(finding: Finding) -> str:
     return "in_question" if doubtful else finding.status
 
 
+def by_status(diagnosis: Diagnosis) -> list[Finding]:
+    """Return the findings in the order in which they are shown: what was found first, what is not testable last."""
+    return [f for status in STATUS for f in diagnosis.effects if told_as(f) == status]
+
+
 @dataclass(frozen=True)
 class Shown:
     """An effect's parameters as far as they are printed.
