@@ -9,10 +9,10 @@ from simulate import commands, random_motion, simulate
 
 from thermal_robot import diagnose
 from thermal_robot.campaign import Campaign, Units
+from thermal_robot.diagnosis import settings
 from thermal_robot.diagnosis.next_samples import candidates, next_samples
 from thermal_robot.effects import choose, library
 from thermal_robot.effects.apply import displacement
-from thermal_robot.inference import settings
 from thermal_robot.inference.fit import fit
 from thermal_robot.observations import Frames, observe
 

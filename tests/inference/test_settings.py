@@ -2,13 +2,13 @@
 
 import ast
 from collections import Counter
+from importlib import import_module
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import thermal_robot
-from thermal_robot.inference import settings
 
 ROOT = Path(thermal_robot.__file__).parent
 PLAIN = {0.0, 1.0, 2.0, 3.0, 6.0, 0.5}
@@ -44,33 +44,37 @@ def of(path):
     return ast.parse(path.read_text(encoding="utf-8"))
 
 
-OWN = of(ROOT / "inference" / "settings.py")
+FILES = {name: of(ROOT / name / "settings.py") for name in ("inference", "diagnosis")}
+
+
+OWN = [(package, name, after) for package, tree in FILES.items() for name, after in constants(tree)]
 
 
 def test_every_setting_has_its_reason_behind_it():
     bare = []
-    for name, after in constants(OWN):
+    for _, name, after in OWN:
         told = isinstance(after, ast.Expr) and isinstance(after.value, ast.Constant)
         if not (told and isinstance(after.value.value, str) and len(after.value.value.split()) >= 4):
             bare.append(name)
     assert bare == []
-    assert len(list(constants(OWN))) > 100
+    assert len(OWN) > 100
 
 
 def test_no_setting_is_defined_twice():
-    names = Counter(name for name, _ in constants(OWN))
+    names = Counter(name for _, name, _ in OWN)
     assert [name for name, times in names.items() if times > 1] == []
 
 
 def test_every_setting_is_used():
     text = "\n".join(path.read_text(encoding="utf-8") for path in ROOT.rglob("*.py") if path.name != "settings.py")
-    unused = [name for name, _ in constants(OWN) if f"settings.{name}" not in text]
+    unused = [name for _, name, _ in OWN if f"settings.{name}" not in text]
     assert unused == []
 
 
-@pytest.mark.parametrize("name", sorted({name for name, _ in constants(OWN)}))
-def test_a_setting_is_a_number_or_an_array_of_numbers(name):
-    assert np.isfinite(np.asarray(getattr(settings, name), dtype=float)).all()
+@pytest.mark.parametrize(("package", "name"), sorted({(package, name) for package, name, _ in OWN}))
+def test_a_setting_is_a_number_or_an_array_of_numbers(package, name):
+    value = getattr(import_module(f"thermal_robot.{package}.settings"), name)
+    assert np.isfinite(np.asarray(value, dtype=float)).all()
 
 
 @pytest.mark.parametrize("path", JUDGING, ids=[str(p.relative_to(ROOT)) for p in JUDGING])

@@ -10,6 +10,7 @@ from threadpoolctl import threadpool_limits
 from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.diagnosis.answer import Conclusion, answer
 from thermal_robot.diagnosis.beside_scatter import beside_scatter
+from thermal_robot.diagnosis.beside_steps import beside_steps
 from thermal_robot.diagnosis.cautions import usable
 from thermal_robot.diagnosis.examine import examine
 from thermal_robot.diagnosis.held_out import held_out
@@ -103,7 +104,7 @@ def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
     while len(stages) > 1 and worse_elsewhere(known, stages[-1]):
         stages.pop()
     fit, refused = worth_their_word(stages[-1], progress)
-    chance = random_gap(fit)
+    fit, chance, refused = beside_steps(fit, random_gap(fit), refused, progress)
     if chance.explains_size:
         return beside_scatter(fit, chance, refused, progress)
     left, laws = examine(fit, progress), discovered(fit)

@@ -23,8 +23,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign
+from thermal_robot.diagnosis import settings
 from thermal_robot.effects import gate
-from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.evidence import Combination
 from thermal_robot.inference.fit import Fit

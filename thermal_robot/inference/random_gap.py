@@ -18,7 +18,7 @@ from thermal_robot.inference.problem import Linear
 from thermal_robot.inference.robust import distance_limit
 from thermal_robot.inference.rows import repeated_poses
 from thermal_robot.inference.scatter import JointScatter, Scatter, enough_rows, joint_errors, variance_components
-from thermal_robot.inference.steps import followed, period, stepped
+from thermal_robot.inference.steps import followed, period, seen, stepped
 
 Array = NDArray[np.float64]
 
@@ -48,6 +48,8 @@ class RandomGap:
         The variances behind it.
     steps
         By joint: logarithm of the Bayes factor of steps of the command against errors that follow nothing.
+    seen
+        The same of all joints that err from pose to pose, some of whose steps may stay hidden.
     stepped
         Probability that what poses bring is due to such steps.
     laws
@@ -61,6 +63,7 @@ class RandomGap:
     p_value: float
     scatter: Scatter
     steps: Mapping[str, float]
+    seen: float
     stepped: float
     laws: Mapping[str, str]
     note: str = ""
@@ -115,13 +118,13 @@ def random_gap(fit: Fit) -> RandomGap:
         if 2 * within.sum() < len(within):
             break  # most rows lie beyond any scatter: robot and table do not belong together
         used = within & asked
-    laws, steps, kept = _judge(fit, scatter, gap[used], pose, used, noise)
+    laws, steps, kept = _judge(fit, scatter, gap[used], pose, used, noise, freedom)
     own = [steps[fit.campaign.robot.joint_names[k.component.joint]] for k in kept if k.component.kind == "pose"]
-    likely = stepped(own, again=len(scatter.kinds) > 1)
+    likely = stepped(seen(own), again=len(scatter.kinds) > 1)
     real = tuple(k.component for k in kept if k.component.kind == "visit" or likely >= settings.SCATTER_SURE)
     p_value, explains = _chance_of_size(scatter, real, gap[used], sensitivity[used], noise, held, freedom)
     note = _note(scatter, laws, bool(own) and likely < settings.SCATTER_SURE)
-    return RandomGap(tuple(kept), explains, p_value, scatter, steps, likely, laws, note)
+    return RandomGap(tuple(kept), explains, p_value, scatter, steps, seen(own), likely, laws, note)
 
 
 def _in_joints(fit: Fit) -> list[tuple[str, int]]:
@@ -174,12 +177,22 @@ class _Mean:
 
 
 def _judge(
-    fit: Fit, scatter: Scatter, gap: Array, pose: NDArray[np.int64], used: NDArray[np.bool_], noise: Array
+    fit: Fit,
+    scatter: Scatter,
+    gap: Array,
+    pose: NDArray[np.int64],
+    used: NDArray[np.bool_],
+    noise: Array,
+    freedom: int,
 ) -> tuple[dict[str, str], dict[str, float], list[Kept]]:
-    """Sort the chosen components: those that follow a law, and scatter; with what speaks for steps of each joint."""
+    """Sort the chosen components: those that follow a law, and scatter; with what speaks for steps of each joint.
+
+    What was fitted took errors of the poses with it: a share of so many parameters in all that was measured of them.
+    """
     names, sensitivity = fit.campaign.robot.joint_names, fit.corrected.joint_sensitivity
     recorded = {name: values[used] for name, values in quantities(fit.corrected).items()}
     number = np.unique(pose[used], return_inverse=True)[1].ravel()
+    taken = freedom / (gap.shape[1] * (int(number.max()) + 1))
     laws: dict[str, str] = {}
     factors: dict[str, float] = {}
     kept: list[Kept] = []
@@ -202,7 +215,7 @@ def _judge(
             continue
         step = float(np.sqrt(settings.FLAT) * c.sigma)
         if c.kind == "pose":
-            seen = period(errors, weight, command, step)
+            seen = period(errors, variance + taken * c.sigma**2, command, step)
             step, factors[names[c.joint]] = seen.step, seen.log_factor
         kept.append(Kept(c, step))
     return laws, factors, kept

@@ -1,4 +1,4 @@
-"""Every number that was chosen in the inference and the diagnosis: its value, its unit, and why that one.
+"""Every number that was chosen in the inference and for findings: its value, its unit, and why that one.
 
 What is known of one effect stands in that effect's file.
 """
@@ -7,8 +7,8 @@ import numpy as np
 
 # --- what is believed before the data ---
 
-PRIOR_PROBABILITY = 0.1
-"""That an effect is at work, random ones included: of sixteen effects one or two are then expected."""
+PRIOR_PROBABILITY = 1.0 / 6.0
+"""That an effect is at work, random ones included: two or three of sixteen, as on robots of known causes (2 to 5)."""
 IN_ALL, ONE_MORE = 1.0 / 3.0, 0.5
 """Share of an effect's probability that it is in all its places, and that it is in one; each further one halves it, so
 that all shares sum to one."""
@@ -328,14 +328,16 @@ STEP_SURE = 3.0
 """Logarithm of a Bayes factor, 20 to 1, from which a step is measured by its period, no more by the errors' size."""
 BAND = 1.35
 """The step is looked for within this factor of what the scatter's size says: its 99.9 % interval with 30 poses."""
-STEP_CELL = 0.1
-"""Of the shortest period: rounding commands to it costs 3 % of a periodogram's height."""
-MOST_CELLS = 2_000_000
-"""Cells of a periodogram: a second of time, 50 MB."""
+STEP_SLACKS = (0.05, 0.1, 0.2)
+"""Of a step: how even an encoder's positions are, as interpolated ones, and how much of the errors is of others."""
+STEP_BANDS, STEP_PHASES, STEP_HARMONICS = 12, 32, 8
+"""Bands of frequency, 5 % each, in which errors count in one step; phases; harmonics that such a slack leaves."""
+STEP_POSES, MOST_ANGLES = 100, 100_000_000
+"""Poses of a search for steps, more only say it more surely, and poses times frequencies: some seconds of time."""
+STEPS_REACH = 12.0
+"""Log odds above which an effect is not tried again without it: steps would have to be plain in several joints."""
 FLAT = 12.0
 """Square of a step over the variance of the errors that rounding to it makes: those of an even distribution."""
-SAWTOOTH_POWER = 0.6
-"""Share of a sawtooth's variance in its first harmonic, 6/π²."""
 
 # --- findings ---
 
@@ -379,22 +381,3 @@ PURE = 1e-6
 """Of a unit twist, m or rad: with less of one kind it is all of the other."""
 UNHEARD = 1e-2
 """Of the noise's variance: what rows have in common below it is left out where rows are held out."""
-
-# --- what to measure next ---
-
-LEADING, MOST_LEADING = 0.01, 4
-"""Probability of an explanation that is to be told apart, and how many are."""
-LEAST_LEADING = 1e-3
-"""Explanations that are less probable are not worth a measurement."""
-DECIDED, WORTHWHILE = 0.9, 1.0
-"""An explanation so probable is decided where further samples would bring less than so many nats for any rival."""
-WIDE = 2.4
-"""rad: as far as a joint without a limit is sent; nearly once round."""
-BEYOND = 5.0
-"""K outside the campaign's temperatures: a hall on another day."""
-LOOSE = 0.1
-"""m and rad: where the data leave a frame open, it is somewhere there."""
-TIE = 1e-3
-"""Weight of the information on parameters beside that on explanations, when samples are proposed: it breaks ties."""
-FEW_PAYLOADS = 6
-"""A campaign with no more payloads than this is offered these; another its lightest and heaviest."""
