@@ -7,8 +7,9 @@ displacements that are known so far, and the gap is there. Gauss-Newton re-obser
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +27,9 @@ from thermal_robot.kinematics import (
     segment_loads,
 )
 from thermal_robot.robot import Robot
+
+if TYPE_CHECKING:
+    from thermal_robot.effects import Effect, Parameter
 
 Array = NDArray[np.float64]
 
@@ -72,6 +76,8 @@ class Observations:
         (N, 3) displacement of the measured point that the instrument adds, measurement frame, m.
     displaced
         Whether anything is displaced in the chain.
+    parameters
+        Of each effect that was asked for them here: the settings of an effect in single places share them.
     """
 
     campaign: Campaign
@@ -81,6 +87,7 @@ class Observations:
     rotation: Array
     instrument: Array | None = None
     displaced: bool = False
+    parameters: dict[Effect, tuple[Parameter, ...]] = field(init=False, default_factory=dict, repr=False)
 
     @property
     def robot(self) -> Robot:

@@ -3,7 +3,7 @@
 import ast
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import numpy as np
 import pytest
@@ -398,3 +398,28 @@ def test_an_effect_with_a_constructor_of_its_own_may_sit_in_one_joint(observatio
         ("joint_2", 0.5),
         ("joint_3", 0.5),
     ]
+    # it compares as equal with any other of its kind, and is not mistaken for it
+    assert [p.size for p in checked(Built(0.7), observations)] == [0.7, 0.7]
+
+
+def test_settings_in_single_places_share_what_the_effect_answers(observations):
+    asked = []
+
+    @dataclass(frozen=True)
+    class Counted(Effect):
+        """Writes down when it is asked."""
+
+        size: float = 0.5
+        name: ClassVar[str] = "counted"
+
+        def parameters(self, observations):
+            asked.append(self.size)
+            return tuple(replace(GOOD, size=self.size, place=joint) for joint in ("joint_2", "joint_3"))
+
+    here = replace(observations)
+    singles = [checked(one, here) for one in gate.alone(Counted(), here)]
+    assert [p.place for (p,) in singles] == ["joint_2", "joint_3"]
+    assert asked == [0.5]
+    assert [p.size for p in checked(Counted(0.7), here)] == [0.7, 0.7]
+    checked(Counted(), replace(observations))  # what is seen from elsewhere is asked anew
+    assert asked == [0.5, 0.7, 0.5]

@@ -303,9 +303,12 @@ def _padded(parts: Sequence[tuple[list[int], Array, Array]]) -> Iterator[tuple[l
     yield from (part for part in parts if part[1].shape[1] > settings.NARROW)
     if narrow:
         wide = max(value.shape[1] for _, value, _ in narrow)
-        padded = [[np.pad(a, ((0, 0), (0, wide - a.shape[1]))) for a in part[1:]] for part in narrow]
-        value, along = (np.concatenate(arrays) for arrays in zip(*padded, strict=True))
-        yield [b for part in narrow for b in part[0]], value, along
+        blocks = [b for part in narrow for b in part[0]]
+        value, along, first = np.zeros((len(blocks), wide)), np.zeros((len(blocks), wide)), 0
+        for alike, own, seen in narrow:
+            rows, columns = slice(first, first + len(alike)), slice(own.shape[1])
+            value[rows, columns], along[rows, columns], first = own, seen, first + len(alike)
+        yield blocks, value, along
 
 
 def _by_width(gram: Gram, blocks: Sequence[int]) -> list[list[int]]:
