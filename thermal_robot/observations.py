@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,9 +27,6 @@ from thermal_robot.kinematics import (
     segment_loads,
 )
 from thermal_robot.robot import Robot
-
-if TYPE_CHECKING:
-    from thermal_robot.effects import Effect, Parameter
 
 Array = NDArray[np.float64]
 
@@ -87,7 +84,7 @@ class Observations:
     rotation: Array
     instrument: Array | None = None
     displaced: bool = False
-    parameters: dict[Effect, tuple[Parameter, ...]] = field(init=False, default_factory=dict, repr=False)
+    parameters: dict[Any, tuple[Any, ...]] = field(init=False, default_factory=dict, repr=False)
 
     @property
     def robot(self) -> Robot:

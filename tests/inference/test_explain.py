@@ -99,12 +99,12 @@ def test_settings_of_one_effect_are_never_together_and_share_its_prior():
 def test_log_priors_are_those_of_effects_and_not_of_settings():
     """However many settings of an effect are listed, the odds that it is at work are one to nine, or a little less."""
     gain, lost = choose(("joint_gain", "backlash"), (), ())
-    assert np.exp(log_odds()) == pytest.approx(1.0 / 9.0)
+    assert np.exp(log_odds()) == pytest.approx(1.0 / 5.0)
     joints = ("a", "b", "c", "d")
     everywhere, alone = lost, [replace(lost, places=(j,)) for j in joints]
     several = [replace(lost, places=own) for k in (2, 3, 4) for own in combinations(joints, k)]
     odds = np.exp(log_priors([gain, everywhere, *alone, *several]))
-    assert odds[0] == pytest.approx(1.0 / 9.0)
+    assert odds[0] == pytest.approx(1.0 / 5.0)
     assert 0.9 * odds[0] < odds[1:].sum() <= odds[0]
     # in all as likely as in one; which one, nobody knows
     assert odds[1] == pytest.approx(odds[2:6].sum())
@@ -119,10 +119,10 @@ def test_settings_of_the_same_places_share_by_their_weight():
     hangs = Backlash(largest=(1.0, 1.0, 1.0), chain=("a", "b", "c"))
     shares = [replace(hangs, held=held) for held in (0.0, 0.2, 0.5, (0.5, 0.5, 0.0))]
     odds = np.exp(log_priors(shares))
-    assert odds.sum() == pytest.approx(1.0 / 9.0)
+    assert odds.sum() == pytest.approx(1.0 / 5.0)
     assert odds[1] == pytest.approx(odds[2])
     assert odds[0] > odds[1]
-    assert odds[3] == pytest.approx(odds[2] / 9.0)
+    assert odds[3] == pytest.approx(odds[2] / 5.0)
 
 
 def test_a_law_has_one_share_of_all_that_were_tried_however_many_are_compared():

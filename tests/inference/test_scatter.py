@@ -166,7 +166,7 @@ def test_too_little_says_nothing(robot):
     remainder, sensitivity, noise, _, _ = simulate(robot, 0, rows=9)
     scatter = variance_components(remainder, sensitivity, noise)
     assert scatter.components == ()
-    assert scatter.probability == {"visit": 0.1, "pose": 0.1}
+    assert scatter.probability == pytest.approx({"visit": 1.0 / 6.0, "pose": 1.0 / 6.0})
     assert "nothing can be said" in scatter.note
 
 
