@@ -97,7 +97,7 @@ def test_settings_of_one_effect_are_never_together_and_share_its_prior():
 
 
 def test_log_priors_are_those_of_effects_and_not_of_settings():
-    """However many settings of an effect are listed, the odds that it is at work are one to nine, or a little less."""
+    """However many settings of an effect are listed, the odds that it is at work are one to five, or a little less."""
     gain, lost = choose(("joint_gain", "backlash"), (), ())
     assert np.exp(log_odds()) == pytest.approx(1.0 / 5.0)
     joints = ("a", "b", "c", "d")

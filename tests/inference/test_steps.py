@@ -42,7 +42,7 @@ def test_normal_errors_have_no_steps_and_are_refuted():
         rng, command = np.random.default_rng(seed), commands(seed, 200, reach=0.3)
         found = period(STEP / np.sqrt(12.0) * rng.normal(size=200), variances(0.0, 200), command, STEP)
         assert found.step == pytest.approx(STEP)
-        assert found.log_factor < np.log(0.01)
+        assert found.log_factor < np.log(1e-4)
 
 
 def test_a_bayes_factor_is_as_often_right_as_it_says():
@@ -76,7 +76,7 @@ def test_a_ripple_on_errors_of_another_kind_is_no_step():
         rng, command = np.random.default_rng(seed), commands(seed, 600)
         errors = 1.0 / np.sqrt(12.0) * rng.normal(size=600) * STEP + 0.35 * sawtooth(command)
         found = period(errors, variances(0.0, 600), command, STEP)
-        assert found.log_factor < np.log(0.01)
+        assert found.log_factor < np.log(1e-4)
 
 
 def test_a_joint_is_an_encoders_as_its_steps_say():
@@ -93,13 +93,24 @@ def test_a_joint_is_an_encoders_as_its_steps_say():
     assert stepped(seen([30.0, -30.0]), again=False) > 0.99
 
 
-def test_a_step_far_from_what_the_size_says_is_not_looked_for():
+HALVES = pytest.mark.xfail(reason="whole steps lie on half steps, too: with a slack they are taken for these, by e³⁸")
+THIRDS = pytest.mark.xfail(reason="two thirds of a step count a little, by e³, too few for a step to be measured by")
+
+
+@pytest.mark.parametrize("other", [1.6, pytest.param(1.0 / 1.45, marks=THIRDS), pytest.param(1.0 / 1.6, marks=HALVES)])
+def test_a_step_far_from_what_the_size_says_is_not_looked_for(other):
+    command = commands(0)
+    errors, variance = sawtooth(command), variances(0.0, 150)
+    assert period(errors, variance, command, other * STEP).log_factor < 0.0
+
+
+def test_a_step_that_the_size_says_outweighs_one_far_from_it():
     command = commands(0)
     errors, variance = sawtooth(command), variances(0.0, 150)
     plain = period(errors, variance, command, STEP).log_factor
     assert plain > 100.0
-    for other in (STEP / 1.6, STEP / 1.45, 1.6 * STEP):  # where it stands, half a step and two thirds count some, too
-        assert period(errors, variance, command, other).log_factor < 0.2 * plain
+    for other in (1.0 / 1.6, 1.0 / 1.45, 1.6):
+        assert period(errors, variance, command, other * STEP).log_factor < 0.2 * plain
 
 
 def test_too_many_steps_say_nothing_and_one_command_has_one_error():
