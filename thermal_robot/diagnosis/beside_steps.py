@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from operator import itemgetter
 
 import numpy as np
 from scipy.special import expit
@@ -11,7 +12,7 @@ from thermal_robot.diagnosis.parts import Refused
 from thermal_robot.effects import Effect, gate
 from thermal_robot.effects.law import PREFIX
 from thermal_robot.inference import settings
-from thermal_robot.inference.fit import Fit, refit
+from thermal_robot.inference.fit import Fit, less
 from thermal_robot.inference.random_gap import RandomGap, random_gap
 
 
@@ -42,20 +43,19 @@ def beside_steps(
         Without the effects that steps speak against.
     """
     while hidden := {joint for joint, factor in chance.steps.items() if factor < 0.0}:
-        names, rivals = fit.names_of(fit.explanation.best), []
-        held = fit.probability_of_just(names)
+        rivals = []
         for name in (effect.name for effect, _ in fit.effects if _moves(fit, effect) & hidden):
-            odds = np.log(max(held, settings.TINY) / max(fit.probability_of_just(names - {name}), settings.TINY))
-            if odds > settings.STEPS_REACH:
-                continue
-            other = refit(fit, {name: ()}, [effect for effect, _ in fit.effects if effect.name != name], progress)
-            left = random_gap(other)
-            rivals.append((left.seen - chance.seen - float(odds), name, other, left))
-        gain, name, other, left = max(rivals, key=lambda rival: rival[0], default=(0.0, "", fit, chance))
-        if gain <= 0.0:
+            log_odds = float(np.log(max(fit.odds(name), settings.TINY)))
+            if log_odds <= settings.STEPS_REACH:
+                other = less(fit, name, progress)
+                left = random_gap(other)
+                rivals.append((left.seen - chance.seen - log_odds, name, other, left))
+        best = max(rivals, key=itemgetter(0), default=None)
+        if best is None or best[0] <= 0.0:
             break
+        gain, name, fit, chance = best
         progress(f"steps of encoders speak against {name}")
-        fit, chance, refused = other, left, {**refused, name: Refused(float(expit(-gain)))}
+        refused = {**refused, name: Refused(float(expit(-gain)))}
     return fit, chance, refused
 
 

@@ -13,7 +13,7 @@ from thermal_robot.diagnosis.parts import Refused
 from thermal_robot.effects.law import PREFIX
 from thermal_robot.inference import settings
 from thermal_robot.inference.explain import log_odds
-from thermal_robot.inference.fit import Fit, refit
+from thermal_robot.inference.fit import Fit, less
 
 
 def worth_their_word(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, Refused]]:
@@ -50,7 +50,7 @@ def worth_their_word(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, di
             progress(f"{worst} stays in question")
         if not worst.startswith(PREFIX):
             refused[worst] = _refused(fit, judged[worst]) if judged else Refused(fit.probability(worst))
-        fit = refit(fit, {worst: ()}, [effect for effect, _ in fit.effects if effect.name != worst], progress)
+        fit = less(fit, worst, progress)
 
 
 def in_question(fit: Fit) -> dict[str, float]:
@@ -58,13 +58,8 @@ def in_question(fit: Fit) -> dict[str, float]:
 
     What others could do in its place does not count here: two of which one is at work are told as confounded.
     """
-    best = fit.names_of(fit.explanation.best)
-    whole, found = fit.probability_of_just(best), {}
-    for name in (n for n in best if not n.startswith(PREFIX)):
-        odds = whole / max(fit.probability_of_just(best - {name}), settings.TINY)
-        if odds < settings.NAMING_ODDS:
-            found[name] = odds
-    return found
+    known = (n for n in fit.names_of(fit.explanation.best) if not n.startswith(PREFIX))
+    return {name: odds for name in known if (odds := fit.odds(name)) < settings.NAMING_ODDS}
 
 
 def _refused(fit: Fit, judged: Earned) -> Refused:

@@ -76,6 +76,11 @@ class Fit:
         e = self.explanation
         return min(float(e.probabilities[[self.names_of(c) == names for c in e.combinations]].sum()), 1.0)
 
+    def odds(self, name: str) -> float:
+        """Odds of an effect of the explanation against nothing in its place."""
+        best = self.names_of(self.explanation.best)
+        return self.probability_of_just(best) / max(self.probability_of_just(best - {name}), settings.TINY)
+
 
 def fit(campaign: Campaign, effects: Sequence[Effect], progress: Callable[[str], None] = lambda _: None) -> Fit:
     """Fit frames, choose effects, refit the choice exactly.
@@ -119,6 +124,11 @@ def _settings(effect: Effect, observations: Observations) -> tuple[Effect, ...]:
     """Return the settings of an effect that are compared, in all its joints and in each alone."""
     known = gate.variants(effect, observations)
     return tuple(dict.fromkeys((*known, *gate.alone(known[0], observations))))
+
+
+def less(known: Fit, name: str, progress: Callable[[str], None] = lambda _: None) -> Fit:
+    """Fit again without one effect."""
+    return refit(known, {name: ()}, [effect for effect, _ in known.effects if effect.name != name], progress)
 
 
 def refit(

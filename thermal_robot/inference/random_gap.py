@@ -48,10 +48,6 @@ class RandomGap:
         The variances behind it.
     steps
         By joint: logarithm of the Bayes factor of steps of the command against errors that follow nothing.
-    seen
-        The same of all joints that err from pose to pose, some of whose steps may stay hidden.
-    stepped
-        Probability that what poses bring is due to such steps.
     laws
         By joint: the quantity that its errors follow, so that they are no scatter but what no known effect explains.
     note
@@ -63,10 +59,18 @@ class RandomGap:
     p_value: float
     scatter: Scatter
     steps: Mapping[str, float]
-    seen: float
-    stepped: float
     laws: Mapping[str, str]
     note: str = ""
+
+    @property
+    def seen(self) -> float:
+        """The logarithm of the Bayes factor of steps in all those joints, some of whose steps may stay hidden."""
+        return seen(tuple(self.steps.values()))
+
+    @property
+    def stepped(self) -> float:
+        """Probability that what poses bring is due to such steps."""
+        return stepped(self.seen, again=len(self.scatter.kinds) > 1)
 
     def kept_of(self, kind: str) -> list[Kept]:
         """Return the kept components of one kind."""
@@ -119,12 +123,11 @@ def random_gap(fit: Fit) -> RandomGap:
             break  # most rows lie beyond any scatter: robot and table do not belong together
         used = within & asked
     laws, steps, kept = _judge(fit, scatter, gap[used], pose, used, noise, freedom)
-    own = [steps[fit.campaign.robot.joint_names[k.component.joint]] for k in kept if k.component.kind == "pose"]
-    likely = stepped(seen(own), again=len(scatter.kinds) > 1)
+    likely = stepped(seen(tuple(steps.values())), again=len(scatter.kinds) > 1)
     real = tuple(k.component for k in kept if k.component.kind == "visit" or likely >= settings.SCATTER_SURE)
     p_value, explains = _chance_of_size(scatter, real, gap[used], sensitivity[used], noise, held, freedom)
-    note = _note(scatter, laws, bool(own) and likely < settings.SCATTER_SURE)
-    return RandomGap(tuple(kept), explains, p_value, scatter, steps, seen(own), likely, laws, note)
+    note = _note(scatter, laws, bool(steps) and likely < settings.SCATTER_SURE)
+    return RandomGap(tuple(kept), explains, p_value, scatter, steps, laws, note)
 
 
 def _in_joints(fit: Fit) -> list[tuple[str, int]]:
@@ -215,8 +218,8 @@ def _judge(
             continue
         step = float(np.sqrt(settings.FLAT) * c.sigma)
         if c.kind == "pose":
-            seen = period(errors, variance + taken * c.sigma**2, command, step)
-            step, factors[names[c.joint]] = seen.step, seen.log_factor
+            found = period(errors, variance + taken * c.sigma**2, command, step)
+            step, factors[names[c.joint]] = found.step, found.log_factor
         kept.append(Kept(c, step))
     return laws, factors, kept
 

@@ -102,8 +102,7 @@ def _tried(errors: Array, variance: Array, command: Array, slack: float) -> tupl
     There are none where there would be too many.
     """
     known = variance + slack**2
-    spread = max(float(command.std()), 1.0) * np.sqrt(max(float((1.0 / known).sum()), (2.0 * np.pi) ** 2))
-    width = 1.0 / spread
+    width = 1.0 / (max(float(command.std()), 1.0) * np.sqrt(max(float((1.0 / known).sum()), (2.0 * np.pi) ** 2)))
     bands = np.geomspace(1.0 / settings.BAND, settings.BAND, settings.STEP_BANDS + 1)
     if (bands[-1] - bands[0]) / width * len(errors) > settings.MOST_ANGLES:
         return np.zeros(0), np.zeros(0)
@@ -132,8 +131,7 @@ def _series(errors: Array, variance: Array, slack: float) -> NDArray[np.complex1
     taken = log_ndtr((0.5 - np.abs(near)) / slack)
     taken = taken - logsumexp(taken, axis=0)
     each = taken + _normal(errors[:, None, None], near, variance[:, None, None])
-    series = np.fft.rfft(logsumexp(each, axis=1), axis=1)[:, : settings.STEP_HARMONICS + 1]
-    return np.asarray(series)
+    return np.asarray(np.fft.rfft(logsumexp(each, axis=1), axis=1)[:, : settings.STEP_HARMONICS + 1])
 
 
 def _sums(weight: NDArray[np.complex128], place: Array, lowest: float, width: float, count: int) -> Array:
