@@ -8,7 +8,7 @@ import numpy as np
 # --- what is believed before the data ---
 
 PRIOR_PROBABILITY = 1.0 / 6.0
-"""That an effect is at work, random ones included: two or three of sixteen; a probe named 2 to 5 on nine real robots."""
+"""That an effect is at work, random ones too: two or three of sixteen; a probe named 2 to 5 on nine real robots."""
 IN_ALL, ONE_MORE = 1.0 / 3.0, 0.5
 """Share of an effect's probability that it is in all its places, and that it is in one; each further one halves it, so
 that all shares sum to one."""
