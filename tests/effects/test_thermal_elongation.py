@@ -10,6 +10,7 @@ from simulate import simulate
 
 from thermal_robot.effects import ThermalElongation
 from thermal_robot.effects.channel import by_place
+from thermal_robot.effects.lagging import History
 from thermal_robot.observations import observe
 
 on_arms = pytest.mark.parametrize("arm", ["rv_m2", "ur10", "panda"], indirect=True)
@@ -70,10 +71,56 @@ def test_only_a_lag_may_be_refined():
         (1500.0, False, 0.0),
         (1500.0, True, 0.3),
     }
+    started = replace(lagging, starts=(0.0,))
+    assert set(started.nearby(2.0)) - {replace(n, starts=(0.0,)) for n in lagging.nearby(2.0)} == {
+        replace(started, balanced=False)
+    }
     alone = replace(lagging, common=False, places=("forearm",))
     assert {(s.lag, s.common, s.places) for s in alone.nearby(2.0)} == {
         (lag, False, ("forearm",)) for lag in (750.0, 1500.0, 3000.0)
     }
+
+
+def one_lag(campaign):
+    """The setting with one coefficient for all and a lag of 1500 s."""
+    settings = ThermalElongation().variants(observe(campaign))
+    return next(s for s in settings if s.lag == 1500.0 and s.common and not s.spread)
+
+
+@on_arms
+def test_what_came_before_the_record_is_a_strain_that_the_lag_forgets(arm):
+    """A record that begins late differs from the whole one by what the link was warmer then, exp(−t / lag) of it."""
+    time, alpha, cut = np.linspace(0.0, 5400.0, SAMPLES), 2e-5, 3
+    air = 20.0 + 9.0 * np.sin(time / 900.0)
+    whole = commanded(arm, {"time": time, "temperature": air})
+    late = whole.take(np.arange(cut, SAMPLES))
+    lagging, cut_short = one_lag(whole), one_lag(late)
+    assert cut_short.starts == (time[cut],)
+    link = History(lagging.times, lagging.temperatures).followed(1500.0, time[cut : cut + 1], air[cut : cut + 1])
+    apart = tool_with(whole, lagging, [alpha])[cut:] - tool_with(late, cut_short, [alpha])
+    assert np.abs(apart).max() > 1e-5
+    free = replace(cut_short, balanced=False)
+    np.testing.assert_allclose(
+        tool_with(late, free, [alpha, alpha * (link[0] - air[cut])]),
+        tool_with(whole, lagging, [alpha])[cut:],
+        atol=1e-14,
+    )
+
+
+def test_every_session_starts_anew(rv_m2):
+    time, session = np.arange(SAMPLES) * 600.0, np.repeat(["b", "a"], SAMPLES // 2)
+    campaign = commanded(rv_m2, {"time": time, "temperature": np.linspace(20.0, 25.0, SAMPLES)})
+    campaign = replace(campaign, labels={"session": session})
+    lagging = one_lag(campaign)
+    assert lagging.starts == (0.0, 600.0 * (SAMPLES // 2))
+    free = replace(lagging, balanced=False)
+    names = [p.name for p in free.parameters(observe(campaign))]
+    assert len(names) == 3
+    assert names[0] == lagging.parameters(observe(campaign))[0].name
+    second = tool_with(campaign, free, [0.0, 0.0, 1e-4]) - tool_with(campaign, free, [0.0, 0.0, 0.0])
+    assert not second[: SAMPLES // 2].any()
+    size = np.linalg.norm(second[SAMPLES // 2 :], axis=1) / np.linalg.norm(tool_at(rv_m2, campaign.q), axis=1)[5:]
+    np.testing.assert_allclose(np.log(size / 1e-4), -(time[SAMPLES // 2 :] - 3000.0) / 1500.0, atol=1e-9)
 
 
 def test_it_is_drawn_against_the_links_own_temperature_or_the_robots(rv_m2):

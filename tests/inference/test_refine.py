@@ -65,3 +65,22 @@ def test_constants_of_several_effects_are_moved_together(rv_m2):
 
     before = [(explanation.linear.blocks[b].effect, explanation.values[b][0]) for b in explanation.best.blocks]
     assert left(after) < 0.7 * left(before)
+
+
+@pytest.mark.parametrize("other", ["instrument_scale", "drift"])
+def test_what_only_pays_for_a_constant_that_is_off_is_left_out(other):
+    """At 3600 s instead of 2200 s both are needed; where the constant moves while the other waits, one is enough."""
+    for seed in range(3):
+        seen, explanation = explained(campaign("panda", seed, LAG, 2200.0, 20.0), (LAG, other))
+        both = [explanation.linear.blocks[b].effect.name for b in explanation.best.blocks]
+        assert both == [LAG, other]
+        ((effect, values),) = refined(explanation, seen, 1.6)
+        assert effect.name == LAG
+        assert len(values) == len(effect.parameters(seen))
+        assert effect.lag == pytest.approx(2200.0, rel=0.1)
+
+
+def test_an_effect_at_work_stays_beside_a_constant(rv_m2):
+    data = simulate(rv_m2, ["joint_gain", LAG], seed=3, ratio=(5.0, 6.0))[0]
+    seen, explanation = explained(data, ("joint_gain", LAG))
+    assert [e.name for e, _ in refined(explanation, seen, 1.6)] == ["joint_gain", LAG]

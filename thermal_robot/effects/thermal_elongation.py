@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, at_segment
+from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, Response, at_segment
 from thermal_robot.effects.lagging import History
 from thermal_robot.effects.quantities import driving
 
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 _SIZE = 1.5e-5  # 1/K
 _LAGS = (600.0, 1500.0, 3600.0)
 _SHORTEST, _LONGEST = 300.0, 10800.0  # s: walls of 2 mm, and castings of 20 mm in still air
+_START = 3.0  # K between a link and what its sensor lets expect, at switching on: half of what motors of 100 W bring
 _SPREAD = 0.3  # of the common coefficient: steel and aluminium lie 30 % below and above their mean
 
 
@@ -46,6 +47,12 @@ class ThermalElongation(Effect):
     times, temperatures
         The campaign's record, s and °C, from which the link's temperature follows; kept where there is a lag, as
         a later sample knows only its own instant.
+    starts
+        Instants, s, from which the record holds: the first row, and the first of each session, as nobody reads the
+        sensor in between.
+    balanced
+        Whether the links are then as warm as the record lets expect. Else they differ by some kelvin, of which
+        exp(−(t − start) / lag) is left at t.
     """
 
     common: bool = False
@@ -53,6 +60,8 @@ class ThermalElongation(Effect):
     times: tuple[float, ...] = ()
     temperatures: tuple[float, ...] = ()
     spread: float = 0.0
+    starts: tuple[float, ...] = ()
+    balanced: bool = True
 
     name: ClassVar[str] = "thermal_elongation"
     title: ClassVar[str] = "thermal elongation of the links"
@@ -70,56 +79,84 @@ class ThermalElongation(Effect):
 
         A lag of 10 to 60 min is tried with each of the three: with the wrong one it may be worse than none.
         """
-        one = replace(self, common=True, spread=0.0)
+        one = replace(self, common=True, spread=0.0, balanced=True)
         plain = (replace(one, common=False), one, replace(one, spread=_SPREAD))
         # a sensor on each link knows its temperature; where but some have one, nothing says what the rest follow
         if not observations.varies("time") or _columns(observations) != ("temperature",):
             return plain
         record = History.of(observations.covariates["time"], observations.covariates["temperature"])
-        told = [replace(own, times=record.times, temperatures=record.temperatures) for own in plain]
+        starts = _starts(observations)
+        told = [replace(own, times=record.times, temperatures=record.temperatures, starts=starts) for own in plain]
         return (*plain, *(replace(own, lag=lag) for own in told for lag in _LAGS))
 
     def nearby(self, factor: float) -> tuple[Effect, ...]:
-        """Return lags longer and shorter by a factor, of 5 min to 3 h, and other ways to share the coefficients."""
+        """Return lags longer and shorter by a factor, of 5 min to 3 h; other ways to share; links out of balance."""
         if not self.lag:
             return (self,)
         near = (float(np.clip(self.lag * share, _SHORTEST, _LONGEST)) for share in (1.0, factor, 1.0 / factor))
         lags = (replace(self, lag=lag) for lag in near)
         # what is common to all links is in none of them alone
-        shared = () if self.places else ((False, 0.0), (True, 0.0), (True, _SPREAD))
-        return tuple(dict.fromkeys((*lags, *(replace(self, common=one, spread=apart) for one, apart in shared))))
+        if self.places:
+            return tuple(dict.fromkeys(lags))
+        shared = [replace(self, common=one, spread=part) for one, part in ((False, 0.0), (True, 0.0), (True, _SPREAD))]
+        balanced = [replace(self, balanced=state) for state in (True, False)] if self.starts else []
+        return tuple(dict.fromkeys((*lags, *shared, *balanced)))
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
-        """One coefficient of expansion a segment, or one for all, with the segments' deviations from it; 1/K."""
-        responses = {}
-        for s, segment in enumerate(observations.robot.segments):
+        """One coefficient of expansion a segment, or one for all, with the segments' deviations from it; 1/K.
+
+        Then, where the links start out of balance, what they are longer by at each start.
+        """
+        responses, segments = {}, observations.robot.segments
+        for s, segment in enumerate(segments):
             temperature = self._temperature(observations, segment.parent_link)
             if temperature is None or segment.length < 1e-9:
                 continue
-            along = np.concatenate([segment.direction, np.zeros(3)]) * segment.length
-            twist = (temperature - observations.campaign.reference_temperature)[:, None] * along
-            responses[s] = at_segment(s, twist)
+            responses[s] = _grown(observations, s, temperature - observations.campaign.reference_temperature)
         one = (Parameter("strain per kelvin", "1/K", _SIZE, "link", "", tuple(responses.values())),)
+        began = () if self.balanced or not self.lag else self._began(observations, tuple(responses))
         if self.common and not self.spread:
-            return one
+            return (*one, *began)
         label, size = ("deviation", self.spread * _SIZE) if self.common else ("strain per kelvin", _SIZE)
-        segments = observations.robot.segments
         each = tuple(
             Parameter(f"{label} of {segments[s].name}", "1/K", size, "link", segments[s].parent_link, (response,))
             for s, response in responses.items()
         )
-        return (*one, *each) if self.common else each
+        return (*one, *each, *began) if self.common else (*each, *began)
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
         """Return the temperature that was recorded of the link, or of the robot."""
         own = f"temperature.{parameters[0].place}"
         return driving(observations, own if own in observations.covariates else "temperature")
 
+    def _began(self, observations: Observations, grown: Sequence[int]) -> tuple[Parameter, ...]:
+        """One strain a start: how much longer the links were than the record says, forgotten with the lag."""
+        found = []
+        for k, start in enumerate(self.starts):
+            since = observations.covariates["time"] - start
+            left = np.where(since >= 0.0, np.exp(-np.maximum(since, 0.0) / self.lag), 0.0)
+            responses = tuple(_grown(observations, s, left) for s in grown)
+            found.append(Parameter(f"strain at start {k + 1}", "1", _START * _SIZE, "link", "", responses))
+        return tuple(found)
+
     def _temperature(self, observations: Observations, link: str) -> Array | None:
         recorded = observations.temperature(link)
         if recorded is None or not self.lag:
             return recorded
         return History(self.times, self.temperatures).followed(self.lag, observations.covariates["time"], recorded)
+
+
+def _grown(observations: Observations, s: int, strain: Array) -> Response:
+    """Return the twist of a segment that is longer by a strain (N,), along its virtual prismatic joint."""
+    segment = observations.robot.segments[s]
+    return at_segment(s, strain[:, None] * np.concatenate([segment.direction, np.zeros(3)]) * segment.length)
+
+
+def _starts(observations: Observations) -> tuple[float, ...]:
+    """Return when the first row was measured, and the first of each session, s."""
+    time, session = observations.covariates["time"], observations.campaign.labels.get("session")
+    runs = [time] if session is None else [time[session == run] for run in np.unique(session)]
+    return tuple(sorted(float(run.min()) for run in runs))
 
 
 def _columns(observations: Observations) -> tuple[str, ...]:

@@ -82,6 +82,10 @@ class Explanation:
     discrepancy: Discrepancy
     forms: Sequence[Form]
 
+    def block_of(self, effect: Effect) -> int:
+        """Return the block of the best combination that is this effect, in whatever setting."""
+        return next(b for b in self.best.blocks if self.linear.blocks[b].effect.name == effect.name)
+
     def far(self, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """(N,) True for those of the given rows whose residual is larger than noise allows."""
         beyond = self.whitening.noise * self.best.noise * np.hypot(1.0, self.discrepancy.tau)

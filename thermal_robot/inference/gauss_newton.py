@@ -36,7 +36,7 @@ def gauss_newton(
     explanation
         Weights, noise and prior scales.
     held
-        Its effects with their (P,) values so far.
+        Its effects, or some of them, with their (P,) values so far.
     settled
         Step at which it ends, in standard deviations.
 
@@ -49,7 +49,8 @@ def gauss_newton(
     """
     whitening, best = explanation.whitening, explanation.best
     effects = [effect for effect, _ in held]
-    sizes = [explanation.linear.blocks[b].sizes * best.scales[b] for b in best.blocks]
+    chosen = [explanation.block_of(effect) for effect in effects]
+    sizes = [explanation.linear.blocks[b].sizes * best.scales[b] for b in chosen]
     ends = np.cumsum([len(size) for size in sizes])[:-1]
     prior = np.concatenate([*sizes, np.zeros(0)])
     state = np.concatenate([*(values for _, values in held), np.zeros(0)])

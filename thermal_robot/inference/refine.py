@@ -46,13 +46,48 @@ def refined(explanation: Explanation, observations: Observations, factor: float)
     explanation = replace(explanation, whitening=heard(explanation))
     blocks = [explanation.linear.blocks[b] for b in explanation.best.blocks]
     values = [explanation.values[b][0] for b in explanation.best.blocks]
+    moved = _fewer(explanation, observations, _all_moved(explanation, observations, blocks, factor), factor)
+    if moved != blocks:
+        linear, problem, found = _evaluated(explanation, moved)
+        values = [mean for mean, _ in parameter_values(linear, problem, found).values()]
+    return [(item.effect, mean) for item, mean in zip(moved, values, strict=True)]
+
+
+def _all_moved(
+    explanation: Explanation, observations: Observations, blocks: Sequence[Block], factor: float
+) -> list[Block]:
+    """Return the blocks with the constants of each moved in turn."""
+    moved = list(blocks)
     for place, item in enumerate(blocks):
         if len(gate.nearby(item.effect, factor)) > 1:
-            blocks[place] = _moved(explanation, observations, blocks, place, factor)
-            if blocks[place] is not item:
-                linear, problem, found = _evaluated(explanation, blocks)
-                values = [mean for mean, _ in parameter_values(linear, problem, found).values()]
-    return [(item.effect, mean) for item, mean in zip(blocks, values, strict=True)]
+            moved[place] = _moved(explanation, observations, moved, place, factor)
+    return moved
+
+
+def _fewer(explanation: Explanation, observations: Observations, blocks: list[Block], factor: float) -> list[Block]:
+    """Return the blocks less those that only pay for a constant that is a little off.
+
+    Beside such an effect the constant stays where the two are best together, and no step leads away. So each is left
+    out in turn while the constants move.
+    """
+    best = _weighed(explanation, blocks)
+    while len(blocks) > 1:
+        rivals = []
+        for k in range(len(blocks)):
+            others = [*blocks[:k], *blocks[k + 1 :]]
+            if any(len(gate.nearby(item.effect, factor)) > 1 for item in others):
+                rivals.append(_all_moved(explanation, observations, others, factor))
+        scores = [_weighed(explanation, rival) for rival in rivals]
+        if not scores or max(scores) <= best:
+            break
+        blocks, best = rivals[int(np.argmax(scores))], max(scores)
+    return blocks
+
+
+def _weighed(explanation: Explanation, blocks: Sequence[Block]) -> float:
+    """Return the log evidence of these effects with the prior odds of each."""
+    priors = log_odds() * sum(1.0 + item.effect.apart for item in blocks)
+    return _evaluated(explanation, blocks)[2].log_evidence + priors
 
 
 def heard(explanation: Explanation) -> Whitening:

@@ -124,7 +124,8 @@ def settle(
         if last:
             break
         before = explanation
-        for (effect, _), b in zip(held, explanation.best.blocks, strict=True):
+        for effect, _ in held:
+            b = explanation.block_of(effect)
             leading = _leading(effect, blocks[b], explanation.values[b][0])
             others = _others(effect, start, whole[effect.name])
             variants[effect.name] = tuple(dict.fromkeys((*gate.nearby(effect, factor), *leading, *others)))
