@@ -137,8 +137,23 @@ def test_few_poses_that_are_seen_well_show_steps_plainly():
         rng, command = np.random.default_rng(seed), commands(seed, 30)
         errors = sawtooth(command) + 0.05 * STEP * rng.normal(size=30)
         assert period(errors, variances(0.05 * STEP, 30), command, 1.2 * STEP).log_factor > np.log(1e6)
+
+
+@pytest.mark.parametrize(
+    "bound",
+    [
+        0.5,
+        pytest.param(
+            1e-4, marks=pytest.mark.xfail(reason="e⁻¹·⁶ to e⁻⁴·³ since a fifth of a step may be others' errors")
+        ),
+    ],
+)
+def test_few_poses_that_are_seen_well_count_against_steps_of_another_command(bound):
+    for seed in range(10):
+        rng, command = np.random.default_rng(seed), commands(seed, 30)
+        errors = sawtooth(command) + 0.05 * STEP * rng.normal(size=30)
         other = period(errors, variances(0.05 * STEP, 30), commands(seed + 50, 30), STEP)
-        assert other.log_factor < np.log(0.5)
+        assert other.log_factor < np.log(bound)
 
 
 def recorded(rng, rows=120):
