@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from helpers import SAMPLES, commanded
 
-from thermal_robot.effects.quantities import GRAVITY, REACH, driving, position_of, quantities, quantity, unit
+from thermal_robot.effects.quantities import GRAVITY, REACH, began, driving, position_of, quantities, quantity, unit
 from thermal_robot.kinematics import tool_poses
 from thermal_robot.observations import observe
 
@@ -97,3 +97,12 @@ def test_what_drives_an_effect_has_its_unit_and_varies(rv_m2):
     assert driving(observations, "humidity") is None
     assert position_of(observations, "joint_2")[:2] == ("position of joint_2", "rad")
     np.testing.assert_array_equal(position_of(observations, "joint_2")[2], observations.q[:, 1])
+
+
+def test_a_session_begins_with_the_first_of_its_rows_in_whatever_order(rv_m2):
+    clock = np.arange(float(SAMPLES))[::-1]
+    campaign = commanded(rv_m2, {"time": clock})
+    assert began(observe(campaign), clock) == {"": 0.0}
+    labels = {"session": np.repeat(["late", "early"], [4, SAMPLES - 4])}
+    seen = observe(replace(campaign, labels=labels))
+    assert began(seen, clock) == {"early": 0.0, "late": float(SAMPLES - 4)}

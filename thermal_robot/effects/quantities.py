@@ -66,6 +66,14 @@ def quantity(observations: Observations, name: str) -> Array | None:
     return np.unique(labels, return_inverse=True)[1].astype(float)
 
 
+def began(observations: Observations, clock: Array) -> dict[str, float]:
+    """Return by session when it began on a clock (N,), with its first row; by an empty name where there are none."""
+    rows = observations.campaign.labels.get("session")
+    if rows is None:
+        return {"": float(clock.min())}
+    return {str(run): float(clock[rows == run].min()) for run in np.unique(rows)}
+
+
 def strains(observations: Observations, joint: str, slips: Sequence[float]) -> Array | None:
     """Return (N, K) strains of a joint's elements as shares of what makes them slip, −1 to 1; ``None`` without order.
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, Response, at_segment
 from thermal_robot.effects.lagging import History
-from thermal_robot.effects.quantities import driving
+from thermal_robot.effects.quantities import began, driving
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -85,7 +85,7 @@ class ThermalElongation(Effect):
         if not observations.varies("time") or _columns(observations) != ("temperature",):
             return plain
         record = History.of(observations.covariates["time"], observations.covariates["temperature"])
-        starts = _starts(observations)
+        starts = tuple(sorted(began(observations, observations.covariates["time"]).values()))
         told = [replace(own, times=record.times, temperatures=record.temperatures, starts=starts) for own in plain]
         return (*plain, *(replace(own, lag=lag) for own in told for lag in _LAGS))
 
@@ -150,13 +150,6 @@ def _grown(observations: Observations, s: int, strain: Array) -> Response:
     """Return the twist of a segment that is longer by a strain (N,), along its virtual prismatic joint."""
     segment = observations.robot.segments[s]
     return at_segment(s, strain[:, None] * np.concatenate([segment.direction, np.zeros(3)]) * segment.length)
-
-
-def _starts(observations: Observations) -> tuple[float, ...]:
-    """Return when the first row was measured, and the first of each session, s."""
-    time, session = observations.covariates["time"], observations.campaign.labels.get("session")
-    runs = [time] if session is None else [time[session == run] for run in np.unique(session)]
-    return tuple(sorted(float(run.min()) for run in runs))
 
 
 def _columns(observations: Observations) -> tuple[str, ...]:

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.campaign.turning import SLIPS
 from thermal_robot.effects.law import Discovered
-from thermal_robot.effects.quantities import CLOCK, TURN, quantities, unit
+from thermal_robot.effects.quantities import CLOCK, TURN, began, quantities, unit
 from thermal_robot.inference import settings
 from thermal_robot.observations import Observations
 
@@ -177,17 +177,15 @@ def relaxing(observations: Observations, law: Discovered) -> list[Discovered]:
 
     A session begins with its first row; where there are none, the campaign does.
     """
-    clock, rows = law.values(observations), observations.campaign.labels.get("session")
+    clock = law.values(observations)
     if clock is None or not np.ptp(clock) > 0.0:
         return []
-    span = float(np.ptp(clock))
-    law = replace(law, labels=(), runs=(), origin=float(clock.min()), span=span)
-    if rows is None or len(set(rows)) < 2:
-        found = [replace(law, shape="relaxing", starts=(law.origin,))]
+    span, starts = float(np.ptp(clock)), began(observations, clock)
+    law = replace(law, labels=(), runs=(), origin=float(clock.min()), span=span, starts=tuple(starts.values()))
+    if len(starts) < 2:
+        found = [replace(law, shape="relaxing")]
     else:
-        runs = tuple(np.unique(rows).tolist())
-        starts = tuple(float(clock[rows == run].min()) for run in runs)
-        found = [replace(law, shape=shape, runs=runs, starts=starts) for shape in ("relaxing", "relaxing each")]
+        found = [replace(law, shape=shape, runs=tuple(starts)) for shape in ("relaxing", "relaxing each")]
     return [replace(one, marks=(share * span,)) for one in found for share in settings.RELAXED_WITHIN]
 
 
