@@ -27,7 +27,9 @@ def refined(explanation: Explanation, observations: Observations, factor: float)
 
     An effect's settings nearby are tried. Where none is better by 0.1 nat they move closer, the logarithm of their
     factor halved, until a parabola through them promises no more. Weights and other effects stay; rows set aside are
-    heard, with the weight of their distance, as a constant that is off puts aside just the rows that tell of it.
+    heard, with the weight of their distance, as a constant that is off puts aside just the rows that tell of it. At
+    last each effect is left out in turn while the constants of the others move: one that only paid for a constant that
+    was a little off goes.
 
     Parameters
     ----------
@@ -41,7 +43,7 @@ def refined(explanation: Explanation, observations: Observations, factor: float)
     Returns
     -------
     list
-        The chosen effects in their order, their constants moved, with their (P,) values, SI.
+        The chosen effects that stay, in their order, their constants moved, with their (P,) values, SI.
     """
     explanation = replace(explanation, whitening=heard(explanation))
     blocks = [explanation.linear.blocks[b] for b in explanation.best.blocks]
@@ -59,7 +61,7 @@ def _all_moved(
     """Return the blocks with the constants of each moved in turn."""
     moved = list(blocks)
     for place, item in enumerate(blocks):
-        if len(gate.nearby(item.effect, factor)) > 1:
+        if _movable(item, factor):
             moved[place] = _moved(explanation, observations, moved, place, factor)
     return moved
 
@@ -75,13 +77,18 @@ def _fewer(explanation: Explanation, observations: Observations, blocks: list[Bl
         rivals = []
         for k in range(len(blocks)):
             others = [*blocks[:k], *blocks[k + 1 :]]
-            if any(len(gate.nearby(item.effect, factor)) > 1 for item in others):
+            if any(_movable(item, factor) for item in others):
                 rivals.append(_all_moved(explanation, observations, others, factor))
         scores = [_weighed(explanation, rival) for rival in rivals]
         if not scores or max(scores) <= best:
             break
         blocks, best = rivals[int(np.argmax(scores))], max(scores)
     return blocks
+
+
+def _movable(item: Block, factor: float) -> bool:
+    """Whether the block's effect has constants to move, or is shared in other ways."""
+    return len(gate.nearby(item.effect, factor)) > 1
 
 
 def _weighed(explanation: Explanation, blocks: Sequence[Block]) -> float:
