@@ -72,7 +72,7 @@ def further_conditions(robot, q, rng, moving, links):
     return covariates
 
 
-NEW = ("tracking_lag", "link_compliance", "thermal_bending")
+NEW = ("joint_ripple", "tracking_lag", "link_compliance", "thermal_bending", "base_compliance")
 """Effects that are at work in the background only where they are asked for: the campaigns of old seeds stay."""
 
 
@@ -82,7 +82,14 @@ def draw_effect(name, nominal, rng, places=None, variant=0):
     effect = variants[rng.integers(len(variants)) if name == "drift" else variant]
     parameters = effect.parameters(nominal)
     values = np.array([p.size for p in parameters]) * rng.normal(size=len(parameters))
-    if name in ("thermal_elongation", "joint_compliance", "backlash", "tracking_lag", "link_compliance"):
+    if name in (
+        "thermal_elongation",
+        "joint_compliance",
+        "backlash",
+        "tracking_lag",
+        "link_compliance",
+        "base_compliance",
+    ):
         values = np.abs(values)
     if name == "thermal_elongation":
         values = np.array([p.size for p in parameters]) * rng.uniform(0.6, 1.6, len(parameters))

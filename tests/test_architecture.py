@@ -38,7 +38,7 @@ FREE = {
     "paper": {"errors", "kinematics", "robot", "assembly", "paper"},
 }
 """Rooms that may import less than what stands before them: one draws what it is given, two need no campaign."""
-TYPES = {"report": {f"thermal_robot.diagnosis.{n}" for n in ("result", "parts")}}
+TYPES = {"report": {f"thermal_robot.diagnosis.{n}" for n in ("result", "parts", "explained")}}
 """What a room may know beyond that by type alone: the report sees values, and nothing that computes them."""
 LONGEST = 400
 

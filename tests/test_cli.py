@@ -104,7 +104,7 @@ def test_diagnose_prints_the_verdict_and_writes_what_is_asked_for(folder, diagno
     assert (diagnosed.status, diagnosed.complaint) == (0, "")
     found = json.loads(diagnosed.json.read_text(encoding="utf-8"))
     jsonschema.validate(found, schema())
-    assert found["schema"] == "thermal-robot/diagnosis/1"
+    assert found["schema"] == "thermal-robot/diagnosis/2"
     assert found["verdict"]["effects"] == ["thermal_elongation"]
     assert found["verdict"]["unexplained"] is False
     assert found["campaign"]["samples"] == 120
@@ -266,7 +266,7 @@ def test_a_command_line_that_is_none_exits_with_two(arguments, capsys):
 def test_a_campaign_after_the_names_of_effects_is_still_the_campaign(run, folder):
     status, out, _ = run("diagnose", "--without", "drift", folder)
     assert status == 0
-    assert "only these effects were considered" in " ".join(out.split())
+    assert "left out by request (--without drift): drift" in " ".join(out.split())
 
 
 def test_the_version_is_told(capsys):
@@ -311,3 +311,20 @@ def test_check_takes_a_urdf_that_pinocchio_takes(run, folder, tmp_path, text):
     status, out, err = run("check", copied)
     assert (status, err) == (0, "")
     assert out.splitlines()[1:] == run("check", folder)[1].splitlines()[1:]  # but for the folder's name
+
+
+def test_a_table_that_is_at_fault_is_bad_input_and_gives_no_model(poses, tmp_path):
+    campaign = read_campaign(poses)
+    spoilt = replace(campaign, q=campaign.q * np.where(np.arange(campaign.robot.n) == 2, -1.0, 1.0))
+    (tmp_path / "cell").mkdir()
+    write_campaign(spoilt, tmp_path / "cell")
+    done = diagnosed_once(tmp_path / "cell", tmp_path)
+    assert done.status == cli.BAD_INPUT
+    assert done.complaint.count("\n") == 1
+    assert "joint_3 is reversed" in done.complaint
+    assert done.text.startswith("The table is at fault, not the robot: joint_3 is reversed")
+    plain = json.loads(done.json.read_text())
+    jsonschema.validate(plain, schema())
+    assert plain["verdict"]["usable"] is False
+    assert done.report.exists()
+    assert not done.model.exists()

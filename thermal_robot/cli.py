@@ -141,10 +141,12 @@ def _diagnose(options: argparse.Namespace) -> None:
         print(found)
         if options.json:
             _write(options.json, found.to_json)
-    if options.model:
-        _write(options.model, found.model.save)
     if options.report:
         _write(options.report, lambda path: _page(found, path))
+    if not found.usable:
+        raise CampaignError(str(options.campaign), found.reason)
+    if options.model:
+        _write(options.model, found.model.save)
 
 
 def _predict(options: argparse.Namespace) -> None:

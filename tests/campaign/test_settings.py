@@ -45,6 +45,13 @@ def test_absent_gravity_and_noise_stay_absent() -> None:
     assert again.reference_temperature == STANDARD_TEMPERATURE == 20.0
 
 
+def test_settings_from_before_moves_were_derived_do_not_derive_them() -> None:
+    data = Settings("robot.urdf", "tool").to_dict()
+    assert Settings.from_dict(data).moves == "direct"
+    del data["moves"]
+    assert Settings.from_dict(data).moves == "unknown"
+
+
 def test_a_vector_is_three_floats() -> None:
     assert as_vector(np.array([1, 2, 3])) == (1.0, 2.0, 3.0)
     assert all(type(value) is float for value in as_vector(np.arange(3)))

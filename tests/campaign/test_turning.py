@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from helpers import commanded
 
-from thermal_robot.campaign.turning import SLIPS, since_turns, strained
+from thermal_robot.campaign.turning import SLIPS, arrivals, since_turns, strained
 
 
 def along(path, **columns):
@@ -49,6 +49,28 @@ def test_it_is_what_a_walk_from_row_to_row_finds(seed):
         way = step or way
         expected.append(now - last)
     np.testing.assert_allclose(along(path), expected, atol=1e-12)
+
+
+def came(path, sessions=None, **columns):
+    q = np.array(path, dtype=float)[:, None]
+    columns = {name: np.array(values, dtype=float) for name, values in columns.items()}
+    found = arrivals(q, ("elbow",), columns or {"order": np.arange(float(len(q)))}, sessions)
+    return found["approach.elbow"].tolist() if found else None
+
+
+def test_a_joint_comes_from_where_it_was_before():
+    assert came([0.0, 1.0, 3.0, 2.0, 0.5, 0.75]) == [0.0, 1.0, 1.0, -1.0, -1.0, 1.0]
+    # backwards in the file, and forwards in time
+    assert came([3.0, 0.0, 2.0, 1.0], time=[20.0, 0.0, 30.0, 10.0]) == [1.0, 0.0, -1.0, 1.0]
+
+
+def test_a_joint_that_rests_keeps_the_side_from_which_it_came():
+    assert came([1.0, 1.0, 2.0, 2.0, 2.0, 1.0, 1.0]) == [0.0, 0.0, 1.0, 1.0, 1.0, -1.0, -1.0]
+
+
+def test_nobody_knows_whence_the_first_row_of_a_session_came():
+    assert came([0.0, 1.0, 5.0, 4.0], sessions=np.array(list("aabb"))) == [0.0, 1.0, 0.0, -1.0]
+    assert came([0.0, 1.0], time=[5.0, 5.0]) is None
 
 
 def strains(path):

@@ -11,7 +11,7 @@ from campaign.files import ROWS as WHOLE
 from campaign.files import add, put
 from campaign.spoilt import TOML, read, refusal, table_is_refused, with_column
 
-from thermal_robot.campaign import read_campaign
+from thermal_robot.campaign import describe, read_campaign
 
 # table, row, column, found, words of the sentence
 REFUSED = [
@@ -116,3 +116,29 @@ def test_rows_that_differ_by_rounding_are_one_configuration(tmp_path: Path) -> N
     rows = ["0.1,0.1,30,0.4,1000,0,500", "0.1000000000001,0.1,30,0.4,1000,0,500", "0.2,0.1,30,0.4,1000,0,500"]
     error = refusal(tmp_path, table="\n".join(["turn,lift,slide,roll,x,y,z", *rows]) + "\n")
     assert error.found == "3 rows with 2 different joint configurations"
+
+
+def test_approach_follows_from_the_order_where_it_was_not_recorded(tmp_path: Path) -> None:
+    ordered = add(WHOLE, order="1 2 3")
+    told = read_campaign(put(tmp_path / "direct", ordered))
+    assert told.derived == tuple(f"approach.{joint}" for joint in told.robot.joint_names)
+    assert told.covariates["approach.lift"].tolist() == [0.0, -1.0, -1.0]
+    assert told.covariates["approach.slide"].tolist() == [0.0, 1.0, 1.0]
+    # what comes after is known of the whole campaign, not of the rows that are left
+    assert told.take([0, 2]).covariates["approach.lift"].tolist() == [0.0, -1.0]
+    assert "from the order of rows" in describe(told)
+
+
+def test_recorded_or_unknown_moves_are_not_guessed(tmp_path: Path) -> None:
+    ordered = add(WHOLE, order="1 2 3")
+    recorded = read_campaign(put(tmp_path / "recorded", add(ordered, approach__lift="1 1 1")))
+    assert recorded.derived == ()
+    assert "approach.slide" not in recorded.covariates
+    assert read_campaign(put(tmp_path / "no order")).derived == ()
+    folder = put(tmp_path / "unknown", ordered)
+    text = (folder / "campaign.toml").read_text().replace("[robot]", '[robot]\nmoves = "unknown"')
+    (folder / "campaign.toml").write_text(text)
+    unknown = read_campaign(folder)
+    assert unknown.derived == ()
+    assert not any(name.startswith("approach.") for name in unknown.covariates)
+    assert unknown.settings.moves == "unknown"

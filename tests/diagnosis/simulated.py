@@ -9,7 +9,7 @@ import numpy as np
 from thermal_robot.diagnosis.one_walk import Model
 from thermal_robot.inference.columns import Block
 from thermal_robot.inference.explain import explain, log_odds
-from thermal_robot.inference.problem import Linear, gram
+from thermal_robot.inference.problem import Linear, gram, parameter_values
 from thermal_robot.inference.robust import Noise
 from thermal_robot.inference.search import Search
 
@@ -75,6 +75,12 @@ def forced(known, item):
     problem = gram(linear, white)
     best = Search(problem, [0.0] * len(linear.blocks)).evaluate(range(len(linear.blocks)))
     effects = (*known.effects, (item.effect, np.zeros(item.columns.shape[2])))
-    given = {"linear": linear, "whitening": white, "problem": problem, "best": best}
+    given = {
+        "values": parameter_values(linear, problem, best),
+        "linear": linear,
+        "whitening": white,
+        "problem": problem,
+        "best": best,
+    }
     said = replace(e, **given, combinations=[best], probabilities=np.ones(1))
     return replace(known, explanation=said, effects=effects, families=tuple(b.effect.name for b in linear.blocks))

@@ -5,6 +5,7 @@ import pytest
 from simulate import simulate
 
 from thermal_robot import diagnose
+from thermal_robot.effects import RANDOM, library
 
 
 def test_the_parts_agree_with_each_other(hall):
@@ -53,5 +54,9 @@ def test_what_was_not_asked_for_is_not_said(rv_m2):
     narrow = diagnose(campaign, only=["drift", "encoder_resolution"])
     assert {f.name for f in narrow.effects} == {"drift", "encoder_resolution"}
     assert narrow.narrowed
+    assert set(narrow.left_out) == {*library(), *RANDOM} - {"drift", "encoder_resolution"}
+    assert narrow.to_dict()["verdict"]["left_out"] == list(narrow.left_out)
     without = diagnose(campaign, without=["drift", "encoder_resolution"])
     assert not {"drift", "encoder_resolution"} & {f.name for f in without.effects}
+    assert without.left_out == ("drift", "encoder_resolution")
+    assert "by request (--without drift encoder_resolution)" in str(without)

@@ -34,8 +34,9 @@ def log_odds(known):
 
 def told(monkeypatch, known, factor, seen_without):
     """What becomes of a fit in which steps show with one Bayes factor, and with another once an effect is out."""
-    with_it = SimpleNamespace(steps={JOINT: factor}, seen=factor)
-    without = SimpleNamespace(steps={JOINT: seen_without}, seen=seen_without)
+    joint = (*known.effects[0][0].places, JOINT)[0]  # one in which the effect acts
+    with_it = SimpleNamespace(steps={joint: factor}, seen=factor)
+    without = SimpleNamespace(steps={joint: seen_without}, seen=seen_without)
     monkeypatch.setattr(module, "random_gap", lambda other: with_it if other.effects else without)
     return beside_steps(known, with_it, {}, lambda _: None)
 

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import load_arm
+from denavit import off
 from helpers import with_law
 from simulate import simulate
 
@@ -157,3 +158,25 @@ def test_separates_lists_each_group_once_and_frames_only_where_nothing_else_is_l
     assert separates([base, unknown]) == (("base_frame", "joint_offset"),)
     assert separates([*pair, base, unknown]) == (("drift", "thermal_elongation"),)
     assert separates([Finding("drift", "found", 1.0)]) == ()
+
+
+def test_where_geometry_is_found_its_zeros_are_told_with_numbers(rv_m2):
+    campaign, zeros = off(rv_m2, 5, zero=5e-3)
+    found = said(fit(campaign, choose(("joint_offset", "geometric"), (), ())))
+    whole, inside = found["geometric"], found["joint_offset"]
+    assert (whole.status, inside.status, inside.confounded_with) == ("found", "contained", ("geometric",))
+    assert inside.probability == whole.probability
+    first, *others = rv_m2.joint_names
+    assert f"zero offset, {first}" in inside.unseen
+    told = {p.name.rpartition(", ")[2]: p for p in inside.parameters}
+    assert list(told) == others[: len(told)]
+    for name, p in told.items():
+        assert p.identified
+        assert abs(p.value - zeros[rv_m2.joint_names.index(name)]) < 4.0 * p.std < 1e-3
+    assert all(p.identified for p in whole.parameters)
+    # that zeros are inside geometry is no question that further measurements would answer
+    assert separates(tuple(found.values())) == ()
+
+
+def test_zeros_that_suffice_are_found_themselves(offsets):
+    assert said(offsets)["joint_offset"].unseen == ()

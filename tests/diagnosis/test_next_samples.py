@@ -258,7 +258,10 @@ def test_the_table_is_in_the_campaigns_units(rv_m2):
     table = asked.to_table()
     assert list(table.columns) == [*rv_m2.joint_names, "time", "temperature", "separates", "gain"]
     np.testing.assert_allclose(np.radians(table[list(rv_m2.joint_names)].to_numpy()), asked.commands.q)
-    assert "drift | thermal_elongation" in set(table["separates"])
+    for separates in table["separates"]:
+        first, second = (set(explanation.split(" + ")) for explanation in separates.split(" | "))
+        assert first != second
+        assert first | second <= set(pair)
 
 
 def test_where_all_is_settled_the_parameters_are_sharpened(rv_m2):

@@ -2,16 +2,10 @@
 
 from dataclasses import FrozenInstanceError, fields
 
-import numpy as np
 import pytest
 
 from thermal_robot.diagnosis import parts
-from thermal_robot.diagnosis.parts import Finding, Location, Place, is_frame
-
-
-def place(kind, name):
-    none = np.zeros(0)
-    return Place(kind, name, 1.0, "time", "s", none, False, "rad", none, none, none, np.zeros((2, 0)))
+from thermal_robot.diagnosis.parts import Finding, Location, is_frame
 
 
 @pytest.mark.parametrize(
@@ -20,7 +14,6 @@ def place(kind, name):
 )
 def test_a_place_says_its_kind_once(kind, name, words):
     assert Location(kind, name, 0.5).words.removeprefix("the ") == words
-    assert place(kind, name).words == Location(kind, name, 0.5).words
 
 
 def test_a_frame_is_what_needs_a_known_frame():

@@ -66,7 +66,7 @@ def test_json_holds_all_and_nothing_that_json_cannot(hall, tmp_path):
     again = json.loads(text, parse_constant=lambda word: pytest.fail(f"{word} is no JSON"))
     assert again == hall.to_dict()
     jsonschema.validate(again, schema())
-    assert again["schema"] == "thermal-robot/diagnosis/1"
+    assert again["schema"] == "thermal-robot/diagnosis/2"
     assert tuple(again["verdict"]["effects"]) == hall.verdict
     assert [e["name"] for e in again["effects"]] == [f.name for f in hall.effects]
     assert again["gap"]["held_out"]["shrinkage"] == hall.gap.held_out.shrinkage

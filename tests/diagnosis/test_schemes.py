@@ -7,7 +7,8 @@ import pytest
 from diagnosis.simulated import forced
 from simulate import simulate
 
-from thermal_robot.diagnosis.schemes import worse_elsewhere, worst_folds
+from thermal_robot.diagnosis.parts import FoldScheme, HeldOut
+from thermal_robot.diagnosis.schemes import hardest, worse_elsewhere, worst_folds
 from thermal_robot.effects import choose
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.fit import fit
@@ -66,6 +67,14 @@ def test_schemes_come_in_order_and_say_what_they_are(warm):
                 assert s.shrinkage == pytest.approx(1.0 - (s.rms_after / s.rms_before) ** 2)
             assert (schemes["session"].folds, schemes["time"].folds, schemes["temperature"].folds) == (4, 20, 2)
             assert schemes["reach"].rows == pytest.approx(0.2 * schemes["time"].rows, abs=1)
+
+
+def test_the_hardest_is_told_where_it_leaves_clearly_more_than_the_average():
+    average = HeldOut("blocked", 5, 4e-4, 1e-4, 0.94, (0.9, 0.96))
+    found = [FoldScheme(name, name, 2, 40, 4e-4, left, 0.9, 1e-6) for name, left in (("reach", 1.5e-4), ("time", 1e-4))]
+    assert hardest(found, average).name == "reach"
+    assert hardest(found, replace(average, rms_after=1.3e-4)) is None
+    assert hardest((), average) is None
 
 
 def test_folds_by_time_are_those_of_the_diagnosis(rv_m2):

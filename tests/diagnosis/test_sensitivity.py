@@ -4,9 +4,9 @@ import numpy as np
 import pytest
 from simulate import simulate
 
+from thermal_robot.diagnosis import settings
 from thermal_robot.diagnosis.sensitivity import prior_sensitivity
 from thermal_robot.effects import choose
-from thermal_robot.inference import settings
 from thermal_robot.inference.fit import fit
 
 RIVALS = choose(("joint_offset", "joint_gain", "backlash", "drift"), (), ())

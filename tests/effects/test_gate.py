@@ -14,6 +14,7 @@ from thermal_robot import EffectError, diagnose
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.effects import (
     Effect,
+    Geometric,
     JointOffset,
     Parameter,
     Response,
@@ -26,7 +27,7 @@ from thermal_robot.effects import (
     gate,
     library,
 )
-from thermal_robot.effects.gate import checked, driver
+from thermal_robot.effects.gate import checked, driver, independent
 from thermal_robot.inference.columns import block
 from thermal_robot.observations import observe
 
@@ -423,3 +424,15 @@ def test_settings_in_single_places_share_what_the_effect_answers(observations):
     assert [p.size for p in checked(Counted(0.7), here)] == [0.7, 0.7]
     checked(Counted(), replace(observations))  # what is seen from elsewhere is asked anew
     assert asked == [0.5, 0.7, 0.5]
+
+
+def test_parameters_in_which_an_effect_is_told_keep_the_contract_too(rv_m2):
+    class Muddled(Geometric):
+        def independent(self, observations):
+            own = self.parameters(observations)
+            return (own[0], own[0])
+
+    seen = observe(commanded(rv_m2))
+    assert len(independent(Geometric(), seen)) > 0
+    with pytest.raises(EffectError, match="the name is used twice"):
+        independent(Muddled(), seen)

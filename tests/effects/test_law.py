@@ -132,7 +132,7 @@ def test_it_is_described_by_place_quantity_and_shape(shape):
         (replace(STEP, kind="link", shape="constant"), "a constant error at the placement of joint_3"),
         (
             replace(STEP, quantity="joint_3", shape="harmonic", marks=(101.0,)),
-            "an error at joint_3 that follows joint_3 (harmonic of order 101)",
+            "an error at joint_3 that follows its position (harmonic of order 101)",
         ),
         (replace(STEP, shape="smooth"), "an error at joint_3 that follows time (smooth)"),
         (

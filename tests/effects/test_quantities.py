@@ -53,6 +53,24 @@ def test_what_does_not_vary_is_no_quantity(rv_m2):
     assert all(values.shape == (SAMPLES,) and np.ptp(values) > 0 for values in found.values())
 
 
+def test_a_joint_that_stands_still_and_a_twin_are_no_quantities(rv_m2):
+    campaign = commanded(rv_m2)
+    q = campaign.q.copy()
+    q[:, 1] = 0.3 + 7e-7 * np.linspace(-1.0, 1.0, SAMPLES)
+    recorded = {"encoder.joint_3": q[:, 2] + 1e-4 * np.sin(np.arange(SAMPLES)), "encoder.joint_2": q[:, 1]}
+    found = quantities(observe(replace(campaign, q=q, covariates=recorded)))
+    assert {"joint_1", "joint_3"} < set(found)
+    assert not {"joint_2", "encoder.joint_2", "encoder.joint_3"} & set(found)
+
+
+def test_a_wrist_that_keeps_pointing_down_has_no_direction_of_gravity(rv_m2):
+    campaign = commanded(rv_m2)
+    q = np.tile(campaign.q[:1], (SAMPLES, 1))
+    q[:, 0] = np.linspace(-1.0, 1.0, SAMPLES)  # about the vertical
+    q[:, 4] += 1e-3 * np.linspace(0.0, 1.0, SAMPLES)
+    assert not set(GRAVITY) & set(quantities(observe(replace(campaign, q=q))))
+
+
 def test_the_row_stands_in_for_a_clock_only_where_there_is_none(rv_m2):
     np.testing.assert_array_equal(quantities(observe(commanded(rv_m2)))["order"], np.arange(SAMPLES))
     for clock in ("time", "order"):

@@ -16,6 +16,7 @@ MARKS = {
     "hysteresis": (0.7, 3.0),
     "relaxing": (0.7,),
     "relaxing each": (0.7,),
+    "apart": (float(X[60]),),
     "levels": (-2.0, 0.0, 1.0, 4.0),
     "smooth": (-1.5, 0.0, 0.4, 2.0, 3.5),
 }

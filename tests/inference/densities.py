@@ -4,8 +4,6 @@ import numpy as np
 from scipy.linalg import null_space
 from scipy.stats import multivariate_normal
 
-SPREAD = 1.5  # of ln λ: effects of three times the stated size are no surprise
-
 
 def away_of(linear, whitening):
     """Orthonormal basis of what the frames do not take up of the rows in use, and the factor that whitens each row."""
@@ -42,7 +40,7 @@ def direct(linear, whitening, found, log_prior, scales=None, noise=None, beside=
     density -= 0.5 * whitening.held * (np.log(noise**2) + 1.0 / noise**2)
     return (
         density
-        - 0.5 * sum((np.log(s) / SPREAD) ** 2 for s in scales.values())
+        - 0.5 * sum((np.log(s) / linear.blocks[b].spread) ** 2 for b, s in scales.items())
         + sum(log_prior[b] for b in found.blocks)
     )
 
@@ -67,7 +65,8 @@ def volume(linear, whitening, found, beside=None):
     bend = np.array([[0.25 * (along(a + b) - along(a - b)) / step**2 for b in axes] for a in axes]).reshape(
         count, count
     )
-    curvature = np.linalg.eigvalsh(bend) * SPREAD**2
+    spread = [linear.blocks[b].spread for b in found.blocks]
+    curvature = np.linalg.eigvalsh(bend * np.outer(spread, spread))
     return -0.5 * np.log(curvature).sum() if (curvature > 0.0).all() else np.nan
 
 

@@ -5,7 +5,7 @@ from itertools import combinations
 
 import numpy as np
 import pytest
-from inference.densities import SPREAD, direct, seen_of, volume
+from inference.densities import direct, seen_of, volume
 from inference.problems import columns_of, small_problem
 from scipy.special import logsumexp
 
@@ -19,6 +19,7 @@ def integrated(linear, whitening, found):
     The noise is held. The grid reaches six standard deviations of the prior; finer, it gives the same to 1e-6.
     """
     gap, columns = seen_of(linear, whitening, found.blocks, found.noise)
+    spread = np.array([linear.blocks[b].spread for b in found.blocks])
     # what no column reaches does not depend on the scales
     basis = np.linalg.qr(np.hstack(columns))[0]
     gap, columns = basis.T @ gap, [basis.T @ own for own in columns]
@@ -28,11 +29,11 @@ def integrated(linear, whitening, found):
     def density(move):
         covariance = np.eye(len(gap)) + np.tensordot(np.exp(2.0 * move), outer, 1)
         solved = np.linalg.solve(covariance, np.broadcast_to(gap, move.shape[:-1] + gap.shape)[..., None])[..., 0]
-        return -0.5 * (np.linalg.slogdet(covariance)[1] + solved @ gap + ((move / SPREAD) ** 2).sum(axis=-1))
+        return -0.5 * (np.linalg.slogdet(covariance)[1] + solved @ gap + ((move / spread) ** 2).sum(axis=-1))
 
     grid = np.stack(np.meshgrid(*[logs] * len(columns), indexing="ij"), axis=-1)
     total = logsumexp([logsumexp(density(line)) for line in grid])
-    width = len(columns) * np.log((logs[1] - logs[0]) / np.sqrt(2.0 * np.pi * SPREAD**2))
+    width = np.log((logs[1] - logs[0]) / np.sqrt(2.0 * np.pi * spread**2)).sum()
     peak = density(np.log([found.scales[b] for b in found.blocks]))
     return total + width - peak
 
@@ -46,10 +47,13 @@ def all_combinations(linear, whitening, log_prior=(-1.0, -2.0, -0.5)):
 
 @pytest.mark.parametrize("present", [(), (1,), (0, 2)])
 @pytest.mark.parametrize("held", [0.0, 20.0])
-def test_evidence_is_the_density_of_the_gap(present, held):
+@pytest.mark.parametrize("spreads", [(1.5, 1.5, 1.5), (0.5, 1.5, 1.0)])
+def test_evidence_is_the_density_of_the_gap(present, held, spreads):
     log_prior = (-1.0, -2.0, -0.5)
     for seed in range(5):
         linear, whitening = small_problem(seed, present=present, held=held)
+        blocks = (replace(b, spread=s) for b, s in zip(linear.blocks, spreads, strict=True))
+        linear = replace(linear, blocks=tuple(blocks))
         _, _, found = all_combinations(linear, whitening, log_prior)
         ours = np.array([c.log_evidence for c in found])
         theirs = np.array([direct(linear, whitening, c, log_prior) + volume(linear, whitening, c) for c in found])

@@ -358,11 +358,37 @@ def test_zeros_that_are_found_anew_in_each_session_follow_the_session(rv_m2):
     here, target = seen(in_sessions(rv_m2, "joint_3", (0.0, 6e-4, -4e-4)))
     found = scan(here, [target])[0][0]
     assert (found[0].law.place, found[0].law.quantity) == ("joint_3", "session")
+    # no law of the clock stands beside it: the session says enough
+    own = [i.law for i in found if (i.law.kind, i.law.place) == ("joint", "joint_3") and not i.law.of + i.law.by]
+    plain = {law.quantity for law in own if law.shape in ("smooth", "ramp", "levels")}
+    assert "session" in plain
+    assert "time" not in plain
     # where nobody says when, the session is all that there is
     two = in_sessions(rv_m2, "joint_3", (0.0, 0.0, 4e-4))
     blind = replace(two, covariates={k: v for k, v in two.covariates.items() if k != "time"})
     here, target = seen(blind)
     assert scan(here, [target])[0][0][0].law.quantity in ("session", "order")
+
+
+def test_a_tool_that_stands_elsewhere_in_one_session_is_no_curve_over_weeks(rv_m2):
+    data = in_sessions(rv_m2, "joint_3", (0.0, 0.0, 0.0))
+    noon = data.labels["session"] == "noon"
+    weeks = {
+        **data.covariates,
+        "time": data.covariates["time"] + 1.8e6 * np.digitize(data.covariates["time"], [5e3, 1e4]),
+    }
+    data = replace(data, covariates=weeks)
+    frames = Frames.declared(data)
+    away, sound = np.zeros((data.samples, 6)), np.zeros((data.samples, 6))
+    away[noon, 0] = 4.2e-4
+    real, plain = (observe(data, frames, displacement=Displacement(tool=twist)) for twist in (away, sound))
+    here, target = seen(replace(data, position=data.position + real.predicted_position - plain.predicted_position))
+    found = scan(here, [target])[0][0]
+    at_tool = [i.law for i in found if i.law.kind == "tool" and not i.law.by]
+    assert (found[0].law.kind, found[0].law.quantity) == ("tool", "session")
+    assert "time" not in {law.quantity for law in at_tool}
+    best = shaped(here, target, found[0].law).law
+    assert best.describe() == "the tool stands elsewhere in session noon"
 
 
 @pytest.mark.parametrize("sizes", [(1.0, 1.0, 1.0), (1.0, -0.6, 0.4)])

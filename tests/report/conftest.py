@@ -20,6 +20,7 @@ from thermal_robot.diagnosis.parts import (
     Where,
 )
 from thermal_robot.diagnosis.result import Diagnosis
+from thermal_robot.effects.law_size import Size
 
 JOINTS = (
     "shoulder_pan_joint",
@@ -266,13 +267,47 @@ def with_law():
         quantity="time",
         shape="step",
         describes="an error at elbow_joint that follows time (step)",
-        title="an error at elbow_joint that follows time (step)",
+        size=(Size("step", 1.7e-4, 6e-6, "rad"),),
+        usually="warming, or something that slips",
+        title="a step at elbow_joint over time",
     )
     first, *rest = base.effects
     return replace(base, effects=(first, law, *rest), verdict=("thermal_elongation", "discovered.1"))
 
 
-CASES = {"found": found, "nothing": nothing, "unexplained": unexplained, "confounded": confounded}
+def contained():
+    """Geometry, with the joints' zeros inside it."""
+    base = found()
+    zeros = tuple(Estimate(f"zero offset, {joint}", -7.1e-3, 2e-5, "rad", True) for joint in JOINTS[1:5])
+    axes = tuple(Estimate(f"distance a of {joint}", 1e-4, 1e-5, "m", True) for joint in JOINTS[1:])
+    shifts = tuple(f"shift d of {joint}" for joint in (*JOINTS[:1], *JOINTS[2:4]))
+    geometric = Finding("geometric", "found", 0.9999, 0.96, (0.95, 0.97), parameters=axes, unseen=shifts)
+    inside = Finding(
+        "joint_offset",
+        "contained",
+        0.9999,
+        0.0,
+        (0.0, 0.0),
+        confounded_with=("geometric",),
+        parameters=zeros,
+        unseen=(f"zero offset, {JOINTS[0]}", f"zero offset, {JOINTS[5]}"),
+    )
+    return replace(
+        base,
+        summary="Geometry explains the gap.",
+        effects=(geometric, inside, *NOT_FOUND[1:2], *NOT_TESTABLE),
+        verdict=("geometric",),
+        separates=(),
+    )
+
+
+CASES = {
+    "found": found,
+    "nothing": nothing,
+    "unexplained": unexplained,
+    "confounded": confounded,
+    "contained": contained,
+}
 
 
 @pytest.fixture(params=list(CASES))

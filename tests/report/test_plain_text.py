@@ -2,8 +2,9 @@
 
 from dataclasses import replace
 
-from thermal_robot.diagnosis.parts import Estimate, Finding
+from thermal_robot.diagnosis.parts import Estimate, Finding, FoldScheme
 from thermal_robot.report import text
+from thermal_robot.report.details import details
 
 
 def section(written, heading):
@@ -13,7 +14,7 @@ def section(written, heading):
 
 def test_it_opens_with_the_verdict_and_fits_a_terminal(diagnosis):
     written = text(diagnosis)
-    assert " ".join(written.split("\n\n")[0].split()) == diagnosis.summary
+    assert " ".join(written.split("\n\n")[0].split()) == " ".join((diagnosis.summary, *details(diagnosis)))
     assert max(len(line) for line in written.splitlines()) <= 96
     assert not written.endswith("\n")
     assert all(line == line.rstrip() for line in written.splitlines())
@@ -27,7 +28,7 @@ def test_printing_a_diagnosis_prints_it(diagnosis):
 def test_every_candidate_is_told_under_its_status(diagnosis):
     lines = section(text(diagnosis), "WHICH")
     headings = {"found": "  found", "confounded": "  cannot be told apart", "not_found": "  not found"}
-    headings["not_testable"] = "  not testable with these data"
+    headings |= {"not_testable": "  not testable with these data", "contained": "  part of what was found"}
     for finding in diagnosis.effects:
         heading = max(k for k, line in enumerate(lines) if line == headings[finding.status])
         after = next(k for k in range(heading + 1, len(lines)) if lines[k].split()[0] == finding.name)
@@ -74,7 +75,7 @@ def test_needs_name_a_column_once_for_all_joints(case):
 
 def test_needs_of_links_are_told_from_those_of_joints(case):
     bending = Finding("thermal_bending", "not_testable", needs=("temperature.hand", "temperature.arm"))
-    assert "needs temperature.<link>" in text(replace(case("found"), effects=(bending,)))
+    assert "needs temperature.<link>" in text(replace(case("found"), effects=(bending,), verdict=()))
 
 
 def test_confounded_effects_name_each_other(case):
@@ -116,7 +117,28 @@ def test_rows_set_aside_are_listed_up_to_ten(case):
     assert "set aside  as outliers: rows 17, 80" in text(case("found"))
     assert "set aside  no row" in text(case("nothing"))
     many = text(replace(case("found"), outliers=tuple(range(2, 18))))
-    assert "as outliers: rows 2, 3, 4, 5, 6, 7, 8, 9, 10, 11 and 6 more" in many
+    assert "104 of 120 rows, 16 set aside" in many
+    assert "set aside  as outliers: rows 2, 3, 4, 5, 6, 7, 8, 9, 10, 11 and 6 more" in many
+
+
+def test_what_the_user_left_out_is_no_absent_effect(case):
+    assert "left out   by request (--without joint_gain): joint_gain" in text(
+        replace(case("found"), left_out=("joint_gain",))
+    )
+    assert "left out" not in text(case("found"))
+
+
+def test_what_plus_minus_means_is_said_once(diagnosis):
+    told = text(diagnosis).count("± is one standard deviation")
+    assert told == (1 if "±" in text(diagnosis).replace("± is one", "") else 0)
+
+
+def test_the_hardest_hold_out_is_told_where_it_is_harder(case):
+    base = case("found")
+    hard = FoldScheme("reach", "the fifth that reaches out furthest", 1, 24, 4.1e-4, 9.15e-5, 0.95, 1e-6)
+    told = " ".join(text(replace(base, gap=replace(base.gap, schemes=(hard,), hardest=hard))).split())
+    assert "hardest hold-out 410 µm → 92 µm, held out by reach (the fifth that reaches out furthest): 3.0 times" in told
+    assert "hardest hold-out" not in text(replace(base, gap=replace(base.gap, schemes=(hard,))))
 
 
 def test_nothing_found_says_so(case):
@@ -143,3 +165,13 @@ def test_advice_and_warnings_are_told(case):
     assert case("found").advice in written
     assert "to tell apart: thermal_elongation, drift" in written
     assert case("found").warnings[0] in written
+
+
+def test_zeros_inside_geometry_are_printed_with_what_is_not_seen(case):
+    diagnosis = case("contained")
+    said = text(diagnosis)
+    inside = said[said.index("part of what was found") :]
+    for joint in diagnosis.joint_names[1:5]:
+        assert f"zero offset, {joint}" in inside
+    assert "−7.100 ± 0.020 mrad" in inside
+    assert "2 not seen apart from the others or the frames: zero offset, shoulder_pan_joint" in " ".join(inside.split())

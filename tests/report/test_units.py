@@ -140,3 +140,16 @@ def test_a_number_has_an_exponent_only_far_from_one(value, digits, written):
 def test_what_is_no_number_is_not_written_as_one(value):
     assert units.number(value) == units.percent(value) == units.MISSING
     assert units.p_value(value) == "p unknown"
+
+
+@pytest.mark.parametrize(
+    ("value", "std", "unit", "written"),
+    [
+        (4.2e-4, 3e-5, "m", "420 ± 30 µm"),
+        (1.7e-4, 6e-6, "rad", "0.1700 ± 0.0060 mrad"),
+        (2e-3, 0.0, "m", "2.00 mm"),
+        (3e-6, 2e-4, "rad", "0.00 ± 0.20 mrad"),
+    ],
+)
+def test_a_size_is_written_with_its_deviation(value, std, unit, written):
+    assert units.measured(value, std, unit) == written

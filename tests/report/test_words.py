@@ -5,30 +5,41 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from thermal_robot.diagnosis.parts import Dependence, Estimate, Finding, Location
+from thermal_robot.diagnosis.parts import Dependence, Estimate, Finding, FoldScheme, Location
+from thermal_robot.effects.law_size import Size
 from thermal_robot.report.words import (
     NO_BREAK,
     STATUS,
     bound,
     by_status,
     campaign,
+    hardest,
     in_words,
     law,
     laws,
+    left_out,
     needs,
     noise,
     noise_of,
     one_of,
+    one_sigma,
     parameters,
     places,
+    rivals,
     rows_in_words,
+    rows_used,
     sentences,
+    set_aside,
     told_as,
     verdict,
     with_aside,
 )
 
 JOINTS = ("joint_1", "joint_2")
+LAW = (
+    "a law found in the data: an error at elbow_joint that follows time (step); step 0.1700 ± 0.0060 mrad; usually "
+    "warming, or something that slips"
+)
 
 
 def finding(**known):
@@ -41,7 +52,7 @@ def several(count, identified=True):
 
 
 def test_every_status_has_words(case):
-    shown = {told_as(f) for kind in ("found", "confounded") for f in case(kind).effects}
+    shown = {told_as(f) for kind in ("found", "confounded", "contained") for f in case(kind).effects}
     assert {*shown, "in_question"} == set(STATUS)
 
 
@@ -62,6 +73,21 @@ def test_what_is_in_question_is_shown_between_what_was_found_and_what_was_not(ca
     before, after = shown[: shown.index(doubtful)], shown[shown.index(doubtful) + 1 :]
     assert {f.status for f in before} == {"found", "confounded"}
     assert {f.status for f in after} == {"not_found", "not_testable"}
+
+
+def test_what_is_part_of_a_larger_effect_says_of_which(case):
+    whole = case("contained")
+    inside = whole.finding("joint_offset")
+    assert rivals(inside, whole) == "its part of geometric"
+    assert rivals(replace(inside, status="confounded"), whole) == "these data cannot tell it from geometric"
+    assert rivals(whole.finding("geometric"), whole) == ""
+
+
+def test_what_is_not_seen_is_counted_and_named_once(case):
+    shown = parameters(case("contained").finding("geometric"))
+    assert shown.unseen.startswith("3 not seen apart from the others or the frames: shift d of shoulder_pan_joint; ")
+    assert shown.undetermined == ""
+    assert parameters(case("found").effects[0]).unseen == ""
 
 
 def test_lists_are_cut_and_say_how_many_are_missing():
@@ -98,6 +124,11 @@ def test_parameters_that_are_not_determined_are_named_without_a_number():
     shown = parameters(finding(parameters=(*several(2), *several(6, identified=False))))
     assert len(shown.shown) == 2
     assert shown.undetermined == "p0; p1; p2; p3 and 2 more"
+
+
+def test_a_law_with_a_size_has_nothing_undetermined():
+    law = finding(parameters=several(2, identified=False), quantity="time", size=(Size("step", 1e-4, 1e-6, "rad"),))
+    assert parameters(law).undetermined == ""
 
 
 def test_places_are_told_largest_first_and_small_ones_counted():
@@ -160,7 +191,7 @@ def test_needs_name_a_column_once(wanted, words):
 def test_a_law_is_known_by_the_quantity_that_it_follows(law_case):
     diagnosis = law_case()
     assert [f.name for f in laws(diagnosis)] == ["discovered.1"]
-    assert law(diagnosis.finding("discovered.1")) == "a law found in the data: follows time, shape: step"
+    assert law(diagnosis.finding("discovered.1")) == LAW
     assert law(diagnosis.finding("thermal_elongation")) == ""
     assert laws(replace(diagnosis, verdict=("thermal_elongation",))) == []
 
@@ -225,9 +256,52 @@ def test_without_rows_set_aside_there_is_one_gap(case):
     assert with_aside(replace(found, gap=replace(found.gap, held_out=held))) == ""
 
 
-def test_a_law_that_is_the_size_of_a_known_effect_names_it(law_case):
+def test_a_law_without_words_or_size_is_told_by_its_quantity():
+    assert law(finding(quantity="time")) == "a law found in the data: it follows time"
+
+
+def test_a_law_elsewhere_has_a_size_of_translation_and_one_of_rotation(law_case):
     (own,) = laws(law_case())
-    assert law(own) == "a law found in the data: follows time, shape: step"
-    assert (
-        law(replace(own, of="backlash")) == "a law found in the data: a backlash whose size follows time, shape: step"
+    size = (Size("difference", 4.2e-4, 3e-5, "m"), Size("difference", 3e-4, 5e-5, "rad"))
+    assert "; difference 420 ± 30 µm and 0.300 ± 0.050 mrad; usually" in law(replace(own, size=size))
+
+
+def test_rows_set_aside_are_counted_and_named(case):
+    assert set_aside(case("found")) == "as outliers: rows 17, 80"
+    assert rows_used(case("found")) == "118 of 120 rows, 2 set aside"
+    assert (set_aside(case("nothing")), rows_used(case("nothing"))) == ("no row", "all 120 rows")
+
+
+def test_the_hardest_way_of_holding_out_is_told_beside_the_average(case):
+    base = case("found")
+    assert hardest(base) == ""
+    scheme = FoldScheme("temperature", "the warmest fifth", 2, 40, 4.1e-4, 9.15e-5, 0.95, 1e-6)
+    said = hardest(replace(base, gap=replace(base.gap, hardest=scheme)))
+    assert said == "410 µm → 92 µm, held out by temperature (the warmest fifth): 3.0 times the average"
+
+
+def test_what_was_left_out_is_named_as_left_out(case):
+    base = case("found")
+    assert left_out(base) == ""
+    assert left_out(replace(base, left_out=("drift", "geometric"))) == (
+        "by request (--without drift geometric): drift, geometric"
     )
+    few = replace(base, effects=base.effects[:1], left_out=("drift", "geometric"))
+    assert left_out(few) == "by request all but thermal_elongation (--only thermal_elongation)"
+
+
+def test_what_plus_minus_means_is_said_where_it_stands(case):
+    assert one_sigma(case("found")) == "± is one standard deviation (1 sigma)."
+    assert one_sigma(case("nothing")) == ""
+
+
+def test_rivals_are_named_with_the_way_to_see_them(case):
+    base = case("confounded")
+    said = "these data cannot tell it from drift"
+    found = replace(base.effects[1], confounded_with=("drift",))
+    assert rivals(found, base) == f"{said}; --without joint_offset shows drift in its place"
+    assert rivals(replace(found, name="somebodys_own"), base) == said
+    assert rivals(base.effects[0], base) == ""
+    frame = Finding("base_frame", "not_testable", needs=('frames.base = "known"',))
+    declared = replace(base, effects=(*base.effects[:2], frame))
+    assert rivals(base.effects[1], declared) == "these data cannot tell it from base_frame"

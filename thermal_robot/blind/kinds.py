@@ -35,8 +35,9 @@ REPEATED = 1.0 / 3.0
 
 CONTAINS = {"geometric": {"joint_offset", "instrument_scale"}}
 """What a larger effect can do exactly as well (formats.md)."""
-IMITATES = {"transmission_error": {"joint_gain"}}
-"""What a larger effect can do nearly as well: over less than a turn, two harmonics are a straight line."""
+IMITATES = {"transmission_error": {"joint_gain"}, "link_compliance": {"base_compliance"}}
+"""What a larger effect can do nearly as well: over less than a turn, two harmonics are a straight line; the upright
+link that stands on the base bends under the moment that tips it."""
 RANDOM = ("encoder_resolution", "excess_repeatability")
 """Effects that scatter: they leave nothing for a mean to explain, and are asked alone."""
 CONDITION = {

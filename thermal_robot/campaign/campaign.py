@@ -50,6 +50,8 @@ class Campaign:
         units, no NaN: gaps were filled on reading.
     extra
         Names of those covariates that the format does not define; in the unit of the file.
+    derived
+        Names of those covariates that were not recorded but follow from the order of the rows.
     labels
         (N,) text for ``"session"`` and ``"pose"`` where the table has them; ``""`` where a cell is empty.
     simulated_position, simulated_orientation
@@ -63,6 +65,8 @@ class Campaign:
         One sigma per axis of the instrument, m and rad; ``None`` when not given.
     payload_com
         (3,) centre of mass of the payload in the tool frame, m.
+    moves
+        Whether the robot goes straight from pose to pose: ``"direct"`` or ``"unknown"``.
     reference_temperature
         °C at which the URDF's lengths hold.
     priors, gears
@@ -93,6 +97,7 @@ class Campaign:
     orientation: FloatArray | None = None
     covariates: Mapping[str, FloatArray] = field(default_factory=dict)
     extra: tuple[str, ...] = ()
+    derived: tuple[str, ...] = ()
     labels: Mapping[str, TextArray] = field(default_factory=dict)
     simulated_position: FloatArray | None = None
     simulated_orientation: FloatArray | None = None
@@ -102,6 +107,7 @@ class Campaign:
     noise_position: float | None = None
     noise_orientation: float | None = None
     payload_com: FloatArray = field(default_factory=lambda: np.zeros(3))
+    moves: str = "direct"
     reference_temperature: float = STANDARD_TEMPERATURE
     priors: Mapping[str, float] = field(default_factory=dict)
     gears: Mapping[str, float] = field(default_factory=dict)
@@ -175,6 +181,11 @@ class Campaign:
         """``"pose"`` where orientations were measured, otherwise ``"position"``."""
         return "position" if self.orientation is None else "pose"
 
+    @property
+    def reach(self) -> float:
+        """Diagonal of the volume that was measured, m."""
+        return float(np.linalg.norm(np.ptp(np.asarray(self.position), axis=0)))
+
     @cached_property
     def since_turn(self) -> Mapping[str, FloatArray]:
         """(N,) by joint: signed distance from its last turning point, rad or m; empty where rows are in no order.
@@ -194,6 +205,7 @@ class Campaign:
             tool_frame=self.robot.tool_frame,
             root_frame=self.robot.root_frame,
             gravity=as_vector(self.robot.gravity),
+            moves=self.moves,
             reference_temperature=self.reference_temperature,
             units=self.units,
             base_known=self.base_known,
@@ -241,7 +253,8 @@ class Campaign:
         changes: dict[str, Any] = {
             key: {other: value for other, value in getattr(self, key).items() if other != name} for key in _BY_NAME
         }
-        changes["extra"] = tuple(other for other in self.extra if other != name)
+        for key in ("extra", "derived"):
+            changes[key] = tuple(other for other in getattr(self, key) if other != name)
         return dataclasses.replace(self, **changes)
 
 

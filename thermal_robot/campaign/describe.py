@@ -107,6 +107,7 @@ def _covariates(campaign: Campaign) -> Iterator[Sequence[str]]:
             of = "not defined by the format"
         elif quantity in names.PER_JOINT:
             of = f"all {len(places)} joints" if len(places) == campaign.robot.n > 1 else ", ".join(places)
+            of += ", from the order of rows" if set(columns) <= set(campaign.derived) else ""
         values = np.concatenate(
             [campaign.covariates[c] / covariate_scale(c, campaign.robot, campaign.units) for c in columns]
         )

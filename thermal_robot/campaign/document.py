@@ -18,7 +18,7 @@ else:
     import tomli as tomllib
 
 SECTIONS: dict[str, tuple[str, ...]] = {
-    "robot": ("urdf", "tool_frame", "root_frame", "gravity", "reference_temperature"),
+    "robot": ("urdf", "tool_frame", "root_frame", "gravity", "moves", "reference_temperature"),
     "measurements": ("file", "angle_unit", "length_unit"),
     "frames": ("base", "tool", "target"),
     "noise": ("position", "orientation"),

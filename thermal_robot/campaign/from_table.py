@@ -9,7 +9,7 @@ import numpy as np
 
 from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.names import did_you_mean, listed
-from thermal_robot.campaign.settings import STANDARD_TEMPERATURE, Settings, Vector, as_vector
+from thermal_robot.campaign.settings import MOVES, STANDARD_TEMPERATURE, Settings, Vector, as_vector
 from thermal_robot.campaign.tabular import table_from_frame
 from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, Units
 from thermal_robot.campaign.validate import build_campaign
@@ -36,6 +36,7 @@ def campaign_from_table(
     noise_orientation: float | None = None,
     payload_com: Sequence[float] = (0.0, 0.0, 0.0),
     reference_temperature: float = STANDARD_TEMPERATURE,
+    moves: str = MOVES[0],
     priors: Mapping[str, float] | None = None,
     gears: Mapping[str, float] | None = None,
     name: str = "table",
@@ -61,6 +62,9 @@ def campaign_from_table(
         Centre of mass of the payload in the tool frame.
     reference_temperature
         °C at which the URDF's lengths hold.
+    moves
+        ``"direct"`` where the robot goes straight from pose to pose in the order of the rows, which tells directions of
+        approach where no column does; else ``"unknown"``.
     priors, gears
         Expected size by effect; transmission ratio by joint.
     name
@@ -77,6 +81,7 @@ def campaign_from_table(
     _require_word("length_unit", length_unit, LENGTH_UNITS)
     _require_word("base", base, ("known", "unknown"))
     _require_word("tool", tool, ("known", "unknown"))
+    _require_word("moves", moves, MOVES)
     units = Units(angle_unit, length_unit)
     position = _size("noise_position", noise_position)
     settings = Settings(
@@ -84,6 +89,7 @@ def campaign_from_table(
         tool_frame=robot.tool_frame,
         root_frame=robot.root_frame,
         gravity=as_vector(robot.gravity),
+        moves=moves,
         reference_temperature=float(reference_temperature),
         units=units,
         base_known=base == "known",

@@ -11,6 +11,9 @@ from thermal_robot.errors import CampaignError
 
 Vector: TypeAlias = tuple[float, float, float]
 
+MOVES = ("direct", "unknown")
+"""Whether the robot goes straight from pose to pose in the order of the rows, which tells whence each joint came."""
+
 STANDARD_TEMPERATURE = 20.0
 """°C; ISO 1, the temperature at which lengths are specified unless somebody says otherwise."""
 
@@ -28,6 +31,8 @@ class Settings:
         Ends of the chain; ``root_frame`` ``None`` for the URDF's root.
     gravity
         m/s², in the root frame; ``None`` for the robot's default.
+    moves
+        One of :data:`MOVES`.
     reference_temperature
         °C at which the URDF's lengths hold.
     units
@@ -50,6 +55,7 @@ class Settings:
     tool_frame: str
     root_frame: str | None = None
     gravity: Vector | None = None
+    moves: str = "direct"
     reference_temperature: float = STANDARD_TEMPERATURE
     units: Units = SI
     base_known: bool = False
@@ -68,6 +74,7 @@ class Settings:
             "tool_frame": self.tool_frame,
             "root_frame": self.root_frame,
             "gravity": None if self.gravity is None else list(self.gravity),
+            "moves": self.moves,
             "reference_temperature": self.reference_temperature,
             "units": {"angle": self.units.angle, "length": self.units.length},
             "base_known": self.base_known,
@@ -96,7 +103,8 @@ class Settings:
         CampaignError
             A key that is missing or unknown, or a value of the wrong kind.
         """
-        values = dict(data)
+        # those who wrote no word of moves were fitted to what was recorded alone
+        values = {"moves": "unknown", **data}
         known = set(cls.__dataclass_fields__)
         for key in sorted(known.symmetric_difference(values)):
             problem = "is missing from the settings" if key in known else "is not a setting"

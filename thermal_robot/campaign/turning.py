@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
+Rows = NDArray[np.int64]
 
 SLIPS = tuple(2.0 ** (k / 4) for k in range(-28, 9))
 """rad or m: how far a joint goes before an element slips; from 8 mm, a twentieth of a short stroke, to more than half a
@@ -37,19 +38,49 @@ def since_turns(
     sessions
         (N,) label of the uninterrupted run that a row belongs to; ``None`` where there is one.
     """
-    clock = covariates.get("time", covariates.get("order"))
-    if clock is None or not len(q) or not np.ptp(clock) > 0.0:
-        return {}
     since = np.zeros_like(q)
     strain = np.zeros((*q.shape, len(SLIPS)))
-    for run in np.unique(sessions) if sessions is not None else [None]:
-        rows = np.arange(len(q)) if sessions is None else np.flatnonzero(sessions == run)
-        rows = rows[np.argsort(clock[rows], kind="stable")]
+    runs = list(_runs(covariates, sessions, len(q)))
+    for rows in runs:
         for j in range(q.shape[1]):
             since[rows, j] = _since_turn(q[rows, j])
         strain[rows] = _strains(q[rows])
+    if not runs:
+        return {}
     held = {strained(name, r): strain[:, j, k] for j, name in enumerate(names) for k, r in enumerate(SLIPS)}
     return {**dict(zip(names, since.T, strict=True)), **held}
+
+
+def arrivals(
+    q: Array, names: tuple[str, ...], covariates: Mapping[str, Array], sessions: NDArray[np.str_] | None
+) -> dict[str, Array]:
+    """Return (N,) by ``approach.<joint>``: the side from which each joint came, as the order of rows tells it.
+
+    +1 where the joint was increasing on its way from the row before, −1 where it was decreasing; one that did not move
+    keeps the side that it had. 0 at the first row of a session, where nothing is known. It holds for a robot that goes
+    straight from pose to pose.
+
+    Parameters
+    ----------
+    q, names, covariates, sessions
+        As for :func:`since_turns`; without a column that tells the order the answer is empty.
+    """
+    side = np.zeros_like(q)
+    runs = list(_runs(covariates, sessions, len(q)))
+    for rows in runs:
+        for j in range(q.shape[1]):
+            side[rows, j] = np.sign(_since_turn(q[rows, j]))
+    return {f"approach.{name}": side[:, j] for j, name in enumerate(names)} if runs else {}
+
+
+def _runs(covariates: Mapping[str, Array], sessions: NDArray[np.str_] | None, samples: int) -> Iterator[Rows]:
+    """Yield the rows of each uninterrupted run in their order; none where nothing tells the order."""
+    clock = covariates.get("time", covariates.get("order"))
+    if clock is None or not samples or not np.ptp(clock) > 0.0:
+        return
+    for run in np.unique(sessions) if sessions is not None else [None]:
+        rows = np.arange(samples) if sessions is None else np.flatnonzero(sessions == run)
+        yield rows[np.argsort(clock[rows], kind="stable")]
 
 
 def strained(joint: str, slip: float) -> str:

@@ -16,6 +16,7 @@ from thermal_robot.campaign.plausible import doubts
 from thermal_robot.campaign.recognise import Columns, recognise
 from thermal_robot.campaign.settings import Settings
 from thermal_robot.campaign.table import Table
+from thermal_robot.campaign.turning import arrivals
 from thermal_robot.campaign.units import Units, covariate_scale
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot
@@ -75,6 +76,7 @@ def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str,
         noise_position=settings.noise_position,
         noise_orientation=settings.noise_orientation,
         payload_com=np.array(settings.payload_com),
+        moves=settings.moves,
         reference_temperature=settings.reference_temperature,
         priors=dict(settings.priors),
         gears=dict(settings.gears),
@@ -86,7 +88,17 @@ def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str,
     if measured:
         _require_enough(table.file, campaign)
     warnings = (*table.warnings, *columns.warnings, *gaps, *doubts(campaign))
-    return replace(campaign, warnings=warnings)
+    return replace(_arrived(campaign), warnings=warnings)
+
+
+def _arrived(campaign: Campaign) -> Campaign:
+    """Return the campaign with the directions of approach, where nobody recorded any but the order tells them."""
+    recorded = any(split_name(name)[0] == "approach" for name in campaign.covariates)
+    if recorded or campaign.moves != "direct":
+        return campaign
+    names, sessions = campaign.robot.joint_names, campaign.labels.get("session")
+    found = arrivals(campaign.q, names, campaign.covariates, sessions)
+    return replace(campaign, covariates={**campaign.covariates, **found}, derived=tuple(found))
 
 
 def _commands(table: Table, robot: Robot, units: Units) -> FloatArray:

@@ -136,6 +136,7 @@ def _document(campaign: Campaign) -> dict[str, Any]:
             "tool_frame": settings.tool_frame,
             "root_frame": settings.root_frame,
             "gravity": list(settings.gravity or ()),
+            "moves": settings.moves,
             "reference_temperature": settings.reference_temperature,
         },
         "measurements": {

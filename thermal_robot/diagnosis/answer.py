@@ -14,11 +14,12 @@ from thermal_robot.diagnosis.examine import Examined
 from thermal_robot.diagnosis.findings import by_share, findings, separates, titled
 from thermal_robot.diagnosis.held_out import Shrinkage
 from thermal_robot.diagnosis.numbered import numbered
-from thermal_robot.diagnosis.parts import Gap, Refused, Rows, Unexplained
+from thermal_robot.diagnosis.parts import Gap, Misfit, Refused, Rows, Unexplained
 from thermal_robot.diagnosis.random_findings import random_findings
 from thermal_robot.diagnosis.result import Diagnosis
-from thermal_robot.diagnosis.schemes import worst_folds
+from thermal_robot.diagnosis.schemes import hardest, worst_folds
 from thermal_robot.diagnosis.sensitivity import prior_sensitivity
+from thermal_robot.diagnosis.wanted import wanted
 from thermal_robot.diagnosis.where import locate
 from thermal_robot.effects import Effect, gate, random_effects
 from thermal_robot.effects.quantities import unit
@@ -45,6 +46,8 @@ class Conclusion:
         The random part of that residual that the instrument's noise does not account for.
     refused
         Effects that were taken out of the fit again.
+    misfit
+        Why nothing can be said of the robot; ``None`` where something can.
     """
 
     fit: Fit
@@ -53,6 +56,7 @@ class Conclusion:
     left: Examined
     chance: RandomGap
     refused: Mapping[str, Refused]
+    misfit: Misfit | None = None
 
 
 def answer(
@@ -61,7 +65,7 @@ def answer(
     candidates: Sequence[Effect],
     *,
     asked: Callable[[str], bool],
-    narrowed: bool,
+    left_out: Sequence[str],
     notes: Sequence[str],
 ) -> Diagnosis:
     """Put a diagnosis together.
@@ -76,24 +80,24 @@ def answer(
         Systematic effects that were considered.
     asked
         Tells whether the user asked for an effect of this name, systematic or random.
-    narrowed
-        Whether the user left effects out.
+    left_out
+        Names of the effects that the user left out.
     notes
         What was left out of the campaign, one sentence each.
     """
     fit, shrinkage, laws = numbered(last.fit, shrinkage, last.laws)
     last = replace(last, fit=fit, laws=laws)
     campaign, remaining = fit.campaign, last.left.unexplained
-    refused = {name: r.share for name, r in last.refused.items() if r.share is not None}
+    sensitivity = prior_sensitivity(fit)
     shares = {name: value for name, (value, _) in shrinkage.shares.items()}
     where, locations = locate(fit, shares)
-    gap = _gap(last, shrinkage)
     held = [effect.name for effect, _ in fit.effects]
     systematic = findings(
         fit, shrinkage.shares, locations, {d.law.name: d.probability for d in last.laws}, last.refused
     )
     chance = [f for f in random_findings(fit, last.chance) if asked(f.name)]
     found = by_share(titled((*systematic, *chance), (*candidates, *random_effects())))
+    groups, probability = separates(found), _probability(last)
     return Diagnosis(
         campaign=campaign.name,
         robot=campaign.robot.name,
@@ -102,23 +106,30 @@ def answer(
         measures=campaign.measures,
         joint_names=campaign.robot.joint_names,
         outliers=tuple(campaign.rows[fit.explanation.outliers].tolist()),
-        gap=gap,
+        gap=_gap(last, shrinkage),
         effects=found,
         where=where,
         unexplained=last.unexplained,
         verdict=(*(f.name for f in found if f.name in held), *(f.name for f in chance if f.status == "found")),
-        probability=fit.probability_of_just({effect.name for effect, _ in fit.effects}),
-        separates=separates(found),
+        probability=probability,
+        separates=groups,
         model=_model(fit),
         rows=_rows(fit, shrinkage),
-        warnings=(*campaign.warnings, *notes, *cautions(fit, candidates if narrowed else (), refused)),
-        sensitivity=prior_sensitivity(fit),
+        warnings=(*campaign.warnings, *notes, *cautions(fit, last.refused, sensitivity)),
+        sensitivity=sensitivity,
         fit=fit,
         remaining=remaining,
-        # the diagonal of the volume that was measured
-        reach=float(np.linalg.norm(np.ptp(np.asarray(campaign.position), axis=0))),
-        narrowed=narrowed,
+        reach=campaign.reach,
+        left_out=tuple(left_out),
+        wanted=wanted(fit, found, groups, remaining, last.unexplained, probability),
+        misfit=last.misfit,
     )
+
+
+def _probability(last: Conclusion) -> float:
+    """Return how probable exactly the effects of the fit are; with what was refused at work they are not all."""
+    exactly = last.fit.probability_of_just({effect.name for effect, _ in last.fit.effects})
+    return min([exactly, *(1.0 - refused.probability for refused in last.refused.values())])
 
 
 def _gap(last: Conclusion, shrinkage: Shrinkage) -> Gap:
@@ -129,7 +140,7 @@ def _gap(last: Conclusion, shrinkage: Shrinkage) -> Gap:
     def rms(rows: NDArray[np.float64]) -> float:
         return float(np.sqrt((rows**2).sum(axis=1).mean()))
 
-    turned = before.shape[1] == 6
+    turned, schemes = before.shape[1] == 6, worst_folds(fit)
     return Gap(
         rms(before[:, :3]),
         rms(after[:, :3]),
@@ -138,7 +149,8 @@ def _gap(last: Conclusion, shrinkage: Shrinkage) -> Gap:
         shrinkage.overall,
         rms(before[:, 3:]) if turned else None,
         rms(after[:, 3:]) if turned else None,
-        worst_folds(fit),
+        schemes,
+        hardest(schemes, shrinkage.overall),
     )
 
 

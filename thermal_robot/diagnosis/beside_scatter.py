@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from thermal_robot.diagnosis.parts import Refused, Unexplained
 from thermal_robot.diagnosis.unlisted import as_laws_say
 from thermal_robot.diagnosis.where import without_laws
 from thermal_robot.effects import Effect
+from thermal_robot.inference import settings
 from thermal_robot.inference.discover import discovered
 from thermal_robot.inference.explain import explain
 from thermal_robot.inference.fit import Fit, refit
@@ -45,11 +47,16 @@ def beside_scatter(
     covariance = chance.scatter.covariance(fit.corrected.joint_sensitivity)
     linear = generalised(e.linear, covariance, chance.scatter.noise)
     noise = Noise(*(float(s) for s in chance.scatter.noise[::3]))
-    again = explain(linear, noise, families=fit.families)
-    kept = tuple(dict.fromkeys(fit.families[b] for b in again.best.blocks))
+    # of many rows each choice takes minutes: then only what was chosen is asked whether it stays
+    asked = range(len(linear.blocks)) if fit.campaign.samples <= settings.MANY_ROWS else e.best.blocks
+    linear = replace(linear, blocks=tuple(linear.blocks[b] for b in asked))
+    families = [item.effect.name for item in linear.blocks]
+    again = explain(linear, noise, families=families)
+    kept = {families[b] for b in again.best.blocks}
     feigned: dict[str, tuple[Effect, ...]] = {name: () for name in dict.fromkeys(fit.families) if name not in kept}
-    own = {name: fit.blocks_of(name) for name in feigned}
-    refused = {**refused, **{name: Refused(again.probability(blocks)) for name, blocks in own.items()}}
+    own = {name: [b for b, family in enumerate(families) if family == name] for name in feigned}
+    chances = {n: again.probability(blocks) if blocks else fit.probability(n) for n, blocks in own.items()}
+    refused = {**refused, **{name: Refused(probability) for name, probability in chances.items()}}
     fit = refit(fit, feigned, [linear.blocks[b].effect for b in again.best.blocks], progress)
     chance = random_gap(fit)
     covariance = chance.scatter.covariance(fit.corrected.joint_sensitivity)[:, :3, :3]

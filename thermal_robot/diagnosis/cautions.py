@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
 
 from thermal_robot.campaign import Campaign
-from thermal_robot.effects import Effect
+from thermal_robot.diagnosis.cancelling import cancelling, cancelling_within
+from thermal_robot.diagnosis.parts import Refused, Sensitivity
+from thermal_robot.diagnosis.signs import wrong_sides
+from thermal_robot.effects import Effect, gate
+from thermal_robot.effects.effect import UNSOURCED
 from thermal_robot.inference import settings
-from thermal_robot.inference.algebra import orthonormal, without
 from thermal_robot.inference.fit import Fit
 
 
@@ -60,7 +63,9 @@ def contradicted(campaign: Campaign) -> list[str]:
 
 
 def cautions(
-    fitted: Fit, considered: Sequence[Effect], refused: Mapping[str, float] = MappingProxyType({})
+    fitted: Fit,
+    refused: Mapping[str, Refused] = MappingProxyType({}),
+    sensitivity: Sensitivity | None = None,
 ) -> tuple[str, ...]:
     """Return warnings about the diagnosis, one sentence each.
 
@@ -68,10 +73,10 @@ def cautions(
     ----------
     fitted
         The final fit.
-    considered
-        The effects that were considered, if the user left some out; empty otherwise.
     refused
-        By effect that rows held out refused: what adding it brings there, as a share of their mean square.
+        By effect that was taken out again: why.
+    sensitivity
+        How far the verdict depends on the prior sizes.
     """
     notes = []
     campaign, e = fitted.campaign, fitted.explanation
@@ -79,30 +84,49 @@ def cautions(
     if campaign.noise_position is not None and remains < settings.STATED_TOO_LARGE * campaign.noise_position:
         times = campaign.noise_position / remains
         notes.append(f"the stated noise of position is {times:.1f} times what remains: it is stated too large")
-    for name, times in _cancelling(fitted):
+    read = {column for effect, _ in fitted.effects for column in gate.reads(effect, fitted.nominal)}
+    if read & set(campaign.derived):
+        notes.append(
+            "directions of approach were not recorded: they follow from the order of the rows, as of a robot that goes "
+            'straight from pose to pose; if it does not, write moves = "unknown" under [robot]'
+        )
+    notes += wrong_sides(fitted)
+    for effect, parameter, times in _outside(fitted):
+        notes.append(
+            f"{effect.title}: {parameter} is {times:.0f} times its expected size, which no robot is known to reach: it "
+            "may stand in for something else"
+        )
+    for name, times in cancelling_within(fitted):
         notes.append(
             f"parameters of {name} cancel each other: single ones do up to {times:.0f} times what all do together"
         )
-    for name, share in refused.items():
-        notes.append(f"rows held out are predicted no better with {name} (share {share:.1%}): not reported as found")
-    if considered:
-        notes.append("only these effects were considered: " + ", ".join(effect.name for effect in considered))
+    for pair in cancelling(fitted):
+        notes.append(f"{pair.words}; both are kept, and neither is to be believed by itself")
+    for name, why in refused.items():
+        if why.share is not None:
+            told = f"rows held out are predicted no better with {name} (share {why.share:.1%}): not reported as found"
+            notes.append(told)
+        if why.reason:
+            notes.append(why.reason)
+    notes += _fragile(sensitivity)
     return tuple(notes)
 
 
-def _cancelling(fitted: Fit) -> Iterator[tuple[str, float]]:
-    """Yield effects whose parameters cancel each other: name, and largest single contribution over the sum.
+def _fragile(sensitivity: Sensitivity | None) -> Iterator[str]:
+    """Say where the verdict stands and falls with the expected sizes of the effects."""
+    if sensitivity is None:
+        return
+    for chance, times in ((sensitivity.smaller, "a third of"), (sensitivity.larger, "three times")):
+        if chance < settings.FRAGILE:
+            yield f"with {times} the expected sizes of all effects this verdict would be improbable ({chance:.0e})"
 
-    Such parameters have no meaning one by one. Over part of a turn, for example, harmonics of low order are nearly
-    collinear. Contributions are taken with the unknown frames projected out.
-    """
+
+def _outside(fitted: Fit) -> Iterator[tuple[Effect, str, float]]:
+    """Yield parameters far outside sizes that stand on sources: effect, parameter, and times that size."""
     e = fitted.explanation
-    frames = e.linear.frames.reshape(e.linear.gap.size, e.linear.frames.shape[2])
-    basis = orthonormal(frames)
     for b, (effect, values) in zip(e.best.blocks, fitted.effects, strict=True):
-        moved = e.linear.blocks[b].columns.reshape(len(frames), -1) * values
-        moved = without(moved, basis)
-        whole = float(np.linalg.norm(moved.sum(axis=1)))
-        times = float(np.linalg.norm(moved, axis=0).max(initial=0.0)) / max(whole, settings.TINY)
-        if times > settings.CANCELLING:
-            yield effect.name, times
+        item, deviation = e.linear.blocks[b], np.sqrt(np.diag(e.values[b][1]))
+        sure = np.maximum(np.abs(values) - settings.SIGMAS_95 * deviation, 0.0) / item.sizes
+        for k in np.flatnonzero(sure > settings.OUTSIDE):
+            if effect.size_spread < UNSOURCED:
+                yield effect, item.parameters[k].name, float(np.abs(values[k]) / item.sizes[k])

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from threadpoolctl import threadpool_limits
@@ -11,15 +12,20 @@ from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.diagnosis.answer import Conclusion, answer
 from thermal_robot.diagnosis.beside_scatter import beside_scatter
 from thermal_robot.diagnosis.beside_steps import beside_steps
+from thermal_robot.diagnosis.cancelling import one_of_each
 from thermal_robot.diagnosis.cautions import usable
+from thermal_robot.diagnosis.data_faults import data_fault
+from thermal_robot.diagnosis.data_faults.misfit import another_motion, frames_alone
 from thermal_robot.diagnosis.examine import examine
 from thermal_robot.diagnosis.held_out import held_out
+from thermal_robot.diagnosis.parts import Misfit
 from thermal_robot.diagnosis.result import Diagnosis, told
+from thermal_robot.diagnosis.rippled import rippled
 from thermal_robot.diagnosis.schemes import worse_elsewhere
 from thermal_robot.diagnosis.unlisted import as_laws_say, one_more_law
 from thermal_robot.diagnosis.where import without_laws
 from thermal_robot.diagnosis.word import worth_their_word
-from thermal_robot.effects import Effect, choose, library
+from thermal_robot.effects import RANDOM, Effect, choose, library
 from thermal_robot.errors import CampaignError
 from thermal_robot.inference import settings
 from thermal_robot.inference.discover import discovered
@@ -69,28 +75,44 @@ def diagnose(
     candidates = choose(only, without, effects)
     everything = {*library(), *(effect.name for effect in (*effects, *candidates))}
     _check_priors(campaign, everything)
+
+    def asked(name: str) -> bool:
+        return name not in without and (not only or name in only)
+
     campaign, notes = usable(campaign)
     # matrices are small: threads that wait for each other cost several times what they bring, and the last bits
     with threadpool_limits(1):
-        last = _explained(fit(campaign, candidates, progress), progress)
+        last = _concluded(campaign, candidates, progress)
         shrinkage = held_out(last.fit, progress)
         progress("places")
         found = answer(
             last,
             shrinkage,
             candidates,
-            asked=lambda name: name not in without and (not only or name in only),
-            narrowed=len(candidates) < len(everything),
+            asked=asked,
+            left_out=sorted(name for name in {*everything, *RANDOM} if not asked(name)),
             notes=notes,
         )
     return told(found)
+
+
+def _concluded(campaign: Campaign, candidates: Sequence[Effect], progress: Callable[[str], None]) -> Conclusion:
+    """Explain the gap, unless robot and table do not belong together: a fault of the table comes before the robot's."""
+    fault = data_fault(campaign, progress)
+    if fault is not None:
+        return replace(frames_alone(campaign, candidates), misfit=Misfit(fault))
+    last = _explained(fit(campaign, candidates, progress), progress)
+    misfit = another_motion(last.fit)
+    return last if misfit is None else replace(frames_alone(campaign, candidates), misfit=misfit)
 
 
 def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
     """Let laws that nobody wrote down compete with the known effects, then ask what of the rest is random.
 
     One law after another joins the explanation, while each is worth its place and regions held out do not get worse.
+    Of effects that cancel each other one is kept.
     """
+    known, cancelled = one_of_each(rippled(known, progress), progress)
     stages = [known]
     most = settings.MOST_LAWS if known.campaign.samples < settings.MANY_ROWS else 1
     while len(stages) <= most:
@@ -103,8 +125,9 @@ def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
     # the first of several laws may go astray between the places that were measured, and the others set it right
     while len(stages) > 1 and worse_elsewhere(known, stages[-1]):
         stages.pop()
-    fit, refused = worth_their_word(stages[-1], progress)
-    fit, chance, refused = beside_steps(fit, random_gap(fit), refused, progress)
+    fit, more = one_of_each(stages[-1], progress)
+    fit, refused = worth_their_word(fit, progress)
+    fit, chance, refused = beside_steps(fit, random_gap(fit), {**cancelled, **more, **refused}, progress)
     if chance.explains_size:
         return beside_scatter(fit, chance, refused, progress)
     left, laws = examine(fit, progress), discovered(fit)

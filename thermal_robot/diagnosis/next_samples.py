@@ -109,7 +109,7 @@ class NextSamples:
         return pd.DataFrame(rows)
 
 
-def next_samples(fit: Fit, count: int = 10, pool: int = 400, seed: int = 0) -> NextSamples:
+def next_samples(fit: Fit, count: int = 10, pool: int = 400, seed: int = 0, loads: Sequence[float] = ()) -> NextSamples:
     """Choose the samples to measure next.
 
     Parameters
@@ -122,13 +122,15 @@ def next_samples(fit: Fit, count: int = 10, pool: int = 400, seed: int = 0) -> N
         Number of candidates from which they are chosen, see :func:`candidates`.
     seed
         Seed of the candidates; the same seed gives the same samples.
+    loads
+        Payloads beside none, kg, that candidates may carry where the campaign recorded none.
 
     Returns
     -------
     NextSamples
         Empty where no sample would be informative.
     """
-    offered = candidates(fit, pool, seed)
+    offered = candidates(fit, pool, seed, loads)
     leading, probability = _leading(fit)
     models = _expected(fit, observe(offered, fit.corrected.frames), leading)
     chosen, pairs, gains = _chosen(models, probability, min(count, pool))
@@ -150,14 +152,14 @@ def next_samples(fit: Fit, count: int = 10, pool: int = 400, seed: int = 0) -> N
     return NextSamples(samples, offered.take(np.array(chosen, dtype=np.int64)))
 
 
-def candidates(fit: Fit, pool: int = 400, seed: int = 0) -> Campaign:
+def candidates(fit: Fit, pool: int = 400, seed: int = 0, loads: Sequence[float] = ()) -> Campaign:
     """Draw samples that could be measured next: a campaign without measurements.
 
     Joint positions are uniform within the limits, and within 2.4 rad for a joint that can turn once round; the
     range of the campaign is always included. Temperatures are the campaign's lowest and highest, and 5 K beyond them,
-    alike for all links. Payloads are those of the campaign. Joints are approached from either side. Times follow the
-    campaign, for as long as it lasted. Other columns are copied from a random row; torques and encoder readings from
-    the row with the nearest pose.
+    alike for all links. Payloads are those of the campaign, or none and ``loads`` where these are given. Joints are
+    approached from either side. Times follow the campaign, for as long as it lasted. Other columns are copied from a
+    random row; torques and encoder readings from the row with the nearest pose.
     """
     from scipy.spatial import cKDTree
 
@@ -183,6 +185,8 @@ def candidates(fit: Fit, pool: int = 400, seed: int = 0) -> Campaign:
             covariates[name] = np.ceil(after) if kind == "order" else after
         else:
             covariates[name] = values[alike if kind in _GIVEN else rows]
+    if loads:
+        covariates["payload"] = rng.choice([0.0, *loads], pool)
     # orientation only says what is measured; the simulator knows nothing of new poses, and columns do not ask it
     return replace(
         campaign.take(rows),

@@ -12,7 +12,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.diagnosis.parts import Explained, Place
+from thermal_robot.diagnosis import settings
+from thermal_robot.diagnosis.explained import Explained, Place
 from thermal_robot.diagnosis.where import locate
 from thermal_robot.effects import Effect, Parameter
 from thermal_robot.effects.channel import by_place, sensitivity
@@ -20,9 +21,9 @@ from thermal_robot.effects.effect import Channel, Driver
 from thermal_robot.effects.gate import driver
 from thermal_robot.effects.quantities import quantities, unit
 from thermal_robot.errors import EffectError
-from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.fit import Fit
+from thermal_robot.inference.settings import FEW_LEVELS, TINY
 from thermal_robot.observations import Observations
 
 Array = NDArray[np.float64]
@@ -80,7 +81,7 @@ def _shown(
         name,
         name_unit,
         values,
-        len(np.unique(values)) <= settings.FEW_LEVELS,
+        len(np.unique(values)) <= FEW_LEVELS,
         unit,
         error + after,
         after,
@@ -147,13 +148,13 @@ def _unsteady(values: Array, error: Array) -> float:
 def _line(values: Array, error: Array) -> Array:
     """(2, k) the fitted law over its quantity; means of neighbouring rows where it depends on others, too."""
     levels = np.unique(values)
-    if len(levels) <= settings.FEW_LEVELS:
+    if len(levels) <= FEW_LEVELS:
         return np.array([levels, [error[values == level].mean() for level in levels]])
     order = np.argsort(values, kind="stable")
     x, y = values[order], error[order]
     # a law of this quantity alone lies between its neighbours
     between = np.interp(x[1:-1:2], x[::2], y[::2])[: len(x[1:-1:2])]
-    alone = float(np.abs(between - y[1:-1:2]).mean()) < settings.ROUGH * float(np.ptp(y)) + settings.TINY
+    alone = float(np.abs(between - y[1:-1:2]).mean()) < settings.ROUGH * float(np.ptp(y)) + TINY
     parts = np.array_split(
         order,
         min(len(order), settings.DENSE_POINTS)

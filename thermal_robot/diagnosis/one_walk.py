@@ -39,7 +39,8 @@ class Model:
     linear
         Gap, frames and the blocks of the model, K columns in all.
     scales
-        Per block: prior standard deviation of its parameters, in their expected sizes.
+        Per block: prior standard deviation of its parameters, in their expected sizes; one for all, or (P,) with next
+        to none where one is held at zero.
     whitening
         Weights and noise of all rows; a fit to some rows whitens those alone.
     variance
@@ -56,7 +57,7 @@ class Model:
     """
 
     linear: Linear
-    scales: tuple[float, ...]
+    scales: tuple[Array | float, ...]
     whitening: Whitening
     variance: float
     kept: Rows
@@ -71,7 +72,8 @@ class Model:
         ``further`` blocks, with the scale of each, come after its own.
         """
         e = explanation
-        scales = {**{b: e.best.scales[b] for b in e.best.blocks}, **(further or {})}
+        own = {b: e.held(b) / e.linear.blocks[b].sizes for b in e.best.blocks}
+        scales: dict[int, Array | float] = {**own, **(further or {})}
         linear = Linear(e.linear.gap, e.linear.frames, tuple(e.linear.blocks[b] for b in scales))
         return cls(linear, tuple(scales.values()), e.whitening, e.best.noise**2, ~e.outliers, block)
 
@@ -82,8 +84,9 @@ class Model:
         as noise: a smooth discrepancy is small beside it, and how positions compare with orientations is not what the
         noise says. At the corrected robot frames that are aliases could seem apart, and would stretch without measure.
         """
-        sizes = [float(np.sqrt(np.mean((v / b.sizes) ** 2))) for v, b in zip(values, nominal.blocks, strict=True)]
-        scales = tuple(max(size, settings.LEAST_HELD) for size in sizes)
+        pairs = list(zip(values, nominal.blocks, strict=True))
+        sizes = [float(np.sqrt(np.mean((v / b.sizes) ** 2))) for v, b in pairs]
+        scales = tuple(max(size, settings.LEAST_HELD) * b.kept(v) for size, (v, b) in zip(sizes, pairs, strict=True))
         whitening = replace(self.whitening, smooth=None)
         return replace(self, linear=nominal, scales=scales, whitening=whitening, apart=True, seen={})
 

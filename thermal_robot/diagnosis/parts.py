@@ -10,9 +10,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.effects.effect import in_words
+from thermal_robot.effects.law_size import Size
 
 Array = NDArray[np.float64]
-Status = Literal["found", "not_found", "not_testable", "confounded"]
+Status = Literal["found", "not_found", "not_testable", "confounded", "contained"]
 
 
 @dataclass(frozen=True)
@@ -49,10 +50,11 @@ class Finding:
     name
         The effect's name.
     status
-        ``found``, ``not_found``, ``not_testable`` or ``confounded``.
+        ``found``, ``not_found``, ``not_testable``, ``confounded``, or ``contained``: a part of a larger effect that was
+        found, in ``confounded_with``.
     probability
         Posterior probability that it is at work; of a discovered law, that one of this quantity is at work at this
-        place. ``None`` where it is not testable.
+        place; of one contained, that the larger one is. ``None`` where it is not testable.
     shrinkage, shrinkage_ci95
         Its share of the gap's mean square on held-out rows, noise included, and the 95 % interval. For an effect of the
         fit it is the Shapley value, and these sum to the overall shrinkage; for another the gain from adding it.
@@ -64,13 +66,18 @@ class Finding:
     locations
         Places where it acts, largest share first.
     parameters
-        Its estimates; empty if it is not part of the fit.
+        Its estimates; empty if it is neither part of the fit nor contained.
+    unseen
+        Names of parameters of which the data see nothing, or nothing beside the others.
     quantity, shape, describes
         Only of a discovered law: the quantity that it follows, the shape, and a sentence about it.
+    size, usually
+        Only of a discovered law: how much it changes over the rows that were measured, and what a law of that place and
+        quantity usually is, in words; ``None`` where nobody can say.
     of
         Only of a discovered law that is a known effect whose size follows the quantity: that effect's name.
     title
-        The effect in plain words.
+        The effect in plain words; of a discovered law a short name.
     random
         Whether it is random, so that no correction can remove it.
     """
@@ -84,9 +91,12 @@ class Finding:
     confounded_with: tuple[str, ...] = ()
     locations: tuple[Location, ...] = ()
     parameters: tuple[Estimate, ...] = ()
+    unseen: tuple[str, ...] = ()
     quantity: str | None = None
     shape: str | None = None
     describes: str | None = None
+    size: tuple[Size, ...] = ()
+    usually: str | None = None
     of: str | None = None
     title: str = ""
     random: bool = False
@@ -96,11 +106,55 @@ class Finding:
 class Refused:
     """An effect that was taken out of the fit again: its probability, and what it brings rows held out as a share.
 
-    The share is ``None`` where it is the scatter of joints that had feigned it.
+    The share is ``None`` where it is the scatter of joints that had feigned it, or where another effect stands for it;
+    ``reason`` is a sentence that tells a reader why, or empty.
     """
 
     probability: float
     share: float | None = None
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class DataFault:
+    """A fault of the table, not of the robot, that alone makes robot and table fit.
+
+    Attributes
+    ----------
+    kinds
+        What kinds of faults it may be: those that the data cannot tell apart.
+    what, remedy
+        What is wrong and what to do about it, in plain words without a full stop; alternatives stand side by side.
+    rms_before, rms_after
+        Rms distance over the rows struck, once frames are registered, as they stand and mended, m. Where orientations
+        are measured their turns count in it.
+    rows
+        Numbers in the file of the rows that it struck; empty where it struck all.
+    """
+
+    kinds: tuple[str, ...]
+    what: str
+    remedy: str
+    rms_before: float
+    rms_after: float
+    rows: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """Robot and table do not belong together, so that nothing is said of the robot.
+
+    Attributes
+    ----------
+    fault
+        The fault of the table that would mend it; ``None`` where none does.
+    away, turned
+        Where none does: rms distance, m, or rms turn, rad, that the best explanation leaves; ``None`` for what fits.
+    """
+
+    fault: DataFault | None = None
+    away: float | None = None
+    turned: float | None = None
 
 
 def is_frame(found: Sequence[Finding], name: str) -> bool:
@@ -174,7 +228,11 @@ class FoldScheme:
 
 @dataclass(frozen=True)
 class Gap:
-    """Rms distances in m over the rows that are not outliers; of orientation in rad, ``None`` if not measured."""
+    """Rms distances in m over the rows that are not outliers; of orientation in rad, ``None`` if not measured.
+
+    ``schemes`` are other ways of holding rows out, the hardest first; ``hardest`` is the first of them where it leaves
+    clearly more than ``held_out`` does, else ``None``.
+    """
 
     rms_before: float
     rms_after: float
@@ -184,6 +242,7 @@ class Gap:
     orientation_before: float | None = None
     orientation_after: float | None = None
     schemes: tuple[FoldScheme, ...] = ()
+    hardest: FoldScheme | None = None
 
 
 @dataclass(frozen=True)
@@ -246,6 +305,38 @@ class Unexplained:
     depends_on: tuple[Dependence, ...] = ()
 
 
+@dataclass(frozen=True)
+class Wanted:
+    """The one thing that would help most.
+
+    Attributes
+    ----------
+    kind
+        ``column``: to be recorded; ``frame``: to be measured and declared known; ``pose``: to be measured; ``range``:
+        poses over the whole range of every joint; ``repeats``: poses repeated on another day.
+    name
+        Of the column (of repeats: that labels them), or of the frame as the campaign declares it; empty elsewhere.
+    apart
+        Effects that this tells apart.
+    untested, whether
+        Effects that could then be tested; and the cause that a column would show or rule out, in a word.
+    place, follows
+        Of a remainder that a column would tell of: where it enters, and what it follows; empty where not known.
+    position, conditions
+        Of a pose: joint positions by name, rad or m, and further columns, SI.
+    """
+
+    kind: Literal["column", "frame", "pose", "range", "repeats"]
+    name: str = ""
+    apart: tuple[str, ...] = ()
+    untested: tuple[str, ...] = ()
+    whether: str = ""
+    place: str = ""
+    follows: str = ""
+    position: Mapping[str, float] = field(default_factory=dict)
+    conditions: Mapping[str, float] = field(default_factory=dict)
+
+
 @dataclass(frozen=True, eq=False)
 class Rows:
     """The data of the figures, one row per measurement, N rows.
@@ -288,65 +379,3 @@ class Sensitivity:
 
     smaller: float
     larger: float
-
-
-@dataclass(frozen=True, eq=False)
-class Place:
-    """One place where an effect acts, n rows.
-
-    Attributes
-    ----------
-    kind, name
-        ``joint`` and its name, and so on.
-    share
-        Share of the effect's contribution that enters here, 0..1.
-    quantity, quantity_unit
-        What drives the effect here.
-    values
-        (n,) of that quantity, SI.
-    levels
-        Whether it takes a few values only.
-    unit
-        Of the error: ``rad`` or ``m`` at the place; ``m at the tool`` where the error both shifts and turns.
-    before, after, spread
-        (n,) the error with the effect left in, without it, and one sigma of noise of both.
-    line
-        (2, k) the fitted law: quantity and error.
-    """
-
-    kind: str
-    name: str
-    share: float
-    quantity: str
-    quantity_unit: str
-    values: Array
-    levels: bool
-    unit: str
-    before: Array
-    after: Array
-    spread: Array
-    line: Array
-
-    @property
-    def words(self) -> str:
-        """The place with its kind, unless its name says it already."""
-        return in_words(self.kind, self.name)
-
-
-@dataclass(frozen=True, eq=False)
-class Explained:
-    """What one effect explains.
-
-    Attributes
-    ----------
-    effect
-        Its name.
-    places
-        Places with a share worth drawing, largest first.
-    left_out
-        Number of further places.
-    """
-
-    effect: str
-    places: tuple[Place, ...]
-    left_out: int

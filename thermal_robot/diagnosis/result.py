@@ -15,13 +15,13 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from thermal_robot.correction import CorrectedModel
-from thermal_robot.diagnosis.parts import Finding, Gap, Rows, Sensitivity, Unexplained, Where, is_frame
+from thermal_robot.diagnosis.parts import Finding, Gap, Misfit, Rows, Sensitivity, Unexplained, Wanted, Where, is_frame
 
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.next_samples import NextSamples
     from thermal_robot.inference.fit import Fit
 
-SCHEMA = "thermal-robot/diagnosis/1"
+SCHEMA = "thermal-robot/diagnosis/2"
 
 
 class Teller(Protocol):
@@ -96,10 +96,14 @@ class Diagnosis:
         alone; ``None`` where the two are the same.
     reach
         Diagonal of the measured volume, m.
-    narrowed
-        Whether effects were left out by request.
+    left_out
+        Names of the effects that were left out by request.
+    wanted
+        What to measure or to record next; ``None`` where nothing is needed.
     sensitivity, fit
         How far the verdict depends on the prior sizes; the fit behind the diagnosis.
+    misfit
+        Why nothing can be said of the robot: robot and table do not belong together; ``None`` where they do.
     """
 
     campaign: str
@@ -123,9 +127,21 @@ class Diagnosis:
     warnings: tuple[str, ...] = field(default=())
     remaining: Unexplained | None = None
     reach: float = float("inf")
-    narrowed: bool = False
+    left_out: tuple[str, ...] = ()
+    wanted: Wanted | None = None
     sensitivity: Sensitivity | None = None
     fit: Fit | None = None
+    misfit: Misfit | None = None
+
+    @property
+    def usable(self) -> bool:
+        """Whether robot and table describe the same motion, so that something can be said of the robot."""
+        return self.misfit is None
+
+    @property
+    def reason(self) -> str:
+        """What is wrong with the table, and which remedy fits; empty where it is usable."""
+        return "" if self.usable else f"{self.summary} {self.advice}"
 
     def explain(self, effect: str) -> Any:
         """Draw the residual with and without one effect, against the quantity that drives it, place by place.
@@ -159,6 +175,11 @@ class Diagnosis:
             raise ValueError("this diagnosis was made without its fit")
         return self.fit
 
+    @property
+    def narrowed(self) -> bool:
+        """Whether effects were left out by request."""
+        return bool(self.left_out)
+
     def finding(self, effect: str) -> Finding:
         """Return the finding of one effect; ``KeyError`` for a name that was not a candidate."""
         return {f.name: f for f in self.effects}[effect]
@@ -173,7 +194,7 @@ class Diagnosis:
         return is_frame(self.effects, effect)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the JSON object of the format ``thermal-robot/diagnosis/1``."""
+        """Return the JSON object of the format ``thermal-robot/diagnosis/2``."""
         left = self.unexplained
         plain: dict[str, Any] = {
             "schema": SCHEMA,
@@ -188,9 +209,12 @@ class Diagnosis:
             ),
             "gap": _gap_as_json(self.gap),
             "verdict": {
+                "usable": self.usable,
+                "reason": self.reason,
                 "effects": self.verdict,
                 "probability": self.probability,
                 "unexplained": left.flagged,
+                "left_out": self.left_out,
                 "summary": self.summary,
                 "if_prior_sizes": None if self.sensitivity is None else asdict(self.sensitivity),
             },
@@ -208,7 +232,7 @@ class Diagnosis:
         return dict(_jsonable(plain))
 
     def _samples(self) -> list[dict[str, Any]]:
-        return [] if self.fit is None else self.next_samples().to_list()
+        return [] if self.fit is None or not self.usable else self.next_samples().to_list()
 
     def to_json(self, path: str | Path) -> None:
         """Write :meth:`to_dict` to a file."""
@@ -236,6 +260,7 @@ def _gap_as_json(gap: Gap) -> dict[str, Any]:
         "orientation": orientation,
         "held_out": asdict(gap.held_out),
         "schemes": [asdict(scheme) for scheme in gap.schemes],
+        "hardest": None if gap.hardest is None else gap.hardest.name,
     }
 
 

@@ -7,7 +7,7 @@ from all rows is said at :func:`~thermal_robot.diagnosis.held_out.held_out`.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis.one_walk import Model, Walk, deviation
-from thermal_robot.diagnosis.parts import FoldScheme
+from thermal_robot.diagnosis.parts import FoldScheme, HeldOut
 from thermal_robot.inference import settings
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.rows import blocks, each, neighbourhoods
@@ -45,6 +45,11 @@ def worst_folds(fit: Fit) -> tuple[FoldScheme, ...]:
     plain = model.bare(fit.before)
     found = [_judged(plain, model, *scheme) for scheme in schemes(fit)]
     return tuple(sorted((f for f in found if f is not None), key=lambda f: -f.rms_after))
+
+
+def hardest(schemes: Sequence[FoldScheme], average: HeldOut) -> FoldScheme | None:
+    """Return the least favourable scheme where it leaves clearly more than the average; ``None`` where it does not."""
+    return next((s for s in schemes[:1] if s.rms_after > settings.HARDER * average.rms_after), None)
 
 
 def worse_elsewhere(narrow: Fit, wider: Fit) -> bool:

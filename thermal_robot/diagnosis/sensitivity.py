@@ -6,8 +6,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from thermal_robot.diagnosis import settings
 from thermal_robot.diagnosis.parts import Sensitivity
-from thermal_robot.inference import settings
 from thermal_robot.inference.explain import log_priors
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.search import Search
@@ -16,9 +16,9 @@ from thermal_robot.inference.search import Search
 def prior_sensitivity(fit: Fit) -> Sensitivity:
     """Recompute the probability of the verdict with all prior sizes divided and multiplied by ``PRIOR_FACTOR``.
 
-    The scale of each effect is learnt from the data, with the prior ln λ ~ N(0, 1.5²) about the stated size. The
-    verdict should therefore depend little on the stated sizes; where it does, the data do not decide. The leading
-    combinations alone are compared.
+    The scale of each effect is learnt from the data, with a prior about the stated size that is as wide as its size is
+    unknown (:attr:`~thermal_robot.effects.Effect.size_spread`). The verdict should therefore depend little on the
+    stated sizes; where it does, the data do not decide. The leading combinations alone are compared.
     """
     e = fit.explanation
     problem = e.problem

@@ -1,4 +1,4 @@
-"""Every number that was chosen to propose what to measure next: its value, its unit, and why that one."""
+"""Every number that was chosen to weigh a verdict again, to draw an effect, and to propose what to measure next."""
 
 LEADING, MOST_LEADING = 0.01, 4
 """Probability of an explanation that is to be told apart, and how many are."""
@@ -16,3 +16,20 @@ TIE = 1e-3
 """Weight of the information on parameters beside that on explanations, when samples are proposed: it breaks ties."""
 FEW_PAYLOADS = 6
 """A campaign with no more payloads than this is offered these; another its lightest and heaviest."""
+LOAD, PAYS, TRIAL = 2.0, 1.3, 10
+"""kg that nearly every arm carries, offered where no payload was recorded; times what poses without it tell, less is
+not worth a second set-up; and of how many samples that is asked."""
+WRONG_SIDE, INSISTS = 3.0, 7.0
+"""Standard deviations from which a parameter is on the side where it cannot be, and the natural logarithm, 1 in 1000,
+by which an explanation with such ones must be more probable than any other for that to be told."""
+PRIOR_FACTOR, COMPARED = 3.0, 8
+"""Factor of all prior sizes, down and up, under which the verdict is weighed again, and among how many explanations."""
+MATERIAL_PLACE, MOST_PLACES = 0.03, 8
+"""Of an effect's work: a place with less is not drawn; and how many are."""
+LINE_POINTS, ROUGH, DENSE_POINTS, ROWS_A_POINT = 25, 0.01, 400, 10
+"""Points of a drawn law; of its range, the roughness below which it follows one quantity alone, its points then, and
+rows that a point stands for otherwise."""
+ROWS_ALIKE = 8
+"""Rows that are taken together when asking whether an error follows a quantity."""
+PURE = 1e-6
+"""Of a unit twist, m or rad: with less of one kind it is all of the other."""

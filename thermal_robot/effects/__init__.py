@@ -1,6 +1,7 @@
 """Every effect in a file of its own; the library of all of them, and the user's own through entry points."""
 
 from thermal_robot.effects.backlash import Backlash
+from thermal_robot.effects.base_compliance import BaseCompliance
 from thermal_robot.effects.base_frame import BaseFrame
 from thermal_robot.effects.catalogue import RANDOM, choose, library, random_effects
 from thermal_robot.effects.drift import Drift
@@ -32,6 +33,7 @@ from thermal_robot.effects.transmission_error import TransmissionError
 __all__ = [
     "RANDOM",
     "Backlash",
+    "BaseCompliance",
     "BaseFrame",
     "Drift",
     "Effect",

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from thermal_robot.effects.effect import TWIST, Effect, Parameter, at_base
+from thermal_robot.effects.effect import TWIST, UNSOURCED, Effect, Parameter, at_base
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -24,6 +24,7 @@ class BaseFrame(Effect):
 
     name: ClassVar[str] = "base_frame"
     title: ClassVar[str] = "a misplaced base frame"
+    size_spread: ClassVar[float] = UNSOURCED
     contained_in: ClassVar[tuple[str, ...]] = ("geometric",)
     frame: ClassVar[str] = "base"
 

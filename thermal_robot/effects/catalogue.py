@@ -10,6 +10,7 @@ from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 
 from thermal_robot.effects.backlash import Backlash
+from thermal_robot.effects.base_compliance import BaseCompliance
 from thermal_robot.effects.base_frame import BaseFrame
 from thermal_robot.effects.drift import Drift
 from thermal_robot.effects.effect import Effect
@@ -20,6 +21,7 @@ from thermal_robot.effects.instrument_scale import InstrumentScale
 from thermal_robot.effects.joint_compliance import JointCompliance
 from thermal_robot.effects.joint_gain import JointGain
 from thermal_robot.effects.joint_offset import JointOffset
+from thermal_robot.effects.joint_ripple import JointRipple
 from thermal_robot.effects.link_compliance import LinkCompliance
 from thermal_robot.effects.random_effect import RandomEffect
 from thermal_robot.effects.thermal_bending import ThermalBending
@@ -35,11 +37,13 @@ _SYSTEMATIC: tuple[type[Effect], ...] = (
     JointOffset,
     JointGain,
     TransmissionError,
+    JointRipple,
     Backlash,
     JointCompliance,
     TrackingLag,
     Geometric,
     LinkCompliance,
+    BaseCompliance,
     ThermalElongation,
     ThermalBending,
     Drift,

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from thermal_robot.effects.effect import TWIST, Array, Driver, Effect, Parameter, at_base
+from thermal_robot.effects.effect import TWIST, UNSOURCED, Array, Driver, Effect, Parameter, at_base
 from thermal_robot.effects.quantities import driving
 
 if TYPE_CHECKING:
@@ -37,6 +37,7 @@ class Drift(Effect):
 
     name: ClassVar[str] = "drift"
     title: ClassVar[str] = "drift of the base or the instrument"
+    size_spread: ClassVar[float] = UNSOURCED
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return ``time`` unless time or order varies."""

@@ -70,7 +70,21 @@ def _is_what_it_holds(effect: Any) -> bool:
 
 def _parameters(effect: Effect, observations: Observations) -> tuple[Parameter, ...]:
     """Return all parameters of an effect, seen to keep the contract."""
-    answer = _asked(effect, "parameters", observations)
+    return _seen(effect, _asked(effect, "parameters", observations), observations)
+
+
+def independent(effect: Effect, observations: Observations) -> tuple[Parameter, ...]:
+    """Return the parameters in which an effect is told (:meth:`Effect.independent`), once they keep the contract.
+
+    Raises
+    ------
+    EffectError
+        Otherwise; see :func:`checked`.
+    """
+    return _seen(effect, _asked(effect, "independent", observations), observations)
+
+
+def _seen(effect: Effect, answer: Any, observations: Observations) -> tuple[Parameter, ...]:
     if not isinstance(answer, (tuple, list)):
         raise EffectError(f"effect {effect.name!r} answers {type(answer).__name__}, expected a tuple of Parameter")
     names = set()
@@ -265,6 +279,8 @@ def _wrong(parameter: Any, observations: Observations) -> str:
         return f"kind is {parameter.kind!r}, expected one of {', '.join(KINDS)}"
     if not isinstance(parameter.size, Real) or not 0.0 < float(parameter.size) < np.inf:
         return f"size is {parameter.size!r}, expected a finite number above 0"
+    if not isinstance(parameter.positive, bool):
+        return f"positive is {parameter.positive!r}, expected True or False"
     if not isinstance(parameter.responses, (tuple, list)):
         return f"responses are {type(parameter.responses).__name__}, expected a tuple of Response"
     wrong = next((wrong for r in parameter.responses if (wrong := _wrong_response(r, observations))), "")

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, at_instrument
+from thermal_robot.effects.effect import UNSOURCED, Array, Driver, Effect, Parameter, at_instrument
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -26,6 +26,7 @@ class InstrumentScale(Effect):
 
     name: ClassVar[str] = "instrument_scale"
     title: ClassVar[str] = "a scale error of the instrument"
+    size_spread: ClassVar[float] = UNSOURCED
     contained_in: ClassVar[tuple[str, ...]] = ("geometric",)
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:

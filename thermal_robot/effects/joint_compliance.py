@@ -29,7 +29,9 @@ class JointCompliance(Effect):
 
     τ_j (N·m) is the torque that holds the joint against gravity (Pinocchio's sign): from the URDF's inertias and the
     payload, or ``torque.<joint>`` where the robot reports it. c_j in rad/(N·m). Expected size: a wind-up of 1 mrad at
-    the largest torque that the campaign puts on any joint, which is what harmonic drives are rated for.
+    the largest torque that the campaign puts on any joint. Reducers' catalogues state 1e4 to 1e6 N·m/rad for the sizes
+    of industrial arms, 1 to 100 µrad/(N·m). A servo without integral part droops by the same law, by up to 30 mrad on
+    light arms.
 
     Where the URDF has no masses and no torque is reported, the weights are free. Holding torques are linear in the
     bodies' masses and first moments, so that c_j τ_j = Σ_k w_jk s_jk(q), with shapes s_jk known from the kinematics
@@ -53,8 +55,10 @@ class JointCompliance(Effect):
     weights: tuple[float, ...] = ()
 
     name: ClassVar[str] = "joint_compliance"
-    title: ClassVar[str] = "joints that yield to load"
+    title: ClassVar[str] = "joints that yield to load (gear or servo)"
     singular: ClassVar[str] = "a yielding to load"
+    if_negative: ClassVar[str] = "the sign of torque.* is reversed, or gravity points up"
+    size_spread: ClassVar[float] = 1.0
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return what would give torques, where neither these nor the shape of gravity's vary."""
@@ -100,7 +104,15 @@ class JointCompliance(Effect):
             size = _WIND_UP / max(float(np.abs(torque).max()), 1e-9)
             units = {"rad": "rad/(N·m)", "m": "m/N"}
             found += [
-                Parameter("compliance", units[unit(robot, joint)], size, "joint", joint, (at_joint(j, -torque[:, j]),))
+                Parameter(
+                    "compliance",
+                    units[unit(robot, joint)],
+                    size,
+                    "joint",
+                    joint,
+                    (at_joint(j, -torque[:, j]),),
+                    positive=True,
+                )
                 for j, joint in enumerate(names)
             ]
         return tuple(found)

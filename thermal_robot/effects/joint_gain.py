@@ -17,7 +17,8 @@ if TYPE_CHECKING:
 class JointGain(Effect):
     """Every joint moves by a little more or less than commanded: q_actual = q_command + g_j q_command.
 
-    Expected size 5e-4: a belt's pitch, a ball screw's lead or a mis-set ratio, where the encoder sits on the motor.
+    Expected size 5e-4, and seldom above 1e-3: a belt's pitch, a ball screw's lead or a mis-set ratio, where the encoder
+    sits on the motor.
     Over a small range of a joint it cannot be told from one period of :class:`TransmissionError`.
     """
 

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, at_joint
+from thermal_robot.effects.effect import UNSOURCED, Array, Driver, Effect, Parameter, at_joint
 from thermal_robot.effects.quantities import position_of, unit
 
 if TYPE_CHECKING:
@@ -21,13 +21,16 @@ class JointOffset(Effect):
     (Mooring, Roth and Driels, *Fundamentals of Manipulator Calibration*, 1991).
 
     The first joint's offset is exactly a turn of the base about that joint's axis, and the last one's a turn of the
-    tool: with unknown frames neither can be told. All offsets are contained in :class:`Geometric`.
+    tool: with unknown frames neither can be told. All offsets are contained in :class:`Geometric`; where that
+    was found, they are what a controller's zeros can take of it.
     """
 
     name: ClassVar[str] = "joint_offset"
     title: ClassVar[str] = "joint zero offsets"
     singular: ClassVar[str] = "a zero offset"
+    size_spread: ClassVar[float] = UNSOURCED
     contained_in: ClassVar[tuple[str, ...]] = ("geometric",)
+    told_inside: ClassVar[bool] = True
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """One offset a joint; rad or m."""

@@ -15,6 +15,7 @@ from thermal_robot.effects import gate
 from thermal_robot.effects.catalogue import restored
 from thermal_robot.effects.effect import (
     TWIST,
+    UNSOURCED,
     Array,
     Driver,
     Effect,
@@ -79,6 +80,7 @@ class Discovered(Effect):
     """
 
     title: ClassVar[str] = "an unlisted law"
+    size_spread: ClassVar[float] = UNSOURCED
     name: str = PREFIX + "1"  # type: ignore[misc]
     kind: str = "joint"
     place: str = ""
@@ -282,18 +284,33 @@ class Discovered(Effect):
         how = SHAPES[self.shape].words.format(mark=self._marked(mark), order=mark)
         if self.shape == "harmonic" and self.unit == SI.length:
             how = f"a wave of {2.0 * np.pi / mark:.4g} {self.unit}"
+        follows = "its position" if (self.kind, self.place) == ("joint", self.quantity) else self.quantity
         if self.modulated is not None:
-            return f"{self.modulated.singular} in {at} that changes with {self.quantity} ({how})"
+            return f"{self.modulated.singular} in {at} that changes with {follows} ({how})"
         if self.shape == "constant":
             return f"a constant error at {at}"
+        if self.labels and not self.by:
+            return (
+                f"{f'the zero of {at} is another' if self.kind == 'joint' else f'{at} stands elsewhere'} {self._when()}"
+            )
+        if self.kind != "joint" and self.runs and self.shape == "step":
+            return f"{at} stands elsewhere from session {self.runs[1]} on"
         if self.by:
-            return f"an error at {at} that follows {self.quantity} times {self.by} ({how})"
+            return f"an error at {at} that follows {follows} times {self.by} ({how})"
         if (self.kind, self.shape) == ("joint", "step") and self.quantity in CLOCK:
             between = f", between session {self.runs[0]} and {self.runs[1]}" if self.runs else ""
             return f"the zero of {at} jumped at {self.quantity} {_whole(mark)} {self.unit}".rstrip() + between
         if self.quantity.startswith(TURN):
             return f"an error at {at} that follows how far it has gone since it last turned round ({how})"
-        return f"an error at {at} that follows {self.quantity} ({how})"
+        return f"an error at {at} that follows {follows} ({how})"
+
+    def _when(self) -> str:
+        """Say at which labels of its quantity it is another than elsewhere."""
+        if self.shape == "apart":
+            return f"in {self.quantity} {self.labels[int(self.marks[0])]}"
+        if len(self.labels) == 2:
+            return f"in {self.quantity} {self.labels[1]} than in {self.labels[0]}"
+        return f"in each {self.quantity}"
 
     def _marked(self, mark: float, digits: int = 3) -> str:
         return f"{mark:.{digits}g} {self.unit}".rstrip().replace("-", "−")
@@ -314,12 +331,12 @@ def _whole(mark: float) -> str:
 
 
 def _times(parameter: Parameter, function: Array, label: str) -> Parameter:
-    """Return a parameter whose unit response is multiplied by an (N,) function."""
+    """Return a parameter whose unit response is multiplied by an (N,) function; it may have either sign."""
     responses = tuple(
         replace(r, values=r.values * (function if r.channel == "joint" else function[:, None]))
         for r in parameter.responses
     )
-    return replace(parameter, label=f"{parameter.label}, {label}", responses=responses)
+    return replace(parameter, label=f"{parameter.label}, {label}", responses=responses, positive=False)
 
 
 def _literal(value: object) -> str:

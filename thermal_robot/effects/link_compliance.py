@@ -41,11 +41,17 @@ class LinkCompliance(Effect):
 
     name: ClassVar[str] = "link_compliance"
     title: ClassVar[str] = "links that bend under load"
+    if_negative: ClassVar[str] = "gravity points up"
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
-        """Return what would give a load, unless one that bends a segment varies."""
-        varying = any(np.ptp(turn) > _STEADY for s in beams(observations.robot) for turn, _ in _yields(observations, s))
-        return () if varying else ("payload", "masses in the URDF")
+        """Return what would give a load, unless one that bends a segment varies.
+
+        Where the arm's own masses are not known, what a payload bends it by stands in for their share, too.
+        """
+        varying = observations.robot.has_masses and any(
+            np.ptp(turn) > _STEADY for s in beams(observations.robot) for turn, _ in _yields(observations, s)
+        )
+        return () if varying else ("masses in the URDF",)
 
     def reads(self, observations: Observations) -> tuple[str, ...]:
         """Return the payload where it was recorded."""
@@ -64,7 +70,8 @@ class LinkCompliance(Effect):
                 across = np.concatenate([np.cross(axes[k], segment.direction), axes[k]])
                 twist = np.column_stack([np.repeat(shift[:, None], 3, 1), np.repeat(turn[:, None], 3, 1)]) * across
                 label = f"bending compliance of {segment.name}, axis {k + 1}"
-                found.append(Parameter(label, "1/(N·m²)", size, "link", segment.parent_link, (at_segment(s, twist),)))
+                response = (at_segment(s, twist),)
+                found.append(Parameter(label, "1/(N·m²)", size, "link", segment.parent_link, response, positive=True))
         return tuple(found)
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:

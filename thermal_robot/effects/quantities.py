@@ -9,7 +9,9 @@ import numpy as np
 
 from thermal_robot.campaign.turning import strained
 from thermal_robot.campaign.units import SI, unit_of
+from thermal_robot.effects import settings
 from thermal_robot.effects.effect import Array, Driver
+from thermal_robot.effects.resolution import resolution, varies, without_twins
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -31,17 +33,25 @@ def unit(robot: Robot, name: str) -> str:
 
 
 def quantities(observations: Observations) -> dict[str, Array]:
-    """Return what a remainder might follow, by name, (N,) each; only what varies.
+    """Return what a remainder might follow, by name, (N,) each; only what varies by more than it is read to.
 
-    Recorded covariates first, the row's number where neither time nor order is recorded, the session as its number in
-    the alphabet, then each joint's position, gravity's direction in the tool frame and the tool's place. What a joint
+    Of two readings of the same the coarser one stands for both (:mod:`thermal_robot.effects.resolution`). Recorded
+    covariates come first, the row's number where neither time nor order is recorded, the session as its number in the
+    alphabet, then each joint's position, gravity's direction in the tool frame and the tool's place. What a joint
     remembers (:data:`TURN`) is not among them: it bears on that joint alone.
     """
     recorded = [name for name in observations.covariates if observations.varies(name)]
     names = [*recorded, *([] if {"time", "order"} & set(recorded) else ["order"]), "session"]
     names += [*observations.robot.joint_names, *GRAVITY, *REACH]
     found = {name: quantity(observations, name) for name in names}
-    return {name: values for name, values in found.items() if values is not None and np.ptp(values) > 0}
+    robot = observations.robot
+    telling = {n: v for n, v in found.items() if v is not None and varies(v, _least(robot, n, v))}
+    return without_twins(telling, robot.joint_names)
+
+
+def _least(robot: Robot, name: str, values: Array) -> float:
+    """Return by how much a quantity must vary for an error to be seen to follow it, in its unit."""
+    return settings.GRAVITY_READS_TO if name in GRAVITY else resolution(values, unit(robot, name))
 
 
 def quantity(observations: Observations, name: str) -> Array | None:

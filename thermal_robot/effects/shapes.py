@@ -15,6 +15,7 @@ harmonic   1, sin(k x), cos(k x)                                   order k
 product    1, x / span                                             x the product of two quantities
 hysteresis 1, x_k: how far elements are strained, −1 to 1          how far each goes till it slips
 levels     x = m_k                                                 the levels
+apart      x ≠ m, x = m                                            the level that is apart
 relaxing   1, exp(−x / τ), x the time since each session began    τ
 relaxing   1, the same for each session with a size of its own     τ
 each
@@ -61,6 +62,8 @@ class Shape:
         Whether the second mark is a width, to be refined, too.
     each
         Whether there is a function for each mark, after those that ``labels`` names.
+    size, noun
+        What the difference between its largest and its smallest value is called; and what the law is, in a short name.
     of
         What the functions are of: the (N,) ``quantity``; the (N, K) ``strains`` of elements of slips as marked; the
         (N, 1) time since the ``run`` began, or since each of the ``runs`` began, infinite in the others (N, R).
@@ -72,6 +75,8 @@ class Shape:
     mark: Literal["", "sudden", "gradual"] = ""
     width: bool = False
     each: bool = False
+    size: str = "range"
+    noun: str = "an error"
     of: Literal["quantity", "strains", "run", "runs"] = "quantity"
 
 
@@ -133,6 +138,11 @@ def _levels(x: Array, marks: tuple[float, ...], origin: float, span: float) -> A
     return np.asarray(np.eye(len(marks))[np.abs(x[:, None] - np.array(marks)).argmin(axis=1)])
 
 
+def _apart(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
+    there = x == marks[0]
+    return np.column_stack([~there, there]).astype(float)
+
+
 def _smooth(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
     from scipy.interpolate import CubicSpline
 
@@ -146,22 +156,27 @@ def _smooth(x: Array, marks: tuple[float, ...], origin: float, span: float) -> A
 
 
 SHAPES: dict[str, Shape] = {
-    "constant": Shape(_constant, ("constant",), "constant"),
+    "constant": Shape(_constant, ("constant",), "constant", noun="a constant error"),
     "ramp": Shape(_ramp, ("at the start", "rise over the campaign"), "in proportion"),
     "quadratic": Shape(_quadratic, ("constant", "linear", "quadratic"), "quadratic"),
-    "step": Shape(_step, ("before", "after"), "a step at {mark}", "sudden"),
-    "slide": Shape(_slide, ("before", "after"), "a smooth step at {mark}", "gradual", width=True),
+    "step": Shape(_step, ("before", "after"), "a step at {mark}", "sudden", size="step", noun="a step"),
+    "slide": Shape(
+        _slide, ("before", "after"), "a smooth step at {mark}", "gradual", width=True, size="step", noun="a step"
+    ),
     "hinge": Shape(_hinge, ("constant", "slope beyond, over the range"), "a bend at {mark}", "gradual"),
-    "bump": Shape(_bump, ("constant", "height"), "a bump at {mark}", "gradual", width=True),
+    "bump": Shape(_bump, ("constant", "height"), "a bump at {mark}", "gradual", width=True, size="bump", noun="a bump"),
     "drag": Shape(_drag, ("constant", "slope over the range", "of its sign"), "its slope and its sign"),
-    "harmonic": Shape(_harmonic, ("constant", "sine", "cosine"), "harmonic of order {order:g}"),
+    "harmonic": Shape(
+        _harmonic, ("constant", "sine", "cosine"), "harmonic of order {order:g}", size="peak to peak", noun="a wave"
+    ),
     "product": Shape(_product, ("constant", "at the largest product"), "in proportion to the product"),
     "hysteresis": Shape(_hysteresis, ("constant",), "springs that slip", each=True, of="strains"),
     "relaxing": Shape(
         _relaxing, ("constant", "at the start"), "it settles within {mark} of each start", "gradual", of="run"
     ),
     "relaxing each": Shape(_relaxing, ("constant",), "it settles within {mark} of each start", "gradual", of="runs"),
-    "levels": Shape(_levels, (), "a value at each of its levels", each=True),
+    "levels": Shape(_levels, (), "a value at each of its levels", each=True, size="difference"),
+    "apart": Shape(_apart, ("elsewhere", "there"), "one apart from the others", size="difference", noun="an offset"),
     "smooth": Shape(_smooth, (), "smooth", each=True),
 }
 """Every shape by its name."""

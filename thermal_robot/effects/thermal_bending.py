@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 
 from thermal_robot.effects.beam import beams, cross_axes
-from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, at_segment
+from thermal_robot.effects.effect import UNSOURCED, Array, Driver, Effect, Parameter, at_segment
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -35,6 +35,7 @@ class ThermalBending(Effect):
 
     name: ClassVar[str] = "thermal_bending"
     title: ClassVar[str] = "links that bow with heat"
+    size_spread: ClassVar[float] = UNSOURCED
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return the links' temperatures, unless the difference of one to the robot's varies."""

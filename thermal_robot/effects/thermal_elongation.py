@@ -27,7 +27,8 @@ class ThermalElongation(Effect):
     """Every segment lengthens with its link's temperature: Δl_s = α_s l_s (T_link − T_reference).
 
     Equation 5 of Kluz et al. (2018) with a coefficient of its own for each segment, a common one for all, or a common
-    one with a smaller deviation for each (partial pooling), along the virtual prismatic joint of their Eqs 6-8.
+    one with a smaller deviation above it for each (partial pooling), along the virtual prismatic joint of their Eqs
+    6-8. No link shrinks when it becomes warmer: none of them is negative.
     Expected size 1.5e-5 /K (steel 1.2e-5, aluminium 2.3e-5). Where one sensor reads the air or a place on the robot,
     the links follow it with a time constant: dT_link/dt = (T_recorded − T_link) / lag, minutes to an hour for a cast
     link (mass · heat capacity / surface · film coefficient: 600 to 3600 s).
@@ -41,7 +42,8 @@ class ThermalElongation(Effect):
     common
         Whether all segments have one coefficient, which few data can tell better than one each.
     spread
-        Of the common coefficient: expected deviation of each segment's own from it; 0 where they do not deviate.
+        Of the common coefficient, the least of all: expected deviation of each segment's own above it; 0 where they do
+        not deviate.
     lag
         Time constant, s; 0 for a link that has the recorded temperature.
     times, temperatures
@@ -65,6 +67,7 @@ class ThermalElongation(Effect):
 
     name: ClassVar[str] = "thermal_elongation"
     title: ClassVar[str] = "thermal elongation of the links"
+    if_negative: ClassVar[str] = "links shrink when warm, check the temperature column"
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return ``temperature`` unless a temperature that applies to a segment varies."""
@@ -113,13 +116,22 @@ class ThermalElongation(Effect):
             if temperature is None or segment.length < 1e-9:
                 continue
             responses[s] = _grown(observations, s, temperature - observations.campaign.reference_temperature)
-        one = (Parameter("strain per kelvin", "1/K", _SIZE, "link", "", tuple(responses.values())),)
+        whole = tuple(responses.values())
+        one = (Parameter("strain per kelvin", "1/K", _SIZE, "link", "", whole, positive=True),)
         began = () if self.balanced or not self.lag else self._began(observations, tuple(responses))
         if self.common and not self.spread:
             return (*one, *began)
         label, size = ("deviation", self.spread * _SIZE) if self.common else ("strain per kelvin", _SIZE)
         each = tuple(
-            Parameter(f"{label} of {segments[s].name}", "1/K", size, "link", segments[s].parent_link, (response,))
+            Parameter(
+                f"{label} of {segments[s].name}",
+                "1/K",
+                size,
+                "link",
+                segments[s].parent_link,
+                (response,),
+                positive=True,
+            )
             for s, response in responses.items()
         )
         return (*one, *each, *began) if self.common else (*each, *began)

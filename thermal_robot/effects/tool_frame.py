@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from thermal_robot.effects.effect import TWIST, Effect, Parameter, at_tool
+from thermal_robot.effects.effect import TWIST, UNSOURCED, Effect, Parameter, at_tool
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -31,6 +31,7 @@ class ToolFrame(Effect):
 
     name: ClassVar[str] = "tool_frame"
     title: ClassVar[str] = "a misplaced tool frame"
+    size_spread: ClassVar[float] = UNSOURCED
     frame: ClassVar[str] = "tool"
 
     def missing(self, observations: Observations) -> tuple[str, ...]:

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, at_joint
+from thermal_robot.effects.effect import UNSOURCED, Array, Driver, Effect, Parameter, at_joint
 from thermal_robot.effects.quantities import driving, unit
 
 if TYPE_CHECKING:
@@ -40,6 +40,7 @@ class TrackingLag(Effect):
     name: ClassVar[str] = "tracking_lag"
     title: ClassVar[str] = "joints that trail their command"
     singular: ClassVar[str] = "a trailing of the command"
+    size_spread: ClassVar[float] = UNSOURCED
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return the velocity columns, unless at least one of them varies."""

@@ -21,7 +21,7 @@ class TransmissionError(Effect):
 
     An eccentric wheel or encoder disc on the joint's side gives order 1, an oval one order 2; where the campaign
     states a gear ratio (``[gears]``), those of the motor's side give the ratio and twice that. Expected size 0.3 mrad,
-    one minute of arc.
+    one minute of arc: catalogues of strain-wave gears state 1 to 2′ from peak to peak.
 
     Attributes
     ----------

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -9,7 +10,9 @@ from numpy.typing import NDArray
 
 from thermal_robot.effects import Effect, Parameter
 from thermal_robot.effects.channel import column
+from thermal_robot.effects.effect import UNSOURCED
 from thermal_robot.effects.gate import checked
+from thermal_robot.inference import settings
 from thermal_robot.observations import Observations
 
 Array = NDArray[np.float64]
@@ -29,12 +32,24 @@ class Block:
         (N, m, P) derivative of the gap by each parameter, root frame axes.
     sizes
         (P,) expected size of each parameter, the campaign's ``[priors]`` applied.
+    spread
+        Standard deviation of the logarithm of their common factor.
     """
 
     effect: Effect
     parameters: tuple[Parameter, ...]
     columns: Array
     sizes: Array
+    spread: float = UNSOURCED
+
+    @property
+    def positive(self) -> NDArray[np.bool_]:
+        """(P,) which parameters cannot be negative."""
+        return np.array([p.positive for p in self.parameters] or [False] * len(self.sizes), dtype=bool)
+
+    def kept(self, values: Array) -> Array:
+        """(P,) share of each parameter's size to which it is held: next to none where it is zero and kept from less."""
+        return np.where(self.positive & (values <= 0.0), settings.LEAST_HELD, 1.0)
 
 
 def block(observations: Observations, effect: Effect) -> Block:
@@ -46,17 +61,24 @@ def block(observations: Observations, effect: Effect) -> Block:
         If its parameters break the contract.
     """
     campaign = observations.campaign
-    measures = 6 if campaign.measures == "pose" else 3
     parameters = checked(effect, observations)
-    columns = np.zeros((campaign.samples, measures, len(parameters)))
-    for p, parameter in enumerate(parameters):
-        for response in parameter.responses:
-            columns[:, :, p] += column(observations, response, measures)
+    columns = moved_by(observations, parameters)
     sizes = np.array([parameter.size for parameter in parameters])
     if effect.name in campaign.priors and len(sizes):
         # one size is stated for the whole effect: its parameters keep their default proportions
         sizes = sizes * (campaign.priors[effect.name] / sizes[0])
-    return Block(effect, parameters, columns, sizes)
+    return Block(effect, parameters, columns, sizes, effect.size_spread)
+
+
+def moved_by(observations: Observations, parameters: Sequence[Parameter]) -> Array:
+    """(N, m, P) derivative of the gap by each of P parameters, root frame axes."""
+    campaign = observations.campaign
+    measures = 6 if campaign.measures == "pose" else 3
+    columns = np.zeros((campaign.samples, measures, len(parameters)))
+    for p, parameter in enumerate(parameters):
+        for response in parameter.responses:
+            columns[:, :, p] += column(observations, response, measures)
+    return columns
 
 
 def frame_columns(observations: Observations) -> tuple[Array, tuple[str, ...]]:

@@ -86,6 +86,11 @@ class Explanation:
         """Return the block of the best combination that is this effect, in whatever setting."""
         return next(b for b in self.best.blocks if self.linear.blocks[b].effect.name == effect.name)
 
+    def held(self, block: int) -> Array:
+        """(P,) prior standard deviation of a block's parameters, SI; one that is held at zero has next to none."""
+        item = self.linear.blocks[block]
+        return item.sizes * self.best.scales[block] * item.kept(self.values[block][0])
+
     def far(self, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """(N,) True for those of the given rows whose residual is larger than noise allows."""
         beyond = self.whitening.noise * self.best.noise * np.hypot(1.0, self.discrepancy.tau)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Protocol
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -12,8 +14,28 @@ from thermal_robot.inference.algebra import solve
 from thermal_robot.inference.columns import frame_columns
 from thermal_robot.kinematics import exp6, quaternion_to_rotation, tool_poses
 from thermal_robot.observations import Frames, observe
+from thermal_robot.robot import Robot
 
 Array = NDArray[np.float64]
+
+
+class Paired(Protocol):
+    """Commands paired with measurements, as a campaign holds them; see :class:`~thermal_robot.campaign.Campaign`."""
+
+    @property
+    def robot(self) -> Robot: ...  # noqa: D102
+    @property
+    def q(self) -> Array: ...  # noqa: D102
+    @property
+    def position(self) -> Array | None: ...  # noqa: D102
+    @property
+    def orientation(self) -> Array | None: ...  # noqa: D102
+    @property
+    def simulated_position(self) -> Array | None: ...  # noqa: D102
+    @property
+    def base_known(self) -> bool: ...  # noqa: D102
+    @property
+    def tool_known(self) -> bool: ...  # noqa: D102
 
 
 def align(source: Array, target: Array, weights: Array) -> Array:
@@ -62,12 +84,13 @@ def register(campaign: Campaign, keep: NDArray[np.bool_] | None = None) -> Frame
     if len(used) < 3:
         raise EstimationError("at least three rows are needed to fit the unknown frames")
     sample = campaign.take(used[np.linspace(0, len(used) - 1, min(len(used), settings.START_ROWS)).astype(int)])
-    fits = [_alternate(sample, frames, frames.tool[:3, 3] + start) for start in _starts(campaign)]
+    fits = [alternate(sample, frames, frames.tool[:3, 3] + start) for start in starts(campaign)]
     _, best = min(fits, key=lambda fit: fit[0])
     return _refine(campaign.take(used), best, robust=keep is None)
 
 
-def _starts(campaign: Campaign) -> Array:
+def starts(campaign: Paired) -> Array:
+    """(K, 3) shifts of the target, m, from which :func:`alternate` begins; the first is none."""
     fixed = campaign.tool_known or campaign.simulated_position is not None
     return settings.TARGET_STARTS[:1] if fixed else settings.TARGET_STARTS
 
@@ -79,16 +102,36 @@ def _soft(distance: Array) -> Array:
     )
 
 
-def _alternate(campaign: Campaign, declared: Frames, target: Array) -> tuple[float, Frames]:
+def alternate(
+    campaign: Paired, declared: Frames, target: Array, rounds: int = settings.START_ROUNDS
+) -> tuple[float, Frames]:
+    """Alternate the rigid alignment of the base with the linear fit of the target's place, robustly.
+
+    Parameters
+    ----------
+    campaign
+        With measurements.
+    declared
+        Frames as declared; known ones stay.
+    target
+        (3,) where the target may sit on the tool frame, m.
+    rounds
+        Alternations at most.
+
+    Returns
+    -------
+    tuple
+        Median distance that is left, m, and the frames.
+    """
     measured = np.asarray(campaign.position)
     if campaign.simulated_position is not None:
         origin, turns = np.asarray(campaign.simulated_position), None
     else:
         poses = tool_poses(campaign.robot, campaign.q)
         origin, turns = poses[:, :3, 3], poses[:, :3, :3]
-    base, weights, cost = declared.base, np.ones(campaign.samples), np.inf
+    base, weights, cost = declared.base, np.ones(len(measured)), np.inf
     place = declared.tool[:3, 3] if campaign.tool_known else target
-    for _ in range(settings.START_ROUNDS):
+    for _ in range(rounds):
         predicted = origin if turns is None else origin + turns @ place
         if not campaign.base_known:
             base = align(predicted, measured, weights)

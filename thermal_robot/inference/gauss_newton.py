@@ -50,20 +50,20 @@ def gauss_newton(
     whitening, best = explanation.whitening, explanation.best
     effects = [effect for effect, _ in held]
     chosen = [explanation.block_of(effect) for effect in effects]
-    sizes = [explanation.linear.blocks[b].sizes * best.scales[b] for b in chosen]
+    sizes, sides = [explanation.held(b) for b in chosen], [explanation.linear.blocks[b].positive for b in chosen]
+    least = np.where(np.concatenate([*sides, np.zeros(0, dtype=bool)]), 0.0, -np.inf)
     ends = np.cumsum([len(size) for size in sizes])[:-1]
     prior = np.concatenate([*sizes, np.zeros(0)])
     state = np.concatenate([*(values for _, values in held), np.zeros(0)])
     used = np.flatnonzero(whitening.weights > 0)
     root = (np.sqrt(whitening.weights[used])[:, None] / (whitening.noise * best.noise)).ravel()
-    smooth = whitening.smooth
 
     def pairs(state: Array) -> list[tuple[Effect, Array]]:
         return list(zip(effects, np.split(state, ends), strict=True)) if effects else []
 
     def white(columns: Array) -> Array:
         flat = columns[used].reshape(len(root), -1) * root[:, None]
-        return flat if smooth is None else smooth.whitened(flat)
+        return flat if whitening.smooth is None else whitening.smooth.whitened(flat)
 
     def left(observations: Observations, state: Array) -> float:
         return float((white(observations.gap[:, :, None]) ** 2).sum() + ((state / prior) ** 2).sum())
@@ -74,9 +74,10 @@ def gauss_newton(
         flat, names = frame_columns(observations)
         columns = [block(observations, effect).columns for effect in effects]
         stack = white(np.concatenate([flat, *columns, observations.gap[:, :, None]], axis=2))
-        step, size = _ridge_step(stack[:, :-1], stack[:, -1], state, prior)
+        step, size = _step_inside(stack[:, :-1], stack[:, -1], state, prior, least)
         for part in settings.STEP_PARTS:
-            tried = moved(frames, part * step[: len(names)], names), state + part * step[len(names) :]
+            ahead = np.maximum(state + part * step[len(names) :], least)
+            tried = moved(frames, part * step[: len(names)], names), ahead
             there = corrected_observations(campaign, tried[0], pairs(tried[1]))
             if (after := left(there, tried[1])) <= cost or size < settled:
                 break
@@ -86,6 +87,17 @@ def gauss_newton(
         if size < settled:
             break
     return observations, pairs(state)
+
+
+def _step_inside(design: Array, gap: Array, state: Array, prior: Array, least: Array) -> tuple[Array, float]:
+    """Return the ridge step after which nothing is below its least, 0 or −∞: what would be is held at zero."""
+    flat, held = design.shape[1] - len(prior), np.zeros(len(prior), dtype=bool)
+    while True:
+        step, size = _ridge_step(design, gap, state, np.where(held, settings.LEAST_HELD * prior, prior))
+        below = ~held & (state + step[flat:] < least)
+        if not below.any():
+            return step, size
+        held |= below
 
 
 def _ridge_step(design: Array, gap: Array, state: Array, prior: Array) -> tuple[Array, float]:

@@ -24,6 +24,12 @@ class Gram:
         Where each block's D_b columns stand; blocks are reduced to what the data can see of them.
     bases
         Per block, (P_b, D_b): parameter values, in prior sizes, of a unit of each reduced column.
+    positive
+        (D,) which reduced columns cannot be negative; in a block with any of them each is a parameter.
+    ranks
+        Per block: how many directions of it the data see.
+    spreads
+        (B,) of each block: standard deviation of ln λ before the data.
     equations
         n: scalar equations with weight, less the rank of the frames.
     noise_dof
@@ -38,6 +44,9 @@ class Gram:
     total: float
     slices: tuple[slice, ...]
     bases: tuple[Array, ...]
+    positive: NDArray[np.bool_]
+    ranks: tuple[int, ...]
+    spreads: Array
     equations: float
     noise_dof: float
     offset: float = 0.0
@@ -54,4 +63,7 @@ class Gram:
             vector=self.vector[own],
             slices=tuple(slice(a, b) for a, b in pairwise(ends.tolist())),
             bases=tuple(self.bases[b] for b in blocks),
+            positive=self.positive[own],
+            ranks=tuple(self.ranks[b] for b in blocks),
+            spreads=self.spreads[list(blocks)],
         )

@@ -90,7 +90,7 @@ class Ladder:
     def _containing(plain: Gram, inside: frozenset[frozenset[int]]) -> Iterator[int]:
         """Yield the larger block of each pair of which one contains the other, where the data see the smaller."""
         for pair in inside:
-            small, large = sorted(pair, key=lambda b: plain.slices[b].stop - plain.slices[b].start)
+            small, large = sorted(pair, key=lambda b: plain.ranks[b])
             own = plain.slices[small]
             if float(np.trace(plain.matrix[own, own])) > settings.CONTAINS:
                 yield large

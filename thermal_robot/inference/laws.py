@@ -114,8 +114,8 @@ def shapes(
 
     Always: straight, quadratic, and hinges at quantiles of the quantity. With ``jumps`` also steps and bumps: of
     positions, gravity and the clock, as nothing jumps at a temperature. Of a velocity also its sign. Of a joint's own
-    position also harmonics of the given orders. Of two quantities their product alone. Of what a joint remembers
-    elements that slip.
+    position also harmonics of the given orders. Of labels also one that is apart from the others. Of two quantities
+    their product alone. Of what a joint remembers elements that slip.
     """
     if law.shape == "constant":
         return [law]
@@ -124,6 +124,8 @@ def shapes(
         return list(dict.fromkeys([law, *_of_two(law, values)]))
     smooth = of_quantity(law, values)
     found = [law, smooth] if law.labels or len(smooth.marks) < 3 else [law, smooth, straight(law)]
+    if law.labels and len(levels := np.unique(values)) > 2:
+        found += [replace(law, shape="apart", marks=(float(m),)) for m in levels]
     if smooth.shape == "levels":
         return list(dict.fromkeys(found))
     found.append(replace(law, shape="quadratic", marks=()))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -108,34 +109,51 @@ def normal_equations(
     along = known.T @ cross
     rest = full[flat:, flat:] * np.outer(sizes, sizes) - along.T @ along
     rest = 0.5 * (rest + rest.T)
-    bases, slices = (like.bases, like.slices) if like else _reduction(linear, rest, np.diag(full)[flat:] * sizes**2)
+    bases, ranks = (like.bases, like.ranks) if like else _reduction(linear, rest, np.diag(full)[flat:] * sizes**2)
     reduction = _block_diagonal(bases)
+    ends = np.cumsum([0, *(basis.shape[1] for basis in bases)]).tolist()
     log_det = _log_det(full[:flat, :flat], known.shape[1])
     return Gram(
         reduction.T @ rest[:-1, :-1] @ reduction,
         reduction.T @ rest[:-1, -1],
         float(rest[-1, -1]),
-        slices,
+        tuple(slice(a, b) for a, b in pairwise(ends)),
         bases,
+        _positive(linear, bases),
+        ranks,
+        np.array([b.spread for b in linear.blocks]),
         equations - known.shape[1],
         whitening.held,
         -0.5 * (log_det + (whitening.smooth.log_det if whitening.smooth else 0.0)),
     )
 
 
-def _reduction(linear: Linear, rest: Array, before: Array) -> tuple[tuple[Array, ...], tuple[slice, ...]]:
-    """Return for each block the directions that the data see, and where they stand among all of them."""
-    bases, slices, start, parameter = [], [], 0, 0
+def _reduction(linear: Linear, rest: Array, before: Array) -> tuple[tuple[Array, ...], tuple[int, ...]]:
+    """Return for each block the directions that the data see, and how many they are.
+
+    Where a parameter of it cannot be negative, each parameter that the data see is a direction by itself.
+    """
+    bases, ranks, parameter = [], [], 0
     for item in linear.blocks:
         own = slice(parameter, parameter + len(item.sizes))
         value, vector = np.linalg.eigh(rest[own, own])
         # what is left of an exact alias of the frames is rounding of what it was before they were projected out
         longest = float(before[own].max(initial=0.0))
-        seen = value > max(settings.INFORMATION_FLOOR, settings.PROJECTED_FLOOR * longest)
-        bases.append(vector[:, seen])
-        slices.append(slice(start, start + int(seen.sum())))
-        start, parameter = start + int(seen.sum()), own.stop
-    return tuple(bases), tuple(slices)
+        floor = max(settings.INFORMATION_FLOOR, settings.PROJECTED_FLOOR * longest)
+        seen = value > floor
+        if item.positive.any():
+            bases.append(np.eye(len(item.sizes))[:, np.diag(rest)[own] > floor])
+        else:
+            bases.append(vector[:, seen])
+        ranks.append(int(seen.sum()))
+        parameter = own.stop
+    return tuple(bases), tuple(ranks)
+
+
+def _positive(linear: Linear, bases: Sequence[Array]) -> NDArray[np.bool_]:
+    """(D,) which reduced columns cannot be negative."""
+    pairs = zip(linear.blocks, bases, strict=True)
+    return np.concatenate([*((item.positive @ basis).astype(bool) for item, basis in pairs), np.zeros(0, dtype=bool)])
 
 
 def _block_diagonal(bases: Sequence[Array]) -> Array:
@@ -168,17 +186,17 @@ def contained(problem: Gram) -> frozenset[frozenset[int]]:
     """Return the pairs of blocks of which the smaller lies, as far as the data can tell, in the span of the larger.
 
     The two are confounded and never named together. The smaller is preferred where it suffices; otherwise the larger
-    stands for both.
+    stands for both. One with parameters that cannot be negative does not span what its columns do: it contains none.
     """
     matrix, slices = problem.matrix, problem.slices
-    sizes = np.array([s.stop - s.start for s in slices], dtype=int)
-    owner = np.repeat(np.arange(len(slices)), sizes)
+    sizes = np.array(problem.ranks, dtype=int)
+    owner = np.repeat(np.arange(len(slices)), [s.stop - s.start for s in slices])
     total = np.bincount(owner, np.diag(matrix), len(slices))
     enough = np.maximum(settings.CONTAINED * total, settings.CONTAINED_LEFT)
     pairs = set()
     for large, outer in enumerate(slices):
         smaller = (sizes > 0) & (sizes < sizes[large])
-        if not smaller.any():
+        if not smaller.any() or problem.positive[outer].any():
             continue
         inside = ((matrix[:, outer] @ whitener(matrix[outer, outer])) ** 2).sum(axis=1)
         left = total - np.bincount(owner, inside, len(slices))
@@ -187,7 +205,7 @@ def contained(problem: Gram) -> frozenset[frozenset[int]]:
 
 
 def parameter_values(linear: Linear, problem: Gram, found: Combination) -> dict[int, tuple[Array, Array]]:
-    """Return for each block of a combination the (P,) posterior mean and (P, P) covariance of its parameters, SI.
+    """Return for each block of a combination the (P,) posterior mode and (P, P) covariance of its parameters, SI.
 
     Directions that the data do not see keep their prior variance.
     """

@@ -77,6 +77,11 @@ class RandomGap:
         return [k for k in self.kept if k.component.kind == kind]
 
 
+def nothing_random(fit: Fit) -> RandomGap:
+    """Return the random gap of which nothing can be said."""
+    return RandomGap((), False, 1.0, Scatter((), (), {}, fit.explanation.whitening.noise), {}, {})
+
+
 def random_gap(fit: Fit) -> RandomGap:
     """Say which joints scatter beyond the instrument, anew at each visit or once a pose.
 
@@ -122,12 +127,46 @@ def random_gap(fit: Fit) -> RandomGap:
         if 2 * within.sum() < len(within):
             break  # most rows lie beyond any scatter: robot and table do not belong together
         used = within & asked
+    scatter, used, carried = _stands(scatter, gap, sensitivity, noise, pose, held, freedom, used)
     laws, steps, kept = _judge(fit, scatter, gap[used], pose, used, noise, freedom)
     likely = stepped(seen(tuple(steps.values())), again=len(scatter.kinds) > 1)
     real = tuple(k.component for k in kept if k.component.kind == "visit" or likely >= settings.SCATTER_SURE)
     p_value, explains = _chance_of_size(scatter, real, gap[used], sensitivity[used], noise, held, freedom)
-    note = _note(scatter, laws, bool(steps) and likely < settings.SCATTER_SURE)
+    few = ", ".join(fit.campaign.robot.joint_names[j] for j in carried)
+    note = _note(scatter, laws, few, bool(steps) and likely < settings.SCATTER_SURE)
     return RandomGap(tuple(kept), explains, p_value, scatter, steps, laws, note)
+
+
+def _stands(
+    scatter: Scatter,
+    gap: Array,
+    sensitivity: Array,
+    noise: Array,
+    pose: NDArray[np.int64],
+    held: list[bool],
+    freedom: int,
+    used: NDArray[np.bool_],
+) -> tuple[Scatter, NDArray[np.bool_], list[int]]:
+    """Ask whether scatter is seen without the few rows that speak most for it; scatter is in all rows.
+
+    Returns the scatter and the rows that count, and the joints of which a few rows had told it: the scatter is then
+    that of the other rows.
+    """
+    chosen = [c for c in scatter.components if c.chosen]
+    if not chosen:
+        return scatter, used, []
+    rows = np.flatnonzero(used)
+    told = [joint_errors(scatter, gap[rows], sensitivity[rows], c.joint) for c in chosen]
+    most = np.argsort(-np.max([np.abs(errors / spread) for errors, spread in told], axis=0), kind="stable")
+    rest = used.copy()
+    rest[rows[most[: int(np.ceil(settings.CARRYING * len(rows)))]]] = False
+    start = [(c.kind, c.joint) for c in chosen]
+    again = variance_components(
+        gap, sensitivity, noise, pose, stated=held, freedom=freedom, weights=rest.astype(float), start=start
+    )
+    speaks = {(c.kind, c.joint) for c in again.components if c.chosen or c.log_bayes_factor > 0.0}
+    carried = [joint for kind, joint in start if (kind, joint) not in speaks]
+    return (again, rest, carried) if carried else (scatter, used, [])
 
 
 def _in_joints(fit: Fit) -> list[tuple[str, int]]:
@@ -269,7 +308,9 @@ def _chance_of_size(
     return p, bool(real) and (p > settings.LEVEL or ratio2 < settings.MATERIAL_SCALE**2)
 
 
-def _note(scatter: Scatter, laws: Mapping[str, str], doubtful: bool) -> str:
+def _note(scatter: Scatter, laws: Mapping[str, str], few: str, doubtful: bool) -> str:
+    if few:
+        return f"what looks like scatter of {few} is carried by a few rows: it is no scatter"
     if laws:
         joint, quantity = next(iter(laws.items()))
         return f"what looks like scatter of {joint} follows {quantity}: it is no scatter"

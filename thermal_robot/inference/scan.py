@@ -21,6 +21,8 @@ from thermal_robot.inference.target import Alike, Seat, Target
 from thermal_robot.observations import Observations
 
 Array = NDArray[np.float64]
+Site = tuple[str, str, str]
+"""Kind and name of a place, and a quantity."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -292,9 +294,22 @@ def _break(seats: Seats, t: int, levels: Scanned) -> Scanned | None:
     return Scanned(steps[int(gains.argmax())], float(gains.max()))
 
 
+def _clock_gives_way(single: dict[Site, Scanned], session: Site, seats: Seats, t: int) -> None:
+    """Leave out the law of the clock where that of the sessions at its place says nearly as much: it is coarser."""
+    own = _best_shape(seats, t, single[session].law)
+    for clock in [(*session[:2], name) for name in CLOCK]:
+        if clock in single and _best_shape(seats, t, single[clock].law) < own + settings.COARSER:
+            del single[clock]
+
+
+def _best_shape(seats: Seats, t: int, law: Discovered) -> float:
+    """Return the log evidence that a law gains in its best shape, once the choice among its shapes is paid for."""
+    return max(item.worth for item in _measured(seats, t, law))
+
+
 def _best(own: Mapping[str, list[Scanned]], seats: Seats, t: int) -> list[Scanned]:
     """Return all that is better than what it contains, sorted; of a smooth and a straight law the better one."""
-    single: dict[tuple[str, str, str], Scanned] = {}
+    single: dict[Site, Scanned] = {}
     for item in (*own["plain"], *own["memory"]):
         key = (item.law.kind, item.law.place, item.law.quantity)
         if key not in single or item.worth > single[key].worth:
@@ -304,10 +319,12 @@ def _best(own: Mapping[str, list[Scanned]], seats: Seats, t: int) -> list[Scanne
         if step is not None and step.gain > single[key].gain - settings.REFINED_GAIN:
             # one step in time explains as much: nothing is known of the session beside when it was
             del single[key]
+        elif step is not None:
+            _clock_gives_way(single, key, seats, t)
     alone = {key: item.worth for key, item in single.items()}
     for key in sorted(alone, key=lambda key: -alone[key])[: settings.SHAPED]:
         # a step is no smooth law; a product of the clock with anything would stand in for it
-        best = max(item.worth for item in _measured(seats, t, single[key].law))
+        best = _best_shape(seats, t, single[key].law)
         alone[key] = max(alone[key], best - float(np.log(single[key].tried)))
     inside = [
         max(alone.get((i.law.kind, i.law.place, name), -np.inf) for name in (i.law.quantity, i.law.by))

@@ -178,7 +178,7 @@ class Search:
         return one.log_evidence > best.log_evidence - settings.NEARLY
 
     def _width(self, block: int) -> int:
-        return int(self.gram.slices[block].stop - self.gram.slices[block].start)
+        return self.gram.ranks[block]
 
     def _climb(self, start: Sequence[int], barred: frozenset[int]) -> Combination:
         best = max(self.evaluate(()), self.evaluate(start), key=lambda c: c.log_evidence)
@@ -270,8 +270,7 @@ def _gains(gram: Gram, base: Combination, blocks: Sequence[int]) -> list[tuple[i
     left = gram.vector - gram.matrix[:, used] @ base.values
     log_scale = np.array(settings.SCALE_GRID)
     square = np.exp(2.0 * log_scale)[:, None]
-    prior = -0.5 * (log_scale / settings.SIZE_SPREAD) ** 2
-    norm = np.log((log_scale[1] - log_scale[0]) / (np.sqrt(2.0 * np.pi) * settings.SIZE_SPREAD))
+    step = float(log_scale[1] - log_scale[0])
     freedom = gram.equations + gram.noise_dof
     rest = (gram.noise_dof + gram.total - float(gram.vector[used] @ base.values)) / freedom
     rest = max(rest, settings.LEAST_VARIANCE * variance)
@@ -289,10 +288,12 @@ def _gains(gram: Gram, base: Combination, blocks: Sequence[int]) -> list[tuple[i
         for _ in range(settings.NOISE_ROUNDS):
             taken = (along[:, None] * square / (left_over[:, :, None] + square * value[:, None])).sum(axis=2) / freedom
             left_over = np.maximum(rest - taken, settings.LEAST_VARIANCE * rest)
-        log = -0.5 * np.log1p(square * value[:, None] / left_over[:, :, None]).sum(axis=2) + prior
+        spread = gram.spreads[alike][:, None]
+        log = -0.5 * np.log1p(square * value[:, None] / left_over[:, :, None]).sum(axis=2)
+        log -= 0.5 * (log_scale / spread) ** 2 + np.log(np.sqrt(2.0 * np.pi) * spread / step)
         log -= 0.5 * freedom * np.log(left_over / rest)
         top = log.max(axis=1)
-        gain = top + np.log(np.exp(log - top[:, None]).sum(axis=1)) + norm
+        gain = top + np.log(np.exp(log - top[:, None]).sum(axis=1))
         result += list(zip(alike, gain.tolist(), np.exp(log_scale[log.argmax(axis=1)]).tolist(), strict=True))
     return result
 

@@ -14,8 +14,6 @@ IN_ALL, ONE_MORE = 1.0 / 3.0, 0.5
 that all shares sum to one."""
 LEADING_PLACES = 4
 """Places at most in which an effect is tried together once it was found in all: those that do most, as fitted."""
-SIZE_SPREAD = 1.5
-"""Standard deviation of ln λ: an effect three times larger or smaller than stated is no surprise."""
 GIVEN_NOISE_DOF = 20.0
 """Degrees of freedom that a stated noise is worth: it is trusted to about 15 %, as data sheets are."""
 NOISE_SLACK = 1.3
@@ -112,8 +110,11 @@ SPARE_EQUATIONS = 6
 EVIDENCE_STEPS, EVIDENCE_SETTLED, LEAST_VARIANCE = 40, 1e-3, 1e-12
 """Newton steps of scales and noise at most, the change of a logarithm at which they end, and the smallest variance, in
 squares of the noise: what fits better is rounding."""
+PIVOTS, SIDE_ROUNDING = 60, 1e-10
+"""Changes at most of which columns are held at zero: a handful suffices; of the sums that tell it, what is rounding."""
 SCALE_GRID = tuple(np.linspace(-6.0, 6.0, 25))
-"""ln λ at which a block that might be added is weighed: four standard deviations of its prior, in thirds of one."""
+"""ln λ at which a block that might be added is weighed: four standard deviations of the widest prior, in steps that are
+one of the narrowest."""
 NEARLY, AT_ONCE = 3.0, 8
 """Log evidence below the best down to which neighbours are computed exactly, and how many before one is taken."""
 PAIR_REACH, PAIRS = 6.0, 60
@@ -142,8 +143,9 @@ STEP_PARTS = tuple(0.25**k for k in range(4))
 """Of a Gauss-Newton step: how much of it is taken, the first that betters the fit; where none does, it ends there."""
 REVISIONS = 3
 """Times that a choice is made again at its own exact fit."""
-MANY_ROWS = 5000
-"""Above, a choice is revised once and one law looked for: each takes seconds, and so many rows hardly change it."""
+MANY_ROWS = 500
+"""Above, a choice is revised once and one law looked for: each takes tens of seconds, and so many rows hardly change
+it."""
 SETTLED = 1e-4
 """Last step of a fit, in standard deviations."""
 SETTLED_BETWEEN = 2.0
@@ -199,6 +201,8 @@ SLIDE_WIDTH, BUMP_WIDTHS = 0.08, (0.04, 0.1)
 """Of the range: widths of smooth steps and bumps from which they are refined."""
 MARK_STEP, WIDTH_STEP, MARK_ROUNDS = 0.03, 8.0, 10
 """First shift of a mark (of the range), the relative change of a width a shift, and halvings: to 3e-5 of the range."""
+COARSER = 3.0
+"""Nats that a law of the clock must gain beyond one of the sessions at its place, 20 to 1: else these say enough."""
 LINK_QUANTITIES = 6
 """A segment has six components: only so many quantities that speak elsewhere are tried there."""
 SHAPED = 6
@@ -224,6 +228,13 @@ ORDER_STEP, ORDER_CHUNK, ORDER_ZOOMS = 0.125, 256, 4
 at a time; and rounds in which the best one is refined, each eight times finer."""
 LATTICE = 1e-3
 """Of their spacing: positions that lie on a lattice to within this cannot tell an order from its alias."""
+LOWEST_RIPPLE = 2.5
+"""Orders a turn from which a wave is ripple: what comes round once or twice is an eccentric or oval wheel."""
+RIPPLE_ROWS, MOST_WAVES, WAVES_REFUSED, RIPPLE_ROUNDS = 1200, 30, 2, 3
+"""Rows up to which ripple is looked for, as each choice beside waves takes minutes above; waves of one robot, five a
+joint; waves of each joint that may do harm in rows held out before none is tried any more; times that all is chosen."""
+SAME_ORDER = 0.05
+"""Orders that differ by less are one: over a whole turn 0.3 rad of phase, a few hundredths of the wave's square."""
 SLIP_SHARES = (0.03, 1.0)
 """Of the longest way between two turns: how far the first and the last element goes before it slips; one below is lost
 motion, one above a spring that never slips."""
@@ -316,6 +327,9 @@ SCATTER_SURE = 0.5
 """Probability from which scatter is named."""
 SCATTER_PASSES = 3
 """Times that rows set aside, frames and scatter are settled together."""
+CARRYING = 0.05
+"""Of the rows, those that speak most for scatter: without them the others must still speak for it. Of normal scatter
+they hold a quarter of its variance, of a few bad rows all: as many as may be one lapse of the instrument."""
 SCATTER_LAW_SHARE = 0.15
 """Of a scatter that a smooth law must explain to make it none."""
 STEPS_HIDDEN = 0.05
@@ -343,11 +357,17 @@ FLAT = 12.0
 
 DETERMINED = 0.5
 """A parameter is identified when the data leave less than half of its prior's standard deviation."""
+DISTINCT = 0.1
+"""Of its expected size: a parameter that is less apart from those told before it is told as not seen, as its number
+would be ten times as uncertain as theirs."""
+UNHELD = 30.0
+"""Times its prior deviation: that of a parameter that is told as if it had none; it moves what is identified by 1/3600.
+"""
 NAMING_ODDS = 9.0
 """Of an effect against nothing in its place: who takes a gear apart for what is named is then wrong once in ten."""
-SURE, RIVAL, RIVAL_SHARE = 0.75, 0.2, 0.8
-"""An effect less probable than the first has rivals: effects at least as probable as the second, and present in the
-third share of the explanations without it."""
+TELLS_APART = 3.0
+"""Log evidence, natural logarithm, by which an effect must beat another in its place: 20 to 1, a probability of 95 %.
+"""
 EXACT_LEVEL = 0.01
 """Chance that noise makes an exact alias look like none."""
 INTERVAL = (0.025, 0.975)
@@ -356,28 +376,25 @@ LEAST_HELD = 1e-6
 """Of an effect's expected size: to less its parameters are not held where it is fitted without others."""
 FOLD_ROUNDS = 3
 """Rounds of noise in the fit of a subset of effects: what a subset leaves out is noise to it."""
+HARDER = 1.25
+"""Times what is left of rows held out on average: a way of holding out that leaves more is told beside it."""
 COLDEST = 0.01
 """K: a temperature that varies less does not vary."""
 FRAME_DETERMINED = 1e-9
 """Of the strongest direction of the frames: weaker ones are not determined without the rows held out."""
 FRAME_PRIOR = 1e-12
 """Of a frame's own information, added to it, so that what nothing determines stays where it is."""
-PRIOR_FACTOR, COMPARED = 3.0, 8
-"""Factor of all prior sizes, down and up, under which the verdict is weighed again, and among how many explanations."""
-CANCELLING = 5.0
-"""Times the sum of an effect's parts: single ones that are larger cancel each other."""
+CANCELLING, CANCELLING_PAIR = 5.0, 10.0
+"""Times the sum of an effect's parts: single ones that are larger cancel each other; and of two effects' parts, which
+may well oppose each other, as gears that run out and a link that bends do."""
+FRAGILE = 1e-3
+"""Probability of the verdict with other prior sizes, below which that is said: nobody knows sizes to a factor of three.
+"""
+OUTSIDE = 30.0
+"""Times an expected size that stands on sources: seven deviations of its logarithm, as no robot is known to be."""
 CONTRADICTED = 0.01
 """rad or m: no servo that has settled is as far from its command."""
 STATED_TOO_LARGE = 0.5
 """Of the stated noise: less that remains says that it is stated too large."""
-MATERIAL_PLACE, MOST_PLACES = 0.03, 8
-"""Of an effect's work: a place with less is not drawn; and how many are."""
-LINE_POINTS, ROUGH, DENSE_POINTS, ROWS_A_POINT = 25, 0.01, 400, 10
-"""Points of a drawn law; of its range, the roughness below which it follows one quantity alone, its points then, and
-rows that a point stands for otherwise."""
-ROWS_ALIKE = 8
-"""Rows that are taken together when asking whether an error follows a quantity."""
-PURE = 1e-6
-"""Of a unit twist, m or rad: with less of one kind it is all of the other."""
 UNHEARD = 1e-2
 """Of the noise's variance: what rows have in common below it is left out where rows are held out."""

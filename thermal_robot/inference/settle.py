@@ -58,9 +58,9 @@ class Settled:
     @property
     def containers(self) -> set[str]:
         """Effects of the explanation that contain others."""
-        slices, found = self.explanation.problem.slices, set()
+        ranks, found = self.explanation.problem.ranks, set()
         for pair in contained(self.explanation.problem):
-            smaller, larger = sorted(pair, key=lambda b: slices[b].stop - slices[b].start)
+            smaller, larger = sorted(pair, key=lambda b: ranks[b])
             if self.families[smaller] != self.families[larger]:
                 found.add(self.families[larger])
         return found & set(self.names)

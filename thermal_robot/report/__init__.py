@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from thermal_robot.report.json_schema import schema
+    from thermal_robot.report.next_step import advice
     from thermal_robot.report.page import fragment, html
     from thermal_robot.report.plain_text import text
     from thermal_robot.report.plots_explain import explain_figure
@@ -19,10 +20,10 @@ if TYPE_CHECKING:
     from thermal_robot.report.plots_remainder import plot_remainder
     from thermal_robot.report.plots_where import plot_where
     from thermal_robot.report.plots_which import plot_which
-    from thermal_robot.report.sentence import advice, headline
+    from thermal_robot.report.sentence import headline
 
 _HOME = {
-    "advice": "sentence",
+    "advice": "next_step",
     "explain_figure": "plots_explain",
     "fragment": "page",
     "html": "page",

@@ -8,6 +8,6 @@ from typing import Any
 
 
 def schema() -> dict[str, Any]:
-    """Return the JSON Schema (draft 2020-12) of the format ``thermal-robot/diagnosis/1``."""
+    """Return the JSON Schema (draft 2020-12) of the format ``thermal-robot/diagnosis/2``."""
     text = files(__package__).joinpath("diagnosis.schema.json").read_text(encoding="utf-8")
     return dict(json.loads(text))

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from html import escape
 from typing import TYPE_CHECKING
 
-from thermal_robot.report import units
+from thermal_robot.report.details import details
 from thermal_robot.report.html_parts import bullets, css, document, figure, paragraph, signature
 from thermal_robot.report.page_tables import effects_table, numbers, outliers_table
 from thermal_robot.report.plots_how_far import plot_how_far
@@ -15,7 +15,19 @@ from thermal_robot.report.plots_overview import overview
 from thermal_robot.report.plots_remainder import plot_remainder
 from thermal_robot.report.plots_where import plot_where
 from thermal_robot.report.plots_which import plot_which
-from thermal_robot.report.words import campaign, laws, noise_of, rows_in_words, sentences, verdict, with_aside
+from thermal_robot.report.words import (
+    campaign,
+    hardest,
+    laws,
+    left_out,
+    noise_of,
+    one_sigma,
+    rows_used,
+    sentences,
+    set_aside,
+    verdict,
+    with_aside,
+)
 
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.result import Diagnosis
@@ -52,6 +64,7 @@ def fragment(diagnosis: Diagnosis) -> str:
     body = "\n".join(
         (
             paragraph(diagnosis.summary, strong=True),
+            *map(paragraph, details(diagnosis)),
             numbers(diagnosis),
             figure(overview(diagnosis, headline=False), f"Overview: {diagnosis.summary}"),
             effects_table(diagnosis),
@@ -66,6 +79,7 @@ def fragment(diagnosis: Diagnosis) -> str:
 def _whole(diagnosis: Diagnosis, generated: str | None) -> Iterator[str]:
     yield '<header><div class="tr-kicker">Where the gap lies, what causes it, how far it shrinks</div>'
     yield f"<h1>{escape(diagnosis.summary)}</h1>"
+    yield from map(paragraph, details(diagnosis))
     yield _facts(diagnosis)
     yield numbers(diagnosis)
     yield "</header>"
@@ -78,14 +92,14 @@ def _whole(diagnosis: Diagnosis, generated: str | None) -> Iterator[str]:
     )
     if told := with_aside(diagnosis):
         yield paragraph(f"The gap on rows held out {told}.")
-    for scheme in diagnosis.gap.schemes[:1]:
-        before, after = units.together((scheme.rms_before, scheme.rms_after), "m")
-        yield paragraph(f"Held out by {scheme.name} ({scheme.held_out}), the least favourable way: {before} → {after}.")
+    if told := hardest(diagnosis):
+        yield paragraph(f"Rows held out in the hardest way: {told}.")
     yield paragraph(f"Noise alone would leave {noise_of(diagnosis)}.")
     yield figure(plot_how_far(diagnosis), "Distribution of the gap before and after") + "</section>"
     yield "<section><h2>Which</h2>"
     yield figure(plot_which(diagnosis), "Share of the gap and probability of every effect")
-    yield effects_table(diagnosis) + "</section>"
+    yield effects_table(diagnosis)
+    yield (paragraph(told) if (told := one_sigma(diagnosis)) else "") + "</section>"
     yield "<section><h2>Where</h2>"
     yield figure(plot_where(diagnosis), "Shares of the gap along the chain, by axis and by quantity")
     yield figure(plot_map(diagnosis), "The gap as arrows at the positions of the tool") + "</section>"
@@ -105,8 +119,10 @@ def _whole(diagnosis: Diagnosis, generated: str | None) -> Iterator[str]:
 
 
 def _facts(diagnosis: Diagnosis) -> str:
-    aside = rows_in_words(diagnosis.outliers) if diagnosis.outliers else "no row"
-    facts = {"Verdict": verdict(diagnosis), "Campaign": campaign(diagnosis), "Set aside as outliers": aside}
+    facts = {"Verdict": verdict(diagnosis), "Campaign": campaign(diagnosis), "Set aside": set_aside(diagnosis)}
+    facts["Rows used"] = rows_used(diagnosis)
+    if told := left_out(diagnosis):
+        facts["Left out"] = told
     return f"<dl>{''.join(f'<dt>{k}</dt><dd>{escape(v)}</dd>' for k, v in facts.items())}</dl>"
 
 

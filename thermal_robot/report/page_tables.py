@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thermal_robot.report import units
-from thermal_robot.report.words import STATUS, by_status, law, needs, parameters, places, told_as
+from thermal_robot.report.words import STATUS, by_status, law, needs, parameters, places, rivals, told_as
 
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.parts import Finding
@@ -59,7 +59,7 @@ def effects_table(diagnosis: Diagnosis) -> str:
 
 def _effect(finding: Finding, diagnosis: Diagnosis) -> str:
     quiet = finding.status in ("not_found", "not_testable")
-    details = "".join(_known(finding))
+    details = "".join(_known(finding, diagnosis))
     looks = " ".join([*(["tr-quiet"] if quiet else []), *(["tr-open"] if details else [])])
     cells = f"<td>{_span(finding.name, not quiet)}</td>"
     if finding.status == "not_testable":
@@ -80,9 +80,9 @@ def _span(name: str, found: bool) -> str:
     return f'<span class="tr-found">{escape(name)}</span>' if found else escape(name)
 
 
-def _known(finding: Finding) -> Iterator[str]:
-    if finding.confounded_with:
-        yield _line(f"these data cannot tell it from {', '.join(finding.confounded_with)}")
+def _known(finding: Finding, diagnosis: Diagnosis) -> Iterator[str]:
+    if told := rivals(finding, diagnosis):
+        yield _line(told)
     if described := law(finding):
         yield _line(described)
     if finding.locations:
@@ -96,6 +96,8 @@ def _known(finding: Finding) -> Iterator[str]:
         yield _line(f"and {known.more} more, listed in the JSON")
     if known.undetermined:
         yield _line(f"not determined by these data: {known.undetermined}")
+    if known.unseen:
+        yield _line(known.unseen)
 
 
 def _line(sentence: str) -> str:

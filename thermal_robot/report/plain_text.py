@@ -7,18 +7,25 @@ from textwrap import fill
 from typing import TYPE_CHECKING
 
 from thermal_robot.report import units
+from thermal_robot.report.details import details
 from thermal_robot.report.words import (
     NO_BREAK,
     STATUS,
     bound,
     campaign,
+    hardest,
     law,
+    left_out,
     needs,
     noise,
+    one_sigma,
     parameters,
     places,
+    rivals,
     rows_in_words,
+    rows_used,
     sentences,
+    set_aside,
     told_as,
     verdict,
     with_aside,
@@ -47,8 +54,10 @@ def text(diagnosis: Diagnosis) -> str:
         Plain text, at most 96 columns wide unless a name is longer, without a newline at the end: the verdict, how
         far the gap shrinks, which effects cause it, where they act, what stays unexplained, what to measure next.
     """
+    if not diagnosis.usable:
+        return "\n\n".join("\n".join(block) for block in _unusable(diagnosis))
     blocks = [
-        [_wrap(diagnosis.summary, "")],
+        [_wrap(diagnosis.summary, ""), *(_wrap(s, "") for s in details(diagnosis))],
         list(_facts(diagnosis)),
         ["HOW FAR", *_how_far(diagnosis)],
         ["WHICH", *_which(diagnosis)],
@@ -58,6 +67,20 @@ def text(diagnosis: Diagnosis) -> str:
         ["WARNINGS", *(_wrap(w, "  - ") for w in diagnosis.warnings)],
     ]
     return "\n\n".join("\n".join(block) for block in blocks if len(block) > 1 or block is blocks[0])
+
+
+def _unusable(diagnosis: Diagnosis) -> Iterator[list[str]]:
+    """Say what is wrong with the table, and nothing of the robot."""
+    yield [_wrap(diagnosis.summary, "")]
+    struck = diagnosis.misfit.fault.rows if diagnosis.misfit and diagnosis.misfit.fault else ()
+    yield [
+        _wrap(verdict(diagnosis), f"{'verdict':11}"),
+        _wrap(campaign(diagnosis), f"{'campaign':11}"),
+        *([_wrap(rows_in_words(struck), f"{'struck':11}")] if struck else []),
+    ]
+    yield ["NEXT", _wrap(diagnosis.advice)]
+    if diagnosis.warnings:
+        yield ["WARNINGS", *(_wrap(w, "  - ") for w in diagnosis.warnings)]
 
 
 def _wrap(sentence: str, indent: str = "  ", hang: int = 0) -> str:
@@ -70,8 +93,9 @@ def _wrap(sentence: str, indent: str = "  ", hang: int = 0) -> str:
 def _facts(diagnosis: Diagnosis) -> Iterator[str]:
     yield _wrap(verdict(diagnosis), f"{'verdict':11}")
     yield _wrap(campaign(diagnosis), f"{'campaign':11}")
-    aside = f"as outliers: {rows_in_words(diagnosis.outliers)}" if diagnosis.outliers else "no row"
-    yield _wrap(aside, f"{'set aside':11}")
+    yield _wrap(set_aside(diagnosis), f"{'set aside':11}")
+    if told := left_out(diagnosis):
+        yield _wrap(told, f"{'left out':11}")
 
 
 def _how_far(diagnosis: Diagnosis) -> Iterator[str]:
@@ -79,7 +103,7 @@ def _how_far(diagnosis: Diagnosis) -> Iterator[str]:
     before, after, held_before, held_after, floor = units.together(
         (gap.rms_before, gap.rms_after, held.rms_before, held.rms_after, gap.noise_floor), "m"
     )
-    lines = [("gap, rms distance", before, after, "all rows that were not set aside")]
+    lines = [("gap, rms distance", before, after, rows_used(diagnosis))]
     if gap.orientation_before is not None:
         pair = units.together((gap.orientation_before, gap.orientation_after), "rad")
         lines.append(("gap of orientation, rms", pair[0], pair[1], ""))
@@ -98,10 +122,8 @@ def _how_far(diagnosis: Diagnosis) -> Iterator[str]:
         yield _wrap(told, f"  {'':{_NAME}}")
     shrinkage = f"{units.percent(held.shrinkage)}   95 % interval {_bounds(held.shrinkage_ci95)}"
     yield f"  {'shrinkage, held out':{_NAME}}{shrinkage}"
-    for scheme in gap.schemes[:1]:
-        pair = units.together((scheme.rms_before, scheme.rms_after), "m")
-        worst = f"{pair[0]} → {pair[1]}, held out by {scheme.name}: {scheme.held_out}"
-        yield _wrap(worst, f"  {'least favourable':{_NAME}}")
+    if told := hardest(diagnosis):
+        yield _wrap(told, f"  {'hardest hold-out':{_NAME}}")
     yield _wrap(noise(diagnosis, floor), f"  {'noise floor':{_NAME}}")
     yield _wrap(
         "Shrinkage is the share of the gap's mean square that the correction removes. Figures of rows held out "
@@ -123,10 +145,12 @@ def _which(diagnosis: Diagnosis) -> Iterator[str]:
         elif status == "found":
             yield "  found: none"
         for finding in group:
-            if status in ("found", "confounded"):
-                yield from _at_length(finding, wide)
+            if status in ("found", "confounded", "contained"):
+                yield from _at_length(finding, wide, diagnosis)
             else:
                 yield _in_short(finding, wide, diagnosis.joint_names)
+    if told := one_sigma(diagnosis):
+        yield _wrap(told)
 
 
 def _share(finding: Finding) -> str:
@@ -134,11 +158,11 @@ def _share(finding: Finding) -> str:
     return f"{units.percent(finding.shrinkage):>7}  {bounds}".rstrip()
 
 
-def _at_length(finding: Finding, wide: int) -> Iterator[str]:
+def _at_length(finding: Finding, wide: int, diagnosis: Diagnosis) -> Iterator[str]:
     inner = " " * 6
     yield f"    {finding.name:{wide}}{units.probability(finding.probability):>13}   {_share(finding)}"
-    if finding.confounded_with:
-        yield _wrap(f"these data cannot tell it from {', '.join(finding.confounded_with)}", inner)
+    if told := rivals(finding, diagnosis):
+        yield _wrap(told, inner)
     if described := law(finding):
         yield _wrap(described, inner)
     if finding.locations:
@@ -153,6 +177,8 @@ def _at_length(finding: Finding, wide: int) -> Iterator[str]:
         yield f"{inner}and {known.more} more, listed in the JSON"
     if known.undetermined:
         yield _wrap(f"not determined by these data: {known.undetermined}", inner, hang=2)
+    if known.unseen:
+        yield _wrap(known.unseen, inner, hang=2)
 
 
 def _in_short(finding: Finding, wide: int, joints: Sequence[str]) -> str:

@@ -27,7 +27,7 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from thermal_robot.diagnosis.parts import Explained, Place
+    from thermal_robot.diagnosis.explained import Explained, Place
 
 _ACROSS = 3
 _HIGH = 0.99

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 _LOOK: dict[str, dict[str, Any]] = {
     "found": {"color": AFTER, "edgecolor": AFTER},
     "confounded": {"color": "none", "edgecolor": AFTER, "hatch": "////"},
+    "contained": {"color": FAINT, "edgecolor": AFTER},
     "not_found": {"color": FAINT, "edgecolor": MUTED},
 }
 _FURTHEST_BELOW_ZERO, _FURTHEST = -0.25, 1.5

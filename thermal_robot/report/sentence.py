@@ -1,17 +1,20 @@
-"""The verdict in one plain sentence, and what to measure next."""
+"""The verdict in one plain sentence, short enough to be read aloud: at most 45 words and three causes."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from itertools import product
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from thermal_robot.diagnosis.parts import Finding, Unexplained
+    from thermal_robot.diagnosis.parts import Finding, Misfit, Unexplained
     from thermal_robot.diagnosis.result import Diagnosis
 
-_ANOTHER_MOTION = 0.02  # of the volume that was measured: a gap after correction above it is not a robot's
-_ANOTHER_TURN = 0.2  # rad: the same of orientation; no joint errs by eleven degrees
-_WEIGHTY = 0.01  # of the gap on held-out rows: an effect with less is named last
+MOST_WORDS = 45
+"""Of a headline."""
+_MOST_CAUSES = 3  # that a headline names; the others are counted
+_MOST_OF_A_NAME = 9  # words: of a longer title the headline says the beginning
+_WEIGHTY = 0.01  # of the gap on held-out rows: an effect with less is counted among the smaller ones
 _CARRIES = 1.5  # times what is left of the fitted rows: more on held-out rows is not called noise
 _SURE = 0.995  # a probability above it would be rounded to 100 %, which is never claimed
 # m: from which length on it is read times so much in which unit; what rounds to 1 mm is never written as 1e+03 µm
@@ -19,72 +22,130 @@ _LENGTHS = ((0.9995, 1.0, "m"), (0.9995e-3, 1e3, "mm"), (0.0, 1e6, "µm"))
 
 
 def headline(diagnosis: Diagnosis) -> str:
-    """Return the verdict as one sentence."""
-    gap, left = diagnosis.gap, diagnosis.unexplained
+    """Return the verdict as one sentence of at most 45 words.
+
+    It names at most three causes, the largest shares first, and counts the others. Of what there is to say of them the
+    fullest wording is taken that fits; the rest is left to :mod:`thermal_robot.report.details`.
+    """
+    return next((text for text in _wordings(diagnosis) if len(text.split()) <= MOST_WORDS), "") or _cut(
+        list(_wordings(diagnosis))[-1]
+    )
+
+
+def _cut(text: str) -> str:
+    return " ".join(text.split()[:MOST_WORDS]).rstrip(".,;:") + "."
+
+
+def _wordings(diagnosis: Diagnosis) -> Iterator[str]:
+    """Yield the sentence in all its wordings, the fullest first."""
+    size, left = length(diagnosis.gap.rms_before), diagnosis.unexplained
     remaining = diagnosis.remaining or left
-    size = length(gap.rms_before)
-    if _another_motion(diagnosis):
-        return _misfit(diagnosis)
-    which = "none of the effects that were considered" if diagnosis.narrowed else "no known effect"
-    if not diagnosis.verdict:
-        if not left.flagged:
-            floor = length(gap.noise_floor)
-            return f"No gap beyond the noise: the {size} between model and robot is what noise alone leaves ({floor})."
-        return f"The gap of {size} is explained by {which}{_place(left)}."
-    found = [diagnosis.finding(name) for name in diagnosis.verdict]
-    causes, chance = [f for f in found if not f.random], [diagnosis.title(f.name) for f in found if f.random]
-    probability = diagnosis.probability
-    sure = f"{100 * probability:.0f} % sure" if probability < _SURE else "more than 99 % sure"
-    if not causes:
+    if diagnosis.misfit is not None:
+        yield _misfit(diagnosis.misfit, diagnosis.reach)
+    elif not diagnosis.verdict and not left.flagged:
+        floor = length(diagnosis.gap.noise_floor)
+        yield f"No gap beyond the noise: the {size} between model and robot is what noise alone leaves ({floor})."
+    elif not diagnosis.verdict:
+        which = "none of the effects that were considered" if diagnosis.narrowed else "no known effect"
+        for place in (_place(left), ""):
+            yield f"The gap of {size} is explained by {which}{place}."
+    elif not (causes := systematic(diagnosis)):
         rest = f", of which {length(remaining.rms)} is not explained" if remaining.flagged and remaining.rms else ""
-        return f"The gap of {size} is scatter: {_listed(chance)} ({sure}){rest}; no correction removes scatter."
-    text = f"The gap of {size} comes from {_causes(diagnosis, causes)} ({sure}); correcting for "
-    text += ("them " if len(causes) > 1 else "it ") + _how_far(diagnosis) + _rest(diagnosis, remaining)
-    if laws := sum(f.quantity is not None for f in causes):
-        text += f"; {which} has {'that shape' if laws == 1 else 'these shapes'}"
-    if chance:
-        text += f"; there is also scatter, which no correction removes: {_listed(chance)}"
-    doubts = [
-        f"{diagnosis.title(f.name)} cannot be told apart from {' or '.join(map(diagnosis.title, f.confounded_with))}"
-        for f in causes
-        if f.confounded_with
-    ]
-    return text + ("; but " + ", and ".join(doubts) if doubts else "") + "."
+        names = listed([_name(diagnosis, f) for f in scattering(diagnosis)])
+        yield f"The gap of {size} is scatter: {names} ({_sure(diagnosis)}){rest}; no correction removes scatter."
+    else:
+        first, rivals = (_MOST_CAUSES, 2, 1), (True, False)
+        for most, beside in product(first, rivals):
+            names = _causes(diagnosis, causes, most, beside)
+            for told in _how_far(diagnosis, remaining, len(causes) > 1):
+                yield f"The gap of {size} comes from {names} ({_sure(diagnosis)}); {told}."
 
 
-def _another_motion(diagnosis: Diagnosis) -> bool:
-    gap = diagnosis.gap
-    return gap.rms_after > _ANOTHER_MOTION * diagnosis.reach or (gap.orientation_after or 0.0) > _ANOTHER_TURN
+def systematic(diagnosis: Diagnosis) -> list[Finding]:
+    """Return the causes that a correction can remove, the largest share first."""
+    return [f for f in map(diagnosis.finding, diagnosis.verdict) if not f.random]
 
 
-def _misfit(diagnosis: Diagnosis) -> str:
-    gap, reach = diagnosis.gap, diagnosis.reach
-    turned = gap.rms_after <= _ANOTHER_MOTION * reach
-    left = f"{gap.orientation_after:.2g} rad" if turned else f"{length(gap.rms_after)} of {length(reach)}"
-    return (
-        f"Robot and table do not describe the same motion ({left} remain): check units, signs and order of the "
-        "joints, axes of the instrument, order of the quaternion, and that all rows belong to one set-up."
-    )
+def scattering(diagnosis: Diagnosis) -> list[Finding]:
+    """Return the causes that no correction can remove."""
+    return [f for f in map(diagnosis.finding, diagnosis.verdict) if f.random]
 
 
-def _causes(diagnosis: Diagnosis, causes: Sequence[Finding]) -> str:
-    """Name those that weigh something first."""
-    weighty = [f for f in causes if (f.shrinkage or 0.0) >= _WEIGHTY] or list(causes[:1])
-    slight = [diagnosis.title(f.name) for f in causes if f not in weighty]
-    first = _listed([diagnosis.title(f.name) for f in weighty])
-    return first + (f", and, barely visible, {_listed(slight)}" if slight else "")
+def weighty(causes: Sequence[Finding], most: int = _MOST_CAUSES) -> list[Finding]:
+    """Return the causes that a headline names: those that weigh something, at most so many, but always the first."""
+    return [f for f in causes if (f.shrinkage or 0.0) >= _WEIGHTY][:most] or list(causes[:1])
 
 
-def _how_far(diagnosis: Diagnosis) -> str:
-    held = diagnosis.gap.held_out
-    if held.shrinkage < 0.0:
+def unnamed(diagnosis: Diagnosis) -> list[Finding]:
+    """Return the causes that the headline counts without naming them."""
+    text = headline(diagnosis)
+    return [f for f in systematic(diagnosis) if _name(diagnosis, f) not in text]
+
+
+def _misfit(misfit: Misfit, reach: float) -> str:
+    fault = misfit.fault
+    if fault is None:
+        left = f"{misfit.turned:.2g} rad" if misfit.away is None else f"{length(misfit.away)} of {length(reach)}"
         return (
-            f"does not carry over to held-out data: their gap is {length(held.rms_after)} with it and "
-            f"{length(held.rms_before)} without"
+            f"Robot and table do not describe the same motion ({left} remain): check units, signs and order of the "
+            "joints, axes of the instrument, order of the quaternion, and that all rows belong to one set-up."
         )
-    return (
-        f"removes {100 * held.shrinkage:.1f} % of its mean square on held-out data and leaves {length(held.rms_after)}"
-    )
+    struck = f" in {len(fault.rows)} rows" if fault.rows else ""
+    fall = f"{length(fault.rms_before)} to {length(fault.rms_after)}"
+    return f"The table is at fault{struck}, not the robot: {fault.what}. Mended, the gap falls from {fall}."
+
+
+def _sure(diagnosis: Diagnosis) -> str:
+    probability = diagnosis.probability
+    return f"{100 * probability:.0f} % sure" if probability < _SURE else "more than 99 % sure"
+
+
+def _causes(diagnosis: Diagnosis, causes: Sequence[Finding], most: int, beside: bool) -> str:
+    """Name the first few, each with what the data cannot tell it from, and count the others."""
+    named = weighty(causes, most)
+    names = [_name(diagnosis, f) + (_doubt(diagnosis, f) if beside else " (in doubt)" * _doubted(f)) for f in named]
+    fewer = len(causes) - len(named)
+    return listed([*names, *(["a smaller one"] if fewer == 1 else [f"{fewer} smaller ones"] if fewer else [])])
+
+
+def _name(diagnosis: Diagnosis, finding: Finding) -> str:
+    words = diagnosis.title(finding.name).split()
+    return " ".join(words) if len(words) <= _MOST_OF_A_NAME else " ".join(words[:_MOST_OF_A_NAME]).rstrip(",;") + "…"
+
+
+def _doubted(finding: Finding) -> bool:
+    return bool(finding.confounded_with)
+
+
+def _doubt(diagnosis: Diagnosis, finding: Finding) -> str:
+    rivals = [diagnosis.title(name) for name in finding.confounded_with]
+    return f" (or {rivals[0] if len(rivals) == 1 else 'others'})" if rivals else ""
+
+
+def _how_far(diagnosis: Diagnosis, remaining: Unexplained, several: bool) -> Iterator[str]:
+    """Yield what correcting does, the fullest wording first; that it harms somewhere is always said."""
+    gap, held = diagnosis.gap, diagnosis.gap.held_out
+    it = "them" if several else "it"
+    if held.shrinkage < 0.0:
+        pair = f"{length(held.rms_after)} with it and {length(held.rms_before)} without"
+        yield f"correcting for {it} does not carry over to held-out data: their gap is {pair}"
+        yield f"correcting harms held-out data: {pair}"
+        return
+    leaves, hard, harms = length(held.rms_after), "", ""
+    if gap.hardest is not None and gap.hardest.shrinkage < 0.0:
+        hard = harms = f"; but it harms rows held out by {gap.hardest.name}"
+    elif gap.hardest is not None:
+        hard = f"; held out by {gap.hardest.name}, {length(gap.hardest.rms_after)}"
+    full = f"correcting for {it} removes {100 * held.shrinkage:.1f} % of its mean square on held-out data"
+    scatter = "; there is also scatter" * bool(scattering(diagnosis))
+    yield f"{full} and leaves {leaves}{_rest(diagnosis, remaining)}{hard}{scatter}"
+    yield f"{full} and leaves {leaves}{_rest(diagnosis, remaining)}{hard}"
+    short = f"correcting removes {100 * held.shrinkage:.1f} % on held-out data and leaves {leaves}"
+    yield f"{short}{_rest(diagnosis, remaining)}{hard}"
+    more = ", more than noise" if remaining.flagged else ""
+    yield f"{short}{more}{hard}"
+    for elsewhere in dict.fromkeys((hard, harms)):
+        yield f"correcting leaves {leaves} on held-out data{more}{elsewhere}"
 
 
 def _rest(diagnosis: Diagnosis, remaining: Unexplained) -> str:
@@ -94,8 +155,8 @@ def _rest(diagnosis: Diagnosis, remaining: Unexplained) -> str:
             return f", which is noise ({floor})"
         return f", while {length(gap.rms_after)} is left on the rows it was fitted to (noise: {floor})"
     if gap.noise_source == "remainder" or remaining.rms == 0.0:
-        return ", which is more than noise" + _place(remaining)
-    return f", of which {length(remaining.rms)} is not explained" + _place(remaining)
+        return ", which is more than noise"
+    return f", of which {length(remaining.rms)} is not explained"
 
 
 def length(metres: float) -> str:
@@ -104,8 +165,9 @@ def length(metres: float) -> str:
     return f"{metres * factor:.3g} {unit}"
 
 
-def _listed(names: Sequence[str]) -> str:
-    return names[0] if len(names) == 1 else ", ".join(names[:-1]) + " and " + names[-1]
+def listed(names: Sequence[str]) -> str:
+    """Put names one after the other: ``a, b and c``."""
+    return "".join(names) if len(names) < 2 else ", ".join(names[:-1]) + " and " + names[-1]
 
 
 def _place(unexplained: Unexplained) -> str:
@@ -116,26 +178,3 @@ def _place(unexplained: Unexplained) -> str:
     if unexplained.depends_on:
         parts.append(f"follows {unexplained.depends_on[0].covariate}")
     return "; it " + " and ".join(parts) if parts else ""
-
-
-def advice(diagnosis: Diagnosis) -> str:
-    """Return what to measure next in one sentence."""
-    if diagnosis.separates:
-        apart = " from ".join(map(diagnosis.title, diagnosis.separates[0][:2]))
-        if any(diagnosis.is_frame(name) for name in diagnosis.separates[0]):
-            return f"A frame measured on its own, and declared known, would tell {apart}."
-        return f"More poses over the whole range of every joint would tell {apart}."
-    # repeats are not recorded but made: the last advice asks for them
-    missing = [
-        f
-        for f in diagnosis.effects
-        if f.status == "not_testable" and f.needs != ("pose",) and not diagnosis.is_frame(f.name)
-    ]
-    # what is no column, such as masses in the URDF, cannot be recorded
-    columns = sorted({n.split(".")[0] for f in missing for n in f.needs if " " not in n})
-    if diagnosis.unexplained.flagged and columns:
-        untested = _listed([diagnosis.title(f.name) for f in missing])
-        return f"Record {_listed(columns)}: {untested} could not be tested, and a remainder is unexplained."
-    if diagnosis.unexplained.flagged:
-        return "Repeat a few poses in another order and on another day: this shows how much of the remainder repeats."
-    return "Nothing: the data determine the explanation."

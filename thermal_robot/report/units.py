@@ -94,8 +94,17 @@ def estimate(parameter: Estimate, beside: Iterable[Estimate] = ()) -> str:
         return "not determined by these data"
     alike = [parameter, *(p for p in beside if p.unit == parameter.unit)]
     best = scale(parameter.unit, max(max(abs(p.value or 0.0), p.std or 0.0) for p in alike))
+    return _spread(parameter.value, parameter.std or 0.0, best)
+
+
+def measured(value: float, std: float, unit: str) -> str:
+    """Write an SI value with its standard deviation: ``0.42 ± 0.03 mm``."""
+    return _spread(value, std, scale(unit, max(abs(value), std)))
+
+
+def _spread(value: float, std: float, best: Scale) -> str:
     unit = "" if best.unit in ("", "1") else f" {best.unit}"
-    value, std = parameter.value * best.factor, (parameter.std or 0.0) * best.factor
+    value, std = value * best.factor, std * best.factor
     if std <= 0.0 or not isfinite(std):
         return f"{number(value)}{unit}"
     largest = max(abs(value), std)

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 STATUS = {
     "found": "found",
     "confounded": "cannot be told apart",
+    "contained": "part of what was found",
     "in_question": "in question",
     "not_found": "not found",
     "not_testable": "not testable with these data",
@@ -62,12 +63,15 @@ class Shown:
         How many identified ones are not shown.
     undetermined
         Names of those that the data do not determine; empty where there is none.
+    unseen
+        How many the data do not see, or not beside the others, with their names; empty where there is none.
     """
 
     heading: str
     shown: tuple[tuple[str, str], ...]
     more: int
     undetermined: str
+    unseen: str
 
 
 def parameters(finding: Finding) -> Shown:
@@ -77,13 +81,21 @@ def parameters(finding: Finding) -> Shown:
     if len(known) > _ALL_UP_TO:
         chosen = sorted(known, key=lambda p: -_significance(p))[:_MOST]
         heading = f"the {_MOST} most significant of {len(known)} parameters:"
-    undetermined = [p.name for p in finding.parameters if p not in known]
+    # of a law its size says what is known; a constant in it that the frames can take up is no news
+    undetermined = [] if finding.size else [p.name for p in finding.parameters if p not in known]
     return Shown(
         heading,
         tuple((p.name, units.estimate(p, chosen)) for p in chosen),
         len(known) - len(chosen),
         in_words(undetermined, most=4, between="; "),  # names hold commas
+        _unseen(finding.unseen),
     )
+
+
+def _unseen(names: Sequence[str]) -> str:
+    """Say how many parameters are not seen and which; empty where there are none."""
+    listed = in_words(names, most=6, between="; ")
+    return f"{len(names)} not seen apart from the others or the frames: {listed}" if names else ""
 
 
 def _significance(parameter: Estimate) -> float:
@@ -108,6 +120,27 @@ def rows_in_words(rows: Sequence[int], most: int = 10) -> str:
     return f"{'row' if len(rows) == 1 else 'rows'} {in_words([str(r) for r in rows], most)}"
 
 
+def set_aside(diagnosis: Diagnosis) -> str:
+    """Say which rows were set aside: ``as outliers: rows 8, 24, 74, 90``."""
+    return f"as outliers: {rows_in_words(diagnosis.outliers)}" if diagnosis.outliers else "no row"
+
+
+def rows_used(diagnosis: Diagnosis) -> str:
+    """Say how many rows were set aside, and how many were not: ``116 of 120 rows, 4 set aside``."""
+    aside, samples = len(diagnosis.outliers), diagnosis.samples
+    return f"{samples - aside} of {samples} rows, {aside} set aside" if aside else f"all {samples} rows"
+
+
+def hardest(diagnosis: Diagnosis) -> str:
+    """Say how far it shrinks where rows are held out in the hardest way; empty where that is as on average."""
+    scheme = diagnosis.gap.hardest
+    if scheme is None:
+        return ""
+    before, after = units.together((scheme.rms_before, scheme.rms_after), "m")
+    times = units.number(scheme.rms_after / diagnosis.gap.held_out.rms_after, 2)
+    return f"{before} → {after}, held out by {scheme.name} ({scheme.held_out}): {times} times the average"
+
+
 def places(finding: Finding, most: int = 4) -> str:
     """Say where an effect sits, its largest shares first; empty where that is not known."""
     shown = [p for p in finding.locations if p.share >= _NEGLIGIBLE][:most] or list(finding.locations[:1])
@@ -120,6 +153,8 @@ def places(finding: Finding, most: int = 4) -> str:
 
 def verdict(diagnosis: Diagnosis) -> str:
     """Name the explanation and how probable exactly this one is."""
+    if not diagnosis.usable:
+        return "none: robot and table do not belong together"
     names = in_words(diagnosis.verdict) or "no effect"
     said = f"{names}; probability of exactly this explanation {units.probability(diagnosis.probability)}"
     return said + ("; a remainder stays unexplained" if diagnosis.unexplained.flagged else "")
@@ -171,13 +206,42 @@ def needs(finding: Finding, joints: Sequence[str]) -> str:
 
 
 def law(finding: Finding) -> str:
-    """Describe a law that was discovered in the data; empty for an effect of the library."""
+    """Describe a law that was discovered in the data, its size and what it usually is; empty for a known effect."""
     if not finding.quantity:
         return ""
-    what = f"a {finding.of} whose size follows" if finding.of else "follows"
-    return f"a law found in the data: {what} {finding.quantity}" + (
-        f", shape: {finding.shape}" if finding.shape else ""
-    )
+    described = finding.describes or f"it follows {finding.quantity}"
+    large = " and ".join(units.measured(s.value, s.std, s.unit) for s in finding.size)
+    told = [f"a law found in the data: {described}", f"{finding.size[0].what} {large}" if large else ""]
+    return "; ".join(part for part in (*told, f"usually {finding.usually}" if finding.usually else "") if part)
+
+
+def rivals(finding: Finding, diagnosis: Diagnosis) -> str:
+    """Say of which effect it is a part, or what it cannot be told from and how to see the one not preferred."""
+    if not finding.confounded_with:
+        return ""
+    if finding.status == "contained":
+        return f"its part of {', '.join(finding.confounded_with)}"
+    said = f"these data cannot tell it from {', '.join(finding.confounded_with)}"
+    others = [name for name in finding.confounded_with if not diagnosis.is_frame(name)]
+    if finding.name not in diagnosis.verdict or not others:
+        return said
+    return f"{said}; --without {finding.name} shows {one_of(others)} in its place"
+
+
+def left_out(diagnosis: Diagnosis) -> str:
+    """Say which effects the user left out, and how he asked for that; empty where he did not."""
+    out, kept = diagnosis.left_out, [f.name for f in diagnosis.effects if f.quantity is None]
+    if not out:
+        return ""
+    if len(out) <= len(kept):
+        return f"by request (--without {' '.join(out)}): {', '.join(out)}"
+    return f"by request all but {', '.join(kept)} (--only {' '.join(kept)})"
+
+
+def one_sigma(diagnosis: Diagnosis) -> str:
+    """Say what ± means; empty where it does not stand anywhere."""
+    told = any(f.size or any(p.identified and p.std for p in f.parameters) for f in diagnosis.effects)
+    return "± is one standard deviation (1 sigma)." if told else ""
 
 
 def laws(diagnosis: Diagnosis) -> list[Finding]:

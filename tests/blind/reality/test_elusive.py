@@ -1,4 +1,4 @@
-"""Ripples of any order, memory, new zeros, and what nobody records."""
+"""Waves of any order, memory, new zeros, and what nobody records."""
 
 from dataclasses import replace
 
@@ -7,13 +7,14 @@ import pytest
 
 pytest.importorskip("mujoco", reason='the blind trial needs "thermal-robot[blind]"')
 
-from thermal_robot.blind.reality.elusive import ELUSIVE, FAST, SLOW, slipped, wandered
+from thermal_robot.blind.reality.elusive import ELUSIVE, SLOW, slipped, wandered
 from thermal_robot.blind.reality.fault import Fault
+from thermal_robot.blind.reality.faults import FAULTS
 
-BY_NAME: dict[str, Fault] = {fault.name: fault for fault in ELUSIVE}
+BY_NAME: dict[str, Fault] = {**FAULTS, **{fault.name: fault for fault in ELUSIVE}}
 
 
-@pytest.mark.parametrize(("name", "orders"), [("ripple", SLOW), ("fast_ripple", FAST)])
+@pytest.mark.parametrize(("name", "orders"), [("slow_wave", SLOW), ("joint_ripple", (5.0, 200.0))])
 def test_a_ripple_comes_back_after_its_period_whatever_its_order(name, orders, setting):
     rng = np.random.default_rng(1)
     drawn = np.array([BY_NAME[name].draw(setting, rng).max(axis=0)[1] for _ in range(200)])

@@ -80,6 +80,26 @@ def test_links_grow_along_themselves(ur10, setting, gauge):
     assert np.abs(moved).max() > 50e-6
 
 
+def test_a_soft_base_lets_its_load_sink_about_a_point_that_stays(setting, body):
+    FAULTS["base_compliance"].act(body, setting, np.array([[1e-6, 2e-6, 0.7]]))
+    below = np.array([0.0, 0.0, -0.7])
+    np.testing.assert_allclose(body.base[:, :3, :3] @ below + body.base[:, :3, 3], np.tile(below, (90, 1)), atol=1e-6)
+    # the centre of all that has weight goes down: gravity does work on each spring
+    turned = (body.base[:, [2, 0], [1, 2]] - body.base[:, [1, 2], [2, 0]]) / 2.0
+    assert (turned * setting.overturning[:, :2] >= -1e-15).all()
+    np.testing.assert_allclose(turned, setting.overturning[:, :2] * [1e-6, 2e-6], rtol=1e-3, atol=1e-9)
+
+
+def test_some_bases_turn_at_the_flange_and_some_below(setting):
+    fault = FAULTS["base_compliance"]
+    rng = np.random.default_rng(6)
+    drawn = [fault.draw(setting, rng) for _ in range(40)]
+    depths = np.array([values[0, 2] for values in drawn])
+    assert (depths == 0.0).any()
+    assert ((depths >= 0.0) & (depths <= 1.0)).all()
+    assert {len(fault.known_as(setting, values)) for values in drawn} == {2, 4}
+
+
 def test_a_link_as_warm_as_its_hall_does_not_bow(setting, gauge, body):
     values = np.full((len(setting.world.segments), 2), 1e-4)
     level = replace(setting, links=np.repeat(setting.air[:, None], setting.links.shape[1], axis=1))

@@ -35,6 +35,7 @@ def test_poses_and_torques_are_the_sound_robots(days):
     poses, torque = day.world.poses(day.q, day.payload, day.world.sound(day.samples))
     np.testing.assert_array_equal(day.poses, poses)
     np.testing.assert_array_equal(day.torque, torque)
+    np.testing.assert_array_equal(day.overturning, day.world.overturning(day.q, day.payload))
 
 
 def test_time_begins_with_the_first_row_and_passes(days):

@@ -12,7 +12,10 @@ from conftest import AWKWARD
 from thermal_robot.blind.plan import PARALLELOGRAMS, ROBOTS
 from thermal_robot.blind.reality import World
 from thermal_robot.blind.reality.world import cross_axes
+from thermal_robot.campaign import Campaign
+from thermal_robot.effects.base_compliance import overturning
 from thermal_robot.kinematics import gravity_torques, tool_poses
+from thermal_robot.observations import observe
 from thermal_robot.robot import load_robot
 
 NAMED = {name: (urdf, tool) for name, urdf, tool in ROBOTS}
@@ -51,6 +54,27 @@ def test_a_joint_that_slides_is_known_as_one():
         "rail_joint": True,
         "hand_joint": False,
     }
+
+
+def test_the_overturning_moment_is_weight_times_lever():
+    """An arm of 4 kg, level, with its weight 0.4 m from the wall and a payload 0.8 m from it; upright, with none."""
+    world = World(BEAM, "end", payload_com=(0.0, 0.0, 0.0))
+    moments = world.overturning(np.array([[0.0], [0.0], [np.pi / 2]]), np.array([0.0, 2.0, 2.0]))
+    np.testing.assert_allclose(moments[:, 1], 9.81 * np.array([1.6, 3.2, 0.0]), atol=1e-12)
+    np.testing.assert_allclose(moments[:, [0, 2]], 0.0, atol=1e-12)
+
+
+@pytest.mark.parametrize("name", [*NAMED, "awkward"])
+def test_the_overturning_moment_varies_as_the_program_has_it(name):
+    """But for a link that nothing moves."""
+    urdf, tool = NAMED.get(name, (AWKWARD, "tip"))
+    robot = load_robot(urdf, tool)
+    world = World(robot.urdf, tool, payload_com=(0.02, -0.01, 0.05))
+    q, payload = drawn(world, 40, 5), np.linspace(0.0, 3.0, 40)
+    place = np.array([0.02, -0.01, 0.05])
+    campaign = Campaign("commands", robot, q, covariates={"payload": payload}, payload_com=place, target=place)
+    moments, program = world.overturning(q, payload), overturning(observe(campaign))
+    np.testing.assert_allclose(moments - moments[0], program - program[0], atol=1e-8)
 
 
 def test_hinges_of_the_beams_move_nothing_while_they_are_stiff(ur10):

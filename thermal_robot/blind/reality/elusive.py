@@ -5,14 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.blind.reality.fault import Fault, Number, joints, milli, one, own_position, part
+from thermal_robot.blind.reality import gears
+from thermal_robot.blind.reality.fault import Fault, joints, milli, one, part
 from thermal_robot.blind.reality.setting import Setting
 from thermal_robot.blind.reality.world import Body
 
 Array = NDArray[np.float64]
 
-SLOW, FAST = (1.0, 60.0), (60.0, 200.0)
-"""Orders a turn: of gear stages and cam followers, and of teeth, balls and motors whose ratio nobody states."""
+SLOW = (1.0, 2.5)
+"""Orders a turn: of what comes round hardly more often than the joint, but no whole number of times."""
 ELEMENTS = 4
 _SLIPS = (0.05, 0.6)  # of a joint's range: how far it goes before an element slips
 _LASTS = (0.5, 3.0)  # rows: how long what nobody records stays as it is
@@ -20,19 +21,8 @@ _SEEDS = 2**31
 _SESSIONS = 3  # at most
 
 
-def _order(bounds: tuple[float, float]) -> Number:
-    """Draw an order evenly over its logarithm."""
-    return lambda setting, j, rng: float(np.exp(rng.uniform(*np.log(bounds))))
-
-
 def _seed(setting: Setting, j: int, rng: np.random.Generator) -> float:
     return float(rng.integers(_SEEDS))
-
-
-def _ripple(body: Body, setting: Setting, values: Array) -> None:
-    """A wave of the joint's own position, of an order that is no whole number; a joint that slides has one a metre."""
-    size, order, phase = values.T
-    body.joints += size * np.sin(order * setting.q + phase)
 
 
 def _winding(body: Body, setting: Setting, values: Array) -> None:
@@ -108,18 +98,7 @@ def _nothing(setting: Setting, places: object) -> tuple[str, ...]:
 
 
 ELUSIVE = (
-    *(
-        Fault(
-            name,
-            one(milli, _order(orders), part(0.0, 2 * np.pi)),
-            _ripple,
-            joints,
-            few=True,
-            quantities=own_position,
-            fixed=((1, (1.0,)), (2, (0.0,))),
-        )
-        for name, orders in (("ripple", SLOW), ("fast_ripple", FAST))
-    ),
+    gears.waves("slow_wave", SLOW),
     Fault(
         "winding",
         one(milli, *[part(*_SLIPS)] * ELEMENTS, *[part(0.3, 1.0)] * ELEMENTS),

@@ -159,3 +159,8 @@ def part(low: float, high: float) -> Number:
 def within(low: float, high: float) -> Number:
     """Draw a position of the joint between two quantiles of where it goes."""
     return lambda setting, j, rng: float(np.quantile(setting.q[:, j], rng.uniform(low, high)))
+
+
+def order(bounds: tuple[float, float]) -> Number:
+    """Draw an order evenly over its logarithm."""
+    return lambda setting, j, rng: float(np.exp(rng.uniform(*np.log(bounds))))

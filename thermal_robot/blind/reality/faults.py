@@ -8,7 +8,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.blind.reality import gears
-from thermal_robot.blind.reality.fault import Fault, clock, each_joint, joints, own_position, segments, some, twist
+from thermal_robot.blind.reality.fault import (
+    Fault,
+    clock,
+    each_joint,
+    joints,
+    own_position,
+    segments,
+    some,
+    twist,
+)
 from thermal_robot.blind.reality.setting import Setting
 from thermal_robot.blind.reality.world import Body
 
@@ -19,6 +28,9 @@ _SETTLES = (600.0, 72000.0)
 """s, evenly over the logarithm. Fastest: ρ c d / h of a steel tube of 2 mm in still air, 3.6e6 · 0.002 / 12. Between:
 a laser tracker is stable two hours after it was switched on (Pollack Periodica 15 (3), 2020), three times 40 minutes.
 Slowest: 4 d² / (π² κ) of a concrete floor that is warm on one side, 0.35 m thick and with κ of 7e-7 m²/s."""
+_SPRINGS = (0.4, 1.6)  # of one another: what stands on a plate is up to four times as stiff about one axis; ours
+_DEPTHS = (0.0, 1.0)  # m: from the flange down to the floor under a pedestal
+_TEETH = (5.0, 200.0)  # a turn: of gear stages, teeth, balls and motors whose ratio nobody states
 _HOLDS = 1e9  # N·m: friction against which no gravity helps
 
 
@@ -72,6 +84,30 @@ def _crept(setting: Setting, values: Array) -> dict[str, float]:
     """How far the base has gone in the last row that was measured."""
     last = setting.time[setting.given][-1] - setting.time[0]
     return dict(twist("base")(setting, values[:, :6] * -np.expm1(-last / values[0, 6])))
+
+
+def _tip(body: Body, setting: Setting, values: Array) -> None:
+    """A base on springs turns under the moment of all weights, about a point on the vertical through its origin."""
+    springs, depth = np.abs(values[0, :2]), values[0, 2]
+    turn = np.column_stack([setting.overturning[:, :2] * springs, np.zeros(setting.samples)])
+    body.move("base", np.hstack([depth * np.cross(turn, [0.0, 0.0, 1.0]), turn]))
+
+
+def _draw_tip(setting: Setting, rng: np.random.Generator) -> Array:
+    depth = rng.choice([0.0, rng.uniform(*_DEPTHS)])
+    low, high = np.log(_SPRINGS)
+    return np.append(1e-6 * np.exp(rng.uniform(low, high, 2)), depth)[None]
+
+
+def _tipped(setting: Setting, values: Array) -> dict[str, float]:
+    """The springs; and, where the base turns about a point below, how far the moment shifts it."""
+    depth = float(values[0, 2])
+    found = {}
+    for axis, spring in zip("xy", np.abs(values[0, :2]).tolist(), strict=True):
+        found[f"compliance about {axis}, base"] = spring
+        if depth > 0.0:
+            found[f"shift by the moment about {axis}, base"] = depth * spring
+    return found
 
 
 def _scale(body: Body, setting: Setting, values: Array) -> None:
@@ -132,6 +168,7 @@ FAULTS: dict[str, Fault] = {
             known_as=gears.harmonics,
             fixed=((3, (0.0, np.pi / 4)), (4, (1.0,))),
         ),
+        gears.waves("joint_ripple", _TEETH),
         Fault(
             "backlash",
             gears.draw_play,
@@ -202,6 +239,15 @@ FAULTS: dict[str, Fault] = {
             quantities=clock,
             known_as=_crept,
             fixed=((6, (1e3, 5e3, 1e6)),),
+        ),
+        Fault(
+            "base_compliance",
+            _draw_tip,
+            _tip,
+            lambda s: [("base", "base")],
+            quantities=lambda s, places: ["payload", *s.world.names],
+            known_as=_tipped,
+            fixed=((2, (0.0, 1.0)),),
         ),
         Fault(
             "instrument_scale",

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.blind.reality.fault import some
+from thermal_robot.blind.reality.fault import Fault, joints, milli, one, order, own_position, part, some
 from thermal_robot.blind.reality.setting import Setting
 from thermal_robot.blind.reality.world import Body
 
@@ -68,10 +68,22 @@ def harmonics(setting: Setting, values: Array) -> dict[str, float]:
     for name, (across, along, oval, phase, ratio) in zip(setting.world.names, values, strict=True):
         disc = complex(along, -across)
         second = disc**2 / 2.0 + oval * np.exp(2j * phase)
-        for order, amplitude in ((ratio, disc), (2.0 * ratio, second)):
-            found[f"sine, order {order:g}, {name}"] = float(amplitude.real)
-            found[f"cosine, order {order:g}, {name}"] = float(amplitude.imag)
+        for turns, amplitude in ((ratio, disc), (2.0 * ratio, second)):
+            found[f"sine, order {turns:g}, {name}"] = float(amplitude.real)
+            found[f"cosine, order {turns:g}, {name}"] = float(amplitude.imag)
     return found
+
+
+def ripple(body: Body, setting: Setting, values: Array) -> None:
+    """Let teeth, balls or a motor's wheel come round: a wave of the joint's own position; one that slides has rad/m."""
+    size, order, phase = values.T
+    body.joints += size * np.sin(order * setting.q + phase)
+
+
+def waves(name: str, orders: tuple[float, float]) -> Fault:
+    """Return the fault of one joint that errs by a wave, of an order drawn between two."""
+    draw, fixed = one(milli, order(orders), part(0.0, 2 * np.pi)), ((1, (1.0,)), (2, (0.0,)))
+    return Fault(name, draw, ripple, joints, few=True, quantities=own_position, fixed=fixed)
 
 
 def play(body: Body, setting: Setting, values: Array) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -79,6 +80,11 @@ class Setting:
     def samples(self) -> int:
         """N."""
         return len(self.time)
+
+    @cached_property
+    def overturning(self) -> Array:
+        """(N, 3) moment of the sound robot's weight and payload about the root frame's origin, N·m."""
+        return self.world.overturning(self.q, self.payload)
 
     @property
     def before(self) -> NDArray[np.int64]:

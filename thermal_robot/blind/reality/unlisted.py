@@ -17,10 +17,6 @@ Array = NDArray[np.float64]
 
 GRAVITY = ("gravity.x", "gravity.y", "gravity.z")
 """Gravity's direction in the tool frame: a quantity that nobody records and anybody can compute."""
-REACH = ("reach.x", "reach.y")
-"""Where the tool is, from which the moment on a pedestal follows."""
-MOMENT = tuple(f"{a} * {b}" for place in REACH for a, b in (("payload", place), (place, "payload")))
-"""That moment: the load times where it is, in either order."""
 
 
 def _slip(body: Body, setting: Setting, values: Array) -> None:
@@ -44,16 +40,6 @@ def _hot_motor(body: Body, setting: Setting, values: Array) -> None:
     """A gearbox that stiffens and leans when its motor is hot: grows with the square of what a column records."""
     heat = setting.extra["motor_temperature"] - 20.0
     body.joints += values[:, 0] * ((heat / 25.0) ** 2)[:, None]
-
-
-def _pedestal(body: Body, setting: Setting, values: Array) -> None:
-    """A pedestal that rocks under the moment of the arm, in its own soft direction more than in the other."""
-    place = setting.poses[:, :3, 3]
-    twist = np.zeros((setting.samples, 6))
-    loaded = 1.0 + setting.payload / (setting.payload.max() + 1e-9)
-    twist[:, 3] = -values[0, 0] * place[:, 1] * loaded * values[0, 1]
-    twist[:, 4] = values[0, 0] * place[:, 0] * loaded
-    body.move("base", twist)
 
 
 def _nest(body: Body, setting: Setting, values: Array) -> None:
@@ -155,14 +141,6 @@ UNLISTED: dict[str, Fault] = {
             quantities=lambda s, places: ["motor_temperature"],
         ),
         Fault(
-            "soft_pedestal",
-            lambda s, rng: np.array([[1e-4, rng.uniform(0.2, 0.6)]]),
-            _pedestal,
-            _base,
-            quantities=lambda s, places: [*s.world.names[:3], "payload", *REACH, *MOMENT],
-            fixed=((1, (0.4,)),),
-        ),
-        Fault(
             "loose_nest",
             lambda s, rng: np.array([[1e-4, float(rng.integers(3))]]),
             _nest,
@@ -227,4 +205,4 @@ UNLISTED: dict[str, Fault] = {
         *ELUSIVE,
     )
 }
-"""Twelve kinds of one quantity at one place, and those of the two other modules, by name."""
+"""Eleven kinds of one quantity at one place, and those of the two other modules, by name."""

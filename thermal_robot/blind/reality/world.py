@@ -195,6 +195,19 @@ class World:
             poses[i, :3, 3] = data.xpos[tool]
         return poses, torque
 
+    def overturning(self, q: Array, payload: Array) -> Array:
+        """(N, 3) moment about the root frame's origin, N·m, of the weight of all links and of the payload."""
+        model = copy(self.compile(False, None))  # its payload changes
+        data = mujoco.MjData(model)
+        carried, address = model.body("payload").id, self.address(model)
+        moments = np.empty((len(q), 3))
+        for i in range(len(q)):
+            model.body_mass[carried] = payload[i]
+            data.qpos[address] = self.coupling @ q[i] + self.rest
+            mujoco.mj_kinematics(model, data)
+            moments[i] = np.cross(model.body_mass @ data.xipos, model.opt.gravity)
+        return moments
+
     @property
     def pieces(self) -> Array:
         """(S,) length of the pieces of each segment's beam, m."""

@@ -1,0 +1,44 @@
+"""What fits to the other rows leave: against refitting row by row, and what no column can explain."""
+
+import numpy as np
+
+from thermal_robot.inference.folds import left_out
+from thermal_robot.inference.rows import each
+
+
+def problem(seed, noise=1.0):
+    rng = np.random.default_rng(seed)
+    columns = rng.normal(size=(60, 3, 4))
+    truth = np.array([1.0, -2.0, 0.5, 3.0])
+    return columns, columns @ truth + noise * rng.normal(size=(60, 3))
+
+
+def test_it_is_what_separate_fits_leave():
+    columns, values = problem(0)
+    labels = np.arange(60) % 5
+    expected = 0.0
+    for label in range(5):
+        held = labels == label
+        fitted = np.linalg.lstsq(columns[~held].reshape(-1, 4), values[~held].ravel(), rcond=None)[0]
+        expected += ((values[held] - columns[held] @ fitted) ** 2).sum()
+    np.testing.assert_allclose(left_out(columns, values, 4, np.zeros(0), each(labels)), expected, rtol=1e-8)
+
+
+def test_without_noise_nothing_is_left():
+    columns, values = problem(1, noise=0.0)
+    assert left_out(columns, values, 4, np.zeros(0), each(np.arange(60) % 4)) < 1e-12
+
+
+def test_a_tight_prior_holds_a_column_at_nothing():
+    columns, values = problem(2)
+    folds = each(np.arange(60) % 6)
+    without = left_out(columns[:, :, :3], values, 3, np.zeros(0), folds)
+    np.testing.assert_allclose(left_out(columns, values, 3, np.array([1e12]), folds), without, rtol=1e-6)
+
+
+def test_columns_of_noise_do_harm_to_rows_held_out():
+    rng = np.random.default_rng(3)
+    columns, values = problem(4)
+    folds = each(np.arange(60) % 6)
+    wider = np.concatenate([columns, rng.normal(size=(60, 3, 40))], axis=2)
+    assert left_out(wider, values, 44, np.zeros(0), folds) > 1.1 * left_out(columns, values, 4, np.zeros(0), folds)

@@ -1,0 +1,55 @@
+"""Waves that the remainder of a fit shows: those that are at work, at their orders, and none of noise."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers import NOISE, tool_with
+from simulate import simulate
+
+from thermal_robot.effects import choose
+from thermal_robot.effects.joint_ripple import JointRipple
+from thermal_robot.inference.fit import fit
+from thermal_robot.inference.ripple import alike, waves
+
+SAMPLES = 200
+
+
+def rippling(robot, found, amplitudes, seed):
+    """A campaign of a robot whose joints err by waves of these amplitudes, rad; a sine each."""
+    plain = simulate(robot, samples=SAMPLES, seed=seed, noise=NOISE)[0]
+    values = np.column_stack([amplitudes, np.zeros(len(amplitudes))]).ravel()
+    noise = NOISE * np.random.default_rng(seed).normal(size=(SAMPLES, 3))
+    return replace(plain, position=tool_with(plain, found, values) + noise)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_waves_are_found_in_their_joints_at_their_orders(rv_m2, seed):
+    true = JointRipple().having("joint_2", 26.6, 1.0).having("joint_1", 11.9, 1.0)
+    found = waves(fit(rippling(rv_m2, true, (2e-4, 3e-4), seed), choose(only=("joint_offset", "joint_ripple"))))
+    assert sorted(found.joints) == ["joint_1", "joint_2"]
+    for joint, order in zip(found.joints, found.orders, strict=True):
+        # the peak of a wave over some four radians is 1.6 wide
+        assert order == pytest.approx({"joint_2": 26.6, "joint_1": 11.9}[joint], abs=0.1)
+    assert found.share < 1e-4  # either was one of hundreds
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_noise_has_no_waves(rv_m2, seed):
+    plain = rippling(rv_m2, JointRipple(), (), seed)
+    assert waves(fit(plain, choose(only=("joint_offset", "joint_ripple")))) == JointRipple()
+
+
+def test_a_wave_that_comes_round_twice_is_no_ripple(rv_m2):
+    oval = JointRipple().having("joint_2", 2.0, 1.0)
+    found = waves(fit(rippling(rv_m2, oval, (4e-4,), 1), choose(only=("transmission_error", "joint_ripple"))))
+    assert found == JointRipple()
+
+
+def test_ripples_are_alike_whatever_the_order_in_which_waves_were_found():
+    one = JointRipple().having("joint_1", 12.0, 10.0).having("joint_2", 26.6, 20.0)
+    other = JointRipple().having("joint_2", 26.61, 20.0).having("joint_1", 12.0, 10.0)
+    assert alike(one, other)
+    assert not alike(one, other.having("joint_3", 5.0, 10.0))
+    assert not alike(one, JointRipple().having("joint_1", 12.0, 10.0).having("joint_2", 27.0, 20.0))
+    assert alike(JointRipple(), JointRipple())

@@ -1,0 +1,44 @@
+"""Say that robot and table do not belong together; then no effect is claimed."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+
+from thermal_robot.campaign import Campaign
+from thermal_robot.diagnosis.answer import Conclusion
+from thermal_robot.diagnosis.data_faults import settings
+from thermal_robot.diagnosis.examine import examine
+from thermal_robot.diagnosis.parts import Misfit
+from thermal_robot.effects import Effect
+from thermal_robot.inference.fit import Fit, fit
+from thermal_robot.inference.random_gap import nothing_random
+
+_NEEDED = "a table that fits the robot"
+
+
+def another_motion(fitted: Fit) -> Misfit | None:
+    """Tell whether a fit leaves more than any robot errs: robot and table then do not describe the same motion."""
+    left = fitted.corrected.gap[~fitted.explanation.outliers]
+    away = float(np.sqrt((left[:, :3] ** 2).sum(axis=1).mean()))
+    turned = float(np.sqrt((left[:, 3:] ** 2).sum(axis=1).mean()))
+    if away > settings.ANOTHER_MOTION * fitted.campaign.reach:
+        return Misfit(away=away)
+    return Misfit(turned=turned) if turned > settings.ANOTHER_TURN else None
+
+
+def frames_alone(campaign: Campaign, candidates: Sequence[Effect]) -> Conclusion:
+    """Conclude from the unknown frames and nothing else: no candidate can be tested.
+
+    Parameters
+    ----------
+    campaign
+        With measurements.
+    candidates
+        Effects that were asked for.
+    """
+    bare = replace(fit(campaign, ()), needs={effect.name: (_NEEDED,) for effect in candidates})
+    left = examine(bare)
+    return Conclusion(bare, (), left.unexplained, left, nothing_random(bare), {})

@@ -1,0 +1,90 @@
+"""Ripple of the gears: errors that come back many times in a turn of the joint, of orders that the data tell."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from fractions import Fraction
+from typing import TYPE_CHECKING, ClassVar
+
+import numpy as np
+
+from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, at_joint
+from thermal_robot.effects.quantities import position_of, unit
+
+if TYPE_CHECKING:
+    from thermal_robot.observations import Observations
+
+_AMPLITUDE = 1e-4  # rad or m
+_NEVER = 1e-300
+_NEAR = 0.2  # orders: as near as a wave's peak tells an order, over a good part of a turn
+
+
+@dataclass(frozen=True)
+class JointRipple(Effect):
+    """A joint errs by waves of its own position: q_actual = q_command + Σ_k a_k sin(n_k q) + b_k cos(n_k q).
+
+    Teeth, balls and the motor's own wheel come round n times in a turn of the joint; n need be no whole number. Strain
+    wave gears are rated for a transmission error of 1 to 2 minutes of arc peak to peak, most of it twice a turn of the
+    motor; the waves of three UR robots have amplitudes of 0.02 to 0.33 mrad. Expected size 0.1 mrad. What comes round
+    once or twice in a turn is :class:`TransmissionError`.
+
+    Where the campaign states a gear ratio, an order near a whole or half multiple of it is said to be the motor's.
+
+    Orders are no parameters: they are looked for in what remains, joint by joint, and join one after another
+    (:mod:`thermal_robot.inference.ripple`). Without waves the effect does nothing.
+
+    Attributes
+    ----------
+    joints, orders
+        Joint and order (rad per rad; rad/m where it slides) of each wave.
+    tried
+        Among how many waves all of these were picked: the product of the numbers for each.
+    """
+
+    joints: tuple[str, ...] = ()
+    orders: tuple[float, ...] = ()
+    tried: float = 1.0
+
+    name: ClassVar[str] = "joint_ripple"
+    title: ClassVar[str] = "ripple of the gears"
+    singular: ClassVar[str] = "a ripple of the gear"
+
+    @property
+    def share(self) -> float:
+        """Of the prior probability: the orders are some of many. Without waves nothing can be at work."""
+        return 1.0 / self.tried if self.orders else _NEVER
+
+    def having(self, joint: str, order: float, tried: float) -> JointRipple:
+        """Return the ripple with one wave more, that was picked among so many."""
+        return replace(
+            self, joints=(*self.joints, joint), orders=(*self.orders, order), tried=self.tried * max(tried, 1.0)
+        )
+
+    def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
+        """Two amplitudes a wave; rad, or m where the joint slides."""
+        robot = observations.robot
+        found = []
+        for joint, order in zip(self.joints, self.orders, strict=True):
+            j, own = robot.joint_names.index(joint), unit(robot, joint)
+            for what, wave in (("sine", np.sin), ("cosine", np.cos)):
+                values = at_joint(j, wave(order * observations.q[:, j]))
+                label = f"{what}, order {order:.6g}{_of_motor(order, observations.campaign.gears.get(joint))}"
+                found.append(Parameter(label, own, _AMPLITUDE, "joint", joint, (values,)))
+        return tuple(found)
+
+    def at(self, place: str) -> Effect | None:
+        """Waves have joints of their own."""
+        return None
+
+    def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
+        """Return the joint's own position."""
+        return position_of(observations, parameters[0].place)
+
+
+def _of_motor(order: float, ratio: float | None) -> str:
+    """Return in words how often a wave comes round in a turn of the motor, where that is a whole or a half number."""
+    if ratio is None:
+        return ""
+    times = Fraction(order / ratio).limit_denominator(2)
+    return f" ({times} a turn of the motor)" if times and abs(order - float(times) * ratio) < _NEAR else ""

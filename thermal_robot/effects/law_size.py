@@ -1,0 +1,87 @@
+"""How large a fitted law is: the height of its step, the range that it runs through, with what is known of it."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from math import sqrt
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thermal_robot.effects.effect import Array
+from thermal_robot.effects.shapes import SHAPES
+
+if TYPE_CHECKING:
+    from thermal_robot.effects.law import Discovered
+    from thermal_robot.observations import Observations
+
+
+@dataclass(frozen=True)
+class Size:
+    """How much a law changes over the rows that were measured.
+
+    Attributes
+    ----------
+    what
+        Of what it is the size: ``step``, ``range``.
+    value, std
+        The change and its standard deviation, one sigma; never undetermined, as a constant has no part in it.
+    unit
+        Of both, SI.
+    """
+
+    what: str
+    value: float
+    std: float
+    unit: str
+
+
+def sizes(law: Discovered, observations: Observations, values: Array, covariance: Array) -> tuple[Size, ...]:
+    """Return how much a law changes between the two rows between which it changes most.
+
+    Parameters
+    ----------
+    law
+        The law.
+    observations
+        The rows over which it is judged.
+    values, covariance
+        Of its K·C parameters, as fitted: (K·C,) and (K·C, K·C), functions first, SI.
+
+    Returns
+    -------
+    tuple of Size
+        One for a joint, and for an effect that changes; at a link, the base or the tool one of the translation, m, and
+        one of the rotation, rad, each the length of a vector. Empty where the campaign cannot tell the law's values.
+    """
+    rows, parameters = law.at_rows(observations), law.parameters(observations)
+    if rows is None or not parameters:
+        return ()
+    functions = rows[0]
+    components = len(parameters) // functions.shape[1]
+    by_function = np.asarray(values, dtype=float).reshape(-1, components)
+    units = [parameter.unit for parameter in parameters[:components]]
+    what = SHAPES[law.shape].size
+    found = []
+    for unit, own in _together(units, single=law.modulated is not None):
+        moved = functions @ by_function[:, own]
+        first = int(np.linalg.norm(moved - moved.mean(axis=0), axis=1).argmax())
+        last = int(np.linalg.norm(moved - moved[first], axis=1).argmax())
+        change = moved[last] - moved[first]
+        length = float(np.linalg.norm(change))
+        direction = np.zeros(components)
+        direction[own] = change / length if length > 0.0 else 0.0
+        weight = np.kron(functions[last] - functions[first], direction)
+        found.append(Size(what, length, sqrt(max(float(weight @ covariance @ weight), 0.0)), unit))
+    if law.modulated is not None:  # of an effect with several parameters the one that is plainest
+        found = sorted(found, key=lambda size: -size.value / max(size.std, 1e-300))[:1]
+    return tuple(found)
+
+
+def _together(units: list[str], single: bool) -> Iterator[tuple[str, list[int]]]:
+    """Yield units with the components that make up one vector: all of one unit, unless each stands for itself."""
+    if single:
+        yield from ((unit, [c]) for c, unit in enumerate(units))
+    else:
+        yield from ((unit, [c for c, u in enumerate(units) if u == unit]) for unit in dict.fromkeys(units))

@@ -1,0 +1,135 @@
+"""Laws in words: a short name, what a law of that place and quantity usually is, and the column that would tell.
+
+What is usual is the experience of calibration: Mooring, Roth and Driels, *Fundamentals of Manipulator Calibration*,
+1991, chapter 2 (geometry, gears, joints that yield), and ISO 230-1 and 230-3 (play, warming). It is never more than a
+hint, and is said as one.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import TYPE_CHECKING
+
+from thermal_robot.effects.quantities import CLOCK, GRAVITY, REACH, TURN
+from thermal_robot.effects.shapes import SHAPES
+
+if TYPE_CHECKING:
+    from thermal_robot.effects.law import Discovered
+
+_LOAD = "something that yields to load"
+_SLIPS = "warming, or something that slips"
+_ANY = ""
+
+USUALLY: dict[tuple[str, str], str] = {
+    ("joint", "own position"): "gears or an encoder",
+    ("joint", "memory"): "play or friction in the gears",
+    ("joint", "position"): "load that another joint shifts, or a cable that pulls",
+    ("joint", "session"): "a joint that was referenced anew",
+    ("joint", "temperature"): "a gear or a brake that warms",
+    ("joint", "motion"): "a servo that trails its command",
+    ("joint", "approach"): "play in the gears",
+    ("joint", "nothing"): "a zero that is off",
+    ("link", "session"): "a part that was mounted anew",
+    ("link", "temperature"): "a link that grows or bows with heat",
+    ("link", "nothing"): "a link that is bent, or made otherwise",
+    ("base", "position"): "a base that yields to the arm's load",
+    ("base", "session"): "a base or an instrument that was set up anew",
+    ("base", "temperature"): "a floor, a stand or an instrument that warms",
+    ("base", "motion"): "a base that swings",
+    ("tool", "position"): "a tool or a target that bends under its own weight",
+    ("tool", "session"): "a tool or a target that was mounted anew",
+    ("tool", "temperature"): "a tool that grows with heat",
+    (_ANY, "time"): _SLIPS,
+    (_ANY, "session"): "something that was mounted anew",
+    (_ANY, "temperature"): "something that warms",
+    (_ANY, "position"): _LOAD,
+    (_ANY, "load"): _LOAD,
+    (_ANY, "motion"): "something that swings or trails",
+}
+"""What errs there, by kind of place and kind of quantity; the empty place stands for those that are not listed."""
+
+TELLS: dict[str, tuple[str, ...]] = {
+    "time": ("temperature",),
+    "session": ("temperature",),
+    "temperature": ("temperature",),
+    "position": ("torque", "payload"),
+    "load": ("torque", "payload"),
+    "own position": (),
+    "motion": ("velocity", "acceleration"),
+    "approach": ("approach",),
+    "memory": ("approach",),
+    "nothing": ("approach", "temperature"),
+}
+"""By kind of quantity that an error follows, the columns that would tell what it is, the most telling first."""
+
+WHETHER = {
+    "temperature": "warmth",
+    "torque": "load",
+    "payload": "load",
+    "approach": "lost motion",
+    "velocity": "motion",
+    "acceleration": "motion",
+}
+"""By column, the cause that it would show or rule out."""
+
+
+def kind_of(quantity: str, place: str, joints: Sequence[str]) -> str:
+    """Return the kind of a quantity, as seen from a place.
+
+    Parameters
+    ----------
+    quantity
+        Name of a column, a joint, or something derived (:mod:`thermal_robot.effects.quantities`).
+    place
+        Where the error enters: a joint's name, or another.
+    joints
+        Names of the robot's joints.
+
+    Returns
+    -------
+    str
+        One of those in :data:`TELLS`, or empty for a quantity that only this campaign knows.
+    """
+    column, _, of = quantity.partition(".")
+    if quantity.startswith(TURN):
+        return "memory"
+    if quantity in joints or (column == "encoder" and of in joints):
+        return "own position" if place in (quantity, of) else "position"
+    if quantity in (*GRAVITY, *REACH):
+        return "position"
+    if quantity in CLOCK:
+        return "time"
+    kinds = {"torque": "load", "payload": "load", "tilt": "load"}
+    kinds |= dict.fromkeys(("velocity", "acceleration", "speed"), "motion")
+    kinds |= {name: name for name in ("session", "temperature", "approach")} | {"none": "nothing"}
+    return kinds.get(column, "")
+
+
+def usually(law: Discovered, joints: Sequence[str]) -> str:
+    """Say what a law of that place and that quantity usually is; empty where nobody can say."""
+    kinds = [kind_of(name, law.place, joints) for name in (law.quantity, law.by) if name]
+    found = (USUALLY.get((law.kind, kind)) or USUALLY.get((_ANY, kind), "") for kind in kinds)
+    return next((words for words in found if words), "")
+
+
+def called(law: Discovered) -> str:
+    """Return a short name of a law: what errs, and over what."""
+    at = {"joint": law.place, "link": f"{law.place}'s placement"}.get(law.kind, f"the {law.kind}")
+    if law.modulated is not None:
+        return f"{law.modulated.singular} in {at} over {_follows(law)}"
+    what = SHAPES[law.shape].noun
+    if law.shape == "constant":
+        return f"{what} at {at}"
+    if law.shape == "apart" and law.labels:
+        return f"{at} standing elsewhere in {law.quantity} {law.labels[int(law.marks[0])]}"
+    if law.runs and law.shape == "step":
+        return f"{what} at {at} between sessions"
+    if law.quantity.startswith(TURN):
+        return f"{what} at {at} since it turned"
+    return f"{what} at {at} over {_follows(law)}"
+
+
+def _follows(law: Discovered) -> str:
+    if law.by:
+        return f"{law.quantity} times {law.by}"
+    return "its position" if law.kind == "joint" and law.quantity == law.place else law.quantity

@@ -1,0 +1,150 @@
+"""What is inside what: one effect of a fit told in other parameters, as many as the data can tell apart.
+
+A large effect has more parameters than the data determine: many do the same, alone or with the unknown frames. Of a
+list of parameters that are combinations of them, in the order in which a reader wants them, each is kept that the data
+see beside those before it, until together they do all that the effect does. This is a change of coordinates: the first
+take all they can, and no prior bears on those of an effect inside. For the geometry of robots such parameters were
+listed by Khalil, Gautier and Enguehard (*Robotica* 9, 1991).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.effects import Effect, Parameter, gate
+from thermal_robot.inference import settings
+from thermal_robot.inference.columns import Block, moved_by
+from thermal_robot.inference.fit import Fit
+from thermal_robot.inference.problem import Linear, gram
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Portion:
+    """What one effect does of all that a larger one was found to do, or the larger one's rest.
+
+    Attributes
+    ----------
+    effect
+        Name of the effect.
+    parameters
+        The k of them that are told.
+    values, spread, prior
+        (k,) value and posterior and prior standard deviation of each, in its unit.
+    unseen
+        Parameters that the data do not tell from those before them, or from the frames.
+    """
+
+    effect: str
+    parameters: tuple[Parameter, ...]
+    values: Array
+    spread: Array
+    prior: Array
+    unseen: tuple[Parameter, ...]
+
+
+def divided(fit: Fit, name: str) -> tuple[Portion, ...]:
+    """Divide an effect of a fit: first what is inside it and told there, the rest last.
+
+    Parameters
+    ----------
+    fit
+        The fit.
+    name
+        Of an effect of the fit.
+
+    Returns
+    -------
+    tuple of Portion
+        Empty where the effect is told in its own parameters. All parts together move the target as the effect does, but
+        for the unknown frames.
+    """
+    number = next(k for k, (effect, _) in enumerate(fit.effects) if effect.name == name)
+    effect, values = fit.effects[number]
+    inside, rest = _inside(fit, effect), gate.independent(effect, fit.corrected)
+    if not inside and not rest:
+        return ()
+    block = fit.explanation.best.blocks[number]
+    item = fit.explanation.linear.blocks[block]
+    listed = [(e.name, p) for e in inside for p in gate.checked(e, fit.corrected)] + [(name, p) for p in rest]
+    of, wanted = zip(*listed, *((name, p) for p in item.parameters), strict=True)  # whatever the list does not do
+    seen, across, within = _coordinates(fit, item, wanted)
+    kept = _kept(across, within)
+    free = np.array([of[k] != name for k in kept])
+    sizes = np.array([p.size for p in wanted])[kept]
+    told, covariance, prior = _freed(
+        seen.T @ (values / item.sizes),
+        seen.T @ (fit.explanation.values[block][1] / np.outer(item.sizes, item.sizes)) @ seen,
+        fit.explanation.best.scales[block],
+        across[:, kept],
+        free,
+    )
+    spread = np.sqrt(np.maximum(np.diag(covariance), 0.0))
+    return tuple(
+        Portion(
+            part,
+            tuple(wanted[kept[k]] for k in mine),
+            (sizes * told)[mine],
+            (sizes * spread)[mine],
+            (sizes * prior)[mine],
+            tuple(wanted[k] for k in range(len(listed)) if of[k] == part and within[k] and k not in kept),
+        )
+        for part in dict.fromkeys((*(e.name for e in inside), name))
+        for mine in [[k for k, number in enumerate(kept) if of[number] == part]]
+    )
+
+
+def _freed(
+    values: Array, covariance: Array, scale: float, across: Array, free: NDArray[np.bool_]
+) -> tuple[Array, Array, Array]:
+    """Return (k,) values, (k, k) covariance and (k,) prior deviation in other coordinates, some free of their prior.
+
+    Of a posterior N(values, covariance) under the prior N(0, scale²), the likelihood is what the data say. With the
+    columns of ``across`` as new coordinates, the prior of those that are free is wide, that of the others the old one.
+    """
+    tight = np.linalg.inv(covariance)
+    data = across.T @ (tight - np.eye(len(tight)) / scale**2) @ across
+    said = across.T @ tight @ values
+    posterior: Array = np.asarray(np.linalg.inv(data + np.diag((scale * np.where(free, settings.UNHELD, 1.0)) ** -2.0)))
+    prior = scale * np.linalg.norm(np.linalg.pinv(across), axis=1)
+    return np.asarray(posterior @ said), posterior, np.asarray(prior)
+
+
+def _inside(fit: Fit, effect: Effect) -> list[Effect]:
+    """Return in all their places the candidates that are told where this effect was found, and not themselves."""
+    first, held = [known[0] for known in fit.variants.values() if known], {e.name for e, _ in fit.effects}
+    return [e for e in first if e.told_inside and effect.name in e.contained_in and e.name not in held]
+
+
+def _coordinates(fit: Fit, item: Block, wanted: Sequence[Parameter]) -> tuple[Array, Array, NDArray[np.bool_]]:
+    """Return (P, D) the directions of an effect that the data see, (D, W) what each parameter is in them, and whether.
+
+    All in prior sizes. What is no combination of the effect's parameters, as far as the data tell, is not in them.
+    """
+    e, sizes = fit.explanation, np.array([p.size for p in wanted])
+    asked = Block(item.effect, tuple(wanted), moved_by(fit.corrected, wanted), sizes)
+    problem = gram(Linear(e.linear.gap, e.linear.frames, (item, asked)), e.whitening)
+    own, others = problem.slices
+    inner, cross = problem.matrix[own, own], problem.matrix[own, others] @ problem.bases[1].T
+    across = np.asarray(np.linalg.solve(inner, cross))
+    length = np.einsum("wi,ij,wj->w", problem.bases[1], problem.matrix[others, others], problem.bases[1])
+    left = length - (cross * across).sum(axis=0)
+    return problem.bases[0], across, left < np.maximum(settings.CONTAINED * length, settings.CONTAINED_LEFT)
+
+
+def _kept(across: Array, within: NDArray[np.bool_]) -> list[int]:
+    """Return the numbers of the columns that are independent of those before them, as many as there are rows."""
+    basis = np.zeros((len(across), 0))
+    kept: list[int] = []
+    for k in np.flatnonzero(within):
+        left = across[:, k] - basis @ (basis.T @ across[:, k])
+        left = left - basis @ (basis.T @ left)  # rounding
+        if len(kept) < len(across) and np.linalg.norm(left) > settings.DISTINCT:
+            basis = np.column_stack([basis, left / np.linalg.norm(left)])
+            kept.append(int(k))
+    return kept

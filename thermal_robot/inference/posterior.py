@@ -1,0 +1,177 @@
+"""Parameters of one combination at given scales and noise, those that cannot be negative held on their side.
+
+A parameter that is at least zero has half a normal prior, of twice the density. The mode is looked for on that side: a
+column that would be negative is dropped (block principal pivoting, Portugal, Júdice and Vicente, *Mathematics of
+Computation* 63, 1994). What the side is worth is taken column by column, each along its own normal: with mean m and
+deviation σ of a column that stays beside the others that stay, log 2Φ(m/σ); of one that is dropped, with the slope −g
+and the curvature h of the log posterior at zero, log 2/(λ√h) + g²/2h + log Φ(−g/√h). For a single column both are
+exact, and the same.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg.lapack import dpotrf, dpotri
+from scipy.special import erfcx, log_ndtr
+
+from thermal_robot.errors import EstimationError
+from thermal_robot.inference import settings
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+UNDETERMINED = "the measurements do not determine anything: too few, or all alike"
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """Reduced columns of one combination: G (D, D), b (D,), the block of each, and which cannot be negative."""
+
+    matrix: Array
+    vector: Array
+    owner: NDArray[np.int64]
+    positive: Mask
+
+    def some(self, free: Mask) -> Columns:
+        """Return those columns alone."""
+        if free.all():
+            return self
+        return Columns(self.matrix[np.ix_(free, free)], self.vector[free], self.owner[free], self.positive[free])
+
+
+@dataclass(frozen=True, eq=False)
+class Posterior:
+    """Parameters of one combination at given scales and noise.
+
+    Attributes
+    ----------
+    values, covariance
+        Posterior mode and covariance about it; of a dropped column zero, and its mean square.
+    free
+        (D,) False for columns that are dropped.
+    log_volume
+        Log of the posterior's volume over the prior's: −½ log|I + Λ G/s²|, and what the sides are worth.
+    effective
+        Per block: how many of its columns the data determine.
+    fitted, determined
+        The same, and |θ|²/λ², with the moments that the sides leave.
+    """
+
+    values: Array
+    covariance: Array
+    free: Mask
+    log_volume: float
+    effective: Array
+    fitted: Array
+    determined: Array
+
+    @classmethod
+    def at(cls, columns: Columns, scale: Array, variance: float, free: Mask | None = None) -> Posterior:
+        """Solve (G/s² + Λ⁻¹) θ = b/s² with θ ≥ 0 where that is asked; ``free`` is a guess of what is not dropped.
+
+        Raises
+        ------
+        EstimationError
+            If rounding hides what the columns bring.
+        """
+        size, count = len(columns.vector), len(scale)
+        free = np.ones(size, dtype=bool) if free is None else free
+        fewest = size + 1
+        for _ in range(settings.PIVOTS):
+            values, covariance, log_det, pull, wrong = _tried(columns, scale, variance, free)
+            if not wrong.any():
+                break
+            # all that are wrong change at once, as long as they become fewer; else the last one (Murty)
+            many, fewest = int(wrong.sum()) < fewest, min(int(wrong.sum()), fewest)
+            free = free ^ (wrong if many else np.arange(size) == np.flatnonzero(wrong)[-1])
+        else:
+            values, covariance, log_det, pull, _ = _tried(columns, scale, variance, free)
+            values = np.where(columns.positive, np.maximum(values, 0.0), values)
+        tight = scale[columns.owner] ** -2.0
+        spread = np.zeros(size)
+        spread[free] = np.diag(covariance)
+        effective = _by_block(columns, np.where(free, 1.0 - spread * tight, 0.0), count)
+        first, second, worth = values, values**2 + spread, 0.0
+        if columns.positive.any():
+            first, second, worth = _sides(columns, values, spread, covariance, free, pull, tight, variance)
+        whole = np.diag(second)
+        whole[np.ix_(free, free)] = covariance
+        return cls(
+            values,
+            whole,
+            free,
+            worth - 0.5 * log_det,
+            effective,
+            _by_block(columns, first**2 * tight, count),
+            _by_block(columns, 1.0 - (second - first**2) * tight, count),
+        )
+
+    def step(self, log_scale: Array, spread: Array) -> Array:
+        """Return the Newton step of ln λ, its curvature held positive."""
+        slope = self.fitted - self.determined - log_scale / spread**2
+        return np.minimum(np.maximum(slope / (self.fitted + self.determined + 1.0 / spread**2), -1.0), 1.0)
+
+
+def _by_block(columns: Columns, values: Array, count: int) -> Array:
+    """(count,) sums over the columns of each block."""
+    return np.asarray(np.bincount(columns.owner, values, count), dtype=float)
+
+
+def _tried(columns: Columns, scale: Array, variance: float, free: Mask) -> tuple[Array, Array, float, Array, Mask]:
+    """Return what follows where just these columns are not dropped.
+
+    Values (D,), covariance of those that stay, log determinant, slopes (D,) of the log likelihood, and which columns
+    should change by more than rounding: those that stay and are negative, those dropped that would be positive.
+    """
+    mean, covariance, log_det = _both_sides(columns.some(free), scale, variance)
+    values = np.zeros(len(free))
+    values[free] = mean
+    pull = (columns.vector - columns.matrix[:, free] @ mean) / variance
+    rounding = (
+        settings.SIDE_ROUNDING * (np.abs(columns.vector) + np.abs(columns.matrix[:, free]) @ np.abs(mean)) / variance
+    )
+    negative = values < -settings.SIDE_ROUNDING * np.abs(values).max(initial=0.0)
+    return values, covariance, log_det, pull, columns.positive & np.where(free, negative, pull > rounding)
+
+
+def _both_sides(columns: Columns, scale: Array, variance: float) -> tuple[Array, Array, float]:
+    """Return mean, covariance and log|I + Λ G/s²| without sides."""
+    size = len(columns.vector)
+    if not size:
+        return np.zeros(0), np.zeros((0, 0)), 0.0
+    tight = 1.0 / scale[columns.owner] ** 2
+    precision = columns.matrix / variance
+    precision.ravel()[:: size + 1] += tight
+    factor, failed = dpotrf(precision, lower=1, clean=1)
+    if failed:
+        raise EstimationError(UNDETERMINED)
+    lower, _ = dpotri(factor, lower=1)
+    covariance = lower + lower.T  # above the diagonal it is zero
+    covariance.ravel(order="K")[:: size + 1] *= 0.5
+    log_det = float(2.0 * np.log(factor.ravel(order="K")[:: size + 1]).sum() - np.log(tight).sum())
+    return covariance @ columns.vector / variance, covariance, log_det
+
+
+def _sides(
+    columns: Columns, values: Array, spread: Array, covariance: Array, free: Mask, pull: Array, tight: Array, s2: float
+) -> tuple[Array, Array, float]:
+    """Return mean and mean square of every column on its side, and the logarithm of what the sides are worth."""
+    mean, own, worth, out = values.copy(), spread.copy(), 0.0, ~free
+    if out.any():
+        along = columns.matrix[np.ix_(out, free)] / s2
+        bend = np.diag(columns.matrix)[out] / s2 + tight[out] - ((along @ covariance) * along).sum(axis=1)
+        bend = np.maximum(bend, tight[out])
+        mean[out], own[out] = pull[out] / bend, 1.0 / bend
+        worth = float((0.5 * np.log(tight[out] / bend) + 0.5 * pull[out] ** 2 / bend).sum())
+    p = columns.positive
+    root = np.sqrt(own[p])
+    z = mean[p] / root
+    log_mass = log_ndtr(z)
+    # of a normal on one side of zero: mean m + σ r, mean square σ² + m (m + σ r), with r = φ(z)/Φ(z)
+    ratio = np.sqrt(2.0 / np.pi) / erfcx(-z / np.sqrt(2.0))
+    first, second = mean.copy(), mean**2 + own
+    first[p] = np.maximum(mean[p] + root * ratio, 0.0)
+    second[p] = np.maximum(own[p] + mean[p] * first[p], first[p] ** 2)
+    return first, second, worth + float((log_mass + np.log(2.0)).sum())
