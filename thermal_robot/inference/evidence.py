@@ -80,47 +80,53 @@ def evidence(gram: Gram, blocks: tuple[int, ...], prior: float, start: Combinati
     owner = np.repeat(np.arange(len(blocks)), [len(span) for span in spans])
     columns = Columns(gram.matrix[np.ix_(used, used)], gram.vector[used], owner, gram.positive[used])
     scale = np.array([start.scales.get(b, 1.0) if start else 1.0 for b in blocks])
-    spread = gram.spreads[list(blocks)]
-    equations, held = gram.equations, gram.noise_dof
-    least = settings.LEAST_VARIANCE
-    variance = start.noise**2 if start else max((held + gram.total) / (held + equations), least)
-    free = None
-    for last in [*(False,) * settings.EVIDENCE_STEPS, True]:
-        found = Posterior.at(columns, scale, variance, free)
-        free, effective = found.free, float(found.effective.sum())
-        step = found.step(np.log(scale), spread)
-        residual = float(gram.total - (2 * columns.vector - columns.matrix @ found.values) @ found.values)
-        target = max((held + max(residual, 0.0)) / max(held + equations - effective, 1.0), least)
-        moved = max(abs(np.log(target / variance)), float(np.abs(step).max(initial=0.0)))
-        if last or moved < settings.EVIDENCE_SETTLED:
-            break
-        variance, scale = target, scale * np.exp(step)
+    variance = start.noise**2 if start else (gram.noise_dof + gram.total) / (gram.noise_dof + gram.equations)
+    variance, spread = max(variance, settings.LEAST_VARIANCE), gram.spreads[list(blocks)]
+    found, scale, variance = _most_probable(gram, columns, scale, spread, variance)
+    held = gram.noise_dof
     quadratic = gram.total - columns.vector @ found.values
     log_evidence = float(
-        -0.5 * ((equations + held) * np.log(variance) + held / variance + quadratic / variance)
+        -0.5 * ((gram.equations + held) * np.log(variance) + held / variance + quadratic / variance)
         + found.log_volume
         - 0.5 * float(((np.log(scale) / spread) ** 2).sum())
-        + _log_volume(owner, scale, spread, found.values, found.covariance)
+        + _log_volume(found.bend(owner, scale, spread), spread)
         + prior
         + gram.offset
     )
     if not np.isfinite(log_evidence):
         raise EstimationError(UNDETERMINED)
     scales = dict(zip(blocks, scale.tolist(), strict=True))
+    effective = float(found.effective.sum())
     return Combination(
         blocks, log_evidence, float(np.sqrt(variance)), scales, found.values, found.covariance, effective
     )
 
 
-def _log_volume(owner: NDArray[np.int64], scale: Array, spread: Array, values: Array, covariance: Array) -> float:
+def _most_probable(
+    gram: Gram, columns: Columns, scale: Array, spread: Array, variance: float
+) -> tuple[Posterior, Array, float]:
+    """Return the parameters at the most probable scales and variance of the noise, and these."""
+    held = gram.noise_dof
+    before, reach, free = np.zeros(len(scale)), 1.0, np.ones(len(columns.vector), dtype=bool)
+    for last in [*(False,) * settings.EVIDENCE_STEPS, True]:
+        found = Posterior.at(columns, scale, variance, free)
+        step = found.step(columns.owner, scale, spread)
+        if (found.free != free).any() and step @ before < -settings.TAKEN_BACK * (before @ before):
+            reach *= 0.5  # to and fro between two sets of dropped columns: the mode lies where they meet
+        free, before, step = found.free, step, reach * step
+        residual = float(gram.total - (2 * columns.vector - columns.matrix @ found.values) @ found.values)
+        left = max(held + gram.equations - float(found.effective.sum()), 1.0)
+        target = max((held + max(residual, 0.0)) / left, settings.LEAST_VARIANCE)
+        if last or max(abs(np.log(target / variance)), np.abs(step).max(initial=0.0)) < settings.EVIDENCE_SETTLED:
+            break
+        variance, scale = target, scale * np.exp(step)
+    return found, scale, variance
+
+
+def _log_volume(bend: Array, spread: Array) -> float:
     """Return −½ log|σ H σ|: the volume of the peak over all ln λ against that of their priors N(0, σ_b²).
 
-    H is minus the second derivative of the log integrand: with m and C posterior mean and covariance of the values,
-    H_bc = δ_bc (2 (m_bᵀm_b + tr C_bb)/λ_b² + 1/σ_b²) − (4 m_bᵀ C_bc m_c + 2 tr C_bc C_cb)/(λ_b λ_c)². It leaves out
-    that s follows λ, and what is not parabolic: both within about 0.1 for blocks that are well seen.
+    H leaves out that s follows λ, and what is not parabolic: both within about 0.1 for blocks that are well seen.
     """
-    each = np.eye(len(scale))[:, owner] / scale[:, None] ** 2
-    bend = -2.0 * (each @ (covariance * (2.0 * np.outer(values, values) + covariance)) @ each.T)
-    bend[np.diag_indices(len(scale))] += 2.0 * (each @ (values**2 + np.diag(covariance))) + 1.0 / spread**2
     peak = np.linalg.eigvalsh(bend * np.outer(spread, spread))
     return -0.5 * float(np.log(np.maximum(peak, settings.FLATTEST_PEAK)).sum())

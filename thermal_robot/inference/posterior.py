@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.linalg.lapack import dpotrf, dpotri
+from scipy.linalg.lapack import dposv, dpotrf, dpotri
 from scipy.special import erfcx, log_ndtr
 
 from thermal_robot.errors import EstimationError
@@ -91,13 +91,15 @@ class Posterior:
             values = np.where(columns.positive, np.maximum(values, 0.0), values)
         tight = scale[columns.owner] ** -2.0
         spread = np.zeros(size)
-        spread[free] = np.diag(covariance)
+        spread[free] = covariance.diagonal()
         effective = _by_block(columns, np.where(free, 1.0 - spread * tight, 0.0), count)
         first, second, worth = values, values**2 + spread, 0.0
         if columns.positive.any():
             first, second, worth = _sides(columns, values, spread, covariance, free, pull, tight, variance)
-        whole = np.diag(second)
-        whole[np.ix_(free, free)] = covariance
+        whole = covariance
+        if not free.all():
+            whole = np.diag(second)
+            whole[np.ix_(free, free)] = covariance
         return cls(
             values,
             whole,
@@ -108,10 +110,29 @@ class Posterior:
             _by_block(columns, 1.0 - (second - first**2) * tight, count),
         )
 
-    def step(self, log_scale: Array, spread: Array) -> Array:
-        """Return the Newton step of ln λ, its curvature held positive."""
-        slope = self.fitted - self.determined - log_scale / spread**2
-        return np.minimum(np.maximum(slope / (self.fitted + self.determined + 1.0 / spread**2), -1.0), 1.0)
+    def bend(self, owner: NDArray[np.int64], scale: Array, spread: Array) -> Array:
+        """Return minus the second derivative of the log integrand after ln λ, (B, B).
+
+        With m and C mode and covariance of the values, priors N(0, σ_b²) of ln λ and s held, it is
+        H_bc = δ_bc (2 (m_bᵀm_b + tr C_bb)/λ_b² + 1/σ_b²) − (4 m_bᵀ C_bc m_c + 2 tr C_bc C_cb)/(λ_b λ_c)².
+        """
+        each = np.zeros((len(scale), len(owner)))
+        each[owner, np.arange(len(owner))] = scale[owner] ** -2.0
+        moment = np.multiply.outer(2.0 * self.values, self.values)
+        moment += self.covariance
+        moment *= self.covariance
+        bend = -2.0 * (each @ moment @ each.T)
+        own = 2.0 * (each @ (self.values**2 + self.covariance.diagonal())) + spread**-2.0
+        bend.ravel()[:: len(scale) + 1] += own
+        return np.asarray(bend)
+
+    def step(self, owner: NDArray[np.int64], scale: Array, spread: Array) -> Array:
+        """Return the Newton step of ln λ, each at most one; where the integrand is not convex, of each for itself."""
+        slope = self.fitted - self.determined - np.log(scale) / spread**2
+        _, step, failed = dposv(self.bend(owner, scale, spread), slope) if len(scale) else (None, slope, 0)
+        if failed:
+            step = slope / (self.fitted + self.determined + spread**-2.0)
+        return np.minimum(np.maximum(step, -1.0), 1.0)
 
 
 def _by_block(columns: Columns, values: Array, count: int) -> Array:
@@ -122,18 +143,23 @@ def _by_block(columns: Columns, values: Array, count: int) -> Array:
 def _tried(columns: Columns, scale: Array, variance: float, free: Mask) -> tuple[Array, Array, float, Array, Mask]:
     """Return what follows where just these columns are not dropped.
 
-    Values (D,), covariance of those that stay, log determinant, slopes (D,) of the log likelihood, and which columns
-    should change by more than rounding: those that stay and are negative, those dropped that would be positive.
+    Values (D,), covariance of those that stay, log determinant, slopes (D,) of the log likelihood where a column is
+    dropped, and which columns should change by more than rounding: those that stay and are negative, those dropped that
+    would be positive.
     """
     mean, covariance, log_det = _both_sides(columns.some(free), scale, variance)
-    values = np.zeros(len(free))
+    values, pull, wrong = np.zeros(len(free)), np.zeros(len(free)), np.zeros(len(free), dtype=bool)
     values[free] = mean
-    pull = (columns.vector - columns.matrix[:, free] @ mean) / variance
-    rounding = (
-        settings.SIDE_ROUNDING * (np.abs(columns.vector) + np.abs(columns.matrix[:, free]) @ np.abs(mean)) / variance
-    )
-    negative = values < -settings.SIDE_ROUNDING * np.abs(values).max(initial=0.0)
-    return values, covariance, log_det, pull, columns.positive & np.where(free, negative, pull > rounding)
+    out = np.flatnonzero(~free)
+    if len(out):
+        beside, vector = columns.matrix[np.ix_(out, free)], columns.vector[out]
+        pull[out] = (vector - beside @ mean) / variance
+        rounding = settings.SIDE_ROUNDING * (np.abs(vector) + np.abs(beside) @ np.abs(mean)) / variance
+        wrong[out] = pull[out] > rounding
+    if columns.positive.any():
+        negative = values < -settings.SIDE_ROUNDING * np.abs(values).max(initial=0.0)
+        wrong |= columns.positive & negative
+    return values, covariance, log_det, pull, wrong
 
 
 def _both_sides(columns: Columns, scale: Array, variance: float) -> tuple[Array, Array, float]:

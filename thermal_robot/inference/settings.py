@@ -110,8 +110,8 @@ SPARE_EQUATIONS = 6
 EVIDENCE_STEPS, EVIDENCE_SETTLED, LEAST_VARIANCE = 40, 1e-3, 1e-12
 """Newton steps of scales and noise at most, the change of a logarithm at which they end, and the smallest variance, in
 squares of the noise: what fits better is rounding."""
-PIVOTS, SIDE_ROUNDING = 60, 1e-10
-"""Changes at most of which columns are held at zero: a handful suffices; of the sums that tell it, what is rounding."""
+PIVOTS, SIDE_ROUNDING, TAKEN_BACK = 60, 1e-10, 0.9
+"""Changes at most of the columns held at zero; of the sums that tell it, what is rounding; less is no step back."""
 SCALE_GRID = tuple(np.linspace(-6.0, 6.0, 25))
 """ln λ at which a block that might be added is weighed: four standard deviations of the widest prior, in steps that are
 one of the narrowest."""
