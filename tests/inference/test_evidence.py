@@ -9,6 +9,8 @@ from inference.densities import direct, seen_of, volume
 from inference.problems import columns_of, small_problem
 from scipy.special import logsumexp
 
+from thermal_robot.inference import settings
+from thermal_robot.inference.evidence import evidence
 from thermal_robot.inference.problem import gram
 from thermal_robot.inference.search import Search
 
@@ -104,13 +106,30 @@ def test_scales_and_noise_are_the_most_probable_ones(present):
     for seed in range(5):
         linear, whitening = small_problem(seed, present=present, rows=30)
         _, _, found = all_combinations(linear, whitening)
-        for c in found:
+        for c in (c for c in found if c.exact):
             best = direct(linear, whitening, c, (0, 0, 0))
             for factor in (0.98, 1.02):
                 assert direct(linear, whitening, c, (0, 0, 0), noise=factor * c.noise) < best
                 for b in c.blocks:
                     other = {**c.scales, b: factor * c.scales[b]}
                     assert direct(linear, whitening, c, (0, 0, 0), scales=other) < best
+
+
+def test_what_is_left_on_the_way_is_far_below():
+    left = 0
+    for seed in range(5):
+        linear, whitening = small_problem(seed, present=(0, 1, 2), rows=60, noise=0.3)
+        sums = gram(linear, whitening)
+        search = Search(sums, (0.0,) * 3)
+        chosen = [c for size in (3, 2, 1, 0) for c in combinations(range(3), size)]
+        found = [search.evaluate(c) for c in chosen]
+        most = max(c.log_evidence for c in found)
+        for c in (c for c in found if not c.exact):
+            whole = evidence(sums, c.blocks, 0.0, None)
+            assert whole.exact
+            assert c.log_evidence <= whole.log_evidence < most - settings.DETOUR_FROM
+            left += 1
+    assert left >= 5
 
 
 def test_a_column_of_noise_lowers_the_evidence_on_average():

@@ -19,15 +19,15 @@ def rippled(fit: Fit, progress: Callable[[str], None]) -> Fit:
     Parameters
     ----------
     fit
-        To which waves are added; one that was not to consider ripple comes back as it is, and one of so many rows that
-        each choice beside waves would take minutes.
+        To which waves are added; one that was not to consider ripple comes back as it is.
     progress
         Called with a few words at each stage.
     """
     name = JointRipple.name
-    if name not in fit.variants or fit.campaign.samples > settings.RIPPLE_ROWS:
+    if name not in fit.variants:
         return fit
-    for _ in range(settings.RIPPLE_ROUNDS):
+    many = fit.campaign.samples > settings.ENOUGH_ROWS
+    for _ in range(1 if many else settings.RIPPLE_ROUNDS):
         progress("ripple of the gears")
         held = next((e for e, _ in fit.effects if isinstance(e, JointRipple)), JointRipple())
         found = waves(fit)

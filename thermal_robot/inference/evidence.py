@@ -48,7 +48,7 @@ class Combination:
     effective
         How many parameters the data determine.
     exact
-        Whether all scales are at their most probable values; else those of one block alone, and there are no values.
+        Whether all scales are at their most probable values; else at most those of one block are.
     """
 
     blocks: tuple[int, ...]
@@ -61,7 +61,9 @@ class Combination:
     exact: bool = True
 
 
-def evidence(gram: Gram, blocks: tuple[int, ...], prior: float, start: Combination | None) -> Combination:
+def evidence(
+    gram: Gram, blocks: tuple[int, ...], prior: float, start: Combination | None, floor: float = -np.inf
+) -> Combination:
     """Return one combination with noise and scales at their most probable values.
 
     Parameters
@@ -74,6 +76,8 @@ def evidence(gram: Gram, blocks: tuple[int, ...], prior: float, start: Combinati
         Their log prior odds.
     start
         A combination like it, from whose noise and scales the iteration starts.
+    floor
+        Log evidence that is of interest: where it is clear that this is not reached, the iteration ends.
     """
     spans = [np.arange(gram.slices[b].start, gram.slices[b].stop) for b in blocks]
     used = np.concatenate([*spans, np.zeros(0, dtype=int)])
@@ -82,35 +86,31 @@ def evidence(gram: Gram, blocks: tuple[int, ...], prior: float, start: Combinati
     scale = np.array([start.scales.get(b, 1.0) if start else 1.0 for b in blocks])
     variance = start.noise**2 if start else (gram.noise_dof + gram.total) / (gram.noise_dof + gram.equations)
     variance, spread = max(variance, settings.LEAST_VARIANCE), gram.spreads[list(blocks)]
-    found, scale, variance = _most_probable(gram, columns, scale, spread, variance)
-    held = gram.noise_dof
-    quadratic = gram.total - columns.vector @ found.values
-    log_evidence = float(
-        -0.5 * ((gram.equations + held) * np.log(variance) + held / variance + quadratic / variance)
-        + found.log_volume
-        - 0.5 * float(((np.log(scale) / spread) ** 2).sum())
-        + _log_volume(found.bend(owner, scale, spread), spread)
-        + prior
-        + gram.offset
-    )
+    known = prior + gram.offset
+    found, scale, variance, exact = _most_probable(gram, columns, scale, spread, variance, floor - known)
+    log_evidence = known + _log_joint(gram, columns, found, scale, spread, variance)
+    log_evidence += _log_volume(found.bend(owner, scale, spread), spread)
     if not np.isfinite(log_evidence):
         raise EstimationError(UNDETERMINED)
     scales = dict(zip(blocks, scale.tolist(), strict=True))
     effective = float(found.effective.sum())
     return Combination(
-        blocks, log_evidence, float(np.sqrt(variance)), scales, found.values, found.covariance, effective
+        blocks, log_evidence, float(np.sqrt(variance)), scales, found.values, found.covariance, effective, exact
     )
 
 
 def _most_probable(
-    gram: Gram, columns: Columns, scale: Array, spread: Array, variance: float
-) -> tuple[Posterior, Array, float]:
-    """Return the parameters at the most probable scales and variance of the noise, and these."""
+    gram: Gram, columns: Columns, scale: Array, spread: Array, variance: float, floor: float
+) -> tuple[Posterior, Array, float, bool]:
+    """Return the parameters at the most probable scales and variance of the noise, these, and whether they are that.
+
+    They are not where it was clear on the way that the log evidence stays below the floor.
+    """
     held = gram.noise_dof
     before, reach, free = np.zeros(len(scale)), 1.0, np.ones(len(columns.vector), dtype=bool)
     for last in [*(False,) * settings.EVIDENCE_STEPS, True]:
         found = Posterior.at(columns, scale, variance, free)
-        step = found.step(columns.owner, scale, spread)
+        step, gain = found.step(columns.owner, scale, spread)
         if (found.free != free).any() and step @ before < -settings.TAKEN_BACK * (before @ before):
             reach *= 0.5  # to and fro between two sets of dropped columns: the mode lies where they meet
         free, before, step = found.free, step, reach * step
@@ -119,8 +119,21 @@ def _most_probable(
         target = max((held + max(residual, 0.0)) / left, settings.LEAST_VARIANCE)
         if last or max(abs(np.log(target / variance)), np.abs(step).max(initial=0.0)) < settings.EVIDENCE_SETTLED:
             break
+        if np.isfinite(floor):
+            gain += 0.5 * (gram.equations + held) * (target / variance - 1.0 - np.log(target / variance))
+            reached = _log_joint(gram, columns, found, scale, spread, variance)
+            if reached + settings.CLEARLY * gain < floor:
+                return found, scale, variance, False
         variance, scale = target, scale * np.exp(step)
-    return found, scale, variance
+    return found, scale, variance, True
+
+
+def _log_joint(gram: Gram, columns: Columns, found: Posterior, scale: Array, spread: Array, variance: float) -> float:
+    """Return log p(y, s, λ) of one combination, up to what is common to all."""
+    held = gram.noise_dof
+    quadratic = gram.total - columns.vector @ found.values
+    fit = -0.5 * ((gram.equations + held) * np.log(variance) + (held + quadratic) / variance)
+    return float(fit + found.log_volume - 0.5 * ((np.log(scale) / spread) ** 2).sum())
 
 
 def _log_volume(bend: Array, spread: Array) -> float:

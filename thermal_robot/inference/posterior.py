@@ -126,13 +126,16 @@ class Posterior:
         bend.ravel()[:: len(scale) + 1] += own
         return np.asarray(bend)
 
-    def step(self, owner: NDArray[np.int64], scale: Array, spread: Array) -> Array:
-        """Return the Newton step of ln λ, each at most one; where the integrand is not convex, of each for itself."""
+    def step(self, owner: NDArray[np.int64], scale: Array, spread: Array) -> tuple[Array, float]:
+        """Return the Newton step of ln λ, each at most one, and what it gains if the log integrand is parabolic.
+
+        Where that is not convex, the step is of each scale for itself.
+        """
         slope = self.fitted - self.determined - np.log(scale) / spread**2
         _, step, failed = dposv(self.bend(owner, scale, spread), slope) if len(scale) else (None, slope, 0)
         if failed:
             step = slope / (self.fitted + self.determined + spread**-2.0)
-        return np.minimum(np.maximum(step, -1.0), 1.0)
+        return np.minimum(np.maximum(step, -1.0), 1.0), float(0.5 * slope @ step)
 
 
 def _by_block(columns: Columns, values: Array, count: int) -> Array:

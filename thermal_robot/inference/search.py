@@ -47,6 +47,8 @@ class Search:
         """List what each block excludes."""
         self._apart: dict[int, set[int]] = {}
         self._expanded: set[tuple[int, ...]] = set()
+        self._far: set[tuple[int, ...]] = set()
+        self._most = max((c.log_evidence for c in self.seen.values() if c.exact), default=-np.inf)
         for a, b in self.exclusive:
             self._apart.setdefault(a, set()).add(b)
             self._apart.setdefault(b, set()).add(a)
@@ -60,13 +62,17 @@ class Search:
         """Return the combination's evidence, computed once."""
         key = tuple(sorted(blocks))
         known = self.seen.get(key)
-        if known is None or not known.exact:
+        if known is None or not (known.exact or key in self._far):
             self.seen[key] = self._computed(key, known or start)
+            self._most = max(self._most, self.seen[key].log_evidence)
+            if not self.seen[key].exact:
+                self._far.add(key)
         return self.seen[key]
 
     def _computed(self, key: tuple[int, ...], start: Combination | None) -> Combination:
         try:
-            return evidence(self.gram, key, sum(self.log_prior[b] for b in key), start)
+            floor = self._most - settings.DETOUR_FROM
+            return evidence(self.gram, key, sum(self.log_prior[b] for b in key), start, floor)
         except EstimationError:
             if not key:
                 raise

@@ -107,9 +107,9 @@ TARGET_STARTS = np.vstack([np.zeros(3), 0.2 * np.eye(3), -0.2 * np.eye(3)])
 """m: where the target may sit on the tool frame; from each the fit reaches 0.3 m."""
 SPARE_EQUATIONS = 6
 """Equations that must be left once the frames are fitted: as many as one pose has."""
-EVIDENCE_STEPS, EVIDENCE_SETTLED, LEAST_VARIANCE = 40, 1e-3, 1e-12
-"""Newton steps of scales and noise at most, the change of a logarithm at which they end, and the smallest variance, in
-squares of the noise: what fits better is rounding."""
+EVIDENCE_STEPS, EVIDENCE_SETTLED, LEAST_VARIANCE, CLEARLY = 40, 1e-3, 1e-12, 4.0
+"""Newton steps of scales and noise at most, the change of a logarithm at which they end, the smallest variance, in
+squares of the noise: what fits better is rounding; times that a step's promise must not suffice to end without it."""
 PIVOTS, SIDE_ROUNDING, TAKEN_BACK = 60, 1e-10, 0.9
 """Changes at most of the columns held at zero; of the sums that tell it, what is rounding; less is no step back."""
 SCALE_GRID = tuple(np.linspace(-6.0, 6.0, 25))
@@ -230,9 +230,9 @@ LATTICE = 1e-3
 """Of their spacing: positions that lie on a lattice to within this cannot tell an order from its alias."""
 LOWEST_RIPPLE = 2.5
 """Orders a turn from which a wave is ripple: what comes round once or twice is an eccentric or oval wheel."""
-RIPPLE_ROWS, MOST_WAVES, WAVES_REFUSED, RIPPLE_ROUNDS = 1200, 30, 2, 3
-"""Rows up to which ripple is looked for, as each choice beside waves takes minutes above; waves of one robot, five a
-joint; waves of each joint that may do harm in rows held out before none is tried any more; times that all is chosen."""
+MOST_WAVES, WAVES_REFUSED, RIPPLE_ROUNDS = 30, 2, 3
+"""Waves of one robot, five a joint; waves of each joint that may do harm in rows held out before none is tried any
+more; times at most that all is chosen beside them, of very many rows once."""
 SAME_ORDER = 0.05
 """Orders that differ by less are one: over a whole turn 0.3 rad of phase, a few hundredths of the wave's square."""
 SLIP_SHARES = (0.03, 1.0)
