@@ -14,7 +14,12 @@ import json
 import math
 import os
 import sys
+from functools import cache
 from pathlib import Path
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from thermal_robot.diagnosis import Diagnosis
 
 HERE = Path(__file__).parent
 TOLERANCE = 1e-9
@@ -44,11 +49,17 @@ def golden(name: str) -> Path:
     return HERE / (name.replace("/", "_") + ".json")
 
 
-def said(name: str) -> dict[str, object]:
-    """Diagnose a campaign; return its verdict and figures, without the words."""
+@cache
+def diagnosed(name: str) -> Diagnosis:
+    """Diagnose a campaign, once in a process: the real ones take a minute each."""
     from thermal_robot import diagnose
 
-    plain = json.loads(json.dumps(diagnose(campaign(name)).to_dict()))
+    return diagnose(campaign(name))
+
+
+def said(name: str) -> dict[str, object]:
+    """Return a campaign's verdict and figures, without the words."""
+    plain = json.loads(json.dumps(diagnosed(name).to_dict()))
     plain["effects"] = {e["name"]: e for e in plain["effects"]}
     for effect in plain["effects"].values():
         effect["parameters"] = {p["name"]: [p["value"], p["std"]] for p in effect["parameters"] if p["identified"]}

@@ -3,21 +3,25 @@
 import json
 import os
 
+import numpy as np
 import pytest
-from golden.record import campaign, differences, golden, names, said
+from golden.record import campaign, diagnosed, differences, golden, names, said
+
+from thermal_robot import CorrectedModel
+from thermal_robot.report.sentence import MOST_WORDS
 
 TOLERANCE = 1e-6
 """Relative: other processors and versions of BLAS round otherwise, and fits multiply that by their condition."""
 QUICK = ("demo", "open_cases/case_000", "open_cases/case_007", "open_cases/case_016")
 REWRITE = "python tests/golden/record.py --only {name}"
+measured = pytest.mark.skipif(
+    not os.environ.get("THERMAL_ROBOT_DATA"), reason="THERMAL_ROBOT_DATA names no folder of measured campaigns"
+)
 
 
 def listed(name):
     marks = [] if name in QUICK else [pytest.mark.slow]
-    if name != "demo":
-        missing = not os.environ.get("THERMAL_ROBOT_DATA")
-        marks.append(pytest.mark.skipif(missing, reason="THERMAL_ROBOT_DATA names no folder of measured campaigns"))
-    return pytest.param(name, marks=marks)
+    return pytest.param(name, marks=marks if name == "demo" else [*marks, measured])
 
 
 @pytest.mark.parametrize("name", [listed(name) for name in names()])
@@ -29,6 +33,46 @@ def test_the_same_is_said_as_before(name):
         f"{name}: {len(lines)} figures changed, the first: {lines[:3]}. If that is meant, write them anew with "
         f"`{rewrite}`, and let the commit message tell what changed, where and why."
     )
+
+
+@pytest.mark.parametrize("name", [listed(name) for name in names()])
+def test_no_campaign_has_a_long_headline(name):
+    assert len(diagnosed(name).summary.split()) <= MOST_WORDS
+
+
+def shrinks(found):
+    """Held-out rows, not those of the fit, say so; and the interval holds the figure."""
+    held_out = found.gap.held_out
+    low, high = held_out.shrinkage_ci95
+    assert 0.0 < low <= held_out.shrinkage <= high < 1.0
+    assert held_out.rms_after < held_out.rms_before
+    return held_out.shrinkage
+
+
+@measured
+@pytest.mark.slow
+def test_ur5_is_calibrated_to_sixty_micrometres(tmp_path):
+    found = diagnosed("ur5_jacobi")
+    assert found.verdict[0] == "geometric"
+    assert shrinks(found) > 0.95
+    test = campaign("ur5_jacobi") / "test.csv"
+    found.model.save(tmp_path / "model.json")
+    model = CorrectedModel.load(tmp_path / "model.json")
+    true = np.genfromtxt(test, delimiter=",", names=True)
+    miss = 1e3 * model.predict(model.samples(test))[0] - np.column_stack([true[c] for c in "xyz"])
+    rms = np.sqrt((miss**2).sum(axis=1).mean())
+    print(f"ur5_jacobi: {rms:.4f} mm on test.csv")
+    assert rms <= 0.060
+
+
+@measured
+@pytest.mark.slow
+def test_ipa_ur10_b_is_geometric_first():
+    found = diagnosed("ipa_ur10_b")
+    assert found.finding("geometric").status == "found"
+    assert found.measures == "pose"
+    assert shrinks(found) > 0.5
+    assert found.gap.orientation_after < found.gap.orientation_before
 
 
 def test_every_campaign_has_its_file_and_every_file_its_campaign():

@@ -1,15 +1,11 @@
 """The headline: what is said of each kind of diagnosis, and never more than that."""
 
-import os
 from dataclasses import replace
 from itertools import product
 
 import numpy as np
 import pytest
-from golden.record import campaign, names
-from golden.test_golden import QUICK
 
-from thermal_robot import diagnose
 from thermal_robot.diagnosis.parts import DataFault, Dependence, Finding, FoldScheme, Location, Misfit, Unexplained
 from thermal_robot.effects import library
 from thermal_robot.report.sentence import MOST_WORDS, headline, length, listed
@@ -170,26 +166,6 @@ def test_no_headline_is_long_whatever_there_is_to_say(case, law_case):
         hardest = diagnosis.gap.hardest
         if hardest is not None and hardest.shrinkage < 0.0 < diagnosis.gap.held_out.shrinkage:
             assert "harms rows held out by temperature" in text
-
-
-@pytest.mark.parametrize(
-    "name",
-    [
-        pytest.param(
-            name,
-            marks=[
-                *([] if name in QUICK else [pytest.mark.slow]),
-                pytest.mark.skipif(
-                    name != "demo" and not os.environ.get("THERMAL_ROBOT_DATA"),
-                    reason="THERMAL_ROBOT_DATA names no folder of measured campaigns",
-                ),
-            ],
-        )
-        for name in names()
-    ],
-)
-def test_no_campaign_has_a_long_headline(name):
-    assert len(diagnose(campaign(name)).summary.split()) <= MOST_WORDS
 
 
 def test_lists_end_in_and():
