@@ -19,12 +19,13 @@ def rippled(fit: Fit, progress: Callable[[str], None]) -> Fit:
     Parameters
     ----------
     fit
-        To which waves are added; one that was not to consider ripple comes back as it is.
+        To which waves are added; one that was not to consider ripple comes back as it is, and one of so many rows that
+        each choice beside waves would take minutes. Beside very many rows it is made once.
     progress
         Called with a few words at each stage.
     """
     name = JointRipple.name
-    if name not in fit.variants:
+    if name not in fit.variants or fit.campaign.samples > settings.RIPPLE_ROWS:
         return fit
     many = fit.campaign.samples > settings.ENOUGH_ROWS
     for _ in range(1 if many else settings.RIPPLE_ROUNDS):

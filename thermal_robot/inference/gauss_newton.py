@@ -26,8 +26,12 @@ def gauss_newton(
     explanation: Explanation,
     held: Sequence[tuple[Effect, Array]],
     settled: float,
+    since: Sequence[tuple[Effect, Array]] | None = None,
 ) -> tuple[Observations, list[tuple[Effect, Array]]]:
     """Refit frames and the explanation's parameters with the exact model, the priors held at their scales.
+
+    It begins at values of a linear fit. Where these are so far off that it ends worse than what they were linearised
+    about, it begins there.
 
     Parameters
     ----------
@@ -39,6 +43,9 @@ def gauss_newton(
         Its effects, or some of them, with their (P,) values so far.
     settled
         Step at which it ends, in standard deviations.
+    since
+        About which the explanation was linearised, with these frames: effects with their values; ``None`` where that
+        is what ``held`` has.
 
     Returns
     -------
@@ -47,6 +54,24 @@ def gauss_newton(
     held
         The effects with their values.
     """
+    observations, found, cost = _descended(campaign, frames, explanation, held, settled, settings.FIT_STEPS)
+    if since is not None:
+        known = {effect.name: values for effect, values in since}
+        begun = [(e, known[e.name] if len(known.get(e.name, ())) == len(v) else np.zeros(len(v))) for e, v in held]
+        if _descended(campaign, frames, explanation, begun, settled, 0)[2] < cost:
+            observations, found, _ = _descended(campaign, frames, explanation, begun, settled, settings.FIT_STEPS)
+    return observations, found
+
+
+def _descended(
+    campaign: Campaign,
+    frames: Frames,
+    explanation: Explanation,
+    held: Sequence[tuple[Effect, Array]],
+    settled: float,
+    steps: int,
+) -> tuple[Observations, list[tuple[Effect, Array]], float]:
+    """Return the corrected model and its effects after so many steps downhill at most, and what they cost."""
     whitening, best = explanation.whitening, explanation.best
     effects = [effect for effect, _ in held]
     chosen = [explanation.block_of(effect) for effect in effects]
@@ -70,7 +95,7 @@ def gauss_newton(
 
     observations = corrected_observations(campaign, frames, pairs(state))
     cost = left(observations, state)
-    for _ in range(settings.FIT_STEPS):
+    for _ in range(steps):
         flat, names = frame_columns(observations)
         columns = [block(observations, effect).columns for effect in effects]
         stack = white(np.concatenate([flat, *columns, observations.gap[:, :, None]], axis=2))
@@ -86,7 +111,7 @@ def gauss_newton(
         (frames, state), observations, cost = tried, there, after
         if size < settled:
             break
-    return observations, pairs(state)
+    return observations, pairs(state), cost
 
 
 def _step_inside(design: Array, gap: Array, state: Array, prior: Array, least: Array) -> tuple[Array, float]:

@@ -114,13 +114,13 @@ def settle(
         start_at = chosen if revision or not begin else [candidates.index(effect) for effect in begin]
         linear = _at(observations, blocks, chosen, held)
         explanation = _explanation(linear, noise, families, tuple(start_at), forms(observations), before, outliers)
-        factor = settings.REFINEMENT ** (1 / 2**revision)
+        factor, since = settings.REFINEMENT ** (1 / 2**revision), held
         held = [(candidates[b], explanation.values[b][0]) for b in explanation.best.blocks]
         finer = refined(explanation, observations, factor) if revision < revisions else held
         stays = [e for e, _ in finer] == [e for e, _ in held] and set(explanation.best.blocks) == set(chosen)
         held, last = finer, revision == revisions or (revision > 0 and stays)
         least = settings.SETTLED_BETWEEN if many and not last else settings.SETTLED
-        observations, held = gauss_newton(campaign, observations.frames, explanation, held, least)
+        observations, held = gauss_newton(campaign, observations.frames, explanation, held, least, since)
         if last:
             break
         before = explanation
