@@ -163,3 +163,16 @@ def test_directions_that_nothing_determines_are_not_moved():
     step, _ = _ridge_step(np.hstack([column, -column]), rng.normal(size=30), np.zeros(0), np.zeros(0))
     assert step[0] == pytest.approx(-step[1], rel=1e-9)
     assert abs(step.sum()) < 1e-9 * abs(step[0])
+
+
+def test_a_linear_fit_that_went_astray_does_not_end_worse_than_it_began(fitted):
+    """Sizes of which the sum of two is right and each is turns away, as of effects that cancel each other."""
+    campaign, explanation, held, seen, (_, right) = fitted
+    astray = [(effect, values + 40.0) for effect, values in held]
+    lost, far = gauss_newton(campaign, seen.frames, explanation, astray, SETTLED)
+    begun = objective(campaign, explanation, seen.frames, [(e, np.zeros(len(v))) for e, v in held])
+    assert objective(campaign, explanation, lost.frames, far) > begun
+    kept, found = gauss_newton(campaign, seen.frames, explanation, astray, SETTLED, ())
+    assert objective(campaign, explanation, kept.frames, found) < begun
+    for (_, one), (_, other) in zip(found, right, strict=True):
+        np.testing.assert_allclose(one, other, atol=1e-6)
