@@ -87,30 +87,37 @@ def evidence(
     variance = start.noise**2 if start else (gram.noise_dof + gram.total) / (gram.noise_dof + gram.equations)
     variance, spread = max(variance, settings.LEAST_VARIANCE), gram.spreads[list(blocks)]
     known = prior + gram.offset
-    found, scale, variance, exact = _most_probable(gram, columns, scale, spread, variance, floor - known)
-    log_evidence = known + _log_joint(gram, columns, found, scale, spread, variance)
-    log_evidence += _log_volume(found.bend(owner, scale, spread), spread)
+    peak = _most_probable(gram, columns, scale, spread, variance, floor - known)
+    found, scale, variance = peak.posterior, peak.scale, peak.variance
+    log_evidence = known + _log_joint(gram, columns, found, scale, spread, variance) + _log_volume(peak.bend, spread)
     if not np.isfinite(log_evidence):
         raise EstimationError(UNDETERMINED)
     scales = dict(zip(blocks, scale.tolist(), strict=True))
     effective = float(found.effective.sum())
     return Combination(
-        blocks, log_evidence, float(np.sqrt(variance)), scales, found.values, found.covariance, effective, exact
+        blocks, log_evidence, float(np.sqrt(variance)), scales, found.values, found.covariance, effective, peak.exact
     )
 
 
-def _most_probable(
-    gram: Gram, columns: Columns, scale: Array, spread: Array, variance: float, floor: float
-) -> tuple[Posterior, Array, float, bool]:
-    """Return the parameters at the most probable scales and variance of the noise, these, and whether they are that.
+@dataclass(frozen=True, eq=False)
+class _Peak:
+    """Where the density of scales and noise is largest, or where it was left: see :class:`Combination`, ``exact``."""
 
-    They are not where it was clear on the way that the log evidence stays below the floor.
-    """
+    posterior: Posterior
+    bend: Array
+    scale: Array
+    variance: float
+    exact: bool
+
+
+def _most_probable(gram: Gram, columns: Columns, scale: Array, spread: Array, variance: float, floor: float) -> _Peak:
+    """Return the most probable scales and variance of the noise, left early where the log evidence stays below."""
     held = gram.noise_dof
     before, reach, free = np.zeros(len(scale)), 1.0, np.ones(len(columns.vector), dtype=bool)
     for last in [*(False,) * settings.EVIDENCE_STEPS, True]:
         found = Posterior.at(columns, scale, variance, free)
-        step, gain = found.step(columns.owner, scale, spread)
+        bend = found.bend(columns.owner, scale, spread)
+        step, gain = found.step(bend, scale, spread)
         if (found.free != free).any() and step @ before < -settings.TAKEN_BACK * (before @ before):
             reach *= 0.5  # to and fro between two sets of dropped columns: the mode lies where they meet
         free, before, step = found.free, step, reach * step
@@ -123,9 +130,9 @@ def _most_probable(
             gain += 0.5 * (gram.equations + held) * (target / variance - 1.0 - np.log(target / variance))
             reached = _log_joint(gram, columns, found, scale, spread, variance)
             if reached + settings.CLEARLY * gain < floor:
-                return found, scale, variance, False
+                return _Peak(found, bend, scale, variance, False)
         variance, scale = target, scale * np.exp(step)
-    return found, scale, variance, True
+    return _Peak(found, bend, scale, variance, True)
 
 
 def _log_joint(gram: Gram, columns: Columns, found: Posterior, scale: Array, spread: Array, variance: float) -> float:

@@ -56,8 +56,8 @@ def gauss_newton(
     """
     observations, found, cost = _descended(campaign, frames, explanation, held, settled, settings.FIT_STEPS)
     if since is not None:
-        known = {effect.name: values for effect, values in since}
-        begun = [(e, known[e.name] if len(known.get(e.name, ())) == len(v) else np.zeros(len(v))) for e, v in held]
+        known = {(effect.name, effect.places, len(values)): values for effect, values in since}
+        begun = [(e, known.get((e.name, e.places, len(values)), np.zeros(len(values)))) for e, values in held]
         if _descended(campaign, frames, explanation, begun, settled, 0)[2] < cost:
             observations, found, _ = _descended(campaign, frames, explanation, begun, settled, settings.FIT_STEPS)
     return observations, found

@@ -80,14 +80,14 @@ class Posterior:
         free = np.ones(size, dtype=bool) if free is None else free
         fewest = size + 1
         for _ in range(settings.PIVOTS):
-            values, covariance, log_det, pull, wrong = _tried(columns, scale, variance, free)
+            values, covariance, log_det, pull, wrong = _solved(columns, scale, variance, free)
             if not wrong.any():
                 break
             # all that are wrong change at once, as long as they become fewer; else the last one (Murty)
             many, fewest = int(wrong.sum()) < fewest, min(int(wrong.sum()), fewest)
             free = free ^ (wrong if many else np.arange(size) == np.flatnonzero(wrong)[-1])
         else:
-            values, covariance, log_det, pull, _ = _tried(columns, scale, variance, free)
+            values, covariance, log_det, pull, _ = _solved(columns, scale, variance, free)
             values = np.where(columns.positive, np.maximum(values, 0.0), values)
         tight = scale[columns.owner] ** -2.0
         spread = np.zeros(size)
@@ -126,13 +126,13 @@ class Posterior:
         bend.ravel()[:: len(scale) + 1] += own
         return np.asarray(bend)
 
-    def step(self, owner: NDArray[np.int64], scale: Array, spread: Array) -> tuple[Array, float]:
+    def step(self, bend: Array, scale: Array, spread: Array) -> tuple[Array, float]:
         """Return the Newton step of ln λ, each at most one, and what it gains if the log integrand is parabolic.
 
         Where that is not convex, the step is of each scale for itself.
         """
         slope = self.fitted - self.determined - np.log(scale) / spread**2
-        _, step, failed = dposv(self.bend(owner, scale, spread), slope) if len(scale) else (None, slope, 0)
+        _, step, failed = dposv(bend, slope) if len(scale) else (None, slope, 0)
         if failed:
             step = slope / (self.fitted + self.determined + spread**-2.0)
         return np.minimum(np.maximum(step, -1.0), 1.0), float(0.5 * slope @ step)
@@ -143,7 +143,7 @@ def _by_block(columns: Columns, values: Array, count: int) -> Array:
     return np.asarray(np.bincount(columns.owner, values, count), dtype=float)
 
 
-def _tried(columns: Columns, scale: Array, variance: float, free: Mask) -> tuple[Array, Array, float, Array, Mask]:
+def _solved(columns: Columns, scale: Array, variance: float, free: Mask) -> tuple[Array, Array, float, Array, Mask]:
     """Return what follows where just these columns are not dropped.
 
     Values (D,), covariance of those that stay, log determinant, slopes (D,) of the log likelihood where a column is

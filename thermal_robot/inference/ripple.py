@@ -97,7 +97,7 @@ class _Pursuit:
         sizes = [linear.blocks[b].sizes * best.scales[b] for b in others]
         robot = campaign.robot
         grids = {
-            joint: _tried(campaign.q[:, j], robot.joint_types[j] == "prismatic")
+            joint: _orders(campaign.q[:, j], robot.joint_types[j] == "prismatic")
             for j, joint in enumerate(robot.joint_names)
         }
         return cls(
@@ -219,7 +219,7 @@ def _ripple(waves: Sequence[_Wave]) -> JointRipple:
     return found
 
 
-def _tried(q: Array, slides: bool) -> Array:
+def _orders(q: Array, slides: bool) -> Array:
     """(K,) orders that are tried in a joint at positions (N,): those of which its range holds a whole wave."""
     grid = orders(q, slides)
     least = 2.0 * np.pi / max(float(np.ptp(q)), settings.TINY)
