@@ -18,7 +18,7 @@ METRIC = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
 INCH = {"inch": 0.0254}
 
 
-def _displaced(change: Callable[[Array], Array]) -> Repair:
+def _at_places(change: Callable[[Array], Array]) -> Repair:
     """Return a repair that changes measured positions."""
 
     def repair(readings: Readings, struck: Rows) -> Readings:
@@ -42,7 +42,7 @@ def _units(units: dict[str, float]) -> Callable[[Readings], Iterator[tuple[str, 
         read = METRIC[readings.length_unit]
         for unit, size in units.items():
             if unit != readings.length_unit:
-                yield f"{unit}, not in {readings.length_unit}", _displaced(lambda p, by=size / read: p * by)  # type: ignore[misc]
+                yield f"{unit}, not in {readings.length_unit}", _at_places(lambda p, by=size / read: p * by)  # type: ignore[misc]
 
     return proposals
 
@@ -50,13 +50,13 @@ def _units(units: dict[str, float]) -> Callable[[Readings], Iterator[tuple[str, 
 def _axes_exchanged(_: Readings) -> Iterator[tuple[str, Repair]]:
     for i, j in combinations(range(3), 2):
         order = [{i: j, j: i}.get(k, k) for k in range(3)]
-        yield f"{'xyz'[i]} and {'xyz'[j]}", _displaced(lambda p, order=order: p[:, order])  # type: ignore[misc]
+        yield f"{'xyz'[i]} and {'xyz'[j]}", _at_places(lambda p, order=order: p[:, order])  # type: ignore[misc]
 
 
 def _mirrored(_: Readings) -> Iterator[tuple[str, Repair]]:
     for k, axis in enumerate("xyz"):
         sign = np.where(np.arange(3) == k, -1.0, 1.0)
-        yield axis, _displaced(lambda p, sign=sign: p * sign)  # type: ignore[misc]
+        yield axis, _at_places(lambda p, sign=sign: p * sign)  # type: ignore[misc]
 
 
 _CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
