@@ -1,4 +1,4 @@
-"""Effects that cancel each other: found, one of them kept, and both only where rows held out need both."""
+"""Effects that cancel each other are found."""
 
 from dataclasses import replace
 
@@ -7,8 +7,8 @@ import pytest
 from helpers import NOISE
 from simulate import simulate
 
-from thermal_robot.diagnosis import cancelling as room
-from thermal_robot.diagnosis.cancelling import Cancelling, cancelling, cancelling_within, goes_astray, one_of_each
+from thermal_robot.diagnosis.cancelling import cancelling, cancelling_within
+from thermal_robot.diagnosis.credible import credible
 from thermal_robot.effects import JointGain, TransmissionError, choose
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.fit import fit
@@ -71,48 +71,4 @@ def test_nothing_found_cancels_nothing(wheels):
     assert wheels.effects == ()
     assert cancelling(wheels) == ()
     assert list(cancelling_within(wheels)) == []
-    assert one_of_each(wheels, print) == (wheels, {})
-
-
-def test_rows_set_aside_count_where_a_model_goes_astray(rv_m2):
-    campaign = simulate(rv_m2, ["joint_gain"], seed=4, noise=NOISE)[0]
-    known = fit(campaign, choose(("joint_gain",)))
-    assert known.effects
-    assert goes_astray(known) == pytest.approx(np.sqrt(3.0) * NOISE, rel=0.15)
-    off = campaign.position.copy()
-    off[7] += 0.01
-    spoilt = fit(replace(campaign, position=off), choose(("joint_gain",)))
-    assert spoilt.explanation.outliers.sum() == 1
-    assert goes_astray(spoilt) == pytest.approx(0.01 * np.sqrt(3.0 / campaign.samples), rel=0.1)
-
-
-@pytest.fixture(scope="module")
-def both(rv_m2):
-    """Gains and lost motion at work, neither of which stands for the other."""
-    campaign = simulate(rv_m2, ["joint_gain", "backlash"], seed=4, noise=NOISE, ratio=(5.0, 6.0))[0]
-    known = fit(campaign, choose(("joint_gain", "backlash")))
-    assert {effect.name for effect, _ in known.effects} == {"joint_gain", "backlash"}
-    return known
-
-
-def paired(monkeypatch, known):
-    """Say of a fit that two effects cancel as long as it holds both."""
-    pair = Cancelling(("joint_gain", "backlash"), ("joint_2", "joint_2"), 12.0)
-    monkeypatch.setattr(room, "cancelling", lambda fit: (pair,) if len(fit.effects) > 1 else ())
-    return one_of_each(known, lambda _: None)
-
-
-def test_two_that_rows_held_out_need_both_stay(both, monkeypatch):
-    kept, refused = paired(monkeypatch, both)
-    assert kept is both
-    assert refused == {}
-
-
-def test_the_one_without_which_rows_held_out_are_predicted_better_stays(both, monkeypatch):
-    monkeypatch.setattr(room, "goes_astray", lambda fit: 1.0 if fit.blocks_of("backlash") else 1.01)
-    kept, refused = paired(monkeypatch, both)
-    assert [effect.name for effect, _ in kept.effects] == ["backlash"]
-    (why,) = refused.values()
-    assert set(refused) == {"joint_gain"}
-    assert 0.0 <= why.probability <= 1.0
-    assert why.reason.endswith("joint_gain is left out")
+    assert credible(wheels, print) == (wheels, {})

@@ -10,9 +10,8 @@ from simulate import simulate
 from thermal_robot import diagnose
 from thermal_robot.diagnosis.cautions import cautions, contradicted, usable
 from thermal_robot.diagnosis.parts import Refused, Sensitivity
-from thermal_robot.effects import LinkCompliance, choose
+from thermal_robot.effects import choose
 from thermal_robot.inference.fit import fit
-from thermal_robot.inference.frames import register
 from thermal_robot.kinematics import Displacement
 from thermal_robot.observations import Frames, observe
 
@@ -119,13 +118,3 @@ def test_a_verdict_that_hangs_on_the_stated_sizes_says_so(rv_m2):
 def test_why_an_effect_was_left_out_is_said(rv_m2):
     known = fit(simulate(rv_m2, seed=2)[0], choose(("drift",), (), ()))
     assert cautions(known, {"joint_gain": Refused(0.2, reason="the two cancel")}) == ("the two cancel",)
-
-
-@pytest.mark.parametrize(("times", "said"), [(1.0, False), (100.0, True)])
-def test_a_link_a_hundred_times_softer_than_any_is_not_believed_in_silence(rv_m2, times, said):
-    """The same bend of a tenth of a millimetre: expected at the size as it is, not at one a hundred times smaller."""
-    plain = simulate(rv_m2, ["link_compliance"], seed=2, ratio=(6.0, 6.0))[0]
-    size = max(p.size for p in LinkCompliance().parameters(observe(plain, register(plain))))
-    known = fit(replace(plain, priors={"link_compliance": size / times}), choose(("link_compliance",), (), ()))
-    assert known.effects
-    assert any("times its expected size" in note for note in cautions(known)) == said

@@ -57,6 +57,15 @@ def test_a_reversed_column_is_told_and_its_effect_is_not_named(rv_m2, effect, sp
     assert effect not in [e.name for e, _ in spoilt.effects]
 
 
+def test_directions_that_nobody_recorded_are_not_reversed_but_wrongly_derived(rv_m2):
+    plain = simulate(rv_m2, ["backlash"], seed=11, ratio=(4.0, 6.0))[0]
+    spoilt = column_reversed(plain, "approach.")
+    derived = tuple(name for name in plain.covariates if name.startswith("approach."))
+    (said,) = wrong_sides(fit(replace(spoilt, derived=derived), choose()))
+    assert "the robot does not go straight" in said
+    assert "reversed" not in said
+
+
 @pytest.mark.slow
 def test_the_sentence_stands_in_text_and_json(rv_m2):
     plain = simulate(rv_m2, ["backlash"], seed=3, ratio=(4.0, 6.0))[0]

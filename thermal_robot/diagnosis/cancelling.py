@@ -2,23 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass, replace
+from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import expit
 
-from thermal_robot.diagnosis.one_walk import Model, Walk
-from thermal_robot.diagnosis.parts import Refused
-from thermal_robot.diagnosis.schemes import schemes
 from thermal_robot.effects.effect import in_words
-from thermal_robot.effects.law import PREFIX
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import orthonormal, without
-from thermal_robot.inference.fit import Fit, less
-from thermal_robot.inference.rows import blocks
+from thermal_robot.inference.fit import Fit
 
 Array = NDArray[np.float64]
 
@@ -95,51 +89,3 @@ def _moved(fit: Fit) -> Iterator[tuple[str, list[tuple[str, str]], Array]]:
         item = e.linear.blocks[b]
         moved = item.columns.reshape(len(noise), -1) * values / noise
         yield effect.name, [(p.kind, p.place) for p in item.parameters], without(moved, basis)
-
-
-def one_of_each(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, Refused]]:
-    """Keep one effect of each pair that cancels, the worst pair first.
-
-    The explanation is chosen again without each of the two, and that one is kept which predicts rows held out better;
-    both stay where rows held out are predicted clearly worse without either.
-
-    Returns
-    -------
-    fit
-        With what is left.
-    refused
-        By name of a known effect that was left out: its probability, by the evidence of the two explanations.
-    """
-    refused: dict[str, Refused] = {}
-    kept: set[tuple[str, str]] = set()
-    while pair := next((c for c in cancelling(fit) if c.effects not in kept), None):
-        progress(f"{pair.effects[0]} and {pair.effects[1]} cancel each other")
-        others = {name: less(fit, name, progress) for name in pair.effects}
-        left = {name: goes_astray(other) for name, other in others.items()}
-        out = min(left, key=lambda name: left[name])
-        if left[out] > settings.WORSE_ELSEWHERE * goes_astray(fit):
-            kept.add(pair.effects)
-            continue
-        best = {name: other.explanation.best.log_evidence for name, other in others.items()}
-        (instead,) = set(pair.effects) - {out}
-        progress(f"{out} is left out")
-        if not out.startswith(PREFIX):
-            refused[out] = Refused(float(expit(best[instead] - best[out])), reason=f"{pair.words}; {out} is left out")
-        fit = others[out]
-    return fit, refused
-
-
-def goes_astray(fit: Fit) -> float:
-    """Rms distance (m) that a fit leaves on rows held out in blocks of time, and in regions of joint space.
-
-    Rows that were set aside count, too: what cancels where it was fitted may be what puts them far off.
-    """
-    model = Model.of(fit.explanation, blocks(fit.campaign))
-    model = replace(model, kept=np.ones(fit.campaign.samples, dtype=bool))
-    total, rows = 0.0, 0
-    for name, _, tests in schemes(fit):
-        walk = Walk.over(model, tests)
-        if name in ("time", "region") and walk.tests:
-            total += walk.squares(range(len(model.spans))).total
-            rows += walk.rows
-    return float(np.sqrt(total / max(rows, 1)))

@@ -10,10 +10,10 @@ import numpy as np
 
 from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis.cancelling import cancelling, cancelling_within
+from thermal_robot.diagnosis.credible import outsized
 from thermal_robot.diagnosis.parts import Refused, Sensitivity
 from thermal_robot.diagnosis.signs import wrong_sides
-from thermal_robot.effects import Effect, gate
-from thermal_robot.effects.effect import UNSOURCED
+from thermal_robot.effects import gate
 from thermal_robot.inference import settings
 from thermal_robot.inference.fit import Fit
 
@@ -91,11 +91,7 @@ def cautions(
             'straight from pose to pose; if it does not, write moves = "unknown" under [robot]'
         )
     notes += wrong_sides(fitted)
-    for effect, parameter, times in _outside(fitted):
-        notes.append(
-            f"{effect.title}: {parameter} is {times:.0f} times its expected size, which no robot is known to reach: it "
-            "may stand in for something else"
-        )
+    notes += [f"{one.words}: it may stand in for something else" for one in outsized(fitted)]
     for name, times in cancelling_within(fitted):
         notes.append(
             f"parameters of {name} cancel each other: single ones do up to {times:.0f} times what all do together"
@@ -119,14 +115,3 @@ def _fragile(sensitivity: Sensitivity | None) -> Iterator[str]:
     for chance, times in ((sensitivity.smaller, "a third of"), (sensitivity.larger, "three times")):
         if chance < settings.FRAGILE:
             yield f"with {times} the expected sizes of all effects this verdict would be improbable ({chance:.0e})"
-
-
-def _outside(fitted: Fit) -> Iterator[tuple[Effect, str, float]]:
-    """Yield parameters far outside sizes that stand on sources: effect, parameter, and times that size."""
-    e = fitted.explanation
-    for b, (effect, values) in zip(e.best.blocks, fitted.effects, strict=True):
-        item, deviation = e.linear.blocks[b], np.sqrt(np.diag(e.values[b][1]))
-        sure = np.maximum(np.abs(values) - settings.SIGMAS_95 * deviation, 0.0) / item.sizes
-        for k in np.flatnonzero(sure > settings.OUTSIDE):
-            if effect.size_spread < UNSOURCED:
-                yield effect, item.parameters[k].name, float(np.abs(values[k]) / item.sizes[k])

@@ -12,8 +12,8 @@ from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.diagnosis.answer import Conclusion, answer
 from thermal_robot.diagnosis.beside_scatter import beside_scatter
 from thermal_robot.diagnosis.beside_steps import beside_steps
-from thermal_robot.diagnosis.cancelling import one_of_each
 from thermal_robot.diagnosis.cautions import usable
+from thermal_robot.diagnosis.credible import credible
 from thermal_robot.diagnosis.data_faults import data_fault
 from thermal_robot.diagnosis.data_faults.misfit import another_motion, frames_alone
 from thermal_robot.diagnosis.examine import examine
@@ -110,9 +110,9 @@ def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
     """Let laws that nobody wrote down compete with the known effects, then ask what of the rest is random.
 
     One law after another joins the explanation, while each is worth its place and regions held out do not get worse.
-    Of effects that cancel each other one is kept.
+    Of effects that cancel each other one is kept; one of a size that no robot reaches is not.
     """
-    known, cancelled = one_of_each(rippled(known, progress), progress)
+    known, cancelled = credible(rippled(known, progress), progress)
     stages = [known]
     most = settings.MOST_LAWS if known.campaign.samples < settings.MANY_ROWS else 1
     while len(stages) <= most:
@@ -125,7 +125,7 @@ def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
     # the first of several laws may go astray between the places that were measured, and the others set it right
     while len(stages) > 1 and worse_elsewhere(known, stages[-1]):
         stages.pop()
-    fit, more = one_of_each(stages[-1], progress)
+    fit, more = credible(stages[-1], progress)
     fit, refused = worth_their_word(fit, progress)
     fit, chance, refused = beside_steps(fit, random_gap(fit), {**cancelled, **more, **refused}, progress)
     if chance.explains_size:

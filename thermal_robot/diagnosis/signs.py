@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.diagnosis import settings
-from thermal_robot.effects import Effect
+from thermal_robot.effects import Effect, gate
 from thermal_robot.inference.columns import Block
 from thermal_robot.inference.evidence import Combination
 from thermal_robot.inference.explain import log_priors, settings_of_one
@@ -20,6 +20,7 @@ from thermal_robot.inference.refine import heard
 from thermal_robot.inference.search import Search
 
 Array = NDArray[np.float64]
+NOT_STRAIGHT = 'the robot does not go straight from the pose before to the next, write moves = "unknown" under [robot]'
 
 
 def wrong_sides(fit: Fit) -> tuple[str, ...]:
@@ -48,9 +49,15 @@ def wrong_sides(fit: Fit) -> tuple[str, ...]:
     if found.log_evidence < known + settings.INSISTS:
         return ()
     return tuple(
-        f"{effect.title}: negative ({', '.join(places)}), which cannot be: {effect.if_negative}"
+        f"{effect.title}: negative ({', '.join(places)}), which cannot be: {_mistake(fit, effect)}"
         for effect, places in negative
     )
+
+
+def _mistake(fit: Fit, effect: Effect) -> str:
+    """Return what is usually wrong then; of columns that were not recorded, how they were derived."""
+    derived = set(gate.reads(effect, fit.nominal)) & set(fit.campaign.derived)
+    return NOT_STRAIGHT if derived else effect.if_negative
 
 
 def _best(linear: Linear, families: list[str], problem: Gram, start: list[int]) -> Combination:

@@ -1,0 +1,91 @@
+"""Of what cancels one is kept, what no robot reaches is left out, and both only where rows held out allow it."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers import NOISE
+from simulate import simulate
+
+from thermal_robot.diagnosis import credible as room
+from thermal_robot.diagnosis.cancelling import Cancelling
+from thermal_robot.diagnosis.cautions import cautions
+from thermal_robot.diagnosis.credible import credible, goes_astray, outsized
+from thermal_robot.effects import LinkCompliance, choose
+from thermal_robot.inference.fit import fit, less
+from thermal_robot.inference.frames import register
+from thermal_robot.observations import observe
+
+
+def test_rows_set_aside_count_where_a_model_goes_astray(rv_m2):
+    campaign = simulate(rv_m2, ["joint_gain"], seed=4, noise=NOISE)[0]
+    known = fit(campaign, choose(("joint_gain",)))
+    assert known.effects
+    assert goes_astray(known) == pytest.approx(np.sqrt(3.0) * NOISE, rel=0.15)
+    off = campaign.position.copy()
+    off[7] += 0.01
+    spoilt = fit(replace(campaign, position=off), choose(("joint_gain",)))
+    assert spoilt.explanation.outliers.sum() == 1
+    assert goes_astray(spoilt) == pytest.approx(0.01 * np.sqrt(3.0 / campaign.samples), rel=0.1)
+
+
+@pytest.fixture(scope="module")
+def both(rv_m2):
+    """Gains and lost motion at work, neither of which stands for the other."""
+    campaign = simulate(rv_m2, ["joint_gain", "backlash"], seed=4, noise=NOISE, ratio=(5.0, 6.0))[0]
+    known = fit(campaign, choose(("joint_gain", "backlash")))
+    assert {effect.name for effect, _ in known.effects} == {"joint_gain", "backlash"}
+    return known
+
+
+def paired(monkeypatch, known):
+    """Say of a fit that two effects cancel as long as it holds both."""
+    pair = Cancelling(("joint_gain", "backlash"), ("joint_2", "joint_2"), 12.0)
+    monkeypatch.setattr(room, "cancelling", lambda fit: (pair,) if len(fit.effects) > 1 else ())
+    return credible(known, lambda _: None)
+
+
+def test_two_that_rows_held_out_need_both_stay(both, monkeypatch):
+    kept, refused = paired(monkeypatch, both)
+    assert kept is both
+    assert refused == {}
+
+
+def test_the_one_without_which_rows_held_out_are_predicted_better_stays(both, monkeypatch):
+    monkeypatch.setattr(room, "goes_astray", lambda fit: 1.0 if fit.blocks_of("backlash") else 1.01)
+    kept, refused = paired(monkeypatch, both)
+    assert [effect.name for effect, _ in kept.effects] == ["backlash"]
+    (why,) = refused.values()
+    assert set(refused) == {"joint_gain"}
+    assert 0.0 <= why.probability <= 1.0
+    assert why.reason.endswith("joint_gain is left out")
+
+
+def soft(robot, times, effect):
+    """An arm in which one effect is at work, its links said to bend a number of times less than they do."""
+    plain = simulate(robot, [effect], seed=2, ratio=(6.0, 6.0))[0]
+    size = max(p.size for p in LinkCompliance().parameters(observe(plain, register(plain))))
+    return replace(plain, priors={"link_compliance": size / times})
+
+
+@pytest.mark.parametrize(("times", "count"), [(1.0, 0), (100.0, 1)])
+def test_links_softer_than_any_stay_where_nothing_else_predicts_rows_held_out(rv_m2, times, count):
+    """The same bend: expected at the size as it is, not at one a hundred times smaller."""
+    known = fit(soft(rv_m2, times, "link_compliance"), choose(("link_compliance",)))
+    assert known.effects
+    assert min(len(outsized(known)), 1) == count
+    assert credible(known, lambda _: None) == (known, {})
+    assert any("times its expected size" in note for note in cautions(known)) == bool(count)
+
+
+def test_links_softer_than_any_lose_where_something_else_predicts_rows_held_out(rv_m2):
+    """Joints that yield, told as links that bend: those would be softer than any."""
+    known = fit(soft(rv_m2, 300.0, "joint_compliance"), choose(("joint_compliance", "link_compliance")))
+    links = replace(less(known, "joint_compliance"), variants=known.variants)
+    assert [effect.name for effect, _ in links.effects] == ["link_compliance"]
+    doubts = outsized(links)
+    assert [doubt.times for doubt in doubts] == sorted((doubt.times for doubt in doubts), reverse=True)
+    kept, refused = credible(links, lambda _: None)
+    assert [effect.name for effect, _ in kept.effects] == ["joint_compliance"]
+    assert refused["link_compliance"].probability == 0.0
+    assert refused["link_compliance"].reason.endswith("link_compliance is left out")
