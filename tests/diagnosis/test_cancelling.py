@@ -52,7 +52,7 @@ def test_a_gain_and_a_wave_that_undo_each_other_are_found(wheels):
     """sin q = q − q³/6: within a quarter of a radian the two differ by a hundredth."""
     (pair,) = cancelling(holding(wheels, 0.1, -0.1))
     assert set(pair.effects) == {"joint_gain", "transmission_error"}
-    assert pair.places == (wheels.corrected.robot.joint_names[JOINT],) * 2
+    assert pair.sites == (("joint", wheels.corrected.robot.joint_names[JOINT]),) * 2
     assert pair.times > 50.0
     assert pair.words.startswith("joint_gain and transmission_error at joint_2 cancel each other")
 

@@ -11,7 +11,7 @@ from thermal_robot.diagnosis import credible as room
 from thermal_robot.diagnosis.cancelling import Cancelling
 from thermal_robot.diagnosis.cautions import cautions
 from thermal_robot.diagnosis.credible import credible, goes_astray, outsized
-from thermal_robot.effects import LinkCompliance, choose
+from thermal_robot.effects import LinkCompliance, choose, gate
 from thermal_robot.inference.fit import fit, less
 from thermal_robot.inference.frames import register
 from thermal_robot.observations import observe
@@ -39,8 +39,8 @@ def both(rv_m2):
 
 
 def paired(monkeypatch, known):
-    """Say of a fit that two effects cancel as long as it holds both."""
-    pair = Cancelling(("joint_gain", "backlash"), ("joint_2", "joint_2"), 12.0)
+    """Say of a fit that two effects cancel as long as it holds both, not in any one joint."""
+    pair = Cancelling(("joint_gain", "backlash"), (("base", ""),) * 2, 12.0)
     monkeypatch.setattr(room, "cancelling", lambda fit: (pair,) if len(fit.effects) > 1 else ())
     return credible(known, lambda _: None)
 
@@ -87,5 +87,20 @@ def test_links_softer_than_any_lose_where_something_else_predicts_rows_held_out(
     assert [doubt.times for doubt in doubts] == sorted((doubt.times for doubt in doubts), reverse=True)
     kept, refused = credible(links, lambda _: None)
     assert [effect.name for effect, _ in kept.effects] == ["joint_compliance"]
-    assert refused["link_compliance"].probability == 0.0
-    assert refused["link_compliance"].reason.endswith("link_compliance is left out")
+    assert refused
+    for called, why in refused.items():
+        assert why.place in called
+        assert why.reason.endswith(f"{called} is left out")
+    assert 0.0 <= kept.probability("link_compliance") < 0.5 < kept.probability("joint_compliance")
+
+
+def test_one_joint_alone_is_left_out_of_an_effect(rv_m2):
+    campaign = simulate(rv_m2, ["joint_gain"], seed=4, noise=NOISE, ratio=(5.0, 6.0))[0]
+    known = fit(campaign, choose(("joint_gain",)))
+    ((effect, values),) = known.effects
+    best = gate.checked(effect, known.nominal)[int(np.argmax(np.abs(values)))].place
+    for place in (best, next(name for name in campaign.robot.joint_names if name != best)):
+        others = less(known, "joint_gain", place=place)
+        for cut in (*others.variants["joint_gain"], *(cut for cut, _ in others.effects)):
+            assert place not in [p.place for p in gate.checked(cut, known.nominal)]
+        assert (goes_astray(others) > 2.0 * goes_astray(known)) == (place == best)

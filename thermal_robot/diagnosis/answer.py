@@ -129,7 +129,7 @@ def answer(
 def _probability(last: Conclusion) -> float:
     """Return how probable exactly the effects of the fit are; with what was refused at work they are not all."""
     exactly = last.fit.probability_of_just({effect.name for effect, _ in last.fit.effects})
-    return min([exactly, *(1.0 - refused.probability for refused in last.refused.values())])
+    return min([exactly, *(1.0 - refused.probability for refused in last.refused.values() if not refused.place)])
 
 
 def _gap(last: Conclusion, shrinkage: Shrinkage) -> Gap:

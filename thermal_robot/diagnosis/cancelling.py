@@ -25,21 +25,21 @@ class Cancelling:
     ----------
     effects
         Their names.
-    places
-        Where the two parts are, in words.
+    sites
+        Kind and place of the two parts.
     times
         What the smaller part does, over what both do together: rms over the rows, unknown frames projected out, in
         units of the noise.
     """
 
     effects: tuple[str, str]
-    places: tuple[str, str]
+    sites: tuple[tuple[str, str], tuple[str, str]]
     times: float
 
     @property
     def words(self) -> str:
         """Who cancels whom, where, by how much."""
-        (one, other), (here, there) = self.effects, self.places
+        (one, other), (here, there) = self.effects, (in_words(*site) for site in self.sites)
         where = f"at {here}" if here == there else f"at {here} and {there}"
         return f"{one} and {other} {where} cancel each other: each does {self.times:.0f} times what both do together"
 
@@ -59,7 +59,7 @@ def cancelling(fit: Fit) -> tuple[Cancelling, ...]:
         each = min(float(np.linalg.norm(parts[key])) for key in (one, other))
         times, names = each / max(together, settings.TINY), (one[0], other[0])
         if one[0] != other[0] and times > settings.CANCELLING_PAIR:
-            pair = Cancelling(names, (in_words(*one[1:]), in_words(*other[1:])), times)
+            pair = Cancelling(names, (one[1:], other[1:]), times)
             found[names] = max(pair, found.get(names, pair), key=lambda c: c.times)
     return tuple(sorted(found.values(), key=lambda c: -c.times))
 

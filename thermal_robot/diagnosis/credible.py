@@ -21,19 +21,19 @@ from thermal_robot.inference.rows import blocks
 
 @dataclass(frozen=True)
 class Doubt:
-    """Effects of which one should not be in the explanation.
+    """Parts of effects of which one should not be in the explanation.
 
     Attributes
     ----------
-    effects
-        Their names.
+    parts
+        Name of each effect, and the joint or link; empty where it is all of the effect.
     words
         Why, in a sentence without a full stop.
     times
         By how much they are in doubt, as a ratio.
     """
 
-    effects: tuple[str, ...]
+    parts: tuple[tuple[str, str], ...]
     words: str
     times: float
 
@@ -47,51 +47,58 @@ def outsized(fit: Fit) -> tuple[Doubt, ...]:
         if effect.size_spread >= UNSOURCED:
             continue
         for k in np.flatnonzero(sure > settings.OUTSIDE):
-            times = float(np.abs(values[k]) / item.sizes[k])
+            own, times = item.parameters[k], float(np.abs(values[k]) / item.sizes[k])
             words = (
-                f"{effect.title}: {item.parameters[k].name} is {times:.0f} times its expected size, which no robot is "
-                "known to reach"
+                f"{effect.title}: {own.name} is {times:.0f} times its expected size, which no robot is known to reach"
             )
-            found.append(Doubt((effect.name,), words, times))
+            found.append(Doubt((_part(effect.name, own.kind, own.place),), words, times))
     return tuple(sorted(found, key=lambda doubt: -doubt.times))
+
+
+def _part(name: str, kind: str, place: str) -> tuple[str, str]:
+    return name, place if kind in ("joint", "link") else ""
 
 
 def _doubts(fit: Fit) -> Iterator[Doubt]:
     for pair in cancelling(fit):
-        yield Doubt(pair.effects, pair.words, pair.times)
+        parts = (_part(name, *site) for name, site in zip(pair.effects, pair.sites, strict=True))
+        yield Doubt(tuple(parts), pair.words, pair.times)
     yield from outsized(fit)
 
 
 def credible(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, Refused]]:
-    """Leave out one effect of each pair that cancels, and effects of a size that no robot reaches, the worst first.
+    """Leave out one of two parts of effects that cancel, and parts of a size that no robot reaches, the worst first.
 
-    The explanation is chosen again without each effect in doubt, and that one is left out without which rows held out
-    are predicted best; none is where they are then predicted clearly worse.
+    A part is what an effect does in one joint or link. The explanation is chosen again without each part in doubt, and
+    that one is left out without which rows held out are predicted best; none is where they are then predicted clearly
+    worse.
 
     Returns
     -------
     fit
         With what is left.
     refused
-        By name of a known effect that was left out: its probability, by the evidence of the two explanations that keep
-        one of a pair; of a size that is impossible, zero.
+        What was left out, by its name: the probability of a known effect all of which was, by the evidence of the two
+        explanations that keep one of a pair; of a size that is impossible, zero.
     """
     refused: dict[str, Refused] = {}
-    kept: set[tuple[str, ...]] = set()
-    while doubt := next((d for d in _doubts(fit) if d.effects not in kept), None):
+    weighed: set[tuple[tuple[str, str], ...]] = set()
+    while doubt := next((d for d in _doubts(fit) if d.parts not in weighed), None):
+        weighed.add(doubt.parts)
         progress(doubt.words)
-        others = {name: less(fit, name, progress) for name in doubt.effects}
-        left = {name: goes_astray(other) for name, other in others.items()}
-        out = min(left, key=lambda name: left[name])
+        others = {part: less(fit, part[0], progress, part[1]) for part in doubt.parts}
+        left = {part: goes_astray(other) for part, other in others.items()}
+        out = min(left, key=lambda part: left[part])
         if left[out] > settings.WORSE_ELSEWHERE * goes_astray(fit):
-            kept.add(doubt.effects)
             continue
-        best = {name: other.explanation.best.log_evidence for name, other in others.items()}
+        best = {part: other.explanation.best.log_evidence for part, other in others.items()}
         chance = max((float(expit(best[instead] - best[out])) for instead in best if instead != out), default=0.0)
-        progress(f"{out} is left out")
-        if not out.startswith(PREFIX):
-            refused[out] = Refused(chance, reason=f"{doubt.words}; {out} is left out")
-        fit = others[out]
+        fit, (name, place) = others[out], out
+        place = place if name in fit.variants else ""
+        called = f"{name} of {place}" if place else name
+        progress(f"{called} is left out")
+        if not name.startswith(PREFIX):
+            refused[called] = Refused(chance, reason=f"{doubt.words}; {called} is left out", place=place)
     return fit, refused
 
 

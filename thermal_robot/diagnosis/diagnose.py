@@ -16,6 +16,7 @@ from thermal_robot.diagnosis.cautions import usable
 from thermal_robot.diagnosis.credible import credible
 from thermal_robot.diagnosis.data_faults import data_fault
 from thermal_robot.diagnosis.data_faults.misfit import another_motion, frames_alone
+from thermal_robot.diagnosis.deviations import as_groups_say
 from thermal_robot.diagnosis.examine import examine
 from thermal_robot.diagnosis.held_out import held_out
 from thermal_robot.diagnosis.parts import Misfit
@@ -130,7 +131,10 @@ def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
     fit, chance, refused = beside_steps(fit, random_gap(fit), {**cancelled, **more, **refused}, progress)
     if chance.explains_size:
         return beside_scatter(fit, chance, refused, progress)
-    left, laws = examine(fit, progress), discovered(fit)
+    left = examine(fit, progress)
+    if left.unexplained.flagged:
+        fit = as_groups_say(fit)
+    laws = discovered(fit)
     unexplained = as_laws_say(without_laws(fit, left.unexplained), laws, fit.explanation.discrepancy)
     return Conclusion(fit, laws, unexplained, left, chance, refused)
 

@@ -107,12 +107,13 @@ class Refused:
     """An effect that was taken out of the fit again: its probability, and what it brings rows held out as a share.
 
     The share is ``None`` where it is the scatter of joints that had feigned it, or where another effect stands for it;
-    ``reason`` is a sentence that tells a reader why, or empty.
+    ``reason`` is a sentence that tells a reader why, or empty; ``place`` is where only that one of it was taken out.
     """
 
     probability: float
     share: float | None = None
     reason: str = ""
+    place: str = ""
 
 
 @dataclass(frozen=True)

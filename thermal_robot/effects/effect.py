@@ -24,8 +24,9 @@ A new effect is a file like this one::
 Register it under the entry point group ``thermal_robot.effects`` or pass it to :func:`thermal_robot.diagnose`. What
 others want to know of it stands in the same class, each with a default: ``title`` (in plain words), ``size_spread``
 (how well its sizes are known), ``frame`` and ``contained_in`` (what it cannot be told from), ``missing`` and ``reads``
-(columns), ``variants`` and ``nearby`` (settings), ``driver`` (what it is drawn against). Every effect has the argument
-``places`` besides its own: only the parameters in these joints or links are kept, by the gate.
+(columns), ``variants`` and ``nearby`` (settings), ``driver`` (what it is drawn against). Every effect has the arguments
+``places`` and ``excluded`` besides its own: only the parameters in these joints or links, or not in those, are kept, by
+the gate.
 
 Nobody asks an effect directly: :mod:`thermal_robot.effects.gate` does, checks the answer, and names the effect where it
 breaks the contract or raises.
@@ -149,9 +150,12 @@ class Effect(ABC):
     places
         Names of the joints or links whose parameters are kept; empty for all parameters. One place at fault needs few
         parameters, and those of the sound places would count against it.
+    excluded
+        Names of the joints or links whose parameters are not kept, whatever ``places`` says.
     """
 
     places: tuple[str, ...] = field(default=(), kw_only=True)
+    excluded: tuple[str, ...] = field(default=(), kw_only=True)
 
     name: ClassVar[str] = ""
     """By which it is asked for and reported."""
@@ -264,8 +268,8 @@ class Effect(ABC):
         return None
 
     def arguments(self) -> dict[str, Any]:
-        """Return the constructor's arguments, for saving; ``places`` only where it is set."""
-        return {name: value for name, value in asdict(self).items() if name != "places" or value}
+        """Return the constructor's arguments, for saving; ``places`` and ``excluded`` only where they are set."""
+        return {name: value for name, value in asdict(self).items() if name not in ("places", "excluded") or value}
 
 
 def in_words(kind: str, place: str) -> str:

@@ -41,7 +41,8 @@ def checked(effect: Effect, observations: Observations) -> tuple[Parameter, ...]
     tuple of Parameter
         Each with a name of its own, a known kind of place, a place of that kind that the robot has (or none), a
         positive size, and responses of finite values in a channel and at an index that the robot has, of that
-        channel's shape (see :class:`Response`). Where the effect names ``places``, only those there.
+        channel's shape (see :class:`Response`). Where the effect names ``places``, only those there; none in places
+        that are ``excluded``.
 
     Raises
     ------
@@ -53,6 +54,7 @@ def checked(effect: Effect, observations: Observations) -> tuple[Parameter, ...]
         return _kept(effect, _parameters(effect, observations), observations.robot)
     whole = copy.copy(effect)
     object.__setattr__(whole, "places", ())
+    object.__setattr__(whole, "excluded", ())
     known = observations.parameters.get(whole)
     if known is None:
         known = observations.parameters[whole] = _parameters(whole, observations)
@@ -243,14 +245,17 @@ def _asked(effect: Effect, question: str, *about: Any) -> Any:
 
 
 def _kept(effect: Effect, parameters: tuple[Parameter, ...], robot: Robot) -> tuple[Parameter, ...]:
-    """Return the parameters in the joints and links that the effect names; all where it names none."""
-    if not effect.places:
-        return parameters
+    """Return the parameters in the joints and links that the effect names, all where it names none; none excluded."""
     known = dict.fromkeys((*robot.joint_names, *places_of(parameters)))
-    for place in _texts(effect, "places is", effect.places):
-        if place not in known:
-            raise EffectError(f"effect {effect.name!r}: places holds {place!r}, expected any of {', '.join(known)}")
-    return tuple(p for p in parameters if p.kind in ("joint", "link") and p.place in effect.places)
+    for field, named in (("places", effect.places), ("excluded", effect.excluded)):
+        for place in _texts(effect, f"{field} is", named):
+            if place not in known:
+                raise EffectError(
+                    f"effect {effect.name!r}: {field} holds {place!r}, expected any of {', '.join(known)}"
+                )
+    local = {p: p.kind in ("joint", "link") for p in parameters}
+    left = (p for p in parameters if not (local[p] and p.place in effect.excluded))
+    return tuple(p for p in left if not effect.places or (local[p] and p.place in effect.places))
 
 
 def _texts(effect: Effect, what: str, answer: Any) -> tuple[str, ...]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence, Set
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -126,9 +126,21 @@ def _settings(effect: Effect, observations: Observations) -> tuple[Effect, ...]:
     return tuple(dict.fromkeys((*known, *gate.alone(known[0], observations))))
 
 
-def less(known: Fit, name: str, progress: Callable[[str], None] = lambda _: None) -> Fit:
-    """Fit again without one effect."""
-    return refit(known, {name: ()}, [effect for effect, _ in known.effects if effect.name != name], progress)
+def less(known: Fit, name: str, progress: Callable[[str], None] = lambda _: None, place: str = "") -> Fit:
+    """Fit again without one effect, or without one of its joints or links, there where it has others."""
+
+    def rest(effect: Effect) -> Effect | None:
+        if effect.name != name:
+            return effect
+        left = tuple(other for other in effect.places if other != place)
+        if not place or (effect.places and not left):
+            return None
+        cut = replace(effect, places=left, excluded=(*effect.excluded, place))
+        return cut if gate.checked(cut, known.corrected) else None
+
+    others = tuple(dict.fromkeys(cut for effect in known.variants[name] if (cut := rest(effect))))
+    begin = [cut for effect, _ in known.effects if (cut := rest(effect))]
+    return refit(known, {name: others}, begin, progress)
 
 
 def refit(

@@ -49,7 +49,7 @@ def modulated(observations: Observations, effects: Iterable[Effect] | None = Non
         if type(installed.get(effect.name)) is not type(effect) or gate.missing(effect, observations):
             continue
         setting = gate.variants(effect, observations)[0] if effects is None else effect
-        arguments = {k: v for k, v in gate.arguments(setting).items() if k != "places"}
+        arguments = {k: v for k, v in gate.arguments(setting).items() if k not in ("places", "excluded")}
         for joint in _changing(setting, observations):
             driver = _driver(setting, observations, joint)
             names = [*(name for name in conditions(observations, joint) if name != driver), joint]

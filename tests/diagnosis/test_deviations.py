@@ -1,0 +1,88 @@
+"""Deviations hold where rows that are neighbours err alike, and stay as they are where noise is independent."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers import NOISE
+from simulate import simulate
+
+from thermal_robot import diagnose
+from thermal_robot.diagnosis.deviations import as_groups_say
+from thermal_robot.effects import JointGain, choose
+from thermal_robot.inference.fit import fit
+from thermal_robot.kinematics import Displacement
+from thermal_robot.observations import Frames, observe
+
+GAIN, JOINT = 1.5e-3, 1
+
+
+def warped(robot, seed, size):
+    """An arm whose second joint has a wrong gain, in a world in which every joint errs smoothly with all of them."""
+    plain = replace(simulate(robot, seed=seed, noise=NOISE)[0], priors={})
+    rng, error = np.random.default_rng([seed, 1]), np.zeros_like(plain.q)
+    for j in range(plain.q.shape[1]):
+        for _ in range(3):
+            error[:, j] += size * np.sin(
+                plain.q @ rng.normal(scale=0.7, size=plain.q.shape[1]) + rng.uniform(0.0, 6.28)
+            )
+    error[:, JOINT] += GAIN * plain.q[:, JOINT]
+    true = observe(plain, Frames.declared(plain), displacement=Displacement(joint=error)).predicted_position
+    return replace(plain, position=true + NOISE * rng.normal(size=true.shape))
+
+
+def told(known):
+    """Value and deviation of the second joint's gain."""
+    e, b = known.explanation, known.explanation.block_of(JointGain())
+    own = [p.place for p in e.linear.blocks[b].parameters].index(known.corrected.robot.joint_names[JOINT])
+    values, covariance = e.values[b]
+    return values[own], float(np.sqrt(covariance[own, own]))
+
+
+@pytest.fixture(scope="module")
+def off(rv_m2):
+    """(seeds, 2) how far the gain is off in a smooth world, in deviations: of the posterior, and as groups say."""
+    found = []
+    for seed in range(24):
+        known = fit(warped(rv_m2, seed, 2e-4), [JointGain()])
+        found.append([(told(k)[0] - GAIN) / told(k)[1] for k in (known, as_groups_say(known))])
+    return np.array(found)
+
+
+def test_the_posterior_is_too_sure_where_neighbours_err_alike_and_groups_are_not(off):
+    alone, grouped = np.sqrt((off**2).mean(axis=0))
+    assert alone > 1.5
+    assert 0.6 < grouped < 1.35
+    assert (np.abs(off[:, 1]) <= np.abs(off[:, 0]) + 1e-12).all()
+
+
+def test_independent_noise_leaves_deviations_nearly_as_they_are(rv_m2):
+    times = []
+    for seed in range(12):
+        known = fit(warped(rv_m2, seed, 0.0), [JointGain()])
+        grouped = as_groups_say(known)
+        assert told(grouped)[0] == told(known)[0]
+        times.append(told(grouped)[1] / told(known)[1])
+    assert min(times) >= 1.0 - 1e-9
+    assert np.median(times) < 1.3
+
+
+def test_no_axis_becomes_wider_than_its_prior(rv_m2):
+    known = fit(simulate(rv_m2, ["geometric"], seed=3)[0], choose(("geometric",)))
+    (b,) = known.explanation.best.blocks
+    prior = known.explanation.linear.blocks[b].sizes * known.explanation.best.scales[b]
+    narrow, wide = (k.explanation.values[b][1] / np.outer(prior, prior) for k in (known, as_groups_say(known)))
+    assert np.linalg.eigvalsh(wide - narrow).min() > -1e-9
+    assert np.linalg.eigvalsh(wide).max() <= max(1.0, np.linalg.eigvalsh(narrow).max()) + 1e-9
+
+
+def test_a_diagnosis_that_leaves_noise_alone_keeps_them(rv_m2):
+    plain, _ = simulate(rv_m2, ["joint_gain"], seed=4, noise=NOISE, ratio=(5.0, 6.0))
+    found = diagnose(plain, effects=(), only=("joint_gain",))
+    assert not found.unexplained.flagged
+    (gain,) = (f for f in found.effects if f.name == "joint_gain")
+    known = fit(plain, choose(("joint_gain",)))
+    ((effect, _),) = known.effects
+    deviations = np.sqrt(np.diag(known.explanation.values[known.explanation.best.blocks[0]][1]))
+    assert [p.std for p in gain.parameters if p.identified] == pytest.approx(deviations.tolist(), rel=1e-6)
+    assert effect.name == "joint_gain"
