@@ -1,15 +1,24 @@
-"""Deviations of parameters where what remains is no noise: by the jackknife over groups of rows that err alike.
+"""Deviations of parameters where what remains is no noise: what it does to them, by the discrepancy and by groups.
 
 The posterior takes what remains for noise that is independent from row to row. What no effect describes is not: it is
-alike for neighbours in joint space, or in time, and many rows then say no more than a few. The jackknife over groups
-asks the data instead (Efron and Stein, *Annals of Statistics* 9, 1981; for clusters, Cameron and Miller, *Journal of
-Human Resources* 50, 2015): with θ_g fitted without group g of G,
+alike for neighbours in joint space, or in time, and many rows then say no more than a few. Two figures tell how far the
+parameters may be off for that.
 
-    S = (G − 1)/G Σ_g (θ_g − θ̄)(θ_g − θ̄)ᵀ.
+* The smooth discrepancy that was found beside the effects: V = s²(1 + τ²K) is the covariance of the rows. Effects are
+  fitted as if there were none, θ̂ = A Xᵀy/σ² with A = (XᵀX/σ² + Λ⁻¹)⁻¹. Such a θ̂ is off by
 
-Along each principal axis v of the posterior covariance, in units of the prior deviations, what the data say is weighed
-by the ratio of the two variances: 1/λ − 1 of posterior variance λ becomes (1/λ − 1) λ/(vᵀSv), never more than it was.
-The prior keeps its weight.
+      A (XᵀVX/σ⁴ + Λ⁻¹) A,
+
+  which is A itself where V = σ² (the sandwich of Huber, *Proc. 5th Berkeley Symposium* 1, 1967).
+* The jackknife over G groups, regions of joint space and blocks of time, with θ_g fitted without group g,
+
+      (G − 1)/G Σ_g (θ_g − θ̄)(θ_g − θ̄)ᵀ
+
+  (Efron and Stein, *Annals of Statistics* 9, 1981; for clusters, Cameron and Miller, *Journal of Human Resources* 50,
+  2015). It knows of no form, but not of what is smooth over many groups.
+
+Along each principal axis of a block's posterior covariance, in units of the prior deviations, the largest of the
+variances takes the place of the posterior's: 1/λ − 1, what the data say beside the prior, becomes less in proportion.
 """
 
 from __future__ import annotations
@@ -22,15 +31,18 @@ from numpy.typing import NDArray
 
 from thermal_robot.diagnosis.one_walk import Model
 from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import orthonormal, without
+from thermal_robot.inference.discrepancy import Smooth, decomposed
 from thermal_robot.inference.fit import Fit
+from thermal_robot.inference.problem import whitened
 from thermal_robot.inference.rows import blocks, each, neighbourhoods
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
 
 
-def as_groups_say(fit: Fit) -> Fit:
-    """Widen the covariances of a fit to what regions of joint space, and blocks of time, say of its parameters.
+def as_remainder_says(fit: Fit) -> Fit:
+    """Widen the covariances of a fit to what its remainder may do to its parameters.
 
     Returns
     -------
@@ -40,31 +52,51 @@ def as_groups_say(fit: Fit) -> Fit:
     e, campaign = fit.explanation, fit.campaign
     model = Model.of(e, blocks(campaign))
     groups = (model.block, neighbourhoods(campaign, settings.BLOCKS))
-    moved = [_moved(model, each(labels)) for labels in groups]
+    said = [*(_jackknife(model, each(labels)) for labels in groups), _beside_discrepancy(fit, model)]
     wider = dict(e.values)
     for b, span in zip(e.best.blocks, model.spans, strict=True):
         values, covariance = e.values[b]
         prior = e.linear.blocks[b].sizes * e.best.scales[b]
-        parts = [own[:, span - model.flat] / prior for own in moved]
-        wider[b] = values, np.outer(prior, prior) * _widened(covariance / np.outer(prior, prior), parts)
+        unit, own = np.outer(prior, prior), np.ix_(span - model.flat, span - model.flat)
+        wider[b] = values, unit * _widened(covariance / unit, [s[own] / unit for s in said])
     return replace(fit, explanation=replace(e, values=wider))
 
 
-def _moved(model: Model, groups: Sequence[Rows]) -> Array:
-    """(G, P) how far the parameters are from their mean without each group, times √((G − 1)/G)."""
+def _jackknife(model: Model, groups: Sequence[Rows]) -> Array:
+    """(P, P) covariance of the parameters by what they are without each group; zero where there are too few."""
     known = [group for group in groups if model.determines(~group)]
     if len(known) < 2:
-        return np.zeros((1, len(model.tight)))
+        return np.zeros((len(model.tight),) * 2)
     fits = np.stack(model.fits([~group for group in known], range(len(model.spans))))
-    values = -fits[:, model.flat : -1]
-    return np.asarray(np.sqrt((len(known) - 1) / len(known)) * (values - values.mean(axis=0)))
+    apart = fits[:, model.flat : -1] - fits[:, model.flat : -1].mean(axis=0)
+    return np.asarray((len(known) - 1) / len(known) * apart.T @ apart)
 
 
-def _widened(covariance: Array, moved: Sequence[Array]) -> Array:
-    """(P, P) covariance in units of the prior deviations, no axis narrower than any of the (G, P) deviations say."""
+def _beside_discrepancy(fit: Fit, model: Model) -> Array:
+    """(P, P) covariance of parameters that are fitted as if there were no smooth discrepancy; zero where there is none.
+
+    One that is anew in every pose or visit is part of the rows' covariance in the fit.
+    """
+    e = fit.explanation
+    form = e.discrepancy.form
+    if form is None or form.anew:
+        return np.zeros((len(model.tight),) * 2)
+    smooth = Smooth(decomposed(form, e.whitening.weights, e.whitening.noise), e.discrepancy.tau)
+    unit, variance = model.tight**-0.5, e.best.noise**2
+    stack = whitened(model.linear, replace(e.whitening, smooth=None))[:, :-1]
+    columns = without(stack[:, model.flat :], orthonormal(stack[:, : model.flat])) * unit
+    basis, size = smooth.eigen(settings.UNHEARD)
+    along, gram = basis.T @ columns, columns.T @ columns
+    alike = (gram + (along.T * size) @ along) * e.discrepancy.noise**2
+    inner = np.linalg.inv(gram / variance + np.eye(len(gram)))
+    return np.asarray(np.outer(unit, unit) * (inner @ (alike / variance**2 + np.eye(len(gram))) @ inner))
+
+
+def _widened(covariance: Array, said: Sequence[Array]) -> Array:
+    """(P, P) covariance in units of the prior deviations, along none of its axes smaller than any of those said."""
     variance, axes = np.linalg.eigh(covariance)
     variance = np.maximum(variance, settings.TINY)
-    said = np.max([((own @ axes) ** 2).sum(axis=0) for own in moved], axis=0)
-    times = np.maximum(said / variance, 1.0)
+    most = np.max([np.einsum("ki,kl,li->i", axes, own, axes) for own in said], axis=0)
+    times = np.maximum(most / variance, 1.0)
     wide = np.where(variance < 1.0, 1.0 / (1.0 + (1.0 / variance - 1.0) / times), variance)
     return np.asarray((axes * wide) @ axes.T)

@@ -16,7 +16,7 @@ from thermal_robot.diagnosis.cautions import usable
 from thermal_robot.diagnosis.credible import credible
 from thermal_robot.diagnosis.data_faults import data_fault
 from thermal_robot.diagnosis.data_faults.misfit import another_motion, frames_alone
-from thermal_robot.diagnosis.deviations import as_groups_say
+from thermal_robot.diagnosis.deviations import as_remainder_says
 from thermal_robot.diagnosis.examine import examine
 from thermal_robot.diagnosis.held_out import held_out
 from thermal_robot.diagnosis.parts import Misfit
@@ -133,7 +133,7 @@ def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
         return beside_scatter(fit, chance, refused, progress)
     left = examine(fit, progress)
     if left.unexplained.flagged:
-        fit = as_groups_say(fit)
+        fit = as_remainder_says(fit)
     laws = discovered(fit)
     unexplained = as_laws_say(without_laws(fit, left.unexplained), laws, fit.explanation.discrepancy)
     return Conclusion(fit, laws, unexplained, left, chance, refused)

@@ -35,12 +35,15 @@ class Discrepancy:
         That there is any.
     forms
         Probability of each form by its name, those of the forms that are not in question left out.
+    noise
+        Beside it, in units of the whitening noise.
     """
 
     form: Form | None
     tau: float
     probability: float
     forms: Mapping[str, float]
+    noise: float = 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -256,7 +259,7 @@ class _Round:
             _left(linear, white, values),
             self.smooth,
             aside,
-            Discrepancy(self.form, self.rung[1], 1.0 - odds.get("", 0.0), odds),
+            Discrepancy(self.form, self.rung[1], 1.0 - odds.get("", 0.0), odds, self.best.noise),
             ladder.in_question(self.best),
         )
 
