@@ -354,6 +354,22 @@ def test_every_effect_of_joints_or_links_may_sit_in_one_of_them(rv_m2, name):
     assert {gate.at(effect, place, seen) for place in others} == {None}
 
 
+@pytest.mark.parametrize("name", library())
+def test_every_effect_of_joints_or_links_may_be_looked_for_in_all_but_one(rv_m2, name):
+    seen, effect = rich(rv_m2), library()[name]
+    whole = checked(effect, seen)
+    for place in PLACES.get(name, ()):
+        others = replace(effect, excluded=(place,))
+        kept = [p.place != place for p in whole]
+        assert [p.name for p in checked(others, seen)] == [p.name for p, keep in zip(whole, kept, strict=True) if keep]
+        np.testing.assert_array_equal(block(seen, others).columns, block(seen, effect).columns[:, :, kept])
+        assert gate.at(others, place, seen) is None
+        assert checked(replace(others, places=(place,)), seen) == ()
+        settings = (*gate.variants(others, seen), *gate.nearby(others, 1.6))
+        assert {setting.excluded for setting in settings} == {(place,)}
+        assert type(effect)(**gate.arguments(others)) == others
+
+
 def test_joints_that_are_named_exist(observations):
     two = checked(JointOffset(places=("joint_4", "joint_2")), observations)
     assert [p.place for p in two] == ["joint_2", "joint_4"]
@@ -361,6 +377,8 @@ def test_joints_that_are_named_exist(observations):
         checked(JointOffset(places=("joint_2", "elbow")), observations)
     with pytest.raises(EffectError, match="'joint_offset': places is 'joint_2', expected a tuple of texts"):
         checked(JointOffset(places="joint_2"), observations)
+    with pytest.raises(EffectError, match="'joint_offset': excluded holds 'elbow', expected any of joint_1, joint_2"):
+        checked(JointOffset(excluded=("elbow",)), observations)
 
 
 def test_a_model_keeps_its_joints_and_one_of_old_needs_none(rv_m2, tmp_path):
