@@ -74,8 +74,11 @@ def test_links_softer_than_any_stay_where_nothing_else_predicts_rows_held_out(rv
     known = fit(soft(rv_m2, times, "link_compliance"), choose(("link_compliance",)))
     assert known.effects
     assert min(len(outsized(known)), 1) == count
-    assert credible(known, lambda _: None) == (known, {})
-    assert any("times its expected size" in note for note in cautions(known)) == bool(count)
+    kept, refused = credible(known, lambda _: None)
+    assert [effect.name for effect, _ in kept.effects] == ["link_compliance"]
+    assert goes_astray(kept) < 1.05**2 * goes_astray(known)
+    assert all(why.place for why in refused.values())  # at most links that do next to nothing
+    assert any("times its expected size" in note for note in cautions(kept)) == bool(count)
 
 
 def test_links_softer_than_any_lose_where_something_else_predicts_rows_held_out(rv_m2):

@@ -1,4 +1,6 @@
-"""Links that bend under the weight on their end: against rows of hinges in MuJoCo, energy, and steel tables."""
+"""Links that bend and twist under the weight on their end: against hinges in MuJoCo and in a URDF, and energy."""
+
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -6,9 +8,10 @@ from bodies import bodies, displaced, mine
 from helpers import commanded, without_masses
 
 from thermal_robot.campaign import Campaign
-from thermal_robot.effects import LinkCompliance
-from thermal_robot.effects.beam import beams, cross_axes
+from thermal_robot.effects import JointCompliance, LinkCompliance
+from thermal_robot.effects.beam import beams, cross_axes, shafts
 from thermal_robot.observations import observe
+from thermal_robot.robot import load_robot
 
 
 @pytest.mark.parametrize("arm", ["ur10", "panda", "rv_m2"], indirect=True)
@@ -21,13 +24,64 @@ def test_a_beam_of_hinges_bends_as_the_cantilever(arm):
         body = world.sound(len(campaign.q))
         body.beams[at] = values
         expected = displaced(world, campaign, body)
-        found = mine(campaign, LinkCompliance(), values.ravel())
+        found = mine(campaign, LinkCompliance(), [*values.ravel(), *np.zeros(len(shafts(arm)))])
         if np.abs(expected).max() < 1e-10:
             assert np.abs(found).max() < 1e-9
             continue
         # three hinges lack a 36th of what a force on the end does
         error = np.linalg.norm(found - expected, axis=1).max() / np.linalg.norm(expected, axis=1).max()
         assert error < 0.03, f"segment {chosen}: {error:.3f}"
+
+
+def hinged(arm, s):
+    """The same arm with a joint at the end of a segment, which turns about the segment."""
+    segment = arm.segments[s]
+    root = ElementTree.fromstring(arm.urdf)
+    (joint,) = (j for j in root.findall("joint") if j.get("name") == segment.name)
+    along = arm.chain.rotations[segment.index] @ segment.direction
+    added = ElementTree.SubElement(root, "joint", name="hinge", type="revolute")
+    ElementTree.SubElement(added, "origin", xyz=joint.find("origin").get("xyz"), rpy="0 0 0")
+    ElementTree.SubElement(added, "parent", link=segment.parent_link)
+    ElementTree.SubElement(added, "child", link="between")
+    ElementTree.SubElement(added, "axis", xyz=" ".join(f"{x:.17g}" for x in along))
+    ElementTree.SubElement(added, "limit", lower="-1", upper="1", effort="1", velocity="1")
+    ElementTree.SubElement(root, "link", name="between")
+    joint.find("origin").set("xyz", "0 0 0")
+    joint.find("parent").set("link", "between")
+    return load_robot(ElementTree.tostring(root, encoding="unicode"), arm.tool_frame, gravity=arm.gravity)
+
+
+@pytest.mark.parametrize("arm", ["ur10", "panda", "rv_m2"], indirect=True)
+def test_a_shaft_twists_as_a_hinge_at_its_end_yields(arm):
+    campaign = commanded(arm, {"payload": np.tile([0.0, 2.0], 5)}, payload_com=np.array([0.03, 0.02, 0.05]))
+    seen, moved = shafts(arm), []
+    count = 2 * len(beams(arm))
+    for k, s in enumerate(seen):
+        values = np.zeros(count + len(seen))
+        values[count + k] = 1e-5
+        there = hinged(arm, s)
+        joint = there.joint_names.index("hinge")
+        q = np.insert(campaign.q, joint, 0.0, axis=1)
+        springs = np.where(np.arange(there.n) == joint, 1e-5 * arm.segments[s].length, 0.0)
+        expected = mine(
+            Campaign("hinged", there, q, covariates=campaign.covariates, payload_com=campaign.payload_com),
+            JointCompliance(),
+            springs,
+        )
+        moved.append(np.abs(expected).max())
+        np.testing.assert_allclose(mine(campaign, LinkCompliance(), values), expected, atol=1e-3 * moved[-1] + 1e-12)
+    assert max(moved) > 1e-7
+
+
+@pytest.mark.parametrize(
+    ("arm", "links"),
+    [("ur10", ["upper_arm_link", "forearm_link"]), ("rv_m2", ["shoulder", "upper_arm", "forearm"])],
+    indirect=["arm"],
+)
+def test_what_lies_along_a_joint_does_not_twist_beside_it(arm, links):
+    assert [arm.segments[s].parent_link for s in shafts(arm)] == links
+    labels = [p.label for p in LinkCompliance().parameters(observe(commanded(arm)))]
+    assert sum("twisting" in label for label in labels) == len(links)
 
 
 @pytest.mark.parametrize("arm", ["ur10", "rv_m2", "awkward"], indirect=True)
@@ -54,13 +108,13 @@ def test_the_softest_segment_sags_by_a_fifth_of_a_millimetre_at_its_expected_siz
     parameters = LinkCompliance().parameters(observations)
     shifts = [p.size * np.linalg.norm(p.responses[0].values[:, :3], axis=1).max() for p in parameters]
     assert max(shifts) == pytest.approx(2e-4)
-    assert len(parameters) == 2 * len(beams(rv_m2))
+    assert len(parameters) == 2 * len(beams(rv_m2)) + len(shafts(rv_m2))
 
 
 def test_it_is_drawn_against_the_moment_that_bends_it(rv_m2):
     observations = observe(commanded(rv_m2))
     loads = observations.segment_load
-    for parameter in LinkCompliance().parameters(observations):
+    for parameter in LinkCompliance().parameters(observations)[: 2 * len(beams(rv_m2))]:
         s = parameter.responses[0].index
         axis = cross_axes(rv_m2, s)[int(parameter.label[-1]) - 1]
         error = 1e-6 * loads[:, s, 3:] @ axis

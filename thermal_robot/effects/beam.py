@@ -1,4 +1,4 @@
-"""A segment as a straight beam: the two axes across it, about which it bends."""
+"""A segment as a straight beam: the two axes across it, about which it bends, and whether it can be seen to twist."""
 
 from __future__ import annotations
 
@@ -14,11 +14,28 @@ Array = NDArray[np.float64]
 
 SHORTEST = 1e-6
 """m; a shorter segment does not bend."""
+ALONG = 0.9
+"""Cosine of the angle to a joint's axis from which a segment counts as lying along it."""
 
 
 def beams(robot: Robot) -> tuple[int, ...]:
     """Return the segments that are long enough to bend."""
     return tuple(s for s, segment in enumerate(robot.segments) if segment.length > SHORTEST)
+
+
+def shafts(robot: Robot) -> tuple[int, ...]:
+    """Return the beams that lie along the axis of neither joint at their ends.
+
+    Along such an axis a beam that twists is a joint that yields.
+    """
+    chain = robot.chain
+
+    def turns(s: int) -> bool:
+        segment = robot.segments[s]
+        e, along = segment.index, chain.rotations[segment.index] @ segment.direction
+        return max(abs(chain.axes[e] @ segment.direction), abs(chain.axes[e - 1] @ along) if e else 0.0) > ALONG
+
+    return tuple(s for s in beams(robot) if not turns(s))
 
 
 def cross_axes(robot: Robot, s: int) -> Array:

@@ -1,4 +1,4 @@
-"""Elastic links: every segment bends under the weight on its far end."""
+"""Elastic links: every segment bends and twists under the weight on its far end."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from thermal_robot.effects.beam import beams, cross_axes
+from thermal_robot.effects.beam import beams, cross_axes, shafts
 from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, at_segment
 
 if TYPE_CHECKING:
@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 _SAG = 2e-4  # m
 _STEADY = 1e-9  # N·m²
+_UNIT = "1/(N·m²)"
 
 
 @dataclass(frozen=True)
@@ -27,12 +28,14 @@ class LinkCompliance(Effect):
     ====================== ========================================
     turn of the far end    k L (M·e + ½ L (d × F)·e), about e
     its displacement       k L² (½ M·e + ⅓ L (d × F)·e), along e × d
+    its twist              k L M·d, about d, with k = 1/(G J)
     ====================== ========================================
 
-    (Timoshenko, *Strength of Materials* I, 1930, table of cantilevers.) F (N) and M (N·m) are the weight of all that
-    lies beyond: the URDF's masses and ``payload``. Two parameters a segment, 1/(N·m²), one for each axis across it.
-    Expected size: the segment that yields most in the campaign sags by 0.2 mm, some 1e-6 to 1e-5 /(N·m²) for an
-    aluminium tube of 100 mm (E I = 1e5 N·m² and more).
+    (Timoshenko, *Strength of Materials* I, 1930, table of cantilevers, and torsion of tubes.) F (N) and M (N·m) are the
+    weight of all that lies beyond: the URDF's masses and ``payload``. Two parameters a segment, 1/(N·m²), one for each
+    axis across it, and a third for its twist where it does not lie along a joint's axis. Expected size: the segment
+    that yields most in the campaign sags by 0.2 mm, some 1e-6 to 1e-5 /(N·m²) for an aluminium tube of 100 mm (E I =
+    1e5 N·m² and more; of a tube, G J = E I/(1 + ν)).
 
     About the axis of the joint at its end a segment bends as that joint yields (:class:`JointCompliance`), but for the
     part of the force: only bending across the joints' axes tells the two apart well. A load that stays the same bends
@@ -58,7 +61,7 @@ class LinkCompliance(Effect):
         return ("payload",) if "payload" in observations.covariates else ()
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
-        """Return two bending compliances a segment; 1/(N·m²)."""
+        """Return two bending compliances a segment, then what twists; 1/(N·m²)."""
         robot = observations.robot
         bent = {s: _yields(observations, s) for s in beams(robot)}
         most = max((float(np.abs(shift).max(initial=0.0)) for pair in bent.values() for _, shift in pair), default=0.0)
@@ -71,7 +74,15 @@ class LinkCompliance(Effect):
                 twist = np.column_stack([np.repeat(shift[:, None], 3, 1), np.repeat(turn[:, None], 3, 1)]) * across
                 label = f"bending compliance of {segment.name}, axis {k + 1}"
                 response = (at_segment(s, twist),)
-                found.append(Parameter(label, "1/(N·m²)", size, "link", segment.parent_link, response, positive=True))
+                found.append(Parameter(label, _UNIT, size, "link", segment.parent_link, response, positive=True))
+        for s in shafts(robot):
+            segment = robot.segments[s]
+            twist = segment.length * np.outer(
+                observations.segment_load[:, s, 3:] @ segment.direction, segment.direction
+            )
+            response = (at_segment(s, np.hstack([np.zeros_like(twist), twist])),)
+            label = f"twisting compliance of {segment.name}"
+            found.append(Parameter(label, _UNIT, size, "link", segment.parent_link, response, positive=True))
         return tuple(found)
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:

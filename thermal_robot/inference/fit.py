@@ -138,7 +138,7 @@ def less(known: Fit, name: str, progress: Callable[[str], None] = lambda _: None
         cut = replace(effect, places=left, excluded=(*effect.excluded, place))
         return cut if gate.checked(cut, known.corrected) else None
 
-    others = tuple(dict.fromkeys(cut for effect in known.variants[name] if (cut := rest(effect))))
+    others = tuple(dict.fromkeys(cut for effect in known.variants.get(name, ()) if (cut := rest(effect))))
     begin = [cut for effect, _ in known.effects if (cut := rest(effect))]
     return refit(known, {name: others}, begin, progress)
 
