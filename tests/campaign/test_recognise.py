@@ -93,6 +93,15 @@ def test_what_is_ignored_is_no_covariate(tmp_path: Path, name: str) -> None:
     assert name not in campaign.extra
 
 
+def test_the_tilt_of_a_link_is_a_covariate_in_rad(tmp_path: Path) -> None:
+    campaign = read(tmp_path, table=with_column("tilt.beam.x,tilt.bean.y", "1,1", "2,1", "3,1"))
+    scale = campaign.units.angle_scale
+    assert campaign.covariates["tilt.beam.x"].tolist() == pytest.approx([scale, 2.0 * scale, 3.0 * scale])
+    assert not any(name.startswith("tilt.bean") for name in (*campaign.covariates, *campaign.extra))
+    (said,) = (warning for warning in campaign.warnings if "tilt" in warning)
+    assert "the robot has no link 'bean'; did you mean 'beam'?" in said
+
+
 def test_an_empty_column_counts_as_absent(tmp_path: Path) -> None:
     campaign = read_campaign(put(tmp_path / "c", add(WHOLE, temperature="_ _ nan", payload="1 1 1")))
     assert set(campaign.covariates) == {"payload"}

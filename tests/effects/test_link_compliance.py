@@ -1,15 +1,19 @@
 """Links that bend and twist under the weight on their end: against hinges in MuJoCo and in a URDF, and energy."""
 
+from dataclasses import replace
 from xml.etree import ElementTree
 
 import numpy as np
 import pytest
 from bodies import bodies, displaced, mine
-from helpers import commanded, without_masses
+from helpers import NOISE, SAMPLES, commanded, tool_with, without_masses
+from simulate import simulate
 
 from thermal_robot.campaign import Campaign
-from thermal_robot.effects import JointCompliance, LinkCompliance
+from thermal_robot.effects import JointCompliance, LinkCompliance, choose
 from thermal_robot.effects.beam import beams, cross_axes, shafts
+from thermal_robot.inference.fit import fit
+from thermal_robot.kinematics.reference import tool_poses
 from thermal_robot.observations import observe
 from thermal_robot.robot import load_robot
 
@@ -123,3 +127,48 @@ def test_it_is_drawn_against_the_moment_that_bends_it(rv_m2):
         if np.ptp(error) > 1e-9:
             # its own unit is the moment's, about the axis that the error was made with
             np.testing.assert_allclose(values, loads[:, s, 3:] @ axis, atol=1e-6 * np.abs(loads).max())
+
+
+def inclined(arm, *links):
+    """Commands of an arm whose inclinometers read at random, and the pose of each of these links."""
+    rng = np.random.default_rng(4)
+    tilts = {f"tilt.{link}.{axis}": 1e-4 * rng.normal(size=SAMPLES) for link in links for axis in "xy"}
+    campaign = commanded(without_masses(arm), tilts)
+    poses = []
+    for link in links:
+        there = load_robot(arm.urdf, link, gravity=arm.gravity)
+        poses.append(tool_poses(there, campaign.q[:, : there.n]))
+    return campaign, poses
+
+
+@pytest.mark.parametrize(("arm", "link"), [("ur10", "forearm_link"), ("rv_m2", "upper_arm")], indirect=["arm"])
+def test_a_measured_tilt_turns_what_is_beyond_about_the_links_origin(arm, link):
+    campaign, (pose,) = inclined(arm, link)
+    (effect,) = LinkCompliance().variants(observe(campaign))
+    assert effect.tilt
+    assert LinkCompliance().missing(observe(campaign)) == ()
+    read = np.column_stack([*(campaign.covariates[f"tilt.{link}.{axis}"] for axis in "xy"), np.zeros(SAMPLES)])
+    turn = np.einsum("nij,nj->ni", pose[:, :3, :3], read)
+    expected = np.cross(turn, observe(campaign).position - pose[:, :3, 3])
+    np.testing.assert_allclose(mine(campaign, effect, [1.0]), expected, atol=1e-3 * np.abs(expected).max())
+
+
+def test_a_link_that_is_carried_by_one_before_does_not_turn_itself(rv_m2):
+    campaign, poses = inclined(rv_m2, "upper_arm", "forearm")
+    near, far = (pose[:, :3, :3] for pose in poses)
+    read = np.column_stack([*(campaign.covariates[f"tilt.upper_arm.{axis}"] for axis in "xy"), np.zeros(SAMPLES)])
+    carried = np.einsum("nji,njk,nk->ni", far, near, read)
+    both = {**campaign.covariates, "tilt.forearm.x": carried[:, 0], "tilt.forearm.y": carried[:, 1]}
+    first, second = LinkCompliance(tilt=True).parameters(observe(replace(campaign, covariates=both)))
+    assert np.abs(second.responses[0].values).max() < 1e-9 < np.abs(first.responses[0].values).max()
+
+
+def test_a_link_that_turns_as_it_was_read_is_named(rv_m2):
+    plain, rng = simulate(rv_m2, seed=3, noise=NOISE)[0], np.random.default_rng(3)
+    columns = {f"tilt.forearm.{axis}": 5e-4 * rng.normal(size=plain.samples) for axis in "xy"}
+    campaign = replace(plain, covariates={**plain.covariates, **columns}, priors={})
+    there = tool_with(campaign, LinkCompliance(tilt=True), [1.0])
+    known = fit(replace(campaign, position=there + NOISE * rng.normal(size=there.shape)), choose())
+    ((effect, values),) = known.effects
+    assert effect == LinkCompliance(tilt=True, places=effect.places)
+    assert values == pytest.approx([1.0], abs=0.05)

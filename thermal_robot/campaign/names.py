@@ -46,6 +46,15 @@ def listed(names: Iterable[str], limit: int = 12) -> str:
     return ", ".join(quoted[:limit]) + more
 
 
+def tilted(column: str) -> str | None:
+    """Return the link of ``tilt.<link>.x`` or ``tilt.<link>.y``; empty for the base, ``None`` for other columns."""
+    if column in TILT:
+        return ""
+    quantity, place = split_name(column)
+    link, _, axis = place.rpartition(".")
+    return link if quantity == "tilt" and link and axis in ("x", "y") else None
+
+
 def split_name(column: str) -> tuple[str, str]:
     """Return quantity and place of ``approach.elbow_joint``; the place is empty without a dot."""
     quantity, _, place = column.partition(".")

@@ -110,10 +110,11 @@ def _judge(table: Table, column: str, robot: Robot) -> tuple[str, list[str]]:
         if place in robot.joint_names:
             return _COVARIATE, []
         return _IGNORED, [_ignored(column, "the chain has no joint", place, robot.joint_names)]
-    if place and quantity in names.PER_LINK:
-        if place not in robot.urdf_links:
-            return _IGNORED, [_ignored(column, "the robot has no link", place, robot.urdf_links)]
-        if place not in {segment.parent_link for segment in robot.segments}:
+    link = names.tilted(column) or (place if quantity in names.PER_LINK else "")
+    if link:
+        if link not in robot.urdf_links:
+            return _IGNORED, [_ignored(column, "the robot has no link", link, robot.urdf_links)]
+        if link not in {segment.parent_link for segment in robot.segments}:
             return _COVARIATE, [f"column {column!r}: no length of the chain belongs to that link"]
         return _COVARIATE, []
     text = table.first_text(column)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from thermal_robot.campaign.names import PER_JOINT, PER_LINK, POSITION, SIMULATED_POSITION, TILT, split_name
+from thermal_robot.campaign.names import PER_JOINT, PER_LINK, POSITION, SIMULATED_POSITION, split_name, tilted
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot
 
@@ -95,7 +95,7 @@ def unit_of(column: str, robot: Robot, units: Units = SI) -> str:
         return units.joint_unit(_joint_type(column, robot))
     if column in (*POSITION, *SIMULATED_POSITION):
         return units.length
-    if column in TILT:
+    if tilted(column) is not None:
         return units.angle
     quantity, place = split_name(column)
     if quantity not in PER_JOINT:
@@ -110,7 +110,7 @@ def unit_of(column: str, robot: Robot, units: Units = SI) -> str:
 
 def covariate_scale(column: str, robot: Robot, units: Units) -> float:
     """SI value of one unit of a covariate's column; 1 where it is in SI, in °C, or as given."""
-    if column in TILT:
+    if tilted(column) is not None:
         return units.angle_scale
     quantity, place = split_name(column)
     if quantity in _OF_A_JOINT and place in robot.joint_names:

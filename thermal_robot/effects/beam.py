@@ -33,7 +33,8 @@ def shafts(robot: Robot) -> tuple[int, ...]:
     def turns(s: int) -> bool:
         segment = robot.segments[s]
         e, along = segment.index, chain.rotations[segment.index] @ segment.direction
-        return max(abs(chain.axes[e] @ segment.direction), abs(chain.axes[e - 1] @ along) if e else 0.0) > ALONG
+        cosines = [chain.axes[e] @ segment.direction, chain.axes[e - 1] @ along if e else 0.0]
+        return bool(np.abs(cosines).max() > ALONG)
 
     return tuple(s for s in beams(robot) if not turns(s))
 

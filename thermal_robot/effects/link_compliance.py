@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
 from thermal_robot.effects.beam import beams, cross_axes, shafts
 from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, at_segment
+from thermal_robot.effects.quantities import driving
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -40,28 +41,44 @@ class LinkCompliance(Effect):
     About the axis of the joint at its end a segment bends as that joint yields (:class:`JointCompliance`), but for the
     part of the force: only bending across the joints' axes tells the two apart well. A load that stays the same bends
     a link once for all, which is :class:`Geometric`. How a link bends under its own weight is not in it.
+
+    Where inclinometers on links were read (``tilt.<link>.x``, ``tilt.<link>.y``), a link turns about the origin of its
+    frame by the reading ω_k less that of the last one before it in the chain, both in the link's frame, times a gain:
+    1 where it stands where the link does. What is before, or the base, carries the link with it.
+
+    Attributes
+    ----------
+    tilt
+        Whether the turns are those that were measured.
     """
+
+    tilt: bool = False
 
     name: ClassVar[str] = "link_compliance"
     title: ClassVar[str] = "links that bend under load"
     if_negative: ClassVar[str] = "gravity points up"
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
-        """Return what would give a load, unless one that bends a segment varies.
+        """Return what would give a load, unless one that bends a segment, or a measured tilt, varies.
 
         Where the arm's own masses are not known, what a payload bends it by stands in for their share, too.
         """
-        varying = observations.robot.has_masses and any(
-            np.ptp(turn) > _STEADY for s in beams(observations.robot) for turn, _ in _yields(observations, s)
-        )
-        return () if varying else ("masses in the URDF",)
+        return () if _measured(observations) or _loaded(observations) else ("masses in the URDF",)
 
     def reads(self, observations: Observations) -> tuple[str, ...]:
-        """Return the payload where it was recorded."""
-        return ("payload",) if "payload" in observations.covariates else ()
+        """Return the tilts where they are used, else the payload where it was recorded."""
+        used = ("tilt.x", "tilt.y", *_tilts(observations)) if self.tilt else ("payload",)
+        return tuple(column for column in used if column in observations.covariates)
+
+    def variants(self, observations: Observations) -> tuple[Effect, ...]:
+        """Return bending under load and the measured tilts, as far as the campaign has them."""
+        kinds = [tilt for tilt, has in ((False, _loaded), (True, _measured)) if has(observations)]
+        return tuple(replace(self, tilt=tilt) for tilt in kinds) or (self,)
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
-        """Return two bending compliances a segment, then what twists; 1/(N·m²)."""
+        """Return two bending compliances a segment, then what twists, 1/(N·m²); or gains of measured turns."""
+        if self.tilt:
+            return _inclined(observations)
         robot = observations.robot
         bent = {s: _yields(observations, s) for s in beams(robot)}
         most = max((float(np.abs(shift).max(initial=0.0)) for pair in bent.values() for _, shift in pair), default=0.0)
@@ -86,11 +103,57 @@ class LinkCompliance(Effect):
         return tuple(found)
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
-        """Return the bending moment, about the axis about which the error goes with it."""
+        """Return the bending moment, about the axis about which the error goes with it, or the tilt."""
+        if self.tilt:
+            own = _tilts(observations, parameters[0].place)
+            return driving(observations, max(own, key=lambda c: float(np.ptp(observations.covariates[c]))))
         moment = observations.segment_load[:, parameters[0].responses[0].index, 3:]
         axis = np.linalg.lstsq(moment, error, rcond=1e-9)[0]
         values = moment @ axis / (np.linalg.norm(axis) + 1e-300)
         return f"bending moment on {parameters[0].place}", "N·m", values
+
+
+def _loaded(observations: Observations) -> bool:
+    """Whether the masses are known and what they bend a segment by varies."""
+    return observations.robot.has_masses and any(
+        np.ptp(turn) > _STEADY for s in beams(observations.robot) for turn, _ in _yields(observations, s)
+    )
+
+
+def _tilts(observations: Observations, *links: str) -> tuple[str, ...]:
+    """Return the columns of inclinometers, on links of the chain, all where none is named."""
+    links = links or tuple(segment.parent_link for segment in observations.robot.segments)
+    columns = dict.fromkeys(f"tilt.{link}.{axis}" for link in links for axis in "xy")
+    return tuple(column for column in columns if column in observations.covariates)
+
+
+def _measured(observations: Observations) -> bool:
+    return any(observations.varies(column) for column in _tilts(observations))
+
+
+def _inclined(observations: Observations) -> tuple[Parameter, ...]:
+    """Return a gain for each link with an inclinometer, in the order of the chain."""
+    robot, chain = observations.robot, observations.robot.chain
+    before = _reading(observations, "tilt")  # root frame
+    found = []
+    for s, segment in enumerate(robot.segments):
+        link, e = segment.parent_link, segment.index
+        if not _tilts(observations, link):
+            continue
+        frame = observations.commanded.rotations[:, e] @ chain.rotations[e].T  # of the link, in the root frame
+        turn = _reading(observations, f"tilt.{link}")
+        carried = np.einsum("nij,ni->nj", frame, before) * [1.0, 1.0, 0.0]
+        own, before = turn - carried, np.einsum("nij,nj->ni", frame, turn)
+        twist = np.hstack([np.cross(own, chain.translations[e]), own]).reshape(-1, 2, 3) @ chain.rotations[e]
+        response = (at_segment(s, twist.reshape(-1, 6)),)
+        found.append(Parameter("turn per tilt measured", "1", 1.0, "link", link, response, positive=True))
+    return tuple(found)
+
+
+def _reading(observations: Observations, of: str) -> Array:
+    """(N, 3) turn that an inclinometer read about x and y, rad; zero where there is none."""
+    nothing = np.zeros(observations.campaign.samples)
+    return np.column_stack([*(observations.covariates.get(f"{of}.{axis}", nothing) for axis in "xy"), nothing])
 
 
 def _yields(observations: Observations, s: int) -> tuple[tuple[Array, Array], ...]:
