@@ -7,6 +7,7 @@ import pytest
 from simulate import simulate
 
 from thermal_robot import diagnose
+from thermal_robot.diagnosis.cautions import contradicted
 from thermal_robot.diagnosis.signs import wrong_sides
 from thermal_robot.effects import choose
 from thermal_robot.inference.fit import fit
@@ -55,6 +56,18 @@ def test_a_reversed_column_is_told_and_its_effect_is_not_named(rv_m2, effect, sp
             assert (values[np.array(sides)] >= 0.0).all()
     assert [e.name for e, _ in sound.effects] == [effect]
     assert effect not in [e.name for e, _ in spoilt.effects]
+
+
+@pytest.mark.parametrize(("share", "told"), [(-1.0, True), (-0.3, True), (0.0, False), (0.3, False), (1.0, False)])
+def test_torques_that_go_against_gravity_are_told_whatever_explains_the_gap(rv_m2, share, told):
+    """Friction and errors of the sensor as large as what holds the arm."""
+    plain = simulate(rv_m2, ["joint_offset"], seed=5)[0]
+    torque = observe(plain).torque
+    read = share * torque + 0.15 * torque.std() * np.random.default_rng(5).normal(size=torque.shape)
+    columns = {f"torque.{n}": t for n, t in zip(rv_m2.joint_names, read.T, strict=True)}
+    notes = contradicted(replace(plain, covariates={**plain.covariates, **columns}))
+    assert any("the sign of torque.* is reversed" in note for note in notes) == told
+    assert contradicted(plain) == []
 
 
 def test_directions_that_nobody_recorded_are_not_reversed_but_wrongly_derived(rv_m2):

@@ -33,3 +33,6 @@ ROWS_ALIKE = 8
 """Rows that are taken together when asking whether an error follows a quantity."""
 PURE = 1e-6
 """Of a unit twist, m or rad: with less of one kind it is all of the other."""
+AGAINST_GRAVITY = -0.5
+"""Correlation of reported torques with those that hold the arm, below which one of the two has the wrong sign: friction
+and sensors' errors make it less than one, and nothing else turns it round."""
