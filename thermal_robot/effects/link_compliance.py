@@ -34,7 +34,7 @@ class LinkCompliance(Effect):
 
     (Timoshenko, *Strength of Materials* I, 1930, table of cantilevers, and torsion of tubes.) F (N) and M (N·m) are the
     weight of all that lies beyond: the URDF's masses and ``payload``. Two parameters a segment, 1/(N·m²), one for each
-    axis across it, and a third for its twist where it does not lie along a joint's axis. Expected size: the segment
+    axis across it, and if ``twist``, a third where it does not lie along a joint's axis. Expected size: the segment
     that yields most in the campaign sags by 0.2 mm, some 1e-6 to 1e-5 /(N·m²) for an aluminium tube of 100 mm (E I =
     1e5 N·m² and more; of a tube, G J = E I/(1 + ν)).
 
@@ -48,10 +48,14 @@ class LinkCompliance(Effect):
 
     Attributes
     ----------
+    twist
+        Whether segments twist, too. It is not tried by itself: on a real arm whose joints yield, twisting links took
+        their place, each ten times softer than a tube.
     tilt
         Whether the turns are those that were measured.
     """
 
+    twist: bool = False
     tilt: bool = False
 
     name: ClassVar[str] = "link_compliance"
@@ -92,7 +96,7 @@ class LinkCompliance(Effect):
                 label = f"bending compliance of {segment.name}, axis {k + 1}"
                 response = (at_segment(s, twist),)
                 found.append(Parameter(label, _UNIT, size, "link", segment.parent_link, response, positive=True))
-        for s in shafts(robot):
+        for s in shafts(robot) if self.twist else ():
             segment = robot.segments[s]
             twist = segment.length * np.outer(
                 observations.segment_load[:, s, 3:] @ segment.direction, segment.direction

@@ -230,9 +230,10 @@ LATTICE = 1e-3
 """Of their spacing: positions that lie on a lattice to within this cannot tell an order from its alias."""
 LOWEST_RIPPLE = 2.5
 """Orders a turn from which a wave is ripple: what comes round once or twice is an eccentric or oval wheel."""
-RIPPLE_ROWS, MOST_WAVES, WAVES_REFUSED, RIPPLE_ROUNDS = 5000, 30, 2, 3
+RIPPLE_ROWS, MOST_WAVES, WAVES_REFUSED, RIPPLE_ROUNDS, ROUND_ROWS = 5000, 30, 2, 3, 1200
 """Rows up to which ripple is looked for: 12 000 took nine minutes and 5.6 GiB; waves of one robot, five a joint; waves
-of each joint that may do harm in rows held out before none is tried any more; times that all is chosen, at most."""
+of each joint that may do harm in rows held out before none is tried any more; times that all is chosen, at most, and
+rows above which it is once, as it takes a minute there."""
 SAME_ORDER = 0.05
 """Orders that differ by less are one: over a whole turn 0.3 rad of phase, a few hundredths of the wave's square."""
 SLIP_SHARES = (0.03, 1.0)
@@ -388,8 +389,7 @@ CANCELLING, CANCELLING_PAIR = 5.0, 10.0
 """Times the sum of an effect's parts: single ones that are larger cancel each other; and of two effects' parts, which
 may well oppose each other, as gears that run out and a link that bends do."""
 FRAGILE = 1e-3
-"""Probability of the verdict with other prior sizes, below which that is said: nobody knows sizes to a factor of three.
-"""
+"""Probability of the verdict with other prior sizes, below which that is said: they are known to a factor of three."""
 OUTSIDE = 30.0
 """Times an expected size that stands on sources: seven deviations of its logarithm, as no robot is known to be."""
 CONTRADICTED = 0.01
