@@ -27,7 +27,7 @@ TOLERANCE = 1e-9
 NOTHING = 1e-11
 """Below this a figure is rounding of nothing: p-values and shares that underflow."""
 _WORDS = ("summary", "advice", "warnings", "reasons", "describes", "name", "schema", "next", "where", "title", "random")
-_SMALL = ("ur5_jacobi", "wam_jacobi", "ipa_ur10_b")
+_SMALL = ("ur5_jacobi", "wam_jacobi", "ipa_ur10_d")
 
 
 def names() -> list[str]:

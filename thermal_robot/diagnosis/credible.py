@@ -12,6 +12,7 @@ from thermal_robot.diagnosis.cancelling import cancelling
 from thermal_robot.diagnosis.one_walk import Model, Walk
 from thermal_robot.diagnosis.parts import Refused
 from thermal_robot.diagnosis.schemes import schemes
+from thermal_robot.diagnosis.settings import MOST_DOUBTS
 from thermal_robot.effects.effect import UNSOURCED
 from thermal_robot.effects.law import PREFIX
 from thermal_robot.inference import settings
@@ -71,7 +72,7 @@ def credible(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, 
 
     A part is what an effect does in one joint or link. The explanation is chosen again without each part in doubt, and
     that one is left out without which rows held out are predicted best; none is where they are then predicted clearly
-    worse.
+    worse. Where rows are very many, only the worst is weighed.
 
     Returns
     -------
@@ -83,7 +84,8 @@ def credible(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, 
     """
     refused: dict[str, Refused] = {}
     weighed: set[tuple[tuple[str, str], ...]] = set()
-    while doubt := next((d for d in _doubts(fit) if d.parts not in weighed), None):
+    most = MOST_DOUBTS if fit.campaign.samples <= settings.ENOUGH_ROWS else 1
+    while len(weighed) < most and (doubt := next((d for d in _doubts(fit) if d.parts not in weighed), None)):
         weighed.add(doubt.parts)
         progress(doubt.words)
         others = {part: less(fit, part[0], progress, part[1]) for part in doubt.parts}

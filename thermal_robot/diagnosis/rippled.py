@@ -27,7 +27,7 @@ def rippled(fit: Fit, progress: Callable[[str], None]) -> Fit:
     name = JointRipple.name
     if name not in fit.variants or fit.campaign.samples > settings.RIPPLE_ROWS:
         return fit
-    many = fit.campaign.samples > settings.ROUND_ROWS
+    many = fit.campaign.samples > settings.ENOUGH_ROWS
     for _ in range(1 if many else settings.RIPPLE_ROUNDS):
         progress("ripple of the gears")
         held = next((e for e, _ in fit.effects if isinstance(e, JointRipple)), JointRipple())

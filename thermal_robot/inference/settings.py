@@ -230,10 +230,9 @@ LATTICE = 1e-3
 """Of their spacing: positions that lie on a lattice to within this cannot tell an order from its alias."""
 LOWEST_RIPPLE = 2.5
 """Orders a turn from which a wave is ripple: what comes round once or twice is an eccentric or oval wheel."""
-RIPPLE_ROWS, MOST_WAVES, WAVES_REFUSED, RIPPLE_ROUNDS, ROUND_ROWS = 5000, 30, 2, 3, 1200
+RIPPLE_ROWS, MOST_WAVES, WAVES_REFUSED, RIPPLE_ROUNDS = 5000, 30, 2, 3
 """Rows up to which ripple is looked for: 12 000 took nine minutes and 5.6 GiB; waves of one robot, five a joint; waves
-of each joint that may do harm in rows held out before none is tried any more; times that all is chosen, at most, and
-rows above which it is once, as it takes a minute there."""
+of each joint that may do harm in rows held out before none is tried any more; times that all is chosen, at most."""
 SAME_ORDER = 0.05
 """Orders that differ by less are one: over a whole turn 0.3 rad of phase, a few hundredths of the wave's square."""
 SLIP_SHARES = (0.03, 1.0)
