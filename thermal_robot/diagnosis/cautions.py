@@ -12,7 +12,6 @@ from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis.cancelling import cancelling, cancelling_within
 from thermal_robot.diagnosis.credible import outsized
 from thermal_robot.diagnosis.parts import Refused, Sensitivity
-from thermal_robot.diagnosis.settings import AGAINST_GRAVITY
 from thermal_robot.diagnosis.signs import wrong_sides
 from thermal_robot.effects import gate
 from thermal_robot.inference import settings
@@ -76,7 +75,7 @@ def _against_gravity(campaign: Campaign) -> Iterator[str]:
     read = np.column_stack([campaign.covariates[columns[j]] for j in joints])
     one, other = (values - values.mean(axis=0) for values in (holding, read))
     alike = float((one * other).sum() / max(np.linalg.norm(one) * np.linalg.norm(other), settings.TINY))
-    if alike < AGAINST_GRAVITY:
+    if alike < settings.AGAINST_GRAVITY:
         yield (
             f"torque.* goes against the torques that hold the URDF's masses (correlation {alike:.2f}): the sign of "
             "torque.* is reversed, or gravity points up"

@@ -12,7 +12,6 @@ from thermal_robot.diagnosis.cancelling import cancelling
 from thermal_robot.diagnosis.one_walk import Model, Walk
 from thermal_robot.diagnosis.parts import Refused
 from thermal_robot.diagnosis.schemes import schemes
-from thermal_robot.diagnosis.settings import MOST_DOUBTS
 from thermal_robot.effects.effect import UNSOURCED
 from thermal_robot.effects.law import PREFIX
 from thermal_robot.inference import settings
@@ -84,7 +83,7 @@ def credible(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, 
     """
     refused: dict[str, Refused] = {}
     weighed: set[tuple[tuple[str, str], ...]] = set()
-    most = MOST_DOUBTS if fit.campaign.samples <= settings.ENOUGH_ROWS else 1
+    most = settings.MOST_DOUBTS if fit.campaign.samples <= settings.ENOUGH_ROWS else 1
     while len(weighed) < most and (doubt := next((d for d in _doubts(fit) if d.parts not in weighed), None)):
         weighed.add(doubt.parts)
         progress(doubt.words)

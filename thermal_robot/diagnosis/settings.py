@@ -33,9 +33,3 @@ ROWS_ALIKE = 8
 """Rows that are taken together when asking whether an error follows a quantity."""
 PURE = 1e-6
 """Of a unit twist, m or rad: with less of one kind it is all of the other."""
-AGAINST_GRAVITY = -0.5
-"""Correlation of reported torques with those that hold the arm, below which one of the two has the wrong sign: friction
-and sensors' errors make it less than one, and nothing else turns it round."""
-MOST_DOUBTS = 8
-"""Parts of effects that are weighed against an explanation without them, one of them where rows are very many: each
-takes two more choices of the explanation, tens of seconds from a thousand rows on."""

@@ -389,10 +389,11 @@ CANCELLING, CANCELLING_PAIR = 5.0, 10.0
 may well oppose each other, as gears that run out and a link that bends do."""
 FRAGILE = 1e-3
 """Probability of the verdict with other prior sizes, below which that is said: they are known to a factor of three."""
-OUTSIDE = 30.0
-"""Times an expected size that stands on sources: seven deviations of its logarithm, as no robot is known to be."""
-CONTRADICTED = 0.01
-"""rad or m: no servo that has settled is as far from its command."""
+OUTSIDE, MOST_DOUBTS = 30.0, 8
+"""Times an expected size that stands on sources: seven deviations of its logarithm, as no robot is known to be. Parts
+of effects that are weighed against a choice without them: each takes tens of seconds from a thousand rows on."""
+CONTRADICTED, AGAINST_GRAVITY = 0.01, -0.5
+"""rad or m: no settled servo is as far from its command. Correlation of torques with weights that a wrong sign makes."""
 STATED_TOO_LARGE = 0.5
 """Of the stated noise: less that remains says that it is stated too large."""
 UNHEARD = 1e-2
