@@ -393,7 +393,7 @@ OUTSIDE, MOST_DOUBTS = 30.0, 8
 """Times an expected size that stands on sources: seven deviations of its logarithm, as no robot is known to be. Parts
 of effects that are weighed against a choice without them: each takes tens of seconds from a thousand rows on."""
 CONTRADICTED, AGAINST_GRAVITY = 0.01, -0.5
-"""rad or m: no settled servo is as far from its command. Correlation of torques with weights that a wrong sign makes."""
+"""rad or m: no settled servo is as far from its command. Correlation of torque and weight that a wrong sign makes."""
 STATED_TOO_LARGE = 0.5
 """Of the stated noise: less that remains says that it is stated too large."""
 UNHEARD = 1e-2
