@@ -71,6 +71,14 @@ def test_products_are_those_beside_the_dense_covariance(case, tau):
 
 
 @pytest.mark.parametrize("tau", TAUS)
+def test_columns_are_spread_by_the_dense_covariance(case, tau):
+    spectrum, inside, _, _, rng = case
+    stack = rng.normal(size=(len(inside), 7))
+    expected = stack.T @ (np.eye(len(inside)) + tau**2 * inside) @ stack
+    np.testing.assert_allclose(spectrum.spread(tau, stack), expected, rtol=0, atol=1e-10 * np.abs(expected).max())
+
+
+@pytest.mark.parametrize("tau", TAUS)
 def test_columns_are_whitened_by_the_root_of_the_dense_covariance(case, tau):
     spectrum, inside, _, _, rng = case
     stack = rng.normal(size=(len(inside), 5))

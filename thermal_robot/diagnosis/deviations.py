@@ -32,7 +32,7 @@ from numpy.typing import NDArray
 from thermal_robot.diagnosis.one_walk import Model
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import orthonormal, without
-from thermal_robot.inference.discrepancy import Smooth, decomposed
+from thermal_robot.inference.discrepancy import Spectrum
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.problem import whitened
 from thermal_robot.inference.rows import blocks, each, neighbourhoods
@@ -81,13 +81,11 @@ def _beside_discrepancy(fit: Fit, model: Model) -> Array:
     form = e.discrepancy.form
     if form is None or form.anew:
         return np.zeros((len(model.tight),) * 2)
-    smooth = Smooth(decomposed(form, e.whitening.weights, e.whitening.noise), e.discrepancy.tau)
+    spectrum = Spectrum.of(form, e.whitening.weights, e.whitening.noise)
     unit, variance = model.tight**-0.5, e.best.noise**2
     stack = whitened(model.linear, replace(e.whitening, smooth=None))[:, :-1]
     columns = without(stack[:, model.flat :], orthonormal(stack[:, : model.flat])) * unit
-    basis, size = smooth.eigen(settings.UNHEARD)
-    along, gram = basis.T @ columns, columns.T @ columns
-    alike = (gram + (along.T * size) @ along) * e.discrepancy.noise**2
+    gram, alike = columns.T @ columns, spectrum.spread(e.discrepancy.tau, columns) * e.discrepancy.noise**2
     inner = np.linalg.inv(gram / variance + np.eye(len(gram)))
     return np.asarray(np.outer(unit, unit) * (inner @ (alike / variance**2 + np.eye(len(gram))) @ inner))
 

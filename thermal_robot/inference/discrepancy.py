@@ -269,6 +269,13 @@ class Spectrum:
             found -= own.T @ own - within if part.wide else tau**2 * within
         return found
 
+    def spread(self, tau: float, stack: Array) -> Array:
+        """Return Sᵀ(1 + τ²BBᵀ)S of (E, K) columns S."""
+        found = stack.T @ stack
+        for part, own, along in zip(self.parts, self.own, self.along(stack), strict=True):
+            found += tau**2 * (along.T @ own @ along if part.wide else along.T @ along)
+        return np.asarray(found)
+
     def whitened(self, tau: float, stack: Array) -> Array:
         """Return (1 + τ²BBᵀ)^(−½) times (E, K) columns."""
         found = []
