@@ -71,7 +71,7 @@ def credible(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, 
 
     A part is what an effect does in one joint or link. The explanation is chosen again without each part in doubt, and
     that one is left out without which rows held out are predicted best; none is where they are then predicted clearly
-    worse. Where rows are very many, only the worst is weighed.
+    worse. Where rows are very many, only the worst is weighed; of more still, the whole effect, which takes less time.
 
     Returns
     -------
@@ -83,11 +83,12 @@ def credible(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, 
     """
     refused: dict[str, Refused] = {}
     weighed: set[tuple[tuple[str, str], ...]] = set()
+    whole = fit.campaign.samples > settings.RIPPLE_ROWS
     most = settings.MOST_DOUBTS if fit.campaign.samples <= settings.ENOUGH_ROWS else 1
     while len(weighed) < most and (doubt := next((d for d in _doubts(fit) if d.parts not in weighed), None)):
         weighed.add(doubt.parts)
         progress(doubt.words)
-        others = {part: less(fit, part[0], progress, part[1]) for part in doubt.parts}
+        others = {part: less(fit, part[0], progress, "" if whole else part[1]) for part in doubt.parts}
         left = {part: goes_astray(other) for part, other in others.items()}
         out = min(left, key=lambda part: left[part])
         if left[out] > settings.WORSE_ELSEWHERE * goes_astray(fit):
