@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from thermal_robot.effects import inclinometer
 from thermal_robot.effects.effect import UNSOURCED, Array, Driver, Effect, Parameter, at_base
-from thermal_robot.effects.quantities import driving
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 _TIP = 2e-4  # rad
 _DEPTH = 0.5  # m: a pedestal
 _STEADY = 1e-9  # N·m, rad
-TILT = ("tilt.x", "tilt.y")
-"""Columns of an inclinometer on the base."""
 
 
 @dataclass(frozen=True)
@@ -56,11 +54,15 @@ class BaseCompliance(Effect):
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return what would give the base's turn, unless the tilt or the moment of known masses varies."""
-        return () if _measured(observations) or _loaded(observations) else (*TILT, "masses in the URDF")
+        return (
+            ()
+            if _measured(observations) or _loaded(observations)
+            else (*inclinometer.columns(inclinometer.BASE), "masses in the URDF")
+        )
 
     def reads(self, observations: Observations) -> tuple[str, ...]:
         """Return the tilts where they are used, else the payload where it was recorded."""
-        used = TILT if self.tilt else ("payload",)
+        used = inclinometer.columns(inclinometer.BASE) if self.tilt else ("payload",)
         return tuple(column for column in used if column in observations.covariates)
 
     def variants(self, observations: Observations) -> tuple[Effect, ...]:
@@ -73,9 +75,7 @@ class BaseCompliance(Effect):
         robot = observations.robot
         up = -robot.gravity / max(float(np.linalg.norm(robot.gravity)), _STEADY)
         if self.tilt:
-            turn = np.zeros((observations.campaign.samples, 3))
-            for k, column in enumerate(TILT):
-                turn[:, k] = observations.covariates.get(column, 0.0)
+            turn = inclinometer.turn(observations)
             return self._tipping(turn, up, ("turn per tilt measured", "1", 1.0), ("depth", "m", _DEPTH))
         moment = overturning(observations)
         axes = [k for k in range(3) if k != int(np.argmax(np.abs(up)))]
@@ -101,8 +101,7 @@ class BaseCompliance(Effect):
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
         """Return the tilt that varies most, or the moment about the axis about which the error goes with it."""
         if self.tilt:
-            recorded = [column for column in TILT if column in observations.covariates]
-            return driving(observations, max(recorded, key=lambda c: float(np.ptp(observations.covariates[c]))))
+            return inclinometer.varying_most(observations)
         moment = overturning(observations)
         axis = np.linalg.lstsq(moment, error, rcond=1e-9)[0]
         return "overturning moment", "N·m", moment @ axis / (np.linalg.norm(axis) + 1e-300)
@@ -117,7 +116,7 @@ def overturning(observations: Observations) -> Array:
 
 
 def _measured(observations: Observations) -> bool:
-    return any(observations.varies(column) for column in TILT)
+    return inclinometer.varies(observations, inclinometer.BASE)
 
 
 def _loaded(observations: Observations) -> bool:

@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from thermal_robot.effects import inclinometer
 from thermal_robot.effects.beam import beams, cross_axes, shafts
 from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, at_segment
-from thermal_robot.effects.quantities import driving
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -71,7 +71,7 @@ class LinkCompliance(Effect):
 
     def reads(self, observations: Observations) -> tuple[str, ...]:
         """Return the tilts where they are used, else the payload where it was recorded."""
-        used = ("tilt.x", "tilt.y", *_tilts(observations)) if self.tilt else ("payload",)
+        used = inclinometer.columns(inclinometer.BASE, *_links(observations)) if self.tilt else ("payload",)
         return tuple(column for column in used if column in observations.covariates)
 
     def variants(self, observations: Observations) -> tuple[Effect, ...]:
@@ -109,8 +109,7 @@ class LinkCompliance(Effect):
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
         """Return the bending moment, about the axis about which the error goes with it, or the tilt."""
         if self.tilt:
-            own = _tilts(observations, parameters[0].place)
-            return driving(observations, max(own, key=lambda c: float(np.ptp(observations.covariates[c]))))
+            return inclinometer.varying_most(observations, parameters[0].place)
         moment = observations.segment_load[:, parameters[0].responses[0].index, 3:]
         axis = np.linalg.lstsq(moment, error, rcond=1e-9)[0]
         values = moment @ axis / (np.linalg.norm(axis) + 1e-300)
@@ -124,40 +123,32 @@ def _loaded(observations: Observations) -> bool:
     )
 
 
-def _tilts(observations: Observations, *links: str) -> tuple[str, ...]:
-    """Return the columns of inclinometers, on links of the chain, all where none is named."""
-    links = links or tuple(segment.parent_link for segment in observations.robot.segments)
-    columns = dict.fromkeys(f"tilt.{link}.{axis}" for link in links for axis in "xy")
-    return tuple(column for column in columns if column in observations.covariates)
+def _links(observations: Observations) -> tuple[str, ...]:
+    """Return the links that carry a segment, each once."""
+    return tuple(dict.fromkeys(segment.parent_link for segment in observations.robot.segments))
 
 
 def _measured(observations: Observations) -> bool:
-    return any(observations.varies(column) for column in _tilts(observations))
+    return inclinometer.varies(observations, *_links(observations))
 
 
 def _inclined(observations: Observations) -> tuple[Parameter, ...]:
     """Return a gain for each link with an inclinometer, in the order of the chain."""
     robot, chain = observations.robot, observations.robot.chain
-    before = _reading(observations, "tilt")  # root frame
+    before = inclinometer.turn(observations)  # root frame
     found = []
     for s, segment in enumerate(robot.segments):
         link, e = segment.parent_link, segment.index
-        if not _tilts(observations, link):
+        if not inclinometer.recorded(observations, link):
             continue
         frame = observations.commanded.rotations[:, e] @ chain.rotations[e].T  # of the link, in the root frame
-        turn = _reading(observations, f"tilt.{link}")
+        turn = inclinometer.turn(observations, link)
         carried = np.einsum("nij,ni->nj", frame, before) * [1.0, 1.0, 0.0]
         own, before = turn - carried, np.einsum("nij,nj->ni", frame, turn)
         twist = np.hstack([np.cross(own, chain.translations[e]), own]).reshape(-1, 2, 3) @ chain.rotations[e]
         response = (at_segment(s, twist.reshape(-1, 6)),)
         found.append(Parameter("turn per tilt measured", "1", 1.0, "link", link, response, positive=True))
     return tuple(found)
-
-
-def _reading(observations: Observations, of: str) -> Array:
-    """(N, 3) turn that an inclinometer read about x and y, rad; zero where there is none."""
-    nothing = np.zeros(observations.campaign.samples)
-    return np.column_stack([*(observations.covariates.get(f"{of}.{axis}", nothing) for axis in "xy"), nothing])
 
 
 def _yields(observations: Observations, s: int) -> tuple[tuple[Array, Array], ...]:
