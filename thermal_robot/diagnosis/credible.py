@@ -42,10 +42,10 @@ def outsized(fit: Fit) -> tuple[Doubt, ...]:
     """Return each parameter that is surely far outside a size that stands on sources, the farthest first."""
     e, found = fit.explanation, []
     for b, (effect, values) in zip(e.best.blocks, fit.effects, strict=True):
-        item, deviation = e.linear.blocks[b], np.sqrt(np.diag(e.values[b][1]))
-        sure = np.maximum(np.abs(values) - settings.SIGMAS_95 * deviation, 0.0) / item.sizes
         if effect.size_spread >= UNSOURCED:
             continue
+        item, deviation = e.linear.blocks[b], np.sqrt(np.diag(e.values[b][1]))
+        sure = np.maximum(np.abs(values) - settings.SIGMAS_95 * deviation, 0.0) / item.sizes
         for k in np.flatnonzero(sure > settings.OUTSIDE):
             own, times = item.parameters[k], float(np.abs(values[k]) / item.sizes[k])
             words = (
@@ -112,9 +112,9 @@ def goes_astray(fit: Fit) -> float:
     model = Model.of(fit.explanation, blocks(fit.campaign))
     model = replace(model, kept=np.ones(fit.campaign.samples, dtype=bool))
     total, rows = 0.0, 0
-    for name, _, tests in schemes(fit):
+    for tests in (tests for name, _, tests in schemes(fit) if name in ("time", "region")):
         walk = Walk.over(model, tests)
-        if name in ("time", "region") and walk.tests:
+        if walk.tests:
             total += walk.squares(range(len(model.spans))).total
             rows += walk.rows
     return float(np.sqrt(total / max(rows, 1)))

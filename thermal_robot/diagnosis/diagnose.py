@@ -126,8 +126,9 @@ def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
     # the first of several laws may go astray between the places that were measured, and the others set it right
     while len(stages) > 1 and worse_elsewhere(known, stages[-1]):
         stages.pop()
-    few = known.campaign.samples <= settings.ENOUGH_ROWS
-    fit, more = credible(stages[-1], progress) if few else (stages[-1], {})
+    # what no law has joined was weighed already
+    again = len(stages) > 1 and known.campaign.samples <= settings.ENOUGH_ROWS
+    fit, more = credible(stages[-1], progress) if again else (stages[-1], {})
     fit, refused = worth_their_word(fit, progress)
     fit, chance, refused = beside_steps(fit, random_gap(fit), {**cancelled, **more, **refused}, progress)
     if chance.explains_size:

@@ -127,7 +127,7 @@ def _settings(effect: Effect, observations: Observations) -> tuple[Effect, ...]:
 
 
 def less(known: Fit, name: str, progress: Callable[[str], None] = lambda _: None, place: str = "") -> Fit:
-    """Fit again without one effect, or without one of its joints or links, there where it has others."""
+    """Fit again without one effect; with a place, without it in that joint or link alone."""
 
     def rest(effect: Effect) -> Effect | None:
         if effect.name != name:

@@ -388,10 +388,10 @@ CANCELLING, CANCELLING_PAIR = 5.0, 10.0
 """Times the sum of an effect's parts: single ones that are larger cancel each other; and of two effects' parts, which
 may well oppose each other, as gears that run out and a link that bends do."""
 FRAGILE = 1e-3
-"""Probability of the verdict with other prior sizes, below which that is said: they are known to a factor of three."""
+"""Probability of the verdict with other prior sizes, below which that is said: nobody knows them to a factor of 3."""
 OUTSIDE, MOST_DOUBTS = 30.0, 8
 """Times an expected size that stands on sources: seven deviations of its logarithm, as no robot is known to be. Parts
-of effects that are weighed against a choice without them: each takes tens of seconds from a thousand rows on."""
+of effects weighed against a choice without them, one above ENOUGH_ROWS: each takes tens of seconds from 1000 rows."""
 CONTRADICTED, AGAINST_GRAVITY = 0.01, -0.5
 """rad or m: no settled servo is as far from its command. Correlation of torque and weight that a wrong sign makes."""
 STATED_TOO_LARGE = 0.5
