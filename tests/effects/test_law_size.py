@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from helpers import commanded
 
-from thermal_robot.effects import Backlash
+from thermal_robot.effects import Backlash, TransmissionError
 from thermal_robot.effects.law import Discovered
-from thermal_robot.effects.law_size import sizes
+from thermal_robot.effects.law_size import in_joints, sizes
 from thermal_robot.effects.shapes import SHAPES
 from thermal_robot.observations import observe
 
@@ -70,3 +70,26 @@ def test_what_the_campaign_cannot_tell_has_no_size(observations):
 
 def test_every_shape_says_what_its_size_is():
     assert {shape.size for shape in SHAPES.values()} == {"range", "step", "bump", "peak to peak", "difference"}
+
+
+def test_waves_that_do_the_same_are_well_known_together(rv_m2):
+    """What is known of their sum is told, however little is known of each."""
+    here = observe(commanded(rv_m2))
+    parameters = [p for p in TransmissionError().parameters(here) if p.place in ("joint_2", "joint_4")]
+    values = np.array([1e-3, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 3e-3])
+    alike = np.zeros((8, 8))
+    alike[0, 0], alike[7, 7] = 4e-10, 9e-10
+    large, small = in_joints("peak to peak", parameters, values, alike)
+    q = {j: here.q[:, rv_m2.joint_names.index(j)] for j in ("joint_2", "joint_4")}
+    assert [(s.what, s.place, s.unit) for s in (large, small)] == [
+        ("peak to peak", "joint_4", "rad"),
+        ("peak to peak", "joint_2", "rad"),
+    ]
+    assert large.value == pytest.approx(3e-3 * np.ptp(np.cos(2 * q["joint_4"])))
+    assert large.std == pytest.approx(large.value / 3e-3 * 3e-5)
+    assert small.value == pytest.approx(1e-3 * np.ptp(np.sin(q["joint_2"])))
+    assert small.std == pytest.approx(small.value / 1e-3 * 2e-5)
+    twice = [parameters[0]] * 2
+    (sum_of,) = in_joints("peak to peak", twice, np.array([3e-3, -2e-3]), 1e-6 * np.array([[1.0, -1.0], [-1.0, 1.0]]))
+    assert sum_of.value == pytest.approx(small.value)
+    assert sum_of.std == pytest.approx(0.0, abs=1e-12)

@@ -69,3 +69,17 @@ def test_wheels_of_either_side_and_single_orders_are_settings(rv_m2):
     found = [orders(e, geared) for e in TransmissionError().variants(geared)]
     both = ((1, 2, 50, 100), (1, 2), (50, 100), (1,), (2,), (50,), (100,))
     assert found == [frozenset(own) for own in both]
+
+
+def test_its_error_curve_has_more_orders_and_no_larger_sizes(rv_m2):
+    here = observe(commanded(rv_m2))
+    curve = TransmissionError().in_full()
+    own = [p for p in checked(curve, here) if p.place == "joint_3"]
+    assert sorted({int(p.label.split()[-1]) for p in own}) == list(range(1, 9))
+    sizes = np.array([p.size for p in own])
+    assert sizes.max() == 3e-4
+    assert (np.diff(sizes) <= 0.0).all()
+    # no sum of them is more than twice a minute of arc, one sigma
+    assert np.sqrt((sizes**2).sum() / 2.0) < 6e-4
+    assert curve.size_spread < TransmissionError().size_spread
+    assert curve.in_full() is None

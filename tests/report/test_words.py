@@ -14,6 +14,7 @@ from thermal_robot.report.words import (
     by_status,
     campaign,
     hardest,
+    in_joints,
     in_words,
     law,
     laws,
@@ -129,6 +130,17 @@ def test_parameters_that_are_not_determined_are_named_without_a_number():
 def test_a_law_with_a_size_has_nothing_undetermined():
     law = finding(parameters=several(2, identified=False), quantity="time", size=(Size("step", 1e-4, 1e-6, "rad"),))
     assert parameters(law).undetermined == ""
+
+
+def test_what_an_effect_does_in_each_joint_is_told_before_its_waves():
+    sizes = tuple(Size("peak to peak", k * 1e-4, 1e-5, "rad", f"j{k}") for k in (6, 5, 4, 3, 2))
+    waves = finding(parameters=several(2, identified=False), size=sizes)
+    told = [f"j{k} 0.{k}00 ± 0.010 mrad" for k in (6, 5, 4, 3)]
+    assert in_joints(waves) == f"peak to peak: {', '.join(told)} and 1 more"
+    assert parameters(waves).undetermined == ""
+    assert law(waves) == ""
+    assert in_joints(finding(parameters=several(2))) == ""
+    assert in_joints(replace(waves, quantity="time")) == ""
 
 
 def test_places_are_told_largest_first_and_small_ones_counted():

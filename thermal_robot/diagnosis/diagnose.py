@@ -19,6 +19,7 @@ from thermal_robot.diagnosis.data_faults.misfit import another_motion, frames_al
 from thermal_robot.diagnosis.deviations import as_remainder_says
 from thermal_robot.diagnosis.examine import examine
 from thermal_robot.diagnosis.held_out import held_out
+from thermal_robot.diagnosis.in_full import in_full
 from thermal_robot.diagnosis.parts import Misfit
 from thermal_robot.diagnosis.result import Diagnosis, told
 from thermal_robot.diagnosis.rippled import rippled
@@ -113,7 +114,7 @@ def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
     One law after another joins the explanation, while each is worth its place and regions held out do not get worse.
     Of effects that cancel each other one is kept; one of a size that no robot reaches is not.
     """
-    known, cancelled = credible(rippled(known, progress), progress)
+    known, cancelled = credible(in_full(rippled(known, progress), progress), progress)
     stages = [known]
     most = settings.MOST_LAWS if known.campaign.samples < settings.MANY_ROWS else 1
     while len(stages) <= most:

@@ -13,7 +13,7 @@ from thermal_robot.diagnosis.parts import Estimate, Finding, Location, Refused, 
 from thermal_robot.diagnosis.rivals import rivals, unknown_frames, within_frames
 from thermal_robot.effects import Effect
 from thermal_robot.effects.law import PREFIX, Discovered
-from thermal_robot.effects.law_size import sizes
+from thermal_robot.effects.law_size import Size, in_joints, sizes
 from thermal_robot.effects.law_words import called, usually
 from thermal_robot.inference import settings
 from thermal_robot.inference.fit import Fit
@@ -66,6 +66,8 @@ def findings(
         )
         if isinstance(law, Discovered):
             found = replace(found, **_of_law(fit, law, explained[name]))
+        elif law is not None and law.sized_as:
+            found = replace(found, size=_in_joints(fit, law, explained[name]))
         if part and part.parameters and name not in explained:
             found = replace(found, status="contained", probability=fit.probability(part.container))
             found = replace(found, confounded_with=(part.container,))
@@ -94,6 +96,12 @@ def _of_law(fit: Fit, law: Discovered, block: int) -> dict[str, Any]:
         "size": sizes(law, fit.nominal, values, e.values[block][1]),
         "usually": usually(law, fit.campaign.robot.joint_names) or None,
     }
+
+
+def _in_joints(fit: Fit, effect: Effect, block: int) -> tuple[Size, ...]:
+    e = fit.explanation
+    values = dict(zip(e.best.blocks, (v for _, v in fit.effects), strict=True))[block]
+    return in_joints(effect.sized_as, e.linear.blocks[block].parameters, values, e.values[block][1])
 
 
 def titled(found: Sequence[Finding], effects: Iterable[Effect]) -> tuple[Finding, ...]:

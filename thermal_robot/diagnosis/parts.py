@@ -71,9 +71,10 @@ class Finding:
         Names of parameters of which the data see nothing, or nothing beside the others.
     quantity, shape, describes
         Only of a discovered law: the quantity that it follows, the shape, and a sentence about it.
-    size, usually
-        Only of a discovered law: how much it changes over the rows that were measured, and what a law of that place and
-        quantity usually is, in words; ``None`` where nobody can say.
+    size
+        How much a discovered law changes over the rows that were measured, or an effect that is a curve of each joint.
+    usually
+        Only of a discovered law: what one of that place and quantity usually is; ``None`` where nobody can say.
     of
         Only of a discovered law that is a known effect whose size follows the quantity: that effect's name.
     title

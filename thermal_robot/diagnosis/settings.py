@@ -33,3 +33,5 @@ ROWS_ALIKE = 8
 """Rows that are taken together when asking whether an error follows a quantity."""
 PURE = 1e-6
 """Of a unit twist, m or rad: with less of one kind it is all of the other."""
+NEARLY_ALL = 2.576
+"""Standard deviations of the logarithm of an effect's size between which 99 % of robots are."""

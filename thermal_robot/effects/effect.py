@@ -165,6 +165,8 @@ class Effect(ABC):
     """What it is in a single joint, for a sentence; the title where a class states none."""
     if_negative: ClassVar[str] = "check the sign of what it grows with"
     """The usual mistake where the data want parameters negative that cannot be, for a sentence."""
+    sized_as: ClassVar[str] = ""
+    """What is said of all that it does in each joint, such as ``peak to peak``; empty where its parameters say it."""
     needs: ClassVar[tuple[str, ...]] = ()
     """Covariates without which the effect is not testable."""
     size_spread: ClassVar[float] = SOURCED
@@ -238,6 +240,13 @@ class Effect(ABC):
         appear here stays where :meth:`variants` put it.
         """
         return (self,)
+
+    def in_full(self) -> Effect | None:
+        """Return a setting of more parameters, each held to its expected size; ``None`` where there is none.
+
+        It is tried where a parameter comes out larger than nearly all robots have, as one that stands in for others.
+        """
+        return None
 
     def at(self, place: str) -> Effect | None:
         """Return the effect in one joint or link alone; ``None`` where it is to have no such setting.

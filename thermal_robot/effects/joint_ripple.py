@@ -49,6 +49,7 @@ class JointRipple(Effect):
     name: ClassVar[str] = "joint_ripple"
     title: ClassVar[str] = "ripple of the gears"
     singular: ClassVar[str] = "a ripple of the gear"
+    sized_as: ClassVar[str] = "peak to peak"
 
     @property
     def share(self) -> float:

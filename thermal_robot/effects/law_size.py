@@ -1,8 +1,8 @@
-"""How large a fitted law is: the height of its step, the range that it runs through, with what is known of it."""
+"""How large a fitted law or curve is: the height of its step, the range it runs through, with what is known of it."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from math import sqrt
 from typing import TYPE_CHECKING
@@ -13,13 +13,14 @@ from thermal_robot.effects.effect import Array
 from thermal_robot.effects.shapes import SHAPES
 
 if TYPE_CHECKING:
+    from thermal_robot.effects.effect import Parameter
     from thermal_robot.effects.law import Discovered
     from thermal_robot.observations import Observations
 
 
 @dataclass(frozen=True)
 class Size:
-    """How much a law changes over the rows that were measured.
+    """How much a law, or an effect in one joint, changes over the rows that were measured.
 
     Attributes
     ----------
@@ -29,12 +30,15 @@ class Size:
         The change and its standard deviation, one sigma; never undetermined, as a constant has no part in it.
     unit
         Of both, SI.
+    place
+        The joint, where the effect acts in several; empty for a law.
     """
 
     what: str
     value: float
     std: float
     unit: str
+    place: str = ""
 
 
 def sizes(law: Discovered, observations: Observations, values: Array, covariance: Array) -> tuple[Size, ...]:
@@ -77,6 +81,36 @@ def sizes(law: Discovered, observations: Observations, values: Array, covariance
     if law.modulated is not None:  # of an effect with several parameters the one that is plainest
         found = sorted(found, key=lambda size: -size.value / max(size.std, 1e-300))[:1]
     return tuple(found)
+
+
+def in_joints(what: str, parameters: Sequence[Parameter], values: Array, covariance: Array) -> tuple[Size, ...]:
+    """Return how much an effect of joints changes in each of them between the two rows between which it changes most.
+
+    Single waves of a joint that moves over part of a turn do the same in part; what they do together is better known.
+
+    Parameters
+    ----------
+    what
+        Of what it is the size.
+    parameters
+        Of the effect, K in all; each with one response, in its joint.
+    values, covariance
+        As fitted: (K,) and (K, K), SI.
+
+    Returns
+    -------
+    tuple of Size
+        One a joint, the largest first.
+    """
+    found = []
+    for place in dict.fromkeys(parameter.place for parameter in parameters):
+        own = [k for k, parameter in enumerate(parameters) if parameter.place == place]
+        rows = np.column_stack([parameters[k].responses[0].values for k in own])
+        moved = rows @ np.asarray(values, dtype=float)[own]
+        weight = rows[int(moved.argmax())] - rows[int(moved.argmin())]
+        variance = float(weight @ covariance[np.ix_(own, own)] @ weight)
+        found.append(Size(what, float(np.ptp(moved)), sqrt(max(variance, 0.0)), parameters[own[0]].unit, place))
+    return tuple(sorted(found, key=lambda size: -size.value))
 
 
 def _together(units: list[str], single: bool) -> Iterator[tuple[str, list[int]]]:

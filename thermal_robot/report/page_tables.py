@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thermal_robot.report import units
-from thermal_robot.report.words import STATUS, by_status, law, needs, parameters, places, rivals, told_as
+from thermal_robot.report.words import STATUS, by_status, in_joints, law, needs, parameters, places, rivals, told_as
 
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.parts import Finding
@@ -87,6 +87,8 @@ def _known(finding: Finding, diagnosis: Diagnosis) -> Iterator[str]:
         yield _line(described)
     if finding.locations:
         yield _line(f"where: {places(finding)}")
+    if sized := in_joints(finding):
+        yield _line(sized)
     known = parameters(finding)
     if known.heading:
         yield _line(known.heading)

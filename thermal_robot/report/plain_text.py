@@ -14,6 +14,7 @@ from thermal_robot.report.words import (
     bound,
     campaign,
     hardest,
+    in_joints,
     law,
     left_out,
     needs,
@@ -167,6 +168,8 @@ def _at_length(finding: Finding, wide: int, diagnosis: Diagnosis) -> Iterator[st
         yield _wrap(described, inner)
     if finding.locations:
         yield _wrap(f"where: {places(finding)}", inner, hang=7)
+    if sized := in_joints(finding):
+        yield _wrap(sized, inner, hang=2)
     known = parameters(finding)
     if known.heading:
         yield f"{inner}{known.heading}"

@@ -81,7 +81,7 @@ def parameters(finding: Finding) -> Shown:
     if len(known) > _ALL_UP_TO:
         chosen = sorted(known, key=lambda p: -_significance(p))[:_MOST]
         heading = f"the {_MOST} most significant of {len(known)} parameters:"
-    # of a law its size says what is known; a constant in it that the frames can take up is no news
+    # where there is a size, it says what is known; a constant that the frames can take up is no news
     undetermined = [] if finding.size else [p.name for p in finding.parameters if p not in known]
     return Shown(
         heading,
@@ -213,6 +213,14 @@ def law(finding: Finding) -> str:
     large = " and ".join(units.measured(s.value, s.std, s.unit) for s in finding.size)
     told = [f"a law found in the data: {described}", f"{finding.size[0].what} {large}" if large else ""]
     return "; ".join(part for part in (*told, f"usually {finding.usually}" if finding.usually else "") if part)
+
+
+def in_joints(finding: Finding) -> str:
+    """Say how much a known effect does in each joint, the largest first; empty where its parameters say it."""
+    if finding.quantity or not finding.size:
+        return ""
+    told = [f"{s.place} {units.measured(s.value, s.std, s.unit)}" for s in finding.size]
+    return f"{finding.size[0].what}: {in_words(told, most=4)}"
 
 
 def rivals(finding: Finding, diagnosis: Diagnosis) -> str:

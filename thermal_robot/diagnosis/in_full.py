@@ -1,0 +1,59 @@
+"""Effects of few shapes that come out too large: whether a fuller setting, held to the sizes of its source, says more.
+
+Over part of its range two smooth shapes are nearly alike. Where what a robot does is neither, their difference follows
+it with amplitudes that no robot has, and over another part with others. A setting of more shapes, none of which may be
+large, then explains the same, and as much of the rows held out.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from thermal_robot.diagnosis import settings as own
+from thermal_robot.diagnosis.credible import goes_astray
+from thermal_robot.effects import Effect
+from thermal_robot.inference import settings
+from thermal_robot.inference.fit import Fit, refit
+
+
+def in_full(fit: Fit, progress: Callable[[str], None]) -> Fit:
+    """Let fuller settings compete where a parameter is surely larger than 99 % of robots have.
+
+    Parameters
+    ----------
+    fit
+        Of at most as many rows as ripple is looked for in: further settings of more would take minutes.
+    progress
+        Called with a few words at each stage.
+
+    Returns
+    -------
+    Fit
+        The choice made again beside them, unless rows held out are then predicted clearly worse.
+    """
+    if fit.campaign.samples > settings.RIPPLE_ROWS:
+        return fit
+    for effect in _too_large(fit):
+        fuller = effect.in_full()
+        if fuller is None:
+            continue
+        progress(f"{effect.title} in full")
+        begin = [fuller if other is effect else other for other, _ in fit.effects]
+        others = refit(fit, {effect.name: (*fit.variants[effect.name], fuller)}, begin, progress)
+        if goes_astray(others) <= settings.WORSE_ELSEWHERE * goes_astray(fit):
+            return others
+    return fit
+
+
+def _too_large(fit: Fit) -> list[Effect]:
+    """Return the effects of which a parameter is surely beyond the size that nearly all robots have."""
+    e, found = fit.explanation, []
+    for b, (effect, values) in zip(e.best.blocks, fit.effects, strict=True):
+        deviation = np.sqrt(np.diag(e.values[b][1]))
+        sure = np.abs(values) - settings.SIGMAS_95 * deviation
+        common = np.exp(own.NEARLY_ALL * effect.size_spread) * e.linear.blocks[b].sizes
+        if effect.name in fit.variants and (sure > common).any():
+            found.append(effect)
+    return found
