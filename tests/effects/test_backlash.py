@@ -2,14 +2,19 @@
 
 import json
 from dataclasses import replace
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
-from helpers import SAMPLES, commanded, tool_at, tool_with
+from helpers import NOISE, SAMPLES, commanded, commands, tool_at, tool_with
 
-from thermal_robot.effects import Backlash
+from thermal_robot.blind.plan import ARMS
+from thermal_robot.campaign import Campaign
+from thermal_robot.effects import Backlash, choose
 from thermal_robot.effects.catalogue import restored
+from thermal_robot.inference.fit import fit
 from thermal_robot.observations import observe
+from thermal_robot.robot import load_robot
 
 
 def approached(arm, seed=6, **more):
@@ -50,12 +55,14 @@ def test_it_is_drawn_against_the_approach_where_that_varies(rv_m2):
 def test_no_torque_no_play_that_hangs(rv_m2):
     _, campaign = approached(rv_m2)
     variants = Backlash().variants(observe(campaign))
-    shares = sorted(s.held for s in variants)
+    assert [s.held for s in variants if s.grows] == [0.0]
+    shares = sorted(s.held for s in variants if not s.grows)
     assert shares[0] == 0.0 < shares[1] < 0.25
     assert 0.85 < shares[-1] < 1.0
     odds = np.array([share / (1.0 - share) for share in shares[1:]])
     assert (odds[1:] / odds[:-1] < 4.5).all()  # refinement reaches what lies between
-    assert sum(s.weight for s in variants if s.held) == pytest.approx(sum(s.weight for s in variants if not s.held))
+    plain = [s.weight for s in variants if not s.held and not s.grows]
+    assert sum(s.weight for s in variants if s.held) == pytest.approx(sum(plain))
     floating = replace(rv_m2, gravity=np.zeros(3))
     assert Backlash().variants(observe(replace(campaign, robot=floating))) == (Backlash(),)
 
@@ -193,3 +200,117 @@ def test_play_that_always_lies_on_one_side_is_left_to_the_offset(rv_m2):
         values = replace(one_sided, held=share).parameters(here)[j].responses[0].values
         assert bool(np.ptp(values) == 0.0) is still
         assert not still or (values == 0.0).all()
+
+
+@pytest.mark.parametrize("arm", ["ur10", "rv_m2"], indirect=True)
+def test_lost_motion_may_grow_with_torque(arm):
+    approach, campaign = approached(arm)
+    campaign = replace(campaign, covariates={**campaign.covariates, "payload": np.linspace(0.0, 3.0, SAMPLES)})
+    here = observe(campaign)
+    (grows,) = (s for s in Backlash().variants(here) if s.grows)
+    assert set(grows.reads(here)) == {"payload", *(f"approach.{joint}" for joint in arm.joint_names)}
+    parameters = grows.parameters(here)
+    wound = [p for p in parameters if "torque" in p.label]
+    largest = np.abs(here.torque).max(axis=0)
+    loaded = largest > 0.02 * largest.max()
+    assert [p.place for p in wound] == [n for n, heavy in zip(arm.joint_names, loaded, strict=True) if heavy]
+    assert all(p.positive and p.unit == "rad/(N·m)" for p in wound)
+    values = np.array([2e-5 if p in wound else 1e-3 for p in parameters])
+    width = 1e-3 + 2e-5 * np.abs(here.torque) * loaded
+    expected = tool_at(arm, campaign.q - 0.5 * width * approach)
+    np.testing.assert_allclose(tool_with(campaign, grows, values), expected, atol=1e-14)
+    assert restored("backlash", json.dumps(grows.arguments())) == grows
+
+
+def hinged(arm, slide, axis, moving):
+    """The same arm with a hinge on the carriage of a slide, behind its stroke or before it."""
+    root = ElementTree.fromstring(arm.urdf)
+    (joint,) = (j for j in root.findall("joint") if j.get("name") == slide)
+    origin, child = joint.find("origin"), joint.find("child")
+    ElementTree.SubElement(root, "link", name="between")
+    hinge = ElementTree.SubElement(root, "joint", name="hinge", type="revolute")
+    ElementTree.SubElement(hinge, "axis", xyz=" ".join(map(str, axis)))
+    ElementTree.SubElement(hinge, "limit", lower="-1", upper="1", effort="1", velocity="1")
+    ends = ("between", child.get("link")) if moving else (joint.find("parent").get("link"), "between")
+    ElementTree.SubElement(hinge, "parent", link=ends[0])
+    ElementTree.SubElement(hinge, "child", link=ends[1])
+    if moving:
+        child.set("link", "between")
+    else:
+        ElementTree.SubElement(hinge, "origin", dict(origin.attrib))
+        joint.find("parent").set("link", "between")
+        origin.set("xyz", "0 0 0")
+        origin.set("rpy", "0 0 0")
+    return load_robot(ElementTree.tostring(root, encoding="unicode"), arm.tool_frame)
+
+
+@pytest.mark.parametrize("moving", [True, False])
+@pytest.mark.parametrize("arm", ["rail", "gantry", "scara"])
+def test_a_carriage_with_play_turns_about_where_it_sits(arm, moving):
+    arm = load_robot((ARMS / f"{arm}.urdf").read_text(), "tool0")
+    approach, campaign = approached(arm)
+    effect = Backlash(carriage="moving" if moving else "staying")
+    assert effect in Backlash().variants(observe(campaign))
+    parameters = effect.parameters(observe(campaign))
+    turning = [k for k, p in enumerate(parameters) if "turn about" in p.label]
+    slides = [n for n, kind in zip(arm.joint_names, arm.joint_types, strict=True) if kind == "prismatic"]
+    assert [parameters[k].place for k in turning] == [n for n in slides for _ in range(3)]
+    for k in turning:
+        slide, axis = parameters[k].place, np.eye(3)["xyz".index(parameters[k].label.split()[2])]
+        there = hinged(arm, slide, axis, moving)
+        hinge = there.joint_names.index("hinge")
+        came = approach[:, arm.joint_names.index(slide)]
+        values = np.zeros(len(parameters))
+        values[k] = 1e-4
+        expected = tool_at(there, np.insert(campaign.q, hinge, -0.5e-4 * came, axis=1))
+        np.testing.assert_allclose(tool_with(campaign, effect, values), expected, atol=1e-12)
+    assert restored("backlash", json.dumps(effect.arguments())) == effect
+
+
+def test_joints_that_turn_have_no_carriage(rv_m2):
+    _, campaign = approached(rv_m2)
+    assert not any(s.carriage for s in Backlash().variants(observe(campaign)))
+
+
+def measured(arm, true, seed, samples=150):
+    """A campaign of poses reached from either side, whose robot errs by ``true(approach, observations)``; m, noisy."""
+    rng = np.random.default_rng(seed)
+    approach = rng.choice([-1.0, 1.0], (samples, arm.n))
+    columns = {f"approach.{n}": a for n, a in zip(arm.joint_names, approach.T, strict=True)}
+    columns["payload"] = rng.choice([0.0, 2.0], samples)
+    plain = Campaign("moved", arm, commands(arm, samples, rng), covariates=columns)
+    return replace(plain, position=true(approach, plain) + NOISE * rng.normal(size=(samples, 3)))
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_lost_motion_that_grows_is_told_from_one_that_does_not(rv_m2, seed):
+    def grown(approach, plain):
+        return tool_at(rv_m2, plain.q - 0.5 * (2e-4 + 3e-5 * np.abs(observe(plain).torque)) * approach)
+
+    known = fit(measured(rv_m2, grown, seed), choose(("backlash", "joint_compliance", "joint_gain")))
+    ((effect, values),) = known.effects
+    assert (effect.name, effect.grows) == ("backlash", True)
+    deviations = np.sqrt(np.diag(known.explanation.values[known.explanation.best.blocks[0]][1]))
+    rows = zip(effect.parameters(known.corrected), values, deviations, strict=True)
+    off = [(v - 3e-5) / s for p, v, s in rows if "torque" in p.label and s < 1e-5]
+    assert len(off) >= 2
+    assert np.abs(off).max() < 4.0
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_carriage_that_turns_is_found_with_its_slide(seed):
+    arm = load_robot((ARMS / "rail.urdf").read_text(), "tool0")
+    there = hinged(arm, "rail", (0, 0, 1), moving=True)
+
+    def turned(approach, plain):
+        turn = -0.5 * 4e-4 * approach[:, arm.joint_names.index("rail")]
+        return tool_at(there, np.insert(plain.q, there.joint_names.index("hinge"), turn, axis=1))
+
+    known = fit(measured(arm, turned, seed), choose(("backlash", "joint_compliance", "joint_gain")))
+    ((effect, values),) = known.effects
+    assert (effect.name, effect.carriage) == ("backlash", "moving")
+    block = known.explanation.linear.blocks[known.explanation.best.blocks[0]]
+    deviations = np.sqrt(np.diag(known.explanation.values[known.explanation.best.blocks[0]][1]))
+    (k,) = (k for k, p in enumerate(block.parameters) if (p.place, p.label) == ("rail", "turn about z at reversal"))
+    assert abs(values[k] - 4e-4) < 4.0 * deviations[k]
+    assert deviations[k] < 4e-5

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from helpers import commanded
 
-from thermal_robot.effects import Backlash, TransmissionError
+from thermal_robot.effects import Backlash, Geometric, TransmissionError
 from thermal_robot.effects.law import Discovered
 from thermal_robot.effects.law_size import in_joints, sizes
 from thermal_robot.effects.shapes import SHAPES
@@ -93,3 +93,5 @@ def test_waves_that_do_the_same_are_well_known_together(rv_m2):
     (sum_of,) = in_joints("peak to peak", twice, np.array([3e-3, -2e-3]), 1e-6 * np.array([[1.0, -1.0], [-1.0, 1.0]]))
     assert sum_of.value == pytest.approx(small.value)
     assert sum_of.std == pytest.approx(0.0, abs=1e-12)
+    # a twist is no change of a joint
+    assert in_joints("size", Geometric().parameters(here)[:6], np.ones(6), np.eye(6)) == ()

@@ -13,7 +13,7 @@ import numpy as np
 
 from thermal_robot.diagnosis import settings as own
 from thermal_robot.diagnosis.credible import goes_astray
-from thermal_robot.effects import Effect
+from thermal_robot.effects import Effect, gate
 from thermal_robot.inference import settings
 from thermal_robot.inference.fit import Fit, refit
 
@@ -36,7 +36,7 @@ def in_full(fit: Fit, progress: Callable[[str], None]) -> Fit:
     if fit.campaign.samples > settings.RIPPLE_ROWS:
         return fit
     for effect in _too_large(fit):
-        fuller = effect.in_full()
+        fuller = gate.in_full(effect)
         if fuller is None:
             continue
         progress(f"{effect.title} in full")

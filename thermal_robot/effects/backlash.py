@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 import numpy as np
 from scipy.special import erf
 
-from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, at_joint
+from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, at_joint, at_segment
 from thermal_robot.effects.quantities import driving, unit
 from thermal_robot.effects.torque import torque_columns
 
@@ -18,6 +18,9 @@ if TYPE_CHECKING:
 
 _SHARES = (0.2, 0.35, 0.5, 0.7, 0.9)  # their odds grow by about two
 _HANGS = 0.02  # of the largest torque of any joint: what is lighter, friction holds
+_SIZE = 5e-4  # rad or m
+_TURNS = 5e-5  # rad
+_CARRIAGES = ("moving", "staying")
 _SOFT = 0.05  # of friction: how far a film of grease lets a tooth lie between its two sides
 _SHARPEST, _SOFTEST = 0.005, 0.3  # nothing below is seen, nothing above is dry friction
 _STANDS = 0.1  # of the rows: where friction wins in fewer, play that hangs to one side is an offset to the data
@@ -33,6 +36,14 @@ class Backlash(Effect):
     side = ½ (1 + a) erf((τ + F)/(soft F)) + ½ (1 − a) erf((τ − F)/(soft F)), a the approach. A joint that never carries
     more than 2 % of the robot's largest torque never hangs. Expected size 0.5 mrad, two minutes of arc: catalogues
     promise 0.3 mrad of cycloidal gears (1′), wear adds to it, and light arms show ten.
+
+    Friction in a loaded gear grows with the load, and holds the gear wound up on the side from which it came: lost
+    motion is then b_j + h_j |τ_j|, with h_j in rad/(N·m), as the hysteresis of strain-wave gears widens with torque.
+    Expected size 0.5 mrad at the joint's largest torque.
+
+    A slide has play in its guides, too: drive and friction pull beside each other, and the carriage turns when it
+    reverses, by −½ t_e side about each axis e of the joint's frame. The carriage sits on what moves, or stays where the
+    stroke begins. Expected size 0.05 mrad, 10 seconds of arc: catalogues of guides state pitch and yaw of 5 to 20″.
 
     Only poses that are reached from both sides show it. Where torque decides always, it is nearly
     :class:`JointCompliance`, from which only a jump at zero torque tells it.
@@ -51,6 +62,11 @@ class Backlash(Effect):
     steady
         Each joint's torque, N·m, that all but a tenth of the rows exceed, to one side; 0 where the side changes. With
         less friction the joint always lies on that side: an offset, that is left to it.
+    grows
+        Whether lost motion grows with the torque.
+    carriage
+        Where the carriage of a slide sits that turns as it reverses: ``moving`` with the slide or ``staying``; empty
+        where none turns.
     """
 
     held: float | tuple[float, ...] = 0.0
@@ -58,6 +74,8 @@ class Backlash(Effect):
     chain: tuple[str, ...] = ()
     soft: float = 0.0
     steady: tuple[float, ...] = ()
+    grows: bool = False
+    carriage: str = ""
 
     name: ClassVar[str] = "backlash"
     title: ClassVar[str] = "lost motion in the joints"
@@ -74,24 +92,25 @@ class Backlash(Effect):
         """Return the approach columns of the chain's joints that were recorded, and what torques are read from."""
         columns = (f"approach.{joint}" for joint in observations.robot.joint_names)
         recorded = tuple(column for column in columns if column in observations.covariates)
-        return (*recorded, *torque_columns(observations)) if np.any(self.held) else recorded
+        return (*recorded, *torque_columns(observations)) if np.any(self.held) or self.grows else recorded
 
     def variants(self, observations: Observations) -> tuple[Effect, ...]:
-        """Friction always wins, or gravity does above some share of a joint's largest torque."""
+        """Friction always wins, whether or not it grows with torque, or gravity does above a share of the largest."""
+        turning = tuple(replace(self, carriage=sits) for sits in _CARRIAGES if _slides(observations))
         torque = observations.torque
         if torque is None or not np.any(np.ptp(torque, axis=0) > 1e-9):
-            return (self,)
+            return (self, *turning)
         largest = tuple(np.abs(torque).max(axis=0).tolist())
         one_sided = (torque > 0.0).all(axis=0) | (torque < 0.0).all(axis=0)
         steady = tuple(np.where(one_sided, np.quantile(np.abs(torque), _STANDS, axis=0), 0.0).tolist())
         chain = observations.robot.joint_names
         hangs = replace(self, largest=largest, chain=chain, soft=_SOFT, steady=steady)
-        return tuple(replace(hangs, held=share) for share in (0.0, *_SHARES))
+        return (*(replace(hangs, held=share) for share in (0.0, *_SHARES)), replace(hangs, grows=True), *turning)
 
     @property
     def weight(self) -> float:
-        """Friction always wins as likely as not, whatever the number of shares that are tried."""
-        return 1.0 / len(_SHARES) if np.any(self.held) else 1.0
+        """Friction always wins as likely as not, whatever the number of shares; more than that is half as likely."""
+        return 1.0 / len(_SHARES) if np.any(self.held) else 0.5 if self.grows or self.carriage else 1.0
 
     @property
     def apart(self) -> int:
@@ -126,21 +145,38 @@ class Backlash(Effect):
         return replace(self, held=tuple(np.where(np.arange(len(shares)) == j, share, shares).tolist()))
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
-        """One lost motion a joint whose direction of approach is recorded; rad or m."""
-        robot, covariates = observations.robot, observations.covariates
-        return tuple(
-            Parameter(
-                "lost motion",
-                unit(robot, joint),
-                5e-4,
-                "joint",
-                joint,
-                (at_joint(j, -0.5 * self._side(observations, j, np.asarray(covariates[f"approach.{joint}"]))),),
-                positive=True,
-            )
-            for j, joint in enumerate(robot.joint_names)
-            if f"approach.{joint}" in covariates
-        )
+        """One lost motion a joint whose direction of approach is recorded, rad or m; where it grows, one per torque."""
+        robot, covariates, torque = observations.robot, observations.covariates, observations.torque
+        found = []
+        for j, joint in enumerate(robot.joint_names):
+            if f"approach.{joint}" not in covariates:
+                continue
+            own = unit(robot, joint)
+            short = -0.5 * self._side(observations, j, np.asarray(covariates[f"approach.{joint}"]))
+            found.append(Parameter("lost motion", own, _SIZE, "joint", joint, (at_joint(j, short),), positive=True))
+            if self.grows and torque is not None and self._may_hang(j):
+                per, size = "m/N" if own == "m" else "rad/(N·m)", _SIZE / self.largest[j]
+                wound = (at_joint(j, short * np.abs(torque[:, j])),)
+                found.append(Parameter("lost motion per torque", per, size, "joint", joint, wound, positive=True))
+            if self.carriage:
+                found += self._turning(observations, joint, short)
+        return tuple(found)
+
+    def _turning(self, observations: Observations, joint: str, short: Array) -> list[Parameter]:
+        """Return three turns of the carriage of a slide, rad; none of a joint that turns."""
+        robot = observations.robot
+        s = next((s for s, segment in enumerate(robot.segments) if segment.name == joint), None)
+        j = robot.joint_names.index(joint)
+        if s is None or robot.joint_types[j] != "prismatic":
+            return []
+        stroke = observations.q[:, [j]] * (self.carriage == "moving")
+        at = stroke * robot.chain.axes[robot.segments[s].index]
+        found = []
+        for name, axis in zip("xyz", np.eye(3), strict=True):
+            twist = short[:, None] * np.hstack([np.cross(at, axis), np.broadcast_to(axis, at.shape)])
+            label = f"turn about {name} at reversal"
+            found.append(Parameter(label, "rad", _TURNS, "joint", joint, (at_segment(s, twist),)))
+        return found
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
         """Return the direction in which the joint came."""
@@ -162,3 +198,10 @@ class Backlash(Effect):
     def _may_hang(self, j: int) -> bool:
         """Whether a joint carries enough to hang at all."""
         return self.largest[j] >= _HANGS * max(self.largest)
+
+
+def _slides(observations: Observations) -> bool:
+    """Whether a joint slides of which the side is known from which it came."""
+    robot = observations.robot
+    sliding = (n for n, kind in zip(robot.joint_names, robot.joint_types, strict=True) if kind == "prismatic")
+    return any(observations.varies(f"approach.{joint}") for joint in sliding)

@@ -24,9 +24,9 @@ A new effect is a file like this one::
 Register it under the entry point group ``thermal_robot.effects`` or pass it to :func:`thermal_robot.diagnose`. What
 others want to know of it stands in the same class, each with a default: ``title`` (in plain words), ``size_spread``
 (how well its sizes are known), ``frame`` and ``contained_in`` (what it cannot be told from), ``missing`` and ``reads``
-(columns), ``variants`` and ``nearby`` (settings), ``driver`` (what it is drawn against). Every effect has the arguments
-``places`` and ``excluded`` besides its own: only the parameters in these joints or links, or not in those, are kept, by
-the gate.
+(columns), ``variants``, ``nearby`` and ``in_full`` (settings), ``driver`` (what it is drawn against), ``sized_as``
+(whether what it does in each joint is told). Every effect has the arguments ``places`` and ``excluded`` besides its
+own: only the parameters in these joints or links, or not in those, are kept, by the gate.
 
 Nobody asks an effect directly: :mod:`thermal_robot.effects.gate` does, checks the answer, and names the effect where it
 breaks the contract or raises.

@@ -185,7 +185,7 @@ def at(effect: Effect, place: str, observations: Observations) -> Effect | None:
     EffectError
         If it is something else than an effect of this one's name, or the effect breaks the contract otherwise.
     """
-    return _at(effect, place) if place in places_of(checked(effect, observations)) else None
+    return _one_setting(effect, "at", place) if place in places_of(checked(effect, observations)) else None
 
 
 def alone(effect: Effect, observations: Observations) -> tuple[Effect, ...]:
@@ -197,8 +197,19 @@ def alone(effect: Effect, observations: Observations) -> tuple[Effect, ...]:
         As :func:`at`.
     """
     places = places_of(checked(effect, observations))
-    single = (_at(effect, place) for place in places)
+    single = (_one_setting(effect, "at", place) for place in places)
     return tuple(setting for setting in single if setting is not None) if len(places) > 1 else ()
+
+
+def in_full(effect: Effect) -> Effect | None:
+    """Return an effect's setting of more parameters (:meth:`Effect.in_full`); ``None`` where there is none.
+
+    Raises
+    ------
+    EffectError
+        If it is something else than an effect of this one's name.
+    """
+    return _one_setting(effect, "in_full")
 
 
 def places_of(parameters: Sequence[Parameter]) -> tuple[str, ...]:
@@ -206,12 +217,12 @@ def places_of(parameters: Sequence[Parameter]) -> tuple[str, ...]:
     return tuple(dict.fromkeys(p.place for p in parameters if p.kind in ("joint", "link") and p.place))
 
 
-def _at(effect: Effect, place: str) -> Effect | None:
-    answer = _asked(effect, "at", place)
+def _one_setting(effect: Effect, question: str, *about: Any) -> Effect | None:
+    answer = _asked(effect, question, *about)
     if answer is None or _is_setting(effect, answer):
         return answer  # type: ignore[no-any-return]
     raise EffectError(
-        f"effect {effect.name!r}: at answers {answer!r}, expected None or an effect named {effect.name!r}"
+        f"effect {effect.name!r}: {question} answers {answer!r}, expected None or an effect named {effect.name!r}"
     )
 
 

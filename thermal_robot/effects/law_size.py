@@ -93,19 +93,22 @@ def in_joints(what: str, parameters: Sequence[Parameter], values: Array, covaria
     what
         Of what it is the size.
     parameters
-        Of the effect, K in all; each with one response, in its joint.
+        Of the effect, K in all.
     values, covariance
         As fitted: (K,) and (K, K), SI.
 
     Returns
     -------
     tuple of Size
-        One a joint, the largest first.
+        One a joint, the largest first; none of a place that does not err in its joint alone.
     """
     found = []
     for place in dict.fromkeys(parameter.place for parameter in parameters):
         own = [k for k, parameter in enumerate(parameters) if parameter.place == place]
-        rows = np.column_stack([parameters[k].responses[0].values for k in own])
+        responses = [parameters[k].responses for k in own]
+        if any([response.channel for response in all_of] != ["joint"] for all_of in responses):
+            continue
+        rows = np.column_stack(np.broadcast_arrays(*(response.values for (response,) in responses)))
         moved = rows @ np.asarray(values, dtype=float)[own]
         weight = rows[int(moved.argmax())] - rows[int(moved.argmin())]
         variance = float(weight @ covariance[np.ix_(own, own)] @ weight)

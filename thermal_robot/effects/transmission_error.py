@@ -16,7 +16,7 @@ if TYPE_CHECKING:
     from thermal_robot.observations import Observations
 
 _AMPLITUDE = 3e-4  # rad
-_WHEELS = 2  # orders up to this one have that size; above it sizes fall as one over the order
+_WHEELS = 2  # orders up to this one are alike in size; above it sizes fall as one over the order
 _CURVE = tuple(range(1, 9))
 _NOT_LEARNT = 0.05
 
@@ -31,7 +31,8 @@ class TransmissionError(Effect):
 
     Over part of a turn orders 1 and 2 are nearly a line and a parabola. Where a joint errs by neither, they come out
     many times too large (4 mrad in a UR10, for 0.3 mrad over 2 rad). Its error curve has all orders from 1 to 8, above
-    2 of sizes that fall as one over the order. It could take any shape: its size is what catalogues state, not learnt.
+    2 of sizes that fall as one over the order, and all together as large as one wave. It could take any shape: its size
+    is that of the source, not learnt.
 
     Attributes
     ----------
@@ -74,7 +75,7 @@ class TransmissionError(Effect):
             turns += [float(gears[joint])] if joint in gears and self.side != "joint" else []
             own = unit(robot, joint)
             for ratio, k in itertools.product(turns, self.harmonics):
-                order, size = ratio * k, _AMPLITUDE * min(1.0, _WHEELS / k)
+                order, size = ratio * k, _amplitude(k, self.harmonics)
                 for what, wave in (("sine", np.sin), ("cosine", np.cos)):
                     values = at_joint(j, wave(order * observations.q[:, j]))
                     found.append(Parameter(f"{what}, order {order:g}", own, size, "joint", joint, (values,)))
@@ -83,3 +84,10 @@ class TransmissionError(Effect):
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
         """Return the joint's own position."""
         return position_of(observations, parameters[0].place)
+
+
+def _amplitude(order: int, harmonics: tuple[int, ...]) -> float:
+    """Return the expected size of one wave; rad. Those of a curve have the mean square of one alone between them."""
+    falling = [min(1.0, _WHEELS / k) for k in harmonics]
+    whole = np.linalg.norm(falling) if set(_CURVE) <= set(harmonics) else 1.0
+    return float(_AMPLITUDE * min(1.0, _WHEELS / order) / whole)
