@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 _AMPLITUDE = 3e-4  # rad
 _WHEELS = 2  # orders up to this one are alike in size; above it sizes fall as one over the order
 _CURVE = tuple(range(1, 9))
-_NOT_LEARNT = 0.05
+_NOT_LEARNT = 0.05  # of the logarithm of its size: a curve that could grow would follow ripple and steps, too
 
 
 @dataclass(frozen=True)

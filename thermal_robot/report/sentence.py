@@ -123,7 +123,7 @@ def _doubt(diagnosis: Diagnosis, finding: Finding) -> str:
 
 
 def _how_far(diagnosis: Diagnosis, remaining: Unexplained, several: bool) -> Iterator[str]:
-    """Yield what correcting does, the fullest wording first; that it harms somewhere is always said."""
+    """Yield what correcting does, the fullest wording first; that it leaves more or harms elsewhere is always said."""
     gap, held = diagnosis.gap, diagnosis.gap.held_out
     it = "them" if several else "it"
     if held.shrinkage < 0.0:
@@ -131,9 +131,9 @@ def _how_far(diagnosis: Diagnosis, remaining: Unexplained, several: bool) -> Ite
         yield f"correcting for {it} does not carry over to held-out data: their gap is {pair}"
         yield f"correcting harms held-out data: {pair}"
         return
-    leaves, hard, harms = length(held.rms_after), "", ""
+    leaves, hard = length(held.rms_after), ""
     if gap.hardest is not None and gap.hardest.shrinkage < 0.0:
-        hard = harms = f"; but it harms rows held out by {gap.hardest.name}"
+        hard = f"; but it harms rows held out by {gap.hardest.name}"
     elif gap.hardest is not None:
         hard = f"; held out by {gap.hardest.name}, {length(gap.hardest.rms_after)}"
     full = f"correcting for {it} removes {100 * held.shrinkage:.1f} % of its mean square on held-out data"
@@ -144,8 +144,7 @@ def _how_far(diagnosis: Diagnosis, remaining: Unexplained, several: bool) -> Ite
     yield f"{short}{_rest(diagnosis, remaining)}{hard}"
     more = ", more than noise" if remaining.flagged else ""
     yield f"{short}{more}{hard}"
-    for elsewhere in dict.fromkeys((hard, harms)):
-        yield f"correcting leaves {leaves} on held-out data{more}{elsewhere}"
+    yield f"correcting leaves {leaves} on held-out data{more}{hard}"
 
 
 def _rest(diagnosis: Diagnosis, remaining: Unexplained) -> str:
