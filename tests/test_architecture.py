@@ -16,6 +16,7 @@ ROOT = Path(thermal_robot.__file__).parent
 PACKAGE = "thermal_robot"
 ORDER = (
     "errors",
+    "files",
     "kinematics",
     "robot",
     "assembly",

@@ -12,6 +12,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from thermal_robot.errors import CampaignError, ThermalRobotError
+from thermal_robot.files import write_text
 
 DONE, FAILED, BAD_INPUT = 0, 1, 2
 _STAGES = 14
@@ -173,7 +174,7 @@ def _paper(options: argparse.Namespace) -> None:
     found = ledger(PaperInputs() if options.l5 is None else PaperInputs(l5=options.l5))
     written = json.dumps(found.to_dict(), indent=2, ensure_ascii=False, allow_nan=False)
     if options.json and options.json != "-":
-        _write(options.json, lambda path: path.write_text(written + "\n", encoding="utf-8"))
+        _write(options.json, lambda path: write_text(path, written + "\n"))
     print(written if options.json == "-" else found.markdown() if options.markdown else found.text())
 
 
@@ -187,7 +188,7 @@ def _diagnosis(campaign: Path, only: Sequence[str], without: Sequence[str]):  # 
 def _page(found, path: Path) -> None:  # type: ignore[no-untyped-def]
     from thermal_robot.report import html
 
-    path.write_text(html(found, generated=time.strftime("%Y-%m-%d %H:%M")), encoding="utf-8")
+    write_text(path, html(found, generated=time.strftime("%Y-%m-%d %H:%M")))
 
 
 def _take_back(options: argparse.Namespace) -> None:

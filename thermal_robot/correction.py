@@ -16,6 +16,7 @@ from thermal_robot.effects import Effect, gate, library
 from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.errors import CampaignError, EffectError
+from thermal_robot.files import write_text
 from thermal_robot.kinematics import rotation_to_quaternion
 from thermal_robot.observations import Frames, observe
 from thermal_robot.robot import Robot, load_robot
@@ -194,8 +195,8 @@ class CorrectedModel:
         )
 
     def save(self, path: str | Path) -> None:
-        """Write the model to a JSON file that stands alone."""
-        Path(path).write_text(json.dumps(self.to_dict(), indent=1) + "\n", encoding="utf-8")
+        """Write the model to a JSON file that stands alone; it appears whole or not at all."""
+        write_text(path, json.dumps(self.to_dict(), indent=1) + "\n")
 
     @classmethod
     def load(cls, path: str | Path, effects: Sequence[Effect] = ()) -> CorrectedModel:

@@ -16,6 +16,7 @@ import numpy as np
 
 from thermal_robot.blind.cases import Case, Kind, RobotChoice
 from thermal_robot.errors import CampaignError, ThermalRobotError
+from thermal_robot.files import write_text
 
 if TYPE_CHECKING:
     from thermal_robot.blind.trial import RealCase
@@ -221,7 +222,7 @@ def _require_folder(target: str | None) -> None:
 
 def _write(target: str, text: str) -> None:
     try:
-        Path(target).write_text(text, encoding="utf-8")
+        write_text(target, text)
     except OSError as error:
         raise CampaignError(target, "cannot be written", found=error.strerror or str(error)) from None
 

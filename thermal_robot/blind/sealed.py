@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from thermal_robot.errors import SealError
+from thermal_robot.files import write_bytes
 
 KEY_BYTES = 32
 
@@ -38,7 +39,7 @@ def seal(answers: dict[str, Any], path: Path, key: bytes) -> str:
     if len(key) != KEY_BYTES:
         raise ValueError(f"a key has {KEY_BYTES} bytes, not {len(key)}")
     plain = canonical(answers)
-    path.write_bytes(_cipher(plain, key))
+    write_bytes(path, _cipher(plain, key))
     return _commitment(plain, key)
 
 

@@ -22,6 +22,7 @@ from thermal_robot.blind.sealed import open_seal, seal
 from thermal_robot.blind.shares import shares
 from thermal_robot.blind.supervise import examine
 from thermal_robot.errors import ThermalRobotError
+from thermal_robot.files import write_bytes, write_text
 
 PLAN, SEALED, REPLIES = "trial.json", "answers.sealed", "replies.jsonl"
 OPENED, RECORDS, CAMPAIGNS = "opened.json", "records.json", "campaigns"
@@ -256,7 +257,7 @@ def _read_replies(path: Path, made: Mapping[str, str]) -> dict[str, Plain]:
     whole = path.read_bytes()
     complete = whole[: whole.rfind(b"\n") + 1]
     if complete != whole:  # a line that was torn when the trial was stopped
-        path.write_bytes(complete)
+        write_bytes(path, complete)
     try:
         lines = [json.loads(line) for line in complete.splitlines()]
         return {
@@ -279,4 +280,4 @@ def _digest(folder: Path, pattern: str = "*") -> str:
 
 
 def _write(path: Path, value: Any) -> None:
-    path.write_text(json.dumps(value, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
+    write_text(path, json.dumps(value, indent=1, ensure_ascii=False) + "\n")

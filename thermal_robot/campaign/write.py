@@ -15,6 +15,7 @@ from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.declaration import FILE_NAME
 from thermal_robot.campaign.units import Units, covariate_scale
 from thermal_robot.errors import CampaignError
+from thermal_robot.files import whole, write_text
 
 TABLE_NAME = "measurements.csv"
 ROBOT_NAME = "robot.urdf"
@@ -51,8 +52,8 @@ def write_campaign(campaign: Campaign, directory: str | Path) -> Path:
     file = folder / FILE_NAME
     try:
         folder.mkdir(parents=True, exist_ok=True)
-        (folder / ROBOT_NAME).write_text(campaign.robot.urdf, encoding="utf-8")
-        file.write_text(tomli_w.dumps(_document(campaign)), encoding="utf-8")
+        write_text(folder / ROBOT_NAME, campaign.robot.urdf)
+        write_text(file, tomli_w.dumps(_document(campaign)))
     except OSError as error:
         raise CampaignError(str(folder), f"cannot be written: {error.strerror}") from error
     write_table(campaign, folder / TABLE_NAME)
@@ -113,7 +114,7 @@ def _columns(campaign: Campaign) -> Iterator[tuple[str, np.ndarray[Any, np.dtype
 
 def _write_csv(path: Path, columns: Sequence[str], data: Sequence[Sequence[str]]) -> None:
     try:
-        with path.open("w", encoding="utf-8", newline="") as file:
+        with whole(path) as place, place.open("w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow(columns)
             writer.writerows(zip(*data, strict=True))

@@ -16,6 +16,7 @@ import numpy as np
 
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.diagnosis.parts import Finding, Gap, Misfit, Rows, Sensitivity, Unexplained, Wanted, Where, is_frame
+from thermal_robot.files import write_text
 
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.next_samples import NextSamples
@@ -235,8 +236,8 @@ class Diagnosis:
         return [] if self.fit is None or not self.usable else self.next_samples().to_list()
 
     def to_json(self, path: str | Path) -> None:
-        """Write :meth:`to_dict` to a file."""
-        Path(path).write_text(json.dumps(self.to_dict(), indent=2, ensure_ascii=False) + "\n", encoding="utf-8")
+        """Write :meth:`to_dict` to a file, which appears whole or not at all."""
+        write_text(path, json.dumps(self.to_dict(), indent=2, ensure_ascii=False) + "\n")
 
     def __repr__(self) -> str:
         return f"Diagnosis({self.campaign!r}: {', '.join(self.verdict) or 'no effect'})"

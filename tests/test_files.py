@@ -1,0 +1,117 @@
+"""Files appear whole or not at all, however writing ends."""
+
+import os
+import signal
+import subprocess
+import sys
+import time
+
+import pytest
+
+from thermal_robot.files import whole, write_bytes, write_text
+
+
+def test_what_is_written_takes_the_place_at_once(tmp_path):
+    file = tmp_path / "model.json"
+    with whole(file) as place:
+        place.write_text("half")
+        assert not file.exists()
+        assert place.suffix == ".json"
+        place.write_text("all of it")
+    assert file.read_text() == "all of it"
+    assert list(tmp_path.iterdir()) == [file]
+
+
+@pytest.mark.parametrize("ends", [ValueError, KeyboardInterrupt, OSError])
+def test_a_failure_leaves_what_was_there_and_nothing_else(tmp_path, ends):
+    file = tmp_path / "model.json"
+    file.write_text("before")
+
+    def fails():
+        with whole(file) as place:
+            place.write_text("half")
+            raise ends
+
+    with pytest.raises(ends):
+        fails()
+    assert file.read_text() == "before"
+    assert list(tmp_path.iterdir()) == [file]
+
+
+def test_no_folder_is_an_error_and_leaves_nothing(tmp_path):
+    with pytest.raises(OSError, match="No such file"):
+        write_text(tmp_path / "nowhere" / "model.json", "text")
+    assert list(tmp_path.iterdir()) == []
+
+
+WRITER = """
+import sys
+from thermal_robot.files import whole
+with whole(sys.argv[1]) as place, place.open("w") as file:
+    for _ in range(20_000_000):
+        file.write("x" * 4096)
+        file.flush()
+        print("wrote", flush=True)
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="kills a process")
+@pytest.mark.parametrize("seed", range(3))
+def test_a_killed_process_leaves_what_was_there(tmp_path, seed):
+    file = tmp_path / "table.csv"
+    file.write_text("before")
+    with subprocess.Popen([sys.executable, "-c", WRITER, str(file)], stdout=subprocess.PIPE) as process:
+        process.stdout.readline()
+        time.sleep(0.02 * seed)
+        process.send_signal(signal.SIGKILL)
+    assert file.read_text() == "before"
+    assert all(other.name.startswith(".") for other in tmp_path.iterdir() if other != file)
+
+
+FULL = """
+import resource, signal, sys
+from thermal_robot.files import write_text
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+resource.setrlimit(resource.RLIMIT_FSIZE, (10_000, 10_000))
+try:
+    write_text(sys.argv[1], "x" * 1_000_000)
+except OSError as error:
+    sys.exit(error.strerror)
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="limits the size of files")
+def test_a_full_disk_leaves_what_was_there_and_nothing_else(tmp_path):
+    file = tmp_path / "page.html"
+    file.write_text("before")
+    found = subprocess.run([sys.executable, "-c", FULL, str(file)], capture_output=True, text=True)
+    assert found.returncode == 1
+    assert "File too large" in found.stderr
+    assert file.read_text() == "before"
+    assert list(tmp_path.iterdir()) == [file]
+
+
+@pytest.mark.skipif(os.name != "posix", reason="links and permissions of POSIX")
+def test_a_link_stays_a_link_and_permissions_stay(tmp_path):
+    file, link = tmp_path / "real.json", tmp_path / "link.json"
+    file.write_text("before")
+    file.chmod(0o640)
+    link.symlink_to(file)
+    write_text(link, "after")
+    assert link.is_symlink()
+    assert file.read_text() == "after"
+    assert file.stat().st_mode & 0o777 == 0o640
+    plain, new = tmp_path / "plain", tmp_path / "new"
+    plain.touch()
+    write_bytes(new, b"x")
+    assert new.stat().st_mode == plain.stat().st_mode
+
+
+@pytest.mark.skipif(not os.path.exists("/dev/stdout"), reason="has no devices as files")
+def test_what_is_no_file_is_written_to(tmp_path):
+    code = "from thermal_robot.files import write_text; write_text('/dev/stdout', 'told'); print(', and more')"
+    assert subprocess.run([sys.executable, "-c", code], stdout=subprocess.PIPE).stdout == b"told, and more\n"
+    with (tmp_path / "out").open("a") as file:  # a shell's >>
+        subprocess.run([sys.executable, "-c", code], stdout=file, check=True)
+    assert (tmp_path / "out").read_text() == "told, and more\n"
+    assert len(list(tmp_path.iterdir())) == 1

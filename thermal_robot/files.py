@@ -1,0 +1,89 @@
+"""Files that appear whole or not at all: written beside their place, flushed to the disk, then moved there at once."""
+
+from __future__ import annotations
+
+import os
+import secrets
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+_BESIDE = ".thermal-robot-"
+
+
+@contextmanager
+def whole(path: str | Path) -> Iterator[Path]:
+    """Give a place to write to, which takes the place of ``path`` once all is written.
+
+    Whoever reads ``path`` sees the file as it was, or as it became, whatever happens in between: a full disk, an
+    exception, a process that is killed. What is no file, such as ``/dev/stdout`` or a pipe, is written to directly; a
+    link stays a link, and a file keeps its permissions.
+
+    Parameters
+    ----------
+    path
+        File to write, in a folder that exists.
+
+    Yields
+    ------
+    Path
+        Where to write, with the same suffix.
+
+    Raises
+    ------
+    OSError
+        If the folder or the disk does not take it; ``path`` is then as it was.
+    """
+    asked = Path(path)
+    if asked.is_relative_to("/dev") or (asked.exists() and not asked.is_file()):
+        yield asked
+        return
+    target = asked.resolve()
+    beside = target.with_name(f"{_BESIDE}{secrets.token_hex(8)}{target.suffix}")
+    try:
+        beside.touch(exist_ok=False)
+        yield beside
+        with beside.open("rb+") as file:
+            os.fsync(file.fileno())
+        if target.exists():
+            beside.chmod(target.stat().st_mode & 0o7777)
+        beside.replace(target)
+    except BaseException:
+        with suppress(OSError):
+            beside.unlink()
+        raise
+    _flush(target.parent)
+
+
+def write_text(path: str | Path, text: str) -> None:
+    """Write a text in UTF-8, whole or not at all.
+
+    Raises
+    ------
+    OSError
+        As :func:`whole`.
+    """
+    with whole(path) as place:
+        place.write_text(text, encoding="utf-8")
+
+
+def write_bytes(path: str | Path, content: bytes) -> None:
+    """Write bytes, whole or not at all.
+
+    Raises
+    ------
+    OSError
+        As :func:`whole`.
+    """
+    with whole(path) as place:
+        place.write_bytes(content)
+
+
+def _flush(folder: Path) -> None:
+    """Let the folder's new entry reach the disk, where folders can be opened."""
+    with suppress(OSError):
+        number = os.open(folder, os.O_RDONLY)
+        try:
+            os.fsync(number)
+        finally:
+            os.close(number)
