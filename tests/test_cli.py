@@ -12,10 +12,11 @@ from types import SimpleNamespace
 
 import jsonschema
 import numpy as np
+import pandas as pd
 import pytest
 from simulate import simulate
 
-from thermal_robot import __version__, cli, read_campaign
+from thermal_robot import CorrectedModel, __version__, cli, read_campaign
 from thermal_robot.campaign import write_campaign
 from thermal_robot.campaign.write import write_table
 from thermal_robot.datasets import demo_directory
@@ -249,6 +250,48 @@ def test_a_file_that_cannot_be_written_is_bad_input(run, folder, tmp_path, optio
     assert status == 2
     assert "cannot be written" in err
     assert err.count("\n") == 1
+
+
+def test_what_is_read_is_never_written(run, folder, diagnosed, tmp_path):
+    spare = tmp_path / "spare"
+    shutil.copytree(folder, spare)
+    model = tmp_path / "model.json"
+    model.write_bytes(diagnosed.model.read_bytes())
+    before = {f: f.read_bytes() for f in (*spare.iterdir(), model) if f.is_file()}
+    for name in ("campaign.toml", "measurements.csv", "robot.urdf"):
+        for option in ("--json", "--model", "--report"):
+            refused(run("diagnose", spare, option, spare / name), name, "would be overwritten")
+    (tmp_path / "link.csv").symlink_to(spare / "fresh.csv")
+    for target in (spare / "fresh.csv", model, tmp_path / "link.csv"):
+        refused(run("predict", model, spare / "fresh.csv", "-o", target), target.name, "would be overwritten")
+    refused(run("diagnose", spare, "--json", tmp_path / "a", "--model", tmp_path / "a"), "two outputs")
+    assert before == {f: f.read_bytes() for f in before}
+
+
+def test_an_output_that_fails_does_not_take_the_others_with_it(folder, tmp_path, monkeypatch, capsys):
+    def full(*_):
+        raise OSError(28, "No space left on device")
+
+    monkeypatch.setattr("thermal_robot.cli._page", full)
+    outputs = {option: tmp_path / option.strip("-") for option in ("--json", "--report", "--model")}
+    status = cli.main(["diagnose", str(folder), "--only", "drift", *(str(x) for pair in outputs.items() for x in pair)])
+    said = capsys.readouterr()
+    assert status == 2
+    assert "verdict" in said.out
+    assert str(outputs["--report"]) in said.err
+    assert "No space left on device" in said.err
+    assert json.loads(outputs["--json"].read_text())["schema"]
+    CorrectedModel.load(outputs["--model"])
+    assert not outputs["--report"].exists()
+
+
+def test_predict_writes_parquet_where_the_name_says_so(run, folder, diagnosed, tmp_path):
+    for out in (tmp_path / "p.csv", tmp_path / "p.parquet"):
+        assert run("predict", diagnosed.model, folder / "fresh.csv", "-o", out) == (0, "", "")
+    header, written = table(tmp_path / "p.csv")
+    frame = pd.read_parquet(tmp_path / "p.parquet")
+    assert list(frame.columns) == header
+    np.testing.assert_array_equal(frame.to_numpy(), written)
 
 
 @pytest.mark.parametrize("arguments", [[], ["diagnos"], ["diagnose"], ["predict", "m", "s"], ["check", "a", "b"]])

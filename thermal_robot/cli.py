@@ -130,31 +130,32 @@ def _check(options: argparse.Namespace) -> None:
 
 def _diagnose(options: argparse.Namespace) -> None:
     _take_back(options)
-    targets = [t for t in (options.json, options.model, options.report) if t and t != "-"]
-    for target in targets:
-        _require_folder(target)
+    _require_free((options.json, options.model, options.report), _read_from(Path(options.campaign)))
     found = _diagnosis(Path(options.campaign), options.only, options.without)
+    outputs: list[tuple[str | None, Callable[[Path], object]]] = [
+        (None if options.json == "-" else options.json, found.to_json),
+        (options.report, lambda path: _page(found, path)),
+        (options.model if found.usable else None, lambda path: found.model.save(path)),
+    ]
+    # files come first: who reads what is printed may stop early
+    failed = _written(outputs)
     if options.json == "-":
         import json
 
         print(json.dumps(found.to_dict(), indent=2, ensure_ascii=False))
     else:
         print(found)
-        if options.json:
-            _write(options.json, found.to_json)
-    if options.report:
-        _write(options.report, lambda path: _page(found, path))
+    if failed:
+        raise CampaignError(", ".join(failed), "cannot be written", found="; ".join(dict.fromkeys(failed.values())))
     if not found.usable:
         raise CampaignError(str(options.campaign), found.reason)
-    if options.model:
-        _write(options.model, found.model.save)
 
 
 def _predict(options: argparse.Namespace) -> None:
     from thermal_robot.campaign import write_predictions
     from thermal_robot.correction import CorrectedModel
 
-    _require_folder(options.output)
+    _require_free((options.output,), (options.model, options.samples))
     model = CorrectedModel.load(options.model)
     samples = model.samples(options.samples)
     if model.counts_anew(samples):
@@ -200,18 +201,46 @@ def _take_back(options: argparse.Namespace) -> None:
         raise CampaignError("diagnose", "no campaign was named", expected="campaign.toml, or its folder")
 
 
-def _require_folder(target: str) -> None:
-    """Refuse a file that could not be written before anything is computed."""
-    folder = Path(target).resolve().parent
-    if not folder.is_dir() or Path(target).is_dir():
-        raise CampaignError(target, "cannot be written", expected="a file in a folder that exists")
+def _read_from(campaign: Path) -> list[Path]:
+    """Return the files that a campaign is read from."""
+    from thermal_robot.campaign.declaration import read_declaration
+
+    declaration = read_declaration(campaign)
+    robot = [declaration.robot] if isinstance(declaration.robot, Path) else []
+    return [declaration.file, declaration.table, *robot]
+
+
+def _require_free(targets: Sequence[str | None], inputs: Sequence[str | Path]) -> None:
+    """Refuse, before anything is computed, a file that could not be written, that is read from, or is named twice."""
+    read, written = {Path(file).resolve() for file in inputs}, set()
+    for target in targets:
+        if not target or target == "-":
+            continue
+        file = Path(target).resolve()
+        if not file.parent.is_dir() or file.is_dir():
+            raise CampaignError(target, "cannot be written", expected="a file in a folder that exists")
+        if file in read:
+            raise CampaignError(target, "is read from, and would be overwritten", expected="another file to write")
+        if file in written:
+            raise CampaignError(target, "is named for two outputs", expected="a file for each")
+        written.add(file)
+
+
+def _written(outputs: Sequence[tuple[str | None, Callable[[Path], object]]]) -> dict[str, str]:
+    """Write each output that was asked for, whatever becomes of the others; return what went wrong by file."""
+    failed = {}
+    for target, write in outputs:
+        try:
+            if target:
+                write(Path(target))
+        except OSError as error:
+            failed[target or ""] = error.strerror or str(error)
+    return failed
 
 
 def _write(target: str, write: Callable[[Path], object]) -> None:
-    try:
-        write(Path(target))
-    except OSError as error:
-        raise CampaignError(target, "cannot be written", found=error.strerror or str(error)) from None
+    for file, reason in _written([(target, write)]).items():
+        raise CampaignError(file, "cannot be written", found=reason)
 
 
 @contextmanager

@@ -20,7 +20,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _DECIMAL_COMMA = re.compile(r"[+\-−]?\d*,\d+([eE][+-]?\d+)?")
-_PARQUET = (".parquet", ".pq")
+PARQUET = (".parquet", ".pq")
+"""Endings of the names of Parquet files."""
+NO_PARQUET = "Parquet files need pyarrow, which is not installed"
+WITH_PARQUET = 'pip install "thermal-robot[parquet]", or the table as CSV'
 
 
 def read_table(path: Path) -> Table:
@@ -39,7 +42,7 @@ def read_table(path: Path) -> Table:
     if not path.is_file():
         problem = "is a directory" if path.is_dir() else "there is no such file"
         raise CampaignError(file, problem, expected="the table of measurements")
-    if path.suffix.lower() in _PARQUET:
+    if path.suffix.lower() in PARQUET:
         return _read_parquet(path)
     text, warnings = _decode(path)
     lines, numbers = _records(file, text)
@@ -102,11 +105,7 @@ def _read_parquet(path: Path) -> Table:
     try:
         frame = pd.read_parquet(path)
     except ImportError as error:
-        raise CampaignError(
-            str(path),
-            "Parquet files need pyarrow, which is not installed",
-            expected='pip install "thermal-robot[parquet]", or the table as CSV',
-        ) from error
+        raise CampaignError(str(path), NO_PARQUET, expected=WITH_PARQUET) from error
     except Exception as error:  # pyarrow raises its own, which cannot be named without importing it
         reason = " ".join(str(error).split())
         raise CampaignError(str(path), f"cannot be read as a Parquet file ({reason})") from error

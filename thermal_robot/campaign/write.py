@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike
 from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.declaration import FILE_NAME
+from thermal_robot.campaign.tabular import NO_PARQUET, PARQUET, WITH_PARQUET
 from thermal_robot.campaign.units import Units, covariate_scale
 from thermal_robot.errors import CampaignError
 from thermal_robot.files import whole, write_text
@@ -74,25 +75,33 @@ def write_table(campaign: Campaign, path: str | Path) -> None:
 
 
 def write_predictions(path: str | Path, positions: ArrayLike, orientations: ArrayLike | None, units: Units) -> None:
-    """Write predicted poses: the columns x y z, and qw qx qy qz if given, only.
+    """Write predicted poses, as CSV or, by its ending, as Parquet: x y z, and qw qx qy qz if given, only.
 
     Parameters
     ----------
     path
-        CSV file to write.
+        File to write.
     positions
         (N, 3) m.
     orientations
         (N, 4) unit quaternions wxyz, or ``None``.
     units
         The positions are written in their length unit.
+
+    Raises
+    ------
+    CampaignError
+        A file that cannot be written, or Parquet without pyarrow.
     """
     values = np.asarray(positions, dtype=np.float64).reshape(-1, 3) / units.length_scale
     columns: tuple[str, ...] = names.POSITION
     if orientations is not None:
         values = np.hstack([values, np.asarray(orientations, dtype=np.float64).reshape(-1, 4)])
         columns += names.ORIENTATION
-    _write_csv(Path(path), columns, [[repr(float(value)) for value in column] for column in values.T])
+    if Path(path).suffix.lower() in PARQUET:
+        _write_parquet(Path(path), dict(zip(columns, values.T, strict=True)))
+    else:
+        _write_csv(Path(path), columns, [[repr(float(value)) for value in column] for column in values.T])
 
 
 def _columns(campaign: Campaign) -> Iterator[tuple[str, np.ndarray[Any, np.dtype[np.float64]]]]:
@@ -118,6 +127,18 @@ def _write_csv(path: Path, columns: Sequence[str], data: Sequence[Sequence[str]]
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow(columns)
             writer.writerows(zip(*data, strict=True))
+    except OSError as error:
+        raise CampaignError(str(path), f"cannot be written: {error.strerror}") from error
+
+
+def _write_parquet(path: Path, columns: dict[str, Any]) -> None:
+    import pandas as pd
+
+    try:
+        with whole(path) as place:
+            pd.DataFrame(columns).to_parquet(place, index=False)
+    except ImportError as error:
+        raise CampaignError(str(path), NO_PARQUET, expected=WITH_PARQUET) from error
     except OSError as error:
         raise CampaignError(str(path), f"cannot be written: {error.strerror}") from error
 
