@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import argparse
+import os
 import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import NoReturn
 
 from thermal_robot.errors import CampaignError, ThermalRobotError
 from thermal_robot.files import write_text
 
-DONE, FAILED, BAD_INPUT = 0, 1, 2
+DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 _STAGES = 14
 """Stages that a diagnosis tells of: reading, frames, effects, up to three exact fits, five folds, remainder, places."""
 _PATIENCE = 2.0
@@ -32,17 +33,35 @@ def main(arguments: Sequence[str] | None = None) -> int:
     Returns
     -------
     int
-        0 done, 1 a failure of the program, 2 bad input (one line on stderr).
+        0 done, 1 a failure of the program or of what it prints to, 2 bad input, 130 interrupted; one line on stderr
+        says which.
     """
     options = _parser().parse_args(arguments)
     try:
         options.run(options)
+        sys.stdout.flush()  # a disk may be full only now
     except ThermalRobotError as error:
-        print(f"thermal-robot: {' '.join(str(error).split())}", file=sys.stderr)
-        return BAD_INPUT
+        return _complain(str(error), BAD_INPUT)
+    except KeyboardInterrupt:
+        return _complain("interrupted; nothing was left half written", INTERRUPTED)
     except BrokenPipeError:
+        _let_go()
         return DONE
+    except OSError as error:
+        _let_go()
+        return _complain(f"cannot print: {error.strerror or error}", FAILED)
     return DONE
+
+
+def _complain(sentence: str, status: int) -> int:
+    print(f"thermal-robot: {' '.join(sentence.split())}", file=sys.stderr)
+    return status
+
+
+def _let_go() -> None:
+    """Let nothing more be printed: what waits for a reader that left, or for a full disk, would fail once more."""
+    with suppress(OSError, ValueError):
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 class _Parser(argparse.ArgumentParser):
@@ -60,7 +79,7 @@ def _parser() -> argparse.ArgumentParser:
         prog="thermal-robot",
         description="Say where the gap between robot and model lies, which effect causes it, how far it shrinks.",
     )
-    parser.add_argument("--version", action="version", version=f"thermal-robot {__version__}")
+    parser.add_argument("-V", "--version", action="version", version=f"thermal-robot {__version__}")
     commands = parser.add_subparsers(required=True, metavar="COMMAND")
 
     demo = commands.add_parser("demo", help="diagnose a campaign that comes with the package")
@@ -70,6 +89,10 @@ def _parser() -> argparse.ArgumentParser:
     check = commands.add_parser("check", help="validate and describe a campaign")
     check.add_argument("campaign", help="campaign.toml, or its folder")
     check.set_defaults(run=_check)
+
+    effects = commands.add_parser("effects", help="the effects that are considered, and what each needs")
+    effects.add_argument("campaign", nargs="?", help="campaign.toml, or its folder: what it has is not asked for")
+    effects.set_defaults(run=_effects)
 
     _diagnose_arguments(commands.add_parser("diagnose", help="where the gap lies, what causes it, how far it shrinks"))
     _predict_arguments(commands.add_parser("predict", help="the corrected model's prediction for new commands"))
@@ -126,6 +149,28 @@ def _check(options: argparse.Namespace) -> None:
     from thermal_robot.campaign import describe, read_campaign
 
     print(describe(read_campaign(options.campaign)))
+
+
+def _effects(options: argparse.Namespace) -> None:
+    from dataclasses import replace
+
+    from thermal_robot.campaign import read_campaign
+    from thermal_robot.datasets import demo_campaign
+    from thermal_robot.diagnosis import Finding
+    from thermal_robot.effects import gate, library
+    from thermal_robot.effects.catalogue import random_effects
+    from thermal_robot.observations import observe
+    from thermal_robot.report.words import needs
+
+    bare = options.campaign is None  # poses and nothing else
+    campaign = replace(demo_campaign(), covariates={}, labels={}) if bare else read_campaign(options.campaign)
+    known, observations = (*library().values(), *random_effects()), observe(campaign)
+    wide = max(len(effect.name) for effect in known)
+    print("Effects that are considered, and what each needs beside measured poses:" if bare else campaign.name)
+    for effect in known:
+        missing = gate.missing(effect, observations)
+        asked = needs(Finding(effect.name, "not_testable", needs=missing), campaign.robot.joint_names)
+        print(f"  {effect.name:{wide}}  {effect.title}{f'; needs {asked}' if asked else ''}")
 
 
 def _diagnose(options: argparse.Namespace) -> None:
