@@ -31,6 +31,7 @@ ORDER = (
     "report",
     "blind",
     "cli",
+    "__main__",
 )
 """Rooms from the ground up: each may import those before it."""
 FREE = {
@@ -127,7 +128,7 @@ def test_imports_go_one_way(path):
 
 def test_nobody_imports_the_command_line():
     users = [dotted(p) for p in MODULES if any(room(t) == "cli" for t, _ in imports(p)) and room(dotted(p)) != "cli"]
-    assert users == []
+    assert users == [f"{PACKAGE}.__main__"]
 
 
 def test_only_kinematics_knows_pinocchio():

@@ -3,15 +3,11 @@
 import csv
 import io
 import json
-import os
 import shutil
-import signal
 import subprocess
 import sys
-import time
 from contextlib import redirect_stderr, redirect_stdout
 from dataclasses import replace
-from pathlib import Path
 from types import SimpleNamespace
 
 import jsonschema
@@ -388,37 +384,3 @@ def test_effects_are_listed_with_what_they_need(run, folder):
     of_campaign = run("effects", folder)[1]
     assert "needs temperature\n" not in of_campaign  # it was recorded
     refused(run("effects", folder / "absent"), "absent")
-
-
-def started(*arguments, **streams):
-    return subprocess.Popen([sys.executable, "-m", "thermal_robot", *map(str, arguments)], text=True, **streams)
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="signals and pipes of POSIX")
-def test_an_interrupt_is_one_line_and_leaves_no_file(folder, tmp_path):
-    os.mkfifo(tmp_path / "nobody-reads")  # who writes to it waits, if the interrupt comes late
-    asked = ("diagnose", folder, "--json", tmp_path / "nobody-reads", "--model", tmp_path / "m.json")
-    with started(*asked, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
-        time.sleep(6.0)  # until it has loaded
-        process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert err == "thermal-robot: interrupted; nothing was left half written\n"
-    assert out == ""
-    assert [file.name for file in tmp_path.iterdir()] == ["nobody-reads"]
-
-
-@pytest.mark.skipif(not Path("/dev/full").exists(), reason="has no full device")
-def test_a_full_disk_behind_the_terminal_is_one_line():
-    with open("/dev/full", "w") as full, started("effects", stdout=full, stderr=subprocess.PIPE) as process:
-        err = process.communicate(timeout=60)[1]
-    assert process.returncode == 1
-    assert err == "thermal-robot: cannot print: No space left on device\n"
-
-
-@pytest.mark.skipif(sys.platform == "win32", reason="pipes of POSIX")
-def test_a_reader_that_leaves_is_no_error():
-    with started("effects", stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
-        process.stdout.close()
-        assert process.stderr.read() == ""
-    assert process.returncode == 0

@@ -4,6 +4,7 @@ import json
 from dataclasses import replace
 
 import numpy as np
+import pandas as pd
 import pytest
 from conftest import load_arm
 from simulate import simulate
@@ -235,3 +236,12 @@ def test_more_columns_than_the_campaign_had_change_no_prediction():
     less = {name: values for name, values in fresh.covariates.items() if name != first}
     with_more, with_less = (model.predict(f)[0] for f in (fresh, replace(fresh, covariates=less)))
     np.testing.assert_allclose(with_more, with_less, atol=0.0)
+
+
+def test_a_table_is_predicted_as_its_file_is(hall, tmp_path):
+    _, model, fresh, _ = hall
+    write_table(fresh, tmp_path / "fresh.csv")
+    of_file = model.predict(tmp_path / "fresh.csv")[0]
+    of_table = model.predict(pd.read_csv(tmp_path / "fresh.csv"))[0]
+    np.testing.assert_array_equal(of_table, of_file)
+    np.testing.assert_allclose(of_file, model.predict(fresh)[0], atol=1e-12)

@@ -3,8 +3,11 @@
 import copy
 import pickle
 
+import numpy as np
+import pandas as pd
 import pytest
 
+import thermal_robot as tr
 from thermal_robot import errors
 from thermal_robot.errors import CampaignError, RobotError, ThermalRobotError
 
@@ -74,3 +77,33 @@ def test_a_robots_error_names_what_offends_and_what_would_do():
     error = RobotError("no such link", name="tol", candidates=iter(["tool"]))
     assert (str(error), error.name, error.candidates) == ("no such link", "tol", ("tool",))
     assert (RobotError("odd").name, RobotError("odd").candidates) == ("", ())
+
+
+@pytest.fixture(scope="module")
+def demo():
+    return tr.demo_campaign()
+
+
+TABLE = pd.DataFrame({"joint_1": [0.0]})
+WRONG = {
+    "diagnose nothing": (lambda demo: tr.diagnose(None), "found NoneType, expected a campaign, or the path of one"),
+    "diagnose a table": (lambda demo: tr.diagnose(TABLE), "found DataFrame, expected .* campaign_from_table makes one"),
+    "diagnose only a number": (lambda demo: tr.diagnose(demo, only=3), "only: .*found int, expected names of effects"),
+    "diagnose only numbers": (lambda demo: tr.diagnose(demo, only=[3]), "only: .*found int, expected names of effects"),
+    "diagnose with a name": (lambda demo: tr.diagnose(demo, effects="drift"), "found str, expected a list of your own"),
+    "read a number": (lambda demo: tr.read_campaign(3), "found int, expected the path of a campaign.toml"),
+    "a table of no robot": (
+        lambda demo: tr.campaign_from_table(None, TABLE),
+        "robot: .*found NoneType, expected a",
+    ),
+    "no table": (lambda demo: tr.campaign_from_table(demo.robot, [1, 2]), "table: .*found list, expected a pandas"),
+    "samples of an array": (lambda demo: tr.read_samples(np.zeros((3, 5)), demo), "found ndarray, expected a table"),
+    "load a dict": (lambda demo: tr.CorrectedModel.load({}), "found dict, expected the path of a file that save"),
+    "a frame that is no name": (lambda demo: tr.load_robot("builtin:rv_m2", 3), "the name of a link, not int"),
+}
+
+
+@pytest.mark.parametrize("call", WRONG)
+def test_a_wrong_type_is_told_with_what_is_wanted(demo, call):
+    with pytest.raises(ThermalRobotError, match=WRONG[call][1]):
+        WRONG[call][0](demo)

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,11 +16,14 @@ from thermal_robot.campaign import Campaign, Settings, read_samples
 from thermal_robot.effects import Effect, gate, library
 from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.law import PREFIX, Discovered
-from thermal_robot.errors import CampaignError, EffectError
+from thermal_robot.errors import CampaignError, EffectError, require
 from thermal_robot.files import write_text
 from thermal_robot.kinematics import rotation_to_quaternion
 from thermal_robot.observations import Frames, observe
 from thermal_robot.robot import Robot, load_robot
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Array = NDArray[np.float64]
 
@@ -57,13 +61,14 @@ class CorrectedModel:
     simulated: bool = False
     last_order: tuple[float, float] | None = None
 
-    def predict(self, samples: Campaign) -> tuple[Array, Array | None]:
+    def predict(self, samples: Campaign | str | Path | pd.DataFrame) -> tuple[Array, Array | None]:
         """Predict what the instrument would measure.
 
         Parameters
         ----------
         samples
-            Commands and conditions; measurements, if any, are ignored.
+            Commands and conditions; measurements, if any, are ignored. A table, or the path of one, is read as by
+            :meth:`samples`.
 
         Returns
         -------
@@ -77,6 +82,8 @@ class CorrectedModel:
         CampaignError
             If a column that the model needs is missing or has an empty cell; the error names it.
         """
+        if not isinstance(samples, Campaign):
+            samples = self.samples(samples)
         self._require(samples)
         # the model reads just what it was fitted to, whatever else a table holds
         read = {name: values for name, values in samples.covariates.items() if name in self.needs}
@@ -132,9 +139,16 @@ class CorrectedModel:
                 expected="sim.x, sim.y, sim.z",
             )
 
-    def samples(self, path: str | Path) -> Campaign:
-        """Read a table of commands and conditions in the units of the campaign that the model was fitted to."""
-        return replace(read_samples(path, self.settings, self.robot), name=str(path))
+    def samples(self, table: str | Path | pd.DataFrame) -> Campaign:
+        """Read a table of commands and conditions in the units of the campaign that the model was fitted to.
+
+        Raises
+        ------
+        CampaignError
+            A table that cannot be used.
+        """
+        samples = read_samples(table, self.settings, self.robot)
+        return replace(samples, name=str(table)) if isinstance(table, (str, os.PathLike)) else samples
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything, the URDF's text included, as plain values."""
@@ -207,6 +221,7 @@ class CorrectedModel:
         CampaignError
             If it is not such a file.
         """
+        require("load()", path, (str, os.PathLike), "the path of a file that save() wrote")
         try:
             plain = json.loads(Path(path).read_text(encoding="utf-8"))
             found = plain.get("schema") if isinstance(plain, dict) else None

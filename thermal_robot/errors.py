@@ -85,3 +85,15 @@ class EstimationError(ThermalRobotError):
 
 class SealError(ThermalRobotError):
     """Sealed answers that are not those that were sealed."""
+
+
+def require(call: str, given: object, kinds: tuple[type, ...], expected: str) -> None:
+    """Refuse an argument of a wrong kind by what is wanted instead.
+
+    Raises
+    ------
+    CampaignError
+        Naming the call, the type that was found, and what is expected.
+    """
+    if not isinstance(given, kinds):
+        raise CampaignError(call, "cannot take this", found=f"{type(given).__name__}", expected=expected)

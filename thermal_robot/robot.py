@@ -171,6 +171,9 @@ def load_robot(
         in the end itself, or if gravity is not three finite numbers.
     """
     text, source = _urdf_text(urdf)
+    for frame in (tool_frame, root_frame):
+        if frame is not None and not isinstance(frame, str):
+            raise RobotError(f"a frame is the name of a link, not {type(frame).__name__}")
     if not tool_frame:
         leaves = leaf_links(text, source)
         more = f" and {len(leaves) - _MOST_SHOWN} more" if len(leaves) > _MOST_SHOWN else ""

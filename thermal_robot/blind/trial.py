@@ -59,7 +59,7 @@ def run_trial(
     workers: int = 1,
     progress: Callable[[str, int, int], None] = lambda *_: None,
     sealed: Callable[[str], None] = lambda _: None,
-    timeout: float = 120.0,
+    timeout: float = 600.0,
 ) -> list[Plain]:
     """Run a trial, or go on with one that was stopped.
 

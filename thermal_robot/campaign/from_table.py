@@ -13,7 +13,7 @@ from thermal_robot.campaign.settings import MOVES, STANDARD_TEMPERATURE, Setting
 from thermal_robot.campaign.tabular import table_from_frame
 from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, Units
 from thermal_robot.campaign.validate import build_campaign
-from thermal_robot.errors import CampaignError
+from thermal_robot.errors import CampaignError, require
 from thermal_robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -77,6 +77,10 @@ def campaign_from_table(
     CampaignError
         As for a file, which is called ``<table>``.
     """
+    import pandas as pd
+
+    require("campaign_from_table(), robot", robot, (Robot,), "a robot, as load_robot gives it")
+    require("campaign_from_table(), table", table, (pd.DataFrame,), "a pandas DataFrame")
     _require_word("angle_unit", angle_unit, ANGLE_UNITS)
     _require_word("length_unit", length_unit, LENGTH_UNITS)
     _require_word("base", base, ("known", "unknown"))

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.declaration import FILE_NAME, check_gears, read_declaration
 from thermal_robot.campaign.settings import Settings
-from thermal_robot.campaign.tabular import read_table
+from thermal_robot.campaign.tabular import read_table, table_from_frame
 from thermal_robot.campaign.validate import build_campaign
-from thermal_robot.errors import RobotError
+from thermal_robot.errors import RobotError, require
 from thermal_robot.robot import Robot, load_robot
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 
 def read_campaign(path: str | Path) -> Campaign:
@@ -34,6 +38,7 @@ def read_campaign(path: str | Path) -> Campaign:
     RobotError
         A robot that cannot be loaded, or has no such frame.
     """
+    require("read_campaign()", path, (str, os.PathLike), f"the path of a {FILE_NAME}, or of its folder")
     declaration = read_declaration(Path(path))
     settings = declaration.settings
     try:
@@ -50,13 +55,15 @@ def read_campaign(path: str | Path) -> Campaign:
     return build_campaign(read_table(declaration.table), settings, robot, name=name)
 
 
-def read_samples(path: str | Path, settings: Settings | Campaign, robot: Robot | None = None) -> Campaign:
+def read_samples(
+    path: str | Path | pd.DataFrame, settings: Settings | Campaign, robot: Robot | None = None
+) -> Campaign:
     """Read a table of commands and conditions to predict.
 
     Parameters
     ----------
     path
-        CSV or Parquet, with the columns and units of the campaign. Measured columns are ignored.
+        CSV or Parquet, or the table itself, with the columns and units of the campaign. Measured columns are ignored.
     settings
         Of the campaign that the model was fitted to, or that campaign itself.
     robot
@@ -79,5 +86,10 @@ def read_samples(path: str | Path, settings: Settings | Campaign, robot: Robot |
         settings = settings.settings
     if robot is None:
         raise TypeError("read_samples() needs the robot when it is given settings instead of a campaign")
-    file = Path(path)
-    return build_campaign(read_table(file), settings, robot, name=file.stem, measured=False)
+    if isinstance(path, (str, os.PathLike)):
+        file = Path(path)
+        return build_campaign(read_table(file), settings, robot, name=file.stem, measured=False)
+    import pandas as pd
+
+    require("read_samples()", path, (pd.DataFrame,), "a table: its path, or a pandas DataFrame")
+    return build_campaign(table_from_frame(path), settings, robot, name="table", measured=False)

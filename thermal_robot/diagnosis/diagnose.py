@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import replace
 from pathlib import Path
@@ -28,7 +29,7 @@ from thermal_robot.diagnosis.unlisted import as_laws_say, one_more_law
 from thermal_robot.diagnosis.where import without_laws
 from thermal_robot.diagnosis.word import worth_their_word
 from thermal_robot.effects import RANDOM, Effect, choose, library
-from thermal_robot.errors import CampaignError
+from thermal_robot.errors import CampaignError, require
 from thermal_robot.inference import settings
 from thermal_robot.inference.discover import discovered
 from thermal_robot.inference.fit import Fit, fit
@@ -50,7 +51,7 @@ def diagnose(
     campaign
         A campaign, or the path of one.
     only, without
-        Names of effects to consider, or to leave out.
+        Names of effects to consider, or to leave out; one name may stand by itself.
     effects
         Effects of your own, considered beside those of the library.
     progress
@@ -70,10 +71,13 @@ def diagnose(
     EstimationError
         If there are too few measurements for the unknown frames.
     """
+    expected = "a campaign, or the path of one; campaign_from_table makes one of a DataFrame"
+    require("diagnose()", campaign, (Campaign, str, os.PathLike), expected)
+    require("diagnose(), effects", effects, (list, tuple), "a list of your own effects; names go to only")
+    only, without = _names("only", only), _names("without", without)
     if not isinstance(campaign, Campaign):
         progress("reading the campaign")
         campaign = read_campaign(campaign)
-    only, without = tuple(only), tuple(without)
     candidates = choose(only, without, effects)
     everything = {*library(), *(effect.name for effect in (*effects, *candidates))}
     _check_priors(campaign, everything)
@@ -96,6 +100,16 @@ def diagnose(
             notes=notes,
         )
     return told(found)
+
+
+def _names(argument: str, given: Iterable[str]) -> tuple[str, ...]:
+    if isinstance(given, str):
+        return (given,)
+    require(f"diagnose(), {argument}", given, (Iterable,), "names of effects")
+    names = tuple(given)
+    for name in names:
+        require(f"diagnose(), {argument}", name, (str,), "names of effects")
+    return names
 
 
 def _concluded(campaign: Campaign, candidates: Sequence[Effect], progress: Callable[[str], None]) -> Conclusion:
