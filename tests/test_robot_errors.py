@@ -1,11 +1,13 @@
 """What is said of a robot that cannot be used."""
 
+import os
 import re
 import sys
 
 import pytest
 from coupled import PARALLELOGRAM, joint, link
 
+from thermal_robot import CampaignError, CorrectedModel
 from thermal_robot.errors import RobotError
 from thermal_robot.robot import load_robot
 
@@ -201,3 +203,28 @@ def test_package_of_example_robots_is_missing(monkeypatch):
     error = refusal("example-robot-data:ur10", "tool0")
     assert 'pip install "thermal-robot[robots]"' in str(error)
     assert error.name == "ur10"
+
+
+@pytest.mark.skipif(not hasattr(os, "mkfifo"), reason="has no pipes as files")
+def test_what_is_no_file_is_not_read(tmp_path):
+    os.mkfifo(tmp_path / "pipe.urdf")
+    with pytest.raises(RobotError, match="' is a pipe or a device"):
+        load_robot(tmp_path / "pipe.urdf", "tool0")
+    with pytest.raises(RobotError, match="is a pipe or a device"):
+        load_robot("/dev/zero", "tool0")
+    with (tmp_path / "large.urdf").open("wb") as file:
+        file.truncate(65 << 20)
+    with pytest.raises(RobotError, match="larger than any URDF"):
+        load_robot(tmp_path / "large.urdf", "tool0")
+    with pytest.raises(CampaignError, match="expected a model file"):
+        CorrectedModel.load(tmp_path / "pipe.urdf")
+
+
+def test_thousands_of_joints_are_refused_at_once():
+    """Pinocchio takes 11 GB for 500, and ends the process at 1000."""
+    links = "".join(f"<link name='l{k}'/>" for k in range(5001))
+    joint = "<joint name='j{0}' type='continuous'><parent link='l{0}'/><child link='l{1}'/></joint>"
+    joints = "".join(joint.format(k, k + 1) for k in range(5000))
+    for tool in ("l5000", ""):
+        told = str(refusal(f"<robot name='r'>{links}{joints}</robot>", tool))
+        assert "has 5000 joints that move, expected at most 150" in told

@@ -222,6 +222,8 @@ class CorrectedModel:
             If it is not such a file.
         """
         require("load()", path, (str, os.PathLike), "the path of a file that save() wrote")
+        if Path(path).exists() and not Path(path).is_file():
+            raise CampaignError(str(path), "is a folder, a pipe or a device", expected="a model file")
         try:
             plain = json.loads(Path(path).read_text(encoding="utf-8"))
             found = plain.get("schema") if isinstance(plain, dict) else None

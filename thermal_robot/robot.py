@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics.model import SHORTEST_SEGMENT, Chain, build_chain_model, leaf_links
+from thermal_robot.kinematics.numbers import require_numbers
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -25,6 +26,7 @@ EXAMPLE_ROBOT_DATA = "example-robot-data:"
 _DESCRIPTION = "the robot description"
 
 _MOST_SHOWN = 12
+_LARGEST_FILE = 64 << 20  # bytes; a URDF is text about links, of a few kilobytes each
 """Names in one message; a humanoid has dozens of fingers."""
 
 # The table of example-robot-data sends this name to the loader of another robot (5.1 and before).
@@ -168,12 +170,14 @@ def load_robot(
     RobotError
         If there is no such file, name or link, if it is not a URDF, if the chain has no movable joint, or one
         that is not revolute, continuous, prismatic or fixed, if one of its joints mimics one that does not exist, or
-        in the end itself, or if gravity is not three finite numbers.
+        in the end itself, if gravity is not three finite numbers, or if a mass, an inertia, an origin, an axis or a
+        limit is no number, or one that no robot has.
     """
     text, source = _urdf_text(urdf)
     for frame in (tool_frame, root_frame):
         if frame is not None and not isinstance(frame, str):
             raise RobotError(f"a frame is the name of a link, not {type(frame).__name__}")
+    require_numbers(text, source)
     if not tool_frame:
         leaves = leaf_links(text, source)
         more = f" and {len(leaves) - _MOST_SHOWN} more" if len(leaves) > _MOST_SHOWN else ""
@@ -270,6 +274,11 @@ def _written(urdf: WritesUrdf) -> str:
 def _read(path: Path) -> tuple[str, str]:
     source = f"the robot file {str(path)!r}"
     try:
+        if path.exists() and not path.is_dir():
+            if not path.is_file():
+                raise RobotError(f"{source} is a pipe or a device, not a file", name=str(path))
+            if path.stat().st_size > _LARGEST_FILE:
+                raise RobotError(f"{source} is larger than any URDF ({_LARGEST_FILE >> 20} MiB)", name=str(path))
         return path.read_text(encoding="utf-8-sig", errors="replace").lstrip(), source
     except IsADirectoryError:
         problem = "is a folder, not a URDF file"
