@@ -20,10 +20,15 @@ def started(*arguments, **streams):
 def test_an_interrupt_is_one_line_and_leaves_no_file(tmp_path):
     os.mkfifo(tmp_path / "nobody-reads")  # who writes to it waits, if the interrupt comes late
     asked = ("diagnose", demo_directory(), "--json", tmp_path / "nobody-reads", "--model", tmp_path / "m.json")
-    with started(*asked, stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+    # who is started in the background ignores interrupts, and so would all that it starts
+    heeds = {"preexec_fn": lambda: signal.signal(signal.SIGINT, signal.SIG_DFL)}
+    with started(*asked, stdout=subprocess.PIPE, stderr=subprocess.PIPE, **heeds) as process:
         time.sleep(6.0)  # until it has loaded
         process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=60)
+        try:
+            out, err = process.communicate(timeout=60)
+        finally:
+            process.kill()
     assert process.returncode == 130
     assert err == "thermal-robot: interrupted; nothing was left half written\n"
     assert out == ""
