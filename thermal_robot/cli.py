@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import NoReturn
 
 from thermal_robot.errors import CampaignError, ThermalRobotError
-from thermal_robot.files import write_text
+from thermal_robot.files import require_free, write_one, write_text, written
 
 DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
 _STAGES = 14
@@ -141,7 +141,7 @@ def _demo(options: argparse.Namespace) -> None:
     print(f"The demo's campaign is simulated; its answer lies in {campaign / 'truth.json'}.\n")
     found = _diagnosis(campaign, (), ())
     print(found)
-    _write(options.report, lambda path: _page(found, path))
+    write_one(options.report, lambda path: _page(found, path))
     print(f"Drawn in {options.report}")
 
 
@@ -175,7 +175,7 @@ def _effects(options: argparse.Namespace) -> None:
 
 def _diagnose(options: argparse.Namespace) -> None:
     _take_back(options)
-    _require_free((options.json, options.model, options.report), _read_from(Path(options.campaign)))
+    require_free((options.json, options.model, options.report), _read_from(Path(options.campaign)))
     found = _diagnosis(Path(options.campaign), options.only, options.without)
     outputs: list[tuple[str | None, Callable[[Path], object]]] = [
         (None if options.json == "-" else options.json, found.to_json),
@@ -183,7 +183,7 @@ def _diagnose(options: argparse.Namespace) -> None:
         (options.model if found.usable else None, lambda path: found.model.save(path)),
     ]
     # files come first: who reads what is printed may stop early
-    failed = _written(outputs)
+    failed = written(outputs)
     if options.json == "-":
         import json
 
@@ -200,7 +200,7 @@ def _predict(options: argparse.Namespace) -> None:
     from thermal_robot.campaign import write_predictions
     from thermal_robot.correction import CorrectedModel
 
-    _require_free((options.output,), (options.model, options.samples))
+    require_free((options.output,), (options.model, options.samples))
     model = CorrectedModel.load(options.model)
     samples = model.samples(options.samples)
     if model.counts_anew(samples):
@@ -209,7 +209,7 @@ def _predict(options: argparse.Namespace) -> None:
             file=sys.stderr,
         )
     position, orientation = model.predict(samples)
-    _write(options.output, lambda path: write_predictions(path, position, orientation, model.settings.units))
+    write_one(options.output, lambda path: write_predictions(path, position, orientation, model.settings.units))
 
 
 def _paper(options: argparse.Namespace) -> None:
@@ -220,7 +220,7 @@ def _paper(options: argparse.Namespace) -> None:
     found = ledger(PaperInputs() if options.l5 is None else PaperInputs(l5=options.l5))
     written = json.dumps(found.to_dict(), indent=2, ensure_ascii=False, allow_nan=False)
     if options.json and options.json != "-":
-        _write(options.json, lambda path: write_text(path, written + "\n"))
+        write_one(options.json, lambda path: write_text(path, written + "\n"))
     print(written if options.json == "-" else found.markdown() if options.markdown else found.text())
 
 
@@ -253,39 +253,6 @@ def _read_from(campaign: Path) -> list[Path]:
     declaration = read_declaration(campaign)
     robot = [declaration.robot] if isinstance(declaration.robot, Path) else []
     return [declaration.file, declaration.table, *robot]
-
-
-def _require_free(targets: Sequence[str | None], inputs: Sequence[str | Path]) -> None:
-    """Refuse, before anything is computed, a file that could not be written, that is read from, or is named twice."""
-    read, written = {Path(file).resolve() for file in inputs}, set()
-    for target in targets:
-        if not target or target == "-":
-            continue
-        file = Path(target).resolve()
-        if not file.parent.is_dir() or file.is_dir():
-            raise CampaignError(target, "cannot be written", expected="a file in a folder that exists")
-        if file in read:
-            raise CampaignError(target, "is read from, and would be overwritten", expected="another file to write")
-        if file in written:
-            raise CampaignError(target, "is named for two outputs", expected="a file for each")
-        written.add(file)
-
-
-def _written(outputs: Sequence[tuple[str | None, Callable[[Path], object]]]) -> dict[str, str]:
-    """Write each output that was asked for, whatever becomes of the others; return what went wrong by file."""
-    failed = {}
-    for target, write in outputs:
-        try:
-            if target:
-                write(Path(target))
-        except OSError as error:
-            failed[target or ""] = error.strerror or str(error)
-    return failed
-
-
-def _write(target: str, write: Callable[[Path], object]) -> None:
-    for file, reason in _written([(target, write)]).items():
-        raise CampaignError(file, "cannot be written", found=reason)
 
 
 @contextmanager

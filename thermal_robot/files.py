@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import os
 import secrets
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
+
+from thermal_robot.errors import CampaignError
 
 _BESIDE = ".thermal-robot-"
 
@@ -77,6 +79,52 @@ def write_bytes(path: str | Path, content: bytes) -> None:
     """
     with whole(path) as place:
         place.write_bytes(content)
+
+
+def require_free(targets: Sequence[str | None], inputs: Sequence[str | Path] = ()) -> None:
+    """Refuse, before anything is computed, a file that could not be written, that is read from, or is named twice.
+
+    Raises
+    ------
+    CampaignError
+        Naming the file; none and ``-`` are no files.
+    """
+    read, taken = {Path(file).resolve() for file in inputs}, set()
+    for target in targets:
+        if not target or target == "-":
+            continue
+        file = Path(target).resolve()
+        if not file.parent.is_dir() or file.is_dir():
+            raise CampaignError(target, "cannot be written", expected="a file in a folder that exists")
+        if file in read:
+            raise CampaignError(target, "is read from, and would be overwritten", expected="another file to write")
+        if file in taken:
+            raise CampaignError(target, "is named for two outputs", expected="a file for each")
+        taken.add(file)
+
+
+def written(outputs: Sequence[tuple[str | None, Callable[[Path], object]]]) -> dict[str, str]:
+    """Write each output that was asked for, whatever becomes of the others; return what went wrong by file."""
+    failed = {}
+    for target, write in outputs:
+        try:
+            if target:
+                write(Path(target))
+        except OSError as error:
+            failed[target or ""] = error.strerror or str(error)
+    return failed
+
+
+def write_one(target: str, write: Callable[[Path], object]) -> None:
+    """Write one output.
+
+    Raises
+    ------
+    CampaignError
+        If it cannot be written.
+    """
+    for file, reason in written([(target, write)]).items():
+        raise CampaignError(file, "cannot be written", found=reason)
 
 
 def _flush(folder: Path) -> None:

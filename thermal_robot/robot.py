@@ -26,8 +26,9 @@ EXAMPLE_ROBOT_DATA = "example-robot-data:"
 _DESCRIPTION = "the robot description"
 
 _MOST_SHOWN = 12
-_LARGEST_FILE = 64 << 20  # bytes; a URDF is text about links, of a few kilobytes each
 """Names in one message; a humanoid has dozens of fingers."""
+_LARGEST_FILE = 64 << 20
+"""Bytes: a URDF is text about links, of a few kilobytes each."""
 
 # The table of example-robot-data sends this name to the loader of another robot (5.1 and before).
 _LOADER_BY_ITS_NAME = {"ur3": "UR3Loader"}

@@ -16,7 +16,7 @@ import numpy as np
 
 from thermal_robot.blind.cases import Case, Kind, RobotChoice
 from thermal_robot.errors import CampaignError, ThermalRobotError
-from thermal_robot.files import write_text
+from thermal_robot.files import require_free, write_one, write_text
 
 if TYPE_CHECKING:
     from thermal_robot.blind.trial import RealCase
@@ -74,8 +74,7 @@ def run(options: argparse.Namespace) -> None:
         If the options make no sense, or MuJoCo is missing.
     """
     _require_mujoco()
-    for target in (options.json, options.report):
-        _require_folder(target)
+    require_free((options.json, options.report))
     if options.workers < 1:
         raise ThermalRobotError("--workers must be at least 1")
     seed = int(time.time()) if options.seed is None else options.seed
@@ -124,9 +123,9 @@ def _tell(records: list[dict[str, Any]], options: argparse.Namespace) -> None:
     written = json.dumps(found, indent=2, ensure_ascii=False)
     print(written if options.json == "-" else markdown(found) if options.markdown else text(found))
     if options.json and options.json != "-":
-        _write(options.json, written + "\n")
+        write_one(options.json, lambda path: write_text(path, written + "\n"))
     if options.report:
-        _write(options.report, html(found, time.strftime("%Y-%m-%d %H:%M")))
+        write_one(options.report, lambda path: write_text(path, html(found, time.strftime("%Y-%m-%d %H:%M"))))
 
 
 def _cases(options: argparse.Namespace, seed: int, note: Callable[[str], None]) -> tuple[Case | RealCase, ...]:
@@ -212,19 +211,6 @@ def _require_mujoco() -> None:
 
     if find_spec("mujoco") is None:
         raise ThermalRobotError('the blind trial needs MuJoCo: pip install "thermal-robot[blind]"')
-
-
-def _require_folder(target: str | None) -> None:
-    """Refuse a file that could not be written before anything is computed."""
-    if target and target != "-" and (not Path(target).resolve().parent.is_dir() or Path(target).is_dir()):
-        raise CampaignError(target, "cannot be written", expected="a file in a folder that exists")
-
-
-def _write(target: str, text: str) -> None:
-    try:
-        write_text(target, text)
-    except OSError as error:
-        raise CampaignError(target, "cannot be written", found=error.strerror or str(error)) from None
 
 
 @contextmanager

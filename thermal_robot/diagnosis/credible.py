@@ -12,9 +12,10 @@ from thermal_robot.diagnosis.cancelling import cancelling
 from thermal_robot.diagnosis.one_walk import Model, Walk
 from thermal_robot.diagnosis.parts import Refused
 from thermal_robot.diagnosis.schemes import schemes
-from thermal_robot.effects.effect import UNSOURCED
+from thermal_robot.effects.effect import UNSOURCED, Array, Effect
 from thermal_robot.effects.law import PREFIX
 from thermal_robot.inference import settings
+from thermal_robot.inference.columns import Block
 from thermal_robot.inference.fit import Fit, less
 from thermal_robot.inference.rows import blocks
 
@@ -40,12 +41,10 @@ class Doubt:
 
 def outsized(fit: Fit) -> tuple[Doubt, ...]:
     """Return each parameter that is surely far outside a size that stands on sources, the farthest first."""
-    e, found = fit.explanation, []
-    for b, (effect, values) in zip(e.best.blocks, fit.effects, strict=True):
+    found = []
+    for effect, values, item, sure in surely(fit):
         if effect.size_spread >= UNSOURCED:
             continue
-        item, deviation = e.linear.blocks[b], np.sqrt(np.diag(e.values[b][1]))
-        sure = np.maximum(np.abs(values) - settings.SIGMAS_95 * deviation, 0.0) / item.sizes
         for k in np.flatnonzero(sure > settings.OUTSIDE):
             own, times = item.parameters[k], float(np.abs(values[k]) / item.sizes[k])
             words = (
@@ -53,6 +52,14 @@ def outsized(fit: Fit) -> tuple[Doubt, ...]:
             )
             found.append(Doubt((_part(effect.name, own.kind, own.place),), words, times))
     return tuple(sorted(found, key=lambda doubt: -doubt.times))
+
+
+def surely(fit: Fit) -> Iterator[tuple[Effect, Array, Block, Array]]:
+    """Yield each effect, its values, its columns, and how many expected sizes each value is at least, at 95 %."""
+    e = fit.explanation
+    for b, (effect, values) in zip(e.best.blocks, fit.effects, strict=True):
+        item, deviation = e.linear.blocks[b], np.sqrt(np.diag(e.values[b][1]))
+        yield effect, values, item, np.maximum(np.abs(values) - settings.SIGMAS_95 * deviation, 0.0) / item.sizes
 
 
 def _part(name: str, kind: str, place: str) -> tuple[str, str]:

@@ -85,8 +85,7 @@ def findings(
 
 def _of_law(fit: Fit, law: Discovered, block: int) -> dict[str, Any]:
     """Return the fields of a finding that only a law has: what it follows, in which shape, how far, and in words."""
-    e = fit.explanation
-    values = dict(zip(e.best.blocks, (v for _, v in fit.effects), strict=True))[block]
+    e, values = fit.explanation, _values(fit, block)
     return {
         "quantity": law.follows,
         "shape": law.shape,
@@ -100,8 +99,12 @@ def _of_law(fit: Fit, law: Discovered, block: int) -> dict[str, Any]:
 
 def _in_joints(fit: Fit, effect: Effect, block: int) -> tuple[Size, ...]:
     e = fit.explanation
-    values = dict(zip(e.best.blocks, (v for _, v in fit.effects), strict=True))[block]
-    return in_joints(effect.sized_as, e.linear.blocks[block].parameters, values, e.values[block][1])
+    return in_joints(effect.sized_as, e.linear.blocks[block].parameters, _values(fit, block), e.values[block][1])
+
+
+def _values(fit: Fit, block: int) -> Array:
+    """Return the values of one block of the best combination, as they were refined."""
+    return fit.effects[fit.explanation.best.blocks.index(block)][1]
 
 
 def titled(found: Sequence[Finding], effects: Iterable[Effect]) -> tuple[Finding, ...]:
@@ -125,7 +128,7 @@ def by_share(found: Sequence[Finding]) -> tuple[Finding, ...]:
 def _estimates(fit: Fit, block: int) -> tuple[Estimate, ...]:
     e = fit.explanation
     item = e.linear.blocks[block]
-    values = dict(zip(e.best.blocks, (v for _, v in fit.effects), strict=True))[block]
+    values = _values(fit, block)
     spread = np.sqrt(np.maximum(np.diag(e.values[block][1]), 0.0))
     prior = item.sizes * e.best.scales[block]
     result = []

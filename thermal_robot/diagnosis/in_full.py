@@ -12,7 +12,7 @@ from collections.abc import Callable
 import numpy as np
 
 from thermal_robot.diagnosis import settings as own
-from thermal_robot.diagnosis.credible import goes_astray
+from thermal_robot.diagnosis.credible import goes_astray, surely
 from thermal_robot.effects import Effect, gate
 from thermal_robot.inference import settings
 from thermal_robot.inference.fit import Fit, refit
@@ -35,7 +35,7 @@ def in_full(fit: Fit, progress: Callable[[str], None]) -> Fit:
     """
     if fit.campaign.samples > settings.RIPPLE_ROWS:
         return fit
-    for effect in _too_large(fit):
+    for effect in _uncommon(fit):
         fuller = gate.in_full(effect)
         if fuller is None:
             continue
@@ -47,13 +47,10 @@ def in_full(fit: Fit, progress: Callable[[str], None]) -> Fit:
     return fit
 
 
-def _too_large(fit: Fit) -> list[Effect]:
+def _uncommon(fit: Fit) -> list[Effect]:
     """Return the effects of which a parameter is surely beyond the size that nearly all robots have."""
-    e, found = fit.explanation, []
-    for b, (effect, values) in zip(e.best.blocks, fit.effects, strict=True):
-        deviation = np.sqrt(np.diag(e.values[b][1]))
-        sure = np.abs(values) - settings.SIGMAS_95 * deviation
-        common = np.exp(own.NEARLY_ALL * effect.size_spread) * e.linear.blocks[b].sizes
-        if effect.name in fit.variants and (sure > common).any():
-            found.append(effect)
-    return found
+    return [
+        effect
+        for effect, _, _, sure in surely(fit)
+        if effect.name in fit.variants and (sure > np.exp(own.NEARLY_ALL * effect.size_spread)).any()
+    ]
