@@ -25,6 +25,7 @@ ORDER = (
     "observations",
     "effects",
     "inference",
+    "prediction",
     "correction",
     "diagnosis",
     "datasets",

@@ -24,6 +24,7 @@ from thermal_robot.effects import RANDOM, library
 from thermal_robot.report import schema
 
 NOISE = 25e-6
+PLACE, STD = ["x", "y", "z"], ["std.x", "std.y", "std.z"]
 
 
 @pytest.fixture(scope="module")
@@ -173,24 +174,30 @@ def table(path):
 def test_predict_writes_the_same_rows_in_order_and_nothing_else(run, folder, diagnosed, tmp_path):
     model, out = diagnosed.model, tmp_path / "p.csv"
     assert run("predict", model, folder / "fresh.csv", "-o", out) == (0, "", "")
-    header, predicted = table(out)
-    assert header == ["x", "y", "z"]
+    own, written = (pd.read_csv(file, dtype=str) for file in (folder / "fresh.csv", out))
+    kept = [name for name in own.columns if name not in PLACE]
+    assert list(written.columns) == [*kept, *PLACE, *STD, "outside"]
+    pd.testing.assert_frame_equal(written[kept], own[kept])  # as they stand, to the last digit
+    predicted, std = (written[columns].to_numpy(float) for columns in (PLACE, STD))
     truth = np.loadtxt(folder / "fresh_truth_mm.txt")
     assert predicted.shape == truth.shape == (30, 3)
     assert np.sqrt(((predicted - truth) ** 2).mean()) < 0.5e3 * NOISE
+    assert (np.abs(predicted - truth) < 1.96 * std).mean() > 0.85
+    assert run("predict", "--noise", model, folder / "fresh.csv", "-o", out) == (0, "", "")
+    assert (pd.read_csv(out)[STD].to_numpy() > std).all()
     # the campaign's own table, measured columns and all, is as good a table of samples
     assert run("predict", model, folder / "measurements.csv", "--output", out)[0] == 0
-    header, predicted = table(out)
-    assert (header, len(predicted)) == (["x", "y", "z"], 120)
+    again = pd.read_csv(out)
+    assert [list(again.columns).count(name) for name in (*PLACE, *STD)] == [1] * 6
+    assert len(again) == 120
 
 
 def test_predict_writes_quaternions_for_poses(run, poses, diagnosed_poses, tmp_path):
     model, out = diagnosed_poses.model, tmp_path / "p.csv"
     assert run("predict", model, poses / "fresh.csv", "-o", out) == (0, "", "")
-    header, predicted = table(out)
-    assert header == ["x", "y", "z", "qw", "qx", "qy", "qz"]
+    predicted = pd.read_csv(out)
     assert len(predicted) == 30
-    np.testing.assert_allclose(np.linalg.norm(predicted[:, 3:], axis=1), 1.0, atol=1e-12)
+    np.testing.assert_allclose(np.linalg.norm(predicted[["qw", "qx", "qy", "qz"]], axis=1), 1.0, atol=1e-12)
 
 
 def test_units_of_the_campaign_are_units_of_its_prediction(run, folder, diagnosed, tmp_path):
@@ -203,7 +210,7 @@ def test_units_of_the_campaign_are_units_of_its_prediction(run, folder, diagnose
     places = []
     for where, model in ((folder, diagnosed.model), (tmp_path / "um", tmp_path / "m.json")):
         assert run("predict", model, where / "measurements.csv", "-o", tmp_path / "p.csv")[0] == 0
-        places.append(table(tmp_path / "p.csv")[1])
+        places.append(pd.read_csv(tmp_path / "p.csv")[[*PLACE, *STD]].to_numpy())
     np.testing.assert_allclose(places[1], 1e3 * places[0], rtol=0, atol=1e-2)
 
 
@@ -288,10 +295,10 @@ def test_an_output_that_fails_does_not_take_the_others_with_it(folder, tmp_path,
 def test_predict_writes_parquet_where_the_name_says_so(run, folder, diagnosed, tmp_path):
     for out in (tmp_path / "p.csv", tmp_path / "p.parquet"):
         assert run("predict", diagnosed.model, folder / "fresh.csv", "-o", out) == (0, "", "")
-    header, written = table(tmp_path / "p.csv")
+    written = pd.read_csv(tmp_path / "p.csv", float_precision="round_trip")
     frame = pd.read_parquet(tmp_path / "p.parquet")
-    assert list(frame.columns) == header
-    np.testing.assert_array_equal(frame.to_numpy(), written)
+    written["outside"] = written["outside"].fillna("").astype(frame["outside"].dtype)
+    pd.testing.assert_frame_equal(frame, written, check_dtype=False)
 
 
 @pytest.mark.parametrize("arguments", [[], ["diagnos"], ["diagnose"], ["predict", "m", "s"], ["check", "a", "b"]])

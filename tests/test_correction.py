@@ -241,7 +241,15 @@ def test_more_columns_than_the_campaign_had_change_no_prediction():
 def test_a_table_is_predicted_as_its_file_is(hall, tmp_path):
     _, model, fresh, _ = hall
     write_table(fresh, tmp_path / "fresh.csv")
-    of_file = model.predict(tmp_path / "fresh.csv")[0]
-    of_table = model.predict(pd.read_csv(tmp_path / "fresh.csv"))[0]
-    np.testing.assert_array_equal(of_table, of_file)
-    np.testing.assert_allclose(of_file, model.predict(fresh)[0], atol=1e-12)
+    of_file, of_rows = (model.prediction(rows) for rows in (tmp_path / "fresh.csv", fresh))
+    frame = pd.read_csv(tmp_path / "fresh.csv", index_col=None)
+    frame.index = np.arange(7, 7 + len(frame))
+    of_table = model.predict(frame)
+    scale = model.settings.units.length_scale
+    np.testing.assert_allclose(of_file.position, of_rows.position, atol=1e-12)
+    np.testing.assert_array_equal(of_table[["x", "y", "z"]], of_file.position / scale)
+    np.testing.assert_array_equal(of_table[["std.x", "std.y", "std.z"]], of_file.std / scale)
+    kept = [name for name in frame.columns if name not in ("x", "y", "z")]
+    assert list(of_table.columns) == [*kept, "x", "y", "z", "std.x", "std.y", "std.z", "outside"]
+    pd.testing.assert_frame_equal(of_table[kept], frame[kept])
+    np.testing.assert_array_equal(model.predict(tmp_path / "fresh.csv")[0], of_file.position)

@@ -124,6 +124,7 @@ def _predict_arguments(predict: argparse.ArgumentParser) -> None:
     predict.add_argument("model", help="file that `diagnose --model` wrote")
     predict.add_argument("samples", help="table with the campaign's columns and units")
     predict.add_argument("-o", "--output", metavar="F", required=True, help="table to write")
+    predict.add_argument("--noise", action="store_true", help="count the instrument's noise in std.x, std.y, std.z")
     predict.set_defaults(run=_predict)
 
 
@@ -197,7 +198,8 @@ def _diagnose(options: argparse.Namespace) -> None:
 
 
 def _predict(options: argparse.Namespace) -> None:
-    from thermal_robot.campaign import write_predictions
+    from thermal_robot.campaign import read_table, write_predictions
+    from thermal_robot.campaign.tabular import PARQUET
     from thermal_robot.correction import CorrectedModel
 
     require_free((options.output,), (options.model, options.samples))
@@ -208,8 +210,10 @@ def _predict(options: argparse.Namespace) -> None:
             f"thermal-robot: note: order in {options.samples} counts its own rows; predicted as after the campaign",
             file=sys.stderr,
         )
-    position, orientation = model.predict(samples)
-    write_one(options.output, lambda path: write_predictions(path, position, orientation, model.settings.units))
+    prediction = model.prediction(samples, noise=options.noise)
+    own = read_table(Path(options.samples)).frame(numbers=Path(options.output).suffix.lower() in PARQUET)
+    table = model.predicted(own, prediction)
+    write_one(options.output, lambda path: write_predictions(path, table))
 
 
 def _paper(options: argparse.Namespace) -> None:

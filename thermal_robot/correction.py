@@ -7,12 +7,12 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.campaign import Campaign, Settings, read_samples
+from thermal_robot.campaign import Campaign, Settings, read_samples, with_prediction
 from thermal_robot.effects import Effect, gate, library
 from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.law import PREFIX, Discovered
@@ -20,6 +20,7 @@ from thermal_robot.errors import CampaignError, EffectError, require
 from thermal_robot.files import write_text
 from thermal_robot.kinematics import rotation_to_quaternion
 from thermal_robot.observations import Frames, observe
+from thermal_robot.prediction import Prediction, Spread
 from thermal_robot.robot import Robot, load_robot
 
 if TYPE_CHECKING:
@@ -50,6 +51,8 @@ class CorrectedModel:
         Whether the nominal prediction is that of the user's own simulator (``sim.*``).
     last_order
         First and last ``order`` of the campaign, where it had that column.
+    spread
+        How far its predictions may be off; ``None`` where a file of version 0.2 does not say.
     """
 
     robot: Robot
@@ -60,8 +63,13 @@ class CorrectedModel:
     needs: tuple[str, ...] = ()
     simulated: bool = False
     last_order: tuple[float, float] | None = None
+    spread: Spread | None = None
 
-    def predict(self, samples: Campaign | str | Path | pd.DataFrame) -> tuple[Array, Array | None]:
+    @overload
+    def predict(self, samples: Campaign | str | Path) -> tuple[Array, Array | None]: ...
+    @overload
+    def predict(self, samples: pd.DataFrame) -> pd.DataFrame: ...
+    def predict(self, samples: Campaign | str | Path | pd.DataFrame) -> tuple[Array, Array | None] | pd.DataFrame:
         """Predict what the instrument would measure.
 
         Parameters
@@ -77,10 +85,49 @@ class CorrectedModel:
         orientation
             (N, 4) quaternions wxyz; ``None`` where the campaign measured positions only.
 
+        A data frame is answered by a data frame: see :meth:`predicted`.
+
         Raises
         ------
         CampaignError
             If a column that the model needs is missing or has an empty cell; the error names it.
+        """
+        if isinstance(samples, (Campaign, str, os.PathLike)):
+            return self.prediction(samples)[:2]
+        return self.predicted(samples, self.prediction(samples))
+
+    def predicted(self, samples: pd.DataFrame, prediction: Prediction) -> pd.DataFrame:
+        """Return the samples with what is predicted of them, in the units of the campaign.
+
+        Parameters
+        ----------
+        samples
+            Their own columns are kept as they stand, but for those of measurements.
+        prediction
+            Of them.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Then x y z, qw qx qy qz where the campaign measured orientation, std.x std.y std.z, and in ``outside`` the
+            columns in which the row leaves what was measured, separated by blanks.
+        """
+        return with_prediction(samples, *prediction, self.settings.units)
+
+    def prediction(self, samples: Campaign | str | Path | pd.DataFrame, *, noise: bool = False) -> Prediction:
+        """Predict what the instrument would measure, and how far that may be off.
+
+        Parameters
+        ----------
+        samples
+            As for :meth:`predict`.
+        noise
+            Whether the standard deviations hold the instrument's noise: what a measurement differs by, not the target.
+
+        Raises
+        ------
+        CampaignError
+            As :meth:`predict`.
         """
         if not isinstance(samples, Campaign):
             samples = self.samples(samples)
@@ -92,9 +139,12 @@ class CorrectedModel:
         moved, instrument = displacement(nominal, self.effects)
         corrected = observe(samples, self.frames, displacement=moved)
         position = corrected.predicted_position + (0.0 if instrument is None else instrument)
-        if self.measures != "pose":
-            return position, None
-        return position, rotation_to_quaternion(self.frames.base[:3, :3] @ corrected.rotation)
+        turned = self.measures == "pose"
+        orientation = rotation_to_quaternion(self.frames.base[:3, :3] @ corrected.rotation) if turned else None
+        if self.spread is None:
+            return Prediction(position, orientation, np.full_like(position, np.nan), ((),) * len(position))
+        std = self.spread.std(corrected, self.effects, noise)
+        return Prediction(position, orientation, std, self.spread.outside(samples))
 
     def counts_anew(self, samples: Campaign) -> bool:
         """Tell whether the ``order`` of the samples merely numbers the rows of their own file.
@@ -170,6 +220,7 @@ class CorrectedModel:
             "needs": list(self.needs),
             "simulated": self.simulated,
             "last_order": self.last_order,
+            "spread": None if self.spread is None else self.spread.to_dict(),
         }
 
     @classmethod
@@ -206,6 +257,7 @@ class CorrectedModel:
             tuple(plain["needs"]),
             bool(plain["simulated"]),
             tuple(plain["last_order"]) if plain["last_order"] else None,
+            Spread.from_dict(plain["spread"]) if plain.get("spread") else None,
         )
 
     def save(self, path: str | Path) -> None:

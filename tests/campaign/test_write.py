@@ -14,6 +14,7 @@ from thermal_robot.campaign import (
     Units,
     read_campaign,
     read_samples,
+    with_prediction,
     write_campaign,
     write_predictions,
     write_table,
@@ -52,21 +53,35 @@ def test_samples_are_no_campaign_but_have_a_table(tmp_path: Path) -> None:
     np.testing.assert_allclose(again.q, samples.q, rtol=1e-12)
 
 
-def test_predictions(tmp_path: Path) -> None:
-    file = tmp_path / "predicted.csv"
-    write_predictions(file, [[1.0, 0.1, -0.25], [0, 0, 1]], None, Units("rad", "mm"))
-    frame = pd.read_csv(file)
-    assert list(frame.columns) == ["x", "y", "z"]
-    np.testing.assert_allclose(frame, [[1000, 100, -250], [0, 0, 1000]], rtol=1e-15)
-    write_predictions(file, [[1.0, 0.1, -0.25]], [[1, 0, 0, 0]], Units("rad", "um"))
-    frame = pd.read_csv(file)
-    assert list(frame.columns) == ["x", "y", "z", "qw", "qx", "qy", "qz"]
-    np.testing.assert_allclose(frame, [[1e6, 1e5, -2.5e5, 1, 0, 0, 0]], rtol=1e-15)
+def predicted(positions, orientations=None, units=None, outside=(), samples=None):
+    rows = len(positions)
+    frame = pd.DataFrame({"joint_1": np.arange(rows)}) if samples is None else samples
+    return with_prediction(
+        frame, positions, orientations, np.full((rows, 3), 1e-5), outside or [()] * rows, units or Units()
+    )
+
+
+@pytest.mark.parametrize("ending", ["csv", "parquet"])
+def test_predictions(tmp_path: Path, ending: str) -> None:
+    file, read = tmp_path / f"predicted.{ending}", pd.read_csv if ending == "csv" else pd.read_parquet
+    samples = pd.DataFrame({"joint_1": ["0.10", "0.2"], "x": [9.0, 9.0], "note": ["a", "b, c"], " qw ": [1, 1]})
+    outside = [(), ("joint_1", "payload")]
+    write_predictions(file, predicted([[1.0, 0.1, -0.25], [0, 0, 1]], None, Units("rad", "mm"), outside, samples))
+    frame = read(file)
+    assert list(frame.columns) == ["joint_1", "note", "x", "y", "z", "std.x", "std.y", "std.z", "outside"]
+    np.testing.assert_allclose(frame[["x", "y", "z"]], [[1000, 100, -250], [0, 0, 1000]], rtol=1e-15)
+    np.testing.assert_allclose(frame[["std.x", "std.y", "std.z"]], 0.01, rtol=1e-15)
+    assert frame["note"].tolist() == ["a", "b, c"]
+    assert frame["outside"].fillna("").tolist() == ["", "joint_1 payload"]
+    write_predictions(file, predicted([[1.0, 0.1, -0.25]], [[1, 0, 0, 0]], Units("rad", "um")))
+    frame = read(file)
+    assert list(frame.columns)[1:8] == ["x", "y", "z", "qw", "qx", "qy", "qz"]
+    np.testing.assert_allclose(frame.iloc[:, 1:8], [[1e6, 1e5, -2.5e5, 1, 0, 0, 0]], rtol=1e-15)
 
 
 def test_a_place_that_cannot_be_written(tmp_path: Path) -> None:
     with pytest.raises(CampaignError, match="cannot be written: No such file or directory"):
-        write_predictions(tmp_path / "nowhere" / "p.csv", [[0, 0, 0]], None, Units())
+        write_predictions(tmp_path / "nowhere" / "p.csv", predicted([[0, 0, 0]]))
     (tmp_path / "taken").write_text("")
     with pytest.raises(CampaignError, match="cannot be written"):
         write_campaign(full(tmp_path / "c"), tmp_path / "taken")
@@ -85,5 +100,6 @@ def test_a_second_copy_is_the_first_to_the_last_letter(tmp_path: Path) -> None:
 
 def test_predictions_keep_every_digit(tmp_path: Path) -> None:
     positions = np.random.default_rng(4).normal(size=(50, 3))
-    write_predictions(tmp_path / "p.csv", positions, None, Units())
-    np.testing.assert_array_equal(np.loadtxt(tmp_path / "p.csv", delimiter=",", skiprows=1), positions)
+    write_predictions(tmp_path / "p.csv", predicted(positions))
+    again = pd.read_csv(tmp_path / "p.csv", float_precision="round_trip")
+    np.testing.assert_array_equal(again[["x", "y", "z"]], positions)

@@ -5,8 +5,14 @@ from thermal_robot.campaign.describe import describe
 from thermal_robot.campaign.from_table import campaign_from_table
 from thermal_robot.campaign.read import read_campaign, read_samples
 from thermal_robot.campaign.settings import Settings
+from thermal_robot.campaign.tabular import read_table
 from thermal_robot.campaign.units import Units, unit_of
-from thermal_robot.campaign.write import write_campaign, write_predictions, write_table
+from thermal_robot.campaign.write import (
+    with_prediction,
+    write_campaign,
+    write_predictions,
+    write_table,
+)
 
 __all__ = [
     "Campaign",
@@ -16,7 +22,9 @@ __all__ = [
     "describe",
     "read_campaign",
     "read_samples",
+    "read_table",
     "unit_of",
+    "with_prediction",
     "write_campaign",
     "write_predictions",
     "write_table",

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.errors import CampaignError
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 Cells: TypeAlias = "Sequence[str] | NDArray[np.float64]"
 """A column: text as it stands in the file, or numbers where the source has a type of its own."""
@@ -80,6 +83,20 @@ class Table:
         if isinstance(cells, np.ndarray):
             return ["" if np.isnan(value) else f"{value:.15g}" for value in cells]
         return ["" if cell.lower() in _EMPTY else cell for cell in cells]
+
+    def frame(self, *, numbers: bool = False) -> pd.DataFrame:
+        """Return the table as a data frame: cells as they stand, or ``numbers`` where a column has nothing else.
+
+        Decimal commas become numbers in any case.
+        """
+        import pandas as pd
+
+        if not (numbers or self.decimal_comma):
+            return pd.DataFrame(dict(self.columns))
+        plain = {name for name in self.columns if self.first_text(name) is None}
+        return pd.DataFrame(
+            {n: self.numbers(n, gaps=True) if n in plain else cells for n, cells in self.columns.items()}
+        )
 
     def first_text(self, column: str) -> int | None:
         """Return the index of the first cell that is not a number, ``None`` for a numeric column."""

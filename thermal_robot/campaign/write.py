@@ -5,7 +5,7 @@ from __future__ import annotations
 import csv
 from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +17,9 @@ from thermal_robot.campaign.tabular import NO_PARQUET, PARQUET, WITH_PARQUET
 from thermal_robot.campaign.units import Units, covariate_scale
 from thermal_robot.errors import CampaignError
 from thermal_robot.files import whole, write_text
+
+if TYPE_CHECKING:
+    import pandas as pd
 
 TABLE_NAME = "measurements.csv"
 ROBOT_NAME = "robot.urdf"
@@ -74,34 +77,57 @@ def write_table(campaign: Campaign, path: str | Path) -> None:
     _write_csv(Path(path), columns, data)
 
 
-def write_predictions(path: str | Path, positions: ArrayLike, orientations: ArrayLike | None, units: Units) -> None:
-    """Write predicted poses, as CSV or, by its ending, as Parquet: x y z, and qw qx qy qz if given, only.
+def with_prediction(
+    samples: pd.DataFrame,
+    position: ArrayLike,
+    orientation: ArrayLike | None,
+    std: ArrayLike,
+    outside: Sequence[Sequence[str]],
+    units: Units,
+) -> pd.DataFrame:
+    """Return samples with what is predicted of them.
 
     Parameters
     ----------
-    path
-        File to write.
-    positions
-        (N, 3) m.
-    orientations
+    samples
+        N rows; their columns are kept as they stand, but for those of what is predicted.
+    position, std
+        (N, 3) m: of the target, and one standard deviation per axis.
+    orientation
         (N, 4) unit quaternions wxyz, or ``None``.
+    outside
+        Per row: names of the columns in which it leaves what was measured.
     units
-        The positions are written in their length unit.
+        Lengths are given in their length unit.
+    """
+    groups: list[tuple[Sequence[str], Any]] = [(names.POSITION, np.asarray(position) / units.length_scale)]
+    if orientation is not None:
+        groups.append((names.ORIENTATION, np.asarray(orientation)))
+    groups.append((names.STD, np.asarray(std) / units.length_scale))
+    predicted = {name: column for group, values in groups for name, column in zip(group, values.T, strict=True)}
+    predicted[names.OUTSIDE] = [" ".join(columns) for columns in outside]
+    taken = {*names.POSITION, *names.ORIENTATION, *predicted}
+    return samples[[name for name in samples.columns if str(name).strip() not in taken]].assign(**predicted)
+
+
+def write_predictions(path: str | Path, predictions: pd.DataFrame) -> None:
+    """Write what :func:`with_prediction` returns, as CSV with all digits or, by its ending, as Parquet.
 
     Raises
     ------
     CampaignError
         A file that cannot be written, or Parquet without pyarrow.
     """
-    values = np.asarray(positions, dtype=np.float64).reshape(-1, 3) / units.length_scale
-    columns: tuple[str, ...] = names.POSITION
-    if orientations is not None:
-        values = np.hstack([values, np.asarray(orientations, dtype=np.float64).reshape(-1, 4)])
-        columns += names.ORIENTATION
-    if Path(path).suffix.lower() in PARQUET:
-        _write_parquet(Path(path), dict(zip(columns, values.T, strict=True)))
-    else:
-        _write_csv(Path(path), columns, [[repr(float(value)) for value in column] for column in values.T])
+    try:
+        with whole(path) as place:
+            if Path(path).suffix.lower() in PARQUET:
+                predictions.to_parquet(place, index=False)
+            else:
+                predictions.to_csv(place, index=False, lineterminator="\n")
+    except ImportError as error:
+        raise CampaignError(str(path), NO_PARQUET, expected=WITH_PARQUET) from error
+    except OSError as error:
+        raise CampaignError(str(path), f"cannot be written: {error.strerror}") from error
 
 
 def _columns(campaign: Campaign) -> Iterator[tuple[str, np.ndarray[Any, np.dtype[np.float64]]]]:
@@ -127,18 +153,6 @@ def _write_csv(path: Path, columns: Sequence[str], data: Sequence[Sequence[str]]
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow(columns)
             writer.writerows(zip(*data, strict=True))
-    except OSError as error:
-        raise CampaignError(str(path), f"cannot be written: {error.strerror}") from error
-
-
-def _write_parquet(path: Path, columns: dict[str, Any]) -> None:
-    import pandas as pd
-
-    try:
-        with whole(path) as place:
-            pd.DataFrame(columns).to_parquet(place, index=False)
-    except ImportError as error:
-        raise CampaignError(str(path), NO_PARQUET, expected=WITH_PARQUET) from error
     except OSError as error:
         raise CampaignError(str(path), f"cannot be written: {error.strerror}") from error
 

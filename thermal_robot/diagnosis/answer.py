@@ -15,6 +15,7 @@ from thermal_robot.diagnosis.findings import by_share, findings, separates, titl
 from thermal_robot.diagnosis.held_out import Shrinkage
 from thermal_robot.diagnosis.numbered import numbered
 from thermal_robot.diagnosis.parts import Gap, Misfit, Refused, Rows, Unexplained
+from thermal_robot.diagnosis.predictive import spread
 from thermal_robot.diagnosis.random_findings import random_findings
 from thermal_robot.diagnosis.result import Diagnosis
 from thermal_robot.diagnosis.schemes import hardest, worst_folds
@@ -113,7 +114,7 @@ def answer(
         verdict=(*(f.name for f in found if f.name in held), *(f.name for f in chance if f.status == "found")),
         probability=probability,
         separates=groups,
-        model=_model(fit),
+        model=_model(last),
         rows=_rows(fit, shrinkage),
         warnings=(*campaign.warnings, *notes, *cautions(fit, last.refused, sensitivity)),
         sensitivity=sensitivity,
@@ -154,9 +155,9 @@ def _gap(last: Conclusion, shrinkage: Shrinkage) -> Gap:
     )
 
 
-def _model(fit: Fit) -> CorrectedModel:
-    campaign = fit.campaign
-    needs = [column for effect, _ in fit.effects for column in gate.reads(effect, fit.nominal)]
+def _model(last: Conclusion) -> CorrectedModel:
+    fit, campaign = last.fit, last.fit.campaign
+    needs = tuple(dict.fromkeys(c for effect, _ in fit.effects for c in gate.reads(effect, fit.nominal)))
     clock = campaign.covariates.get("order")
     return CorrectedModel(
         robot=campaign.robot,
@@ -164,9 +165,10 @@ def _model(fit: Fit) -> CorrectedModel:
         frames=fit.corrected.frames,
         effects=fit.effects,
         measures=campaign.measures,
-        needs=tuple(dict.fromkeys(needs)),
+        needs=needs,
         simulated=campaign.simulated_position is not None,
         last_order=None if clock is None else (float(clock.min()), float(clock.max())),
+        spread=None if last.misfit else spread(fit, needs, last.left.floor),
     )
 
 

@@ -25,8 +25,9 @@ Register it under the entry point group ``thermal_robot.effects`` or pass it to 
 others want to know of it stands in the same class, each with a default: ``title`` (in plain words), ``size_spread``
 (how well its sizes are known), ``frame`` and ``contained_in`` (what it cannot be told from), ``missing`` and ``reads``
 (columns), ``variants``, ``nearby`` and ``in_full`` (settings), ``driver`` (what it is drawn against), ``sized_as``
-(whether what it does in each joint is told). Every effect has the arguments ``places`` and ``excluded`` besides its
-own: only the parameters in these joints or links, or not in those, are kept, by the gate.
+(whether what it does in each joint is told), ``fading`` (where it is not known to go on). Every effect has the
+arguments ``places`` and ``excluded`` besides its own: only the parameters in these joints or links, or not in those,
+are kept, by the gate.
 
 Nobody asks an effect directly: :mod:`thermal_robot.effects.gate` does, checks the answer, and names the effect where it
 breaks the contract or raises.
@@ -273,6 +274,13 @@ class Effect(ABC):
         -------
         Driver or None
             ``None`` where no quantity can be named: the one that goes with the error most is then drawn.
+        """
+        return None
+
+    def fading(self, observations: Observations) -> Array | None:
+        """Return (N,) what part of the effect its responses hold; ``None`` where they hold all of it.
+
+        Less than one in rows where nobody knows whether it goes on as where it was found.
         """
         return None
 

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.campaign.units import SI
-from thermal_robot.effects import gate
+from thermal_robot.effects import gate, settings
 from thermal_robot.effects.catalogue import restored
 from thermal_robot.effects.effect import (
     TWIST,
@@ -203,14 +203,43 @@ class Discovered(Effect):
         values = self._followed(observations)
         if values is None:
             return None
+        if SHAPES[self.shape].runs_on:
+            values = np.clip(values, *self._range)
         functions, labels = self.functions(values)
+        left = self.fading(observations)
+        if left is not None:
+            functions = functions * left[:, None]
         if not self.by or self.shape == "product":
             return functions, labels
         second = quantity(observations, self.by)
         if second is None:
             return None
-        v = (second - self.by_origin) / self.by_span
+        v = np.clip((second - self.by_origin) / self.by_span, 0.0, 1.0)
         return np.column_stack([functions, functions * v[:, None]]), (*labels, *(f"{n}, × {self.by}" for n in labels))
+
+    @property
+    def _range(self) -> tuple[float, float]:
+        """Least and largest value of what the shape is of where the law was found."""
+        return (-self.span, self.span) if self.shape == "product" else (self.origin, self.origin + self.span)
+
+    def fading(self, observations: Observations) -> Array | None:
+        """Return (N,) how much of the law is left; ``None`` where its shape ends by itself.
+
+        All of it where it was found. Beyond, where it would run on and nobody knows that it does, it keeps the value of
+        the edge, and of that ever less: a normal process with no mean falls back to zero so. The clock is another
+        matter: what has changed by the end of the campaign stays.
+        """
+        if not SHAPES[self.shape].runs_on:
+            return None
+        reads = [(self.quantity, self.values(observations), *self._range)]
+        if self.by and self.shape != "product":
+            reads.append((self.by, quantity(observations, self.by), self.by_origin, self.by_origin + self.by_span))
+        left = np.ones(observations.campaign.samples)
+        for name, values, low, high in reads:
+            if values is not None and name not in CLOCK:
+                beyond = (values - np.clip(values, low, high)) / (settings.FADES * ((high - low) or 1.0))
+                left *= np.exp(-0.5 * beyond**2)
+        return np.maximum(left, settings.FADED)
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """Return one parameter a function and component; rad or m, or the unit of the effect in the law."""

@@ -19,3 +19,11 @@ GRAVITY_READS_TO = 5e-3
 """Of gravity's direction: a load that shifts by less moves an arm that bends by 2 mm no more than 10 µm."""
 TWIN = 0.01
 """Of the spread of a quantity: another reading of it that differs by less is its twin."""
+FADES = 0.5
+"""Of the range in which a law was found: so far beyond it the law has e^−½ of its size. A law with five knots turns
+within a quarter of its range, so that half a range away next to nothing of it is known."""
+FADED = 1e-6
+"""Of a law's size, that is left of it at least: next to nothing, and still a number to divide by."""
+BESIDE = 0.02
+"""Of the range that was measured: a row that leaves it by less is not called outside. A hundred rows of a range leave a
+hundredth of it open at either end, and the next one of them falls there now and then."""

@@ -1,0 +1,35 @@
+"""Of fresh rows, 95 % lie within 1.96 of the deviations that a model tells, on simulated and on real robots."""
+
+import os
+
+import numpy as np
+import pytest
+from simulate import simulate
+
+from thermal_robot import diagnose
+
+DATA = os.environ.get("THERMAL_ROBOT_DATA")
+
+NOISE = 25e-6
+MIXTURES = (["joint_offset"], ["thermal_elongation"], ["joint_compliance"], ["transmission_error"], ["geometric"], [])
+
+
+def within(prediction, measured):
+    return np.abs(measured - prediction.position) < 1.96 * prediction.std
+
+
+@pytest.mark.slow
+def test_fresh_rows_of_simulated_robots():
+    """Over cases and rows together, with the instrument's noise and without."""
+    noisy, clean, rng = [], [], np.random.default_rng(20)
+    for robot in ():
+        for seed, effects in enumerate(MIXTURES):
+            for samples in (60, 150):
+                campaign, _, (fresh, place) = simulate(robot, effects, samples=samples, seed=40 + seed, fresh=200)
+                model = diagnose(campaign).model
+                measured = place + rng.normal(scale=NOISE, size=place.shape)
+                noisy.append(within(model.prediction(fresh, noise=True), measured).mean())
+                clean.append(within(model.prediction(fresh), place).mean())
+    assert 0.93 < np.mean(noisy) < 0.97, noisy
+    assert 0.90 < np.mean(clean), clean
+    assert min(noisy) > 0.80, noisy

@@ -1,0 +1,100 @@
+"""How far a prediction may be off: against refits with fresh noise, and beyond what was measured."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from simulate import simulate
+
+from thermal_robot import CorrectedModel, diagnose
+from thermal_robot.inference.columns import block
+from thermal_robot.observations import observe
+from thermal_robot.prediction import Spread, sensitivity
+
+NOISE = 25e-6
+
+
+@pytest.fixture(scope="module")
+def warm(rv_m2):
+    campaign, _, (fresh, place) = simulate(rv_m2, ["thermal_elongation"], seed=3, fresh=200)
+    return campaign, diagnose(campaign, only="thermal_elongation"), fresh, place
+
+
+def test_a_step_of_frames_and_parameters_moves_the_prediction_as_its_columns_say(warm):
+    campaign, found, _, _ = warm
+    ((effect, values),) = found.model.effects
+    model = replace(found.model, spread=None)
+    moved = sensitivity(found.fit.corrected, [effect])[:, :, -len(values) :]
+    for p, size in enumerate(block(found.fit.corrected, effect).sizes):
+        step = np.zeros(len(values))
+        step[p] = 1e-3 * size
+        there, here = (replace(model, effects=((effect, v),)).predict(campaign)[0] for v in (values + step, values))
+        np.testing.assert_allclose((there - here) / step[p], moved[:, :, p], rtol=0, atol=2e-3 * np.abs(moved).max())
+
+
+def test_deviations_are_those_of_refits_with_fresh_noise(warm):
+    """The spread of many fits to the same robot, each with noise of its own, is what one of them says of itself."""
+    campaign, found, fresh, _ = warm
+    rng = np.random.default_rng(8)
+    exact = found.model.predict(campaign)[0]
+    predicted = []
+    for _ in range(12):
+        again = replace(campaign, position=exact + rng.normal(scale=NOISE, size=exact.shape))
+        predicted.append(diagnose(again, only="thermal_elongation").model.predict(fresh)[0])
+    spread = np.std(predicted, axis=0, ddof=1)
+    plain = replace(found.model, spread=replace(found.model.spread, beyond=np.zeros(3)))
+    told = plain.prediction(fresh).std
+    assert 0.85 < np.sqrt((spread**2).mean() / (told**2).mean()) < 1.15
+
+
+def test_noise_is_counted_where_it_is_asked_for(warm):
+    _, found, fresh, _ = warm
+    spread = found.model.spread
+    less, more = (found.model.prediction(fresh, noise=noise).std for noise in (False, True))
+    np.testing.assert_allclose(more**2 - less**2, np.broadcast_to(spread.noise**2, less.shape), rtol=1e-9)
+    assert np.sqrt((spread.noise**2 + spread.beyond**2).mean()) == pytest.approx(NOISE, rel=0.25)
+
+
+def test_a_row_outside_what_was_measured_is_marked_and_less_sure(warm):
+    campaign, found, fresh, _ = warm
+    hot = {**fresh.covariates, "temperature": np.full(fresh.samples, campaign.covariates["temperature"].max() + 30.0)}
+    q = fresh.q.copy()
+    q[:, 1] = campaign.q[:, 1].max() + np.linspace(0.0, 0.5, fresh.samples)
+    inside, warmer = found.model.prediction(fresh), found.model.prediction(replace(fresh, covariates=hot))
+    farther = found.model.prediction(replace(fresh, q=q))
+    assert np.mean([not names for names in inside.outside]) > 0.9
+    assert all("temperature" in names for names in warmer.outside)
+    assert farther.outside[0] in ((), *inside.outside)
+    assert all("joint_2" in names for names in farther.outside[20:])
+    assert (warmer.std.mean(axis=1) > 1.5 * inside.std.mean(axis=1)).mean() > 0.95
+
+
+def test_a_column_that_is_not_read_does_not_mark(warm):
+    campaign, found, fresh, _ = warm
+    heavy = {**fresh.covariates, "payload": np.full(fresh.samples, 99.0)}
+    prediction = found.model.prediction(replace(fresh, covariates=heavy))
+    assert not any("payload" in names for names in prediction.outside)
+    assert set(found.model.spread.ranges) == {*campaign.robot.joint_names, "temperature"}
+
+
+def test_a_saved_model_is_as_sure(warm, tmp_path):
+    _, found, fresh, _ = warm
+    found.model.save(tmp_path / "model.json")
+    again = CorrectedModel.load(tmp_path / "model.json").prediction(fresh, noise=True)
+    whole = found.model.prediction(fresh, noise=True)
+    np.testing.assert_allclose(again.std, whole.std, rtol=1e-9)
+    assert again.outside == whole.outside
+
+
+def test_who_takes_effects_out_is_told_no_deviation(warm):
+    _, found, fresh, _ = warm
+    assert np.isnan(replace(found.model, effects=(), needs=()).prediction(fresh).std).all()
+    assert np.isnan(replace(found.model, spread=None).prediction(fresh).std).all()
+
+
+def test_numbers_survive_json(warm):
+    _, found, _, _ = warm
+    again = Spread.from_dict(found.model.spread.to_dict())
+    np.testing.assert_array_equal(again.covariance, found.model.spread.covariance)
+    assert again.ranges == found.model.spread.ranges
+    assert observe(warm[0], found.model.frames).gap.shape == (warm[0].samples, 3)

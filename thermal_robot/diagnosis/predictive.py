@@ -1,0 +1,97 @@
+"""How far predictions of fresh rows are off: by the parameters' covariance, and by what rows held out say beside it.
+
+The prediction is linear in the errors of frames and parameters, e = J (θ̂ − θ) + δ + n. The first has the variance
+J C Jᵀ with C the posterior covariance of all of them together; where the rows have a smooth discrepancy in common,
+C is the sandwich of :mod:`thermal_robot.diagnosis.deviations`. What neither frames nor effects tell, δ, and the
+instrument's noise n are measured on rows held out, as the size t for which 95 % of them lie within 1.96 √(J C Jᵀ + t²)
+(split conformal prediction: Lei et al., *J. Am. Stat. Assoc.* 113, 2018): a normal law is not assumed of them.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.diagnosis.one_walk import Model, Walk
+from thermal_robot.diagnosis.settings import LOOSE
+from thermal_robot.inference import settings
+from thermal_robot.inference.discrepancy import Spectrum
+from thermal_robot.inference.fit import Fit
+from thermal_robot.inference.problem import whitened
+from thermal_robot.inference.rows import blocks, each
+from thermal_robot.prediction import Spread, by_parameters, moves
+
+Array = NDArray[np.float64]
+
+
+def spread(fit: Fit, needs: tuple[str, ...], floor: float) -> Spread:
+    """Return what makes the predictions of a fit uncertain.
+
+    Parameters
+    ----------
+    fit
+        The fit whose model predicts.
+    needs
+        Columns that it reads.
+    floor
+        One sigma per axis of the noise where the campaign states none, m.
+    """
+    campaign, model = fit.campaign, Model.of(fit.explanation, blocks(fit.campaign))
+    covariance = _covariance(fit, model)
+    left, rows = _held_out(fit, model)
+    told = by_parameters(fit.corrected, [effect for effect, _ in fit.effects], covariance)[rows]
+    total = _size(left, told, ~fit.explanation.outliers[rows])
+    noise = np.full(3, campaign.noise_position or floor)
+    values = {name: campaign.q[:, j] for j, name in enumerate(campaign.robot.joint_names)}
+    values.update({name: campaign.covariates[name] for name in needs if name in campaign.covariates})
+    ranges = {name: (float(v.min()), float(v.max())) for name, v in values.items()}
+    beyond = np.sqrt(np.maximum(total**2 - noise**2, 0.0))
+    return Spread(covariance, beyond, np.sqrt(np.maximum(total**2 - beyond**2, 0.0)), ranges)
+
+
+def _covariance(fit: Fit, model: Model) -> Array:
+    """(K, K) covariance of frames and parameters together, without what turns the target and does not move it."""
+    e, flat, variance = fit.explanation, model.flat, fit.explanation.best.noise**2
+    stack = whitened(model.linear, replace(e.whitening, smooth=None))[:, :-1]
+    tight = np.concatenate([np.full(flat, LOOSE**-2.0), model.tight])
+    unit = ((stack**2).sum(axis=0) / variance + tight) ** -0.5
+    stack *= unit
+    form = e.discrepancy.form
+    if form is not None and not form.anew:
+        gram = stack.T @ stack / variance
+        spectrum = Spectrum.of(form, e.whitening.weights, e.whitening.noise)
+        alike = spectrum.spread(e.discrepancy.tau, stack) * (e.discrepancy.noise / variance) ** 2
+    else:
+        gram = alike = model.whole[0][:-1, :-1] * np.outer(unit, unit) / variance
+    prior = np.diag(tight * unit**2)
+    inner = np.linalg.inv(gram + prior)
+    moving = np.concatenate([moves(fit.corrected), np.ones(len(model.tight), dtype=bool)])
+    found = np.outer(unit, unit) * (inner @ (alike + prior) @ inner)
+    return np.asarray(found[np.ix_(moving, moving)])
+
+
+def _held_out(fit: Fit, model: Model) -> tuple[Array, NDArray[np.int64]]:
+    """(H, 3) what is left of rows while they are held out, measurement frame, m, and the number of each.
+
+    Where none can be held out, of all rows.
+    """
+    walk, base = Walk.over(model, each(model.block)), fit.corrected.frames.base[:3, :3]
+    if not walk.tests:
+        return fit.corrected.gap[:, :3] @ base.T, np.arange(fit.campaign.samples)
+    return walk.residuals(range(len(model.spans)))[:, :3] @ base.T, walk.numbers
+
+
+def _size(left: Array, told: Array, kept: NDArray[np.bool_]) -> Array:
+    """(3,) size per axis of what is left beside what is told, so that 95 % of all are within 1.96 of both together.
+
+    The axes differ as their rms does; rows set aside count in the share, and not in that.
+    """
+    size = np.log(np.mean(left[kept] ** 2, axis=0) + settings.TINY) / 2.0
+    # a rms of K numbers is known to 1/√2K: axes differ by what exceeds that (James and Stein)
+    apart, chance = size - size.mean(), 1.0 / max(2 * int(kept.sum()), 1)
+    size = np.exp(size.mean() + apart * max(1.0 - 2.0 * chance / max(float((apart**2).sum()), settings.TINY), 0.0))
+    beside = np.sqrt(np.maximum((left / settings.SIGMAS_95) ** 2 - told, 0.0)) / size
+    level = min(0.95 * (1.0 + 1.0 / len(left)), 1.0)
+    return np.asarray(size * np.quantile(beside, level))

@@ -1,0 +1,136 @@
+"""How far a prediction may be off: parameters that are not exactly known, what no effect tells, the instrument."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.campaign import Campaign
+from thermal_robot.effects import Effect, gate, settings
+from thermal_robot.inference.columns import block, frame_columns
+from thermal_robot.observations import Observations
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Spread:
+    """What makes a prediction uncertain, and where the model was measured.
+
+    Attributes
+    ----------
+    covariance
+        (K, K) of the errors of the frames' step and of the effects' parameters, in the order of :func:`sensitivity`.
+    beyond
+        (3,) one sigma per axis of what neither frames nor effects tell, measurement frame, m.
+    noise
+        (3,) one sigma per axis of the instrument, measurement frame, m; rows held out tell it with ``beyond``.
+    ranges
+        Least and largest value that was measured, by joint and by column that the model needs, SI.
+    """
+
+    covariance: Array
+    beyond: Array
+    noise: Array
+    ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return lists and numbers, ready for JSON."""
+        arrays = {name: getattr(self, name).tolist() for name in ("covariance", "beyond", "noise")}
+        return {**arrays, "ranges": {name: list(ends) for name, ends in self.ranges.items()}}
+
+    @classmethod
+    def from_dict(cls, plain: Mapping[str, Any]) -> Spread:
+        """Return what :meth:`to_dict` wrote."""
+        covariance, beyond, noise = (np.array(plain[name], dtype=float) for name in ("covariance", "beyond", "noise"))
+        ranges = {str(name): (float(low), float(high)) for name, (low, high) in plain["ranges"].items()}
+        return cls(covariance, beyond, noise, ranges)
+
+    def std(self, observations: Observations, effects: Sequence[tuple[Effect, Array]], noise: bool) -> Array:
+        """(N, 3) one standard deviation per axis of a prediction, measurement frame, m.
+
+        Parameters
+        ----------
+        observations
+            Of the corrected model.
+        effects
+            Its effects with their (P,) values.
+        noise
+            Whether the instrument's noise counts: what a measurement may differ by, or where the target is.
+        """
+        held = [effect for effect, _ in effects]
+        variance = by_parameters(observations, held, self.covariance)
+        variance += self.beyond**2 + (self.noise**2 if noise else 0.0)
+        for effect, values in effects:
+            left = gate.fading(effect, observations)
+            if left is not None and (left < 1.0).any():
+                moved = block(observations, effect).columns[:, :3] @ values @ observations.frames.base[:3, :3].T
+                # what it may still be where nobody knows: as much as was given up
+                variance += (moved * ((1.0 - left) / left)[:, None]) ** 2
+        return np.asarray(np.sqrt(variance))
+
+    def outside(self, samples: Campaign) -> tuple[tuple[str, ...], ...]:
+        """Return for each row the joints and columns in which it leaves what was measured."""
+        joints = samples.robot.joint_names
+        left: list[list[str]] = [[] for _ in range(samples.samples)]
+        for name, (low, high) in self.ranges.items():
+            values = samples.q[:, joints.index(name)] if name in joints else samples.covariates.get(name)
+            if values is None:
+                continue
+            allowed = settings.BESIDE * (high - low)
+            for row in np.flatnonzero((values < low - allowed) | (values > high + allowed)):
+                left[row].append(name)
+        return tuple(tuple(names) for names in left)
+
+
+class Prediction(NamedTuple):
+    """What the instrument would measure, and how sure that is.
+
+    Attributes
+    ----------
+    position
+        (N, 3) in the measurement frame, m.
+    orientation
+        (N, 4) quaternions wxyz; ``None`` where the campaign measured positions only.
+    std
+        (N, 3) one standard deviation per axis, measurement frame, m; NaN where the model does not tell.
+    outside
+        Per row: the joints and columns in which it leaves what was measured.
+    """
+
+    position: Array
+    orientation: Array | None
+    std: Array
+    outside: tuple[tuple[str, ...], ...]
+
+
+def sensitivity(observations: Observations, effects: Sequence[Effect]) -> Array:
+    """(N, 3, K) derivative of the target's position by the unknown frames and the effects' parameters.
+
+    Columns as :func:`~thermal_robot.inference.columns.frame_columns` orders them, those that turn the target left out,
+    then each effect's parameters. In the axes of the measurement frame; m a unit of each.
+    """
+    frames = frame_columns(observations)[0][:, :3, moves(observations)]
+    columns = [frames, *(block(observations, effect).columns[:, :3] for effect in effects)]
+    return np.asarray(observations.frames.base[:3, :3] @ np.concatenate(columns, axis=2))
+
+
+def moves(observations: Observations) -> NDArray[np.bool_]:
+    """(f,) which columns of the unknown frames move the target: not those of its turn on the tool."""
+    names = frame_columns(observations)[1]
+    return np.array([name != "tool" or k < names.index("tool") + 3 for k, name in enumerate(names)], dtype=bool)
+
+
+def by_parameters(observations: Observations, effects: Sequence[Effect], covariance: Array) -> Array:
+    """(N, 3) variance per axis of the measurement frame that the parameters' covariance makes, m²: diag(J C Jᵀ).
+
+    NaN where the covariance is of other effects.
+    """
+    moved = sensitivity(observations, effects)
+    if moved.shape[2] != len(covariance):
+        return np.full(moved.shape[:2], np.nan)
+    return np.asarray(np.maximum(((moved @ covariance) * moved).sum(axis=2), 0.0))
