@@ -3,6 +3,7 @@
 import csv
 import io
 import json
+import os
 import shutil
 import subprocess
 import sys
@@ -301,7 +302,7 @@ def test_predict_writes_parquet_where_the_name_says_so(run, folder, diagnosed, t
     pd.testing.assert_frame_equal(frame, written, check_dtype=False)
 
 
-@pytest.mark.parametrize("arguments", [[], ["diagnos"], ["diagnose"], ["predict", "m", "s"], ["check", "a", "b"]])
+@pytest.mark.parametrize("arguments", [["diagnos"], ["diagnose"], ["predict", "m", "s"], ["check", "a", "b"]])
 def test_a_command_line_that_is_none_exits_with_two(arguments, capsys):
     try:
         status = cli.main(arguments)
@@ -391,3 +392,103 @@ def test_effects_are_listed_with_what_they_need(run, folder):
     of_campaign = run("effects", folder)[1]
     assert "needs temperature\n" not in of_campaign  # it was recorded
     refused(run("effects", folder / "absent"), "absent")
+
+
+@pytest.fixture
+def stdin(monkeypatch):
+    def stdin(file):
+        content = file.read_bytes() if hasattr(file, "read_bytes") else file
+        monkeypatch.setattr(sys, "stdin", io.TextIOWrapper(io.BytesIO(content)))
+
+    return stdin
+
+
+def test_quiet_prints_the_result_alone(run, folder, tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    asked = ("diagnose", folder, "--only", "thermal_elongation", "drift", "--json", tmp_path / "d.json")
+    status, out, err = run(*asked, "-q")
+    assert (status, err) == (0, "")
+    assert out == json.loads((tmp_path / "d.json").read_text())["verdict"]["summary"] + "\n"
+    assert run("-q", *asked) == (0, out, "")
+    assert run("check", folder, "-q") == (0, "", "")
+    assert run("effects", "-q") == run("effects")  # the list is what was asked for
+    refused(run("check", tmp_path / "absent", "-q"), "absent")
+    status, out, err = run("demo", "-q")
+    assert (status, out.count("\n"), err) == (0, 1, "")
+    assert out.startswith("The gap of ")
+
+
+def test_verbose_tells_the_stages_and_changes_no_result(run, folder):
+    asked = ("diagnose", folder, "--only", "thermal_elongation", "drift")
+    status, out, err = run(*asked, "-v")
+    assert (status, out) == run(*asked)[:2]
+    stages = [line.split(" s  ")[1] for line in err.splitlines()]
+    assert (stages[0], stages[-1]) == ("reading the campaign", "done")
+    assert len(stages) > 5
+
+
+def test_a_campaign_on_standard_input_has_its_paths_in_the_current_folder(run, folder, stdin, monkeypatch):
+    monkeypatch.chdir(folder)
+    for command in ("check", "effects"):
+        stdin(folder / "campaign.toml")
+        status, out, err = run(command, "-")
+        assert (status, err) == (0, "")
+        assert out.splitlines()[1:] == run(command, folder)[1].splitlines()[1:]  # but for its name
+    few = ("--only", "thermal_elongation", "drift")
+    for given in ((*few, "-"), ("-", *few)):
+        stdin(folder / "campaign.toml")
+        status, out, err = run("diagnose", "-q", *given)
+        assert (status, out, err) == run("diagnose", folder, "-q", *few)
+    stdin(folder / "campaign.toml")
+    refused(run("diagnose", "-", "--json", "robot.urdf"), "robot.urdf", "would be overwritten")
+    stdin((folder / "campaign.toml").read_bytes().replace(b'"tool0"', b'"tool_0"'))
+    refused(run("check", "-"), "standard input, [robot]", "'tool_0'", "tool0")
+    stdin(folder / "measurements.csv")
+    refused(run("check", "-"), "standard input", "TOML")
+
+
+def test_predict_reads_and_writes_streams(run, folder, diagnosed, stdin, tmp_path):
+    model, samples, out = diagnosed.model, folder / "fresh.csv", tmp_path / "p.csv"
+    assert run("predict", model, samples, "-o", out) == (0, "", "")
+    stdin(samples)
+    assert run("predict", model, "-", "-o", "-") == (0, out.read_text(), "")
+    stdin(model)
+    assert run("predict", "-", samples, "-o", tmp_path / "again.csv") == (0, "", "")
+    assert (tmp_path / "again.csv").read_text() == out.read_text()
+    refused(run("predict", "-", "-", "-o", out), "one standard input", "model", "samples")
+    lines = samples.read_text().splitlines()
+    stdin("\n".join([*lines[:3], "wrong," + lines[3].split(",", 1)[1]]).encode())
+    refused(run("predict", model, "-", "-o", "-"), "standard input, row 4", "wrong")
+
+
+def test_any_file_of_a_diagnosis_may_be_printed_instead_of_the_text(run, folder, diagnosed, tmp_path, monkeypatch):
+    few = ("diagnose", folder, "--only", "thermal_elongation", "drift")
+    assert run(*few, "--model", tmp_path / "m.json")[0] == 0
+    status, out, err = run(*few, "--model", "-")
+    assert (status, out, err) == (0, (tmp_path / "m.json").read_text(), "")
+    status, out, err = run(*few, "--report", "-", "--json", tmp_path / "d.json", "-v")
+    assert status == 0
+    assert out.lower().startswith("<!doctype html>")
+    assert out.rstrip().endswith("</html>")
+    assert json.loads((tmp_path / "d.json").read_text())["schema"]
+    refused(run(*few, "--report", "-", "--json", "-"), "one standard output", "json", "report")
+    monkeypatch.chdir(tmp_path)
+    assert run(*few, "--json", "./-")[1].startswith("The gap of")
+    assert (tmp_path / "-").read_text() == (tmp_path / "d.json").read_text()
+
+
+def test_a_table_that_is_at_fault_is_printed_as_json_all_the_same(run, poses, tmp_path):
+    campaign = read_campaign(poses)
+    write_campaign(replace(campaign, q=-campaign.q), tmp_path)
+    status, out, err = run("diagnose", tmp_path, "--json", "-")
+    assert status == 2
+    assert err.count("\n") == 1
+    assert json.loads(out)["verdict"]["usable"] is False
+
+
+def test_a_letter_that_the_terminal_lacks_is_no_failure(folder):
+    command = [sys.executable, "-m", "thermal_robot", "check", str(folder)]
+    asked = {"PYTHONIOENCODING": "ascii", "PYTHONUTF8": "0"}
+    done = subprocess.run(command, capture_output=True, env={**os.environ, **asked}, check=False)
+    assert (done.returncode, done.stderr) == (0, b"")
+    assert b"m/s?" in done.stdout

@@ -11,7 +11,8 @@ import thermal_robot as tr
 from thermal_robot import errors
 from thermal_robot.errors import CampaignError, RobotError, ThermalRobotError
 
-KINDS = [kind for kind in vars(errors).values() if isinstance(kind, type) and issubclass(kind, Exception)]
+CLASSES = [kind for kind in vars(errors).values() if isinstance(kind, type)]
+KINDS = [kind for kind in CLASSES if issubclass(kind, Exception) and not issubclass(kind, Warning)]
 RAISED = [
     RobotError("no link 'tol'", name="tol", candidates=["tool", "tool0"]),
     CampaignError("t.csv", "a value is missing", row=3, column="x", found="''", expected="a number"),

@@ -5,21 +5,23 @@ from __future__ import annotations
 import argparse
 import os
 import sys
-import threading
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from pathlib import Path
-from typing import NoReturn
+from typing import TYPE_CHECKING, Any
 
+from thermal_robot.console import NORMAL, QUIET, add_loudness, heard, note, stages
 from thermal_robot.errors import CampaignError, ThermalRobotError
 from thermal_robot.files import require_free, write_one, write_text, written
+from thermal_robot.parser import BAD_INPUT, DONE, FAILED, INTERRUPTED, STATUSES, Parser
+from thermal_robot.streams import piped
 
-DONE, FAILED, BAD_INPUT, INTERRUPTED = 0, 1, 2, 130
-_STAGES = 14
-"""Stages that a diagnosis tells of: reading, frames, effects, up to three exact fits, five folds, remainder, places."""
-_PATIENCE = 2.0
-"""s after which a terminal shows the stages: what is over sooner needs no bar."""
+if TYPE_CHECKING:
+    from thermal_robot.campaign import Campaign
+    from thermal_robot.diagnosis import Diagnosis
+
+_CAMPAIGN = "campaign.toml, its folder, or - for standard input (paths in it are then those of the current folder)"
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -37,8 +39,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
         says which.
     """
     options = _parser().parse_args(arguments)
+    with suppress(AttributeError):  # a terminal without this letter or that is no reason to stop
+        sys.stdout.reconfigure(errors="replace")  # type: ignore[union-attr]
     try:
-        options.run(options)
+        if options.run is _diagnose:
+            _take_back(options)
+        with heard(options.loudness), piped(options):
+            options.run(options)
         sys.stdout.flush()  # a disk may be full only now
     except ThermalRobotError as error:
         return _complain(str(error), BAD_INPUT)
@@ -64,98 +71,109 @@ def _let_go() -> None:
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
-class _Parser(argparse.ArgumentParser):
-    """A parser whose complaint is one line, as all complaints of this program."""
-
-    def error(self, message: str) -> NoReturn:
-        print(f"{self.prog}: {message}; see {self.prog} --help", file=sys.stderr)
-        raise SystemExit(BAD_INPUT)
-
-
-def _parser() -> argparse.ArgumentParser:
+def _parser() -> Parser:
     from thermal_robot import __version__
+    from thermal_robot.blind import command as trial  # light: it loads the trial once it is run
 
-    parser = _Parser(
+    parser = Parser(
         prog="thermal-robot",
-        description="Say where the gap between robot and model lies, which effect causes it, how far it shrinks.",
+        description="Say where the gap between robot and model lies, which effect causes it, how far it shrinks.\n"
+        "Begin with the demo. With a campaign of your own: check it, diagnose it, predict with the corrected model.",
+        epilog="`thermal-robot COMMAND --help` prints the options of a command.\n"
+        f"A file that is `-` is standard input or output; one of that name is `./-`.\n\n{STATUSES}",
     )
     parser.add_argument("-V", "--version", action="version", version=f"thermal-robot {__version__}")
-    commands = parser.add_subparsers(required=True, metavar="COMMAND")
+    add_loudness(parser, NORMAL)
+    commands = parser.add_subparsers(metavar="COMMAND")
+    parser.set_defaults(run=lambda _: parser.bare(commands.choices), reads=(), writes=())
 
-    demo = commands.add_parser("demo", help="diagnose a campaign that comes with the package")
-    demo.add_argument("--report", metavar="F.html", default="demo.html", help="page to draw (default: %(default)s)")
-    demo.set_defaults(run=_demo)
+    def command(name: str, does: str, example: str = "") -> Parser:
+        again = f"{does[0].upper()}{does[1:]}.\n\nexample:\n  thermal-robot {name}{example}"
+        made: Parser = commands.add_parser(name, help=does, description=again)
+        add_loudness(made, argparse.SUPPRESS)
+        return made
 
-    check = commands.add_parser("check", help="validate and describe a campaign")
-    check.add_argument("campaign", help="campaign.toml, or its folder")
-    check.set_defaults(run=_check)
-
-    effects = commands.add_parser("effects", help="the effects that are considered, and what each needs")
-    effects.add_argument("campaign", nargs="?", help="campaign.toml, or its folder: what it has is not asked for")
-    effects.set_defaults(run=_effects)
-
-    _diagnose_arguments(commands.add_parser("diagnose", help="where the gap lies, what causes it, how far it shrinks"))
-    _predict_arguments(commands.add_parser("predict", help="the corrected model's prediction for new commands"))
-    _paper_arguments(commands.add_parser("paper", help="the paper's figures beside the computed ones"))
-
-    from thermal_robot.blind import command  # light: it loads the trial once it is run
-
-    blind = commands.add_parser("blind", help="the blind trial: effects withheld, then named")
-    command.add_arguments(blind)
-    blind.set_defaults(run=command.run)
+    _demo_arguments(command("demo", "diagnose a campaign that comes with the package, and draw it"))
+    _check_arguments(command("check", "validate and describe a campaign; nothing is fitted", " campaign.toml"))
+    _effects_arguments(command("effects", "list the effects that are considered, and what each needs"))
+    files = " campaign.toml --report diagnosis.html --model model.json"
+    _diagnose_arguments(command("diagnose", "say where the gap lies, what causes it, how far it shrinks", files))
+    files = " model.json samples.csv -o predicted.csv"
+    _predict_arguments(command("predict", "say where the robot will really be, by the corrected model", files))
+    _paper_arguments(command("paper", "print the figures of the paper beside the computed ones"))
+    blind = command("blind", "run the blind trial: effects are withheld, then named", " --seed 7 --report trial.html")
+    trial.add_arguments(blind)
+    blind.set_defaults(run=trial.run, writes=("json", "report"))
     return parser
 
 
+def _demo_arguments(demo: argparse.ArgumentParser) -> None:
+    demo.add_argument("--report", metavar="F.html", default="demo.html", help="page to draw (default: %(default)s)")
+    demo.set_defaults(run=_demo, writes=("report",), only=(), without=())
+
+
+def _check_arguments(check: argparse.ArgumentParser) -> None:
+    check.add_argument("campaign", help=_CAMPAIGN)
+    check.set_defaults(run=_check, reads=("campaign",))
+
+
+def _effects_arguments(effects: argparse.ArgumentParser) -> None:
+    effects.add_argument("campaign", nargs="?", help=f"{_CAMPAIGN}; what it recorded is then not asked for")
+    effects.set_defaults(run=_effects, reads=("campaign",))
+
+
 def _diagnose_arguments(diagnose: argparse.ArgumentParser) -> None:
-    diagnose.add_argument("campaign", nargs="?", help="campaign.toml, or its folder")
+    diagnose.add_argument("campaign", nargs="?", help=_CAMPAIGN)
     diagnose.add_argument("--json", metavar="F", help="write the diagnosis as JSON ('-' prints it instead of the text)")
-    diagnose.add_argument("--report", metavar="F.html", help="write a page with figures")
-    diagnose.add_argument("--model", metavar="F", help="save the corrected model for `predict`")
-    diagnose.add_argument(
-        "--without", metavar="EFFECT", nargs="+", action="extend", default=[], help="leave effects out"
-    )
-    diagnose.add_argument(
-        "--only", metavar="EFFECT", nargs="+", action="extend", default=[], help="consider these only"
-    )
-    diagnose.set_defaults(run=_diagnose)
+    diagnose.add_argument("--report", metavar="F.html", help="write a page with figures ('-' prints it)")
+    diagnose.add_argument("--model", metavar="F", help="save the corrected model for `predict` ('-' prints it)")
+    choice: dict[str, Any] = {"metavar": "EFFECT", "nargs": "+", "action": "extend", "default": []}
+    diagnose.add_argument("--without", **choice, help="leave effects out; `thermal-robot effects` lists their names")
+    diagnose.add_argument("--only", **choice, help="consider these only; both options take several names")
+    diagnose.set_defaults(run=_diagnose, reads=("campaign",), writes=("json", "report", "model"))
 
 
 def _predict_arguments(predict: argparse.ArgumentParser) -> None:
-    predict.add_argument("model", help="file that `diagnose --model` wrote")
-    predict.add_argument("samples", help="table with the campaign's columns and units")
-    predict.add_argument("-o", "--output", metavar="F", required=True, help="table to write")
+    predict.add_argument("model", help="file that `diagnose --model` wrote, or - for standard input")
+    predict.add_argument("samples", help="table with the campaign's columns and units, or - for standard input (CSV)")
+    predict.add_argument(
+        "-o",
+        "--output",
+        metavar="F",
+        required=True,
+        help="table to write, Parquet by its ending ('-' prints it as CSV)",
+    )
     predict.add_argument("--noise", action="store_true", help="count the instrument's noise in std.x, std.y, std.z")
-    predict.set_defaults(run=_predict)
+    predict.set_defaults(run=_predict, reads=("model", "samples"), writes=("output",))
 
 
 def _paper_arguments(paper: argparse.ArgumentParser) -> None:
     paper.add_argument("--json", metavar="F", help="write the ledger as JSON ('-' prints it instead of the text)")
     paper.add_argument("--l5", metavar="M", type=float, help="wrist to tool point, m (default: 0.150, assumed)")
     paper.add_argument("--markdown", action="store_true", help="print the table of docs/paper.md instead of the text")
-    paper.set_defaults(run=_paper)
+    paper.set_defaults(run=_paper, writes=("json",))
 
 
 def _demo(options: argparse.Namespace) -> None:
     from thermal_robot.datasets import demo_directory
 
-    campaign = demo_directory()
-    print(f"The demo's campaign is simulated; its answer lies in {campaign / 'truth.json'}.\n")
-    found = _diagnosis(campaign, (), ())
-    print(found)
+    options.campaign = demo_directory()
+    intro = f"The demo's campaign is simulated; its answer lies in {options.campaign / 'truth.json'}."
+    found = _diagnosis(options)
+    _tell(options, f"{intro}\n\n{found}", found.summary)
     write_one(options.report, lambda path: _page(found, path))
-    print(f"Drawn in {options.report}")
+    _tell(options, f"Drawn in {options.report}")
 
 
 def _check(options: argparse.Namespace) -> None:
-    from thermal_robot.campaign import describe, read_campaign
+    from thermal_robot.campaign import describe
 
-    print(describe(read_campaign(options.campaign)))
+    _tell(options, describe(_read(options)))
 
 
 def _effects(options: argparse.Namespace) -> None:
     from dataclasses import replace
 
-    from thermal_robot.campaign import read_campaign
     from thermal_robot.datasets import demo_campaign
     from thermal_robot.diagnosis import Finding
     from thermal_robot.effects import gate, library
@@ -164,7 +182,7 @@ def _effects(options: argparse.Namespace) -> None:
     from thermal_robot.report.words import needs
 
     bare = options.campaign is None  # poses and nothing else
-    campaign = replace(demo_campaign(), covariates={}, labels={}) if bare else read_campaign(options.campaign)
+    campaign = replace(demo_campaign(), covariates={}, labels={}) if bare else _read(options)
     known, observations = (*library().values(), *random_effects()), observe(campaign)
     wide = max(len(effect.name) for effect in known)
     print("Effects that are considered, and what each needs beside measured poses:" if bare else campaign.name)
@@ -175,22 +193,16 @@ def _effects(options: argparse.Namespace) -> None:
 
 
 def _diagnose(options: argparse.Namespace) -> None:
-    _take_back(options)
-    require_free((options.json, options.model, options.report), _read_from(Path(options.campaign)))
-    found = _diagnosis(Path(options.campaign), options.only, options.without)
+    require_free((options.json, options.model, options.report), _read_from(options))
+    found = _diagnosis(options)
     outputs: list[tuple[str | None, Callable[[Path], object]]] = [
-        (None if options.json == "-" else options.json, found.to_json),
+        (options.json, found.to_json),
         (options.report, lambda path: _page(found, path)),
         (options.model if found.usable else None, lambda path: found.model.save(path)),
     ]
     # files come first: who reads what is printed may stop early
     failed = written(outputs)
-    if options.json == "-":
-        import json
-
-        print(json.dumps(found.to_dict(), indent=2, ensure_ascii=False))
-    else:
-        print(found)
+    _tell(options, str(found), found.summary)
     if failed:
         raise CampaignError(", ".join(failed), "cannot be written", found="; ".join(dict.fromkeys(failed.values())))
     if not found.usable:
@@ -206,9 +218,9 @@ def _predict(options: argparse.Namespace) -> None:
     model = CorrectedModel.load(options.model)
     samples = model.samples(options.samples)
     if model.counts_anew(samples):
-        print(
-            f"thermal-robot: note: order in {options.samples} counts its own rows; predicted as after the campaign",
-            file=sys.stderr,
+        note(
+            f"order in {Path(options.samples).name} counts its own rows; predicted as after the campaign",
+            options.loudness,
         )
     prediction = model.prediction(samples, noise=options.noise)
     own = read_table(Path(options.samples)).frame(numbers=Path(options.output).suffix.lower() in PARQUET)
@@ -222,20 +234,40 @@ def _paper(options: argparse.Namespace) -> None:
     from thermal_robot.paper import PaperInputs, ledger
 
     found = ledger(PaperInputs() if options.l5 is None else PaperInputs(l5=options.l5))
-    written = json.dumps(found.to_dict(), indent=2, ensure_ascii=False, allow_nan=False)
-    if options.json and options.json != "-":
-        write_one(options.json, lambda path: write_text(path, written + "\n"))
-    print(written if options.json == "-" else found.markdown() if options.markdown else found.text())
+    if options.json:
+        plain = json.dumps(found.to_dict(), indent=2, ensure_ascii=False, allow_nan=False)
+        write_one(options.json, lambda path: write_text(path, plain + "\n"))
+    if not options.printed:
+        print(found.markdown() if options.markdown else found.text())
 
 
-def _diagnosis(campaign: Path, only: Sequence[str], without: Sequence[str]):  # type: ignore[no-untyped-def]
+def _tell(options: argparse.Namespace, text: str, brief: str = "") -> None:
+    """Print the text, or what is left of it where little was asked for; nothing where a file takes its place."""
+    said = brief if options.loudness == QUIET else text
+    if said and not options.printed:
+        print(said)
+
+
+def _read(options: argparse.Namespace) -> Campaign:
+    from thermal_robot.campaign import read_campaign
+
+    return read_campaign(options.campaign, folder=_folder(options))
+
+
+def _folder(options: argparse.Namespace) -> Path | None:
+    """Return the folder that a campaign's paths start from where it is not that of its file."""
+    return Path() if options.piped else None
+
+
+def _diagnosis(options: argparse.Namespace) -> Diagnosis:
     from thermal_robot.diagnosis import diagnose
 
-    with _progress() as progress:
-        return diagnose(campaign, only=only, without=without, progress=progress)
+    with stages(options.loudness) as progress:
+        progress("reading the campaign")
+        return diagnose(_read(options), only=options.only, without=options.without, progress=progress)
 
 
-def _page(found, path: Path) -> None:  # type: ignore[no-untyped-def]
+def _page(found: Diagnosis, path: Path) -> None:
     from thermal_robot.report import html
 
     write_text(path, html(found, generated=time.strftime("%Y-%m-%d %H:%M")))
@@ -244,47 +276,19 @@ def _page(found, path: Path) -> None:  # type: ignore[no-untyped-def]
 def _take_back(options: argparse.Namespace) -> None:
     """Give back a campaign that `--only a b campaign.toml` took for the name of an effect."""
     for names in (options.only, options.without):
-        if options.campaign is None and names and Path(names[-1]).exists():
+        if options.campaign is None and names and (names[-1] == "-" or Path(names[-1]).exists()):
             options.campaign = names.pop()
     if options.campaign is None:
         raise CampaignError("diagnose", "no campaign was named", expected="campaign.toml, or its folder")
 
 
-def _read_from(campaign: Path) -> list[Path]:
+def _read_from(options: argparse.Namespace) -> list[Path]:
     """Return the files that a campaign is read from."""
     from thermal_robot.campaign.declaration import read_declaration
 
-    declaration = read_declaration(campaign)
+    declaration = read_declaration(Path(options.campaign), _folder(options))
     robot = [declaration.robot] if isinstance(declaration.robot, Path) else []
     return [declaration.file, declaration.table, *robot]
-
-
-@contextmanager
-def _progress() -> Iterator[Callable[[str], None]]:
-    """Show the stages on a terminal once it has lasted; nothing elsewhere."""
-    if not sys.stderr.isatty():
-        yield lambda _: None
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
-
-    bar = Progress(
-        SpinnerColumn(),
-        TextColumn("{task.description}"),
-        BarColumn(),
-        TimeElapsedColumn(),
-        console=Console(stderr=True),
-        transient=True,
-    )
-    task = bar.add_task("", total=_STAGES)
-    patience = threading.Timer(_PATIENCE, bar.start)
-    patience.daemon = True
-    patience.start()
-    try:
-        yield lambda stage: bar.update(task, description=stage, advance=1)
-    finally:
-        patience.cancel()
-        bar.stop()
 
 
 if __name__ == "__main__":

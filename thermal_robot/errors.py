@@ -87,6 +87,10 @@ class SealError(ThermalRobotError):
     """Sealed answers that are not those that were sealed."""
 
 
+class Note(UserWarning):
+    """Something that was left out, which is no error; the command line tells it in one line."""
+
+
 def require(call: str, given: object, kinds: tuple[type, ...], expected: str) -> None:
     """Refuse an argument of a wrong kind by what is wanted instead.
 

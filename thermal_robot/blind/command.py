@@ -7,14 +7,14 @@ import json
 import os
 import sys
 import time
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
 import numpy as np
 
 from thermal_robot.blind.cases import Case, Kind, RobotChoice
+from thermal_robot.console import QUIET, counted, note
 from thermal_robot.errors import CampaignError, ThermalRobotError
 from thermal_robot.files import require_free, write_one, write_text
 
@@ -27,8 +27,6 @@ ALWAYS = ("single", "null")
 DATA = "THERMAL_ROBOT_DATA"
 OWN_CASES = 6
 """How often each fault of the user's own is asked for."""
-
-Progress = Callable[[str, int, int], None]
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
@@ -80,28 +78,33 @@ def run(options: argparse.Namespace) -> None:
     seed = int(time.time()) if options.seed is None else options.seed
     directory = Path(options.directory or f"blind-{seed}")
     # what is printed instead of the text stands alone on stdout
-    notes = sys.stderr if options.markdown or options.json == "-" else sys.stdout
+    notes = sys.stderr if options.markdown or options.printed else sys.stdout
 
-    def note(text: str) -> None:
-        print(text, file=notes, flush=True)
+    def tell(text: str) -> None:
+        if options.loudness != QUIET:
+            print(text, file=notes, flush=True)
 
-    cases = _cases(options, seed, note)
-    note(f"Seed {seed}: {len(cases)} cases in {directory}")
-    records = _records(cases, directory, seed, options.workers, note)
+    cases = _cases(options, seed, tell)
+    tell(f"Seed {seed}: {len(cases)} cases in {directory}")
+    records = _records(cases, directory, seed, options, tell)
     _tell(records, options)
 
 
 def _records(
-    cases: Sequence[Case | RealCase], directory: Path, seed: int, workers: int, note: Callable[[str], None]
+    cases: Sequence[Case | RealCase],
+    directory: Path,
+    seed: int,
+    options: argparse.Namespace,
+    tell: Callable[[str], None],
 ) -> list[dict[str, Any]]:
     from thermal_robot.blind.trial import run_trial
 
     def sealed(commitment: str) -> None:
-        note(f"Answers sealed before the first diagnosis: sha256 {commitment}")
+        tell(f"Answers sealed before the first diagnosis: sha256 {commitment}")
 
     try:
-        with _progress() as progress:
-            return run_trial(cases, directory, workers=workers, progress=progress, sealed=sealed)
+        with counted(options.loudness) as progress:
+            return run_trial(cases, directory, workers=options.workers, progress=progress, sealed=sealed)
     except KeyboardInterrupt:
         again = f"--seed {seed} --directory {directory}"
         print(f"thermal-robot: stopped; the same command with {again} continues", file=sys.stderr)
@@ -118,17 +121,18 @@ def _tell(records: list[dict[str, Any]], options: argparse.Namespace) -> None:
     withdrawn = [record for record in records if "withdrawn" in record]
     for record in withdrawn:
         reason = f"{record['id']} ({record['kind']}) was not asked: {record['withdrawn']}"
-        print(f"thermal-robot: note: {reason}", file=sys.stderr)
+        note(reason, options.loudness)
     found = score([record for record in records if record not in withdrawn]).to_dict()
     written = json.dumps(found, indent=2, ensure_ascii=False)
-    print(written if options.json == "-" else markdown(found) if options.markdown else text(found))
-    if options.json and options.json != "-":
+    if not options.printed:
+        print(markdown(found) if options.markdown else text(found))
+    if options.json:
         write_one(options.json, lambda path: write_text(path, written + "\n"))
     if options.report:
         write_one(options.report, lambda path: write_text(path, html(found, time.strftime("%Y-%m-%d %H:%M"))))
 
 
-def _cases(options: argparse.Namespace, seed: int, note: Callable[[str], None]) -> tuple[Case | RealCase, ...]:
+def _cases(options: argparse.Namespace, seed: int, tell: Callable[[str], None]) -> tuple[Case | RealCase, ...]:
     from thermal_robot.blind.plan import plan
 
     counts = _counts(options)
@@ -140,7 +144,7 @@ def _cases(options: argparse.Namespace, seed: int, note: Callable[[str], None]) 
         return drawn
     data = options.data or os.environ.get(DATA)
     if not data:
-        note(f"No real campaigns: neither --data nor {DATA} names a folder")
+        tell(f"No real campaigns: neither --data nor {DATA} names a folder")
         return drawn
     if not Path(data).is_dir():
         raise CampaignError(data, "there is no such folder of real campaigns")
@@ -148,7 +152,7 @@ def _cases(options: argparse.Namespace, seed: int, note: Callable[[str], None]) 
 
     real = real_cases(Path(data), seed, most_real)
     if not real:
-        note(f"No real campaigns: {data} holds none that the trial knows")
+        tell(f"No real campaigns: {data} holds none that the trial knows")
     return (*drawn, *real)
 
 
@@ -211,36 +215,3 @@ def _require_mujoco() -> None:
 
     if find_spec("mujoco") is None:
         raise ThermalRobotError('the blind trial needs MuJoCo: pip install "thermal-robot[blind]"')
-
-
-@contextmanager
-def _progress() -> Iterator[Progress]:
-    """Show how far a trial is: bars on a terminal, elsewhere a line for every tenth."""
-    if not sys.stderr.isatty():
-        yield _tenths()
-        return
-    from rich.console import Console
-    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-
-    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
-    with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
-        tasks: dict[str, Any] = {}
-
-        def show(stage: str, done: int, total: int) -> None:
-            if stage not in tasks:
-                tasks[stage] = bars.add_task(stage, total=total)
-            bars.update(tasks[stage], completed=done)
-
-        yield show
-
-
-def _tenths() -> Progress:
-    told: dict[str, int] = {}
-
-    def show(stage: str, done: int, total: int) -> None:
-        tenth = 10 * done // total
-        if tenth > told.get(stage, 0):
-            told[stage] = tenth
-            print(f"{stage}: {done} of {total}", file=sys.stderr, flush=True)
-
-    return show

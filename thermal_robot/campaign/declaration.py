@@ -29,27 +29,32 @@ class Declaration:
         All the rest, SI.
     gear_rows
         Line of each key of ``[gears]``, for a message once the robot's joints are known.
+    folder
+        Against which its paths are resolved.
     """
 
     file: Path
     table: Path
     settings: Settings
     gear_rows: Mapping[str, int | None]
+    folder: Path
 
     @property
     def robot(self) -> str | Path:
         """What :func:`thermal_robot.robot.load_robot` wants: a reference to a known robot, or a path."""
         urdf = self.settings.urdf
-        return urdf if urdf.startswith(("example-robot-data:", "builtin:")) else self.file.parent / urdf
+        return urdf if urdf.startswith(("example-robot-data:", "builtin:")) else self.folder / urdf
 
 
-def read_declaration(path: Path) -> Declaration:
+def read_declaration(path: Path, folder: Path | None = None) -> Declaration:
     """Read campaign.toml.
 
     Parameters
     ----------
     path
         The file, or the directory that holds it.
+    folder
+        Against which its paths are resolved; its own where absent.
 
     Raises
     ------
@@ -82,9 +87,10 @@ def read_declaration(path: Path) -> Declaration:
         priors=document.positive("priors"),
         gears=document.positive("gears"),
     )
-    table = file.parent / document.string("measurements", "file")
+    folder = file.parent if folder is None else folder
+    table = folder / document.string("measurements", "file")
     rows = {joint: document.row("gears", joint) for joint in settings.gears}
-    return Declaration(file, table, settings, rows)
+    return Declaration(file, table, settings, rows, folder)
 
 
 def check_gears(declaration: Declaration, joints: tuple[str, ...]) -> None:

@@ -18,13 +18,15 @@ if TYPE_CHECKING:
     import pandas as pd
 
 
-def read_campaign(path: str | Path) -> Campaign:
+def read_campaign(path: str | Path, *, folder: str | Path | None = None) -> Campaign:
     """Read and validate a campaign.
 
     Parameters
     ----------
     path
         campaign.toml, or the directory that holds it.
+    folder
+        Against which the paths in it are resolved; its own where absent.
 
     Returns
     -------
@@ -39,7 +41,7 @@ def read_campaign(path: str | Path) -> Campaign:
         A robot that cannot be loaded, or has no such frame.
     """
     require("read_campaign()", path, (str, os.PathLike), f"the path of a {FILE_NAME}, or of its folder")
-    declaration = read_declaration(Path(path))
+    declaration = read_declaration(Path(path), None if folder is None else Path(folder))
     settings = declaration.settings
     try:
         robot = load_robot(

@@ -17,6 +17,9 @@ MOVES = ("direct", "unknown")
 STANDARD_TEMPERATURE = 20.0
 """°C; ISO 1, the temperature at which lengths are specified unless somebody says otherwise."""
 
+MOST_PIPED = 500_000_000
+"""Bytes that are taken from standard input: a million rows of forty columns; a pipe that never ends must end here."""
+
 
 @dataclass(frozen=True)
 class Settings:

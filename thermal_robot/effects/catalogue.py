@@ -29,7 +29,7 @@ from thermal_robot.effects.thermal_elongation import ThermalElongation
 from thermal_robot.effects.tool_frame import ToolFrame
 from thermal_robot.effects.tracking_lag import TrackingLag
 from thermal_robot.effects.transmission_error import TransmissionError
-from thermal_robot.errors import EffectError
+from thermal_robot.errors import EffectError, Note
 
 _SYSTEMATIC: tuple[type[Effect], ...] = (
     BaseFrame,
@@ -65,7 +65,7 @@ def library() -> dict[str, Effect]:
 
     Warns
     -----
-    UserWarning
+    Note
         If an entry point cannot be loaded, gives something that is not an effect, or a name that is already taken; it
         is left out.
     """
@@ -76,9 +76,7 @@ def library() -> dict[str, Effect]:
             _refuse(effect, found)
         except Exception as error:  # another package's code may raise anything
             reason = str(error) if isinstance(error, EffectError) else f"it raises {error!r}"
-            warnings.warn(
-                f"entry point {point.name!r} ({point.value}) is left out: {reason}", UserWarning, stacklevel=2
-            )
+            warnings.warn(f"entry point {point.name!r} ({point.value}) is left out: {reason}", Note, stacklevel=2)
             continue
         found[effect.name] = effect
     return found

@@ -1,0 +1,139 @@
+"""What is told beside the result: stages, counts and notes, as loud as was asked for."""
+
+import argparse
+import io
+import logging
+import threading
+import time
+import warnings
+from contextlib import redirect_stderr
+
+import pytest
+
+from thermal_robot import console
+from thermal_robot.console import NORMAL, QUIET, VERBOSE, add_loudness, counted, heard, note, stages
+from thermal_robot.errors import Note
+
+SAID = ["unknown frames", "combinations of effects", "places"]
+
+
+@pytest.fixture
+def terminal(monkeypatch):
+    """Give a screen that becomes stderr under ``redirect_stderr``; there it shows at once what takes long."""
+    monkeypatch.setattr(console, "_PATIENCE", 0.0)
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setenv("COLUMNS", "80")
+    screen = io.StringIO()
+    screen.isatty = lambda: True
+    return screen
+
+
+def work(loudness):
+    with stages(loudness) as progress:
+        for stage in SAID:
+            progress(stage)
+
+
+def test_the_last_of_several_wishes_counts():
+    parser = argparse.ArgumentParser()
+    add_loudness(parser, NORMAL)
+    assert [parser.parse_args(a).loudness for a in ([], ["-q"], ["-v"], ["-qv"], ["--verbose", "--quiet"])] == [
+        NORMAL, QUIET, VERBOSE, VERBOSE, QUIET,
+    ]  # fmt: skip
+
+
+@pytest.mark.parametrize("loudness", [QUIET, NORMAL])
+def test_off_a_terminal_no_stage_is_told_unasked(capsys, loudness):
+    work(loudness)
+    assert capsys.readouterr() == ("", "")
+
+
+def test_quiet_holds_on_a_terminal(terminal):
+    with redirect_stderr(terminal):
+        work(QUIET)
+    assert terminal.getvalue() == ""
+
+
+def test_verbose_is_a_line_for_each_stage_with_the_seconds_on_a_terminal_too(capsys, terminal):
+    work(VERBOSE)
+    out, err = capsys.readouterr()
+    assert out == ""
+    with redirect_stderr(terminal):
+        work(VERBOSE)
+    for told in (err, terminal.getvalue()):
+        lines = [line.split(" s  ") for line in told.splitlines()]
+        assert [stage for _, stage in lines] == [*SAID, "done"]
+        seconds = [float(number) for number, _ in lines]
+        assert seconds == sorted(seconds)
+        assert seconds[0] >= 0.0
+
+
+def test_work_that_fails_is_not_called_done(capsys):
+    def breaks():
+        with stages(VERBOSE):
+            raise ValueError("broken")
+
+    with pytest.raises(ValueError, match="broken"):
+        breaks()
+    assert "done" not in capsys.readouterr().err
+
+
+def test_a_terminal_shows_the_stage_as_it_is_called_and_nothing_stays_at_work(terminal):
+    with redirect_stderr(terminal), stages(NORMAL) as progress:
+        progress("a law of [bold]tilt[/x]")  # names are not markup
+        until = time.monotonic() + 20.0
+        while "tilt[/x]" not in terminal.getvalue() and time.monotonic() < until:
+            time.sleep(0.05)
+    assert "a law of [bold]tilt[/x]" in terminal.getvalue()
+    assert [t for t in threading.enumerate() if isinstance(t, threading.Timer)] == []
+
+
+def test_counted_work_has_bars_on_a_terminal(terminal):
+    with redirect_stderr(terminal), counted(NORMAL) as progress:
+        progress("diagnoses", 40, 40)
+    assert "40/40" in terminal.getvalue()
+
+
+@pytest.mark.parametrize(("loudness", "lines"), [(QUIET, 0), (NORMAL, 10), (VERBOSE, 10)])
+def test_counted_work_is_a_line_for_every_tenth_elsewhere(capsys, loudness, lines):
+    with counted(loudness) as progress:
+        for done in range(41):
+            progress("diagnoses", done, 40)
+    err = capsys.readouterr().err
+    assert err.count("\n") == lines
+    assert lines == 0 or err.endswith("diagnoses: 40 of 40\n")
+
+
+def test_a_note_is_one_line_unless_none_is_wanted(capsys):
+    note("two\nlines", NORMAL)
+    note("nothing", QUIET)
+    assert capsys.readouterr().err == "thermal-robot: note: two lines\n"
+
+
+def chatter():
+    for _ in range(3):
+        warnings.warn("an effect is left out", Note, stacklevel=1)
+    warnings.warn("glyph missing", UserWarning, stacklevel=1)
+    warnings.warn("will be removed", DeprecationWarning, stacklevel=1)
+    logging.getLogger("their.library").warning("font %s not found", "x")
+
+
+@pytest.mark.parametrize(
+    ("loudness", "told"),
+    [
+        (QUIET, []),
+        (NORMAL, ["an effect is left out"]),
+        (VERBOSE, ["an effect is left out", "glyph missing", "font x not found"]),
+    ],
+)
+def test_warnings_and_logs_become_notes_or_nothing(capsys, loudness, told):
+    before = warnings.showwarning, list(logging.getLogger().handlers)
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", DeprecationWarning)
+        warnings.simplefilter("always", UserWarning)
+        shown = warnings.showwarning
+        with heard(loudness):
+            chatter()
+        assert warnings.showwarning is shown
+    assert capsys.readouterr().err.splitlines() == [f"thermal-robot: note: {text}" for text in told]
+    assert (warnings.showwarning, logging.getLogger().handlers) == before

@@ -1,0 +1,156 @@
+"""What is told beside the result, on stderr: the stages of long work, and notes; as much of it as was asked for."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import sys
+import threading
+import time
+import warnings
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from thermal_robot.errors import Note
+
+QUIET, NORMAL, VERBOSE = "quiet", "normal", "verbose"
+_PATIENCE = 2.0
+"""s after which a terminal shows the stages: of what is over sooner nobody wants to hear."""
+
+Counted = Callable[[str, int, int], None]
+"""Takes a stage, how much of it is done, and how much there is."""
+
+
+def add_loudness(parser: argparse.ArgumentParser, default: str) -> None:
+    """Define ``-q`` and ``-v``; of several the last one counts."""
+    told = {QUIET: "print the result alone: no progress, no notes; of a diagnosis its one sentence"}
+    told[VERBOSE] = "print each stage with the seconds that have passed, and what libraries warn of, on stderr"
+    for loudness, text in told.items():
+        names = (f"-{loudness[0]}", f"--{loudness}")
+        parser.add_argument(*names, dest="loudness", action="store_const", const=loudness, default=default, help=text)
+
+
+def note(text: str, loudness: str) -> None:
+    """Tell something that is no error, in one line."""
+    if loudness != QUIET:
+        print(f"thermal-robot: note: {' '.join(text.split())}", file=sys.stderr, flush=True)
+
+
+@contextmanager
+def heard(loudness: str) -> Iterator[None]:
+    """Make notes of warnings: of the program's own, each once; of what libraries warn of or log where it is asked for.
+
+    Libraries speak to programmers, in lines that name files of theirs.
+    """
+    told = set()
+
+    def show(message: Warning | str, category: type[Warning], *_: Any, **__: Any) -> None:
+        text = str(message)
+        if text not in told and (loudness == VERBOSE or issubclass(category, Note)):
+            told.add(text)
+            note(text, loudness)
+
+    logs = logging.Handler(logging.WARNING)
+    logs.emit = lambda record: show(record.getMessage(), Warning)  # type: ignore[method-assign]
+    with warnings.catch_warnings():
+        warnings.simplefilter("always", Note)
+        warnings.showwarning = show
+        logging.getLogger().addHandler(logs)
+        try:
+            yield
+        finally:
+            logging.getLogger().removeHandler(logs)
+
+
+@contextmanager
+def stages(loudness: str) -> Iterator[Callable[[str], None]]:
+    """Show the stages of work whose length nobody knows beforehand.
+
+    A terminal shows the stage and the time, once it has lasted; there is no bar, for nothing says how far it is. A line
+    for each stage where it is asked for; nothing elsewhere.
+
+    Yields
+    ------
+    Callable
+        Takes a few words at the beginning of each stage.
+    """
+    if loudness == VERBOSE:
+        begin = time.monotonic()
+
+        def line(stage: str) -> None:
+            print(f"{time.monotonic() - begin:6.1f} s  {stage}", file=sys.stderr, flush=True)
+
+        yield line
+        line("done")
+    elif loudness == QUIET or not sys.stderr.isatty():
+        yield lambda _: None
+    else:
+        with _spinning() as show:
+            yield show
+
+
+@contextmanager
+def _spinning() -> Iterator[Callable[[str], None]]:
+    from rich.console import Console
+    from rich.progress import Progress, SpinnerColumn, TextColumn, TimeElapsedColumn
+
+    columns = (SpinnerColumn(), TimeElapsedColumn(), TextColumn("{task.description}", markup=False))
+    shown = Progress(*columns, console=Console(stderr=True), transient=True)
+    task = shown.add_task("", total=None)
+    patience = threading.Timer(_PATIENCE, shown.start)
+    patience.daemon = True
+    patience.start()
+    try:
+        yield lambda stage: shown.update(task, description=stage)
+    finally:
+        patience.cancel()
+        patience.join()  # it may be about to start what is stopped here
+        shown.stop()
+
+
+@contextmanager
+def counted(loudness: str) -> Iterator[Counted]:
+    """Show how far work is whose parts are counted: bars on a terminal, elsewhere a line for every tenth.
+
+    Yields
+    ------
+    Callable
+        A :data:`Counted`.
+    """
+    if loudness == QUIET:
+        yield lambda *_: None
+    elif loudness == VERBOSE or not sys.stderr.isatty():
+        yield _tenths()
+    else:
+        with _bars() as show:
+            yield show
+
+
+@contextmanager
+def _bars() -> Iterator[Counted]:
+    from rich.console import Console
+    from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
+
+    columns = (TextColumn("{task.description}"), BarColumn(), MofNCompleteColumn(), TimeRemainingColumn())
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bars:
+        tasks: dict[str, Any] = {}
+
+        def show(stage: str, done: int, total: int) -> None:
+            if stage not in tasks:
+                tasks[stage] = bars.add_task(stage, total=total)
+            bars.update(tasks[stage], completed=done)
+
+        yield show
+
+
+def _tenths() -> Counted:
+    told: dict[str, int] = {}
+
+    def show(stage: str, done: int, total: int) -> None:
+        tenth = 10 * done // total
+        if tenth > told.get(stage, 0):
+            told[stage] = tenth
+            print(f"{stage}: {done} of {total}", file=sys.stderr, flush=True)
+
+    return show

@@ -1,0 +1,96 @@
+"""``-`` for standard input and output: made a file at the edge, so that nothing else need know of streams."""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+from thermal_robot.campaign.settings import MOST_PIPED
+from thermal_robot.errors import CampaignError, ThermalRobotError
+
+STDIN, STDOUT = "standard input", "standard output"
+_UTF_16 = (b"\xff\xfe", b"\xfe\xff")
+
+
+@contextmanager
+def piped(options: argparse.Namespace) -> Iterator[None]:
+    """Let a command read a file that holds standard input, and print the file that it wrote for standard output.
+
+    Parameters
+    ----------
+    options
+        Of a command. ``reads`` and ``writes`` name those that are files. One that is ``-`` becomes a path; ``piped``
+        then says whether standard input is read, ``printed`` whether a file takes the place of the text on standard
+        output.
+
+    Raises
+    ------
+    CampaignError
+        If ``-`` stands twice for the same stream, or standard input holds no text. Errors raised within speak of the
+        streams by name.
+    """
+    source, target = _named(options, options.reads, STDIN), _named(options, options.writes, STDOUT)
+    options.piped, options.printed = bool(source), bool(target)
+    if not source and not target:
+        yield
+        return
+    with TemporaryDirectory(prefix="thermal-robot-") as made:
+        folder = Path(made).resolve()
+        for name, file in ((source, STDIN), (target, STDOUT)):
+            if name:
+                setattr(options, name, str(folder / file))
+        if source:
+            (folder / STDIN).write_bytes(_read())
+        try:
+            yield
+        except ThermalRobotError as error:
+            error.args = (str(error).replace(f"{folder}{os.sep}", ""),)
+            raise
+        finally:
+            if (folder / STDOUT).exists():
+                _print((folder / STDOUT).read_bytes())
+
+
+def _named(options: argparse.Namespace, names: Sequence[str], stream: str) -> str:
+    """Return the option that stands for a stream, or nothing."""
+    found = [name for name in names if getattr(options, name) == "-"]
+    if len(found) > 1:
+        raise CampaignError(
+            "-", f"there is one {stream}", found=f"- as {' and as '.join(found)}", expected="one of them"
+        )
+    return "".join(found)
+
+
+def _read() -> bytes:
+    """Read all of standard input, within bounds."""
+    if sys.stdin is None or sys.stdin.closed:
+        raise CampaignError(STDIN, "is closed", expected="text from a file or another program")
+    if sys.stdin.isatty():
+        raise CampaignError(STDIN, "is a terminal", expected="text from a file or another program: `- < FILE`")
+    try:
+        content = sys.stdin.buffer.read(MOST_PIPED + 1)
+    except OSError as error:
+        raise CampaignError(STDIN, "cannot be read", found=error.strerror) from None
+    if not content.strip():
+        raise CampaignError(STDIN, "is empty", expected="text from a file or another program")
+    if len(content) > MOST_PIPED:
+        raise CampaignError(STDIN, "is too long", expected=f"at most {MOST_PIPED / 1e6:.0f} MB; name a file instead")
+    if b"\0" in content and not content.startswith(_UTF_16):
+        raise CampaignError(
+            STDIN, "is not text", found="a byte that no text has", expected="a table as CSV, TOML or JSON"
+        )
+    return content
+
+
+def _print(content: bytes) -> None:
+    """Print bytes as they are; as text where there is no stream of bytes beneath."""
+    sys.stdout.flush()
+    if hasattr(sys.stdout, "buffer"):
+        sys.stdout.buffer.write(content)
+    else:
+        sys.stdout.write(content.decode("utf-8"))
