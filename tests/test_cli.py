@@ -163,7 +163,7 @@ def test_only_and_without_choose_among_the_effects(run, folder):
     assert candidates("--only", "thermal_elongation", "--only", "joint_gain") == two
     assert candidates("--without", "drift", "joint_gain") == {*library(), *RANDOM} - {"drift", "joint_gain"}
     refused(run("diagnose", folder, "--only", "thermal_elongatio"), "'thermal_elongatio'", "thermal_elongation")
-    refused(run("diagnose", folder, "--without", "drif"), "'drif'", "drift")
+    refused(run("diagnose", folder, "--without", "drif"), "'drif'", "did you mean 'drift'?")
 
 
 def table(path):

@@ -59,13 +59,12 @@ def test_refused(tmp_path: Path, refused: tuple[Any, ...]) -> None:
 
 
 def test_no_campaign(tmp_path: Path) -> None:
-    for path in (tmp_path, tmp_path / "campaign.toml"):
+    problems = {tmp_path: "this folder has no campaign.toml", tmp_path / "campaign.toml": "there is no such file"}
+    for path, problem in problems.items():
         with pytest.raises(CampaignError) as caught:
             read_campaign(path)
-        assert caught.value.file == str(tmp_path / "campaign.toml")
-        assert str(caught.value).endswith(
-            "there is no such file, expected campaign.toml, or the directory that holds it"
-        )
+        assert caught.value.file == str(path)
+        assert str(caught.value).endswith(f"{problem}, expected campaign.toml, or the folder that holds it")
 
 
 def test_noise_of_zero_is_not_given(tmp_path: Path) -> None:
@@ -124,3 +123,29 @@ def test_gears_are_of_joints_of_the_chain(tmp_path: Path) -> None:
     with pytest.raises(CampaignError, match="no such joint") as caught:
         check_gears(found, ("lift", "elbow"))
     assert (caught.value.row, caught.value.column) == (10, "gears.shoulder")
+
+
+def test_what_is_missing_is_answered_with_the_campaigns_beside_it(tmp_path: Path) -> None:
+    (tmp_path / "tools.toml").write_text("[tool]\n")
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(CampaignError) as refused:
+        read_declaration(tmp_path)
+    assert "this folder has no campaign.toml, expected" in str(refused.value)
+    (tmp_path / "warm.toml").write_text('[measurements]\nfile = "warm.csv"\n')
+    (tmp_path / "cell_2").mkdir()
+    (tmp_path / "cell_2" / "campaign.toml").touch()
+    for asked, problem in ((tmp_path, "this folder has no campaign.toml"), (tmp_path / "warn.toml", "no such file")):
+        with pytest.raises(CampaignError) as refused:
+            read_declaration(asked)
+        assert f"{problem}; campaigns there: 'warm.toml', 'cell_2', expected" in str(refused.value)
+    with pytest.raises(CampaignError, match="no such file, expected"):
+        read_declaration(tmp_path / "nowhere" / "campaign.toml")
+
+
+def test_paths_start_from_the_folder_that_is_named(tmp_path: Path) -> None:
+    (tmp_path / "piped").mkdir()
+    text = '[robot]\nurdf = "r.urdf"\ntool_frame = "t"\n' + '[measurements]\nfile = "m.csv"\n'
+    (tmp_path / "piped" / "c.toml").write_text(text + 'angle_unit = "deg"\nlength_unit = "mm"\n')
+    found = read_declaration(tmp_path / "piped" / "c.toml", tmp_path)
+    assert (found.robot, found.table) == (tmp_path / "r.urdf", tmp_path / "m.csv")
+    assert read_declaration(tmp_path / "piped" / "c.toml").table == tmp_path / "piped" / "m.csv"

@@ -13,6 +13,7 @@ from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, Units
 from thermal_robot.errors import CampaignError
 
 FILE_NAME = "campaign.toml"
+_MOST_NAMED = 5  # campaigns of a folder in one sentence
 
 
 @dataclass(frozen=True)
@@ -63,7 +64,7 @@ def read_declaration(path: Path, folder: Path | None = None) -> Declaration:
     """
     file = path / FILE_NAME if path.is_dir() else path
     if not file.is_file():
-        raise CampaignError(str(file), "there is no such file", expected=f"{FILE_NAME}, or the directory that holds it")
+        raise _absent(path)
     document = Document(file)
     length = Units(length=document.word("measurements", "length_unit", LENGTH_UNITS)).length_scale
     noise = [document.size("noise", key) for key in SECTIONS["noise"]]
@@ -110,6 +111,25 @@ def check_gears(declaration: Declaration, joints: tuple[str, ...]) -> None:
                 column=f"gears.{joint}",
                 expected=f"one of {listed(joints)}",
             )
+
+
+def _absent(path: Path) -> CampaignError:
+    """Say that there is no campaign, and which there are beside it."""
+    problem = f"this folder has no {FILE_NAME}" if path.is_dir() else "there is no such file"
+    found = _campaigns(path if path.is_dir() else path.parent)
+    beside = f"; campaigns there: {listed(found, _MOST_NAMED)}" if found else ""
+    return CampaignError(str(path), problem + beside, expected=f"{FILE_NAME}, or the folder that holds it")
+
+
+def _campaigns(folder: Path) -> list[str]:
+    """Return the names of campaigns in a folder: files that have their section, folders that have their file."""
+    try:
+        inside = sorted(folder.iterdir())
+        files = [f for f in inside if f.suffix == ".toml" and f.is_file() and b"[measurements]" in f.read_bytes()]
+        folders = [f for f in inside if f.is_dir() and (f / FILE_NAME).is_file()]
+    except OSError:  # nothing can be proposed where nothing can be read
+        return []
+    return [f.name for f in (*files, *folders)]
 
 
 def _scaled(vector: Vector, scale: float) -> Vector:

@@ -10,6 +10,7 @@ from pathlib import Path
 from threadpoolctl import threadpool_limits
 
 from thermal_robot.campaign import Campaign, read_campaign
+from thermal_robot.campaign.names import did_you_mean
 from thermal_robot.diagnosis.answer import Conclusion, answer
 from thermal_robot.diagnosis.beside_scatter import beside_scatter
 from thermal_robot.diagnosis.beside_steps import beside_steps
@@ -160,4 +161,5 @@ def _check_priors(campaign: Campaign, known: set[str]) -> None:
     for name in campaign.priors:
         if name not in known:
             expected = "one of " + ", ".join(sorted(known))
-            raise CampaignError(campaign.name, "no effect has this name", column=f"priors.{name}", expected=expected)
+            problem = f"no effect has this name{did_you_mean(name, known)}"
+            raise CampaignError(campaign.name, problem, column=f"priors.{name}", expected=expected)

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import difflib
 import json
 import warnings
 from collections.abc import Iterable
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 
+from thermal_robot.campaign.names import did_you_mean
 from thermal_robot.effects.backlash import Backlash
 from thermal_robot.effects.base_compliance import BaseCompliance
 from thermal_robot.effects.base_frame import BaseFrame
@@ -143,8 +143,8 @@ def choose(
     only, without = ((names,) if isinstance(names, str) else tuple(names) for names in (only, without))
     for name in (*only, *without):
         if name not in known and name not in RANDOM:
-            near = difflib.get_close_matches(name, (*known, *RANDOM), n=3, cutoff=0.3) or sorted(known)
-            raise EffectError(f"no effect is named {name!r}; near to it: {', '.join(near)}")
+            meant = did_you_mean(name, (*known, *RANDOM)) or f"; there are {', '.join(sorted((*known, *RANDOM)))}"
+            raise EffectError(f"no effect is named {name!r}{meant}")
     chosen = tuple(e for name, e in known.items() if (not only or name in only) and name not in without)
     if not chosen:
         raise EffectError("no effect is left to consider")
