@@ -49,3 +49,22 @@ def test_a_reader_that_leaves_is_no_error():
         process.stdout.close()
         assert process.stderr.read() == ""
     assert process.returncode == 0
+
+
+@pytest.mark.skipif(not Path("/dev/full").exists(), reason="has no full device")
+def test_a_full_disk_behind_a_file_that_is_printed_is_one_line():
+    with (
+        open("/dev/full", "w") as full,
+        started("paper", "--json", "-", stdout=full, stderr=subprocess.PIPE) as process,
+    ):
+        err = process.communicate(timeout=60)[1]
+    assert process.returncode == 1
+    assert err == "thermal-robot: cannot print: No space left on device\n"
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="pipes of POSIX")
+def test_a_reader_that_leaves_a_file_that_is_printed_is_no_error():
+    with started("paper", "--json", "-", stdout=subprocess.PIPE, stderr=subprocess.PIPE) as process:
+        process.stdout.close()
+        assert process.stderr.read() == ""
+    assert process.returncode == 0

@@ -1,5 +1,6 @@
 """Files appear whole or not at all, however writing ends."""
 
+import json
 import os
 import signal
 import subprocess
@@ -115,3 +116,33 @@ def test_what_is_no_file_is_written_to(tmp_path):
         subprocess.run([sys.executable, "-c", code], stdout=file, check=True)
     assert (tmp_path / "out").read_text() == "told, and more\n"
     assert len(list(tmp_path.iterdir())) == 1
+
+
+KINDS = {"d.json", "r.html", "m.json", "p.csv", "p.parquet", "f.png"}
+
+
+def every_output(folder, *how):
+    script = os.path.join(os.path.dirname(__file__), "every_output.py")
+    command = [sys.executable, script, str(folder), *how]
+    return json.loads(subprocess.run(command, stdout=subprocess.PIPE, check=True, timeout=300).stdout)
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name != "posix", reason="kills processes")
+def test_a_process_killed_at_any_instant_leaves_every_file_absent_old_or_whole(tmp_path):
+    found = every_output(tmp_path, "killed", "150")
+    assert found["torn"] == []
+    # the kills did come while files were being written
+    assert set(found["interrupted"]) == KINDS
+    assert sum(n > 0 for n in found["interrupted"].values()) >= 4
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(os.name != "posix", reason="limits the size of files")
+def test_a_full_disk_is_an_error_for_every_file_and_leaves_what_was_there(tmp_path):
+    for name in KINDS:
+        (tmp_path / name).write_text("before")
+    raised = every_output(tmp_path, "full")
+    assert set(raised) == KINDS
+    assert all("too large" in reason for reason in raised.values()), raised
+    assert {file.name: file.read_text() for file in tmp_path.iterdir()} == dict.fromkeys(KINDS, "before")

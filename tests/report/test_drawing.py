@@ -75,3 +75,12 @@ def test_rounding_down_gives_the_next_round_number_below():
         assert found <= value < 2.5001 * found
     assert all(a <= b for a, b in pairwise(rounded))
     assert [round_down(v) for v in (1.0, 0.2, 0.0005, 0.3)] == pytest.approx([1.0, 0.2, 0.0005, 0.2])
+
+
+def test_a_figure_is_written_whole_under_the_name_that_matplotlib_gives_it(tmp_path):
+    figure = Drawing(2.0, 1.0)
+    for name in ("a.png", "b.pdf", "c"):
+        figure.savefig(tmp_path / name)
+    figure.savefig(str(tmp_path / "d"), format="svg")
+    found = {file.name: file.read_bytes()[:4] for file in tmp_path.iterdir()}
+    assert found == {"a.png": b"\x89PNG", "b.pdf": b"%PDF", "c.png": b"\x89PNG", "d": b"<?xm"}

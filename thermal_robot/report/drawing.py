@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+import os
 from io import BytesIO
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
+
+from thermal_robot.files import whole
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -28,6 +32,16 @@ class Drawing(Figure):
 
     def __init__(self, width: float, height: float) -> None:
         super().__init__(figsize=(width, height), layout="constrained", facecolor=PAPER)
+
+    def savefig(self, fname: Any, **options: Any) -> None:
+        """Draw into a file, which appears whole or not at all, or into a stream; options are Matplotlib's."""
+        if not isinstance(fname, (str, os.PathLike)):
+            super().savefig(fname, **options)
+            return
+        file = Path(fname)
+        named = file if file.suffix or "format" in options else file.with_suffix(".png")  # as Matplotlib does
+        with whole(named) as place:
+            super().savefig(place, **options)
 
     def _repr_png_(self) -> bytes:
         stream = BytesIO()

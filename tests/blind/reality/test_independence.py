@@ -9,7 +9,13 @@ import thermal_robot
 
 PACKAGE = Path(thermal_robot.__file__).parent
 REALITY = PACKAGE / "blind" / "reality"
-SHARED = {"thermal_robot", "thermal_robot.blind", "thermal_robot.blind.cases", "thermal_robot.errors"}
+SHARED = {
+    "thermal_robot",
+    "thermal_robot.blind",
+    "thermal_robot.blind.cases",
+    "thermal_robot.errors",
+    "thermal_robot.files",
+}
 """What is asked, and the exception for a user's file; the two packages hold no more than their names."""
 FOREIGN = ("pinocchio", "yourdfpy")
 

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from thermal_robot.blind.cases import Case
 from thermal_robot.blind.reality.instrument import Instrument, Measured
 from thermal_robot.blind.reality.setting import Setting
+from thermal_robot.files import write_text
 
 
 def write_folder(
@@ -39,8 +40,8 @@ def write_folder(
         Transmission ratio by joint.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "robot.urdf").write_text(case.robot.urdf, encoding="utf-8")
-    (folder / "campaign.toml").write_text(_document(case, instrument, gears or {}), encoding="utf-8")
+    write_text(folder / "robot.urdf", case.robot.urdf)
+    write_text(folder / "campaign.toml", _document(case, instrument, gears or {}))
     columns = conditions(setting)
     table = columns.iloc[rows].reset_index(drop=True)
     for axis, values in zip("xyz", 1e3 * measured.position.T, strict=True):
@@ -49,8 +50,8 @@ def write_folder(
         for name, values in zip(("qw", "qx", "qy", "qz"), measured.quaternion.T, strict=True):
             table[name] = values.round(10)
     hidden = [c for c in map(str, columns) if any(c == h or c.startswith(h + ".") for h in case.hidden)]
-    table.drop(columns=hidden).to_csv(folder / "measurements.csv", index=False)
-    columns.iloc[others].drop(columns=hidden).to_csv(folder / "fresh.csv", index=False)
+    for name, rows_given in (("measurements.csv", table), ("fresh.csv", columns.iloc[others])):
+        write_text(folder / name, rows_given.drop(columns=hidden).to_csv(index=False))
 
 
 def conditions(setting: Setting) -> pd.DataFrame:
