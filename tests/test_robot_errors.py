@@ -178,6 +178,11 @@ def test_gravity_is_three_finite_numbers(gravity):
     assert str(refusal("builtin:rv_m2", "tool0", gravity=gravity)).startswith("gravity must be three finite numbers")
 
 
+def test_gravity_in_millimetres_is_no_gravity():
+    told = str(refusal("builtin:rv_m2", "tool0", gravity=[0, 0, -9810]))
+    assert told == "gravity must be at most 100 m/s² along each axis, got [0, 0, -9810]"
+
+
 def test_unknown_builtin_robot():
     error = refusal("builtin:rv_m1", "tool0")
     assert str(error) == "there is no built-in robot 'rv_m1'; nearest: rv_m2"

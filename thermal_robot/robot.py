@@ -27,6 +27,8 @@ _DESCRIPTION = "the robot description"
 
 _MOST_SHOWN = 12
 """Names in one message; a humanoid has dozens of fingers."""
+STRONGEST_GRAVITY = 100.0
+"""m/s²: four times that of any planet where a robot has been sent; a figure in mm/s² is above it."""
 _LARGEST_FILE = 64 << 20
 """Bytes: a URDF is text about links, of a few kilobytes each."""
 
@@ -171,8 +173,8 @@ def load_robot(
     RobotError
         If there is no such file, name or link, if it is not a URDF, if the chain has no movable joint, or one
         that is not revolute, continuous, prismatic or fixed, if one of its joints mimics one that does not exist, or
-        in the end itself, if gravity is not three finite numbers, or if a mass, an inertia, an origin, an axis or a
-        limit is no number, or one that no robot has.
+        in the end itself, if gravity is not three numbers of a planet, or if a mass, an inertia, an origin, an axis or
+        a limit is no number, or one that no robot has.
     """
     text, source = _urdf_text(urdf)
     for frame in (tool_frame, root_frame):
@@ -230,10 +232,12 @@ def _three_finite_numbers(gravity: ArrayLike | None) -> Array | None:
         return None
     try:
         vector = np.array(gravity, dtype=float)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         vector = np.empty(0)
     if vector.shape != (3,) or not np.all(np.isfinite(vector)):
         raise RobotError(f"gravity must be three finite numbers in m/s², got {gravity!r}")
+    if not np.all(np.abs(vector) <= STRONGEST_GRAVITY):
+        raise RobotError(f"gravity must be at most {STRONGEST_GRAVITY:g} m/s² along each axis, got {gravity!r}")
     return vector
 
 
