@@ -17,6 +17,7 @@ PACKAGE = "thermal_robot"
 ORDER = (
     "errors",
     "files",
+    "schema",
     "kinematics",
     "robot",
     "assembly",

@@ -62,6 +62,7 @@ class OwnError(ThermalRobotError):
         ({"row": 3}, "t.csv, row 3: is odd"),
         ({"column": "x"}, "t.csv, column 'x': is odd"),
         ({"row": 0, "column": "x"}, "t.csv, row 0, column 'x': is odd"),
+        ({"key": "effects[2].values[3]"}, "t.csv, effects[2].values[3]: is odd"),
         ({"found": "7"}, "t.csv: is odd; found 7"),
         ({"expected": "8"}, "t.csv: is odd, expected 8"),
         ({"row": 2, "found": "", "expected": "8"}, "t.csv, row 2: is odd; found , expected 8"),
@@ -70,7 +71,7 @@ class OwnError(ThermalRobotError):
 def test_the_sentence_names_what_is_known_and_no_more(place, sentence):
     error = CampaignError("t.csv", "is odd", **place)
     assert str(error) == sentence
-    for name in ("row", "column", "found", "expected"):
+    for name in ("row", "column", "key", "found", "expected"):
         assert getattr(error, name) == place.get(name)
 
 

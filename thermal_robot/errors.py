@@ -52,6 +52,8 @@ class CampaignError(ThermalRobotError):
         Row in the file, counted as a text editor does (the header is row 1); ``None`` for the whole file.
     column
         Column or TOML key; ``None`` for the whole row.
+    key
+        Path of a value in a file that is no table, such as ``effects[2].values[3]``.
     found, expected
         What stands there and what should.
     """
@@ -63,12 +65,14 @@ class CampaignError(ThermalRobotError):
         *,
         row: int | None = None,
         column: str | None = None,
+        key: str | None = None,
         found: str | None = None,
         expected: str | None = None,
     ) -> None:
-        self.file, self.problem, self.row, self.column = file, problem, row, column
+        self.file, self.problem, self.row, self.column, self.key = file, problem, row, column, key
         self.found, self.expected = found, expected
         place = file + (f", row {row}" if row is not None else "") + (f", column {column!r}" if column else "")
+        place += f", {key}" if key else ""
         detail = (f"; found {found}" if found is not None else "") + (
             f", expected {expected}" if expected is not None else ""
         )
