@@ -23,6 +23,7 @@ REFUSED = [
     (ROWS.replace("520", "nan"), 4, "z", "'nan'", ["a value is missing"]),
     (ROWS.replace("900", "inf"), 3, "x", "'inf'", ["not a finite number"]),
     (ROWS.replace("0.3", ""), 3, "lift", "an empty cell", ["a value is missing"]),
+    (ROWS.replace("900", "-1e300"), 3, "x", "'-1e300'", ["larger than anything that is measured"]),
     (ROWS.replace("0.3", "-inf"), 3, "lift", "'-inf'", ["not a finite number"]),
     (ROWS.replace(",2,8", ",inf,8"), 3, "time", "'inf'", ["not a finite number"]),
     (ROWS.replace(",2,8", ",two,8"), 3, "time", "'two'", ["text where a number should be"]),

@@ -171,3 +171,63 @@ def test_nullable_numbers_of_pandas_are_numbers() -> None:
     table = table_from_frame(frame)
     np.testing.assert_array_equal(table.numbers("a", gaps=True), [1.0, np.nan])
     assert table.numbers("b").tolist() == [1.0, 0.0]
+
+
+class Mute:
+    """A cell that cannot say itself."""
+
+    def __str__(self) -> str:
+        raise RuntimeError("no words")
+
+
+ODD = {
+    "dates": (pd.date_range("2020", periods=3), None),
+    "times": (pd.to_timedelta([1, 2, 3], unit="s"), None),
+    "intervals": (pd.interval_range(0, 3), None),
+    "complex": (np.array([1.0, 2.0, 3j]), None),
+    "bytes": ([b"1", b"2", b"3"], None),
+    "lists": ([[1.0], [2.0], [3.0]], None),
+    "mute": ([Mute(), 1.0, 2.0], None),
+    "of 5000 digits": (pd.Series([10**5000, 1, 2], dtype=object), None),
+    "infinite": ([1.0, np.inf, 2.0], None),
+    "enormous": ([1.0, -1e300, 2.0], None),
+    "missing": (pd.array([1, None, 3], dtype="Int64"), None),
+    "text": (pd.array(["1", "2", "3"], dtype="string"), [1.0, 2.0, 3.0]),
+    "mixed": ([1.0, "2", 3], [1.0, 2.0, 3.0]),
+    "categories": (pd.Categorical([1.5, 1.5, 2.5]), [1.5, 1.5, 2.5]),
+    "nullable": (pd.array([1, 2, 3], dtype="Int64"), [1.0, 2.0, 3.0]),
+    "sparse": (pd.arrays.SparseArray([0.0, 0.0, 3.0]), [0.0, 0.0, 3.0]),
+    "unsigned": (np.arange(3, dtype=np.uint8), [0.0, 1.0, 2.0]),
+    "half": (np.arange(3, dtype=np.float16), [0.0, 1.0, 2.0]),
+}
+"""Columns by what is odd about them: values, and the numbers that they are; none where they are refused."""
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_a_column_of_any_type_is_read_as_it_is_or_refused_in_a_sentence(name: str) -> None:
+    values, numbers = ODD[name]
+    table = table_from_frame(pd.DataFrame({"a": values}))
+    if numbers is not None:
+        assert table.numbers("a").tolist() == numbers
+        return
+    with pytest.raises(CampaignError, match=r"^<table>, row \d, column 'a': .*expected a number$"):
+        table.numbers("a")
+
+
+@pytest.mark.parametrize(
+    ("index", "rows"),
+    [
+        (pd.Index(pd.array([None, 5, 6], dtype="Int64")), [0, 1, 2]),
+        (pd.Index(np.array([2**63, 1, 2], dtype=np.uint64)), [0, 1, 2]),
+        (pd.MultiIndex.from_product([["a"], [1, 2, 3]]), [0, 1, 2]),
+        (pd.date_range("2020", periods=3), [0, 1, 2]),
+        (pd.RangeIndex(4, 10, 2), [4, 6, 8]),
+    ],
+)
+def test_rows_are_counted_where_the_index_is_no_row_number(index: pd.Index, rows: list[int]) -> None:
+    assert table_from_frame(pd.DataFrame({"a": [1.0, 2.0, 3.0]}).set_axis(index)).rows.tolist() == rows
+
+
+def test_names_of_columns_of_any_type_are_text() -> None:
+    frame = pd.DataFrame([[1.0, 2.0, 3.0]], columns=pd.Index([1, ("a", 2), Mute()], dtype=object, tupleize_cols=False))
+    assert list(table_from_frame(frame).columns) == ["1", "('a', 2)", "<Mute>"]

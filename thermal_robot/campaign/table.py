@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.errors import CampaignError
+from thermal_robot.schema import LARGEST
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -17,6 +18,7 @@ if TYPE_CHECKING:
 Cells: TypeAlias = "Sequence[str] | NDArray[np.float64]"
 """A column: text as it stands in the file, or numbers where the source has a type of its own."""
 
+_REFUSED = {-1: "a value is missing", 0: "larger than anything that is measured", 1: "not a finite number"}
 _EMPTY = frozenset({"", "nan", "na", "n/a", "null", "none", "<na>"})
 
 
@@ -60,16 +62,16 @@ class Table:
         Raises
         ------
         CampaignError
-            Text, an infinite number, or an empty cell where none may be.
+            Text, a number that is infinite or that nobody measures, or an empty cell where none may be.
         """
         cells = self.columns[column]
         values = cells if isinstance(cells, np.ndarray) else self._parse(column, cells)
-        refused = np.isinf(values) if gaps else ~np.isfinite(values)
+        refused = np.abs(values) > LARGEST if gaps else ~(np.abs(values) <= LARGEST)
         if refused.any():
             index = int(np.argmax(refused))
             raise CampaignError(
                 self.file,
-                "a value is missing" if np.isnan(values[index]) else "not a finite number",
+                _REFUSED[int(np.isinf(values[index])) - int(np.isnan(values[index]))],
                 row=int(self.rows[index]),
                 column=column,
                 found=self._as_found(cells[index]),

@@ -79,13 +79,13 @@ def table_from_frame(frame: pd.DataFrame, file: str = "<table>", *, first_row: i
     """
     import pandas as pd
 
-    header = [str(name).strip() for name in frame.columns]
+    header = [_as_text(name) for name in frame.columns]
     _check_header(file, header, number=None if first_row is None else 1)
     if len(frame) == 0:
         raise CampaignError(file, "has a header but no rows", expected="one row per measurement")
     if first_row is not None:
         rows = np.arange(first_row, first_row + len(frame))
-    elif pd.api.types.is_integer_dtype(frame.index.dtype) and frame.index.is_unique:
+    elif pd.api.types.is_signed_integer_dtype(frame.index.dtype) and frame.index.is_unique and not frame.index.hasnans:
         rows = frame.index.to_numpy(dtype=np.int64)
     else:
         rows = np.arange(len(frame))
@@ -95,8 +95,16 @@ def table_from_frame(frame: pd.DataFrame, file: str = "<table>", *, first_row: i
         if pd.api.types.is_numeric_dtype(series.dtype) and not pd.api.types.is_complex_dtype(series.dtype):
             columns[name] = series.to_numpy(dtype=np.float64, na_value=np.nan)
         else:
-            columns[name] = ["" if gap else str(cell).strip() for cell, gap in zip(series, series.isna(), strict=True)]
+            columns[name] = ["" if gap else _as_text(cell) for cell, gap in zip(series, series.isna(), strict=True)]
     return Table(file, columns, rows.astype(np.int64), None if first_row is None else 1)
+
+
+def _as_text(cell: object) -> str:
+    """Return any value as one line of text; what cannot say itself by its type."""
+    try:
+        return str(cell).strip()
+    except Exception:  # a cell may hold anybody's object, and Python writes no whole number of 5000 digits
+        return f"<{type(cell).__name__}>"
 
 
 def _read_parquet(path: Path) -> Table:
