@@ -40,7 +40,7 @@ REFUSED = [
         ["unknown word", '"unknown" or "known"'],
     ),
     ("0.02", "-0.02", 16, "noise.position", "-0.02", ["cannot be negative"]),
-    ("0.02", "0.02\norientation = -1", 17, "noise.orientation", "-1.0", ["cannot be negative"]),
+    ("0.02", "0.02\norientation = -1", 17, "noise.orientation", "-1", ["cannot be negative"]),
     ("101", "0", 22, "gears.lift", "0", ["transmission ratio must be positive"]),
     (
         "lift =",

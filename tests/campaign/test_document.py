@@ -90,3 +90,15 @@ def test_numbers_are_floats_and_no_others_pass(tmp_path: Path) -> None:
             document(tmp_path, f"[robot]\nreference_temperature = {wrong}\n").number(
                 "robot", "reference_temperature", 0.0
             )
+
+
+@pytest.mark.parametrize("value", ["1" * 5000, "[" * 2000 + "]" * 2000])
+def test_what_python_cannot_read_is_no_toml(tmp_path: Path, value: str) -> None:
+    with pytest.raises(CampaignError, match="not valid TOML"):
+        document(tmp_path, f"[robot]\nreference_temperature = {value}\n")
+
+
+def test_a_number_of_four_hundred_digits_is_no_figure(tmp_path: Path) -> None:
+    found = document(tmp_path, f"[noise]\nposition = 1{'0' * 400}\n")
+    with pytest.raises(CampaignError, match="expected a number above 0"):
+        found.size("noise", "position")

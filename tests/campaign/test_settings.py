@@ -21,12 +21,28 @@ def test_settings_refuse_other_keys(tmp_path: Path, change: dict[str, object]) -
         del data["tool_frame"]
     with pytest.raises(CampaignError) as caught:
         Settings.from_dict(data, "model.json")
-    assert (caught.value.file, caught.value.column) == ("model.json", next(iter(change)))
+    assert (caught.value.file, caught.value.key) == ("model.json", next(iter(change)))
 
 
-def test_settings_refuse_other_values(tmp_path: Path) -> None:
-    data = full(tmp_path / "c").settings.to_dict() | {"target": [1.0, 2.0]}
-    with pytest.raises(CampaignError, match=r"model\.json: settings cannot be read"):
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ({"target": [1.0, 2.0]}, r"target: is \[1\.0, 2\.0\], expected three numbers"),
+        ({"target": [1.0, float("nan"), 0.0]}, r"target\[1\]: is NaN, expected a finite number"),
+        ({"noise_position": -1e-5}, "noise_position: a standard deviation cannot be negative"),
+        ({"reference_temperature": -300}, "reference_temperature: no temperature is lower"),
+        ({"gravity": [0, 0, -9810]}, r"gravity\[2\]: is -9810, expected a number of m/s"),
+        ({"units": {"angle": "deg", "length": "inch"}}, r'units\.length: unknown unit, expected "m" or "mm" or "um"'),
+        ({"units": {"angle": "deg"}}, r"units\.length: is missing"),
+        ({"base_known": 1}, "base_known: is 1, expected true or false"),
+        ({"gears": {"lift": 0}}, r"gears\.lift: a transmission ratio must be positive"),
+        ({"priors": [1.0]}, r"priors: is \[1\.0\], expected values by name"),
+        ({"moves": "straight"}, "moves: unknown word"),
+    ],
+)
+def test_settings_refuse_other_values(tmp_path: Path, change: dict[str, object], said: str) -> None:
+    data = full(tmp_path / "c").settings.to_dict() | change
+    with pytest.raises(CampaignError, match=rf"^model\.json, {said}"):
         Settings.from_dict(data, "model.json")
 
 

@@ -8,7 +8,14 @@ from pathlib import Path
 
 from thermal_robot.campaign.document import SECTIONS, Document
 from thermal_robot.campaign.names import did_you_mean, listed
-from thermal_robot.campaign.settings import MOVES, STANDARD_TEMPERATURE, Settings, Vector, as_vector
+from thermal_robot.campaign.settings import (
+    MOVES,
+    STANDARD_TEMPERATURE,
+    TEMPERATURE,
+    Settings,
+    Vector,
+    as_vector,
+)
 from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, Units
 from thermal_robot.errors import CampaignError
 
@@ -74,7 +81,7 @@ def read_declaration(path: Path, folder: Path | None = None) -> Declaration:
         root_frame=document.string("robot", "root_frame", None),
         gravity=document.vector("robot", "gravity", None),
         moves=document.word("robot", "moves", MOVES, MOVES[0]),
-        reference_temperature=document.number("robot", "reference_temperature", STANDARD_TEMPERATURE),
+        reference_temperature=document.number("robot", "reference_temperature", STANDARD_TEMPERATURE, TEMPERATURE),
         units=Units(
             document.word("measurements", "angle_unit", ANGLE_UNITS),
             document.word("measurements", "length_unit", LENGTH_UNITS),

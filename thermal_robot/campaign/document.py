@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-import math
 import re
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
 from thermal_robot.campaign.names import did_you_mean
-from thermal_robot.campaign.settings import as_vector
+from thermal_robot.campaign.settings import GEARS, NUMBER, PRIORS, SIGMA, UNIT, VECTOR, WORD
 from thermal_robot.errors import CampaignError
+from thermal_robot.schema import Kind, MisfitError, alternatives, shown, word
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -28,6 +29,7 @@ SECTIONS: dict[str, tuple[str, ...]] = {
 }
 """Keys by section; priors and gears have keys of the user's own (effects and joints)."""
 
+_NAMED = {"priors": PRIORS, "gears": GEARS}
 _ABSENT: Any = object()
 
 
@@ -43,7 +45,7 @@ class Document:
             raise CampaignError(self.file, f"cannot be read: {error.strerror}") from error
         except UnicodeDecodeError as error:
             raise CampaignError(self.file, "is not UTF-8 text", expected="a TOML file saved as UTF-8") from error
-        except tomllib.TOMLDecodeError as error:
+        except (ValueError, RecursionError) as error:  # a number of 5000 digits, brackets in a thousand brackets
             line = re.search(r"at line (\d+)", str(error))
             row = int(line[1]) if line else None
             raise CampaignError(self.file, f"not valid TOML: {error}", row=row) from error
@@ -101,7 +103,7 @@ class Document:
             problem,
             row=self.row(section, key),
             column=f"{section}.{key}",
-            found=repr(found),
+            found=shown(found),
             expected=expected,
         )
 
@@ -130,55 +132,36 @@ class Document:
             raise self._wrong(section, key, value, f"{meaning}, as text in quotes")
         return value
 
-    def word(self, section: str, key: str, allowed: Any, default: Any = _ABSENT) -> str:
+    def word(self, section: str, key: str, allowed: Iterable[str], default: Any = _ABSENT) -> str:
         """Return one of the allowed words."""
-        expected = " or ".join(f'"{word}"' for word in allowed)
-        value = self._get(section, key, default, expected)
-        if not isinstance(value, str) or value not in allowed:
-            problem = "unknown unit" if key.endswith("unit") else "unknown word"
-            raise self._wrong(section, key, value, expected, problem)
-        return value
+        kind = word(allowed, UNIT if key.endswith("unit") else WORD)
+        return str(self._fit(section, key, self._get(section, key, default, alternatives(allowed)), kind))
 
-    def number(self, section: str, key: str, default: Any) -> float:
-        """Return a finite number."""
-        value = self._get(section, key, default, "a number")
-        if not _is_number(value):
-            raise self._wrong(section, key, value, "a number")
-        return float(value)
+    def number(self, section: str, key: str, default: Any, kind: Kind = NUMBER) -> float:
+        """Return a number of a kind, any finite one where none is given."""
+        return float(self._fit(section, key, self._get(section, key, default, "a number"), kind))
 
     def size(self, section: str, key: str) -> float:
         """Return a number that is not negative, 0 when absent."""
-        value = self.number(section, key, 0.0)
-        if value < 0:
-            raise self._wrong(
-                section,
-                key,
-                value,
-                "a number above 0, or 0 for not given",
-                "a standard deviation cannot be negative",
-            )
-        return value
+        return self.number(section, key, 0.0, SIGMA)
 
     def vector(self, section: str, key: str, default: Any) -> Any:
         """Return three finite numbers, or the default."""
         value = self._get(section, key, default, "three numbers")
         if value is None or value is default:
             return value
-        if not isinstance(value, list) or len(value) != 3 or not all(_is_number(part) for part in value):
-            raise self._wrong(section, key, value, "three numbers in brackets, such as [0.0, 0.0, 80.0]")
-        return as_vector(value)
+        return self._fit(section, key, value, VECTOR, "three numbers in brackets, such as [0.0, 0.0, 80.0]")
 
     def positive(self, section: str) -> dict[str, float]:
         """Return a section whose keys are the user's own, each with a number above 0."""
-        values = self.data.get(section, {})
-        for key, value in values.items():
-            if not _is_number(value):
-                raise self._wrong(section, key, value, "a number above 0")
-            if value <= 0:
-                what = "the expected size of an effect" if section == "priors" else "a transmission ratio"
-                raise self._wrong(section, key, value, "a number above 0", f"{what} must be positive")
-        return {key: float(value) for key, value in values.items()}
+        kind, values = _NAMED[section], self.data.get(section, {})
+        return {key: self._fit(section, key, {key: value}, kind)[key] for key, value in values.items()}
 
-
-def _is_number(value: Any) -> bool:
-    return isinstance(value, (int, float)) and not isinstance(value, bool) and math.isfinite(value)
+    def _fit(self, section: str, key: str, value: Any, kind: Kind, expected: str = "") -> Any:
+        """Return a value of a kind; what is no such value is told with its line."""
+        try:
+            return kind(value, "")
+        except MisfitError as error:
+            found = value if expected else error.value
+            problem = error.problem or "wrong kind of value"
+            raise self._wrong(section, key, found, expected or error.expected, problem) from None

@@ -3,18 +3,32 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING
-
-import numpy as np
+from typing import TYPE_CHECKING, Any
 
 from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.names import did_you_mean, listed
-from thermal_robot.campaign.settings import MOVES, STANDARD_TEMPERATURE, Settings, Vector, as_vector
+from thermal_robot.campaign.settings import (
+    ANGLE_UNIT,
+    GEARS,
+    HOW_MOVED,
+    LENGTH_UNIT,
+    MOVES,
+    PRIORS,
+    SIGMA,
+    STANDARD_TEMPERATURE,
+    TEMPERATURE,
+    VECTOR,
+    WORD,
+    Settings,
+    Vector,
+    as_vector,
+)
 from thermal_robot.campaign.tabular import table_from_frame
-from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, Units
+from thermal_robot.campaign.units import Units
 from thermal_robot.campaign.validate import build_campaign
 from thermal_robot.errors import CampaignError, require
 from thermal_robot.robot import Robot
+from thermal_robot.schema import Kind, MisfitError, boolean, optional, shown, text, word
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -81,29 +95,24 @@ def campaign_from_table(
 
     require("campaign_from_table(), robot", robot, (Robot,), "a robot, as load_robot gives it")
     require("campaign_from_table(), table", table, (pd.DataFrame,), "a pandas DataFrame")
-    _require_word("angle_unit", angle_unit, ANGLE_UNITS)
-    _require_word("length_unit", length_unit, LENGTH_UNITS)
-    _require_word("base", base, ("known", "unknown"))
-    _require_word("tool", tool, ("known", "unknown"))
-    _require_word("moves", moves, MOVES)
-    units = Units(angle_unit, length_unit)
-    position = _size("noise_position", noise_position)
+    frame = word(("known", "unknown"), WORD)
+    units = Units(_given("angle_unit", angle_unit, ANGLE_UNIT), _given("length_unit", length_unit, LENGTH_UNIT))
     settings = Settings(
         urdf="",
         tool_frame=robot.tool_frame,
         root_frame=robot.root_frame,
         gravity=as_vector(robot.gravity),
-        moves=moves,
-        reference_temperature=float(reference_temperature),
+        moves=_given("moves", moves, HOW_MOVED),
+        reference_temperature=_given("reference_temperature", reference_temperature, TEMPERATURE),
         units=units,
-        base_known=base == "known",
-        tool_known=tool == "known",
+        base_known=_given("base", base, frame) == "known",
+        tool_known=_given("tool", tool, frame) == "known",
         target=_vector("target", target, units.length_scale),
-        noise_position=None if position is None else position * units.length_scale,
+        noise_position=_size("noise_position", noise_position, units.length_scale),
         noise_orientation=_size("noise_orientation", noise_orientation),
         payload_com=_vector("payload_com", payload_com, units.length_scale),
-        priors=_positive("priors", priors),
-        gears=_positive("gears", gears),
+        priors=_given("priors", {} if priors is None else priors, PRIORS),
+        gears=_given("gears", {} if gears is None else gears, GEARS),
     )
     for joint in settings.gears:
         if joint not in robot.joint_names:
@@ -113,39 +122,26 @@ def campaign_from_table(
                 column=f"gears.{joint}",
                 expected=f"one of {listed(robot.joint_names)}",
             )
+    name, measured = _given("name", name, text(empty=True)), _given("measured", measured, boolean)
     return build_campaign(table_from_frame(table, FILE), settings, robot, name=name, measured=measured)
 
 
-def _require_word(argument: str, word: str, allowed: Sequence[str] | Mapping[str, float]) -> None:
-    if word not in allowed:
-        expected = " or ".join(f'"{other}"' for other in allowed)
-        problem = "unknown unit" if argument.endswith("unit") else "unknown word"
-        raise CampaignError(FILE, problem, column=argument, found=repr(word), expected=expected)
+def _given(argument: str, value: Any, kind: Kind, expected: str = "") -> Any:
+    """Return an argument of a kind; what is no such value is told by the argument's name."""
+    try:
+        return kind(value, argument)
+    except MisfitError as error:
+        problem = error.problem or "wrong kind of value"
+        found = shown(value if expected else error.value)
+        column = argument if expected else error.path
+        raise CampaignError(FILE, problem, column=column, found=found, expected=expected or error.expected) from None
 
 
-def _size(argument: str, sigma: float | None) -> float | None:
-    """Return a standard deviation, ``None`` where it is not given."""
-    if sigma is not None and not (np.isfinite(sigma) and sigma >= 0):
-        problem = "a standard deviation cannot be negative" if sigma < 0 else "not a finite number"
-        raise CampaignError(FILE, problem, column=argument, found=repr(sigma), expected="a number above 0, or None")
-    return float(sigma) if sigma else None
+def _size(argument: str, sigma: float | None, scale: float = 1.0) -> float | None:
+    """Return a standard deviation in SI, ``None`` where it is not given."""
+    given = _given(argument, sigma, optional(SIGMA), "a finite number above 0, or None")
+    return float(given * scale) if given else None
 
 
 def _vector(argument: str, values: Sequence[float], scale: float) -> Vector:
-    array = np.asarray(values, dtype=np.float64)
-    if array.shape != (3,) or not np.isfinite(array).all():
-        raise CampaignError(FILE, "wrong kind of value", column=argument, found=repr(values), expected="three numbers")
-    return as_vector(array * scale)
-
-
-def _positive(argument: str, sizes: Mapping[str, float] | None) -> dict[str, float]:
-    for key, size in (sizes or {}).items():
-        if not (np.isfinite(size) and size > 0):
-            raise CampaignError(
-                FILE,
-                "must be positive",
-                column=f"{argument}.{key}",
-                found=repr(size),
-                expected="a number above 0",
-            )
-    return {key: float(size) for key, size in (sizes or {}).items()}
+    return as_vector(value * scale for value in _given(argument, values, VECTOR, "three numbers"))

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
-from thermal_robot.campaign.units import SI, Units
-from thermal_robot.errors import CampaignError
+from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, SI, Units
+from thermal_robot.robot import STRONGEST_GRAVITY
+from thermal_robot.schema import Kind, boolean, fitted, listed, mapping, number, optional, record, text, word
 
 Vector: TypeAlias = tuple[float, float, float]
 
@@ -19,6 +20,34 @@ STANDARD_TEMPERATURE = 20.0
 
 MOST_PIPED = 500_000_000
 """Bytes that are taken from standard input: a million rows of forty columns; a pipe that never ends must end here."""
+ABSOLUTE_ZERO = -273.15
+"""°C."""
+
+UNIT, WORD = "unknown unit", "unknown word"
+ANGLE_UNIT, LENGTH_UNIT = word(ANGLE_UNITS, UNIT), word(LENGTH_UNITS, UNIT)
+NUMBER = number(expected="a number")
+HOW_MOVED = word(MOVES, WORD)
+TEMPERATURE = number(least=ABSOLUTE_ZERO, expected="a number of °C", problem="no temperature is lower than −273.15 °C")
+VECTOR = listed(number(), 3, "three numbers")
+GRAVITY = listed(
+    number(
+        least=-STRONGEST_GRAVITY,
+        most=STRONGEST_GRAVITY,
+        expected=f"a number of m/s² from {-STRONGEST_GRAVITY:g} to {STRONGEST_GRAVITY:g}",
+    ),
+    3,
+    "three numbers",
+)
+SIGMA = number(
+    least=0.0,
+    expected="a number above 0, or 0 for not given",
+    problem="a standard deviation cannot be negative",
+)
+PRIORS = mapping(
+    number(above=0.0, expected="a number above 0", problem="the expected size of an effect must be positive")
+)
+GEARS = mapping(number(above=0.0, expected="a number above 0", problem="a transmission ratio must be positive"))
+"""What the values of a campaign may be, whoever states them: campaign.toml, a call, a model file."""
 
 
 @dataclass(frozen=True)
@@ -106,23 +135,35 @@ class Settings:
         CampaignError
             A key that is missing or unknown, or a value of the wrong kind.
         """
-        # those who wrote no word of moves were fitted to what was recorded alone
-        values = {"moves": "unknown", **data}
-        known = set(cls.__dataclass_fields__)
-        for key in sorted(known.symmetric_difference(values)):
-            problem = "is missing from the settings" if key in known else "is not a setting"
-            raise CampaignError(file, problem, column=key)
-        try:
-            values["units"] = Units(**values["units"])
-            for key in ("target", "payload_com"):
-                values[key] = as_vector(values[key])
-            if values["gravity"] is not None:
-                values["gravity"] = as_vector(values["gravity"])
-            for key in ("priors", "gears"):
-                values[key] = {str(name): float(value) for name, value in values[key].items()}
-        except (TypeError, ValueError, AttributeError) as error:
-            raise CampaignError(file, f"settings cannot be read ({error})") from error
-        return cls(**values)
+        settings: Settings = fitted(settings_kind, data, file)
+        return settings
+
+
+_KEYS: dict[str, Kind] = {
+    "urdf": text(empty=True),
+    "tool_frame": text("the name of a link"),
+    "root_frame": optional(text("the name of a link")),
+    "gravity": optional(GRAVITY),
+    "moves": HOW_MOVED,
+    "reference_temperature": TEMPERATURE,
+    "units": record({"angle": ANGLE_UNIT, "length": LENGTH_UNIT}),
+    "base_known": boolean,
+    "tool_known": boolean,
+    "target": VECTOR,
+    "noise_position": optional(SIGMA),
+    "noise_orientation": optional(SIGMA),
+    "payload_com": VECTOR,
+    "priors": PRIORS,
+    "gears": GEARS,
+}
+
+
+def settings_kind(value: Any, path: str) -> Settings:
+    """Kind of the settings in a file (:mod:`thermal_robot.schema`)."""
+    # those who wrote no word of moves were fitted to what was recorded alone
+    values = record(_KEYS)({"moves": "unknown", **value} if isinstance(value, Mapping) else value, path)
+    sigmas = {key: values[key] or None for key in ("noise_position", "noise_orientation")}
+    return Settings(**{**values, **sigmas, "units": Units(**values["units"])})
 
 
 def as_vector(values: Any) -> Vector:

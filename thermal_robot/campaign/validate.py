@@ -14,7 +14,7 @@ from thermal_robot.campaign.fill import fill
 from thermal_robot.campaign.names import split_name
 from thermal_robot.campaign.plausible import doubts
 from thermal_robot.campaign.recognise import Columns, recognise
-from thermal_robot.campaign.settings import Settings
+from thermal_robot.campaign.settings import ABSOLUTE_ZERO, Settings
 from thermal_robot.campaign.table import Table
 from thermal_robot.campaign.turning import arrivals
 from thermal_robot.campaign.units import Units, covariate_scale
@@ -26,8 +26,6 @@ QUATERNION_TOLERANCE = 0.1
 decimal change the length by at most 0.05 · √4."""
 MINIMUM_POSES = 3
 """Distinct configurations without which a rigid frame can turn about the line through two points."""
-ABSOLUTE_ZERO = -273.15
-"""°C."""
 SAME_CONFIGURATION = 9
 """Decimals of a command, rad or m, to which it is compared: a nanoradian is far below what any controller resolves and
 far above what the conversion of units rounds."""
