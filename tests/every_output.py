@@ -12,6 +12,8 @@ import sys
 import time
 from pathlib import Path
 
+import pandas as pd
+
 from thermal_robot import demo_campaign, diagnose
 from thermal_robot.campaign import write_predictions
 from thermal_robot.files import write_text
@@ -26,10 +28,11 @@ def writers():
     campaign = demo_campaign()
     found = diagnose(campaign, only=["thermal_elongation", "backlash"])
     page, figure = html(found, generated="then"), found.explain("backlash")
-    position, orientation = found.model.predict(campaign)
+    rows = pd.DataFrame({"joint_1": campaign.q[:, 0]})
+    predicted = found.model.predicted(rows, found.model.prediction(campaign))
 
     def table(path):
-        write_predictions(path, position, orientation, campaign.units)
+        write_predictions(path, predicted)
 
     return {
         "d.json": found.to_json,

@@ -51,7 +51,7 @@ def test_what_fits_comes_back_as_it_is_wanted():
         (["name"], " ", "name: is ' ', expected a name"),
         (["name"], "a\0b", r"name: is 'a\x00b', expected a name"),
         (["name"], "\ud800", r"name: is '\ud800', expected a name in Unicode"),
-        (["name"], ..., "name: is missing, expected the keys name, joints, place, note"),
+        (["name"], ..., "name: is missing, expected a value"),
         (["surplus"], 1, "surplus: is not known, expected no other key than name, joints, place, note"),
         (["a key"], 1, "['a key']: is not known, expected no other key than name, joints, place, note"),
         (["joints"], {"zero": 1}, "joints: is {'zero': 1}, expected a list"),

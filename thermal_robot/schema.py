@@ -220,7 +220,7 @@ def record(known: Mapping[str, Kind], may_lack: Iterable[str] = ()) -> Kind:
                 raise MisfitError(below(path, str(key)), None, f"no other key than {', '.join(known)}", "is not known")
         for key in known:
             if key not in value and key not in spare:
-                raise MisfitError(below(path, key), None, f"the keys {', '.join(known)}", "is missing")
+                raise MisfitError(below(path, key), None, "a value", "is missing")
         return {key: item(value[key], below(path, key)) for key, item in known.items() if key in value}
 
     return kind

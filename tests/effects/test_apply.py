@@ -72,7 +72,7 @@ def test_an_offset_is_a_displacement_of_its_joint_alone(rv_m2):
 
 
 def test_values_that_are_not_the_parameters_are_refused(rv_m2):
-    with pytest.raises(ValueError, match="shorter"):
+    with pytest.raises(EffectError, match="'joint_offset' was fitted with 4 parameters and has 5 in these rows"):
         displacement(seen(rv_m2), [(JointOffset(), np.zeros(4))])
 
 

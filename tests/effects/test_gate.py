@@ -459,3 +459,14 @@ def test_parameters_in_which_an_effect_is_told_keep_the_contract_too(rv_m2):
     assert len(independent(Geometric(), seen)) > 0
     with pytest.raises(EffectError, match="the name is used twice"):
         independent(Muddled(), seen)
+
+
+def test_parameters_are_declared_whatever_their_responses(observations):
+    endless = Answers((replace(GOOD, responses=(Response("joint", 1, np.full(3, np.inf)),)),))
+    assert gate.declared(endless, observations) == endless.answer
+    with pytest.raises(EffectError):
+        checked(endless, observations)
+    assert gate.declared(replace(endless, excluded=("joint_2",)), observations) == ()
+    for answer, found in ((None, "answers NoneType"), ((GOOD, 1), "answers tuple"), (GOOD, "answers Parameter")):
+        with pytest.raises(EffectError, match=f"'sagging' {found}, expected a tuple of Parameter"):
+            gate.declared(Answers(answer), observations)

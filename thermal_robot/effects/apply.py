@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thermal_robot.effects.effect import Array, Effect
-from thermal_robot.effects.gate import checked
+from thermal_robot.effects.effect import Array, Effect, Parameter
+from thermal_robot.effects.gate import checked, missing
+from thermal_robot.errors import EffectError
 from thermal_robot.kinematics import Displacement
 
 if TYPE_CHECKING:
@@ -37,7 +38,7 @@ def displacement(
     Raises
     ------
     EffectError
-        If an effect's parameters break the contract.
+        If an effect's parameters break the contract, or are not as many as its values: the rows lack what it reads.
     """
     samples, robot = observations.campaign.samples, observations.robot
     joint = np.zeros((samples, robot.n))
@@ -45,7 +46,7 @@ def displacement(
     base, tool = np.zeros((samples, 6)), np.zeros((samples, 6))
     instrument: Array | None = None
     for effect, values in effects:
-        for parameter, value in zip(checked(effect, observations), values, strict=True):
+        for parameter, value in zip(_as_many(effect, observations, len(values)), values, strict=True):
             for response in parameter.responses:
                 moved = value * response.values
                 if response.channel == "joint":
@@ -59,3 +60,15 @@ def displacement(
                 else:
                     instrument = moved if instrument is None else instrument + moved
     return Displacement(joint=joint, segment=segment, base=base, tool=tool), instrument
+
+
+def _as_many(effect: Effect, observations: Observations, values: int) -> tuple[Parameter, ...]:
+    """Return the parameters of an effect that has so many values."""
+    found = checked(effect, observations)
+    if len(found) != values:
+        lacking = ", ".join(missing(effect, observations))
+        raise EffectError(
+            f"effect {effect.name!r} was fitted with {values} parameters and has {len(found)} in these rows"
+            + (f", which lack {lacking}" if lacking else "")
+        )
+    return found

@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 from scipy.special import erf
 
+from thermal_robot.effects.arguments import NotNegative, Share
 from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, at_joint, at_segment
 from thermal_robot.effects.quantities import driving, unit
 from thermal_robot.effects.torque import torque_columns
+from thermal_robot.schema import word
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -69,13 +71,13 @@ class Backlash(Effect):
         where none turns.
     """
 
-    held: float | tuple[float, ...] = 0.0
-    largest: tuple[float, ...] = ()
+    held: Share | tuple[Share, ...] = 0.0
+    largest: tuple[NotNegative, ...] = ()
     chain: tuple[str, ...] = ()
-    soft: float = 0.0
-    steady: tuple[float, ...] = ()
+    soft: Share = 0.0
+    steady: tuple[NotNegative, ...] = ()
     grows: bool = False
-    carriage: str = ""
+    carriage: Annotated[str, word(("", *_CARRIAGES))] = ""
 
     name: ClassVar[str] = "backlash"
     title: ClassVar[str] = "lost motion in the joints"

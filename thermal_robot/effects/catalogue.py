@@ -9,6 +9,7 @@ from functools import cache
 from importlib.metadata import EntryPoint, entry_points
 
 from thermal_robot.campaign.names import did_you_mean
+from thermal_robot.effects.arguments import with_arguments
 from thermal_robot.effects.backlash import Backlash
 from thermal_robot.effects.base_compliance import BaseCompliance
 from thermal_robot.effects.base_frame import BaseFrame
@@ -111,9 +112,8 @@ def restored(name: str, arguments: str) -> Effect:
     if name not in known:
         raise EffectError(f"no effect is named {name!r} here")
     try:
-        plain = json.loads(arguments)
-        return type(known[name])(**{k: tuple(v) if isinstance(v, list) else v for k, v in plain.items()})
-    except (TypeError, ValueError, AttributeError) as error:
+        return with_arguments(type(known[name]), json.loads(arguments), "")
+    except (ValueError, RecursionError) as error:
         raise EffectError(f"effect {name!r} does not take the arguments {arguments}: {error}") from error
 
 

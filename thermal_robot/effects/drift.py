@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from thermal_robot.effects.arguments import NotNegative, Positive
 from thermal_robot.effects.effect import TWIST, UNSOURCED, Array, Driver, Effect, Parameter, at_base
 from thermal_robot.effects.quantities import driving
 
@@ -32,8 +33,8 @@ class Drift(Effect):
     """
 
     origin: float = 0.0
-    span: float = 1.0
-    time_constant: float = 0.0
+    span: Positive = 1.0
+    time_constant: NotNegative = 0.0
 
     name: ClassVar[str] = "drift"
     title: ClassVar[str] = "drift of the base or the instrument"

@@ -61,6 +61,21 @@ def checked(effect: Effect, observations: Observations) -> tuple[Parameter, ...]
     return _kept(effect, known, observations.robot)
 
 
+def declared(effect: Effect, observations: Observations) -> tuple[Parameter, ...]:
+    """Return the parameters of an effect without a look at their responses, which may then be of any rows.
+
+    Raises
+    ------
+    EffectError
+        If they are no tuple of Parameter, or the effect raises anything.
+    """
+    with np.errstate(all="ignore"):
+        answer = _asked(effect, "parameters", observations)
+    if not isinstance(answer, (tuple, list)) or not all(isinstance(parameter, Parameter) for parameter in answer):
+        raise EffectError(f"effect {effect.name!r} answers {type(answer).__name__}, expected a tuple of Parameter")
+    return _kept(effect, tuple(answer), observations.robot)
+
+
 def _is_what_it_holds(effect: Any) -> bool:
     """Tell whether effects that compare as equal are equal: whether all that this one holds is compared, and hashed."""
     try:

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from thermal_robot.effects.arguments import Index
 from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, at_joint
 from thermal_robot.effects.quantities import unit
 from thermal_robot.effects.torque import torque_columns
@@ -51,7 +52,7 @@ class JointCompliance(Effect):
         moment of each body. Empty where the torques are known.
     """
 
-    joints: tuple[int, ...] = ()
+    joints: tuple[Index, ...] = ()
     weights: tuple[float, ...] = ()
 
     name: ClassVar[str] = "joint_compliance"

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from thermal_robot.effects.arguments import Count, Positive
 from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, at_joint
 from thermal_robot.effects.quantities import position_of, unit
 
@@ -43,8 +44,8 @@ class JointRipple(Effect):
     """
 
     joints: tuple[str, ...] = ()
-    orders: tuple[float, ...] = ()
-    tried: float = 1.0
+    orders: tuple[Positive, ...] = ()
+    tried: Count = 1.0
 
     name: ClassVar[str] = "joint_ripple"
     title: ClassVar[str] = "ripple of the gears"

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from textwrap import fill
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.campaign.units import SI
 from thermal_robot.effects import gate, settings
+from thermal_robot.effects.arguments import Count, NotNegative
 from thermal_robot.effects.catalogue import restored
 from thermal_robot.effects.effect import (
     TWIST,
@@ -29,6 +30,7 @@ from thermal_robot.effects.effect import (
 )
 from thermal_robot.effects.quantities import CLOCK, TURN, driving, quantity, strains, unit
 from thermal_robot.effects.shapes import SHAPES
+from thermal_robot.schema import word
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -82,13 +84,13 @@ class Discovered(Effect):
     title: ClassVar[str] = "an unlisted law"
     size_spread: ClassVar[float] = UNSOURCED
     name: str = PREFIX + "1"  # type: ignore[misc]
-    kind: str = "joint"
+    kind: Annotated[str, word(("joint", "link", "base", "tool"))] = "joint"
     place: str = ""
     quantity: str = ""
-    shape: str = "smooth"
+    shape: Annotated[str, word(SHAPES)] = "smooth"
     marks: tuple[float, ...] = ()
     origin: float = 0.0
-    span: float = 1.0
+    span: NotNegative = 1.0
     unit: str = ""
     turns: bool = True
     labels: tuple[str, ...] = ()
@@ -96,10 +98,10 @@ class Discovered(Effect):
     starts: tuple[float, ...] = ()
     by: str = ""
     by_origin: float = 0.0
-    by_span: float = 1.0
+    by_span: NotNegative = 1.0
     of: str = ""
     of_arguments: str = "{}"
-    tried: float = 1.0
+    tried: Count = 1.0
 
     @property
     def share(self) -> float:

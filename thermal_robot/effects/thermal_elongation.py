@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from thermal_robot.effects.arguments import Celsius, Instants, NotNegative
 from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, Response, at_segment
 from thermal_robot.effects.lagging import History
 from thermal_robot.effects.quantities import began, driving
@@ -58,10 +59,10 @@ class ThermalElongation(Effect):
     """
 
     common: bool = False
-    lag: float = 0.0
-    times: tuple[float, ...] = ()
-    temperatures: tuple[float, ...] = ()
-    spread: float = 0.0
+    lag: NotNegative = 0.0
+    times: Instants = ()
+    temperatures: tuple[Celsius, ...] = ()
+    spread: NotNegative = 0.0
     starts: tuple[float, ...] = ()
     balanced: bool = True
 

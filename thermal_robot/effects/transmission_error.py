@@ -5,12 +5,14 @@ from __future__ import annotations
 import itertools
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, ClassVar
+from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 
+from thermal_robot.effects.arguments import Order
 from thermal_robot.effects.effect import SOURCED, Array, Driver, Effect, Parameter, at_joint
 from thermal_robot.effects.quantities import position_of, unit
+from thermal_robot.schema import word
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -42,8 +44,8 @@ class TransmissionError(Effect):
         Whose wheels err: ``joint``, ``motor``, or ``both``.
     """
 
-    harmonics: tuple[int, ...] = (1, 2)
-    side: str = "both"
+    harmonics: tuple[Order, ...] = (1, 2)
+    side: Annotated[str, word(("joint", "motor", "both"))] = "both"
 
     name: ClassVar[str] = "transmission_error"
     title: ClassVar[str] = "periodic transmission errors"
