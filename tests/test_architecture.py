@@ -27,6 +27,7 @@ ORDER = (
     "effects",
     "inference",
     "prediction",
+    "model_file",
     "correction",
     "diagnosis",
     "datasets",

@@ -116,7 +116,7 @@ def test_diagnose_prints_the_verdict_and_writes_what_is_asked_for(folder, diagno
     html = diagnosed.report.read_text(encoding="utf-8")
     assert html.lstrip().lower().startswith("<!doctype html>")
     assert found["verdict"]["summary"].split(" (")[0] in html
-    assert json.loads(diagnosed.model.read_text())["schema"] == "thermal-robot/model/1"
+    assert json.loads(diagnosed.model.read_text())["schema"] == "thermal-robot/model/2"
 
 
 def test_json_to_the_terminal_is_nothing_but_json(run, folder):

@@ -8,8 +8,7 @@ from simulate import simulate
 
 from thermal_robot import CorrectedModel, diagnose
 from thermal_robot.inference.columns import block
-from thermal_robot.observations import observe
-from thermal_robot.prediction import Spread, sensitivity
+from thermal_robot.prediction import sensitivity
 
 NOISE = 25e-6
 
@@ -90,11 +89,3 @@ def test_who_takes_effects_out_is_told_no_deviation(warm):
     _, found, fresh, _ = warm
     assert np.isnan(replace(found.model, effects=(), needs=()).prediction(fresh).std).all()
     assert np.isnan(replace(found.model, spread=None).prediction(fresh).std).all()
-
-
-def test_numbers_survive_json(warm):
-    _, found, _, _ = warm
-    again = Spread.from_dict(found.model.spread.to_dict())
-    np.testing.assert_array_equal(again.covariance, found.model.spread.covariance)
-    assert again.ranges == found.model.spread.ranges
-    assert observe(warm[0], found.model.frames).gap.shape == (warm[0].samples, 3)

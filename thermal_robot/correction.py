@@ -13,22 +13,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign, Settings, read_samples, with_prediction
-from thermal_robot.effects import Effect, gate, library
+from thermal_robot.effects import Effect
 from thermal_robot.effects.apply import displacement
-from thermal_robot.effects.law import PREFIX, Discovered
-from thermal_robot.errors import CampaignError, EffectError, require
+from thermal_robot.errors import CampaignError, require
 from thermal_robot.files import write_text
 from thermal_robot.kinematics import rotation_to_quaternion
+from thermal_robot.model_file import fields_of, read, written
 from thermal_robot.observations import Frames, observe
 from thermal_robot.prediction import Prediction, Spread
-from thermal_robot.robot import Robot, load_robot
+from thermal_robot.robot import Robot
 
 if TYPE_CHECKING:
     import pandas as pd
 
 Array = NDArray[np.float64]
-
-SCHEMA = "thermal-robot/model/1"
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,7 +88,10 @@ class CorrectedModel:
         Raises
         ------
         CampaignError
-            If a column that the model needs is missing or has an empty cell; the error names it.
+            If a column that the model needs is missing or has an empty cell, which the error names; if what it says
+            is so large that no finite position follows.
+        EffectError
+            If an effect of the model cannot be told in these rows.
         """
         if isinstance(samples, (Campaign, str, os.PathLike)):
             return self.prediction(samples)[:2]
@@ -139,6 +140,7 @@ class CorrectedModel:
         moved, instrument = displacement(nominal, self.effects)
         corrected = observe(samples, self.frames, displacement=moved)
         position = corrected.predicted_position + (0.0 if instrument is None else instrument)
+        self._require_finite(samples, position)
         turned = self.measures == "pose"
         orientation = rotation_to_quaternion(self.frames.base[:3, :3] @ corrected.rotation) if turned else None
         if self.spread is None:
@@ -189,6 +191,13 @@ class CorrectedModel:
                 expected="sim.x, sim.y, sim.z",
             )
 
+    @staticmethod
+    def _require_finite(samples: Campaign, position: Array) -> None:
+        wrong = np.flatnonzero(~np.isfinite(position).all(axis=1))
+        if wrong.size:
+            row = int(samples.rows[wrong[0]])
+            raise CampaignError(samples.name, "the values of this row lead to no finite position", row=row)
+
     def samples(self, table: str | Path | pd.DataFrame) -> Campaign:
         """Read a table of commands and conditions in the units of the campaign that the model was fitted to.
 
@@ -201,64 +210,23 @@ class CorrectedModel:
         return replace(samples, name=str(table)) if isinstance(table, (str, os.PathLike)) else samples
 
     def to_dict(self) -> dict[str, Any]:
-        """Return everything, the URDF's text included, as plain values."""
-        return {
-            "schema": SCHEMA,
-            "robot": {
-                "urdf": self.robot.urdf,
-                "tool_frame": self.robot.tool_frame,
-                "root_frame": self.robot.root_frame,
-                "gravity": np.asarray(self.robot.gravity).tolist(),
-            },
-            "settings": self.settings.to_dict(),
-            "frames": {"base": self.frames.base.tolist(), "tool": self.frames.tool.tolist()},
-            "effects": [
-                {"name": e.name, "arguments": gate.arguments(e), "values": np.asarray(v).tolist()}
-                for e, v in self.effects
-            ],
-            "measures": self.measures,
-            "needs": list(self.needs),
-            "simulated": self.simulated,
-            "last_order": self.last_order,
-            "spread": None if self.spread is None else self.spread.to_dict(),
-        }
+        """Return everything, the URDF's text and a checksum included, as plain values."""
+        return written(vars(self))
 
     @classmethod
-    def from_dict(cls, plain: dict[str, Any], effects: Sequence[Effect] = ()) -> CorrectedModel:
+    def from_dict(
+        cls, plain: dict[str, Any], effects: Sequence[Effect] = (), *, file: str = "<model>"
+    ) -> CorrectedModel:
         """Return the model that :meth:`to_dict` wrote; ``effects`` are your own effects that it may hold.
 
         Raises
         ------
+        CampaignError
+            If a value is not what it must be, which is named, or was changed after it was written.
         EffectError
             If it holds an effect that is not installed.
         """
-        robot = load_robot(
-            plain["robot"]["urdf"],
-            plain["robot"]["tool_frame"],
-            root_frame=plain["robot"]["root_frame"],
-            gravity=plain["robot"]["gravity"],
-        )
-        known = {**library(), **{effect.name: effect for effect in effects}}
-        held = []
-        for entry in plain["effects"]:
-            if entry["name"].startswith(PREFIX):
-                known[entry["name"]] = Discovered()
-            if entry["name"] not in known:
-                raise EffectError(f"the model holds the effect {entry['name']!r}, which is not installed here")
-            arguments = {k: tuple(v) if isinstance(v, list) else v for k, v in entry["arguments"].items()}
-            held.append((type(known[entry["name"]])(**arguments), np.array(entry["values"], dtype=float)))
-        frames = Frames(np.array(plain["frames"]["base"]), np.array(plain["frames"]["tool"]))
-        return cls(
-            robot,
-            Settings.from_dict(plain["settings"]),
-            frames,
-            tuple(held),
-            plain["measures"],
-            tuple(plain["needs"]),
-            bool(plain["simulated"]),
-            tuple(plain["last_order"]) if plain["last_order"] else None,
-            Spread.from_dict(plain["spread"]) if plain.get("spread") else None,
-        )
+        return cls(**fields_of(plain, effects, file))
 
     def save(self, path: str | Path) -> None:
         """Write the model to a JSON file that stands alone; it appears whole or not at all."""
@@ -271,25 +239,10 @@ class CorrectedModel:
         Raises
         ------
         CampaignError
-            If it is not such a file.
+            If it is not such a file, was written by a newer version, is damaged, or was changed after it was written;
+            the value that is wrong is named by its place, as ``effects[2].values[3]``.
+        EffectError
+            If it holds an effect that is not installed.
         """
         require("load()", path, (str, os.PathLike), "the path of a file that save() wrote")
-        if Path(path).exists() and not Path(path).is_file():
-            raise CampaignError(str(path), "is a folder, a pipe or a device", expected="a model file")
-        try:
-            plain = json.loads(Path(path).read_text(encoding="utf-8"))
-            found = plain.get("schema") if isinstance(plain, dict) else None
-        except FileNotFoundError:
-            raise CampaignError(str(path), "no such file") from None
-        except OSError as error:
-            raise CampaignError(str(path), "cannot be read", found=error.strerror) from None
-        except (UnicodeDecodeError, json.JSONDecodeError):
-            found = None
-        if found != SCHEMA:
-            raise CampaignError(
-                str(path), "this is not a model that `diagnose --model` wrote", found=repr(found), expected=repr(SCHEMA)
-            )
-        try:
-            return cls.from_dict(plain, effects)
-        except (KeyError, TypeError, ValueError, AttributeError) as error:
-            raise CampaignError(str(path), f"this model file is damaged ({error!r})") from None
+        return cls.from_dict(read(Path(path)), effects, file=str(path))

@@ -43,13 +43,6 @@ class Spread:
         arrays = {name: getattr(self, name).tolist() for name in ("covariance", "beyond", "noise")}
         return {**arrays, "ranges": {name: list(ends) for name, ends in self.ranges.items()}}
 
-    @classmethod
-    def from_dict(cls, plain: Mapping[str, Any]) -> Spread:
-        """Return what :meth:`to_dict` wrote."""
-        covariance, beyond, noise = (np.array(plain[name], dtype=float) for name in ("covariance", "beyond", "noise"))
-        ranges = {str(name): (float(low), float(high)) for name, (low, high) in plain["ranges"].items()}
-        return cls(covariance, beyond, noise, ranges)
-
     def std(self, observations: Observations, effects: Sequence[tuple[Effect, Array]], noise: bool) -> Array:
         """(N, 3) one standard deviation per axis of a prediction, measurement frame, m.
 

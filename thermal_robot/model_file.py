@@ -1,0 +1,375 @@
+"""The file of a corrected model: what stands under each key, and how a damaged one is told.
+
+A key is a field of :class:`thermal_robot.correction.CorrectedModel`. A new one is a line of :data:`PARTS`.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.campaign import Campaign, Settings
+from thermal_robot.campaign.names import LABELS
+from thermal_robot.campaign.settings import GRAVITY, settings_kind
+from thermal_robot.effects import Effect, gate, library
+from thermal_robot.effects.arguments import with_arguments
+from thermal_robot.effects.law import PREFIX, Discovered
+from thermal_robot.errors import CampaignError, EffectError, RobotError
+from thermal_robot.observations import Frames, Observations, observe
+from thermal_robot.prediction import Spread, moves
+from thermal_robot.robot import Robot, load_robot
+from thermal_robot.schema import (
+    NOT_NEGATIVE,
+    Kind,
+    MisfitError,
+    below,
+    boolean,
+    fitted,
+    listed,
+    mapping,
+    matrix,
+    number,
+    optional,
+    plain,
+    record,
+    text,
+    word,
+)
+
+Array = NDArray[np.float64]
+
+SCHEMA = "thermal-robot/model/"
+VERSION = 2
+"""Of the file: 1 had no checksum and is read, too."""
+_LARGEST_FILE = 128 << 20
+"""Bytes: twice those of the largest URDF, as its text is a part."""
+_SQUARE = 1e-6
+"""By how much a rotation matrix may miss its inverse: six digits of each figure are a rounding, fewer a mistake."""
+_FARTHEST = 1e7
+"""m: an instrument may measure in the coordinates of a country, and stands on the Earth."""
+_ROUNDED = 1e-9
+"""Of a covariance's largest entry: by how much rounding makes it miss its transpose."""
+_LARGEST_VALUE = 1e6
+"""Of the expected size of a parameter: a joint that is off by a whole turn has 6e3, a base by 100 m 1e6."""
+_NO_MODEL = "this is not a model that `diagnose --model` wrote"
+
+
+@dataclass(frozen=True)
+class Part:
+    """One key of the file.
+
+    Attributes
+    ----------
+    kind
+        What may stand there, and how a model has it.
+    write
+        From what a model has to what stands there.
+    optional
+        Whether the key is left out where the model has ``None``.
+    """
+
+    kind: Kind
+    write: Callable[[Any], Any] = lambda value: value
+    optional: bool = False
+
+
+def _pose(value: Any, path: str) -> Array:
+    """Take a homogeneous matrix with a proper rotation."""
+    pose: Array = matrix((4, 4))(value, path)
+    turn = pose[:3, :3]
+    if pose[3].tolist() != [0.0, 0.0, 0.0, 1.0]:
+        raise MisfitError(f"{path}[3]", pose[3].tolist(), "[0.0, 0.0, 0.0, 1.0], the last row of a pose")
+    off = float(np.abs(turn @ turn.T - np.eye(3)).max()) if np.abs(turn).max() < 2.0 else np.inf
+    if off > _SQUARE or np.linalg.det(turn) < 0.0:
+        wrong = "is a reflection" if off <= _SQUARE else f"is no rotation (it misses one by {off:.2g})"
+        raise MisfitError(path, value, "three rows that begin with a rotation matrix", wrong)
+    for k in range(3):
+        if abs(pose[k, 3]) > _FARTHEST:
+            raise MisfitError(f"{path}[{k}][3]", float(pose[k, 3]), f"a number of m, at most {_FARTHEST:g}")
+    return pose
+
+
+def _frames(value: Any, path: str) -> Frames:
+    return Frames(**record({"base": _pose, "tool": _pose})(value, path))
+
+
+def _urdf(value: Any, path: str) -> str:
+    """Take the text of a URDF, never the name of a file."""
+    urdf: str = text("the text of a URDF")(value, path)
+    if not urdf.lstrip("\ufeff \t\r\n").startswith("<"):
+        raise MisfitError(path, value, "the text of a URDF")
+    return urdf
+
+
+def _robot(value: Any, path: str) -> Robot:
+    link = text("the name of a link")
+    held = record({"urdf": _urdf, "tool_frame": link, "root_frame": link, "gravity": GRAVITY})(value, path)
+    try:
+        return load_robot(**held)
+    except RobotError as error:
+        raise MisfitError(path, value, "a robot that can be loaded", f"{error}") from None
+
+
+def _ends(value: Any, path: str) -> tuple[float, float]:
+    low, high = listed(number(), 2, "the least and the largest value")(value, path)
+    if low > high:
+        raise MisfitError(path, value, "the smaller one first")
+    return low, high
+
+
+def _spread(value: Any, path: str) -> Spread:
+    """Take what makes a prediction uncertain: a covariance is symmetric and has no negative variance."""
+    sigmas = listed(NOT_NEGATIVE, 3, "three standard deviations")
+    held = record({"covariance": matrix(), "beyond": sigmas, "noise": sigmas, "ranges": mapping(_ends)})(value, path)
+    covariance = held["covariance"]
+    size = float(np.abs(covariance).max(initial=0.0))
+    square = covariance.ndim == 2 and covariance.shape[0] == covariance.shape[1]
+    if (not square and size) or (square and np.abs(covariance - covariance.T).max(initial=0.0) > _ROUNDED * size):
+        raise MisfitError(below(path, "covariance"), value["covariance"], "a symmetric matrix")
+    if size and (covariance.diagonal() < 0.0).any():
+        raise MisfitError(below(path, "covariance"), value["covariance"], "variances that are not negative")
+    return Spread(covariance, np.array(held["beyond"]), np.array(held["noise"]), held["ranges"])
+
+
+def _written_robot(robot: Robot) -> dict[str, Any]:
+    return {
+        "urdf": robot.urdf,
+        "tool_frame": robot.tool_frame,
+        "root_frame": robot.root_frame,
+        "gravity": np.asarray(robot.gravity).tolist(),
+    }
+
+
+def _written_effects(effects: Sequence[tuple[Effect, Array]]) -> list[dict[str, Any]]:
+    return [{"name": e.name, "arguments": gate.arguments(e), "values": np.asarray(v).tolist()} for e, v in effects]
+
+
+_EFFECT = record({"name": text("the name of an effect"), "arguments": mapping(plain), "values": listed(number())})
+
+PARTS: dict[str, Part] = {
+    "robot": Part(_robot, _written_robot),
+    "settings": Part(settings_kind, Settings.to_dict),
+    "frames": Part(_frames, lambda frames: {"base": frames.base.tolist(), "tool": frames.tool.tolist()}),
+    "effects": Part(listed(_EFFECT), _written_effects),
+    "measures": Part(word(("position", "pose"))),
+    "needs": Part(listed(text("the name of a column")), list),
+    "simulated": Part(boolean),
+    "last_order": Part(optional(_ends), lambda order: None if order is None else list(order)),
+    "spread": Part(_spread, Spread.to_dict, optional=True),
+}
+"""Every key but ``schema`` and ``checksum``; a key of a model's field that may be absent is ``optional``."""
+
+
+def written(fields: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a model's fields as plain values, with the version and the checksum."""
+    body = {key: part.write(fields[key]) for key, part in PARTS.items() if not (part.optional and fields[key] is None)}
+    found = {"schema": f"{SCHEMA}{VERSION}", **body}
+    return {"schema": found["schema"], "checksum": checksum(found), **body}
+
+
+def checksum(document: Mapping[str, Any]) -> str:
+    """Return the SHA-256 of all but the checksum itself, however the text is laid out and numbers are spelt."""
+    rest = {key: value for key, value in document.items() if key != "checksum"}
+    return hashlib.sha256(json.dumps(_spelt(rest), sort_keys=True, separators=(",", ":")).encode()).hexdigest()
+
+
+def _spelt(value: Any) -> Any:
+    """Return plain values with all numbers as floats, so that 1 and 1.0 are the same."""
+    if isinstance(value, Mapping):
+        return {key: _spelt(each) for key, each in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [_spelt(each) for each in value]
+    # and 0.0 of what was −0.0
+    return float(value) + 0.0 if isinstance(value, (int, float)) and not isinstance(value, bool) else value
+
+
+def fields_of(document: Any, own: Sequence[Effect], file: str) -> dict[str, Any]:
+    """Return the fields of a model from what :func:`written` returned.
+
+    Parameters
+    ----------
+    document
+        The plain values.
+    own
+        The user's own effects that it may hold.
+    file
+        What to call it in messages.
+
+    Raises
+    ------
+    CampaignError
+        Naming the place of what is wrong; or where all is right, but not what was written.
+    EffectError
+        If it holds an effect that is not installed.
+    """
+    version = _version(document, file)
+    body = {key: value for key, value in document.items() if key != "schema"}
+    may_lack = [key for key, part in PARTS.items() if part.optional]
+    kinds = {key: part.kind for key, part in PARTS.items()}
+    if version > 1:
+        kinds["checksum"] = text("a checksum")
+    fields: dict[str, Any] = fitted(record(kinds, may_lack), body, file)
+    fields["effects"] = _restored(fields["effects"], own, file)
+    _require_fit(fields, file)
+    if version > 1 and fields.pop("checksum") != checksum(document):
+        raise CampaignError(file, "was changed after it was written: every value is possible, but the checksum differs")
+    return fields
+
+
+def _version(document: Any, file: str) -> int:
+    found = document.get("schema") if isinstance(document, Mapping) else None
+    number_of = re.fullmatch(rf"{SCHEMA}([1-9]\d{{0,8}})", found) if isinstance(found, str) else None
+    if number_of is None:
+        raise CampaignError(file, _NO_MODEL, key="schema", found=repr(found), expected=repr(f"{SCHEMA}{VERSION}"))
+    version = int(number_of[1])
+    if version > VERSION:
+        raise CampaignError(
+            file,
+            f"was written by a newer version of thermal-robot, as version {version} of the file; "
+            f"this one reads up to version {VERSION}",
+            key="schema",
+        )
+    return version
+
+
+def _restored(entries: Sequence[dict[str, Any]], own: Sequence[Effect], file: str) -> tuple[tuple[Effect, Array], ...]:
+    """Return the effects of a file with their values."""
+    known = {**library(), **{effect.name: effect for effect in own}}
+    held = []
+    for k, entry in enumerate(entries):
+        name, path = entry["name"], f"effects[{k}]"
+        kind = Discovered if name.startswith(PREFIX) else type(known.get(name))
+        if not issubclass(kind, Effect):
+            raise EffectError(f"{file}, {path}.name: the model holds the effect {name!r}, which is not installed here")
+        effect = fitted(partial(with_arguments, kind), entry["arguments"], file, below(path, "arguments"))
+        if effect.name != name:
+            raise CampaignError(file, f"is {effect.name!r}", key=f"{path}.arguments.name", expected=repr(name))
+        held.append((effect, np.array(entry["values"], dtype=float)))
+    return tuple(held)
+
+
+def _require_fit(fields: Mapping[str, Any], file: str) -> None:
+    """Refuse values that fit the schema and not each other."""
+    robot, settings = fields["robot"], fields["settings"]
+    for joint in settings.gears:
+        if joint not in robot.joint_names:
+            raise CampaignError(file, "the chain has no such joint", key=below("settings.gears", joint))
+    seen = observe(_any_rows(fields), fields["frames"])
+    _require_spread(fields, seen, file)
+    for k, (effect, values) in enumerate(fields["effects"]):
+        if not type(effect).__module__.startswith("thermal_robot."):
+            continue  # an effect of the user's own may ask more of the rows; it is asked when it predicts
+        try:
+            parameters = gate.declared(effect, seen)
+        except EffectError as error:
+            raise EffectError(f"{file}, effects[{k}]: {error}") from None
+        if len(parameters) != len(values):
+            raise CampaignError(
+                file,
+                f"are {len(values)} values",
+                key=f"effects[{k}].values",
+                expected=f"one for each of the {len(parameters)} parameters that {effect.name!r} has on this robot",
+            )
+        if any(not parameter.responses for parameter in parameters):
+            lacking = ", ".join(gate.missing(effect, seen))
+            raise CampaignError(
+                file, f"lacks {lacking or 'a column'}", key="needs", expected=f"what {effect.name!r} reads"
+            )
+        for p, (parameter, value) in enumerate(zip(parameters, values, strict=True)):
+            if abs(value) > _LARGEST_VALUE * parameter.size:
+                raise CampaignError(
+                    file,
+                    f"is {value:g}",
+                    key=f"effects[{k}].values[{p}]",
+                    expected=f"a value of {parameter.name!r}, which is about {parameter.size:g} {parameter.unit}",
+                )
+
+
+def _require_spread(fields: Mapping[str, Any], seen: Observations, file: str) -> None:
+    """Refuse a covariance that is not of the frames and the values."""
+    count = int(moves(seen).sum()) + sum(len(values) for _, values in fields["effects"])
+    spread = fields.get("spread")
+    if spread is not None and len(spread.covariance) != count:
+        raise CampaignError(
+            file,
+            f"is of {len(spread.covariance)} parameters",
+            key="spread.covariance",
+            expected=f"{count} of the frames and the effects",
+        )
+
+
+def _any_rows(fields: Mapping[str, Any]) -> Campaign:
+    """Return three rows with the columns that a model needs: how many parameters an effect has depends on no more."""
+    robot, settings = fields["robot"], fields["settings"]
+    lower, upper = np.maximum(robot.lower, -1.0), np.minimum(robot.upper, 1.0)
+    rows = np.arange(3.0)
+    return Campaign(
+        name="any rows",
+        robot=robot,
+        q=lower + (upper - lower) * np.array([[0.3], [0.5], [0.8]]),
+        covariates=dict.fromkeys(fields["needs"], rows),
+        simulated_position=np.zeros((3, 3)) if fields["simulated"] else None,
+        base_known=settings.base_known,
+        tool_known=settings.tool_known,
+        payload_com=np.array(settings.payload_com),
+        reference_temperature=settings.reference_temperature,
+        labels={label: np.array(["1", "2", "3"]) for label in LABELS},
+        gears=settings.gears,
+        units=settings.units,
+    )
+
+
+def read(path: Path) -> Any:
+    """Return the JSON of a file.
+
+    Raises
+    ------
+    CampaignError
+        If it cannot be read, is larger than any model, or holds no JSON.
+    """
+    file = str(path)
+    try:
+        if path.exists() and not path.is_file():
+            raise CampaignError(file, "is a folder, a pipe or a device", expected="a model file")
+        if path.stat().st_size > _LARGEST_FILE:
+            raise CampaignError(file, f"is larger than any model ({_LARGEST_FILE >> 20} MiB)")
+        content = path.read_bytes()
+    except FileNotFoundError:
+        raise CampaignError(file, "no such file") from None
+    except (OSError, ValueError) as error:  # Python asks for no file whose name holds NUL
+        raise CampaignError(file, "cannot be read", found=getattr(error, "strerror", None) or str(error)) from None
+    try:
+        return json.loads(content.decode("utf-8-sig"), object_pairs_hook=_once, parse_int=_whole)
+    except json.JSONDecodeError as error:
+        found = f"no JSON ({error.msg})" if content.strip() else "an empty file"
+        raise CampaignError(file, _NO_MODEL, row=error.lineno, found=found) from None
+    except UnicodeDecodeError:
+        raise CampaignError(file, _NO_MODEL, found="no text in UTF-8") from None
+    except RecursionError:
+        raise CampaignError(file, _NO_MODEL, found="lists in lists too deep to read") from None
+    except MisfitError as error:
+        raise CampaignError(file, error.problem, key=error.path, expected=error.expected) from None
+
+
+def _once(pairs: list[tuple[str, Any]]) -> dict[str, Any]:
+    """Return an object that has every key once."""
+    found: dict[str, Any] = {}
+    for key, value in pairs:
+        if key in found:
+            raise MisfitError(below("", key), value, "every key once", "stands twice in one object")
+        found[key] = value
+    return found
+
+
+def _whole(digits: str) -> float:
+    """Return a whole number; one of hundreds of digits as it is refused later, with its place."""
+    return int(digits) if len(digits) < 300 else float(digits)
