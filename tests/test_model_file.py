@@ -17,6 +17,7 @@ from thermal_robot.effects.joint_ripple import JointRipple
 from thermal_robot.effects.law import Discovered
 from thermal_robot.model_file import PARTS, SCHEMA, VERSION, checksum
 from thermal_robot.observations import Frames, observe
+from thermal_robot.prediction import Spread, sensitivity
 
 
 def made(arm, effects, needs, seed=3):
@@ -26,7 +27,9 @@ def made(arm, effects, needs, seed=3):
     seen = observe(campaign)
     held = tuple((e, 0.5 * np.array([p.size for p in checked(e, seen)])) for e in effects)
     place = Frames(np.linalg.inv(seen.frames.base), seen.frames.tool)
-    return CorrectedModel(robot, campaign.settings, place, held, "position", needs), fresh
+    count = sensitivity(seen, effects).shape[2]
+    spread = Spread(1e-12 * np.eye(count), np.full(3, 1e-5), np.full(3, 2e-5), {"time": (0.0, 7200.0)})
+    return CorrectedModel(robot, campaign.settings, place, held, "position", needs, spread=spread), fresh
 
 
 LAGS = ThermalElongation(common=True, lag=600.0, times=(0.0, 60.0, 7200.0), temperatures=(20.0, 22.0, 27.5))
@@ -166,8 +169,8 @@ def test_a_possible_value_that_nobody_wrote_is_refused(settled, tmp_path):
         (["needs"], ["time", 3], "needs[1]: is 3, expected the name of a column"),
         (["needs"], ["time"], "needs: lacks temperature, expected what 'thermal_elongation' reads"),
         (["simulated"], 0, "simulated: is 0, expected true or false"),
-        (["last_order"], [3.0, 1.0], "last_order: is [3.0, 1.0], expected the smaller one first"),
-        (["last_order"], [3.0], "last_order: is [3.0], expected the first and the last order"),
+        (["last_order"], [3.0, 1.0], "last_order: is [3.0, 1.0], expected two numbers, the smaller one first"),
+        (["last_order"], [3.0], "last_order: is [3.0], expected two numbers, the smaller one first"),
         (["surplus"], 1, "surplus: is not known, expected no other key than robot, settings"),
         (["checksum"], None, "checksum: is null, expected a checksum"),
     ],
@@ -197,7 +200,28 @@ def test_a_mirror_is_no_rotation(settled, tmp_path):
 def test_a_key_that_lacks_is_named(settled, tmp_path, key):
     document = plain(settled[0])
     del document[key]
-    assert refusal(document, tmp_path) == f"{key}: is missing, expected a value"
+    if key in PARTS and PARTS[key].optional:
+        assert "was changed after it was written" in refusal(document, tmp_path)
+        document["checksum"] = checksum(document)
+        assert CorrectedModel.load(stored(document, tmp_path)).spread is None
+    else:
+        assert refusal(document, tmp_path) == f"{key}: is missing, expected a value"
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda c: c[:-1], "expected a symmetric matrix"),
+        (lambda c: [[-1e-12, *c[0][1:]], *c[1:]], "expected variances that are not negative"),
+        (lambda c: [[*c[0][:-1], 1e-12], *c[1:]], "expected a symmetric matrix"),
+    ],
+)
+def test_a_covariance_is_one_and_fits_the_values(settled, tmp_path, change, said):
+    document = plain(settled[0])
+    document["spread"]["covariance"] = change(document["spread"]["covariance"])
+    told = refusal(document, tmp_path)
+    assert told.startswith("spread.covariance: ")
+    assert said in told
 
 
 def test_an_effect_that_is_not_installed_is_named_with_its_place(settled, tmp_path):

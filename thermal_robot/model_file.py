@@ -24,8 +24,8 @@ from thermal_robot.effects import Effect, gate, library
 from thermal_robot.effects.arguments import with_arguments
 from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.errors import CampaignError, EffectError, RobotError
-from thermal_robot.observations import Frames, Observations, observe
-from thermal_robot.prediction import Spread, moves
+from thermal_robot.observations import Frames, observe
+from thermal_robot.prediction import Spread
 from thermal_robot.robot import Robot, load_robot
 from thermal_robot.schema import (
     NOT_NEGATIVE,
@@ -120,9 +120,9 @@ def _robot(value: Any, path: str) -> Robot:
 
 
 def _ends(value: Any, path: str) -> tuple[float, float]:
-    low, high = listed(number(), 2, "the least and the largest value")(value, path)
+    low, high = listed(number(), 2, "two numbers, the smaller one first")(value, path)
     if low > high:
-        raise MisfitError(path, value, "the smaller one first")
+        raise MisfitError(path, value, "two numbers, the smaller one first")
     return low, high
 
 
@@ -264,7 +264,6 @@ def _require_fit(fields: Mapping[str, Any], file: str) -> None:
         if joint not in robot.joint_names:
             raise CampaignError(file, "the chain has no such joint", key=below("settings.gears", joint))
     seen = observe(_any_rows(fields), fields["frames"])
-    _require_spread(fields, seen, file)
     for k, (effect, values) in enumerate(fields["effects"]):
         if not type(effect).__module__.startswith("thermal_robot."):
             continue  # an effect of the user's own may ask more of the rows; it is asked when it predicts
@@ -294,19 +293,6 @@ def _require_fit(fields: Mapping[str, Any], file: str) -> None:
                 )
 
 
-def _require_spread(fields: Mapping[str, Any], seen: Observations, file: str) -> None:
-    """Refuse a covariance that is not of the frames and the values."""
-    count = int(moves(seen).sum()) + sum(len(values) for _, values in fields["effects"])
-    spread = fields.get("spread")
-    if spread is not None and len(spread.covariance) != count:
-        raise CampaignError(
-            file,
-            f"is of {len(spread.covariance)} parameters",
-            key="spread.covariance",
-            expected=f"{count} of the frames and the effects",
-        )
-
-
 def _any_rows(fields: Mapping[str, Any]) -> Campaign:
     """Return three rows with the columns that a model needs: how many parameters an effect has depends on no more."""
     robot, settings = fields["robot"], fields["settings"]
@@ -318,7 +304,6 @@ def _any_rows(fields: Mapping[str, Any]) -> Campaign:
         q=lower + (upper - lower) * np.array([[0.3], [0.5], [0.8]]),
         covariates=dict.fromkeys(fields["needs"], rows),
         simulated_position=np.zeros((3, 3)) if fields["simulated"] else None,
-        base_known=settings.base_known,
         tool_known=settings.tool_known,
         payload_com=np.array(settings.payload_com),
         reference_temperature=settings.reference_temperature,

@@ -227,9 +227,8 @@ class Discovered(Effect):
     def fading(self, observations: Observations) -> Array | None:
         """Return (N,) how much of the law is left; ``None`` where its shape ends by itself.
 
-        All of it where it was found. Beyond, where it would run on and nobody knows that it does, it keeps the value of
-        the edge, and of that ever less: a normal process with no mean falls back to zero so. The clock is another
-        matter: what has changed by the end of the campaign stays.
+        Beyond where it was found, if it would run on and nobody knows that it does, it keeps the value of the edge, and
+        of that ever less, as a normal process of no mean does. What has changed by the end of the campaign stays.
         """
         if not SHAPES[self.shape].runs_on:
             return None
