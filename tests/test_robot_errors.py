@@ -45,10 +45,8 @@ def test_a_folder(tmp_path):
         ("<robot name='r'>", "is not XML: no element found"),
         ("<robot name='r'/>", "is not a valid URDF: No link elements found"),
         ("<robot name='r'><xacro:arm/></robot>", "is a xacro file; expand it"),
-        (
-            two_links("revolute"),
-            r"is not a valid URDF: Joint \[j\] is of type REVOLUTE but it does not specify limits",
-        ),
+        ("<sdf version='1.9'/>", r"is an SDF file but not a URDF"),
+        ("<mujoco/>", r"is an MJCF file \(MuJoCo\) but not a URDF"),
         (two_links("wobbly"), r"is not a valid URDF: Joint \[j\] has no known type"),
         (
             two_links("fixed").replace("<link name", "<link name='c'/><link name", 1),
@@ -129,7 +127,8 @@ def test_mimics_of_nothing_and_of_themselves_are_named():
 
 @pytest.mark.parametrize("tag", ['<mimic joint="j" multiplier="3,4"/>', '<mimic joint="j" offset=""/>', "<mimic/>"])
 def test_a_spoilt_mimic_tag_is_said(tag):
-    assert "is not a valid URDF: " in str(refusal(two_links("continuous", f'<axis xyz="0 0 1"/>{tag}'), "b"))
+    told = str(refusal(two_links("continuous", f'<axis xyz="0 0 1"/>{tag}'), "b"))
+    assert re.search("joint 'j': mimic .* expected a number|is not a valid URDF: ", told)
 
 
 def test_limits_that_never_meet_are_named():
@@ -225,11 +224,11 @@ def test_what_is_no_file_is_not_read(tmp_path):
         CorrectedModel.load(tmp_path / "pipe.urdf")
 
 
-def test_thousands_of_joints_are_refused_at_once():
+def test_hundreds_of_joints_are_refused_at_once():
     """Pinocchio takes 11 GB for 500, and ends the process at 1000."""
-    links = "".join(f"<link name='l{k}'/>" for k in range(5001))
+    links = "".join(f"<link name='l{k}'/>" for k in range(901))
     joint = "<joint name='j{0}' type='continuous'><parent link='l{0}'/><child link='l{1}'/></joint>"
-    joints = "".join(joint.format(k, k + 1) for k in range(5000))
-    for tool in ("l5000", ""):
+    joints = "".join(joint.format(k, k + 1) for k in range(900))
+    for tool in ("l900", ""):
         told = str(refusal(f"<robot name='r'>{links}{joints}</robot>", tool))
-        assert "has 5000 joints that move, expected at most 150" in told
+        assert "has 900 joints that move, expected at most 150" in told

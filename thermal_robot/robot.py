@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import difflib
+import re
 import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from pathlib import Path
@@ -284,14 +285,30 @@ def _read(path: Path) -> tuple[str, str]:
                 raise RobotError(f"{source} is a pipe or a device, not a file", name=str(path))
             if path.stat().st_size > _LARGEST_FILE:
                 raise RobotError(f"{source} is larger than any URDF ({_LARGEST_FILE >> 20} MiB)", name=str(path))
-        return path.read_text(encoding="utf-8-sig", errors="replace").lstrip(), source
+        return _decoded(path.read_bytes()).lstrip(), source
     except IsADirectoryError:
         problem = "is a folder, not a URDF file"
     except FileNotFoundError:
         problem = "does not exist"
     except OSError as error:
         problem = f"cannot be read: {error.strerror}"
+    except ValueError:  # a name that no file can have
+        problem = "does not exist"
     raise RobotError(f"{source} {problem}", name=str(path))
+
+
+def _decoded(content: bytes) -> str:
+    """Text of a file, whatever it says of its encoding; bytes that are none become marks."""
+    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
+        return content.decode("utf-16", errors="replace")
+    try:
+        return content.decode("utf-8-sig")
+    except UnicodeDecodeError:
+        declared = re.match(rb"\s*<\?xml[^>]*\sencoding\s*=\s*[\"']([\w.-]+)", content)
+        try:
+            return content.decode(declared[1].decode() if declared else "cp1252", errors="replace")
+        except LookupError:
+            return content.decode(errors="replace")
 
 
 def _builtin_path(name: str) -> Path:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from campaign.spoilt import ROWS, TOML, read, with_column
 
-from thermal_robot.campaign import Campaign
+from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.campaign.plausible import doubts
 from thermal_robot.kinematics import tool_poses
 from thermal_robot.robot import Robot
@@ -41,6 +41,15 @@ def test_doubtful(tmp_path: Path, table: str, words: list[str]) -> None:
     fitting = [warning for warning in warnings if all(word in warning for word in words)]
     assert len(fitting) == 1, warnings
     assert not any("\n" in warning for warning in warnings)
+
+
+def test_joints_without_limits_are_told(tmp_path: Path) -> None:
+    campaign = read(tmp_path)
+    assert not any("limits" in warning for warning in campaign.warnings)
+    file = tmp_path / "robot.urdf"
+    file.write_text(file.read_text().replace('<limit lower="-3" upper="3" effort="1" velocity="1"/>', ""))
+    told = [warning for warning in read_campaign(tmp_path).warnings if "limits" in warning]
+    assert told == ["the URDF gives no limits for 'turn': no command is checked against any there"]
 
 
 def test_radians_called_degrees(tmp_path: Path) -> None:

@@ -16,7 +16,7 @@ def two_links(more="", limit=LIMIT):
 {more}</robot>"""
 
 
-# Each is taken by urdfdom, and refused by a strict XML parser.
+# Each is in use, and refused by a strict XML parser.
 LENIENT = ['<xacro:leftover name="x"/>', "<!-- lengths -- from the data sheet -->", '<gazebo:plugin file="p.so"/>']
 
 
@@ -32,17 +32,27 @@ def test_a_urdf_in_use_is_parsed(more):
     assert (model.name, list(model.names)) == ("two", ["universe", "j"])
 
 
-@pytest.mark.parametrize("more", ["", "<!-- lengths -- from the data sheet -->", '<gazebo:plugin file="p.so"/>'])
+@pytest.mark.parametrize("more", ["", *LENIENT[1:]])
 def test_the_reason_is_what_urdfdom_stumbled_over(more):
-    """And not what a strict parser would have: the text without a limit is wrong whatever stands behind it."""
-    assert reason(two_links(more, limit="")) == (
-        "arm.urdf is not a valid URDF: Joint [j] is of type REVOLUTE but it does not specify limits"
+    """And not what a strict parser would have: the text with such a joint is wrong whatever stands behind it."""
+    assert reason(two_links(more).replace("revolute", "wobbly")) == (
+        "arm.urdf is not a valid URDF: Joint [j] has no known type [wobbly]"
     )
 
 
+@pytest.mark.parametrize("limit", ["", "<limit/>", '<limit velocity="1"/>', '<limit effort="2" velocity="1"/>'])
+def test_a_joint_without_limits_has_none(limit):
+    model = parse_urdf(two_links("<!-- é -->", limit=limit), "arm.urdf")
+    assert model.lowerPositionLimit[0] == model.upperPositionLimit[0] == 0.0
+    bounds = '<limit lower="-1" upper="2"/>'
+    assert parse_urdf(two_links(limit=bounds), "arm.urdf").upperPositionLimit[0] == 2.0
+
+
 def test_a_xacro_tag_in_a_comment_makes_no_xacro_file():
-    assert "does not specify limits" in reason(two_links("<!-- was <xacro:arm/> -->", limit=""))
-    assert "is a xacro file" in reason(two_links("<xacro:arm/>", limit=""))
+    parse_urdf(two_links("<!-- was <xacro:arm/> -->"), "arm.urdf")
+    assert "is a xacro file" in reason(two_links("<xacro:arm/>", limit="<limit lower='a'/>"))
+    declared = two_links("<xacro:arm/>").replace("<robot", '<robot xmlns:xacro="http://www.ros.org/wiki/xacro"')
+    assert "is a xacro file" in reason(declared)
 
 
 def test_broken_xml_is_found_in_its_line():
@@ -55,7 +65,7 @@ def test_nothing_but_a_comment_is_empty():
 
 
 def test_what_a_library_prints_is_kept_off_the_terminal_and_the_streams_come_back(capfd):
-    reason(two_links(limit=""))
+    reason(two_links().replace("revolute", "wobbly"))
     os.write(1, b"out")
     os.write(2, b"err")
     assert capfd.readouterr() == ("out", "err")

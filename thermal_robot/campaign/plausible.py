@@ -95,6 +95,10 @@ def _length_unit(campaign: Campaign) -> Iterator[str]:
 
 def _limits(campaign: Campaign) -> Iterator[str]:
     robot = campaign.robot
+    bounds = zip(robot.joint_names, robot.joint_types, np.isinf(robot.lower) | np.isinf(robot.upper), strict=True)
+    free = [name for name, kind, unbound in bounds if kind != "continuous" and unbound]
+    if free:
+        yield f"the URDF gives no limits for {listed(free)}: no command is checked against any there"
     for j, (name, kind) in enumerate(zip(robot.joint_names, robot.joint_types, strict=True)):
         q, lower, upper = campaign.q[:, j], float(robot.lower[j]), float(robot.upper[j])
         outside = (q < lower - LIMIT_TOLERANCE) | (q > upper + LIMIT_TOLERANCE)

@@ -7,7 +7,6 @@ but no regressors, wants the driving joint to be nearer to the root, and cannot 
 from __future__ import annotations
 
 import math
-import re
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -15,7 +14,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.errors import RobotError
-from thermal_robot.kinematics.urdf import nearest, without_comments
+from thermal_robot.kinematics.elements import read_elements, without_comments
+from thermal_robot.kinematics.urdf import nearest
 
 Array = NDArray[np.float64]
 
@@ -74,20 +74,19 @@ class Coupling:
 def mimics(urdf: str) -> dict[str, Mimic]:
     """Read what every joint with a ``<mimic>`` tag follows, which Pinocchio's default parsing drops.
 
-    By pattern and not by an XML parser: many URDF files in use have undeclared namespaces, which urdfdom
-    accepts and parsers refuse.
-
     Raises
     ------
     RobotError
         If a multiplier or an offset is not a finite number.
     """
     found = {}
-    for attributes, body in re.findall(r"<joint\b([^>]*[^/])>(.*?)</joint>", without_comments(urdf), flags=re.DOTALL):
-        name, tag = _attribute(attributes, "name"), re.search(r"<mimic(?=[\s/>])([^>]*)>", body)
-        if name and tag:
-            joint = _attribute(tag[1], "joint") or ""
-            found[name] = Mimic(joint, _number(tag[1], "multiplier", 1.0, name), _number(tag[1], "offset", 0.0, name))
+    for element in read_elements(without_comments(urdf), "the robot description"):
+        if element.path == ("joint", "mimic") and (name := element.owner.get("name")):
+            said = element.attributes
+            numbers = (
+                _number(said.get(key), key, default, name) for key, default in (("multiplier", 1.0), ("offset", 0.0))
+            )
+            found[name] = Mimic(said.get("joint", ""), *numbers)
     return found
 
 
@@ -207,13 +206,7 @@ def common_limits(coupling: Coupling, names: Sequence[str], lower: Array, upper:
     return low, high
 
 
-def _attribute(tag: str, name: str) -> str | None:
-    found = re.search(rf"(?<![\w:.-]){name}\s*=\s*(\"[^\"]*\"|'[^']*')", tag)
-    return found[1][1:-1] if found else None
-
-
-def _number(tag: str, name: str, default: float, joint: str) -> float:
-    text = _attribute(tag, name)
+def _number(text: str | None, name: str, default: float, joint: str) -> float:
     try:
         value = default if text is None else float(text)
     except ValueError:

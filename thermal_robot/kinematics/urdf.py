@@ -10,11 +10,11 @@ import sys
 import tempfile
 import threading
 from collections.abc import Iterable, Iterator
-from xml.parsers import expat
 
 import pinocchio as pin
 
 from thermal_robot.errors import RobotError
+from thermal_robot.kinematics.elements import IS_XACRO, Element, read_elements, without_comments
 
 # Redirecting the process's output streams is global: one thread at a time.
 _STREAMS = threading.Lock()
@@ -36,16 +36,40 @@ def parse_urdf(urdf: str, source: str) -> pin.Model:
         If the text is not a URDF, with the reason.
     """
     said: list[str] = []
+    text = without_comments(urdf)
+    whole = with_limits(text, read_elements(text, source))
     try:
         with _quiet(said):
-            return pin.buildModelFromXML(urdf)
+            return pin.buildModelFromXML(whole)
     except (ValueError, RuntimeError) as error:
-        raise RobotError(f"{source} {_why_not_urdf(urdf, said, str(error))}", name=source) from error
+        reasons = re.findall(r"Error:\s+(.*)", "".join(said))
+        why = IS_XACRO if "<xacro:" in text else f"is not a valid URDF: {reasons[0] if reasons else error}"
+        raise RobotError(f"{source} {why}", name=source) from error
 
 
-def without_comments(urdf: str) -> str:
-    """Blank the comments, keeping their lines: urdfdom takes ``--`` within them, which XML forbids."""
-    return re.sub(r"<!--.*?-->", lambda comment: "\n" * comment[0].count("\n"), urdf, flags=re.DOTALL)
+def with_limits(text: str, elements: Iterable[Element]) -> str:
+    """Give each joint the limits that urdfdom asks for and nobody here uses; bounds of 0 and 0 stand for none.
+
+    Parameters
+    ----------
+    text
+        XML without comments.
+    elements
+        Of it.
+    """
+    limited = {element.number for element in elements if element.path == ("joint", "limit")}
+    added: list[tuple[int, str]] = []
+    for element in elements:
+        if element.path == ("joint", "limit"):
+            more = "".join(f' {name}="0"' for name in ("effort", "velocity") if name not in element.attributes)
+            added.append((element.start + len("<limit"), more))
+        elif element.path == ("joint",) and element.number not in limited:
+            added.append((element.end, '<limit effort="0" velocity="0"/>'))
+    content, parts, last = text.encode(errors="replace"), [], 0
+    for place, more in sorted(added):
+        parts += [content[last:place], more.encode()]
+        last = place
+    return b"".join([*parts, content[last:]]).decode()
 
 
 def nearest(name: str, known: Iterable[str]) -> tuple[str, ...]:
@@ -55,31 +79,6 @@ def nearest(name: str, known: Iterable[str]) -> tuple[str, ...]:
         return difflib.SequenceMatcher(None, name.lower(), candidate.lower()).ratio()
 
     return tuple(sorted(known, key=similarity, reverse=True)[:5])
-
-
-def _why_not_urdf(urdf: str, said: list[str], error: str) -> str:
-    text = without_comments(urdf.strip())
-    if not text.strip():
-        return "is empty"
-    if "<xacro:" in text:
-        return "is a xacro file; expand it to URDF first (xacro robot.xacro > robot.urdf)"
-    try:
-        tag = _root_tag(text)
-    except expat.ExpatError as problem:
-        return f"is not XML: {problem}"
-    if tag != "robot":
-        return f"is XML but not a URDF: its root element is <{tag}>, expected <robot>"
-    reasons = re.findall(r"Error:\s+(.*)", "".join(said))
-    return f"is not a valid URDF: {reasons[0] if reasons else error}"
-
-
-def _root_tag(text: str) -> str:
-    """Name of the outermost element; whether the prefixes of names were declared is not asked, as urdfdom does not."""
-    tags: list[str] = []
-    parser = expat.ParserCreate()
-    parser.StartElementHandler = lambda tag, _: tags.append(tag)
-    parser.Parse(text.encode(), True)
-    return tags[0]
 
 
 @contextlib.contextmanager
