@@ -4,9 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 
+_LONGEST = 1000  # characters of a message: a terminal shows it on a dozen lines
+
 
 class ThermalRobotError(Exception):
-    """Root of the errors that are the user's to mend; the command line prints them in one line."""
+    """Root of the errors that are the user's to mend; each prints as one line that a person can read."""
+
+    def __str__(self) -> str:
+        # a name or a value may be a million characters long, or of bytes that are no text
+        line = " ".join(super().__str__().split()).encode(errors="backslashreplace").decode()
+        return line if len(line) <= _LONGEST else f"{line[: _LONGEST // 2]} … {line[-_LONGEST // 2 :]}"
 
     def __reduce__(self) -> tuple[Callable[..., ThermalRobotError], tuple[object, ...]]:
         # errors cross processes; their constructors take more than the message

@@ -81,6 +81,20 @@ def write_bytes(path: str | Path, content: bytes) -> None:
         place.write_bytes(content)
 
 
+def is_file(path: Path) -> bool:
+    """Return whether there is such a file; a name that is too long, or holds a NUL, is none of a file."""
+    with suppress(OSError, ValueError):
+        return path.is_file()
+    return False
+
+
+def is_folder(path: Path) -> bool:
+    """Return whether there is such a folder, as :func:`is_file`."""
+    with suppress(OSError, ValueError):
+        return path.is_dir()
+    return False
+
+
 def require_free(targets: Sequence[str | None], inputs: Sequence[str | Path] = ()) -> None:
     """Refuse, before anything is computed, a file that could not be written, that is read from, or is named twice.
 
@@ -93,8 +107,12 @@ def require_free(targets: Sequence[str | None], inputs: Sequence[str | Path] = (
     for target in targets:
         if not target or target == "-":
             continue
-        file = Path(target).resolve()
-        if not file.parent.is_dir() or file.is_dir():
+        try:
+            file = Path(target).resolve()
+            fits = file.parent.is_dir() and not file.is_dir()
+        except (OSError, ValueError, RuntimeError):  # a name too long, one with a NUL, a circle of links
+            fits = False
+        if not fits:
             raise CampaignError(target, "cannot be written", expected="a file in a folder that exists")
         if file in read:
             raise CampaignError(target, "is read from, and would be overwritten", expected="another file to write")

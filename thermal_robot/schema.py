@@ -18,8 +18,8 @@ from thermal_robot.errors import CampaignError
 
 Kind: TypeAlias = Callable[[Any, str], Any]
 
-LARGEST = 1e100
-"""No figure of a robot or of a measurement is larger, in any unit: its square is still a number."""
+LARGEST = 1e20
+"""In any unit: nanoseconds since 1970 are 2e18, and no quantity that a robot's log holds is larger."""
 _MOST_SHOWN = 60
 """Letters of what was found that an error shows."""
 

@@ -10,7 +10,8 @@ from campaign.spoilt import toml_is_refused
 
 from thermal_robot.campaign import read_campaign
 from thermal_robot.campaign.document import Document
-from thermal_robot.errors import CampaignError
+from thermal_robot.errors import CampaignError, RobotError
+from thermal_robot.robot import load_robot
 
 # what is replaced, by what, row, column, found, words of the sentence
 REFUSED = [
@@ -92,13 +93,32 @@ def test_numbers_are_floats_and_no_others_pass(tmp_path: Path) -> None:
             )
 
 
-@pytest.mark.parametrize("value", ["1" * 5000, "[" * 2000 + "]" * 2000])
-def test_what_python_cannot_read_is_no_toml(tmp_path: Path, value: str) -> None:
-    with pytest.raises(CampaignError, match="not valid TOML"):
-        document(tmp_path, f"[robot]\nreference_temperature = {value}\n")
+BRACKETS = "[" * 5000 + "]" * 5000
 
 
-def test_a_number_of_four_hundred_digits_is_no_figure(tmp_path: Path) -> None:
-    found = document(tmp_path, f"[noise]\nposition = 1{'0' * 400}\n")
-    with pytest.raises(CampaignError, match="expected a number above 0"):
-        found.size("noise", "position")
+@pytest.mark.parametrize(
+    ("value", "told"),
+    [
+        ("9" * 400, "wrong kind of value"),
+        ("9" * 5000, "too many digits"),
+        ("1e300", "wrong kind of value; found 1e+300, expected a number"),
+        ("1e-300", "smaller than any noise"),
+        (BRACKETS, "values stand within each other too deep"),
+        ('"' + "x" * 2_000_000 + '"', "is larger than any campaign.toml"),
+        ('"' + "x" * 100_000 + '"', "wrong kind of value"),
+    ],
+    ids=lambda text: text[:12],
+)
+def test_a_hostile_value_is_refused(tmp_path: Path, value: str, told: str) -> None:
+    with pytest.raises(CampaignError) as refused:
+        document(tmp_path, f"[noise]\nposition = {value}\n").size("noise", "position")
+    assert told in str(refused.value)
+    assert len(str(refused.value)) <= 1003
+
+
+@pytest.mark.parametrize("path", ["x" * 5000, "x/" * 3000, "a\0b", "", "no such folder/campaign.toml"])
+def test_a_path_that_no_file_can_have_is_refused(tmp_path: Path, path: str) -> None:
+    with pytest.raises(CampaignError, match=r"there is no such file|the path is empty"):
+        read_campaign(path)
+    with pytest.raises(RobotError, match=r"does not exist|cannot be read|is empty"):
+        load_robot(path, "tool")

@@ -99,10 +99,23 @@ def test_columns_that_have_a_type_are_taken_as_they_are() -> None:
 
 
 def test_a_number_survives_its_text() -> None:
-    numbers = np.random.default_rng(2).normal(size=200) * 10.0 ** np.arange(-100, 100)
+    numbers = np.random.default_rng(2).normal(size=200) * 10.0 ** np.linspace(-20, 19, 200)
     table = Table("t.csv", {"a": [repr(float(number)) for number in numbers]}, np.arange(200))
     np.testing.assert_array_equal(table.numbers("a"), numbers)
     comma = Table(
         "t.csv", {"a": [repr(float(n)).replace(".", ",") for n in numbers]}, np.arange(200), decimal_comma=True
     )
     np.testing.assert_array_equal(comma.numbers("a"), numbers)
+
+
+@pytest.mark.parametrize("cell", ["1e300", "-1e21", "1e999", "-inf", "9" * 400])
+@pytest.mark.parametrize("gaps", [True, False])
+def test_a_figure_larger_than_any_is_refused(cell: str, gaps: bool) -> None:
+    for cells in (["1", cell], np.array([1.0, float(cell)])):
+        with pytest.raises(CampaignError, match=r"larger than any figure|not a finite number") as refused:
+            Table("t.csv", {"a": cells}, np.array([2, 3])).numbers("a", gaps=gaps)
+        assert (refused.value.row, refused.value.column) == (3, "a")
+
+
+def test_a_figure_next_to_nothing_is_nothing() -> None:
+    assert Table("t.csv", {"a": ["1e-300", "-1e-29"]}, np.array([2, 3])).numbers("a").tolist() == [0.0, -1e-29]

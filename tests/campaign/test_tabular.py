@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +13,7 @@ from campaign.files import ROWS as WHOLE
 from campaign.files import add, put
 from campaign.spoilt import ROWS, TOML, refusal, renamed, table_is_refused
 
-from thermal_robot.campaign import read_campaign
+from thermal_robot.campaign import read_campaign, tabular
 from thermal_robot.campaign.tabular import table_from_frame
 from thermal_robot.errors import CampaignError
 
@@ -95,7 +96,7 @@ REFUSED = [
     (renamed(note=""), 1, None, "column 9 without one", ["a column has no name"]),
     (ROWS.replace(",2,8", ",2"), 3, None, "8", ["wrong number of fields", "9 as in the header"]),
     (ROWS.replace(",2,8", ",2,8,9"), 3, None, "10", ["wrong number of fields", "9 as in the header"]),
-    (ROWS.replace(",2,8", ',"2,8'), 3, None, "8", ["wrong number of fields"]),
+    (ROWS.replace(",2,8", ',"2,8'), 3, None, None, ["cannot be read as CSV", "unexpected end"]),
     (b"PK\x03\x04...", None, None, None, ["is a workbook", "saved as CSV or Parquet"]),
     (b"PAR1...", None, None, None, ["Parquet file by its contents", "ends in .parquet"]),
     (
@@ -123,11 +124,7 @@ def test_no_table(tmp_path: Path) -> None:
 
 def test_parquet_without_pyarrow(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     (tmp_path / "t.parquet").write_bytes(b"PAR1")
-
-    def missing(*_: object, **__: object) -> None:
-        raise ImportError("pyarrow")
-
-    monkeypatch.setattr(pd, "read_parquet", missing)
+    monkeypatch.setitem(sys.modules, "pyarrow.parquet", None)
     error = refusal(tmp_path, toml=TOML.replace("measurements.csv", "t.parquet"))
     assert error.file == str(tmp_path / "t.parquet")
     assert 'pip install "thermal-robot[parquet]"' in str(error)
@@ -231,3 +228,33 @@ def test_rows_are_counted_where_the_index_is_no_row_number(index: pd.Index, rows
 def test_names_of_columns_of_any_type_are_text() -> None:
     frame = pd.DataFrame([[1.0, 2.0, 3.0]], columns=pd.Index([1, ("a", 2), Mute()], dtype=object, tupleize_cols=False))
     assert list(table_from_frame(frame).columns) == ["1", "('a', 2)", "<Mute>"]
+
+
+HOSTILE = {
+    "a quote that never ends": (ROWS + '"', "cannot be read as CSV"),
+    "a line of 10 MB": (ROWS + "1" * 10_000_000, "cannot be read as CSV"),
+    "nothing but separators": ("," * 1_000_000, "is empty"),
+    "blank lines without end": (ROWS + "\n" * 200_000, "100000 lines in succession are blank"),
+    "columns without end": (
+        "\n".join(line + ",1" * 5000 for line in ROWS.split()).replace(",1", ",c", 5000),
+        "too many columns; found 5009",
+    ),
+    "NUL": (b"\0" * 100_000, "has a header but no rows"),
+}
+
+
+@pytest.mark.parametrize("kind", HOSTILE)
+def test_a_hostile_table_is_refused(tmp_path: Path, kind: str) -> None:
+    table, told = HOSTILE[kind]
+    error = refusal(tmp_path, table=table)
+    assert told in str(error)
+    assert len(str(error)) <= 1003
+
+
+def test_a_table_that_is_too_large_is_refused_before_it_is_read(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(tabular, "MOST_CELLS", 18)
+    assert "has more cells than can be read" in str(refusal(tmp_path))
+    monkeypatch.setattr(tabular, "LARGEST_TABLE", len(ROWS) - 1)
+    assert "is larger than any table" in str(refusal(tmp_path))

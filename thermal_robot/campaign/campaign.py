@@ -11,7 +11,14 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from thermal_robot.campaign.settings import STANDARD_TEMPERATURE, Settings, as_vector
+from thermal_robot.campaign.checked import (
+    checked_array,
+    checked_mapping,
+    checked_noise,
+    checked_number,
+    checked_sizes,
+)
+from thermal_robot.campaign.settings import MOVES, STANDARD_TEMPERATURE, Settings, as_vector
 from thermal_robot.campaign.turning import since_turns
 from thermal_robot.campaign.units import Units
 from thermal_robot.errors import CampaignError
@@ -30,7 +37,8 @@ class Campaign:
     """N measurements of one robot, SI units, arrays read-only.
 
     Made by :func:`read_campaign`, :func:`read_samples` or :func:`campaign_from_table`, which validate. The
-    constructor checks shapes only, so that a program can put a campaign together from arrays.
+    constructor checks shapes and that all figures are finite, so that a program can put a campaign together from
+    arrays.
 
     Attributes
     ----------
@@ -87,7 +95,7 @@ class Campaign:
     Raises
     ------
     CampaignError
-        Arrays whose shapes do not fit together.
+        Arrays whose shapes do not fit together, figures that are not finite, values of another kind.
     """
 
     name: str
@@ -119,8 +127,10 @@ class Campaign:
     travelled: Mapping[str, FloatArray] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
-        samples = len(self.q)
-        if len(self.rows) == 0 and samples:
+        file = f"<{self.name}>"
+        self._require_kinds(file)
+        samples = len(self.q) if hasattr(self.q, "__len__") else 0
+        if np.size(self.rows) == 0 and samples:
             object.__setattr__(self, "rows", np.arange(2, samples + 2))
         shapes: dict[str, tuple[int, ...]] = {
             "q": (samples, self.robot.n),
@@ -132,11 +142,12 @@ class Campaign:
             "target": (3,),
             "payload_com": (3,),
         }
+        optional = ("position", "orientation", "simulated_position", "simulated_orientation")
         for key, shape in shapes.items():
             value = getattr(self, key)
-            if value is not None:
+            if value is not None or key not in optional:
                 number = np.int64 if key == "rows" else np.float64
-                object.__setattr__(self, key, self._frozen(key, value, shape, number))
+                object.__setattr__(self, key, checked_array(file, key, value, shape, number))
         kinds: dict[str, Any] = {
             "covariates": np.float64,
             "labels": np.str_,
@@ -144,24 +155,35 @@ class Campaign:
             "travelled": np.float64,
         }
         for key, kind in kinds.items():
-            arrays = {name: self._frozen(name, value, (samples,), kind) for name, value in getattr(self, key).items()}
+            held = checked_mapping(file, key, getattr(self, key)).items()
+            arrays = {name: checked_array(file, name, value, (samples,), kind) for name, value in held}
             object.__setattr__(self, key, arrays)
+        for key in ("noise_position", "noise_orientation"):
+            object.__setattr__(self, key, checked_noise(file, key, getattr(self, key)))
+        for key in ("priors", "gears"):
+            object.__setattr__(self, key, checked_sizes(file, key, getattr(self, key)))
+        warmth = checked_number(file, "reference_temperature", self.reference_temperature)
+        object.__setattr__(self, "reference_temperature", warmth)
 
-    def _frozen(self, key: str, value: ArrayLike, shape: tuple[int, ...], kind: Any) -> NDArray[Any]:
-        """Return the array read-only; a copy unless it already was: the caller's own stays writable."""
-        array = np.asarray(value, dtype=kind)
-        if array.shape != shape:
-            raise CampaignError(
-                f"<{self.name}>",
-                "wrong shape",
-                column=key,
-                found=str(array.shape),
-                expected=str(shape),
-            )
-        if array.flags.writeable:
-            array = array.copy()
-            array.flags.writeable = False
-        return array
+    def _require_kinds(self, file: str) -> None:
+        """Refuse what is not of its kind, and has no shape."""
+        kinds = {"robot": (Robot, "a robot, from load_robot"), "units": (Units, "Units")}
+        for key, (kind, expected) in kinds.items():
+            if not isinstance(getattr(self, key), kind):
+                found = type(getattr(self, key)).__name__
+                raise CampaignError(file, "wrong kind of value", column=key, found=found, expected=expected)
+        if self.moves not in MOVES:
+            expected = " or ".join(map(repr, MOVES))
+            raise CampaignError(file, "unknown word", column="moves", found=repr(self.moves), expected=expected)
+        for key in ("extra", "derived", "warnings"):
+            names = getattr(self, key)
+            if not isinstance(names, (tuple, list)) or not all(isinstance(name, str) for name in names):
+                raise CampaignError(
+                    file, "wrong kind of value", column=key, found=repr(names), expected="a tuple of texts"
+                )
+        for key in ("base_known", "tool_known"):
+            if not isinstance(getattr(self, key), (bool, np.bool_)):
+                raise CampaignError(file, "wrong kind of value", column=key, expected="True or False")
 
     def __repr__(self) -> str:
         """One line; the arrays stay out of a notebook."""

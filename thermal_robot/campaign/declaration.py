@@ -18,6 +18,7 @@ from thermal_robot.campaign.settings import (
 )
 from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, Units
 from thermal_robot.errors import CampaignError
+from thermal_robot.files import is_file, is_folder
 
 FILE_NAME = "campaign.toml"
 _MOST_NAMED = 5  # campaigns of a folder in one sentence
@@ -69,8 +70,8 @@ def read_declaration(path: Path, folder: Path | None = None) -> Declaration:
     CampaignError
         No such file, a syntax error, a section or key that is unknown or missing, a value of the wrong kind.
     """
-    file = path / FILE_NAME if path.is_dir() else path
-    if not file.is_file():
+    file = path / FILE_NAME if is_folder(path) else path
+    if not is_file(file):
         raise _absent(path)
     document = Document(file)
     length = Units(length=document.word("measurements", "length_unit", LENGTH_UNITS)).length_scale

@@ -8,6 +8,7 @@ from collections.abc import Iterable
 from pathlib import Path
 from typing import Any
 
+from thermal_robot.campaign.figures import SMALLEST
 from thermal_robot.campaign.names import did_you_mean
 from thermal_robot.campaign.settings import GEARS, NUMBER, PRIORS, SIGMA, UNIT, VECTOR, WORD
 from thermal_robot.errors import CampaignError
@@ -31,6 +32,8 @@ SECTIONS: dict[str, tuple[str, ...]] = {
 
 _NAMED = {"priors": PRIORS, "gears": GEARS}
 _ABSENT: Any = object()
+_LARGEST_FILE = 1 << 20
+"""Bytes: it holds a few lines, and a line for every joint and every effect."""
 
 
 class Document:
@@ -39,16 +42,24 @@ class Document:
     def __init__(self, file: Path) -> None:
         self.file = str(file)
         try:
+            if file.stat().st_size > _LARGEST_FILE:
+                raise CampaignError(self.file, "is larger than any campaign.toml", expected="at most 1 MiB")
             self.text = file.read_text(encoding="utf-8-sig")
             self.data: dict[str, Any] = tomllib.loads(self.text)
         except OSError as error:
             raise CampaignError(self.file, f"cannot be read: {error.strerror}") from error
         except UnicodeDecodeError as error:
             raise CampaignError(self.file, "is not UTF-8 text", expected="a TOML file saved as UTF-8") from error
-        except (ValueError, RecursionError) as error:  # a number of 5000 digits, brackets in a thousand brackets
+        except tomllib.TOMLDecodeError as error:
             line = re.search(r"at line (\d+)", str(error))
             row = int(line[1]) if line else None
             raise CampaignError(self.file, f"not valid TOML: {error}", row=row) from error
+        except RecursionError as error:
+            raise CampaignError(
+                self.file, "values stand within each other too deep", expected="lists of numbers"
+            ) from error
+        except ValueError as error:  # an integer of thousands of digits
+            raise CampaignError(self.file, "a number has too many digits to be read", found=str(error)) from error
         self._refuse_unknown()
 
     def row(self, section: str, key: str = "") -> int | None:
@@ -81,7 +92,7 @@ class Document:
                     "wrong kind of value",
                     row=self.row(section),
                     column=section,
-                    found=repr(content),
+                    found=shown(content),
                     expected=f"a section [{section}]",
                 )
             known = SECTIONS[section]
@@ -143,7 +154,10 @@ class Document:
 
     def size(self, section: str, key: str) -> float:
         """Return a number that is not negative, 0 when absent."""
-        return self.number(section, key, 0.0, SIGMA)
+        value = self.number(section, key, 0.0, SIGMA)
+        if 0.0 < value < SMALLEST:
+            raise self._wrong(section, key, value, "a number above 0, or 0 for not given", "smaller than any noise")
+        return value
 
     def vector(self, section: str, key: str, default: Any) -> Any:
         """Return three finite numbers, or the default."""

@@ -11,7 +11,7 @@ from thermal_robot.campaign.declaration import FILE_NAME, check_gears, read_decl
 from thermal_robot.campaign.settings import Settings
 from thermal_robot.campaign.tabular import read_table, table_from_frame
 from thermal_robot.campaign.validate import build_campaign
-from thermal_robot.errors import RobotError, require
+from thermal_robot.errors import CampaignError, RobotError, require
 from thermal_robot.robot import Robot, load_robot
 
 if TYPE_CHECKING:
@@ -41,6 +41,8 @@ def read_campaign(path: str | Path, *, folder: str | Path | None = None) -> Camp
         A robot that cannot be loaded, or has no such frame.
     """
     require("read_campaign()", path, (str, os.PathLike), f"the path of a {FILE_NAME}, or of its folder")
+    if path == "":  # which Path takes for the folder that one stands in
+        raise CampaignError("read_campaign()", "the path is empty", expected=f"that of a {FILE_NAME}, or of its folder")
     declaration = read_declaration(Path(path), None if folder is None else Path(folder))
     settings = declaration.settings
     try:

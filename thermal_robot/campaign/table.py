@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.campaign.figures import first_beyond, settled
 from thermal_robot.errors import CampaignError
-from thermal_robot.schema import LARGEST
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -18,7 +18,6 @@ if TYPE_CHECKING:
 Cells: TypeAlias = "Sequence[str] | NDArray[np.float64]"
 """A column: text as it stands in the file, or numbers where the source has a type of its own."""
 
-_REFUSED = {-1: "a value is missing", 0: "larger than anything that is measured", 1: "not a finite number"}
 _EMPTY = frozenset({"", "nan", "na", "n/a", "null", "none", "<na>"})
 
 
@@ -62,22 +61,23 @@ class Table:
         Raises
         ------
         CampaignError
-            Text, a number that is infinite or that nobody measures, or an empty cell where none may be.
+            Text, a number that is infinite or larger than any, or an empty cell where none may be.
         """
         cells = self.columns[column]
         values = cells if isinstance(cells, np.ndarray) else self._parse(column, cells)
-        refused = np.abs(values) > LARGEST if gaps else ~(np.abs(values) <= LARGEST)
-        if refused.any():
-            index = int(np.argmax(refused))
+        index = first_beyond(np.nan_to_num(values, nan=0.0, posinf=np.inf, neginf=-np.inf) if gaps else values)
+        if index is not None:
+            value = values[index]
+            finite = "not a finite number" if np.isinf(value) else "larger than any figure of a campaign"
             raise CampaignError(
                 self.file,
-                _REFUSED[int(np.isinf(values[index])) - int(np.isnan(values[index]))],
+                "a value is missing" if np.isnan(value) else finite,
                 row=int(self.rows[index]),
                 column=column,
                 found=self._as_found(cells[index]),
                 expected="a number",
             )
-        return values
+        return settled(values)
 
     def text(self, column: str) -> list[str]:
         """Return a column as N strings; numbers as short as they can be, empty cells as ``""``."""

@@ -2,24 +2,33 @@
 
 from __future__ import annotations
 
+import codecs
 import csv
-import io
 import re
 from collections import Counter
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any, TextIO
 
 import numpy as np
 
 from thermal_robot.campaign.names import LABELS
 from thermal_robot.campaign.table import Cells, Table
 from thermal_robot.errors import CampaignError
+from thermal_robot.files import is_file, is_folder
 
 if TYPE_CHECKING:
     import pandas as pd
 
 _DECIMAL_COMMA = re.compile(r"[+\-−]?\d*,\d+([eE][+-]?\d+)?")
+_BLOCK = 1 << 20  # bytes, or characters: what is read of a file at once
+_MOST_BLANK_LINES = 100_000  # in succession: nobody scrolls past so many
+LARGEST_TABLE = 256 << 20
+"""Bytes: a million rows of ten columns with all digits, which are read in 1.5 GB."""
+MOST_CELLS = 20_000_000
+"""The same, for a file whose cells are short or packed."""
+MOST_COLUMNS = 1000
+"""Logs of two arms with every quantity that a controller knows have a few hundred."""
 PARQUET = (".parquet", ".pq")
 """Endings of the names of Parquet files."""
 NO_PARQUET = "Parquet files need pyarrow, which is not installed"
@@ -39,24 +48,25 @@ def read_table(path: Path) -> Table:
         column.
     """
     file = str(path)
-    if not path.is_file():
-        problem = "is a directory" if path.is_dir() else "there is no such file"
+    if not is_file(path):
+        problem = "is a directory" if is_folder(path) else "there is no such file"
         raise CampaignError(file, problem, expected="the table of measurements")
+    if path.stat().st_size > LARGEST_TABLE:
+        raise CampaignError(file, "is larger than any table that can be read", expected=f"{LARGEST_TABLE >> 20} MiB")
     if path.suffix.lower() in PARQUET:
         return _read_parquet(path)
-    text, warnings = _decode(path)
-    lines, numbers = _records(file, text)
-    header = [name.strip() for name in lines[0]]
-    body, rows = lines[1:], np.array(numbers[1:], dtype=np.int64)
-    if not body:
+    encoding, warnings = _encoding(path)
+    with path.open(encoding=encoding, errors="replace", newline="") as stream:
+        separator = _separator(stream)
+        header, cells, numbers = _records(file, csv.reader(stream, delimiter=separator, strict=True))
+    if len(numbers) < 2:
         raise CampaignError(file, "has a header but no rows", expected="one row per measurement")
-    cells: dict[int, list[str]] = {i: [row[i].strip() for row in body] for i in range(len(header))}
     # A separator at the end of every line makes a column of nothing.
     kept = [i for i, name in enumerate(header) if name or any(cells[i])]
     _check_header(file, [header[i] for i in kept], number=numbers[0])
     columns = {header[i]: cells[i] for i in kept}
-    comma = _separator(text) != "," and _has_decimal_comma(columns)
-    return Table(file, columns, rows, numbers[0], comma, warnings)
+    comma = separator != "," and _has_decimal_comma(columns)
+    return Table(file, columns, np.array(numbers[1:], dtype=np.int64), numbers[0], comma, warnings)
 
 
 def table_from_frame(frame: pd.DataFrame, file: str = "<table>", *, first_row: int | None = None) -> Table:
@@ -111,9 +121,15 @@ def _read_parquet(path: Path) -> Table:
     import pandas as pd
 
     try:
+        from pyarrow.parquet import read_metadata
+
+        held = read_metadata(path)
+        _require_size(str(path), held.num_rows, held.num_columns)
         frame = pd.read_parquet(path)
     except ImportError as error:
         raise CampaignError(str(path), NO_PARQUET, expected=WITH_PARQUET) from error
+    except CampaignError:
+        raise
     except Exception as error:  # pyarrow raises its own, which cannot be named without importing it
         reason = " ".join(str(error).split())
         raise CampaignError(str(path), f"cannot be read as a Parquet file ({reason})") from error
@@ -122,63 +138,92 @@ def _read_parquet(path: Path) -> Table:
     return table_from_frame(frame, str(path), first_row=2)
 
 
-def _decode(path: Path) -> tuple[str, tuple[str, ...]]:
-    """Return the text of a file and what was odd about it."""
+def _encoding(path: Path) -> tuple[str, tuple[str, ...]]:
+    """Return how a file's text is encoded, and what was odd about it."""
     file = str(path)
     try:
-        data = path.read_bytes()
+        with path.open("rb") as stream:
+            head = stream.read(4)
+            if head == b"PK\x03\x04":
+                raise CampaignError(file, "is a workbook or an archive", expected="a table saved as CSV or Parquet")
+            if head == b"PAR1":
+                raise CampaignError(file, "is a Parquet file by its contents", expected="a name that ends in .parquet")
+            if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+                return "utf-16", ()
+            decoder = codecs.getincrementaldecoder("utf-8")()
+            block = head
+            while block:
+                decoder.decode(block)
+                block = stream.read(_BLOCK)
+            decoder.decode(b"", final=True)
+            return "utf-8-sig", ()
     except OSError as error:
         raise CampaignError(file, f"cannot be read: {error.strerror}") from error
-    if data.startswith(b"PK\x03\x04"):
-        raise CampaignError(file, "is a workbook or an archive", expected="a table saved as CSV or Parquet")
-    if data.startswith(b"PAR1"):
-        raise CampaignError(file, "is a Parquet file by its contents", expected="a name that ends in .parquet")
-    utf16 = data.startswith((b"\xff\xfe", b"\xfe\xff"))
-    try:
-        text = data.decode("utf-16" if utf16 else "utf-8-sig")
-        warnings: tuple[str, ...] = ()
     except UnicodeDecodeError:
         # Spreadsheets still write the Windows code page; only letters outside ASCII differ.
-        text = data.decode("cp1252", errors="replace")
-        warnings = (f"{file} is not UTF-8 and was read as Windows-1252: check names and labels with accents",)
-    if not text.strip():
-        raise CampaignError(file, "is empty", expected="a header and one row per measurement")
-    return text, warnings
+        odd = f"{file} is not UTF-8 and was read as Windows-1252: check names and labels with accents"
+        return "cp1252", (odd,)
 
 
-def _separator(text: str) -> str:
-    """Return the separator of the header."""
-    header = re.split(r"[\r\n]", text.lstrip("\r\n "), maxsplit=1)[0]
+def _separator(stream: TextIO) -> str:
+    """Return the separator of the header, the first line that holds anything, and go back to the start."""
+    header = ""
+    while not header.strip() and (line := stream.readline(_BLOCK)):
+        header = line
+    stream.seek(0)
     return ";" if ";" in header else "\t" if "\t" in header else ","
 
 
-def _records(file: str, text: str) -> tuple[list[list[str]], list[int]]:
-    """Return the lines that hold anything, split into fields, with the line numbers where they start."""
-    reader = csv.reader(io.StringIO(text, newline=""), delimiter=_separator(text))
-    lines: list[list[str]] = []
+def _records(file: str, reader: Any) -> tuple[list[str], list[list[str]], list[int]]:
+    """Return the header, the cells by column, and the numbers of the lines where header and rows start."""
+    header: list[str] = []
+    cells: list[list[str]] = []
     numbers: list[int] = []
     before = 0
     try:
         for fields in reader:
             start, before = before + 1, reader.line_num
             if not any(field.strip() for field in fields):
+                if start - (numbers[-1] if numbers else 0) > _MOST_BLANK_LINES:
+                    raise CampaignError(file, f"more than {_MOST_BLANK_LINES} lines in succession are blank", row=start)
                 continue
-            if lines and len(fields) != len(lines[0]):
+            if header and len(fields) != len(header):
                 raise CampaignError(
                     file,
                     "wrong number of fields",
                     row=start,
                     found=str(len(fields)),
-                    expected=f"{len(lines[0])} as in the header",
+                    expected=f"{len(header)} as in the header",
                 )
-            lines.append(fields)
             numbers.append(start)
+            if header:
+                for column, field in zip(cells, fields, strict=True):
+                    column.append(field.strip())
+                _require_size(file, len(numbers), len(header))
+            else:
+                header = [name.strip() for name in fields]
+                cells = [[] for _ in header]
     except csv.Error as error:
         raise CampaignError(file, f"cannot be read as CSV ({error})", row=before + 1) from error
-    return lines, numbers
+    if not header:
+        raise CampaignError(file, "is empty", expected="a header and one row per measurement")
+    return header, cells, numbers
+
+
+def _require_size(file: str, rows: int, columns: int) -> None:
+    if rows * columns > MOST_CELLS:
+        raise CampaignError(
+            file,
+            "has more cells than can be read",
+            found=f"{columns} columns of {rows} rows and more",
+            expected=f"at most {MOST_CELLS} cells: leave out rows or columns",
+        )
 
 
 def _check_header(file: str, header: Sequence[str], number: int | None) -> None:
+    if len(header) > MOST_COLUMNS:
+        expected = f"at most {MOST_COLUMNS}: leave out those that do not bear on the measurements"
+        raise CampaignError(file, "too many columns", row=number, found=str(len(header)), expected=expected)
     for name, count in Counter(header).items():
         if not name:
             raise CampaignError(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign, FloatArray
+from thermal_robot.campaign.figures import LARGEST_COMMAND, first_beyond
 from thermal_robot.campaign.fill import fill
 from thermal_robot.campaign.names import split_name
 from thermal_robot.campaign.plausible import doubts
@@ -103,6 +104,17 @@ def _commands(table: Table, robot: Robot, units: Units) -> FloatArray:
     """(N, n) rad or m."""
     joints = zip(robot.joint_names, robot.joint_types, strict=True)
     commands: FloatArray = np.column_stack([table.numbers(joint) * units.joint_scale(kind) for joint, kind in joints])
+    index = first_beyond(commands, LARGEST_COMMAND)
+    if index is not None:
+        joint = robot.joint_names[int(np.argmax(np.abs(commands[index])))]
+        raise CampaignError(
+            table.file,
+            "no joint goes so far",
+            row=int(table.rows[index]),
+            column=joint,
+            found=f"{table.numbers(joint)[index]:.15g}",
+            expected=f"at most {LARGEST_COMMAND:g} rad or m",
+        )
     return commands
 
 

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
 from thermal_robot.campaign import Campaign, read_campaign
@@ -30,7 +32,7 @@ from thermal_robot.diagnosis.unlisted import as_laws_say, one_more_law
 from thermal_robot.diagnosis.where import without_laws
 from thermal_robot.diagnosis.word import worth_their_word
 from thermal_robot.effects import RANDOM, Effect, choose, library
-from thermal_robot.errors import CampaignError, require
+from thermal_robot.errors import CampaignError, EstimationError, require
 from thermal_robot.inference import settings
 from thermal_robot.inference.discover import discovered
 from thermal_robot.inference.fit import Fit, fit
@@ -86,9 +88,11 @@ def diagnose(
     def asked(name: str) -> bool:
         return name not in without and (not only or name in only)
 
+    if campaign.position is None or not campaign.samples:
+        raise CampaignError(campaign.name, "nothing was measured", expected="a campaign with measured positions")
     campaign, notes = usable(campaign)
     # matrices are small: threads that wait for each other cost several times what they bring, and the last bits
-    with threadpool_limits(1):
+    with threadpool_limits(1), _solvable(campaign):
         last = _concluded(campaign, candidates, progress)
         shrinkage = held_out(last.fit, progress)
         progress("places")
@@ -101,6 +105,18 @@ def diagnose(
             notes=notes,
         )
     return told(found)
+
+
+@contextmanager
+def _solvable(campaign: Campaign) -> Iterator[None]:
+    """Say in a sentence that equations have no solution in floating point: figures of very different sizes."""
+    try:
+        yield
+    except np.linalg.LinAlgError as error:
+        raise EstimationError(
+            f"{campaign.name}: the equations cannot be solved in floating point ({error}); look for values that are "
+            "many orders of magnitude too large or too small"
+        ) from error
 
 
 def _names(argument: str, given: Iterable[str]) -> tuple[str, ...]:

@@ -1,0 +1,104 @@
+"""What a program hands to the constructor of a campaign, as arrays and numbers that can be computed with."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.campaign.figures import LARGEST_COMMAND, SMALLEST, first_beyond, settled
+from thermal_robot.errors import CampaignError
+from thermal_robot.schema import LARGEST
+
+_NUMBERS = "a finite number in every place"
+
+
+def checked_array(file: str, key: str, value: Any, shape: tuple[int, ...], kind: Any) -> NDArray[Any]:
+    """Return a value as an array, read-only; a copy unless it already was: the caller's own stays writable.
+
+    Parameters
+    ----------
+    file, key
+        What it belongs to, and its name, for a message.
+    value
+        Anything.
+    shape, kind
+        What it must have, and the type that it is given: ``np.float64``, ``np.int64``, ``np.bool_`` or ``np.str_``.
+
+    Raises
+    ------
+    CampaignError
+        Something else than numbers, another shape, a figure that is not finite or larger than any.
+    """
+    expected = str(shape) if kind is np.str_ else f"numbers of shape {shape}"
+    try:
+        if np.ma.is_masked(value):
+            value = value.astype(np.float64).filled(np.nan)
+        array = np.asarray(value)
+        if kind is not np.str_ and array.dtype.kind not in "biufO":
+            raise TypeError(f"{array.dtype} is no kind of number")
+        if kind is np.int64 and array.dtype.kind in "fO":
+            array = array.astype(np.float64)
+            if first_beyond(array.ravel()) is not None:
+                raise ValueError("not a finite number")
+        array = array.astype(kind, copy=False)
+    except (TypeError, ValueError, OverflowError) as error:
+        found = type(value).__name__ if not isinstance(value, np.ndarray) else f"{value.dtype} {value.shape}"
+        raise CampaignError(file, "cannot be read as an array", column=key, found=found, expected=expected) from error
+    if array.shape != shape:
+        raise CampaignError(file, "wrong shape", column=key, found=str(array.shape), expected=str(shape))
+    if kind is np.float64:
+        row = first_beyond(array, LARGEST_COMMAND if key == "q" else LARGEST)
+        if row is not None:
+            found = f"{array[row]} at index {row}"
+            raise CampaignError(file, "not a figure of a campaign", column=key, found=found, expected=_NUMBERS)
+        array = settled(array)
+    if array.flags.writeable:
+        array = array.copy()
+        array.flags.writeable = False
+    return array
+
+
+def checked_number(file: str, key: str, value: Any, *, least: float = -LARGEST, expected: str = "a number") -> float:
+    """Return a finite number, at least ``least``.
+
+    Raises
+    ------
+    CampaignError
+        Anything else.
+    """
+    if isinstance(value, (int, float, np.integer, np.floating)) and type(value) is not bool:
+        if least <= value <= LARGEST:
+            return float(value)
+    raise CampaignError(file, "not a figure of a campaign", column=key, found=repr(value), expected=expected)
+
+
+def checked_noise(file: str, key: str, sigma: Any) -> float | None:
+    """Return a standard deviation, ``None`` where it is not given or 0, which says the same."""
+    if sigma is None or (isinstance(sigma, (int, float, np.number)) and sigma == 0):
+        return None
+    return checked_number(file, key, sigma, least=SMALLEST, expected="a number above 0, or None")
+
+
+def checked_sizes(file: str, key: str, sizes: Any) -> dict[str, float]:
+    """Return numbers above 0 by name."""
+    above = "a number above 0"
+    held = checked_mapping(file, key, sizes).items()
+    return {name: checked_number(file, f"{key}.{name}", size, least=SMALLEST, expected=above) for name, size in held}
+
+
+def checked_mapping(file: str, key: str, given: Any) -> Mapping[str, Any]:
+    """Return what is given by names.
+
+    Raises
+    ------
+    CampaignError
+        Something else than a mapping, or keys that are no text.
+    """
+    if isinstance(given, Mapping) and all(isinstance(name, str) for name in given):
+        return given
+    raise CampaignError(
+        file, "wrong kind of value", column=key, found=repr(given), expected="values by name, as a dict"
+    )
