@@ -123,8 +123,8 @@ def check_gears(declaration: Declaration, joints: tuple[str, ...]) -> None:
 
 def _absent(path: Path) -> CampaignError:
     """Say that there is no campaign, and which there are beside it."""
-    problem = f"this folder has no {FILE_NAME}" if path.is_dir() else "there is no such file"
-    found = _campaigns(path if path.is_dir() else path.parent)
+    problem = f"this folder has no {FILE_NAME}" if is_folder(path) else "there is no such file"
+    found = _campaigns(path if is_folder(path) else path.parent)
     beside = f"; campaigns there: {listed(found, _MOST_NAMED)}" if found else ""
     return CampaignError(str(path), problem + beside, expected=f"{FILE_NAME}, or the folder that holds it")
 
@@ -135,7 +135,7 @@ def _campaigns(folder: Path) -> list[str]:
         inside = sorted(folder.iterdir())
         files = [f for f in inside if f.suffix == ".toml" and f.is_file() and b"[measurements]" in f.read_bytes()]
         folders = [f for f in inside if f.is_dir() and (f / FILE_NAME).is_file()]
-    except OSError:  # nothing can be proposed where nothing can be read
+    except (OSError, ValueError):  # nothing can be proposed where nothing can be read
         return []
     return [f.name for f in (*files, *folders)]
 

@@ -68,7 +68,7 @@ class Table:
         index = first_beyond(np.nan_to_num(values, nan=0.0, posinf=np.inf, neginf=-np.inf) if gaps else values)
         if index is not None:
             value = values[index]
-            finite = "not a finite number" if np.isinf(value) else "larger than any figure of a campaign"
+            finite = "not a finite number" if np.isinf(value) else "larger than anything that is measured"
             raise CampaignError(
                 self.file,
                 "a value is missing" if np.isnan(value) else finite,
