@@ -101,11 +101,11 @@ def test_the_determinant_and_what_is_followed_are_those_of_the_dense_covariance(
 @pytest.mark.parametrize("tau", TAUS)
 def test_the_eigenvectors_put_the_covariance_together(case, tau):
     spectrum, inside, _, _, _ = case
-    vectors, variance = Smooth(spectrum, tau).eigen(1e-8)
+    vectors, variance = spectrum.eigen(tau, 1e-8)
     assert (variance > 1e-8).all()
     np.testing.assert_allclose(vectors.T @ vectors, np.eye(len(variance)), rtol=0, atol=1e-8)
     np.testing.assert_allclose((vectors * variance) @ vectors.T, tau**2 * inside, rtol=0, atol=2e-8 * len(inside))
-    few, large = Smooth(spectrum, tau).eigen(float(np.median(variance)))
+    few, large = spectrum.eigen(tau, float(np.median(variance)))
     assert few.shape[1] == len(large) < len(variance)
 
 

@@ -106,16 +106,18 @@ def test_the_mean_is_that_of_the_process_given_the_rows_in_use(case, tau):
 
 
 @pytest.mark.parametrize("tau", TAUS)
-def test_the_eigenvectors_put_the_covariance_together(case, tau):
-    expected = np.linalg.eigvalsh(tau**2 * case.inside)
-    expected = expected[expected > 1e-8]
-    for own in (case.grouped, case.spectrum):
-        vectors, variance = Smooth(own, tau).eigen(1e-8)
-        close(np.sort(variance), expected)
-        close(vectors.T @ vectors, np.eye(len(variance)))
-        close((vectors * variance) @ vectors.T, tau**2 * case.inside)
-        few, large = Smooth(own, tau).eigen(float(np.median(variance)))
-        assert few.shape[1] == len(large) < len(variance)
+def test_what_some_rows_have_in_common_is_that_of_their_own_covariance(case, tau):
+    rows = case.rng.random(len(case.stack) // case.measures) < 0.7
+    own, columns = np.repeat(rows, case.measures), case.stack.reshape(len(rows), case.measures, -1)
+    some, covariance = case.stack[own], (np.eye(len(case.stack)) + tau**2 * case.inside)[np.ix_(own, own)]
+    expected = some.T @ some - some.T @ np.linalg.solve(covariance, some)
+    for spectrum in (case.grouped, case.spectrum):
+        close(Smooth(spectrum, tau).taken(rows, lambda which: columns[which], 1e-8), expected, 1e-6)
+        assert not Smooth(spectrum, tau).taken(rows, lambda which: columns[which], 1e9).any()
+    # what lies below a floor is left out of both alike
+    floor = float(np.median(np.linalg.eigvalsh(tau**2 * case.inside)[-4:]))
+    left = [Smooth(s, tau).taken(rows, lambda which: columns[which], floor) for s in (case.grouped, case.spectrum)]
+    close(*left)
 
 
 def test_of_a_group_that_no_row_in_use_has_nothing_is_known():

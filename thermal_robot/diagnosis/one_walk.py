@@ -22,8 +22,9 @@ from scipy.special import stdtrit
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import ridge
 from thermal_robot.inference.explain import Explanation
-from thermal_robot.inference.problem import Linear, Whitening, whitened
+from thermal_robot.inference.problem import Linear, Whitening
 from thermal_robot.inference.rows import each
+from thermal_robot.inference.stack import chunks
 
 Array = NDArray[np.float64]
 Labels = NDArray[np.int64]
@@ -111,15 +112,6 @@ class Model:
         own = [(b.sizes * scale) ** -2.0 for b, scale in zip(self.linear.blocks, self.scales, strict=True)]
         return np.concatenate([*own, np.zeros(0)])
 
-    @cached_property
-    def _white(self) -> tuple[Rows, Array, Array, Array]:
-        """Which rows have weight, their columns whitened as if independent, and U and d of what they have in common."""
-        used, smooth = self.whitening.weights > 0, self.whitening.smooth
-        stack = whitened(self.linear, replace(self.whitening, smooth=None))
-        if smooth is None:
-            return used, stack, np.zeros((len(stack), 0)), np.zeros(0)
-        return used, stack, *smooth.eigen(settings.UNHEARD)
-
     def products(self, rows: Rows) -> Array:
         """(G, K + 1, K + 1) Xᵀ V⁻¹ X of the columns and the gap over some rows, V their own covariance; computed once.
 
@@ -128,19 +120,39 @@ class Model:
         """
         key = rows.tobytes()
         if key not in self.seen:
-            used, stack, basis, variance = self._white
-            picked = np.repeat(rows[used], self.linear.measures)
-            stack, basis = stack[picked], basis[picked]
-            if self.apart:
-                each_row = stack.reshape(-1, self.linear.measures // 3, 3, stack.shape[1])
-                self.seen[key] = np.einsum("ngak,ngal->gkl", each_row, each_row, optimize=True)
-                return self.seen[key]
-            products = stack.T @ stack
-            if len(variance):
-                along = basis.T @ stack
-                products = products - along.T @ np.linalg.solve(np.diag(1.0 / variance) + basis.T @ basis, along)
-            self.seen[key] = products[None]
+            used = self.whitening.weights > 0
+            products, smooth = self._as_if_apart(rows & used), self.whitening.smooth
+            if smooth is not None:
+                which = np.flatnonzero(used)
+                products = products - smooth.taken(rows[used], lambda some: self._white(which[some]), settings.UNHEARD)
+            self.seen[key] = products
         return self.seen[key]
+
+    def _white(self, rows: NDArray[np.int64]) -> Array:
+        """(r, m, K + 1) columns and gap of some rows, whitened as if independent."""
+        root = np.sqrt(self.whitening.weights[rows])[:, None] / self.whitening.noise
+        return np.asarray(self.linear.stack[rows] * root[:, :, None])
+
+    def _as_if_apart(self, rows: Rows) -> Array:
+        """(G, K + 1, K + 1) XᵀX over some rows with weight; those of most rows are of all less those of the others."""
+        if 2 * rows.sum() > (self.whitening.weights > 0).sum():
+            return self._all_apart - self._summed(~rows & (self.whitening.weights > 0))
+        return self._summed(rows)
+
+    @cached_property
+    def _all_apart(self) -> Array:
+        return self._summed(self.whitening.weights > 0)
+
+    def _summed(self, rows: Rows) -> Array:
+        numbers, size = np.flatnonzero(rows), self.linear.stack.shape[2]
+        groups = self.linear.measures // 3 if self.apart else 1
+        found = np.zeros((groups, size, size))
+        for chunk in chunks(len(numbers)):
+            white = self._white(numbers[chunk])
+            for own, some in zip(found, np.split(white, groups, axis=1), strict=True):
+                flat = some.reshape(-1, size)
+                own += flat.T @ flat
+        return found
 
     @cached_property
     def whole(self) -> Array:

@@ -15,6 +15,7 @@ Sources: M. C. Kennedy, A. O'Hagan, *J. R. Statist. Soc. B* 63 (2001), eq. 4; lo
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -25,10 +26,13 @@ from scipy.spatial.distance import cdist
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference import settings
 from thermal_robot.inference.grouped import Grouped
+from thermal_robot.inference.part import Part
 from thermal_robot.inference.rows import repeated_poses
+from thermal_robot.inference.stack import Stack, chunks
 from thermal_robot.observations import Observations
 
 Array = NDArray[np.float64]
+Numbers = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,56 +89,6 @@ class Form:
 
 
 @dataclass(frozen=True, eq=False)
-class Part:
-    """B of the rows in use, never written out: B = functions × moves, row by row.
-
-    Attributes
-    ----------
-    functions
-        (n, k), square roots of the rows' weights included.
-    moves
-        (n, m, c) in units of the noise; (m, c) where all rows have the same.
-    """
-
-    functions: Array
-    moves: Array
-
-    def adjoint(self, stack: Array) -> Array:
-        """Bᵀ times (n, m, s): (c k, s)."""
-        carried = np.moveaxis(np.matmul(np.swapaxes(self.moves, -1, -2), stack), 1, 0)
-        return np.asarray(np.matmul(self.functions.T, carried).reshape(-1, stack.shape[2]))
-
-    def times(self, inner: Array) -> Array:
-        """B times (c k, s): (n, m, s)."""
-        carried = np.matmul(
-            self.functions, inner.reshape(self.moves.shape[-1], self.functions.shape[1], inner.shape[1])
-        )
-        return np.asarray(np.matmul(self.moves, np.moveaxis(carried, 0, 1)))
-
-    @property
-    def wide(self) -> bool:
-        """Whether B has more columns than rows."""
-        rows, count = self.functions.shape
-        return bool(rows * self.moves.shape[-2] <= count * self.moves.shape[-1])
-
-    def own(self) -> Array:
-        """B Bᵀ (n m, n m) where B is wide, else BᵀB (c k, c k)."""
-        rows, count = self.functions.shape
-        moves = np.broadcast_to(self.moves, (rows, *self.moves.shape[-2:]))
-        m, c = moves.shape[1:]
-        if self.wide:
-            flat = moves.reshape(-1, c)
-            return np.asarray(np.repeat(np.repeat(self.functions @ self.functions.T, m, 0), m, 1) * (flat @ flat.T))
-        pairs = np.einsum("nac,nad->cdn", moves, moves, optimize=True)
-        found = np.empty((c, count, c, count))
-        for i in range(c):
-            for j in range(i, c):
-                found[i, :, j] = (self.functions * pairs[i, j][:, None]).T @ self.functions
-                found[j, :, i] = found[i, :, j].T
-        return found.reshape(c * count, c * count)
-
-
-@dataclass(frozen=True, eq=False)
 class Smooth:
     """The correlated part of the rows' covariance, in units of the noise: 1 + τ²BBᵀ on the rows in use.
 
@@ -157,9 +111,19 @@ class Smooth:
         """Return (1 + τ²BBᵀ)^(−½) times (E, K) columns; dearer than :meth:`products`."""
         return self.spectrum.whitened(self.tau, stack)
 
-    def eigen(self, floor: float) -> tuple[Array, Array]:
-        """Return U (E, r), orthonormal, and d (r,) with τ²BBᵀ = U diag(d) Uᵀ; what lies below a floor is left out."""
-        return self.spectrum.eigen(self.tau, floor)
+    def taken(self, rows: NDArray[np.bool_], white: Callable[[Numbers], Array], floor: float) -> Array:
+        """Return SᵀS − SᵀV⁻¹S over some of the n rows in use, V their own covariance.
+
+        Parameters
+        ----------
+        rows
+            (n,) which.
+        white
+            Gives the columns (r, m, K) of rows by their numbers.
+        floor
+            Directions of τ²BBᵀ over all rows in use whose variance lies below it are left out.
+        """
+        return self.spectrum.taken(self.tau, rows, white, floor)
 
     @property
     def log_det(self) -> float:
@@ -212,24 +176,31 @@ class Spectrum:
         square = (moves**2).sum(axis=-1)
         mean = (square * weight[:, None]).mean() if moves.ndim == 3 else square.mean() * weight
         moves = moves / np.sqrt(max(float(mean), settings.TINY))
-        functions = form.functions[used] * np.sqrt(weights[used])[:, None]
         if moves.ndim == 3:
-            axes, each = np.eye(len(noise)), [(moves[used], moves)]
+            axes, each = np.eye(len(noise)), [moves]
         else:
             value, axes = np.linalg.eigh(moves @ moves.T)
-            each = [(root, root) for root in np.sqrt(np.maximum(value, 0.0))[:, None, None]]
-        parts = tuple(Part(functions, near) for near, _ in each)
-        everywhere = tuple(Part(form.functions, far) for _, far in each)
+            each = list(np.sqrt(np.maximum(value, 0.0))[:, None, None])
+        parts = tuple(Part(form.functions, own, used, np.sqrt(weights[used])) for own in each)
+        every = np.arange(len(weights))
+        everywhere = tuple(Part(form.functions, own, every, np.ones(len(every))) for own in each)
         return cls(axes, parts, everywhere, tuple(part.own() for part in parts))
 
-    def along(self, stack: Array) -> list[Array]:
-        """Return BᵀS of each part, or, where B is wide, the part's rows of S."""
-        rows = zip(self.parts, self.apart(stack), strict=True)
-        return [r.reshape(-1, stack.shape[1]) if part.wide else part.adjoint(r) for part, r in rows]
+    def along(self, stack: Array | Stack) -> list[Array]:
+        """Return BᵀS of each part, or, where B is wide, the part's rows of S; S the columns that differ."""
+        stack = stack if isinstance(stack, Stack) else Stack.around(stack, len(self.axes))
+        found = [np.zeros((len(own), len(stack.different))) for own in self.own]
+        for chunk, rows in stack.chunks():
+            for k, (part, own) in enumerate(zip(self.parts, self.apart(rows), strict=True)):
+                if part.wide:
+                    flat = own.reshape(-1, own.shape[2])
+                    found[k][chunk.start * own.shape[1] :][: len(flat)] = flat
+                else:
+                    found[k] += part.adjoint(own, chunk)
+        return found
 
-    def apart(self, stack: Array) -> list[Array]:
-        """Split (E, K) columns into those of each part, (n, m, K)."""
-        rows = stack.reshape(-1, len(self.axes), stack.shape[1])
+    def apart(self, rows: Array) -> list[Array]:
+        """Split (n, m, K) columns into those of each part."""
         if len(self.parts) == 1:
             return [rows]
         return [np.einsum("a,nak->nk", axis, rows)[:, None] for axis in self.axes.T]
@@ -239,6 +210,13 @@ class Spectrum:
         if len(self.parts) == 1:
             return rows[0]
         return np.asarray(np.einsum("aj,jnk->nak", self.axes, np.array([r[:, 0] for r in rows])))
+
+    def back(self, parts: Sequence[Part], inner: Sequence[Array]) -> Array:
+        """(n, m, K) B times (c k, K) of each part."""
+        found = np.empty((len(parts[0].used), len(self.axes), inner[0].shape[1]))
+        for chunk in chunks(len(found)):
+            found[chunk] = self.joined([part.times(own, chunk) for part, own in zip(parts, inner, strict=True)])
+        return found
 
     def factor(self, tau: float, k: int) -> Array:
         """Cholesky factor of 1 + τ² times a part's own matrix, made once."""
@@ -279,16 +257,15 @@ class Spectrum:
     def whitened(self, tau: float, stack: Array) -> Array:
         """Return (1 + τ²BBᵀ)^(−½) times (E, K) columns."""
         found = []
-        for k, (part, rows) in enumerate(zip(self.parts, self.apart(stack), strict=True)):
+        for k, (part, along) in enumerate(zip(self.parts, self.along(stack), strict=True)):
             value, vector = self.decomposed(k)
             power = np.expm1(-0.5 * np.log1p(tau**2 * value))
-            flat = rows.reshape(-1, rows.shape[2])
-            if part.wide:
-                found.append((flat + vector @ (power[:, None] * (vector.T @ flat))).reshape(rows.shape))
-            else:
-                over = power / np.maximum(value, settings.SMOOTH_FLOOR)
-                found.append(rows + part.times(vector @ (over[:, None] * (vector.T @ part.adjoint(rows)))))
-        return self.joined(found).reshape(stack.shape)
+            over = power if part.wide else power / np.maximum(value, settings.SMOOTH_FLOOR)
+            found.append(vector @ (over[:, None] * (vector.T @ along)))
+        if self.parts[0].wide:
+            rows = [own.reshape(len(self.parts[0].used), -1, own.shape[1]) for own in found]
+            return np.asarray(stack + self.joined(rows).reshape(stack.shape))
+        return stack + self.back(self.parts, found).reshape(stack.shape)
 
     def eigen(self, tau: float, floor: float) -> tuple[Array, Array]:
         """Return U (E, r), orthonormal, and d (r,) with τ²BBᵀ = U diag(d) Uᵀ; what lies below a floor is left out."""
@@ -299,13 +276,22 @@ class Spectrum:
             heard = tau**2 * value > floor
             own = vector[:, heard]
             if not part.wide:
-                rows = part.times(own / np.sqrt(value[heard]))
-                own = rows.reshape(len(rows) * rows.shape[1], rows.shape[2])
+                inner = own / np.sqrt(value[heard])
+                rows = [part.times(inner, chunk) for chunk in chunks(len(part.used))]
+                own = np.concatenate(rows).reshape(len(part.used) * rows[0].shape[1], inner.shape[1])
             if len(self.parts) > 1:
                 own = (own[:, None, :] * self.axes[None, :, k, None]).reshape(len(own) * m, own.shape[1])
             found.append(own)
             variance.append(tau**2 * value[heard])
         return np.concatenate(found, axis=1), np.concatenate(variance)
+
+    def taken(self, tau: float, rows: NDArray[np.bool_], white: Callable[[Numbers], Array], floor: float) -> Array:
+        """Return SᵀS − SᵀV⁻¹S over some rows; see :meth:`Smooth.taken`."""
+        basis, variance = self.eigen(tau, floor)
+        columns = white(np.flatnonzero(rows))
+        own = basis[np.repeat(rows, len(self.axes))]
+        along = own.T @ columns.reshape(-1, columns.shape[2])
+        return np.asarray(along.T @ np.linalg.solve(np.diag(1.0 / variance) + own.T @ own, along))
 
     def degrees(self, tau: float) -> float:
         """Trace of the smoother."""
@@ -315,14 +301,12 @@ class Spectrum:
     def mean(self, tau: float, left: Array) -> Array:
         """(N, m) posterior mean given the (E,) residual of the rows in use, in units of the noise."""
         found = []
-        for k, (part, everywhere, rows) in enumerate(
-            zip(self.parts, self.everywhere, self.apart(left[:, None]), strict=True)
-        ):
-            along = rows.reshape(-1, 1) if part.wide else part.adjoint(rows)
+        for k, (part, along) in enumerate(zip(self.parts, self.along(left[:, None]), strict=True)):
             solved = dpotrs(self.factor(tau, k), along, lower=1)[0]
-            inner = part.adjoint(solved.reshape(rows.shape)) if part.wide else solved
-            found.append(everywhere.times(tau**2 * inner))
-        return self.joined(found)[:, :, 0]
+            if part.wide:
+                solved = part.adjoint(solved.reshape(len(part.used), -1, 1), slice(None))
+            found.append(tau**2 * solved)
+        return self.back(self.everywhere, found)[:, :, 0]
 
 
 def decomposed(form: Form, weights: Array, noise: Array) -> Spectrum | Grouped:

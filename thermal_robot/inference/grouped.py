@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.inference import settings
+from thermal_robot.inference.stack import Stack, chunks
 
 Array = NDArray[np.float64]
+Labels = NDArray[np.int64]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,18 +53,22 @@ class Grouped:
         value, vector = np.linalg.eigh(inside)
         return cls(own, groups[used], everywhere, groups, np.maximum(value, 0.0), vector)
 
-    def along(self, stack: Array) -> list[Array]:
-        """Return BᵀS in the eigenvectors of every group: one array (G c, K)."""
-        rows = stack.reshape(len(self.moves), self.moves.shape[1], stack.shape[1])
-        each = self.moves.transpose(0, 2, 1) @ rows
-        summed = _summed(self.group, each, len(self.value))
-        turned = self.vector.transpose(0, 2, 1) @ summed
-        return [np.asarray(turned.reshape(turned.shape[0] * turned.shape[1], turned.shape[2]))]
+    def along(self, stack: Array | Stack) -> list[Array]:
+        """Return BᵀS in the eigenvectors of every group: one array (G c, U), S the columns that differ."""
+        stack = stack if isinstance(stack, Stack) else Stack.around(stack, self.moves.shape[1])
+        found = np.zeros((*self.value.shape, len(stack.different)))
+        for groups, rows, starts in _in_chunks(self.group):
+            each = self.moves[rows].transpose(0, 2, 1) @ stack.rows(rows)
+            found[groups] = self.vector[groups].transpose(0, 2, 1) @ np.add.reduceat(each, starts, axis=0)
+        return [found.reshape(-1, found.shape[2])]
 
     def products(self, tau: float, along: list[Array], plain: Array) -> Array:
         """Return Sᵀ(1 + τ²BBᵀ)⁻¹S, from :meth:`along` and SᵀS."""
         weight = tau**2 / (1.0 + tau**2 * self.value.ravel())
-        return np.asarray(plain - along[0].T @ (weight[:, None] * along[0]))
+        found = plain.copy()
+        for part in chunks(len(weight)):
+            found -= along[0][part].T @ (weight[part, None] * along[0][part])
+        return found
 
     def log_det(self, tau: float) -> float:
         """log|1 + τ²BBᵀ|."""
@@ -86,19 +93,35 @@ class Grouped:
         rows = len(self.groups), self.everywhere.shape[1]
         return self._back(self.everywhere, self.groups, inner, (rows[0] * rows[1], 1)).reshape(rows)
 
-    def eigen(self, tau: float, floor: float) -> tuple[Array, Array]:
-        """Return U (E, r), orthonormal, and d (r,) with τ²BBᵀ = U diag(d) Uᵀ; what lies below a floor is left out."""
-        value = self.value.ravel()
-        heard = np.flatnonzero(tau**2 * value > floor)
-        unit = np.zeros((len(value), len(heard)))
-        unit[heard, np.arange(len(heard))] = 1.0 / np.sqrt(value[heard])
-        size = (len(self.moves) * self.moves.shape[1], len(heard))
-        return self._back(self.moves, self.group, unit, size), tau**2 * value[heard]
+    def taken(self, tau: float, rows: NDArray[np.bool_], white: Callable[[Labels], Array], floor: float) -> Array:
+        """Return SᵀS − SᵀV⁻¹S over some rows; see :meth:`Smooth.taken <.discrepancy.Smooth.taken>`."""
+        heard = tau**2 * self.value > floor
+        unit = self.vector * np.where(heard, 1.0 / np.sqrt(np.where(heard, self.value, 1.0)), 0.0)[:, None, :]
+        tight = 1.0 / np.where(heard, tau**2 * self.value, 1.0)
+        numbers, found = np.flatnonzero(rows), np.zeros((1, 1))
+        for groups, which, starts in _in_chunks(self.group[numbers]):
+            own = self.moves[numbers[which]] @ unit[self.group[numbers[which]]]
+            turned = own.transpose(0, 2, 1)
+            along = np.add.reduceat(turned @ white(numbers[which]), starts, axis=0)
+            inside = np.add.reduceat(turned @ own, starts, axis=0) + tight[groups][:, :, None] * np.eye(own.shape[2])
+            solved, flat = np.linalg.solve(inside, along), (-1, along.shape[2])
+            found = found + along.reshape(flat).T @ solved.reshape(flat)
+        return found
 
     def _back(self, moves: Array, group: NDArray[np.int64], inner: Array, shape: tuple[int, ...]) -> Array:
         """Return B times (G c, K) in the eigenvectors of the groups."""
         turned = self.vector @ inner.reshape(*self.value.shape, inner.shape[1])
         return np.asarray((moves @ turned[group]).reshape(shape))
+
+
+def _in_chunks(group: Labels) -> Iterator[tuple[Labels, Labels, Labels]]:
+    """Yield groups by the thousand: which they are, the numbers of their rows, and where in these each group starts."""
+    order = np.argsort(group, kind="stable")
+    starts = np.flatnonzero(np.diff(group[order], prepend=-1))
+    for part in chunks(len(starts)):
+        own = starts[part]
+        last = starts[part.stop] if part.stop < len(starts) else len(order)
+        yield group[order[own]], order[own[0] : last], own - own[0]
 
 
 def _summed(group: NDArray[np.int64], each: Array, count: int) -> Array:

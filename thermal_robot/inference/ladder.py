@@ -15,7 +15,7 @@ from thermal_robot.inference.discrepancy import Form, Smooth, Spectrum, decompos
 from thermal_robot.inference.evidence import Combination, evidence
 from thermal_robot.inference.gram import Gram
 from thermal_robot.inference.grouped import Grouped
-from thermal_robot.inference.problem import Linear, Whitening, contained, normal_equations, whitened
+from thermal_robot.inference.problem import Linear, Whitening, contained, normal_equations, whitened_stack
 from thermal_robot.inference.search import Search
 
 Array = NDArray[np.float64]
@@ -53,8 +53,9 @@ class Ladder:
     def __post_init__(self) -> None:
         """Decompose the forms once for all sizes."""
         w = self.whitening
-        self._stack = whitened(self.linear, w)
-        self._products, self._equations = self._stack.T @ self._stack, len(self._stack)
+        self._stack = whitened_stack(self.linear, w)
+        self._products, self._equations = self._stack.products(), self._stack.equations
+        self._first = np.unique(self._stack.number, return_index=True)[1]
         plain = normal_equations(self.linear, w, self._products, self._equations)
         inside = contained(plain)
         self._pairs = inside | self.exclusive
@@ -69,19 +70,20 @@ class Ladder:
         given, self.forms = self.forms, []
         self._spectra: list[Spectrum | Grouped] = []
         self._along: list[list[Array] | None] = []
+        self._last: tuple[object, list[Array]] = None, []
         for form in given:
             self._consider(form, float(np.log(share / max(self.among, len(given)))))
         self.searches[PLAIN] = self._search(PLAIN, plain)
 
-    def _consider(self, form: Form, log_prior: float, *, once: bool = False) -> int:
+    def _consider(self, form: Form, log_prior: float) -> int:
         """Add a form, which shares its prior among all sizes; return its number.
 
-        What is asked once needs no products with all columns.
+        Products with all columns are kept where they are few: not those with what is anew in every pose.
         """
         self.forms.append(form)
         spectrum = decomposed(form, self.whitening.weights, self.whitening.noise)
         self._spectra.append(spectrum)
-        self._along.append(None if once else spectrum.along(self._stack))
+        self._along.append(None if form.anew else spectrum.along(self._stack))
         number, each = len(self.forms) - 1, log_prior - float(np.log(len(settings.TAUS)))
         self._priors |= {(number, tau): each for tau in settings.TAUS}
         return number
@@ -184,7 +186,7 @@ class Ladder:
                 further = form.beside(other, part)
                 # the joints so far stay as they are
                 tau = min(settings.TAUS, key=lambda t: abs(t - rung[1] * float(np.hypot(1.0, part))))
-                tried.append((self._beside((self._consider(further, prior, once=True), tau), blocks), tau, further))
+                tried.append((self._beside((self._consider(further, prior), tau), blocks), tau, further))
                 self._forget()
         _, tau, best = max(tried, key=lambda item: item[0])
         return self._size(self._consider(best, prior), blocks, tau)
@@ -231,9 +233,20 @@ class Ladder:
 
     def _left(self, rung: Rung, picked: NDArray[np.int64]) -> Array:
         """Return the products of some columns, whitened by the discrepancy of a rung."""
-        known, spectrum = self._along[rung[0]], self._spectra[rung[0]]
-        along = spectrum.along(self._stack[:, picked]) if known is None else [own[:, picked] for own in known]
-        return spectrum.products(rung[1], along, self._products[np.ix_(picked, picked)])
+        kept, number = np.unique(self._stack.number[picked], return_inverse=True)
+        plain = self._products[np.ix_(self._first[kept], self._first[kept])]
+        found = self._spectra[rung[0]].products(rung[1], self._along_form(rung[0], kept), plain)
+        return np.asarray(found[np.ix_(number, number)])
+
+    def _along_form(self, form: int, kept: NDArray[np.int64]) -> list[Array]:
+        """Return the products of a form with some of the columns that differ."""
+        known = self._along[form]
+        if known is not None:
+            return [own[:, kept] for own in known]
+        key = self._spectra[form], kept.tobytes()
+        if self._last[0] != key:  # one after another its sizes are tried
+            self._last = key, self._spectra[form].along(self._stack.differing(kept))
+        return self._last[1]
 
     def in_question(self, best: Combination) -> tuple[Form, ...]:
         """Return the forms that may be at work beside the best combination.

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
@@ -16,6 +16,7 @@ from thermal_robot.inference.columns import Block
 from thermal_robot.inference.discrepancy import Smooth
 from thermal_robot.inference.evidence import Combination
 from thermal_robot.inference.gram import Gram
+from thermal_robot.inference.stack import Stack
 
 Array = NDArray[np.float64]
 
@@ -44,14 +45,25 @@ class Linear:
         return int(self.gap.shape[1])
 
     @property
-    def columns(self) -> list[Array]:
-        """(N, m, ·) frames, each block's columns, gap."""
-        return [self.frames, *(b.columns for b in self.blocks), self.gap[:, :, None]]
+    def columns(self) -> Iterator[Array]:
+        """(N, m, ·) frames, each block's columns, gap, one after another."""
+        yield self.frames
+        yield from (b.columns for b in self.blocks)
+        yield self.gap[:, :, None]
 
     @cached_property
     def stack(self) -> Array:
         """(N, m, f + P + 1) all columns in one array."""
-        return np.concatenate(self.columns, axis=2)
+        return self.rows(np.arange(len(self.gap)))
+
+    def rows(self, rows: NDArray[np.int64]) -> Array:
+        """(n, m, f + P + 1) all columns of some rows, never held twice."""
+        width = self.frames.shape[2] + sum(len(b.sizes) for b in self.blocks) + 1
+        found, start = np.empty((len(rows), self.measures, width)), 0
+        for columns in self.columns:
+            found[:, :, start : start + columns.shape[2]] = columns[rows]
+            start += columns.shape[2]
+        return found
 
     def contribution(self, block: int, values: Array) -> Array:
         """(N, m) what a block's parameter values do to the gap."""
@@ -172,11 +184,16 @@ def _log_det(matrix: Array, rank: int) -> float:
     return float(np.log(np.linalg.eigvalsh(matrix)[-rank:]).sum())
 
 
+def whitened_stack(linear: Linear, whitening: Whitening) -> Stack:
+    """Return frames, parameters and gap of the rows with weight, in units of noise, without a discrepancy."""
+    used = np.flatnonzero(whitening.weights > 0)
+    return Stack.of(linear.columns, used, np.sqrt(whitening.weights[used])[:, None] / whitening.noise)
+
+
 def whitened(linear: Linear, whitening: Whitening) -> Array:
     """(rows·m, f + P + 1) frames, parameters and gap of the rows with weight, in units of noise."""
     used = np.flatnonzero(whitening.weights > 0)
-    # of a large campaign this is the largest array there is: it is not kept
-    stack = np.concatenate([columns[used] for columns in linear.columns], axis=2)
+    stack = linear.rows(used)
     stack *= (np.sqrt(whitening.weights[used])[:, None] / whitening.noise)[:, :, None]
     flat = stack.reshape(-1, stack.shape[2])
     return flat if whitening.smooth is None else whitening.smooth.whitened(flat)

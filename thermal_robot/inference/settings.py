@@ -84,10 +84,9 @@ BEND_LEVEL = 0.01
 """Share of sound rows that weigh less than fully (Huber's bend)."""
 MOST_OUTLIERS = 0.25
 """Of the rows: more are not gross errors but another motion."""
-CAUCHY_SCALE = 1.5
-"""Times the median distance: the scale of the weights that find the frames; a third of the rows may be wrong."""
-NO_DISTANCE = 1e-12
-"""m: added to that scale, for rows that fit exactly."""
+CAUCHY_SCALE, NO_DISTANCE = 1.5, 1e-12
+"""Times the median distance: the scale of the weights that find the frames, as a third of the rows may be wrong; and m,
+added to it, for rows that fit exactly."""
 CAUCHY_ROUNDS = 4
 """Rounds of weights and noise in a scan: they settle to a per cent."""
 RUN = 3
@@ -161,14 +160,16 @@ LARGE = 0.02
 """rad or m: products of parameters this large show beside noise of tens of micrometres."""
 NO_WORSE = 1.02
 """Times the noise of a fit with an effect that contains others: a fit without it that leaves no more is preferred."""
-ENOUGH_ROWS = 1500
-"""Rows that are scanned for laws, of very many: a law that explains a hundredth of the remainder is then seen."""
-ENOUGH_REMAINDER = 2000
-"""The same for the tests of the remainder."""
+ENOUGH_ROWS, ENOUGH_REMAINDER = 1500, 2000
+"""Rows that are scanned for laws, of very many: a law that explains a hundredth of the remainder is then seen; and the
+same for the tests of the remainder."""
 DRAW_SEED, TEST_SEED = 61, 17
 """Of the rows drawn for a scan, and for a test: the same campaign always gets the same answer."""
 
 # --- the linear problem ---
+
+CHUNK = 1024
+"""Rows whose columns stand in one array at a time: those of tens of thousands would fill the memory."""
 
 SEEN = 1e-10
 """Of the largest eigenvalue of a scaled Gram matrix: a direction below it is rounding, an exact alias of others."""
@@ -295,10 +296,9 @@ TAILS, WORTH_TAILS = 4.0, 3.0
 """Degrees of freedom of the Student law tried beside the normal one, and the log likelihood that it must gain."""
 NORMAL_ROWS = 1000
 """Above, the likelihood of a variance that is well seen is normal in its logarithm."""
-DROP_95 = 1.92
-"""Of the log likelihood at the ends of a 95 % interval: half the χ² quantile of one degree of freedom."""
-SIGMAS_95 = 1.96
-"""Standard deviations of a normal law from its middle to the ends of a 95 % interval."""
+DROP_95, SIGMAS_95 = 1.92, 1.96
+"""Of the log likelihood at the ends of a 95 % interval: half the χ² quantile of one degree of freedom; and standard
+deviations of a normal law from its middle to these ends."""
 FULLY_TRIED, HOPELESS = 3, 3.0
 """Components fitted in full at each step, and the gain in log likelihood below which no prior odds are overcome."""
 MOST_INFLATION = 4.0
