@@ -132,6 +132,16 @@ def test_the_command_is_what_effects_follow(rv_m2):
     np.testing.assert_array_equal(moved.commanded.tool_position, plain.chain.tool_position)
 
 
+def test_what_was_forgotten_is_computed_again(rv_m2):
+    seen = observe(commanded(rv_m2))
+    before = seen.segment_sensitivity
+    held = set(vars(seen))
+    seen.forget()
+    assert held - set(vars(seen)) == {"segment_sensitivity"}
+    assert seen.segment_sensitivity is not before
+    np.testing.assert_array_equal(seen.segment_sensitivity, before)
+
+
 def test_a_simulators_word_stands_for_the_urdf(rv_m2, frames):
     """The prediction is the simulator's; what is displaced moves it as it moves the model."""
     plain = measured_exactly(rv_m2, frames)

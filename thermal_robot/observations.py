@@ -74,7 +74,7 @@ class Observations:
     displaced
         Whether anything is displaced in the chain.
     parameters
-        Of each effect that was asked for them here: the settings of an effect in single places share them.
+        Of the effects that were asked for them here last: the settings of an effect in single places share them.
     """
 
     campaign: Campaign
@@ -114,6 +114,15 @@ class Observations:
         """Tell whether a covariate was recorded and takes more than one value."""
         values = self.covariates.get(column)
         return values is not None and len(values) > 0 and bool(np.ptp(values) > 0)
+
+    def forget(self) -> None:
+        """Free what was computed from the fields; it is computed again when it is asked for.
+
+        What a fit was made at stays with it, and the sensitivities of several fits would fill the memory.
+        """
+        for name in [name for name in vars(self) if isinstance(getattr(type(self), name, None), cached_property)]:
+            del vars(self)[name]
+        self.parameters.clear()
 
     @cached_property
     def commanded(self) -> ChainFrames:

@@ -63,7 +63,7 @@ def test_the_walk_without_a_block_is_that_of_a_campaign_without_it(tests):
         some = Linear(
             known.linear.gap[rows],
             known.linear.frames[rows],
-            tuple(replace(c, columns=c.columns[rows]) for c in known.linear.blocks),
+            tuple(replace(c, source=c.columns[rows]) for c in known.linear.blocks),
         )
         whitening = replace(known.whitening, weights=known.whitening.weights[rows])
         less = replace(

@@ -447,6 +447,13 @@ def test_settings_in_single_places_share_what_the_effect_answers(observations):
     assert [p.size for p in checked(Counted(0.7), here)] == [0.7, 0.7]
     checked(Counted(), replace(observations))  # what is seen from elsewhere is asked anew
     assert asked == [0.5, 0.7, 0.5]
+    # only the last few are kept, so that the responses of hundreds of settings do not fill the memory
+    for size in np.linspace(1.0, 2.0, 20):
+        checked(Counted(float(size)), here)
+    assert len(here.parameters) < 10
+    assert asked[-1] == 2.0
+    checked(Counted(0.7), here)
+    assert asked[-1] == 0.7
 
 
 def test_parameters_in_which_an_effect_is_told_keep_the_contract_too(rv_m2):

@@ -7,7 +7,7 @@ import pytest
 from simulate import simulate
 
 from thermal_robot.effects import library
-from thermal_robot.inference.columns import block, frame_columns
+from thermal_robot.inference.columns import block, frame_columns, moved_by
 from thermal_robot.inference.frames import moved
 from thermal_robot.kinematics import exp6, rotation_to_quaternion
 from thermal_robot.observations import Frames, observe
@@ -62,3 +62,16 @@ def test_positions_are_the_upper_half_of_poses(rv_m2):
         if not effect.missing(observe(poses)):
             whole, half = (block(observe(c), effect).columns for c in (poses, positions))
             np.testing.assert_array_equal(half, whole[:, :3])
+
+
+def test_a_block_holds_neither_columns_nor_responses(rv_m2):
+    """They are computed when they are asked for: those of all settings of a large campaign would fill the memory."""
+    seen = observe(simulate(rv_m2, samples=8, seed=1)[0])
+    effect = library()["transmission_error"]
+    item = block(seen, effect)
+    assert not any(p.responses for p in item.bare)
+    assert [p.name for p in item.bare] == [p.name for p in effect.parameters(seen)] == [p.name for p in item.parameters]
+    assert item.columns is not item.columns
+    np.testing.assert_array_equal(item.columns, moved_by(seen, effect.parameters(seen)))
+    given = replace(item, source=item.columns[:3])
+    assert given.columns is given.source

@@ -86,7 +86,7 @@ def test_rows_that_may_not_be_used_do_not_matter():
 
 def test_settings_of_one_effect_are_never_together_and_share_its_prior():
     linear, _, _ = problem(3, (1,))
-    near = replace(linear.blocks[1], columns=linear.blocks[1].columns + 1e-3 * linear.blocks[2].columns[:, :, :2])
+    near = replace(linear.blocks[1], source=linear.blocks[1].columns + 1e-3 * linear.blocks[2].columns[:, :, :2])
     linear = Linear(linear.gap, linear.frames, (*linear.blocks, near))
     found = explained(linear, families=("a", "b", "c", "b"))
     assert not any({1, 3} <= set(c.blocks) for c in found.combinations)

@@ -231,7 +231,7 @@ def test_forms_that_are_out_of_the_question_are_told():
 
 def test_blocks_that_contain_each_other_are_apart_beside_every_discrepancy():
     linear, whitening = small_problem(6, rows=24, present=(2,))
-    part = replace(linear.blocks[0], columns=linear.blocks[2].columns[:, :, :1])
+    part = replace(linear.blocks[0], source=linear.blocks[2].columns[:, :, :1])
     offered = two_forms(24)
     error = 4.0 * offered[0].functions @ np.random.default_rng(6).normal(size=(3, 3)) * whitening.noise
     linear = replace(linear, gap=linear.gap + error, blocks=(part, *linear.blocks[1:]))

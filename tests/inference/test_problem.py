@@ -157,10 +157,10 @@ def test_units_do_not_matter(unit):
     """Metres or millimetres for the gap; parameters in any unit whose expected size is stated in it."""
     linear, whitening = small_problem(2, present=(0, 2))
     plain = gram(linear, whitening)
-    blocks = tuple(replace(b, columns=b.columns * unit) for b in linear.blocks)
+    blocks = tuple(replace(b, source=b.columns * unit) for b in linear.blocks)
     longer = Linear(linear.gap * unit, linear.frames * 7.0, blocks)
     longer = gram(longer, replace(whitening, noise=whitening.noise * unit))
-    blocks = tuple(replace(b, columns=b.columns * unit, sizes=b.sizes / unit) for b in linear.blocks)
+    blocks = tuple(replace(b, source=b.columns * unit, sizes=b.sizes / unit) for b in linear.blocks)
     other = gram(replace(linear, blocks=blocks), whitening)
     for again in (longer, other):
         assert again.equations == plain.equations == 11 * 3 - 2

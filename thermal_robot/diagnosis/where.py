@@ -99,11 +99,12 @@ def locate(fit: Fit, shrinkage: dict[str, float]) -> tuple[Where, dict[str, tupl
 def _displaced(observations: Observations, block: Block, values: Array) -> dict[tuple[str, str], Array]:
     """(N, m) displacement by place; a parameter common to all links is divided by its response at each."""
     found: dict[tuple[str, str], Array] = {}
-    measures = block.columns.shape[1]
+    whole = block.columns
+    measures = whole.shape[1]
     for k, parameter in enumerate(block.parameters):
         for part in by_place(observations.robot, parameter):
             if part is parameter:
-                columns = block.columns[:, :, k]
+                columns = whole[:, :, k]
             else:
                 columns = sum((column(observations, r, measures) for r in part.responses), np.zeros(1))
             site = part.kind, part.place

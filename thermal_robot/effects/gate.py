@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any, get_args
 import numpy as np
 
 from thermal_robot.effects.effect import Array, Channel, Driver, Effect, Parameter, Response
+from thermal_robot.effects.settings import KEPT
 from thermal_robot.errors import EffectError
 
 if TYPE_CHECKING:
@@ -55,9 +56,10 @@ def checked(effect: Effect, observations: Observations) -> tuple[Parameter, ...]
     whole = copy.copy(effect)
     object.__setattr__(whole, "places", ())
     object.__setattr__(whole, "excluded", ())
-    known = observations.parameters.get(whole)
-    if known is None:
-        known = observations.parameters[whole] = _parameters(whole, observations)
+    known = observations.parameters.pop(whole, None)
+    known = observations.parameters[whole] = _parameters(whole, observations) if known is None else known
+    while len(observations.parameters) > KEPT:
+        del observations.parameters[next(iter(observations.parameters))]
     return _kept(effect, known, observations.robot)
 
 

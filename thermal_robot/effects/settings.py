@@ -1,5 +1,8 @@
-"""Every number that was chosen to say what an error may follow: its value, its unit, and why that one."""
+"""Every number that was chosen in the effects: its value, its unit, and why that one."""
 
+KEPT = 4
+"""Effects whose parameters are kept for the next who asks, those asked for last: the settings of an effect in single
+places come one after another, and the responses of all effects would fill the memory."""
 READS_TO: dict[str, tuple[float, float]] = {
     "rad": (1e-4, 2e-3),
     "m": (1e-4, 1e-3),

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,10 +26,11 @@ class Block:
     ----------
     effect
         The effect, its arguments set.
-    parameters
-        Its P parameters.
-    columns
-        (N, m, P) derivative of the gap by each parameter, root frame axes.
+    bare
+        Its P parameters, without their responses.
+    source
+        Where parameters and columns are computed whenever they are asked for, as those of all settings together would
+        fill the memory; or (N, m, P) the columns themselves.
     sizes
         (P,) expected size of each parameter, the campaign's ``[priors]`` applied.
     spread
@@ -37,15 +38,25 @@ class Block:
     """
 
     effect: Effect
-    parameters: tuple[Parameter, ...]
-    columns: Array
+    bare: tuple[Parameter, ...]
+    source: Observations | Array
     sizes: Array
     spread: float = UNSOURCED
 
     @property
+    def columns(self) -> Array:
+        """(N, m, P) derivative of the gap by each parameter, root frame axes."""
+        return moved_by(self.source, self.parameters) if isinstance(self.source, Observations) else self.source
+
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Its P parameters, with their responses unless it holds its columns themselves."""
+        return checked(self.effect, self.source) if isinstance(self.source, Observations) else self.bare
+
+    @property
     def positive(self) -> NDArray[np.bool_]:
         """(P,) which parameters cannot be negative."""
-        return np.array([p.positive for p in self.parameters] or [False] * len(self.sizes), dtype=bool)
+        return np.array([p.positive for p in self.bare] or [False] * len(self.sizes), dtype=bool)
 
     def kept(self, values: Array) -> Array:
         """(P,) share of each parameter's size to which it is held: next to none where it is zero and kept from less."""
@@ -62,12 +73,12 @@ def block(observations: Observations, effect: Effect) -> Block:
     """
     campaign = observations.campaign
     parameters = checked(effect, observations)
-    columns = moved_by(observations, parameters)
     sizes = np.array([parameter.size for parameter in parameters])
     if effect.name in campaign.priors and len(sizes):
         # one size is stated for the whole effect: its parameters keep their default proportions
         sizes = sizes * (campaign.priors[effect.name] / sizes[0])
-    return Block(effect, parameters, columns, sizes, effect.size_spread)
+    bare = tuple(replace(parameter, responses=()) for parameter in parameters)
+    return Block(effect, bare, observations, sizes, effect.size_spread)
 
 
 def moved_by(observations: Observations, parameters: Sequence[Parameter]) -> Array:

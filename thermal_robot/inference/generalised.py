@@ -34,5 +34,5 @@ def generalised(linear: Linear, covariance: Array, noise: Array) -> Linear:
     return Linear(
         white(linear.gap[:, :, None])[:, :, 0],
         white(linear.frames),
-        tuple(replace(block, columns=white(block.columns)) for block in linear.blocks),
+        tuple(replace(block, source=white(block.columns)) for block in linear.blocks),
     )

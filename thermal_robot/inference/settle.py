@@ -120,7 +120,9 @@ def settle(
         stays = [e for e, _ in finer] == [e for e, _ in held] and set(explanation.best.blocks) == set(chosen)
         held, last = finer, revision == revisions or (revision > 0 and stays)
         least = settings.SETTLED_BETWEEN if many and not last else settings.SETTLED
+        before_step = observations
         observations, held = gauss_newton(campaign, observations.frames, explanation, held, least, since)
+        before_step.forget()
         if last:
             break
         before = explanation
@@ -170,7 +172,8 @@ def _leading(chosen: Effect, item: Block, values: Array) -> Iterator[Effect]:
         return
     every = gate.places_of(item.parameters)
     of = np.array([parameter.place for parameter in item.parameters])
-    moved = [float(np.linalg.norm(item.columns[:, :, of == place] @ values[of == place])) for place in every]
+    columns = item.columns
+    moved = [float(np.linalg.norm(columns[:, :, of == place] @ values[of == place])) for place in every]
     most = sorted(every, key=lambda place: -moved[every.index(place)])
     for count in range(2, min(len(every), settings.LEADING_PLACES + 1)):
         yield replace(chosen, places=tuple(place for place in every if place in most[:count]))
@@ -227,9 +230,11 @@ def _listed(
 
 def _sees(item: Block) -> bool:
     """Whether the data see something of each place of a setting in several places."""
+    places = item.effect.places if len(item.effect.places) > 1 else ()
+    if not places:
+        return True
     length = np.linalg.norm(item.columns, axis=(0, 1)) * item.sizes
     of = np.array([parameter.place for parameter in item.parameters])
-    places = item.effect.places if len(item.effect.places) > 1 else ()
     return all(length[of == place].max(initial=0.0) > settings.ALIAS * length.max() for place in places)
 
 

@@ -52,7 +52,7 @@ class Thin:
             Linear(
                 e.linear.gap[rows],
                 e.linear.frames[rows],
-                tuple(replace(b, columns=b.columns[rows]) for b in e.linear.blocks),
+                tuple(replace(b, source=b.columns[rows]) for b in e.linear.blocks),
             ),
             in_a_row(fit.campaign, e.outliers)[rows],
         )
