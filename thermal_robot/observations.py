@@ -64,26 +64,23 @@ class Observations:
     ----------
     campaign, frames
         What was observed, and the frames used.
-    chain
-        Frames along the chain, root frame, displaced by what is known so far.
     position, rotation
         (N, 3) m and (N, 3, 3): the target's predicted pose in the root frame. Where the campaign brings the prediction
         of the user's own simulator, it stands here.
     instrument
         (N, 3) displacement of the measured point that the instrument adds, measurement frame, m.
-    displaced
-        Whether anything is displaced in the chain.
+    displacement
+        What is known so far to be displaced in the chain.
     parameters
         Of the effects that were asked for them here last: the settings of an effect in single places share them.
     """
 
     campaign: Campaign
     frames: Frames
-    chain: ChainFrames
     position: Array
     rotation: Array
     instrument: Array | None = None
-    displaced: bool = False
+    displacement: Displacement | None = None
     parameters: dict[Any, tuple[Any, ...]] = field(init=False, default_factory=dict, repr=False)
 
     @property
@@ -125,9 +122,14 @@ class Observations:
         self.parameters.clear()
 
     @cached_property
+    def chain(self) -> ChainFrames:
+        """Frames along the chain, root frame, displaced by what is known so far."""
+        return chain_frames(self.robot, self.q, self.displacement)
+
+    @cached_property
     def commanded(self) -> ChainFrames:
         """The chain as it was commanded, nothing displaced: what effects follow must not depend on the effects."""
-        return chain_frames(self.robot, self.q) if self.displaced else self.chain
+        return self.chain if self.displacement is None else chain_frames(self.robot, self.q)
 
     @cached_property
     def torque(self) -> Array | None:
@@ -253,4 +255,6 @@ def observe(
         if campaign.simulated_orientation is not None:
             turn = chain.tool_rotation @ nominal.tool_rotation.transpose(0, 2, 1)
             rotation = turn @ quaternion_to_rotation(campaign.simulated_orientation)
-    return Observations(campaign, frames, chain, position, rotation, instrument, displacement is not None)
+    found = Observations(campaign, frames, position, rotation, instrument, displacement)
+    vars(found)["chain"] = chain  # as the property would find it
+    return found

@@ -26,7 +26,7 @@ def flat(columns, rows, root):
 
 
 def test_a_column_that_occurs_twice_is_held_once(columns, used):
-    stack = Stack.of(columns, *used)
+    stack = Stack.of(columns).weighed(*used)
     assert list(stack.number) == [0, 1, 2, 3, 4, 5, 1, 6]
     whole = stack.rows(slice(None))[:, :, stack.number]
     np.testing.assert_array_equal(whole.reshape(stack.equations, -1), flat(columns, *used))
@@ -36,14 +36,14 @@ def test_columns_that_differ_in_one_row_out_of_use_are_two(columns):
     twin = columns[0].copy()
     twin[5, 0, 0] += 1e-9
     rows = np.arange(6, 70)
-    assert len(Stack.of([columns[0], twin], rows, np.ones((len(rows), 3))).different) == 5
+    assert len(Stack.of([columns[0], twin]).weighed(rows, np.ones((len(rows), 3))).different) == 5
 
 
 @pytest.mark.parametrize("chunk", [1, 7, 1024])
 def test_products_are_those_of_all_rows_at_once(columns, used, chunk, monkeypatch):
     monkeypatch.setattr(settings, "CHUNK", chunk)
     whole = flat(columns, *used)
-    np.testing.assert_allclose(Stack.of(columns, *used).products(), whole.T @ whole, rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(Stack.of(columns).weighed(*used).products(), whole.T @ whole, rtol=1e-12, atol=1e-12)
 
 
 def test_an_array_and_some_of_its_columns_are_taken_as_they_are():

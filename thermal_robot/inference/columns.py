@@ -58,6 +58,11 @@ class Block:
         """(P,) which parameters cannot be negative."""
         return np.array([p.positive for p in self.bare] or [False] * len(self.sizes), dtype=bool)
 
+    @property
+    def held(self) -> Block:
+        """The block with its columns, for who asks for them again and again."""
+        return replace(self, source=self.columns)
+
     def kept(self, values: Array) -> Array:
         """(P,) share of each parameter's size to which it is held: next to none where it is zero and kept from less."""
         return np.where(self.positive & (values <= 0.0), settings.LEAST_HELD, 1.0)

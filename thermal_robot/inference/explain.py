@@ -18,6 +18,7 @@ from thermal_robot.inference.gram import Gram
 from thermal_robot.inference.ladder import PLAIN, Ladder, Rung
 from thermal_robot.inference.problem import Linear, Whitening, discrepancy_mean, frame_step, parameter_values
 from thermal_robot.inference.robust import Noise, distance_limit, first_whitening, reweigh
+from thermal_robot.inference.stack import Stack
 
 Array = NDArray[np.float64]
 NOTHING = np.zeros(0)
@@ -154,7 +155,9 @@ def explain(
     aside = np.zeros(samples, dtype=bool) if outliers is None else outliers & use
     families = families or [str(k) for k in range(len(linear.blocks))]
     log_prior = log_priors([b.effect for b in linear.blocks]) if log_prior is None else log_prior
-    asked = _Asked(linear, families, log_prior, settings_of_one(families), max(among, len(forms)))
+    asked = _Asked(
+        linear, families, log_prior, settings_of_one(families), max(among, len(forms)), Stack.of(linear.columns)
+    )
     # effects that are far off, and gross errors, are settled first, beside a noise that is free
     first = known is None
     whitening = known or replace(first_whitening(linear, noise, use & ~aside), held=0.0)
@@ -183,6 +186,7 @@ class _Asked:
     log_prior: Sequence[float]
     rivals: frozenset[frozenset[int]]
     forms: int
+    stack: Stack
 
 
 @dataclass(frozen=True, eq=False)
@@ -200,7 +204,7 @@ class _Round:
     def of(
         cls, asked: _Asked, whitening: Whitening, beside: Sequence[Form], seeds: Sequence[tuple[int, ...]]
     ) -> _Round:
-        ladder = Ladder(asked.linear, whitening, list(beside), asked.log_prior, asked.rivals, asked.forms)
+        ladder = Ladder(asked.linear, whitening, list(beside), asked.log_prior, asked.rivals, asked.forms, asked.stack)
         ladder.run(seeds)
         rung, best = ladder.consensus(asked.families)
         white = ladder.whitened_at(rung)

@@ -15,8 +15,9 @@ from thermal_robot.inference.discrepancy import Form, Smooth, Spectrum, decompos
 from thermal_robot.inference.evidence import Combination, evidence
 from thermal_robot.inference.gram import Gram
 from thermal_robot.inference.grouped import Grouped
-from thermal_robot.inference.problem import Linear, Whitening, contained, normal_equations, whitened_stack
+from thermal_robot.inference.problem import Linear, Whitening, contained, normal_equations
 from thermal_robot.inference.search import Search
+from thermal_robot.inference.stack import Stack
 
 Array = NDArray[np.float64]
 Rung = tuple[int, float]
@@ -40,6 +41,8 @@ class Ladder:
         Pairs of blocks that must not be together, beside those of which one contains the other.
     among
         Number of forms of which these are left, if they are not all: each keeps its share of the prior.
+    stack
+        The problem's columns, where they are known already.
     """
 
     linear: Linear
@@ -48,12 +51,15 @@ class Ladder:
     log_prior: Sequence[float]
     exclusive: frozenset[frozenset[int]] = frozenset()
     among: int = 0
+    stack: Stack | None = None
     searches: dict[Rung, Search] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         """Decompose the forms once for all sizes."""
         w = self.whitening
-        self._stack = whitened_stack(self.linear, w)
+        used = np.flatnonzero(w.weights > 0)
+        stack = self.stack or Stack.of(self.linear.columns)
+        self._stack = stack.weighed(used, np.sqrt(w.weights[used])[:, None] / w.noise)
         self._products, self._equations = self._stack.products(), self._stack.equations
         self._first = np.unique(self._stack.number, return_index=True)[1]
         plain = normal_equations(self.linear, w, self._products, self._equations)

@@ -16,7 +16,6 @@ from thermal_robot.inference.columns import Block
 from thermal_robot.inference.discrepancy import Smooth
 from thermal_robot.inference.evidence import Combination
 from thermal_robot.inference.gram import Gram
-from thermal_robot.inference.stack import Stack
 
 Array = NDArray[np.float64]
 
@@ -182,12 +181,6 @@ def _log_det(matrix: Array, rank: int) -> float:
     if not rank:
         return 0.0
     return float(np.log(np.linalg.eigvalsh(matrix)[-rank:]).sum())
-
-
-def whitened_stack(linear: Linear, whitening: Whitening) -> Stack:
-    """Return frames, parameters and gap of the rows with weight, in units of noise, without a discrepancy."""
-    used = np.flatnonzero(whitening.weights > 0)
-    return Stack.of(linear.columns, used, np.sqrt(whitening.weights[used])[:, None] / whitening.noise)
 
 
 def whitened(linear: Linear, whitening: Whitening) -> Array:

@@ -46,7 +46,7 @@ def refined(explanation: Explanation, observations: Observations, factor: float)
         The chosen effects that stay, in their order, their constants moved, with their (P,) values, SI.
     """
     explanation = replace(explanation, whitening=heard(explanation))
-    blocks = [explanation.linear.blocks[b] for b in explanation.best.blocks]
+    blocks = [explanation.linear.blocks[b].held for b in explanation.best.blocks]
     values = [explanation.values[b][0] for b in explanation.best.blocks]
     moved = _fewer(explanation, observations, _all_moved(explanation, observations, blocks, factor), factor)
     if moved != blocks:
@@ -131,7 +131,7 @@ def _moved(
             break
         best = int(np.argmax(gains))
         if gains[best] > settings.REFINED_GAIN:
-            item, own = near[best], own + gains[best]
+            item, own = near[best].held, own + gains[best]
             continue
         apart = gate.nearby(item.effect, 1.0)  # settings that do not come closer
         if all(g > -settings.REFINED_FLAT for n, g in zip(near, gains, strict=True) if n.effect not in apart):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from hashlib import blake2b
 
 import numpy as np
@@ -24,20 +24,23 @@ class Stack:
     Attributes
     ----------
     different
-        U arrays (E,): the columns that differ.
+        U arrays (N, m): the columns that differ, of all rows.
     number
         (K,) which of these each column is.
-    measures
-        m.
+    used
+        (n,) the rows in use.
+    root
+        (n, m) by which these are multiplied.
     """
 
     different: tuple[Array, ...]
     number: Numbers
-    measures: int
+    used: Numbers
+    root: Array
 
     @classmethod
-    def of(cls, columns: Iterable[Array], used: Numbers, root: Array) -> Stack:
-        """Take columns (N, m, ·), some at a time, of the rows in use, each multiplied by ``root`` (n, m)."""
+    def of(cls, columns: Iterable[Array]) -> Stack:
+        """Take columns (N, m, ·), some at a time, of all rows as they are."""
         different: list[Array] = []
         number: list[int] = []
         seen: dict[bytes, int] = {}
@@ -47,35 +50,41 @@ class Stack:
                 key = blake2b(own.tobytes(), digest_size=16).digest()
                 if key not in seen:
                     seen[key] = len(different)
-                    different.append((own[used] * root).ravel())
+                    different.append(own)
                 number.append(seen[key])
-        return cls(tuple(different), np.array(number, dtype=np.int64), root.shape[1])
+        return cls(tuple(different), np.array(number), np.arange(len(different[0])), np.ones(different[0].shape))
 
     @classmethod
     def around(cls, array: Array, measures: int) -> Stack:
         """Take the (E, K) columns of an array as they are."""
-        return cls(tuple(array.T), np.arange(array.shape[1]), measures)
+        different = tuple(column.reshape(-1, measures) for column in array.T)
+        rows = len(array) // measures
+        return cls(different, np.arange(len(different)), np.arange(rows), np.ones((rows, measures)))
+
+    def weighed(self, used: Numbers, root: Array) -> Stack:
+        """Return the columns over the rows in use, (n,), multiplied by ``root`` (n, m); they are not held anew."""
+        return replace(self, used=used, root=root)
 
     @property
     def equations(self) -> int:
         """E."""
-        return len(self.different[0])
+        return self.root.size
 
     def differing(self, kept: Numbers) -> Stack:
         """Return some of the columns that differ, each once."""
-        return Stack(tuple(self.different[k] for k in kept), np.arange(len(kept)), self.measures)
+        return replace(self, different=tuple(self.different[k] for k in kept), number=np.arange(len(kept)))
 
     def rows(self, which: slice | Numbers) -> Array:
         """(r, m, U) the different columns of some rows."""
-        first = next(iter(self.different)).reshape(-1, self.measures)[which]
-        found = np.empty((*first.shape, len(self.different)))
+        rows, root = self.used[which], self.root[which]
+        found = np.empty((*root.shape, len(self.different)))
         for k, own in enumerate(self.different):
-            found[:, :, k] = own.reshape(-1, self.measures)[which]
+            np.multiply(own[rows], root, out=found[:, :, k])
         return found
 
     def chunks(self) -> Iterator[tuple[slice, Array]]:
         """Yield the rows in chunks: which they are, and (r, m, U) their columns."""
-        for part in chunks(self.equations // self.measures):
+        for part in chunks(len(self.used)):
             yield part, self.rows(part)
 
     def products(self) -> Array:
