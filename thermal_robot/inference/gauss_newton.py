@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,6 +16,7 @@ from thermal_robot.inference.algebra import whitener
 from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.explain import Explanation
 from thermal_robot.inference.frames import moved
+from thermal_robot.inference.problem import Linear, whitened
 from thermal_robot.observations import Frames, Observations, observe
 
 Array = NDArray[np.float64]
@@ -80,25 +82,21 @@ def _descended(
     ends = np.cumsum([len(size) for size in sizes])[:-1]
     prior = np.concatenate([*sizes, np.zeros(0)])
     state = np.concatenate([*(values for _, values in held), np.zeros(0)])
-    used = np.flatnonzero(whitening.weights > 0)
-    root = (np.sqrt(whitening.weights[used])[:, None] / (whitening.noise * best.noise)).ravel()
+    beside = replace(whitening, noise=whitening.noise * best.noise)
 
     def pairs(state: Array) -> list[tuple[Effect, Array]]:
         return list(zip(effects, np.split(state, ends), strict=True)) if effects else []
 
-    def white(columns: Array) -> Array:
-        flat = columns[used].reshape(len(root), -1) * root[:, None]
-        return flat if whitening.smooth is None else whitening.smooth.whitened(flat)
-
     def left(observations: Observations, state: Array) -> float:
-        return float((white(observations.gap[:, :, None]) ** 2).sum() + ((state / prior) ** 2).sum())
+        gap = whitened(Linear(observations.gap, np.zeros((*observations.gap.shape, 0)), ()), beside)
+        return float((gap**2).sum() + ((state / prior) ** 2).sum())
 
     observations = corrected_observations(campaign, frames, pairs(state))
     cost = left(observations, state)
     for _ in range(steps):
         flat, names = frame_columns(observations)
-        columns = [block(observations, effect).columns for effect in effects]
-        stack = white(np.concatenate([flat, *columns, observations.gap[:, :, None]], axis=2))
+        items = tuple(block(observations, effect) for effect in effects)
+        stack = whitened(Linear(observations.gap, flat, items), beside)
         step, size = _step_inside(stack[:, :-1], stack[:, -1], state, prior, least)
         for part in settings.STEP_PARTS:
             ahead = np.maximum(state + part * step[len(names) :], least)
