@@ -87,3 +87,10 @@ def test_a_diagnosis_that_leaves_noise_alone_keeps_them(rv_m2):
     deviations = np.sqrt(np.diag(known.explanation.values[known.explanation.best.blocks[0]][1]))
     assert [p.std for p in gain.parameters if p.identified] == pytest.approx(deviations.tolist(), rel=1e-6)
     assert effect.name == "joint_gain"
+
+
+def test_a_fit_of_nothing_stays_as_it_is(rv_m2):
+    """A smooth discrepancy and no effect, as where frames are known and no candidate is worth its place."""
+    known = fit(warped(rv_m2, 0, 2e-4), [])
+    assert known.explanation.discrepancy.form is not None
+    assert as_remainder_says(known) is known

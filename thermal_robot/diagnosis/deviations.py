@@ -50,6 +50,8 @@ def as_remainder_says(fit: Fit) -> Fit:
         The same values, with deviations that are the same or larger.
     """
     e, campaign = fit.explanation, fit.campaign
+    if not e.best.blocks:
+        return fit
     model = Model.of(e, blocks(campaign))
     groups = (model.block, neighbourhoods(campaign, settings.BLOCKS))
     said = [*(_jackknife(model, each(labels)) for labels in groups), _beside_discrepancy(fit, model)]
