@@ -144,7 +144,7 @@ def urdf_written_otherwise(rng: Random, files: Files) -> Files:
         keys = rng.sample(sorted(element.attrib), len(element.attrib))
         element.attrib = {key: element.attrib[key] for key in keys}
         element.tail = rng.choice(("\n", "  ", "\n<!-- -->\n".replace("<!-- -->", "")))
-    ET.SubElement(ET.SubElement(root, "material", name="grey"), "color", rgba="0.5 0.5 0.5 1")
+    ET.SubElement(ET.SubElement(root, "material", name="added"), "color", rgba="0.5 0.5 0.5 1")
     return {**files, "robot.urdf": b"<?xml version='1.0'?>\n<!-- a comment -->\n" + ET.tostring(root)}
 
 

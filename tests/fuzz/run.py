@@ -111,7 +111,8 @@ class Tally:
             self.counts.setdefault(target, Counter())[outcome] += 1
             if outcome in SOUND:
                 return
-            cause = (target, outcome, said.split(":")[0][:60], place)
+            kind = said.split(":")[0] if outcome == "traceback" else ""
+            cause = (target, outcome, kind, place)
             self.causes[cause] += 1
             if self.causes[cause] > KEPT:
                 return
