@@ -82,3 +82,11 @@ def test_in_noise_the_choice_of_an_order_is_paid_for():
         worths.append(best - np.log(independent(grid)))
     assert max(worths) < 2.0
     assert np.median(worths) < -2.0
+
+
+@pytest.mark.parametrize("reach", [6.3, 1e3, 1e9, 1e15])
+def test_a_joint_of_any_range_has_few_orders(reach):
+    """An angle in a wrong unit, or an encoder that never turned back: the orders fit into memory all the same."""
+    grid = orders(np.random.default_rng(0).uniform(0.0, reach, ROWS))
+    assert 100 < len(grid) <= 100_001
+    assert grid[0] < grid[-1] or reach > 1e14

@@ -138,3 +138,9 @@ def test_a_close_fit_is_judged_by_the_equations_that_it_leaves():
     rows[0] = 3.0 * SIGMA[:3]
     assert not reweigh(rows, STATED, use, 0.0, 3)[1].any()
     np.testing.assert_array_equal(np.flatnonzero(reweigh(rows, STATED, use, 2.0 / 3.0, 3)[1]), [0])
+
+
+def test_no_stated_noise_is_less_than_rounding():
+    """Somebody wrote 1e-12 mm: a billion times finer than any instrument, and than the figures of a table."""
+    assert Noise(1e-15, 0.5e-9).parts(6) == (1e-9, 1e-9)
+    assert Noise(None, None).parts(6) == (None, None)

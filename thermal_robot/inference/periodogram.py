@@ -15,14 +15,16 @@ def orders(q: Array, slides: bool = False) -> Array:
     """Return the (K,) orders that are looked at in a joint, rad per rad, or rad/m where it slides.
 
     They stand an eighth of a peak's width apart, and end where the positions (N,) could no longer tell an order from
-    its alias: positions on a lattice of spacing d know no order above π/d (Shannon).
+    its alias: positions on a lattice of spacing d know no order above π/d (Shannon). A joint of very many turns is
+    looked at up to :data:`settings.MOST_ORDERS` of them.
     """
     reach = float(np.ptp(q))
     if reach <= settings.SAME_COMMAND:
         return np.zeros(0)
     lowest = np.pi / reach if slides else settings.LOWEST_ORDER
     highest = 2.0 * np.pi / settings.SHORTEST_PERIOD if slides else settings.HIGHEST_ORDER
-    return np.arange(lowest, min(highest, _nyquist(q)), settings.ORDER_STEP * 2.0 * np.pi / reach)
+    step = settings.ORDER_STEP * 2.0 * np.pi / reach
+    return np.arange(lowest, min(highest, _nyquist(q), lowest + settings.MOST_ORDERS * step), step)
 
 
 def independent(grid: Array) -> float:

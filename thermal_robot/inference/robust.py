@@ -22,8 +22,9 @@ class Noise:
     orientation: float | None = None
 
     def parts(self, measures: int) -> tuple[float | None, ...]:
-        """Return the noise of positions, and with six components that of orientations."""
-        return (self.position, self.orientation)[: measures // 3]
+        """Return the noise of positions, and with six components that of orientations; none is less than rounding."""
+        stated = (self.position, self.orientation)[: measures // 3]
+        return tuple(None if sigma is None else max(sigma, settings.ROUNDING) for sigma in stated)
 
 
 def distance_limit(measures: int, rows: int) -> float:
