@@ -492,3 +492,10 @@ def test_a_letter_that_the_terminal_lacks_is_no_failure(folder):
     done = subprocess.run(command, capture_output=True, env={**os.environ, **asked}, check=False)
     assert (done.returncode, done.stderr) == (0, b"")
     assert b"m/s?" in done.stdout
+
+
+def test_a_line_break_in_an_argument_makes_no_second_line(capsys):
+    with pytest.raises(SystemExit) as end:
+        cli.main(["check", "campaign.toml", "a\nb"])
+    assert end.value.code == cli.BAD_INPUT
+    assert capsys.readouterr().err.count("\n") == 1
