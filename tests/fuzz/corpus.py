@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import io
+import json
 import tempfile
 from functools import cache
 from pathlib import Path
@@ -44,19 +45,24 @@ def campaigns() -> tuple[Files, ...]:
     demo = read_campaign(demo_directory())
     made = [
         demo.take(np.arange(ROWS)),
-        *(_made(*arm) for arm in ((AWKWARD, "tip"), (COUPLED, "tip"), (PARALLELOGRAM, "tool"))),
+        *(made(*arm) for arm in ((AWKWARD, "tip"), (COUPLED, "tip"), (PARALLELOGRAM, "tool"))),
     ]
     return (*(files_of(campaign) for campaign in made), every_column())
 
 
-def _made(urdf: str, tool: str) -> Campaign:
-    robot, rng = load_robot(urdf, tool), np.random.default_rng(7)
+UNITS = Units("deg", "mm")
+"""Not those of the program."""
+
+
+def made(urdf: str, tool: str, *, units: Units = UNITS, seed: int = 7) -> Campaign:
+    """A campaign of an arm, with turns, conditions and labels."""
+    robot, rng = load_robot(urdf, tool), np.random.default_rng(seed)
     q = rng.uniform(np.maximum(robot.lower, -2.0), np.minimum(robot.upper, 2.0), (ROWS, robot.n))
     poses = tool_poses(robot, q)
     return Campaign(
         "made", robot, q, poses[:, :3, 3] + 1e-4 * rng.normal(size=(ROWS, 3)), rotation_to_quaternion(poses[:, :3, :3]),
         covariates=conditions(robot, q, rng, 3.0), labels={"session": np.repeat(["a", "b"], ROWS // 2)},
-        noise_position=2e-5, noise_orientation=3e-5, payload_com=np.array([0.0, 0.0, 0.05]), units=Units("deg", "mm"),
+        noise_position=2e-5, noise_orientation=3e-5, payload_com=np.array([0.0, 0.0, 0.05]), units=units,
     )  # fmt: skip
 
 
@@ -69,7 +75,7 @@ def every_column() -> Files:
         TABLE, qw="1 0 0.6", qx="0 -1 0", qy="0 0 0.8", qz="0 0 0", time="0 1.5 3", temperature__beam="20 21 22",
         payload="0 5 5",
         approach__lift="1 -1 0", velocity__slide="10 20 30", acceleration__roll="1 2 3", torque__lift="1.5 2.5 3.5",
-        encoder__lift="20.1 15.1 -44.9", speed="0.1 0.5 1", order="3 1 2", humidity="40 _ 43", session="a a b",
+        encoder__lift="20.1 15.1 -44.9", speed="0.1 0.5 1", order="3 1 2", humidity="40 41 43", session="a a b",
         pose="1 2 3",
         sim__x="1000 900 800", sim__y="0 100 200", sim__z="500 510 520",
     )  # fmt: skip
@@ -80,10 +86,11 @@ def every_column() -> Files:
 @cache
 def models() -> tuple[Files, ...]:
     """A saved model of each arm, with every effect that its campaign allows, and commands for it."""
-    return tuple(_model(files) for files in campaigns()[:4])
+    return tuple(model_of(files) for files in campaigns()[:4])
 
 
-def _model(files: Files) -> Files:
+def model_of(files: Files) -> Files:
+    """A saved model with every effect that a campaign allows, and the campaign's commands."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         put(files, folder)
@@ -116,3 +123,8 @@ def as_parquet(frame) -> bytes:
     buffer = io.BytesIO()
     frame.to_parquet(buffer)
     return buffer.getvalue()
+
+
+def rows_of(files: Files):
+    """Where each row of a table stood before it was moved."""
+    return json.loads(files["rows.json"]) if "rows.json" in files else slice(None)

@@ -72,7 +72,8 @@ def frame_jacobians(robot: Robot, q: ArrayLike, *, point: ArrayLike = (0.0, 0.0,
     model, frame = _with_point(robot.model.copy(), _tool(robot).parentJoint, _tool(robot).placement, point)
     data, to_root = model.createData(), _to_root_axes(robot)
     each = [
-        to_root @ pin.computeFrameJacobian(model, data, configuration, frame, pin.LOCAL_WORLD_ALIGNED)
+        # of one joint Pinocchio gives a vector
+        to_root @ pin.computeFrameJacobian(model, data, configuration, frame, pin.LOCAL_WORLD_ALIGNED).reshape(6, -1)
         for configuration in to_pinocchio(robot, q)
     ]
     return np.array(each) @ robot.chain.coupling.matrix

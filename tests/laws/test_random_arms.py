@@ -1,0 +1,112 @@
+"""The laws of the fixed arms hold for arms drawn at random, and so do the ways of their campaigns through files."""
+
+import inspect
+import tempfile
+from pathlib import Path
+from random import Random
+
+import numpy as np
+import pytest
+from arms import MOST, arms, urdfs
+from fuzz import checks, corpus, harmless
+from hypothesis import given
+from hypothesis import strategies as st
+from kinematics import test_augmented as augmented
+from kinematics import test_frames as frames
+from kinematics import test_gravity as gravity
+from kinematics import test_hanging as hanging
+from kinematics import test_jacobians as jacobians
+from kinematics import test_model as model
+
+from thermal_robot.campaign import Units, campaign_from_table, read_campaign
+from thermal_robot.kinematics import Displacement
+from thermal_robot.robot import load_robot
+
+GROWS = augmented.test_segments_with_a_length_are_those_that_grow
+LAWS = (
+    jacobians.test_frames_are_pinocchios,
+    jacobians.test_jacobians_are_pinocchios,
+    jacobians.test_placement_sensitivities_are_pinocchios_regressor,
+    jacobians.test_gravity_torques_are_pinocchios,
+    frames.test_joint_channel_is_the_jacobian,
+    frames.test_segment_channel_is_the_placement_sensitivity,
+    augmented.test_pinocchios_jacobian_is_the_placement_sensitivity_along_each_segment,
+    GROWS,
+    augmented.test_at_zero_elongation_it_is_the_same_robot,
+    augmented.test_elongated_it_is_the_elongated_robot,
+    augmented.test_jacobian_is_the_finite_difference,
+    gravity.test_torque_is_the_gradient_of_the_potential_energy,
+    gravity.test_the_moment_on_a_segment_holds_its_joint_and_those_that_mimic_it,
+    gravity.test_what_a_segment_carries_is_what_pinocchio_says,
+    gravity.test_the_static_regressor_gives_the_torques,
+    hanging.test_what_hangs_is_the_sum_over_the_tree_up_to_the_next_joint_of_the_chain,
+    model.test_every_placement_is_a_rotation_and_every_axis_a_unit_vector,
+    model.test_masses_and_their_centres_are_pinocchios,
+    model.test_all_names_of_the_urdf_are_there,
+    model.test_a_joints_unit_motion_is_how_it_moves,
+)
+"""Each takes an arm, and draws configurations of it."""
+
+
+@pytest.mark.parametrize("law", LAWS, ids=lambda law: law.__name__.removeprefix("test_"))
+def test_a_law_of_the_fixed_arms(law, configurations):
+    asked = inspect.signature(law).parameters
+
+    @given(arm=arms())
+    def holds(arm):
+        base, tool = np.random.default_rng(5).normal(0.0, 0.3, (2, 6))
+        displaced = Displacement(joint=np.linspace(-0.4, 0.4, arm.n), base=base, tool=tool)
+        known = {"arm": arm, "configurations": configurations, "point": (0.05, -0.1, 0.2), "displaced": displaced}
+        law(**{name: known[name] for name in asked})
+
+    holds()
+
+
+UNITS = st.builds(Units, st.sampled_from(["rad", "deg"]), st.sampled_from(["m", "mm", "um"]))
+
+
+@given(urdf=urdfs(), units=UNITS, seed=st.integers(0, 2**32 - 1))
+def test_a_campaign_survives_its_files(urdf, units, seed):
+    """Written and read, written in another way and read, as a data frame: the same observations."""
+    campaign = corpus.made(urdf, "tip", units=units, seed=seed)
+    files = corpus.files_of(campaign)
+    with tempfile.TemporaryDirectory() as name:
+        corpus.put(files, Path(name))
+        checks.alike(read_campaign(name), campaign)
+    with tempfile.TemporaryDirectory() as name:
+        changed = harmless.changed(Random(seed), files)
+        corpus.put(changed, Path(name))
+        checks.alike(read_campaign(name), campaign, corpus.rows_of(changed), ("air_pressure",))
+    s = units.length_scale
+    framed = campaign_from_table(
+        campaign.robot,
+        corpus.as_frame(files),
+        angle_unit=units.angle,
+        length_unit=units.length,
+        target=campaign.target / s,
+        noise_position=campaign.noise_position / s,
+        noise_orientation=campaign.noise_orientation,
+        payload_com=campaign.payload_com / s,
+    )
+    checks.alike(framed, campaign)
+
+
+@given(urdf=urdfs(), seed=st.integers(0, 2**32 - 1))
+def test_a_model_survives_its_file(urdf, seed):
+    with tempfile.TemporaryDirectory() as name:
+        corpus.put(corpus.model_of(corpus.files_of(corpus.made(urdf, "tip", seed=seed))), Path(name))
+        checks.model(Path(name))
+
+
+def test_arms_of_every_kind_are_drawn():
+    seen, sizes = set(), set()
+
+    @given(urdf=urdfs())
+    def look(urdf):
+        seen.update(word for word in ("revolute", "continuous", "prismatic", "fixed", "mimic", "<mass") if word in urdf)
+        sizes.add(load_robot(urdf, "tip").n)
+
+    look()
+    assert seen == {"revolute", "continuous", "prismatic", "fixed", "mimic", "<mass"}
+    assert min(sizes) == 1
+    assert max(sizes) > MOST / 2
