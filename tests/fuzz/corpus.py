@@ -43,11 +43,11 @@ def files_of(campaign: Campaign) -> Files:
 def campaigns() -> tuple[Files, ...]:
     """The demo's first rows, a table with every column, and arms with every kind of joint, with and without turns."""
     demo = read_campaign(demo_directory())
-    made = [
+    sound = [
         demo.take(np.arange(ROWS)),
         *(made(*arm) for arm in ((AWKWARD, "tip"), (COUPLED, "tip"), (PARALLELOGRAM, "tool"))),
     ]
-    return (*(files_of(campaign) for campaign in made), every_column())
+    return (*(files_of(campaign) for campaign in sound), every_column())
 
 
 UNITS = Units("deg", "mm")
