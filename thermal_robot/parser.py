@@ -28,6 +28,7 @@ class Parser(argparse.ArgumentParser):
 
     def error(self, message: str) -> NoReturn:
         """Say what is wrong, and what was probably meant."""
+        message = " ".join(message.split())
         meant = _CHOICE.search(message)
         meant_by = did_you_mean(meant["found"], re.findall(r"[\w-]+", meant["known"])) if meant else ""
         raise self._stopped(f"{self.prog}: {message}{meant_by}; see {self.prog} --help")
