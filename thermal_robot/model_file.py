@@ -126,18 +126,29 @@ def _ends(value: Any, path: str) -> tuple[float, float]:
     return low, high
 
 
-def _spread(value: Any, path: str) -> Spread:
-    """Take what makes a prediction uncertain: a covariance is symmetric and has no negative variance."""
-    sigmas = listed(NOT_NEGATIVE, 3, "three standard deviations")
-    held = record({"covariance": matrix(), "beyond": sigmas, "noise": sigmas, "ranges": mapping(_ends)})(value, path)
-    covariance = held["covariance"]
+def _covariance(value: Any, path: str) -> Array:
+    """Take a covariance: symmetric, and no variance negative."""
+    covariance: Array = matrix()(value, path)
     size = float(np.abs(covariance).max(initial=0.0))
-    square = covariance.ndim == 2 and covariance.shape[0] == covariance.shape[1]
-    if (not square and size) or (square and np.abs(covariance - covariance.T).max(initial=0.0) > _ROUNDED * size):
-        raise MisfitError(below(path, "covariance"), value["covariance"], "a symmetric matrix")
-    if size and (covariance.diagonal() < 0.0).any():
-        raise MisfitError(below(path, "covariance"), value["covariance"], "variances that are not negative")
-    return Spread(covariance, np.array(held["beyond"]), np.array(held["noise"]), held["ranges"])
+    if not size:
+        return covariance.reshape(len(covariance), len(covariance))
+    if len(set(covariance.shape)) > 1 or np.abs(covariance - covariance.T).max() > _ROUNDED * size:
+        raise MisfitError(path, value, "a symmetric matrix")
+    if (covariance.diagonal() < 0.0).any():
+        raise MisfitError(path, value, "variances that are not negative")
+    return covariance
+
+
+def _spread(value: Any, path: str) -> Spread:
+    """Take what makes a prediction uncertain."""
+    sigmas = listed(NOT_NEGATIVE, 3, "three standard deviations")
+    known = {"covariance": _covariance, "beyond": sigmas, "noise": sigmas, "ranges": mapping(_ends)}
+    held = record({**known, "wider": _covariance}, may_lack=("wider",))(value, path)
+    if held.get("wider", held["covariance"]).shape != held["covariance"].shape:
+        raise MisfitError(below(path, "wider"), value["wider"], "a matrix of the shape of covariance")
+    return Spread(
+        held["covariance"], np.array(held["beyond"]), np.array(held["noise"]), held["ranges"], held.get("wider")
+    )
 
 
 def _written_robot(robot: Robot) -> dict[str, Any]:

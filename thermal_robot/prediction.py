@@ -31,17 +31,21 @@ class Spread:
         (3,) one sigma per axis of the instrument, measurement frame, m; rows held out tell it with ``beyond``.
     ranges
         Least and largest value that was measured, by joint and by column that the model needs, SI.
+    wider
+        (K, K) the same covariance for rows outside these ranges; ``None`` where it is no other.
     """
 
     covariance: Array
     beyond: Array
     noise: Array
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    wider: Array | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return lists and numbers, ready for JSON."""
         arrays = {name: getattr(self, name).tolist() for name in ("covariance", "beyond", "noise")}
-        return {**arrays, "ranges": {name: list(ends) for name, ends in self.ranges.items()}}
+        wider = {} if self.wider is None else {"wider": self.wider.tolist()}
+        return {**arrays, **wider, "ranges": {name: list(ends) for name, ends in self.ranges.items()}}
 
     def std(self, observations: Observations, effects: Sequence[tuple[Effect, Array]], noise: bool) -> Array:
         """(N, 3) one standard deviation per axis of a prediction, measurement frame, m.
@@ -57,6 +61,9 @@ class Spread:
         """
         held = [effect for effect, _ in effects]
         variance = by_parameters(observations, held, self.covariance)
+        if self.wider is not None:
+            away = np.array([bool(names) for names in self.outside(observations.campaign)], dtype=bool)
+            variance[away] = by_parameters(observations, held, self.wider)[away]
         variance += self.beyond**2 + (self.noise**2 if noise else 0.0)
         for effect, values in effects:
             left = gate.fading(effect, observations)

@@ -1,10 +1,13 @@
 """How far predictions of fresh rows are off: by the parameters' covariance, and by what rows held out say beside it.
 
 The prediction is linear in the errors of frames and parameters, e = J (θ̂ − θ) + δ + n. The first has the variance
-J C Jᵀ with C the posterior covariance of all of them together; where the rows have a smooth discrepancy in common,
-C is the sandwich of :mod:`thermal_robot.diagnosis.deviations`. What neither frames nor effects tell, δ, and the
+J C Jᵀ with C the posterior covariance of all of them together. What neither frames nor effects tell, δ, and the
 instrument's noise n are measured on rows held out, as the size t for which 95 % of them lie within 1.96 √(J C Jᵀ + t²)
 (split conformal prediction: Lei et al., *J. Am. Stat. Assoc.* 113, 2018): a normal law is not assumed of them.
+
+Where the rows have a smooth discrepancy in common, it pulls θ̂ along, so that between the rows measured δ and J (θ̂ − θ)
+cancel in part, and rows held out see what is left. Outside what was measured nothing cancels: there C is the sandwich
+of :mod:`thermal_robot.diagnosis.deviations`.
 """
 
 from __future__ import annotations
@@ -39,7 +42,7 @@ def spread(fit: Fit, needs: tuple[str, ...], floor: float) -> Spread:
         One sigma per axis of the noise where the campaign states none, m.
     """
     campaign, model = fit.campaign, Model.of(fit.explanation, blocks(fit.campaign))
-    covariance = _covariance(fit, model)
+    covariance, wider = _covariances(fit, model)
     left, rows = _held_out(fit, model)
     told = by_parameters(fit.corrected, [effect for effect, _ in fit.effects], covariance)[rows]
     total = _size(left, told, ~fit.explanation.outliers[rows])
@@ -48,28 +51,27 @@ def spread(fit: Fit, needs: tuple[str, ...], floor: float) -> Spread:
     values.update({name: campaign.covariates[name] for name in needs if name in campaign.covariates})
     ranges = {name: (float(v.min()), float(v.max())) for name, v in values.items()}
     beyond = np.sqrt(np.maximum(total**2 - noise**2, 0.0))
-    return Spread(covariance, beyond, np.sqrt(np.maximum(total**2 - beyond**2, 0.0)), ranges)
+    return Spread(covariance, beyond, np.sqrt(np.maximum(total**2 - beyond**2, 0.0)), ranges, wider)
 
 
-def _covariance(fit: Fit, model: Model) -> Array:
-    """(K, K) covariance of frames and parameters together, without what turns the target and does not move it."""
+def _covariances(fit: Fit, model: Model) -> tuple[Array, Array | None]:
+    """(K, K) covariance of frames and parameters together, without what turns the target and does not move it.
+
+    The second is what a smooth discrepancy in the rows makes of it; ``None`` where there is none.
+    """
     e, flat, variance = fit.explanation, model.flat, fit.explanation.best.noise**2
-    stack = whitened(model.linear, replace(e.whitening, smooth=None))[:, :-1]
     tight = np.concatenate([np.full(flat, LOOSE**-2.0), model.tight])
-    unit = ((stack**2).sum(axis=0) / variance + tight) ** -0.5
-    stack *= unit
-    form = e.discrepancy.form
-    if form is not None and not form.anew:
-        gram = stack.T @ stack / variance
-        spectrum = Spectrum.of(form, e.whitening.weights, e.whitening.noise)
-        alike = spectrum.spread(e.discrepancy.tau, stack) * (e.discrepancy.noise / variance) ** 2
-    else:
-        gram = alike = model.whole[0][:-1, :-1] * np.outer(unit, unit) / variance
-    prior = np.diag(tight * unit**2)
-    inner = np.linalg.inv(gram + prior)
+    gram = model.whole[0][:-1, :-1] / variance
+    unit = (gram.diagonal() + tight) ** -0.5
+    prior, size = np.diag(tight * unit**2), np.outer(unit, unit)
+    inner = np.linalg.inv(gram * size + prior)
     moving = np.concatenate([moves(fit.corrected), np.ones(len(model.tight), dtype=bool)])
-    found = np.outer(unit, unit) * (inner @ (alike + prior) @ inner)
-    return np.asarray(found[np.ix_(moving, moving)])
+    own, form = np.ix_(moving, moving), e.discrepancy.form
+    if form is None or form.anew:
+        return np.asarray((size * inner)[own]), None
+    stack = whitened(model.linear, replace(e.whitening, smooth=None))[:, :-1] * (unit * e.discrepancy.noise / variance)
+    alike = Spectrum.of(form, e.whitening.weights, e.whitening.noise).spread(e.discrepancy.tau, stack)
+    return np.asarray((size * inner)[own]), np.asarray((size * (inner @ (alike + prior) @ inner))[own])
 
 
 def _held_out(fit: Fit, model: Model) -> tuple[Array, NDArray[np.int64]]:
