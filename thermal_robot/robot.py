@@ -130,6 +130,11 @@ class Robot:
         """Number of joints that can be driven."""
         return len(self.joint_names)
 
+    @property
+    def mass(self) -> float:
+        """Of all that the joints carry, kg; 0 where the URDF gives none."""
+        return float(np.sum(self.chain.masses))
+
     def __repr__(self) -> str:
         ends = f"{self.root_frame!r} to {self.tool_frame!r}"
         return f"Robot({self.name!r}, {ends}, {self.n} joints, {len(self.segments)} segments)"

@@ -65,3 +65,20 @@ def test_a_payload_is_held_until_it_is_changed_and_a_line_is_a_line() -> None:
     assert line.tolist() == [1, 1, 2, 3, 4, 4]
     still, _ = fill("velocity.lift", values)
     assert still.tolist() == [0, 1, 0, 0, 4, 0]
+
+
+@pytest.mark.parametrize("column", ["temperature", "payload", "torque.lift", "speed"])
+def test_gaps_are_filled_in_the_sequence_of_measurement_wherever_the_rows_stand(column: str) -> None:
+    rng = np.random.default_rng(5)
+    clock, values = np.sort(rng.uniform(0, 100, 30)), rng.uniform(1, 2, 30)
+    values[[0, 3, 4, 5, 17, 29]] = np.nan
+    shuffled = rng.permutation(30)
+    np.testing.assert_array_equal(
+        fill(column, values[shuffled], clock[shuffled])[0], fill(column, values, clock)[0][shuffled]
+    )
+    assert "row" not in fill(column, values, clock)[1]
+
+
+def test_a_temperature_between_two_readings_is_that_of_its_time() -> None:
+    filled, _ = fill("temperature", np.array([20.0, np.nan, 30.0]), np.array([0.0, 9.0, 10.0]))
+    assert filled[1] == pytest.approx(29.0)

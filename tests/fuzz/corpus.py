@@ -75,7 +75,7 @@ def every_column() -> Files:
         TABLE, qw="1 0 0.6", qx="0 -1 0", qy="0 0 0.8", qz="0 0 0", time="0 1.5 3", temperature__beam="20 21 22",
         payload="0 5 5",
         approach__lift="1 -1 0", velocity__slide="10 20 30", acceleration__roll="1 2 3", torque__lift="1.5 2.5 3.5",
-        encoder__lift="20.1 15.1 -44.9", speed="0.1 0.5 1", order="3 1 2", humidity="40 41 43", session="a a b",
+        encoder__lift="20.1 15.1 -44.9", speed="0.1 0.5 1", order="3 1 2", humidity="40 _ 43", session="a a b",
         pose="1 2 3",
         sim__x="1000 900 800", sim__y="0 100 200", sim__z="500 510 520",
     )  # fmt: skip

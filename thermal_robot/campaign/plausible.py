@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from thermal_robot.campaign.campaign import Campaign
+from thermal_robot.campaign.mistakes import mistakes
 from thermal_robot.campaign.names import listed
 
 LIMIT_TOLERANCE = 1e-6
@@ -36,8 +37,6 @@ MOVES = 0.5
 """rad or m of a joint's range that carry the target visibly."""
 MOVING_JOINTS = 3
 """Joints that may move and leave the target in place: those of a wrist about a target on its axes."""
-HOTTEST = 150.0
-"""°C that the median temperature of no robot reaches, whose grease ends at 120; 20 °C are 293 K."""
 
 
 def doubts(campaign: Campaign) -> list[str]:
@@ -48,8 +47,8 @@ def doubts(campaign: Campaign) -> list[str]:
         *_limits(campaign),
         *_time(campaign),
         *_speed(campaign),
-        *_temperature(campaign),
         *_pose_labels(campaign),
+        *mistakes(campaign, _reach(campaign)),
     ]
 
 
@@ -71,11 +70,17 @@ def _angle_unit(campaign: Campaign) -> Iterator[str]:
         yield f'no joint leaves ±{values.max() / units.angle_scale:.3g} degrees: is angle_unit = "rad" meant?'
 
 
+def _reach(campaign: Campaign) -> float:
+    """Return how far the arm reaches at most, m; infinite where a slide has no limit."""
+    robot = campaign.robot
+    travel = np.maximum(np.abs(robot.lower), np.abs(robot.upper))[np.array(robot.joint_types) == "prismatic"]
+    return sum(segment.length for segment in robot.segments) + float(travel.sum())
+
+
 def _length_unit(campaign: Campaign) -> Iterator[str]:
     """Compare lengths with the arm's reach: a wrong unit is wrong by a thousand, so coarse bounds do."""
     robot, unit = campaign.robot, campaign.units.length
-    travel = np.maximum(np.abs(robot.lower), np.abs(robot.upper))[np.array(robot.joint_types) == "prismatic"]
-    reach = sum(segment.length for segment in robot.segments) + float(travel.sum())
+    reach = _reach(campaign)
     if not np.isfinite(reach):
         return
     ask = f'the arm reaches {reach:.3g} m: is length_unit = "{unit}" right?'
@@ -137,12 +142,6 @@ def _speed(campaign: Campaign) -> Iterator[str]:
             f"first in row {campaign.rows[first]}: {speed[first]:.6g}; "
             "it is a fraction of the maximum, not per cent"
         )
-
-
-def _temperature(campaign: Campaign) -> Iterator[str]:
-    for name, values in campaign.covariates.items():
-        if name.split(".")[0] == "temperature" and name not in campaign.extra and np.median(values) > HOTTEST:
-            yield f"column {name!r} has a median of {np.median(values):.4g} °C: are these kelvin?"
 
 
 def _pose_labels(campaign: Campaign) -> Iterator[str]:

@@ -22,6 +22,8 @@ from thermal_robot.campaign.units import Units, covariate_scale
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot
 
+CLOCKS = ("time", "order")
+"""Columns that tell when a row was measured, the first that is there."""
 QUATERNION_TOLERANCE = 0.1
 """A quaternion whose length differs from 1 by more is a mistake, not a rounding: four parts that are written with one
 decimal change the length by at most 0.05 · √4."""
@@ -130,12 +132,20 @@ def _covariates(
         _check_covariate(table, column, values)
         gaps = np.isnan(values)
         if gaps.any():
-            values, how = fill(column, values)
+            values, how = fill(column, values, None if column in CLOCKS else _clock(table, columns))
             missing[column] = gaps
             count = int(gaps.sum())
             warnings.append(f"column {column!r} is empty in {count} of {len(gaps)} rows: {how}")
         covariates[column] = values * covariate_scale(column, robot, units)
     return covariates, missing, warnings
+
+
+def _clock(table: Table, columns: Columns) -> FloatArray | None:
+    """(N,) when each row was measured, of the first column without a gap that tells; ``None`` where none does."""
+    for name in CLOCKS:
+        if name in columns.covariates and not np.isnan(values := table.numbers(name, gaps=True)).any():
+            return values
+    return None
 
 
 def _check_covariate(table: Table, column: str, values: NDArray[np.float64]) -> None:
