@@ -99,7 +99,7 @@ def test_gaps_and_their_warnings_stand_together(tmp_path: Path) -> None:
     campaign = read(tmp_path, table=with_column("temperature,payload", "20,1", ",1", "22,1"))
     assert list(campaign.missing) == ["temperature"]
     assert campaign.missing["temperature"].tolist() == [False, True, False]
-    assert campaign.warnings == ("column 'temperature' is empty in 1 of 3 rows: interpolated between rows",)
+    assert campaign.warnings == ("column 'temperature' is empty in 1 of 3 rows: interpolated in time",)
 
 
 def test_warnings_come_in_the_order_of_the_work(tmp_path: Path) -> None:

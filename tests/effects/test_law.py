@@ -206,7 +206,7 @@ RICHER = {
     "an effect that changes": CHANGING,
     "an effect with arguments": replace(CHANGING, of="transmission_error", of_arguments='{"harmonics": [1, 3]}'),
     "two quantities": Discovered(
-        kind="tool", place="tool", quantity="payload", shape="ramp", span=2.0, by="time", by_origin=0.0, by_span=800.0
+        kind="tool", place="tool", quantity="payload", shape="ramp", span=2.0, by="time", by_origin=50.0, by_span=800.0
     ),
     "their product": Discovered(place="joint_2", quantity="payload", shape="product", by="joint_1", span=3.0),
     "memory": Discovered(place="joint_3", quantity="since_turn.joint_3", shape="hysteresis", marks=(0.25, 1.0)),
@@ -255,7 +255,7 @@ def test_an_effect_in_a_law_is_one_that_is_installed_and_takes_its_arguments(ric
 
 def test_a_straight_law_of_two_quantities_holds_each_and_their_product(rich):
     functions, labels = RICHER["two quantities"].at_rows(rich)
-    u, v = COLUMNS["payload"] / 2.0, TIME / 800.0
+    u, v = COLUMNS["payload"] / 2.0, (TIME - 50.0) / 800.0
     for column in (np.ones(SAMPLES), u, v, u * v):
         left = column - functions @ np.linalg.lstsq(functions, column, rcond=None)[0]
         assert np.abs(left).max() < 1e-12
@@ -336,14 +336,15 @@ def test_what_relaxes_knows_its_sessions_and_takes_a_new_one_for_the_last(rv_m2)
     )
 
 
-RAMP = Discovered(place="joint_3", quantity="payload", shape="ramp", origin=0.5, span=1.0)
+RAMP = Discovered(place="joint_3", quantity="payload", shape="ramp", origin=0.5, span=1.0, found=(0.5, 1.5))
 
 
 @pytest.mark.parametrize("shape", [s for s, shape in SHAPES.items() if shape.runs_on])
 def test_a_law_falls_back_to_nothing_beyond_what_was_measured(rich, shape):
     marks = {"hinge": (0.7, 1.0), "smooth": (0.5, 0.8, 1.1, 1.5)}.get(shape, ())
     by = {"by": "joint_1", "by_span": 9.0, "by_origin": -4.0} if shape == "product" else {}
-    law = replace(RAMP, shape=shape, marks=marks, **by)
+    ends = (-1.0, 1.0) if by else (0.5, 1.5)
+    law = replace(RAMP, shape=shape, marks=marks, found=ends, **by)
     one = np.ones(SAMPLES)
 
     def at(payload):
@@ -364,9 +365,20 @@ def test_a_law_falls_back_to_nothing_beyond_what_was_measured(rich, shape):
 
 
 def test_what_has_changed_by_the_end_of_the_campaign_stays(rich):
-    law = replace(RAMP, quantity="time", origin=0.0, span=500.0)
+    law = replace(RAMP, quantity="time", origin=0.0, span=500.0, found=(0.0, 500.0))
     functions, _ = law.at_rows(rich)
     assert gate.fading(law, rich).tolist() == [1.0] * SAMPLES
     late = TIME > 500.0
     assert np.ptp(functions[late], axis=0).max() == 0.0
     np.testing.assert_array_equal(functions[late][0], functions[TIME == 500.0][0])
+
+
+@pytest.mark.parametrize("name", ["two quantities", "their product"])
+def test_a_law_is_delivered_with_the_range_of_its_rows_and_does_the_same_there(rich, name):
+    law = RICHER[name]
+    delivered = gate.delivered(law, rich)
+    assert len(delivered.found) == (4 if name == "two quantities" else 2)
+    assert replace(delivered, found=()) == law
+    np.testing.assert_array_equal(delivered.at_rows(rich)[0], law.at_rows(rich)[0])
+    assert gate.fading(law, rich) is None
+    assert gate.fading(delivered, rich).tolist() == [1.0] * SAMPLES

@@ -49,7 +49,9 @@ BROKEN = {
     "crash": "import os; os.abort()",
     "wrong": "assert 1 == 2",
     "warning": "import warnings; warnings.warn('x', RuntimeWarning)",
-    "unclear": "from thermal_robot.errors import RobotError; raise RobotError('two\\nlines')",
+    "unclear": "from thermal_robot.errors import RobotError\n"
+    "class Two(RobotError):\n    def __str__(self): return 'two\\nlines'\n"
+    "raise Two('')",
     "refused": "from thermal_robot.errors import RobotError; raise RobotError('one line')",
     "right": "pass",
 }

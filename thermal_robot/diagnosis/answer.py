@@ -163,7 +163,7 @@ def _model(last: Conclusion) -> CorrectedModel:
         robot=campaign.robot,
         settings=campaign.settings,
         frames=fit.corrected.frames,
-        effects=fit.effects,
+        effects=tuple((gate.delivered(effect, fit.nominal), values) for effect, values in fit.effects),
         measures=campaign.measures,
         needs=needs,
         simulated=campaign.simulated_position is not None,

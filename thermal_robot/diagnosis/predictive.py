@@ -95,5 +95,6 @@ def _size(left: Array, told: Array, kept: NDArray[np.bool_]) -> Array:
     apart, chance = size - size.mean(), 1.0 / max(2 * int(kept.sum()), 1)
     size = np.exp(size.mean() + apart * max(1.0 - 2.0 * chance / max(float((apart**2).sum()), settings.TINY), 0.0))
     beside = np.sqrt(np.maximum((left / settings.SIGMAS_95) ** 2 - told, 0.0)) / size
-    level = min(0.95 * (1.0 + 1.0 / len(left)), 1.0)
+    inside = settings.INTERVAL[1] - settings.INTERVAL[0]
+    level = min(inside * (1.0 + 1.0 / len(left)), 1.0)
     return np.asarray(size * np.quantile(beside, level))

@@ -277,6 +277,10 @@ class Effect(ABC):
         """
         return None
 
+    def delivered(self, observations: Observations) -> Effect:
+        """Return the effect as a model holds it that predicts other rows; it does the same in these."""
+        return self
+
     def fading(self, observations: Observations) -> Array | None:
         """Return (N,) what part of the effect its responses hold; ``None`` where they hold all of it.
 

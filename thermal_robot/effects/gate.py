@@ -169,6 +169,17 @@ def reads(effect: Effect, observations: Observations) -> tuple[str, ...]:
     return answer
 
 
+def delivered(effect: Effect, observations: Observations) -> Effect:
+    """Return an effect as a model holds it (:meth:`Effect.delivered`).
+
+    Raises
+    ------
+    EffectError
+        If it is no effect of this one's name.
+    """
+    return _settings(effect, "delivered", (_asked(effect, "delivered", observations),))[0]
+
+
 def fading(effect: Effect, observations: Observations) -> Array | None:
     """Return (N,) what part of an effect its responses hold, ``None`` for all (:meth:`Effect.fading`).
 

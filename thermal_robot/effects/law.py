@@ -79,6 +79,8 @@ class Discovered(Effect):
         Name of the known effect that changes with the quantity, and its arguments as JSON text; empty where none does.
     tried
         Among how many laws it was picked.
+    found
+        Least and largest value of what it follows, and of the second quantity, where it was found; empty for no matter.
     """
 
     title: ClassVar[str] = "an unlisted law"
@@ -102,6 +104,7 @@ class Discovered(Effect):
     of: str = ""
     of_arguments: str = "{}"
     tried: Count = 1.0
+    found: tuple[float, ...] = ()
 
     @property
     def share(self) -> float:
@@ -205,38 +208,38 @@ class Discovered(Effect):
         values = self._followed(observations)
         if values is None:
             return None
-        if SHAPES[self.shape].runs_on:
-            values = np.clip(values, *self._range)
-        functions, labels = self.functions(values)
-        left = self.fading(observations)
-        if left is not None:
+        ends = self.found if SHAPES[self.shape].runs_on else ()
+        functions, labels = self.functions(np.clip(values, ends[0], ends[1]) if ends else values)
+        if (left := self.fading(observations)) is not None:
             functions = functions * left[:, None]
         if not self.by or self.shape == "product":
             return functions, labels
-        second = quantity(observations, self.by)
-        if second is None:
+        if (second := quantity(observations, self.by)) is None:
             return None
-        v = np.clip((second - self.by_origin) / self.by_span, 0.0, 1.0)
+        v = ((np.clip(second, ends[2], ends[3]) if ends else second) - self.by_origin) / self.by_span
         return np.column_stack([functions, functions * v[:, None]]), (*labels, *(f"{n}, × {self.by}" for n in labels))
 
-    @property
-    def _range(self) -> tuple[float, float]:
-        """Least and largest value of what the shape is of where the law was found."""
-        return (-self.span, self.span) if self.shape == "product" else (self.origin, self.origin + self.span)
+    def _reads(self, observations: Observations) -> list[tuple[str, Array | None]]:
+        """Return the quantities that it runs on with, and their (N,) values."""
+        by = [(self.by, quantity(observations, self.by))] if self.by and self.shape != "product" else []
+        return [(self.quantity, self.values(observations)), *by]
+
+    def delivered(self, observations: Observations) -> Discovered:
+        """Return the law with the range in which it was found."""
+        ends = [(float(v.min()), float(v.max())) for _, v in self._reads(observations) if v is not None]
+        return replace(self, found=tuple(end for pair in ends for end in pair)) if SHAPES[self.shape].runs_on else self
 
     def fading(self, observations: Observations) -> Array | None:
-        """Return (N,) how much of the law is left; ``None`` where its shape ends by itself.
+        """Return (N,) how much of the law is left; ``None`` where its shape ends by itself, or no range is known.
 
         Beyond where it was found, if it would run on and nobody knows that it does, it keeps the value of the edge, and
         of that ever less, as a normal process of no mean does. What has changed by the end of the campaign stays.
         """
-        if not SHAPES[self.shape].runs_on:
+        if not self.found or not SHAPES[self.shape].runs_on:
             return None
-        reads = [(self.quantity, self.values(observations), *self._range)]
-        if self.by and self.shape != "product":
-            reads.append((self.by, quantity(observations, self.by), self.by_origin, self.by_origin + self.by_span))
         left = np.ones(observations.campaign.samples)
-        for name, values, low, high in reads:
+        for k, (name, values) in enumerate(self._reads(observations)):
+            low, high = self.found[2 * k : 2 * k + 2]
             if values is not None and name not in CLOCK:
                 beyond = (values - np.clip(values, low, high)) / (settings.FADES * ((high - low) or 1.0))
                 left *= np.exp(-0.5 * beyond**2)
@@ -263,8 +266,7 @@ class Discovered(Effect):
         for function, label in zip(functions.T, labels, strict=True):
             for c, component in enumerate(components):
                 twist = function[:, None] * np.eye(6)[c]
-                own = TWIST[c][1]
-                found.append(Parameter(f"{component}, {label}", own, 1e-4, self.kind, where, (respond(twist),)))
+                found.append(Parameter(f"{component}, {label}", TWIST[c][1], 1e-4, self.kind, where, (respond(twist),)))
         return tuple(found)
 
     def nearby(self, factor: float) -> tuple[Effect, ...]:
@@ -346,10 +348,8 @@ class Discovered(Effect):
         return f"{mark:.{digits}g} {self.unit}".rstrip().replace("-", "−")
 
     def _responder(self, observations: Observations) -> tuple[Callable[[Array], Response], str]:
-        if self.kind == "base":
-            return at_base, "base"
-        if self.kind == "tool":
-            return at_tool, "tool"
+        if self.kind in ("base", "tool"):
+            return at_base if self.kind == "base" else at_tool, self.kind
         segments = observations.robot.segments
         s = next(s for s, segment in enumerate(segments) if segment.name == self.place)
         return lambda twist: at_segment(s, twist), segments[s].parent_link
