@@ -49,6 +49,8 @@ class Conclusion:
         Effects that were taken out of the fit again.
     misfit
         Why nothing can be said of the robot; ``None`` where something can.
+    notes
+        What a reader must know of it beside, one sentence each.
     """
 
     fit: Fit
@@ -58,6 +60,7 @@ class Conclusion:
     chance: RandomGap
     refused: Mapping[str, Refused]
     misfit: Misfit | None = None
+    notes: tuple[str, ...] = ()
 
 
 def answer(
@@ -116,7 +119,7 @@ def answer(
         separates=groups,
         model=_model(last),
         rows=_rows(fit, shrinkage),
-        warnings=(*campaign.warnings, *notes, *cautions(fit, last.refused, sensitivity)),
+        warnings=(*campaign.warnings, *notes, *last.notes, *cautions(fit, last.refused, sensitivity)),
         sensitivity=sensitivity,
         fit=fit,
         remaining=remaining,

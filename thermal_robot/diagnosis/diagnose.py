@@ -19,7 +19,7 @@ from thermal_robot.diagnosis.beside_steps import beside_steps
 from thermal_robot.diagnosis.cautions import usable
 from thermal_robot.diagnosis.credible import credible
 from thermal_robot.diagnosis.data_faults import data_fault
-from thermal_robot.diagnosis.data_faults.misfit import another_motion, frames_alone
+from thermal_robot.diagnosis.data_faults.misfit import another_motion, delivered, frames_alone
 from thermal_robot.diagnosis.deviations import as_remainder_says
 from thermal_robot.diagnosis.examine import examine
 from thermal_robot.diagnosis.held_out import held_out
@@ -136,7 +136,9 @@ def _concluded(campaign: Campaign, candidates: Sequence[Effect], progress: Calla
         return replace(frames_alone(campaign, candidates), misfit=Misfit(fault))
     last = _explained(fit(campaign, candidates, progress), progress)
     misfit = another_motion(last.fit)
-    return last if misfit is None else replace(frames_alone(campaign, candidates), misfit=misfit)
+    if misfit is not None:
+        return replace(frames_alone(campaign, candidates), misfit=misfit)
+    return delivered(last, candidates)
 
 
 def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:

@@ -12,11 +12,13 @@ from thermal_robot.diagnosis.answer import Conclusion
 from thermal_robot.diagnosis.data_faults import settings
 from thermal_robot.diagnosis.examine import examine
 from thermal_robot.diagnosis.parts import Misfit
+from thermal_robot.diagnosis.unsettled import unsettled
 from thermal_robot.effects import Effect
 from thermal_robot.inference.fit import Fit, fit
 from thermal_robot.inference.random_gap import nothing_random
 
 _NEEDED = "a table that fits the robot"
+_SETTLED = "a fit that settles"
 
 
 def another_motion(fitted: Fit) -> Misfit | None:
@@ -29,7 +31,13 @@ def another_motion(fitted: Fit) -> Misfit | None:
     return Misfit(turned=turned) if turned > settings.ANOTHER_TURN else None
 
 
-def frames_alone(campaign: Campaign, candidates: Sequence[Effect]) -> Conclusion:
+def delivered(last: Conclusion, candidates: Sequence[Effect]) -> Conclusion:
+    """Return a conclusion whose exact model is the one that was compared; else that of the frames alone, and why."""
+    note = unsettled(last.fit)
+    return replace(frames_alone(last.fit.campaign, candidates, _SETTLED), notes=(note,)) if note else last
+
+
+def frames_alone(campaign: Campaign, candidates: Sequence[Effect], needed: str = _NEEDED) -> Conclusion:
     """Conclude from the unknown frames and nothing else: no candidate can be tested.
 
     Parameters
@@ -38,7 +46,9 @@ def frames_alone(campaign: Campaign, candidates: Sequence[Effect]) -> Conclusion
         With measurements.
     candidates
         Effects that were asked for.
+    needed
+        What they would need.
     """
-    bare = replace(fit(campaign, ()), needs={effect.name: (_NEEDED,) for effect in candidates})
+    bare = replace(fit(campaign, ()), needs={effect.name: (needed,) for effect in candidates})
     left = examine(bare)
     return Conclusion(bare, (), left.unexplained, left, nothing_random(bare), {})
