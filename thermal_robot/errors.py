@@ -13,7 +13,9 @@ class ThermalRobotError(Exception):
     def __str__(self) -> str:
         # a name or a value may be a million characters long, or of bytes that are no text
         line = " ".join(super().__str__().split()).encode(errors="backslashreplace").decode()
-        return line if len(line) <= _LONGEST else f"{line[: _LONGEST // 2]} … {line[-_LONGEST // 2 :]}"
+        line = "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in line)
+        half = _LONGEST // 2 - 2
+        return line if len(line) <= _LONGEST else f"{line[:half]} … {line[-half:]}"
 
     def __reduce__(self) -> tuple[Callable[..., ThermalRobotError], tuple[object, ...]]:
         # errors cross processes; their constructors take more than the message

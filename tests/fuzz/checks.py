@@ -7,6 +7,7 @@ import io
 import json
 import os
 import pickle
+import sys
 import tempfile
 from functools import cache
 from pathlib import Path
@@ -87,6 +88,7 @@ def arguments(folder: Path) -> None:
     words = json.loads((folder / "arguments.json").read_bytes())
     out, err = io.TextIOWrapper(io.BytesIO(), encoding="utf-8"), io.TextIOWrapper(io.BytesIO(), encoding="utf-8")
     os.chdir(folder)
+    before, sys.stdin = sys.stdin, io.TextIOWrapper(io.BytesIO())  # the worker's own brings it its trials
     try:
         with contextlib.redirect_stdout(out), contextlib.redirect_stderr(err):
             status = cli.main(words)
@@ -94,6 +96,7 @@ def arguments(folder: Path) -> None:
         status = end.code
     finally:
         os.chdir("/")
+        sys.stdin = before
     err.seek(0)
     said = err.read()
     assert status in (0, 2), f"exit status {status}: {said}"

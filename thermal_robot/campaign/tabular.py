@@ -134,6 +134,8 @@ def _read_parquet(path: Path) -> Table:
         reason = " ".join(str(error).split())
         raise CampaignError(str(path), f"cannot be read as a Parquet file ({reason})") from error
     # An index with a name is a column that pandas set aside.
+    if twice := [name for name in frame.index.names if name in frame.columns]:
+        raise CampaignError(str(path), "duplicate column", column=str(twice[0]), found="it as the index, too")
     frame = frame.reset_index(drop=frame.index.names == [None])
     return table_from_frame(frame, str(path), first_row=2)
 

@@ -196,7 +196,8 @@ def common_limits(coupling: Coupling, names: Sequence[str], lower: Array, upper:
         i = coupling.leader(j)
         if i is None:
             continue
-        ends = (np.array([lower[j], upper[j]]) - coupling.offset[j]) / coupling.matrix[j, i]
+        with np.errstate(over="ignore"):  # a joint that hardly follows never comes to its limits
+            ends = (np.array([lower[j], upper[j]]) - coupling.offset[j]) / coupling.matrix[j, i]
         low[i], high[i] = max(low[i], ends.min()), min(high[i], ends.max())
         if low[i] > high[i]:
             driver = names[coupling.driving[i]]
