@@ -104,8 +104,9 @@ BRACKETS = "[" * 5000 + "]" * 5000
         ("1e300", "wrong kind of value; found 1e+300, expected a number"),
         ("1e-300", "smaller than any noise"),
         (BRACKETS, "values stand within each other too deep"),
-        ('"' + "x" * 2_000_000 + '"', "is larger than any campaign.toml"),
-        ('"' + "x" * 100_000 + '"', "wrong kind of value"),
+        ('"' + "x" * 100_000 + '"', "is larger than any campaign.toml"),
+        ("1\n" + ".".join("a" * 60_000) + " = 1", "is larger than any campaign.toml"),
+        ('"' + "x" * 50_000 + '"', "wrong kind of value"),
     ],
     ids=lambda text: text[:12],
 )

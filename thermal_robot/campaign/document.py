@@ -32,7 +32,7 @@ SECTIONS: dict[str, tuple[str, ...]] = {
 
 _NAMED = {"priors": PRIORS, "gears": GEARS}
 _ABSENT: Any = object()
-_LARGEST_FILE = 1 << 20
+_LARGEST_FILE = 1 << 16
 """Bytes: it holds a few lines, and a line for every joint and every effect."""
 
 
@@ -43,7 +43,7 @@ class Document:
         self.file = str(file)
         try:
             if file.stat().st_size > _LARGEST_FILE:
-                raise CampaignError(self.file, "is larger than any campaign.toml", expected="at most 1 MiB")
+                raise CampaignError(self.file, "is larger than any campaign.toml", expected="at most 64 KiB")
             self.text = file.read_text(encoding="utf-8-sig")
             self.data: dict[str, Any] = tomllib.loads(self.text)
         except OSError as error:

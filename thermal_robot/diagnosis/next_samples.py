@@ -288,10 +288,10 @@ def _expected(fit: Fit, offered: Observations, leading: Sequence[Combination]) -
 
 
 def _root(design: Array, precision: Array) -> Array:
-    """(K, m, p) root of the covariance of design · N(0, precision⁻¹)."""
-    factor = np.linalg.cholesky(precision)
-    flat = design.reshape(design.shape[0] * design.shape[1], design.shape[2])  # there may be no column
-    return np.asarray(np.linalg.solve(factor, flat.T).T.reshape(design.shape))
+    """(K, m, p) root of the covariance of design · N(0, precision⁻¹), the precision at least that of the prior, 1."""
+    value, vector = np.linalg.eigh(precision)
+    # below the prior's there is rounding alone, where the noise is next to nothing
+    return np.asarray(design @ (vector / np.sqrt(np.maximum(value, 1.0))))
 
 
 class _Conditional:
