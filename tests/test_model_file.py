@@ -268,7 +268,8 @@ def test_what_is_no_file_is_not_read(tmp_path):
     ):
         with pytest.raises(CampaignError) as refused:
             CorrectedModel.load(path)
-        assert str(refused.value) == f"{path}: {said}"
+        name = str(path).replace("\0", r"\x00")  # what a terminal cannot show is written out
+        assert str(refused.value) == f"{name}: {said}"
 
 
 def test_the_checksum_is_of_all_values_and_of_no_spelling():

@@ -26,7 +26,7 @@ from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.errors import CampaignError, EffectError, RobotError
 from thermal_robot.observations import Frames, observe
 from thermal_robot.prediction import Spread
-from thermal_robot.robot import Robot, load_robot
+from thermal_robot.robot import ENDS, Robot, load_robot
 from thermal_robot.schema import (
     NOT_NEGATIVE,
     Kind,
@@ -112,7 +112,7 @@ def _urdf(value: Any, path: str) -> str:
 
 def _robot(value: Any, path: str) -> Robot:
     link = text("the name of a link")
-    held = record({"urdf": _urdf, "tool_frame": link, "root_frame": link, "gravity": GRAVITY})(value, path)
+    held = record({"urdf": _urdf, **dict.fromkeys(ENDS, link), "gravity": GRAVITY})(value, path)
     try:
         return load_robot(**held)
     except RobotError as error:
@@ -154,8 +154,7 @@ def _spread(value: Any, path: str) -> Spread:
 def _written_robot(robot: Robot) -> dict[str, Any]:
     return {
         "urdf": robot.urdf,
-        "tool_frame": robot.tool_frame,
-        "root_frame": robot.root_frame,
+        **{end: getattr(robot, end) for end in ENDS},
         "gravity": np.asarray(robot.gravity).tolist(),
     }
 

@@ -15,6 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign
+from thermal_robot.errors import CampaignError, require
 from thermal_robot.kinematics import (
     ChainFrames,
     Displacement,
@@ -45,6 +46,14 @@ class Frames:
 
     base: Array
     tool: Array
+
+    def __post_init__(self) -> None:
+        for name in ("base", "tool"):
+            pose = getattr(self, name)
+            if not isinstance(pose, np.ndarray) or pose.shape != (4, 4) or not np.isfinite(pose).all():
+                raise CampaignError(
+                    "Frames", "no pose", column=name, found=repr(pose), expected="a (4, 4) array, finite"
+                )
 
     @classmethod
     def declared(cls, campaign: Campaign) -> Frames:
@@ -243,6 +252,8 @@ def observe(
     With ``sim.*`` columns the prediction is the simulator's pose plus what the displacement does to the URDF's pose:
     the simulator says where the nominal robot is, the URDF how an error moves it.
     """
+    require("observe()", campaign, (Campaign,), "a campaign")
+    require("observe(), frames", frames, (Frames, type(None)), "Frames, or None for those that the file declares")
     frames = frames or Frames.declared(campaign)
     robot = campaign.robot
     chain = chain_frames(robot, campaign.q, displacement)

@@ -30,6 +30,8 @@ _MOST_SHOWN = 12
 """Names in one message; a humanoid has dozens of fingers."""
 STRONGEST_GRAVITY = 100.0
 """m/s²: four times that of any planet where a robot has been sent; a figure in mm/s² is above it."""
+ENDS = ("tool_frame", "root_frame")
+"""Names of the links between which the chain lies, as a robot, a campaign and a model call them."""
 _LARGEST_FILE = 64 << 20
 """Bytes: a URDF is text about links, of a few kilobytes each."""
 

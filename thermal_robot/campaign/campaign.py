@@ -251,6 +251,10 @@ class Campaign:
         index = np.asarray(rows)
         if index.size == 0:
             index = index.astype(np.int64)
+        whole = index.dtype.kind in "iu" and np.all((index >= -self.samples) & (index < self.samples))
+        if index.ndim != 1 or not (whole or (index.dtype == bool and len(index) == self.samples)):
+            expected = f"row numbers from 0 to {self.samples - 1}, or {self.samples} booleans"
+            raise CampaignError(f"<{self.name}>", "has no such rows", found=repr(rows), expected=expected)
         changes: dict[str, Any] = {}
         for key in _PER_SAMPLE:
             value = getattr(self, key)

@@ -12,6 +12,7 @@ from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.names import split_name
 from thermal_robot.campaign.units import covariate_scale, unit_of
 from thermal_robot.campaign.validate import SAME_CONFIGURATION
+from thermal_robot.errors import require
 
 _MOST_SESSIONS = 8
 """Sessions named in one line; more would not fit beside each other on a terminal."""
@@ -26,6 +27,7 @@ def describe(campaign: Campaign) -> str:
         Plain text of several lines: robot, what was measured, frames, noise, joints against their limits,
         covariates with their ranges and gaps, repeats, sessions, warnings.
     """
+    require("describe()", campaign, (Campaign,), "a campaign")
     blocks = [
         [f"Campaign {campaign.name}", *_aligned(_facts(campaign))],
         ["Joints", *_aligned(_joints(campaign))],

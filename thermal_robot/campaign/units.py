@@ -45,7 +45,7 @@ class Units:
             ("angle_unit", self.angle, ANGLE_UNITS),
             ("length_unit", self.length, LENGTH_UNITS),
         ):
-            if word not in allowed:
+            if not isinstance(word, str) or word not in allowed:
                 raise CampaignError(
                     "<units>", "unknown unit", column=key, found=repr(word), expected=" or ".join(allowed)
                 )

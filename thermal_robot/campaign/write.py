@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import csv
+import os
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -15,7 +16,7 @@ from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.declaration import FILE_NAME
 from thermal_robot.campaign.tabular import NO_PARQUET, PARQUET, WITH_PARQUET
 from thermal_robot.campaign.units import Units, covariate_scale
-from thermal_robot.errors import CampaignError
+from thermal_robot.errors import CampaignError, require
 from thermal_robot.files import whole, write_text
 
 if TYPE_CHECKING:
@@ -48,6 +49,8 @@ def write_campaign(campaign: Campaign, directory: str | Path) -> Path:
         Samples without measured positions, which :func:`write_table` writes; a directory that cannot be
         written.
     """
+    require("write_campaign()", campaign, (Campaign,), "a campaign")
+    require("write_campaign()", directory, (str, os.PathLike), "the path of a folder")
     folder = Path(directory)
     if campaign.position is None:
         raise CampaignError(str(folder), "samples without measured positions are no campaign")
@@ -60,6 +63,8 @@ def write_campaign(campaign: Campaign, directory: str | Path) -> Path:
         write_text(file, tomli_w.dumps(_document(campaign)))
     except OSError as error:
         raise CampaignError(str(folder), f"cannot be written: {error.strerror}") from error
+    except ValueError as error:  # NUL in a name
+        raise CampaignError(str(folder), f"cannot be written: {error}") from error
     write_table(campaign, folder / TABLE_NAME)
     return file
 

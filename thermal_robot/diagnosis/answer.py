@@ -15,7 +15,7 @@ from thermal_robot.diagnosis.findings import by_share, findings, separates, titl
 from thermal_robot.diagnosis.held_out import Shrinkage
 from thermal_robot.diagnosis.numbered import numbered
 from thermal_robot.diagnosis.parts import Gap, Misfit, Refused, Rows, Unexplained
-from thermal_robot.diagnosis.predictive import spread
+from thermal_robot.diagnosis.predictive import uncertainty
 from thermal_robot.diagnosis.random_findings import random_findings
 from thermal_robot.diagnosis.result import Diagnosis
 from thermal_robot.diagnosis.schemes import hardest, worst_folds
@@ -171,7 +171,7 @@ def _model(last: Conclusion) -> CorrectedModel:
         needs=needs,
         simulated=campaign.simulated_position is not None,
         last_order=None if clock is None else (float(clock.min()), float(clock.max())),
-        spread=None if last.misfit else spread(fit, needs, last.left.floor),
+        spread=None if last.misfit else uncertainty(fit, needs, last.left.floor),
     )
 
 

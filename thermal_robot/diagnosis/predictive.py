@@ -29,7 +29,7 @@ from thermal_robot.prediction import Spread, by_parameters, moves
 Array = NDArray[np.float64]
 
 
-def spread(fit: Fit, needs: tuple[str, ...], floor: float) -> Spread:
+def uncertainty(fit: Fit, needs: tuple[str, ...], floor: float) -> Spread:
     """Return what makes the predictions of a fit uncertain.
 
     Parameters

@@ -18,7 +18,7 @@ def unsettled(fit: Fit) -> str:
     elsewhere, as with errors so large that nothing is linear, their figures are not those of the model that is saved.
     """
     kept = ~fit.explanation.outliers
-    exact, linear = _rms(fit.corrected.gap[kept]), _rms(fit.explanation.remainder[kept])
+    exact, linear = _left(fit.corrected.gap[kept]), _left(fit.explanation.remainder[kept])
     if not fit.effects or exact <= settings.UNSETTLED * linear:
         return ""
     names = ", ".join(effect.name for effect, _ in fit.effects)
@@ -28,5 +28,5 @@ def unsettled(fit: Fit) -> str:
     )
 
 
-def _rms(gap: Array) -> float:
+def _left(gap: Array) -> float:
     return float(np.sqrt((gap[:, :3] ** 2).sum(axis=1).mean()))
