@@ -220,6 +220,9 @@ def _measured(
     robot: Robot, q: ArrayLike, measured: ArrayLike, point: ArrayLike | None
 ) -> tuple[Array, Array, Array | None]:
     """Jacobian (N, c, n) of the c measured components, their standard deviations (N, c), and covariances if given."""
+    for given in (q, () if point is None else point):  # the solver of linear programs does not survive what is none
+        if not np.isfinite(np.asarray(given, dtype=float)).all():
+            raise EstimationError("joint positions and the point must be finite numbers")
     jacobian, values = frame_jacobians(robot, q, point=point), np.asarray(measured, dtype=float)
     poses, c = len(jacobian), values.shape[-1] if values.ndim else 0
     if c not in (3, 6) or values.shape not in ((poses, c), (poses, c, c)):
