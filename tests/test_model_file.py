@@ -59,7 +59,8 @@ def settled():
 
 def stored(document, folder):
     file = folder / "model.json"
-    file.write_text(document if isinstance(document, str) else json.dumps(document), encoding="utf-8")
+    text = document if isinstance(document, str) else json.dumps(document)
+    file.write_text(text, encoding="utf-8", errors="surrogatepass")
     return file
 
 
