@@ -115,7 +115,7 @@ def number(
             found = float(value) if isinstance(value, Real) and value is not True and value is not False else math.nan
         except OverflowError:
             found = math.inf
-        if not math.isfinite(found) or abs(found) > LARGEST:
+        if not math.isfinite(found) or abs(found) > max(LARGEST, most):
             raise MisfitError(path, value, expected)
         if not (least <= found <= most and found > above):
             raise MisfitError(path, value, expected, problem)

@@ -4,6 +4,7 @@ import os
 
 import numpy as np
 import pytest
+from conftest import load_arm
 from simulate import simulate
 
 from thermal_robot import diagnose
@@ -22,7 +23,7 @@ def within(prediction, measured):
 def test_fresh_rows_of_simulated_robots():
     """Over cases and rows together, with the instrument's noise and without."""
     noisy, clean, rng = [], [], np.random.default_rng(20)
-    for robot in ():
+    for robot in (load_arm("rv_m2"), load_arm("ur10")):
         for seed, effects in enumerate(MIXTURES):
             for samples in (60, 150):
                 campaign, _, (fresh, place) = simulate(robot, effects, samples=samples, seed=40 + seed, fresh=200)

@@ -7,8 +7,10 @@ import pytest
 from simulate import simulate
 
 from thermal_robot.effects import gate
+from thermal_robot.effects.arguments import with_arguments
 from thermal_robot.effects.joint_ripple import JointRipple
 from thermal_robot.observations import observe
+from thermal_robot.schema import MisfitError
 
 
 @pytest.fixture(scope="module")
@@ -25,6 +27,16 @@ def test_it_begins_without_waves_and_gains_one_at_a_time(observations):
     # either wave was one of so many, and both are chosen for themselves
     assert two.share == pytest.approx(1.0 / 500_000.0)
     assert gate.alone(two, observations) == ()
+
+
+def test_twenty_waves_are_some_of_very_many_and_are_restored_so():
+    ripple = JointRipple()
+    for order in range(20, 45):
+        ripple = ripple.having("joint_2", float(order), 150.0)
+    assert ripple.tried > 1e50
+    assert with_arguments(JointRipple, {**vars(ripple), "joints": list(ripple.joints)}, "") == ripple
+    with pytest.raises(MisfitError, match="from 1 on"):
+        with_arguments(JointRipple, {"tried": np.inf}, "")
 
 
 def test_a_wave_comes_back_so_many_times_in_a_turn(observations):

@@ -6,6 +6,7 @@ A class says it by annotations: a type, or a type with a kind of :mod:`thermal_r
 
 from __future__ import annotations
 
+import sys
 from collections.abc import Callable
 from dataclasses import fields
 from types import NoneType, UnionType
@@ -34,12 +35,15 @@ from thermal_robot.schema import (
 Positive: TypeAlias = Annotated[float, POSITIVE]
 NotNegative: TypeAlias = Annotated[float, NOT_NEGATIVE]
 Share: TypeAlias = Annotated[float, number(least=0.0, most=1.0, expected="a number from 0 to 1")]
-Count: TypeAlias = Annotated[float, number(least=1.0, expected="a number from 1 on")]
+Count: TypeAlias = Annotated[float, number(least=1.0, most=sys.float_info.max, expected="a number from 1 on")]
 Index: TypeAlias = Annotated[int, whole(0)]
 Order: TypeAlias = Annotated[int, whole(1)]
 Celsius: TypeAlias = Annotated[float, TEMPERATURE]
 Instants: TypeAlias = Annotated[tuple[float, ...], increasing(number())]
-"""What an argument may be, for annotations: a number above 0, one that is not below 0, and so on."""
+"""What an argument may be, for annotations: a number above 0, one that is not below 0, and so on.
+
+A count is a product of choices: some twenty waves were picked among 1e45.
+"""
 
 _PLAIN: dict[Any, Kind] = {
     float: number(),
