@@ -145,8 +145,9 @@ class CorrectedModel:
         orientation = rotation_to_quaternion(self.frames.base[:3, :3] @ corrected.rotation) if turned else None
         if self.spread is None:
             return Prediction(position, orientation, np.full_like(position, np.nan), ((),) * len(position))
-        std = self.spread.std(corrected, self.effects, noise)
-        return Prediction(position, orientation, std, self.spread.outside(samples))
+        outside = self.spread.outside(samples)
+        std = self.spread.std(corrected, self.effects, outside, noise)
+        return Prediction(position, orientation, std, outside)
 
     def counts_anew(self, samples: Campaign) -> bool:
         """Tell whether the ``order`` of the samples merely numbers the rows of their own file.

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from thermal_robot.campaign import Campaign
 from thermal_robot.effects import Effect, gate, settings
 from thermal_robot.inference.columns import block, frame_columns
+from thermal_robot.inference.stack import chunks
 from thermal_robot.observations import Observations
 
 Array = NDArray[np.float64]
@@ -47,8 +48,16 @@ class Spread:
         wider = {} if self.wider is None else {"wider": self.wider.tolist()}
         return {**arrays, **wider, "ranges": {name: list(ends) for name, ends in self.ranges.items()}}
 
-    def std(self, observations: Observations, effects: Sequence[tuple[Effect, Array]], noise: bool) -> Array:
+    def std(
+        self,
+        observations: Observations,
+        effects: Sequence[tuple[Effect, Array]],
+        outside: Sequence[tuple[str, ...]],
+        noise: bool,
+    ) -> Array:
         """(N, 3) one standard deviation per axis of a prediction, measurement frame, m.
+
+        NaN where the covariance is of other effects.
 
         Parameters
         ----------
@@ -56,21 +65,26 @@ class Spread:
             Of the corrected model.
         effects
             Its effects with their (P,) values.
+        outside
+            Of the same rows, as :meth:`outside` tells it.
         noise
             Whether the instrument's noise counts: what a measurement may differ by, or where the target is.
         """
-        held = [effect for effect, _ in effects]
-        variance = by_parameters(observations, held, self.covariance)
+        moved = sensitivity(observations, [effect for effect, _ in effects])
+        if moved.shape[2] != len(self.covariance):
+            return np.full(moved.shape[:2], np.nan)
+        variance = by_parameters(moved, self.covariance)
         if self.wider is not None:
-            away = np.array([bool(names) for names in self.outside(observations.campaign)], dtype=bool)
-            variance[away] = by_parameters(observations, held, self.wider)[away]
+            away = np.flatnonzero([bool(names) for names in outside])
+            variance[away] = by_parameters(moved[away], self.wider)
         variance += self.beyond**2 + (self.noise**2 if noise else 0.0)
+        first = moved.shape[2] - sum(len(values) for _, values in effects)
         for effect, values in effects:
-            left = gate.fading(effect, observations)
+            own, left = slice(first, first + len(values)), gate.fading(effect, observations)
+            first = own.stop
             if left is not None and (left < 1.0).any():
-                moved = block(observations, effect).columns[:, :3] @ values @ observations.frames.base[:3, :3].T
                 # what it may still be where nobody knows: as much as was given up
-                variance += (moved * ((1.0 - left) / left)[:, None]) ** 2
+                variance += (moved[:, :, own] @ values * ((1.0 - left) / left)[:, None]) ** 2
         return np.asarray(np.sqrt(variance))
 
     def outside(self, samples: Campaign) -> tuple[tuple[str, ...], ...]:
@@ -114,23 +128,23 @@ def sensitivity(observations: Observations, effects: Sequence[Effect]) -> Array:
     Columns as :func:`~thermal_robot.inference.columns.frame_columns` orders them, those that turn the target left out,
     then each effect's parameters. In the axes of the measurement frame; m a unit of each.
     """
-    frames = frame_columns(observations)[0][:, :3, moves(observations)]
-    columns = [frames, *(block(observations, effect).columns[:, :3] for effect in effects)]
-    return np.asarray(observations.frames.base[:3, :3] @ np.concatenate(columns, axis=2))
+    frames, names = frame_columns(observations)
+    columns = [frames[:, :3, moves(names)]]
+    columns += [block(observations, effect).columns[:, :3].copy() for effect in effects]  # of poses three of six
+    found = np.concatenate(columns, axis=2)
+    for part in chunks(len(found)):
+        found[part] = observations.frames.base[:3, :3] @ found[part]
+    return found
 
 
-def moves(observations: Observations) -> NDArray[np.bool_]:
-    """(f,) which columns of the unknown frames move the target: not those of its turn on the tool."""
-    names = frame_columns(observations)[1]
+def moves(names: Sequence[str]) -> NDArray[np.bool_]:
+    """(f,) which columns of the unknown frames, by their names, move the target: not those of its turn on the tool."""
     return np.array([name != "tool" or k < names.index("tool") + 3 for k, name in enumerate(names)], dtype=bool)
 
 
-def by_parameters(observations: Observations, effects: Sequence[Effect], covariance: Array) -> Array:
-    """(N, 3) variance per axis of the measurement frame that the parameters' covariance makes, m²: diag(J C Jᵀ).
-
-    NaN where the covariance is of other effects.
-    """
-    moved = sensitivity(observations, effects)
-    if moved.shape[2] != len(covariance):
-        return np.full(moved.shape[:2], np.nan)
-    return np.asarray(np.maximum(((moved @ covariance) * moved).sum(axis=2), 0.0))
+def by_parameters(moved: Array, covariance: Array) -> Array:
+    """(N, 3) variance per axis that the covariance (K, K) of parameters makes, m²: diag(J C Jᵀ), J (N, 3, K)."""
+    found = np.empty(moved.shape[:2])
+    for part in chunks(len(found)):
+        found[part] = ((moved[part] @ covariance) * moved[part]).sum(axis=2)
+    return np.asarray(np.maximum(found, 0.0))

@@ -20,11 +20,12 @@ from numpy.typing import NDArray
 from thermal_robot.diagnosis.one_walk import Model, Walk
 from thermal_robot.diagnosis.settings import LOOSE
 from thermal_robot.inference import settings
+from thermal_robot.inference.columns import frame_columns
 from thermal_robot.inference.discrepancy import Spectrum
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.problem import whitened
 from thermal_robot.inference.rows import blocks, each
-from thermal_robot.prediction import Spread, by_parameters, moves
+from thermal_robot.prediction import Spread, by_parameters, moves, sensitivity
 
 Array = NDArray[np.float64]
 
@@ -44,7 +45,7 @@ def uncertainty(fit: Fit, needs: tuple[str, ...], floor: float) -> Spread:
     campaign, model = fit.campaign, Model.of(fit.explanation, blocks(fit.campaign))
     covariance, wider = _covariances(fit, model)
     left, rows = _held_out(fit, model)
-    told = by_parameters(fit.corrected, [effect for effect, _ in fit.effects], covariance)[rows]
+    told = by_parameters(sensitivity(fit.corrected, [effect for effect, _ in fit.effects])[rows], covariance)
     total = _size(left, told, ~fit.explanation.outliers[rows])
     noise = np.full(3, campaign.noise_position or floor)
     values = {name: campaign.q[:, j] for j, name in enumerate(campaign.robot.joint_names)}
@@ -65,7 +66,7 @@ def _covariances(fit: Fit, model: Model) -> tuple[Array, Array | None]:
     unit = (gram.diagonal() + tight) ** -0.5
     prior, size = np.diag(tight * unit**2), np.outer(unit, unit)
     inner = np.linalg.inv(gram * size + prior)
-    moving = np.concatenate([moves(fit.corrected), np.ones(len(model.tight), dtype=bool)])
+    moving = np.concatenate([moves(frame_columns(fit.corrected)[1]), np.ones(len(model.tight), dtype=bool)])
     own, form = np.ix_(moving, moving), e.discrepancy.form
     if form is None or form.anew:
         return np.asarray((size * inner)[own]), None
