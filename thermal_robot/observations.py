@@ -110,7 +110,7 @@ class Observations:
     @property
     def clock(self) -> Array | None:
         """(N,) ``time`` in s, or ``order`` where there is no time; ``None`` where there is neither."""
-        return self.covariates.get("time", self.covariates.get("order"))
+        return self.campaign.clock
 
     def temperature(self, link: str) -> Array | None:
         """Return the (N,) temperature of a link, °C: its own or the robot's; ``None`` where unrecorded."""

@@ -38,6 +38,7 @@ from numpy.typing import NDArray
 from thermal_robot.blind import real_faults as faults
 from thermal_robot.blind.real_judge import judged
 from thermal_robot.campaign import Campaign, read_campaign, write_campaign, write_table
+from thermal_robot.inference.rows import in_order
 from thermal_robot.observations import Observations, observe
 
 Array = NDArray[np.float64]
@@ -201,8 +202,7 @@ def real_cases(data: Path, seed: int, count: int | None = None) -> tuple[RealCas
 
 def _drawn_rows(campaign: Campaign, seed: int, name: str) -> Campaign:
     """Return at most so many rows as a quick diagnosis takes: every k-th, or those of a spell."""
-    clock = campaign.covariates.get("time", campaign.covariates.get("order"))
-    rows = np.arange(campaign.samples) if clock is None else np.argsort(clock, kind="stable")
+    rows = in_order(campaign)
     rng = np.random.default_rng([seed, list(REMAINDERS).index(name), 1])
     size = int(rng.integers(*_ROWS))
     if campaign.samples > size:

@@ -19,7 +19,7 @@ from thermal_robot.campaign.checked import (
     checked_sizes,
 )
 from thermal_robot.campaign.settings import MOVES, STANDARD_TEMPERATURE, Settings, as_vector
-from thermal_robot.campaign.turning import since_turns
+from thermal_robot.campaign.turning import clock_of, since_turns
 from thermal_robot.campaign.units import Units
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot
@@ -208,6 +208,11 @@ class Campaign:
         """Diagonal of the volume that was measured, m."""
         return float(np.linalg.norm(np.ptp(np.asarray(self.position), axis=0)))
 
+    @property
+    def clock(self) -> FloatArray | None:
+        """(N,) ``time`` in s, or ``order`` where there is no time; ``None`` where there is neither."""
+        return clock_of(self.covariates)
+
     @cached_property
     def since_turn(self) -> Mapping[str, FloatArray]:
         """(N,) by joint: signed distance from its last turning point, rad or m; empty where rows are in no order.
@@ -215,7 +220,7 @@ class Campaign:
         It follows from the order of the whole campaign's rows; those that are taken from it keep theirs. See
         :func:`~thermal_robot.campaign.turning.since_turns`.
         """
-        if self.travelled and {"time", "order"} & set(self.covariates):
+        if self.travelled and self.clock is not None:
             return self.travelled
         return since_turns(self.q, self.robot.joint_names, self.covariates, self.labels.get("session"))
 

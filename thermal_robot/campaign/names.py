@@ -13,7 +13,9 @@ LABELS = ("session", "pose")
 STD = ("std.x", "std.y", "std.z")
 OUTSIDE = "outside"
 TILT = ("tilt.x", "tilt.y")
-PLAIN_COVARIATES = ("time", "order", "temperature", "payload", "speed", *TILT)
+CLOCK = ("time", "order")
+"""Columns that tell when a row was measured; where both are there, the first."""
+PLAIN_COVARIATES = (*CLOCK, "temperature", "payload", "speed", *TILT)
 PER_JOINT = ("approach", "velocity", "acceleration", "torque", "encoder")
 PER_LINK = ("temperature",)
 MEASURED = (*POSITION, *ORIENTATION)

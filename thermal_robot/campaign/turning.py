@@ -7,6 +7,8 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.campaign.names import CLOCK
+
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
@@ -73,9 +75,14 @@ def arrivals(
     return {f"approach.{name}": side[:, j] for j, name in enumerate(names)} if runs else {}
 
 
+def clock_of(covariates: Mapping[str, Array]) -> Array | None:
+    """Return the (N,) column that tells when each row was measured; ``None`` where there is none."""
+    return next((covariates[name] for name in CLOCK if name in covariates), None)
+
+
 def _runs(covariates: Mapping[str, Array], sessions: NDArray[np.str_] | None, samples: int) -> Iterator[Rows]:
     """Yield the rows of each uninterrupted run in their order; none where nothing tells the order."""
-    clock = covariates.get("time", covariates.get("order"))
+    clock = clock_of(covariates)
     if clock is None or not samples or not np.ptp(clock) > 0.0:
         return
     for run in np.unique(sessions) if sessions is not None else [None]:

@@ -12,7 +12,7 @@ from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign, FloatArray
 from thermal_robot.campaign.figures import LARGEST_COMMAND, first_beyond
 from thermal_robot.campaign.fill import fill
-from thermal_robot.campaign.names import split_name
+from thermal_robot.campaign.names import CLOCK, split_name
 from thermal_robot.campaign.plausible import doubts
 from thermal_robot.campaign.recognise import Columns, recognise
 from thermal_robot.campaign.settings import ABSOLUTE_ZERO, Settings
@@ -22,8 +22,6 @@ from thermal_robot.campaign.units import Units, covariate_scale
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot
 
-CLOCKS = ("time", "order")
-"""Columns that tell when a row was measured, the first that is there."""
 QUATERNION_TOLERANCE = 0.1
 """A quaternion whose length differs from 1 by more is a mistake, not a rounding: four parts that are written with one
 decimal change the length by at most 0.05 · √4."""
@@ -127,12 +125,13 @@ def _covariates(
     covariates: dict[str, FloatArray] = {}
     missing: dict[str, NDArray[np.bool_]] = {}
     warnings: list[str] = []
+    clock = _clock(table, columns)
     for column in (*columns.covariates, *columns.extra):
         values = table.numbers(column, gaps=True)
         _check_covariate(table, column, values)
         gaps = np.isnan(values)
         if gaps.any():
-            values, how = fill(column, values, None if column in CLOCKS else _clock(table, columns))
+            values, how = fill(column, values, None if column in CLOCK else clock)
             missing[column] = gaps
             count = int(gaps.sum())
             warnings.append(f"column {column!r} is empty in {count} of {len(gaps)} rows: {how}")
@@ -142,7 +141,7 @@ def _covariates(
 
 def _clock(table: Table, columns: Columns) -> FloatArray | None:
     """(N,) when each row was measured, of the first column without a gap that tells; ``None`` where none does."""
-    for name in CLOCKS:
+    for name in CLOCK:
         if name in columns.covariates and not np.isnan(values := table.numbers(name, gaps=True)).any():
             return values
     return None

@@ -23,6 +23,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign
+from thermal_robot.campaign.names import CLOCK
 from thermal_robot.diagnosis import settings
 from thermal_robot.effects import gate
 from thermal_robot.inference.columns import block, frame_columns
@@ -180,7 +181,7 @@ def candidates(fit: Fit, pool: int = 400, seed: int = 0, loads: Sequence[float] 
             )
         elif kind == "approach":
             covariates[name] = rng.choice([-1.0, 1.0], pool)
-        elif kind in ("time", "order"):
+        elif kind in CLOCK:
             after = last + late * (last - first)
             covariates[name] = np.ceil(after) if kind == "order" else after
         else:

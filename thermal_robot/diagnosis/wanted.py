@@ -4,11 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 
+from thermal_robot.campaign.names import CLOCK
 from thermal_robot.diagnosis import settings
 from thermal_robot.diagnosis.next_samples import NextSamples, next_samples
 from thermal_robot.diagnosis.parts import Finding, Unexplained, Wanted, is_frame
 from thermal_robot.effects.law_words import TELLS, WHETHER, kind_of
-from thermal_robot.effects.quantities import CLOCK
 from thermal_robot.inference.fit import Fit
 
 _OF_JOINTS = ("approach", "torque", "velocity", "acceleration")

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.campaign.names import CLOCK
 from thermal_robot.campaign.units import SI
 from thermal_robot.effects import gate, settings
 from thermal_robot.effects.arguments import Count, NotNegative
@@ -28,7 +29,7 @@ from thermal_robot.effects.effect import (
     at_tool,
     in_words,
 )
-from thermal_robot.effects.quantities import CLOCK, TURN, driving, quantity, strains, unit
+from thermal_robot.effects.quantities import TURN, driving, quantity, strains, unit
 from thermal_robot.effects.shapes import SHAPES
 from thermal_robot.schema import word
 
@@ -196,8 +197,8 @@ class Discovered(Effect):
         if shape.each and self.labels:
             labels += tuple(f"at {self.labels[int(mark)]}" for mark in self.marks)
         elif shape.each:
-            # as many digits as tell the marks apart
-            digits = next(d for d in range(3, 18) if len({f"{m:.{d}g}" for m in self.marks}) == len(set(self.marks)))
+            told = len(set(self.marks))  # as many digits as tell the marks apart
+            digits = next(d for d in range(3, 18) if len({f"{m:.{d}g}" for m in self.marks}) == told)
             labels += tuple(f"at {self._marked(mark, digits)}" for mark in self.marks)
         if shape.of == "runs":
             labels += tuple(f"at the start of {run}" for run in self.runs)
@@ -205,8 +206,7 @@ class Discovered(Effect):
 
     def at_rows(self, observations: Observations) -> tuple[Array, tuple[str, ...]] | None:
         """Return the (N, K) functions at the rows, and a name for each; ``None`` where the campaign cannot tell."""
-        values = self._followed(observations)
-        if values is None:
+        if (values := self._followed(observations)) is None:
             return None
         ends = self.found if SHAPES[self.shape].runs_on else ()
         functions, labels = self.functions(np.clip(values, ends[0], ends[1]) if ends else values)

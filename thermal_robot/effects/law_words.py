@@ -10,7 +10,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
-from thermal_robot.effects.quantities import CLOCK, GRAVITY, REACH, TURN
+from thermal_robot.campaign.names import CLOCK
+from thermal_robot.effects.quantities import GRAVITY, REACH, TURN
 from thermal_robot.effects.shapes import SHAPES
 
 if TYPE_CHECKING:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from thermal_robot.campaign.names import CLOCK
 from thermal_robot.campaign.turning import strained
 from thermal_robot.campaign.units import SI, unit_of
 from thermal_robot.effects import settings
@@ -23,8 +24,6 @@ REACH = ("reach.x", "reach.y", "reach.z")
 """Where the tool frame is in the root frame, m: what leans on the base."""
 TURN = "since_turn."
 """Before a joint's name: signed distance from its last turning point, rad or m (:attr:`Campaign.since_turn`)."""
-CLOCK = ("time", "order")
-"""What tells when."""
 
 
 def unit(robot: Robot, name: str) -> str:
@@ -41,7 +40,7 @@ def quantities(observations: Observations) -> dict[str, Array]:
     remembers (:data:`TURN`) is not among them: it bears on that joint alone.
     """
     recorded = [name for name in observations.covariates if observations.varies(name)]
-    names = [*recorded, *([] if {"time", "order"} & set(recorded) else ["order"]), "session"]
+    names = [*recorded, *([] if set(CLOCK) & set(recorded) else ["order"]), "session"]
     names += [*observations.robot.joint_names, *GRAVITY, *REACH]
     found = {name: quantity(observations, name) for name in names}
     robot = observations.robot

@@ -8,9 +8,10 @@ from dataclasses import replace
 
 import numpy as np
 
+from thermal_robot.campaign.names import CLOCK
 from thermal_robot.effects import Effect, Parameter, Response, gate, library
 from thermal_robot.effects.law import Discovered
-from thermal_robot.effects.quantities import CLOCK, GRAVITY, REACH, TURN, quantities, unit
+from thermal_robot.effects.quantities import GRAVITY, REACH, TURN, quantities, unit
 from thermal_robot.inference.laws import hystereses, law_of, relaxing, straight
 from thermal_robot.observations import Observations
 

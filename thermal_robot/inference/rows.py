@@ -45,7 +45,7 @@ def near_repeats(campaign: Campaign) -> Labels:
 
 def in_order(campaign: Campaign) -> Labels:
     """(N,) row numbers in the order of measurement: by ``time`` or ``order`` where recorded, else as in the file."""
-    clock = campaign.covariates.get("time", campaign.covariates.get("order"))
+    clock = campaign.clock
     return np.arange(campaign.samples) if clock is None else np.argsort(clock, kind="stable")
 
 

@@ -8,9 +8,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.campaign.names import CLOCK
 from thermal_robot.effects import Effect
 from thermal_robot.effects.law import Discovered
-from thermal_robot.effects.quantities import CLOCK, GRAVITY, quantities, unit
+from thermal_robot.effects.quantities import GRAVITY, quantities, unit
 from thermal_robot.effects.shapes import SHAPES
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block
