@@ -8,8 +8,8 @@ from simulate import commands, simulate
 
 from thermal_robot import EstimationError, diagnose
 from thermal_robot.campaign import Campaign
-from thermal_robot.inference.frames import align, register
-from thermal_robot.kinematics import Displacement, exp3, quaternion_to_rotation, rotation_to_quaternion
+from thermal_robot.inference.frames import register
+from thermal_robot.kinematics import Displacement, align, exp3, quaternion_to_rotation, rotation_to_quaternion
 from thermal_robot.observations import Frames, observe
 
 SAMPLES = 60

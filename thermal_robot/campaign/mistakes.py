@@ -8,7 +8,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from thermal_robot.campaign.campaign import Campaign, FloatArray
-from thermal_robot.kinematics import tool_poses
+from thermal_robot.kinematics import align, tool_poses
 
 WARMEST, HOTTEST = 55.0, 150.0
 """°C that the median temperature of a robot does not exceed, whose motors run at 50: a hall of 20 °C has 68 °F; and
@@ -138,10 +138,8 @@ def _simulator(campaign: Campaign, reach: float) -> Iterator[str]:
         return
     poses = tool_poses(campaign.robot, campaign.q)
     own = poses[:, :3, 3] + poses[:, :3, :3] @ campaign.target
-    one, other = own - own.mean(axis=0), predicted - predicted.mean(axis=0)
-    left, _, right = np.linalg.svd(one.T @ other)
-    turn = left @ np.diag([1.0, 1.0, np.linalg.det(left @ right)]) @ right
-    away = float(np.sqrt(((one @ turn - other) ** 2).sum(axis=1).mean()))
+    motion = align(own, predicted, np.ones(len(own)))
+    away = float(np.sqrt(((own @ motion[:3, :3].T + motion[:3, 3] - predicted) ** 2).sum(axis=1).mean()))
     if away > ANOTHER_ROBOT * reach:
         yield (
             f"sim.x, sim.y, sim.z are of another robot, tool or units than the URDF: aligned as well as can be, "

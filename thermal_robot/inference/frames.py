@@ -12,7 +12,7 @@ from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import solve
 from thermal_robot.inference.columns import frame_columns
-from thermal_robot.kinematics import exp6, quaternion_to_rotation, tool_poses
+from thermal_robot.kinematics import align, exp6, quaternion_to_rotation, tool_poses
 from thermal_robot.observations import Frames, observe
 from thermal_robot.robot import Robot
 
@@ -36,20 +36,6 @@ class Paired(Protocol):
     def base_known(self) -> bool: ...  # noqa: D102
     @property
     def tool_known(self) -> bool: ...  # noqa: D102
-
-
-def align(source: Array, target: Array, weights: Array) -> Array:
-    """Return the (4, 4) rigid motion that brings points (N, 3) onto others, least squares.
-
-    Umeyama, *IEEE PAMI* 13 (1991), without scale; reflections excluded.
-    """
-    share = weights / weights.sum()
-    from_mean, to_mean = share @ source, share @ target
-    u, _, vt = np.linalg.svd((target - to_mean).T @ ((source - from_mean) * share[:, None]))
-    turn = u @ np.diag([1.0, 1.0, np.linalg.det(u) * np.linalg.det(vt)]) @ vt
-    motion = np.eye(4)
-    motion[:3, :3], motion[:3, 3] = turn, to_mean - turn @ from_mean
-    return motion
 
 
 def register(campaign: Campaign, keep: NDArray[np.bool_] | None = None) -> Frames:

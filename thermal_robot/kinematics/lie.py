@@ -167,3 +167,17 @@ def _rodrigues_coefficients(vectors: Array) -> tuple[Array, Array, Array]:
     safe = np.where(near, 1.0, angle)
     third = np.where(near, series, (1.0 - first) / safe**2)
     return first, second, third
+
+
+def align(source: Array, target: Array, weights: Array) -> Array:
+    """Return the (4, 4) rigid motion that brings points (N, 3) onto others, least squares.
+
+    Umeyama, *IEEE PAMI* 13 (1991), without scale; reflections excluded.
+    """
+    share = weights / weights.sum()
+    from_mean, to_mean = share @ source, share @ target
+    u, _, vt = np.linalg.svd((target - to_mean).T @ ((source - from_mean) * share[:, None]))
+    turn = u @ np.diag([1.0, 1.0, np.linalg.det(u) * np.linalg.det(vt)]) @ vt
+    motion = np.eye(4)
+    motion[:3, :3], motion[:3, 3] = turn, to_mean - turn @ from_mean
+    return motion
