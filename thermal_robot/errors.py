@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from typing import Any
 
 _LONGEST = 1000  # characters of a message: a terminal shows it on a dozen lines
 
@@ -104,7 +105,7 @@ class Note(UserWarning):
     """Something that was left out, which is no error; the command line tells it in one line."""
 
 
-def require(call: str, given: object, kinds: tuple[type, ...], expected: str) -> None:
+def require(call: str, given: object, kinds: tuple[Any, ...], expected: str) -> None:
     """Refuse an argument of a wrong kind by what is wanted instead.
 
     Raises

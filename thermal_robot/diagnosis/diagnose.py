@@ -38,8 +38,6 @@ from thermal_robot.inference.discover import discovered
 from thermal_robot.inference.fit import Fit, fit
 from thermal_robot.inference.random_gap import random_gap
 
-_CALLABLE: type = Callable  # type: ignore[assignment]
-
 
 def diagnose(
     campaign: Campaign | str | Path,
@@ -79,7 +77,7 @@ def diagnose(
     expected = "a campaign, or the path of one; campaign_from_table makes one of a DataFrame"
     require("diagnose()", campaign, (Campaign, str, os.PathLike), expected)
     require("diagnose(), effects", effects, (list, tuple), "a list of your own effects; names go to only")
-    require("diagnose(), progress", progress, (_CALLABLE,), "a function that takes the words of a stage")
+    require("diagnose(), progress", progress, (Callable,), "a function that takes the words of a stage")
     only, without = _names("only", only), _names("without", without)
     if not isinstance(campaign, Campaign):
         progress("reading the campaign")
