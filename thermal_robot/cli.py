@@ -216,14 +216,15 @@ def _predict(options: argparse.Namespace) -> None:
 
     require_free((options.output,), (options.model, options.samples))
     model = CorrectedModel.load(options.model)
-    samples = model.samples(options.samples)
+    read = read_table(Path(options.samples))
+    samples = model.samples(read)
     if model.counts_anew(samples):
         note(
             f"order in {Path(options.samples).name} counts its own rows; predicted as after the campaign",
             options.loudness,
         )
     prediction = model.prediction(samples, noise=options.noise)
-    own = read_table(Path(options.samples)).frame(numbers=Path(options.output).suffix.lower() in PARQUET)
+    own = read.frame(numbers=Path(options.output).suffix.lower() in PARQUET)
     table = model.predicted(own, prediction)
     write_one(options.output, lambda path: write_predictions(path, table))
 

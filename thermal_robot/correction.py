@@ -12,7 +12,8 @@ from typing import TYPE_CHECKING, Any, overload
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.campaign import Campaign, Settings, read_samples, with_prediction
+from thermal_robot.campaign import Campaign, Settings, read_samples, read_table, with_prediction
+from thermal_robot.campaign.table import Table
 from thermal_robot.effects import Effect
 from thermal_robot.effects.apply import displacement
 from thermal_robot.errors import CampaignError, require
@@ -199,7 +200,7 @@ class CorrectedModel:
             row = int(samples.rows[wrong[0]])
             raise CampaignError(samples.name, "the values of this row lead to no finite position", row=row)
 
-    def samples(self, table: str | Path | pd.DataFrame) -> Campaign:
+    def samples(self, table: str | Path | pd.DataFrame | Table) -> Campaign:
         """Read a table of commands and conditions in the units of the campaign that the model was fitted to.
 
         Raises
@@ -207,8 +208,10 @@ class CorrectedModel:
         CampaignError
             A table that cannot be used.
         """
+        if isinstance(table, (str, os.PathLike)):
+            table = read_table(Path(table))
         samples = read_samples(table, self.settings, self.robot)
-        return replace(samples, name=str(table)) if isinstance(table, (str, os.PathLike)) else samples
+        return replace(samples, name=table.file) if isinstance(table, Table) else samples
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything, the URDF's text and a checksum included, as plain values."""

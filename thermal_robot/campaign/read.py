@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.declaration import FILE_NAME, check_gears, read_declaration
 from thermal_robot.campaign.settings import Settings
+from thermal_robot.campaign.table import Table
 from thermal_robot.campaign.tabular import read_table, table_from_frame
 from thermal_robot.campaign.validate import build_campaign
 from thermal_robot.errors import CampaignError, RobotError, require
@@ -60,14 +61,15 @@ def read_campaign(path: str | Path, *, folder: str | Path | None = None) -> Camp
 
 
 def read_samples(
-    path: str | Path | pd.DataFrame, settings: Settings | Campaign, robot: Robot | None = None
+    path: str | Path | pd.DataFrame | Table, settings: Settings | Campaign, robot: Robot | None = None
 ) -> Campaign:
     """Read a table of commands and conditions to predict.
 
     Parameters
     ----------
     path
-        CSV or Parquet, or the table itself, with the columns and units of the campaign. Measured columns are ignored.
+        CSV or Parquet, or the table itself, already read or a data frame, with the columns and units of the campaign.
+        Measured columns are ignored.
     settings
         Of the campaign that the model was fitted to, or that campaign itself.
     robot
@@ -91,8 +93,9 @@ def read_samples(
     if robot is None:
         raise TypeError("read_samples() needs the robot when it is given settings instead of a campaign")
     if isinstance(path, (str, os.PathLike)):
-        file = Path(path)
-        return build_campaign(read_table(file), settings, robot, name=file.stem, measured=False)
+        path = read_table(Path(path))
+    if isinstance(path, Table):
+        return build_campaign(path, settings, robot, name=Path(path.file).stem, measured=False)
     import pandas as pd
 
     require("read_samples()", path, (pd.DataFrame,), "a table: its path, or a pandas DataFrame")
