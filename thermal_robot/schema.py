@@ -8,6 +8,7 @@ reads a file or takes an argument turns the misfit into a sentence with :func:`f
 from __future__ import annotations
 
 import math
+import sys
 from collections.abc import Callable, Iterable, Mapping
 from numbers import Integral, Real
 from typing import Any, TypeAlias
@@ -236,7 +237,7 @@ def plain(value: Any, path: str) -> Any:
         return value
     if isinstance(value, str):
         return text(empty=True)(value, path)
-    number()(value, path)
+    number(least=-sys.float_info.max, most=sys.float_info.max)(value, path)
     return value
 
 

@@ -65,14 +65,19 @@ def _covariances(fit: Fit, model: Model) -> tuple[Array, Array | None]:
     gram = model.whole[0][:-1, :-1] / variance
     unit = (gram.diagonal() + tight) ** -0.5
     prior, size = np.diag(tight * unit**2), np.outer(unit, unit)
-    inner = np.linalg.inv(gram * size + prior)
+    inner = _symmetric(np.linalg.inv(gram * size + prior))
     moving = np.concatenate([moves(frame_columns(fit.corrected)[1]), np.ones(len(model.tight), dtype=bool)])
     own, form = np.ix_(moving, moving), e.discrepancy.form
     if form is None or form.anew:
         return np.asarray((size * inner)[own]), None
     stack = whitened(model.linear, replace(e.whitening, smooth=None))[:, :-1] * (unit * e.discrepancy.noise / variance)
     alike = Spectrum.of(form, e.whitening.weights, e.whitening.noise).spread(e.discrepancy.tau, stack)
-    return np.asarray((size * inner)[own]), np.asarray((size * (inner @ (alike + prior) @ inner))[own])
+    return np.asarray((size * inner)[own]), np.asarray((size * _symmetric(inner @ (alike + prior) @ inner))[own])
+
+
+def _symmetric(matrix: Array) -> Array:
+    """Return the matrix without what rounding makes it miss its transpose by."""
+    return (matrix + matrix.T) / 2.0
 
 
 def _held_out(fit: Fit, model: Model) -> tuple[Array, NDArray[np.int64]]:
