@@ -145,10 +145,11 @@ def test_what_was_forgotten_is_computed_again(rv_m2):
 def test_a_simulators_word_stands_for_the_urdf(rv_m2, frames):
     """The prediction is the simulator's; what is displaced moves it as it moves the model."""
     plain = measured_exactly(rv_m2, frames)
+    turned = np.random.default_rng(7).normal(size=(12, 4))
     said = replace(
         plain,
         simulated_position=np.random.default_rng(6).normal(size=(12, 3)),
-        simulated_orientation=np.random.default_rng(7).normal(size=(12, 4)),
+        simulated_orientation=turned / np.linalg.norm(turned, axis=1, keepdims=True),
     )
     seen = observe(said, frames)
     np.testing.assert_allclose(seen.position, said.simulated_position, atol=1e-15)

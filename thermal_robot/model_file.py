@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign, Settings
-from thermal_robot.campaign.names import LABELS
+from thermal_robot.campaign.names import LABELS, split_name
 from thermal_robot.campaign.settings import GRAVITY, settings_kind
 from thermal_robot.effects import Effect, gate, library
 from thermal_robot.effects.arguments import with_arguments
@@ -307,12 +307,12 @@ def _any_rows(fields: Mapping[str, Any]) -> Campaign:
     """Return three rows with the columns that a model needs: how many parameters an effect has depends on no more."""
     robot, settings = fields["robot"], fields["settings"]
     lower, upper = np.maximum(robot.lower, -1.0), np.minimum(robot.upper, 1.0)
-    rows = np.arange(3.0)
+    rows = {name: np.arange(3.0) - (split_name(name)[0] == "approach") for name in fields["needs"]}
     return Campaign(
         name="any rows",
         robot=robot,
         q=lower + (upper - lower) * np.array([[0.3], [0.5], [0.8]]),
-        covariates=dict.fromkeys(fields["needs"], rows),
+        covariates=rows,
         simulated_position=np.zeros((3, 3)) if fields["simulated"] else None,
         tool_known=settings.tool_known,
         payload_com=np.array(settings.payload_com),

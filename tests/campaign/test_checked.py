@@ -85,3 +85,26 @@ def test_nothing_measured_is_not_diagnosed(campaign: Campaign) -> None:
     for nothing in (replace(campaign, position=None, orientation=None), campaign.take([])):
         with pytest.raises(CampaignError, match="nothing was measured"):
             diagnose(nothing)
+
+
+@pytest.mark.parametrize(
+    ("changed", "told"),
+    [
+        ({"orientation": np.array([[1.0, 0, 0, 0], [0.0, 0, 0, 0], [0.5, 0, 0, 0]])}, r"'orientation'.* at index 1"),
+        ({"covariates": {"payload": np.array([1.0, 2.0, -3.0])}}, r"'payload': impossible value; found -3 at index 2"),
+        ({"covariates": {"temperature": np.full(3, -300.0)}}, "'temperature': impossible value"),
+        ({"covariates": {"approach.joint_1": np.array([1.0, 0.5, 1.0])}}, "found 0.5 at index 1, expected -1, 0 or 1"),
+        ({"gears": {"joint_22": 100.0}}, r"gears\.joint_22.*did you mean 'joint_2'"),
+    ],
+)
+def test_what_no_table_may_hold_no_campaign_made_by_hand_holds(
+    campaign: Campaign, changed: dict[str, Any], told: str
+) -> None:
+    plain = campaign.take(np.arange(3))
+    with pytest.raises(CampaignError, match=told):
+        replace(plain, **changed)
+
+
+def test_quaternions_of_few_digits_are_orientations(campaign: Campaign) -> None:
+    rounded = np.round(np.full((3, 4), [0.924, 0.383, 0.0, 0.0]), 2)
+    np.testing.assert_array_equal(replace(campaign.take(np.arange(3)), orientation=rounded).orientation, rounded)

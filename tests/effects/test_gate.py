@@ -142,6 +142,15 @@ def test_what_is_no_effect_is_refused(observations):
         checked("joint_offset", observations)
 
 
+@pytest.mark.parametrize("spread", ["wide", 0.0, -1.0, np.nan, np.inf, None])
+def test_the_spread_of_a_size_is_a_number(observations, spread):
+    class Vague(JointOffset):
+        size_spread = spread
+
+    with pytest.raises(EffectError, match=r"size_spread is .*, expected a number above 0"):
+        checked(Vague(), observations)
+
+
 def test_columns_come_through_the_gate(observations):
     with pytest.raises(EffectError, match=r"'sagging'.*not finite"):
         block(observations, Answers(WRONG["nan"][0]))

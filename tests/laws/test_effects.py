@@ -174,7 +174,8 @@ def assert_reads_what_it_follows(campaign, effect):
         before = predicted(campaign, frames, setting, values)
         follows = set()
         for column, recorded in campaign.covariates.items():
-            other = {**campaign.covariates, column: 1.3 * recorded[::-1] + 0.17}
+            changed = -recorded if column.startswith("approach.") else 1.3 * recorded[::-1] + 0.17
+            other = {**campaign.covariates, column: changed}
             after = predicted(replace(campaign, covariates=other), frames, setting, values)
             if any(not np.array_equal(b, a) for b, a in zip(before, after, strict=True)):
                 follows.add(column)

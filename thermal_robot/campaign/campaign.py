@@ -12,6 +12,9 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from thermal_robot.campaign.checked import (
+    check_covariate,
+    check_joints,
+    check_quaternions,
     checked_array,
     checked_mapping,
     checked_noise,
@@ -164,6 +167,16 @@ class Campaign:
             object.__setattr__(self, key, checked_sizes(file, key, getattr(self, key)))
         warmth = checked_number(file, "reference_temperature", self.reference_temperature)
         object.__setattr__(self, "reference_temperature", warmth)
+        self._require_possible(file)
+
+    def _require_possible(self, file: str) -> None:
+        """Refuse what no table may say either."""
+        for name, values in self.covariates.items():
+            check_covariate(file, name, values)
+        for key in ("orientation", "simulated_orientation"):
+            if getattr(self, key) is not None:
+                check_quaternions(file, key, getattr(self, key))
+        check_joints(file, "gears", self.gears, self.robot.joint_names)
 
     def _require_kinds(self, file: str) -> None:
         """Refuse what is not of its kind, and has no shape."""

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.campaign.figures import LARGEST_COMMAND, SMALLEST, first_beyond, settled
+from thermal_robot.campaign.figures import LARGEST_COMMAND, SMALLEST, first_beyond, impossible, no_orientation, settled
+from thermal_robot.campaign.names import did_you_mean, listed
 from thermal_robot.errors import CampaignError
 from thermal_robot.schema import LARGEST
 
@@ -59,6 +60,49 @@ def checked_array(file: str, key: str, value: Any, shape: tuple[int, ...], kind:
         array = array.copy()
         array.flags.writeable = False
     return array
+
+
+def check_quaternions(file: str, key: str, quaternions: NDArray[np.float64]) -> None:
+    """Refuse (N, 4) quaternions of which one is no orientation.
+
+    Raises
+    ------
+    CampaignError
+        Naming the first.
+    """
+    row = no_orientation(quaternions)
+    if row is not None:
+        found, expected = f"{quaternions[row]} at index {row}", "qw, qx, qy, qz of length 1"
+        raise CampaignError(file, "no orientation", column=key, found=found, expected=expected)
+
+
+def check_covariate(file: str, name: str, values: NDArray[np.float64]) -> None:
+    """Refuse (N,) numbers that cannot be what their name says.
+
+    Raises
+    ------
+    CampaignError
+        Naming the first.
+    """
+    wrong = impossible(name, values)
+    if wrong:
+        row, expected = wrong
+        found = f"{values[row]:.15g} at index {row}"
+        raise CampaignError(file, "impossible value", column=name, found=found, expected=expected)
+
+
+def check_joints(file: str, key: str, named: Iterable[str], joints: tuple[str, ...]) -> None:
+    """Refuse what is stated of a joint that the chain does not have.
+
+    Raises
+    ------
+    CampaignError
+        Naming it, and the nearest joint of the chain.
+    """
+    for joint in named:
+        if joint not in joints:
+            problem = f"the chain has no such joint{did_you_mean(joint, joints)}"
+            raise CampaignError(file, problem, column=f"{key}.{joint}", expected=f"one of {listed(joints)}")
 
 
 def checked_number(file: str, key: str, value: Any, *, least: float = -LARGEST, expected: str = "a number") -> float:

@@ -10,21 +10,18 @@ from numpy.typing import NDArray
 
 from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign, FloatArray
-from thermal_robot.campaign.figures import LARGEST_COMMAND, first_beyond
+from thermal_robot.campaign.figures import LARGEST_COMMAND, first_beyond, impossible, no_orientation
 from thermal_robot.campaign.fill import fill
 from thermal_robot.campaign.names import CLOCK, split_name
 from thermal_robot.campaign.plausible import doubts
 from thermal_robot.campaign.recognise import Columns, recognise
-from thermal_robot.campaign.settings import ABSOLUTE_ZERO, Settings
+from thermal_robot.campaign.settings import Settings
 from thermal_robot.campaign.table import Table
 from thermal_robot.campaign.turning import arrivals
 from thermal_robot.campaign.units import Units, covariate_scale
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot
 
-QUATERNION_TOLERANCE = 0.1
-"""A quaternion whose length differs from 1 by more is a mistake, not a rounding: four parts that are written with one
-decimal change the length by at most 0.05 · √4."""
 MINIMUM_POSES = 3
 """Distinct configurations without which a rigid frame can turn about the line through two points."""
 SAME_CONFIGURATION = 9
@@ -149,17 +146,9 @@ def _clock(table: Table, columns: Columns) -> FloatArray | None:
 
 def _check_covariate(table: Table, column: str, values: NDArray[np.float64]) -> None:
     """Refuse numbers that cannot be what the column says; NaN passes."""
-    quantity, place = split_name(column)
-    if quantity == "approach" and place:
-        refused, expected = ~np.isin(values, (-1.0, 0.0, 1.0)) & ~np.isnan(values), "-1, 0 or 1"
-    elif column == "payload":
-        refused, expected = values < 0, "a mass in kg that is not negative"
-    elif quantity == "temperature":
-        refused, expected = values < ABSOLUTE_ZERO, "°C"
-    else:
-        return
-    if refused.any():
-        index = int(np.argmax(refused))
+    wrong = impossible(column, values)
+    if wrong:
+        index, expected = wrong
         raise CampaignError(
             table.file,
             "impossible value",
@@ -180,9 +169,8 @@ def _quaternions(table: Table, group: Sequence[str]) -> FloatArray:
     """(N, 4) unit quaternions wxyz."""
     quaternions: FloatArray = np.column_stack([table.numbers(column) for column in group])
     lengths = np.linalg.norm(quaternions, axis=1)
-    refused = np.abs(lengths - 1.0) > QUATERNION_TOLERANCE
-    if refused.any():
-        index = int(np.argmax(refused))
+    index = no_orientation(quaternions)
+    if index is not None:
         raise CampaignError(
             table.file,
             "no orientation: the quaternion's length is not 1",

@@ -89,7 +89,11 @@ def _is_what_it_holds(effect: Any) -> bool:
 
 def _parameters(effect: Effect, observations: Observations) -> tuple[Parameter, ...]:
     """Return all parameters of an effect, seen to keep the contract."""
-    return _seen(effect, _asked(effect, "parameters", observations), observations)
+    answer = _asked(effect, "parameters", observations)
+    spread: Any = effect.size_spread
+    if not isinstance(spread, (int, float)) or not 0.0 < spread < np.inf:
+        raise EffectError(f"effect {effect.name!r}: size_spread is {spread!r}, expected a number above 0")
+    return _seen(effect, answer, observations)
 
 
 def independent(effect: Effect, observations: Observations) -> tuple[Parameter, ...]:
