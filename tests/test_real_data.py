@@ -69,7 +69,6 @@ def test_ipa_ur10_a_is_geometric_and_more(ipa_ur10_a):
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(reason="3.1 GiB since what is left has forms; 1.2 before that", strict=False)
 def test_eleven_thousand_poses_take_two_gigabytes_at_most(ipa_ur10_a):
     peak = ipa_ur10_a[1]
     print(f"ipa_ur10_a: {peak / 2**30:.2f} GiB")

@@ -101,5 +101,5 @@ def test_a_second_copy_is_the_first_to_the_last_letter(tmp_path: Path) -> None:
 def test_predictions_keep_every_digit(tmp_path: Path) -> None:
     positions = np.random.default_rng(4).normal(size=(50, 3))
     write_predictions(tmp_path / "p.csv", predicted(positions))
-    again = pd.read_csv(tmp_path / "p.csv")
+    again = pd.read_csv(tmp_path / "p.csv", dtype=str).astype(float)
     np.testing.assert_array_equal(again[["x", "y", "z"]], positions)
