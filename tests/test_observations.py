@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 from helpers import commanded, without_masses
 
+from thermal_robot import observations
 from thermal_robot.campaign import Campaign
 from thermal_robot.kinematics import (
     Displacement,
@@ -140,6 +141,16 @@ def test_what_was_forgotten_is_computed_again(rv_m2):
     assert held - set(vars(seen)) == {"chain", "segment_sensitivity"}
     assert seen.segment_sensitivity is not before
     np.testing.assert_array_equal(seen.segment_sensitivity, before)
+
+
+def test_few_observations_hold_their_kinematics_at_once(rv_m2, monkeypatch):
+    campaign = commanded(rv_m2)
+    monkeypatch.setattr(observations, "HELD_ROWS", 3 * campaign.samples)
+    several = [observe(campaign) for _ in range(4)]
+    alike = [seen.segment_sensitivity for seen in several]
+    assert ["chain" in vars(seen) for seen in several] == [False, True, True, True]
+    np.testing.assert_array_equal(several[0].segment_sensitivity, alike[0])
+    assert ["chain" in vars(seen) for seen in several] == [True, False, True, True]
 
 
 def test_a_simulators_word_stands_for_the_urdf(rv_m2, frames):

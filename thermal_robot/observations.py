@@ -10,6 +10,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
+from weakref import ref
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,6 +31,10 @@ from thermal_robot.kinematics import (
 from thermal_robot.robot import Robot
 
 Array = NDArray[np.float64]
+
+HELD_ROWS = 60_000
+"""Rows of all observations together that hold frames and sensitivities: 3 kB each. A diagnosis has ten observations of
+its rows; what those that were not asked lately held is computed again in less than a second."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,17 +127,15 @@ class Observations:
         return values is not None and len(values) > 0 and bool(np.ptp(values) > 0)
 
     def forget(self) -> None:
-        """Free what was computed from the fields; it is computed again when it is asked for.
-
-        What a fit was made at stays with it, and the sensitivities of several fits would fill the memory.
-        """
+        """Free what was computed from the fields; it is computed again when it is asked for."""
         for name in [name for name in vars(self) if isinstance(getattr(type(self), name, None), cached_property)]:
-            del vars(self)[name]
+            vars(self).pop(name, None)
         self.parameters.clear()
 
     @cached_property
     def chain(self) -> ChainFrames:
         """Frames along the chain, root frame, displaced by what is known so far."""
+        _hold(self)
         return chain_frames(self.robot, self.q, self.displacement)
 
     @cached_property
@@ -212,6 +215,19 @@ class Observations:
         return _twist_map(self.chain.tool_rotation, self.lever)
 
 
+_HOLDING: list[ref[Observations]] = []
+
+
+def _hold(observations: Observations) -> None:
+    """Let those that ran their kinematics longest ago forget them, until all together hold few enough rows."""
+    holding = [found for each in _HOLDING if (found := each()) is not None and "chain" in vars(found)]
+    rows = observations.campaign.samples + sum(found.campaign.samples for found in holding)
+    while holding and rows > HELD_ROWS:
+        rows -= holding[0].campaign.samples
+        holding.pop(0).forget()
+    _HOLDING[:] = [*map(ref, holding), ref(observations)]
+
+
 def _twist_map(axes: Array, arm: Array) -> Array:
     """Twist at a point ``arm`` away from a frame with the given axes: [[R, −[arm]× R], [0, R]] in rows of 6."""
     mapped = np.zeros((len(arm), 6, 6))
@@ -267,5 +283,6 @@ def observe(
             turn = chain.tool_rotation @ nominal.tool_rotation.transpose(0, 2, 1)
             rotation = turn @ quaternion_to_rotation(campaign.simulated_orientation)
     found = Observations(campaign, frames, position, rotation, instrument, displacement)
+    _hold(found)
     vars(found)["chain"] = chain  # as the property would find it
     return found

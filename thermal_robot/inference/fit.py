@@ -176,7 +176,6 @@ def _fitted(
     explanation = settled.explanation
     nominal = observe(campaign, register(campaign, ~explanation.outliers))
     before = Linear(nominal.gap, frame_columns(nominal)[0], ())
-    nominal.forget()
     corrected = settled.observations if settled.held else nominal
     return Fit(campaign, nominal, before, corrected, explanation, settled.held, settled.families, needs, variants)
 

@@ -120,9 +120,7 @@ def settle(
         stays = [e for e, _ in finer] == [e for e, _ in held] and set(explanation.best.blocks) == set(chosen)
         held, last = finer, revision == revisions or (revision > 0 and stays)
         least = settings.SETTLED_BETWEEN if many and not last else settings.SETTLED
-        before_step = observations
         observations, held = gauss_newton(campaign, observations.frames, explanation, held, least, since)
-        before_step.forget()
         if last:
             break
         before = explanation
