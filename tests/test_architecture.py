@@ -36,6 +36,7 @@ ORDER = (
     "streams",
     "parser",
     "blind",
+    "commands",
     "cli",
     "__main__",
 )

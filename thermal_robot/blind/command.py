@@ -21,6 +21,8 @@ from thermal_robot.files import require_free, write_one, write_text
 if TYPE_CHECKING:
     from thermal_robot.blind.trial import RealCase
 
+DOES = "run the blind trial: effects are withheld, then named"
+EXAMPLE = " --seed 7 --report trial.html"
 KINDS: tuple[str, ...] = get_args(Kind)
 ALWAYS = ("single", "null")
 """Kinds that can be asked with any one effect."""
@@ -61,6 +63,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", metavar="F", help="write the score as JSON ('-' prints it instead of the text)")
     parser.add_argument("--report", metavar="F.html", help="write a page with the score")
     parser.add_argument("--markdown", action="store_true", help="print the tables of the README instead of the text")
+    parser.set_defaults(run=run, writes=("json", "report"))
 
 
 def run(options: argparse.Namespace) -> None:

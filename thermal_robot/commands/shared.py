@@ -1,0 +1,52 @@
+"""What several commands have in common: a campaign that is named, a text that is printed, a page that is written."""
+
+from __future__ import annotations
+
+import argparse
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from thermal_robot.console import QUIET, stages
+from thermal_robot.files import write_text
+
+if TYPE_CHECKING:
+    from thermal_robot.campaign import Campaign
+    from thermal_robot.diagnosis import Diagnosis
+
+CAMPAIGN = "campaign.toml, its folder, or - for standard input (paths in it are then those of the current folder)"
+
+
+def tell(options: argparse.Namespace, text: str, brief: str = "") -> None:
+    """Print the text, or what is left of it where little was asked for; nothing where a file takes its place."""
+    said = brief if options.loudness == QUIET else text
+    if said and not options.printed:
+        print(said)
+
+
+def read(options: argparse.Namespace) -> Campaign:
+    """Read the campaign that was named."""
+    from thermal_robot.campaign import read_campaign
+
+    return read_campaign(options.campaign, folder=folder(options))
+
+
+def folder(options: argparse.Namespace) -> Path | None:
+    """Return the folder that a campaign's paths start from where it is not that of its file."""
+    return Path() if options.piped else None
+
+
+def diagnosis(options: argparse.Namespace) -> Diagnosis:
+    """Diagnose the campaign that was named, telling the stages."""
+    from thermal_robot.diagnosis import diagnose
+
+    with stages(options.loudness) as progress:
+        progress("reading the campaign")
+        return diagnose(read(options), only=options.only, without=options.without, progress=progress)
+
+
+def page(found: Diagnosis, path: Path) -> None:
+    """Write the page of a diagnosis, with the hour in its footer."""
+    from thermal_robot.report import html
+
+    write_text(path, html(found, generated=time.strftime("%Y-%m-%d %H:%M")))
