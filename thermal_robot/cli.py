@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 
 from thermal_robot.blind import command as blind
-from thermal_robot.commands import check, demo, diagnose, effects, paper, predict
+from thermal_robot.commands import check, correct, demo, diagnose, effects, paper, predict
 from thermal_robot.console import NORMAL, add_loudness, heard
 from thermal_robot.errors import ThermalRobotError
 from thermal_robot.parser import BAD_INPUT, DONE, FAILED, INTERRUPTED, STATUSES, Parser
@@ -21,6 +21,7 @@ COMMANDS = {
     "effects": effects,
     "diagnose": diagnose,
     "predict": predict,
+    "correct": correct,
     "paper": paper,
     "blind": blind,
 }

@@ -83,3 +83,19 @@ def test_known_quaternion():
     # a quarter turn about z carries x to y
     rotation = kin.quaternion_to_rotation([np.sqrt(0.5), 0.0, 0.0, np.sqrt(0.5)])
     np.testing.assert_allclose(rotation @ [1.0, 0.0, 0.0], [0.0, 1.0, 0.0], atol=1e-15)
+
+
+def test_roll_pitch_and_yaw_are_a_rotation_about_fixed_axes():
+    angles = RNG.uniform([-3, -1.5, -3], [3, 1.5, 3], (200, 3))
+    for roll, pitch, yaw in angles:
+        rotation = pinocchio.rpy.rpyToMatrix(roll, pitch, yaw)
+        np.testing.assert_allclose(kin.rotation_to_rpy(rotation), [roll, pitch, yaw], atol=2e-14)
+
+
+@pytest.mark.parametrize("away", [0.0, 1e-16, 1e-9, 1e-5])
+def test_roll_pitch_and_yaw_together_give_the_rotation_at_a_quarter_turn(away):
+    for roll, yaw in RNG.uniform(-3, 3, (50, 2)):
+        for side in (1.0, -1.0):
+            rotation = pinocchio.rpy.rpyToMatrix(roll, side * (np.pi / 2 - away), yaw)
+            again = pinocchio.rpy.rpyToMatrix(kin.rotation_to_rpy(rotation))
+            np.testing.assert_allclose(again, rotation, atol=1e-15)

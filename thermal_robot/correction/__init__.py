@@ -1,5 +1,20 @@
 """The robot as it really is: the corrected model, and what follows from it for commands and for robot files."""
 
+from thermal_robot.correction.calibrated import Calibrated, calibrated
+from thermal_robot.correction.calibrated_mjcf import calibrated_mjcf
+from thermal_robot.correction.calibrated_urdf import calibrated_urdf
+from thermal_robot.correction.determined import determined
+from thermal_robot.correction.dh_table import dh_table
 from thermal_robot.correction.model import CorrectedModel
+from thermal_robot.correction.zero_offsets import zero_offsets
 
-__all__ = ["CorrectedModel"]
+__all__ = [
+    "Calibrated",
+    "CorrectedModel",
+    "calibrated",
+    "calibrated_mjcf",
+    "calibrated_urdf",
+    "determined",
+    "dh_table",
+    "zero_offsets",
+]

@@ -74,7 +74,7 @@ def divided(fit: Fit, name: str) -> tuple[Portion, ...]:
     listed = [(e.name, p) for e in inside for p in gate.checked(e, fit.corrected)] + [(name, p) for p in rest]
     of, wanted = zip(*listed, *((name, p) for p in item.parameters), strict=True)  # whatever the list does not do
     seen, across, within = _coordinates(fit, item, wanted)
-    kept = _kept(across, within)
+    kept = distinct(across, within)
     free = np.array([of[k] != name for k in kept])
     sizes = np.array([p.size for p in wanted])[kept]
     told, covariance, prior = _freed(
@@ -137,7 +137,7 @@ def _coordinates(fit: Fit, item: Block, wanted: Sequence[Parameter]) -> tuple[Ar
     return problem.bases[0], across, left < np.maximum(settings.CONTAINED * length, settings.CONTAINED_LEFT)
 
 
-def _kept(across: Array, within: NDArray[np.bool_]) -> list[int]:
+def distinct(across: Array, within: NDArray[np.bool_]) -> list[int]:
     """Return the numbers of the columns that are independent of those before them, as many as there are rows."""
     basis = np.zeros((len(across), 0))
     kept: list[int] = []

@@ -4,7 +4,15 @@ from thermal_robot.kinematics.augmented import AugmentedModel, augmented_model, 
 from thermal_robot.kinematics.frames import ChainFrames, Displacement, chain_frames, tool_poses
 from thermal_robot.kinematics.gravity import gravity_torques, segment_loads, static_regressor
 from thermal_robot.kinematics.jacobians import frame_jacobians, placement_sensitivities
-from thermal_robot.kinematics.lie import align, exp3, exp6, log3, quaternion_to_rotation, rotation_to_quaternion
+from thermal_robot.kinematics.lie import (
+    align,
+    exp3,
+    exp6,
+    log3,
+    quaternion_to_rotation,
+    rotation_to_quaternion,
+    rotation_to_rpy,
+)
 
 __all__ = [
     "AugmentedModel",
@@ -23,6 +31,7 @@ __all__ = [
     "placement_sensitivities",
     "quaternion_to_rotation",
     "rotation_to_quaternion",
+    "rotation_to_rpy",
     "segment_loads",
     "static_regressor",
     "tool_poses",

@@ -156,6 +156,31 @@ def rotation_to_quaternion(rotations: ArrayLike) -> Array:
     return quaternion
 
 
+def rotation_to_rpy(rotation: ArrayLike) -> Array:
+    """Find roll, pitch and yaw of a rotation, R = Rz(yaw) Ry(pitch) Rx(roll), as a URDF wants them.
+
+    At a pitch of ±90° roll and yaw are not unique, and near it neither is well determined; roll is then found of what
+    the yaw leaves, so that the three together give the rotation to rounding.
+
+    Parameters
+    ----------
+    rotation
+        (3, 3).
+
+    Returns
+    -------
+    ndarray
+        (3,) rad.
+    """
+    r = np.asarray(rotation, dtype=float)
+    yaw = np.arctan2(r[1, 0], r[0, 0])
+    cosine, sine = np.cos(yaw), np.sin(yaw)
+    pitch = np.arctan2(-r[2, 0], cosine * r[0, 0] + sine * r[1, 0])
+    # the second row of Rz(−yaw) R = Ry(pitch) Rx(roll) is (0, cos roll, −sin roll)
+    across = cosine * r[1] - sine * r[0]
+    return np.array([np.arctan2(-across[2], across[1]), pitch, yaw])
+
+
 def _rodrigues_coefficients(vectors: Array) -> tuple[Array, Array, Array]:
     """Sin θ/θ, (1 − cos θ)/θ², (θ − sin θ)/θ³, each (..., 1, 1)."""
     angle = np.linalg.norm(vectors, axis=-1)[..., None, None]

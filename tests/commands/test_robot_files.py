@@ -1,0 +1,58 @@
+"""The files of the calibrated robot that the command line writes."""
+
+import numpy as np
+import pandas as pd
+from commanded import refused
+from readers import by_mujoco, held
+
+from thermal_robot import CorrectedModel
+from thermal_robot.commands import robot_files
+from thermal_robot.correction import calibrated
+from thermal_robot.kinematics import tool_poses
+from thermal_robot.robot import load_robot
+
+
+def test_every_file_holds_the_same_robot(run, diagnosed, tmp_path):
+    files = {name: tmp_path / f"{name}.{'csv' if name in ('dh', 'offsets') else 'xml'}" for name in robot_files.OUTPUTS}
+    options = [word for name, file in files.items() for word in (f"--{name}", file)]
+    assert run("correct", diagnosed.model, *options, "--temperature", "30") == (0, "", "")
+    model = CorrectedModel.load(diagnosed.model)
+    q = np.zeros((1, 5))
+    poses, displaced = tool_poses(load_robot(files["urdf"], "tool0_target"), q), calibrated(model, temperature=30.0)
+    expected = tool_poses(model.robot, q, displaced.displacement) @ model.frames.tool
+    np.testing.assert_allclose(poses, expected, atol=1e-12)
+    seen = by_mujoco(files["mjcf"].read_text(), "base_link", "tool0_target", held(model.robot, q))
+    np.testing.assert_allclose(list(seen), poses, atol=1e-9)
+    table = pd.read_csv(files["dh"])
+    assert list(table["joint"]) == ["base_link", *model.robot.joint_names, "tool0"]
+    assert set(table["convention"]) == {"standard"}
+    assert "d [mm]" in table
+    assert list(pd.read_csv(files["offsets"])["joint"]) == list(model.robot.joint_names)
+    assert "at 30 °C" in files["urdf"].read_text(encoding="utf-8")
+
+
+def test_a_file_of_a_robot_is_printed(run, diagnosed, tmp_path):
+    assert run("correct", diagnosed.model, "--urdf", tmp_path / "r.urdf")[0] == 0
+    assert run("correct", diagnosed.model, "--urdf", "-") == (0, (tmp_path / "r.urdf").read_text(encoding="utf-8"), "")
+    status, out, _ = run("correct", diagnosed.model, "--dh", "-", "--modified")
+    assert status == 0
+    assert out.startswith("convention,joint,type,")
+    assert "\nmodified," in out
+
+
+def test_what_is_left_out_is_listed(run, diagnosed, tmp_path):
+    few, all_ = tmp_path / "few.urdf", tmp_path / "all.urdf"
+    assert run("correct", diagnosed.model, "--urdf", few, "--min-sigma", "1e6", "--temperature", "25")[0] == 0
+    assert run("correct", diagnosed.model, "--urdf", all_, "--temperature", "25")[0] == 0
+    assert "Left out, as they are less than 1e+06 standard deviations from zero:\n" in few.read_text(encoding="utf-8")
+    assert "Written here: nothing" in few.read_text(encoding="utf-8")
+    assert "Left out" not in all_.read_text(encoding="utf-8")
+
+
+def test_options_that_make_no_sense_are_refused(run, diagnosed, tmp_path):
+    model, out = diagnosed.model, tmp_path / "r.urdf"
+    refused(run("correct", model, "--urdf", out, "--min-sigma", "-1"), "min_sigma", "standard deviations")
+    refused(run("correct", model, "--urdf", out, "--temperature", "-400"), "temperature", "°C")
+    refused(run("correct", model, "--from-mjcf", model, "--urdf", out), "--mjcf")
+    refused(run("correct", model, "--mjcf", out, "--from-mjcf", tmp_path / "no.xml"), "no.xml")
+    assert not out.exists()

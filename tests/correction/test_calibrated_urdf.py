@@ -1,0 +1,84 @@
+"""The calibrated URDF: every reader sees the corrected model in it, and its text is the user's own."""
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from readers import READERS, displaced, held, model_of
+from simulate import simulate
+
+from thermal_robot import diagnose
+from thermal_robot.correction import calibrated, calibrated_urdf
+from thermal_robot.effects import JointOffset
+from thermal_robot.kinematics import Displacement, tool_poses
+from thermal_robot.robot import load_robot
+
+ROWS = 12
+
+
+@pytest.mark.parametrize("reader", READERS)
+def test_every_reader_sees_the_displaced_robot(arm, reader, configurations):
+    robot = displaced(arm, seed=1)
+    q = configurations(arm, ROWS, seed=2)
+    expected = tool_poses(arm, q, robot.displacement) @ robot.target
+    text = calibrated_urdf(robot)
+    seen = READERS[reader](text, arm.root_frame, f"{arm.tool_frame}_target", held(arm, q))
+    np.testing.assert_allclose(list(seen), expected, rtol=0, atol=1e-9)
+
+
+def test_a_mimicking_joint_follows_where_the_other_really_is(arm, configurations):
+    robot = displaced(arm, seed=3)
+    q = configurations(arm, ROWS, seed=4)
+    again = load_robot(calibrated_urdf(robot), arm.tool_frame, root_frame=arm.root_frame)
+    assert again.joint_names == arm.joint_names
+    np.testing.assert_array_equal(again.lower, arm.lower)
+    np.testing.assert_allclose(tool_poses(again, q), tool_poses(arm, q, robot.displacement), rtol=0, atol=1e-12)
+
+
+def test_all_else_stands_as_it_stood(arm):
+    robot = displaced(arm, seed=5, target=False)
+    after = re.sub(r"<!--\nCalibrated by.*?-->\n", "", calibrated_urdf(robot), count=1, flags=re.DOTALL)
+    assert re.findall("<!--.*?-->", after, re.DOTALL) == re.findall("<!--.*?-->", arm.urdf, re.DOTALL)
+    after, before = (re.sub("<!--.*?-->", "", text, flags=re.DOTALL) for text in (after, arm.urdf))
+    places = re.compile(r"(<joint\b(?:(?!</joint>).)*?)(<origin\b[^>]*>\s*)", re.DOTALL)
+    assert places.sub(r"\1", after) == places.sub(r"\1", before)
+    moved = {name for name, text in joints(after).items() if text != joints(before)[name]}
+    assert moved == {segment.name for segment in arm.segments}
+
+
+def joints(urdf):
+    return {re.search(r'name="([^"]*)"', j)[1]: j for j in re.findall(r"<joint\s[^>]*type.*?</joint>", urdf, re.DOTALL)}
+
+
+def test_a_sound_robot_is_written_as_it_is(rv_m2):
+    robot = replace(displaced(rv_m2, 0, target=False), displacement=Displacement(np.zeros(5), np.zeros((7, 6))))
+    text = calibrated_urdf(robot)
+    assert text.endswith(rv_m2.urdf[rv_m2.urdf.index("<robot") :])
+    assert "Written here: nothing" in text
+
+
+@pytest.mark.parametrize("frame", ["base", None])
+def test_a_turn_of_a_quarter_in_pitch_and_a_zero_of_any_size(awkward_urdf, frame, configurations):
+    text = awkward_urdf.replace('rpy="0.5 0.6 0.7"', f'rpy="0.5 {np.pi / 2!r} 0.7"')
+    robot = load_robot(text, "tip", root_frame=frame)
+    model = model_of(robot, (JointOffset(), np.linspace(-2.0, 2.0, robot.n)))
+    q = configurations(robot, ROWS)
+    again = load_robot(calibrated_urdf(calibrated(model)), "tip", root_frame=frame)
+    np.testing.assert_allclose(tool_poses(again, q), tool_poses(robot, q + np.linspace(-2, 2, robot.n)), atol=1e-12)
+
+
+@pytest.mark.parametrize("kind", ["joint_offset", "geometric", "thermal_elongation"])
+def test_the_written_robot_predicts_what_its_model_does(rv_m2, kind):
+    """Of a campaign of one such effect the URDF alone, at one temperature, is the corrected model."""
+    campaign, _, (fresh, _) = simulate(rv_m2, [kind], seed=1, fresh=60)
+    model = diagnose(campaign, only=[kind]).model
+    warm = replace(fresh, covariates={**fresh.covariates, "temperature": np.full(60, 31.0)})
+    robot = calibrated(model, temperature=31.0)
+    assert robot.kept == ()
+    again = load_robot(calibrated_urdf(robot), "tool0_target")
+    poses = robot.base @ tool_poses(again, warm.q)
+    predicted = model.predict(warm)[0]
+    np.testing.assert_allclose(poses[:, :3, 3], predicted, rtol=0, atol=1e-9)
+    plain = tool_poses(rv_m2, warm.q) @ model.frames.tool
+    assert np.abs((model.frames.base @ plain)[:, :3, 3] - predicted).max() > 1e-5

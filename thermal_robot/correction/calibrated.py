@@ -1,0 +1,150 @@
+"""The calibrated robot: what of a model a robot file can hold, and what of it stays in the model."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.correction.constant import Told, constant
+from thermal_robot.correction.determined import determined
+from thermal_robot.correction.model import CorrectedModel
+from thermal_robot.kinematics import Displacement, exp6
+from thermal_robot.kinematics.model import PRISMATIC
+from thermal_robot.kinematics.rewritten import xyz_rpy
+from thermal_robot.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Calibrated:
+    """A robot with what of a corrected model is the same in all configurations, at one temperature.
+
+    Attributes
+    ----------
+    robot
+        The nominal one.
+    displacement
+        What displaces its joints (n,) and segments (S, 6); nothing of the base and the tool.
+    base
+        (4, 4) pose of the root frame in the measurement frame.
+    target
+        (4, 4) pose of the measured target in the tool frame.
+    temperature
+        °C at which its lengths hold.
+    held, undetermined, kept
+        Parameters of the model that are in it; that were left out, as the data do not determine them; and that no robot
+        file can hold, so that they stay in the model.
+    min_sigma
+        Standard deviations that those in it are away from zero at least; ``None`` where nobody asked.
+    """
+
+    robot: Robot
+    displacement: Displacement
+    base: Array
+    target: Array
+    temperature: float
+    held: tuple[Told, ...]
+    undetermined: tuple[Told, ...]
+    kept: tuple[Told, ...]
+    min_sigma: float | None = None
+
+    @property
+    def joints(self) -> Array:
+        """(M,) rad or m by which each movable joint stands elsewhere; one that mimics another follows that one."""
+        return np.asarray(self.robot.chain.coupling.matrix @ np.asarray(self.displacement.joint))
+
+    @property
+    def placements(self) -> Array:
+        """(K, 4, 4) of the chain's elements in the frames of their parent links: P exp(ξ) exp(axis · zero offset)."""
+        chain, segments = self.robot.chain, np.asarray(self.displacement.segment)
+        placed = np.tile(np.eye(4), (len(chain.names), 1, 1))
+        placed[:, :3, :3], placed[:, :3, 3] = chain.rotations, chain.translations
+        for s, k in enumerate(chain.placed):
+            placed[k] = placed[k] @ exp6(segments[s])
+        for j, k in enumerate(chain.movable):
+            placed[k] = placed[k] @ exp6(unit_twist(self.robot, int(k)) * self.joints[j])
+        return placed
+
+    @property
+    def origins(self) -> Mapping[str, Array]:
+        """(4, 4) placement by name of the joints that stand elsewhere than on the nominal robot."""
+        chain = self.robot.chain
+        moved = {*chain.placed[np.asarray(self.displacement.segment).any(axis=1)], *chain.movable[self.joints != 0.0]}
+        placed = enumerate(zip(chain.names, self.placements, strict=True))
+        return {name: pose for k, (name, pose) in placed if k in moved}
+
+    @property
+    def links(self) -> Mapping[str, tuple[str, Array]]:
+        """The link of the target, where that is not the tool frame itself: what carries it, and its placement there."""
+        tool = self.robot.tool_frame
+        return {f"{tool}_target": (tool, self.target)} if (self.target != np.eye(4)).any() else {}
+
+    def notes(self, holds: str) -> list[str]:
+        """Return what a reader of a robot file must know, in lines; ``holds`` names such a file."""
+        xyz, rpy = xyz_rpy(self.base)
+        lines = [
+            f"Calibrated by thermal_robot: the robot {self.robot.name!r} from {self.robot.root_frame!r} to "
+            f"{self.robot.tool_frame!r} as it was measured, at {self.temperature:g} °C. All in m, rad, K and s.",
+            f"In the measurement frame {self.robot.root_frame!r} stands at xyz=({xyz}) rpy=({rpy}).",
+            *(f"The measured target is the link {link!r}." for link in self.links),
+            "Joint positions are those that are commanded, and so are the limits: they stay as they were.",
+        ]
+        parts = {"Written here:": self.held}
+        if self.min_sigma is not None:
+            small = f"Left out, as they are less than {self.min_sigma:g} standard deviations from zero:"
+            parts[small] = self.undetermined
+        parts[f"Not written, as {holds} cannot hold them; they stay in the model:"] = self.kept
+        for title, told in parts.items():
+            lines += [title, *(f"  {each}" for each in told)] if told else [f"{title} nothing"]
+        return lines
+
+
+def calibrated(
+    model: CorrectedModel, *, temperature: float | None = None, min_sigma: float | None = None
+) -> Calibrated:
+    """Return the calibrated robot of a corrected model.
+
+    Parameters
+    ----------
+    model
+        The corrected model.
+    temperature
+        °C at which lengths are to hold, where the model says how they grow; by default the campaign's reference
+        temperature, at which those of the nominal robot hold.
+    min_sigma
+        Keep only what is so many standard deviations from zero (:func:`~thermal_robot.correction.determined`); all
+        where absent.
+
+    Raises
+    ------
+    CampaignError
+        If the temperature is none, or the model does not say what is determined.
+    """
+    gone: tuple[Told, ...] = ()
+    if min_sigma is not None:
+        model, gone = determined(model, min_sigma, temperature)
+    found = constant(model, temperature)
+    moved = found.displacement
+    left_out = {(told.effect, told.parameter) for told in gone}
+    held = [told for told, own in zip(found.parameters, found.held, strict=True) if own]
+    return Calibrated(
+        robot=model.robot,
+        displacement=Displacement(moved.joint, moved.segment),
+        base=model.frames.base @ exp6(np.asarray(moved.base)),
+        target=exp6(np.asarray(moved.tool)) @ model.frames.tool,
+        temperature=found.temperature,
+        held=tuple(told for told in held if (told.effect, told.parameter) not in left_out),
+        undetermined=gone,
+        kept=tuple(told for told, own in zip(found.parameters, found.held, strict=True) if not own),
+        min_sigma=min_sigma,
+    )
+
+
+def unit_twist(robot: Robot, element: int) -> Array:
+    """(6,) twist of a chain's element a unit of its motion, in its own frame; zero for a fixed one."""
+    axis, slides = robot.chain.axes[element], robot.chain.kinds[element] == PRISMATIC
+    return np.concatenate([axis, np.zeros(3)] if slides else [np.zeros(3), axis])

@@ -1,0 +1,197 @@
+"""The calibrated robot as an MJCF: translated from its URDF, or put into a model of the user's own."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.correction.calibrated import Calibrated
+from thermal_robot.correction.calibrated_urdf import calibrated_urdf
+from thermal_robot.correction.mujoco_models import Bodies, compiled, digits, known, mjcf_of_urdf
+from thermal_robot.errors import CampaignError
+from thermal_robot.kinematics import quaternion_to_rotation, rotation_to_quaternion
+from thermal_robot.kinematics.markup import Edit, Tag, changed, comment, encoded, indent, tags, with_values
+from thermal_robot.kinematics.model import PRISMATIC
+
+Array = NDArray[np.float64]
+
+_BESIDE, _ASKEW = 0.02, 0.05
+"""m and rad by which the axes of the two nominal robots may differ: more than any two models of one robot do, less than
+those of another robot, or of one whose zeros stand elsewhere."""
+_OTHER_WAYS = dict.fromkeys(("euler", "axisangle", "xyaxes", "zaxis"))
+"""In which a body may be turned; a quaternion takes the place of each."""
+_BEYOND = (
+    "An MJCF could hold zero offsets as a joint's ref, which would move a simulation's start, too: they are in the",
+    "places of bodies. A joint's stiffness is a spring beside its motor, and no compliance of a gear behind it.",
+)
+
+
+def calibrated_mjcf(robot: Calibrated, mjcf: str | Path | None = None) -> str:
+    """Return the MJCF of the calibrated robot.
+
+    Parameters
+    ----------
+    robot
+        The calibrated robot.
+    mjcf
+        A model of the nominal robot of your own, as a path or as its text, with the URDF's names of joints. The bodies
+        of its joints are placed anew, what else it says stays as it stands, and a site ``<tool_frame>_target`` is
+        added. Where absent, MuJoCo's compiler translates the URDF, without its meshes.
+
+    Returns
+    -------
+    str
+        XML text, with a comment that lists what is in it and what is not.
+
+    Raises
+    ------
+    CampaignError
+        If MuJoCo is not installed or does not take the model; if that has not the robot's joints, or not where the
+        robot has them; or if a body's tag does not stand in the text alone: in an included file, in a ``<frame>``.
+    """
+    notes = [*robot.notes("an MJCF"), *_BEYOND]
+    if mjcf is None:
+        # the translation drops all comments
+        content = encoded(mjcf_of_urdf(calibrated_urdf(robot)))
+        start = tags(content)[0].start
+        return changed(content, [(start, start, comment(notes))])
+    patched = _Patched.of(robot, mjcf)
+    start = patched.tags[0].start
+    return changed(patched.content, [(start, start, comment(notes)), *patched.edits()])
+
+
+@dataclass(frozen=True, eq=False)
+class _Patched:
+    """A model of the user's own beside the robot, both with all joints at zero.
+
+    Attributes
+    ----------
+    robot, name
+        The calibrated robot, and what to call the model in errors.
+    content, tags
+        Its text in bytes, and where its elements stand.
+    model, bodies
+        Compiled, and where its bodies are.
+    root
+        (4, 4) pose of the robot's root frame in the model's world.
+    """
+
+    robot: Calibrated
+    name: str
+    content: bytes
+    tags: tuple[Tag, ...]
+    model: Any
+    bodies: Bodies
+    root: Array
+
+    @classmethod
+    def of(cls, robot: Calibrated, mjcf: str | Path) -> _Patched:
+        path = Path(mjcf) if isinstance(mjcf, Path) or not mjcf.lstrip().startswith("<") else None
+        model = compiled(path or mjcf)
+        name = str(path or "the MJCF")
+        chain = robot.robot.chain
+        moving = [chain.names[k] for k in chain.movable]
+        for joint in moving:
+            if known(model, "joint", joint) is None:
+                own = ", ".join(model.joint(j).name or "(unnamed)" for j in range(model.njnt))
+                raise CampaignError(
+                    name, f"has no joint {joint!r}", found=own or "no joint", expected="the URDF's names"
+                )
+        bodies = Bodies.at(model, dict.fromkeys(moving, 0.0))
+        base = known(model, "body", robot.robot.root_frame)
+        content = encoded(path.read_text(encoding="utf-8") if path else str(mjcf))
+        root = np.eye(4) if base is None else bodies.pose(base)
+        return cls(robot, name, content, tags(content), model, bodies, root)
+
+    def edits(self) -> list[Edit]:
+        """Return the changes: bodies of joints and of the tool frame that are placed anew, and the target."""
+        chain, placed = self.robot.robot.chain, self.robot.placements
+        nominal = np.tile(np.eye(4), (len(placed), 1, 1))
+        nominal[:, :3, :3], nominal[:, :3, 3] = chain.rotations, chain.translations
+        found: list[Edit] = []
+        at, before, after, last = self.root, np.eye(4), np.eye(4), 0
+        for k, name in enumerate(chain.names):
+            at, before, after = at @ nominal[k], before @ nominal[k], after @ placed[k]
+            if k in chain.movable:
+                last = self._carrier(name, at, k)
+                found += self._moved(name, last, np.linalg.inv(at) @ self.bodies.pose(last), before, after)
+                before, after, frame = np.eye(4), np.eye(4), at
+        tool = known(self.model, "body", self.robot.robot.tool_frame)
+        if tool is not None and tool != last:
+            found += self._moved("", tool, np.linalg.inv(at) @ self.bodies.pose(tool), before, after)
+        target = np.linalg.inv(self.bodies.pose(last)) @ frame @ after @ self.robot.target
+        return [*found, self._site(last, target)]
+
+    def _carrier(self, joint: str, at: Array, k: int) -> int:
+        """Return the body of a joint, whose axis must lie where the robot has it."""
+        number = int(known(self.model, "joint", joint) or 0)
+        point, direction = self.bodies.line(number)
+        axis = at[:3, :3] @ self.robot.robot.chain.axes[k]
+        askew = float(np.arctan2(np.linalg.norm(np.cross(axis, direction)), axis @ direction))
+        beside = float(np.linalg.norm(np.cross(axis, at[:3, 3] - point)))
+        slides = self.robot.robot.chain.kinds[k] == PRISMATIC
+        if askew > _ASKEW or (beside > _BESIDE and not slides):
+            problem = f"with all joints at zero, the axis of {joint!r} is not where the URDF has it"
+            found = f"it {1e3 * beside:.3g} mm beside and {np.degrees(askew):.3g}° askew"
+            raise CampaignError(self.name, problem, found=found, expected="a model of the same robot")
+        return int(self.model.jnt_bodyid[number])
+
+    def _moved(self, joint: str, body: int, held: Array, before: Array, after: Array) -> list[Edit]:
+        """Return the change that places a body anew, as the robot's placements since the last joint are changed.
+
+        N X N⁻¹ L takes the place of L, with N the body's pose in its parent at zero and X = C⁻¹ R⁻¹ R' C, C the body's
+        constant pose behind the joint's frame: the body moves as that frame does.
+        """
+        if np.array_equal(before, after):
+            return []
+        change = np.linalg.inv(held) @ np.linalg.inv(before) @ after @ held
+        inside = np.linalg.inv(self.bodies.pose(int(self.model.body_parentid[body]))) @ self.bodies.pose(body)
+        own = np.eye(4)
+        own[:3, :3] = quaternion_to_rotation(self.model.body_quat[body])
+        own[:3, 3] = self.model.body_pos[body]
+        pose = inside @ change @ np.linalg.inv(inside) @ own
+        tag = self._tag(joint, body)
+        return [with_values(self.content, tag, {**_placed(pose), **_OTHER_WAYS})]
+
+    def _tag(self, joint: str, body: int) -> Tag:
+        """Return where a body stands in the text: by its name, or by the joint in it."""
+        name = self.model.body(body).name
+        for tag in self.tags:
+            own = tag.path[-1] == "joint" and joint and tag.attributes.get("name") == joint and "worldbody" in tag.path
+            named = tag.path[-1] == "body" and name and tag.attributes.get("name") == name
+            found = self.tags[tag.parent] if own else tag if named else None
+            if found is not None and not {"frame", "replicate"} & set(found.path):
+                self._require_first(joint, body)
+                return found
+        problem = f"the tag of body {name or body!r} is not in this file, or stands in a <frame>"
+        raise CampaignError(self.name, problem, expected="a model in one file: save it by MuJoCo")
+
+    def _require_first(self, joint: str, body: int) -> None:
+        first = self.model.joint(int(self.model.body_jntadr[body])).name if joint else ""
+        if first != joint:
+            problem = f"joint {joint!r} has no body of its own: it shares one with {first!r}"
+            raise CampaignError(self.name, problem, expected="a body between the two")
+
+    def _site(self, body: int, pose: Array) -> Edit:
+        """Return the insertion of the target into the body of the last joint."""
+        chain, tool = self.robot.robot.chain, f"{self.robot.robot.tool_frame}_target"
+        carrier = self._tag(chain.names[int(chain.movable[-1])], body)
+        for tag in self.tags:
+            if tag.path[-1] == "site" and tag.attributes.get("name") == tool:
+                if self.tags[tag.parent] != carrier:
+                    expected = f"it in the body of joint {chain.names[int(chain.movable[-1])]!r}"
+                    raise CampaignError(
+                        self.name, f"has a site {tool!r} already", found="it elsewhere", expected=expected
+                    )
+                return with_values(self.content, tag, {**_placed(pose), **_OTHER_WAYS})
+        values = "".join(f' {name}="{value}"' for name, value in _placed(pose).items())
+        return carrier.stop, carrier.stop, f'{indent(self.content, carrier.start)}  <site name="{tool}"{values}/>'
+
+
+def _placed(pose: Array) -> Mapping[str, str]:
+    return {"pos": digits(pose[:3, 3]), "quat": digits(rotation_to_quaternion(pose[:3, :3]))}
