@@ -123,6 +123,26 @@ def test_frames_of_its_own_are_no_matter():
     assert bodies.findall(after)[0] == '<body name="base" pos="1 2 3" euler="0 0 30">'
 
 
+def test_a_target_stands_on_the_models_own_tool_frame():
+    """Where the model has other lengths than the URDF, its own tool frame carries the target: as a body, or a site."""
+    arm = load_robot(ARM, "tool")
+    robot = displaced(arm, 5, size=1e-4)
+    longer = calibrated_mjcf(
+        displaced(load_robot(ARM.replace("0.5 0 0", "0.505 0 0"), "tool"), 0, size=0.0, target=False)
+    )
+    longer = re.sub("<!--.*?-->", "", longer, flags=re.DOTALL)
+    as_site = re.sub(r'<body name="tool"([^>]*)/>', r'<site name="tool"\1/>', longer)
+    rows = [{"one": 0.0, "two": 0.0, "slide": 0.0}]
+    for text, see in ((longer, by_mujoco), (as_site, lambda t, r, link, q: site(t, link, q, r))):
+        before = next(iter(see(text, "base", "tool", rows)))
+        after = next(site(calibrated_mjcf(robot, text), "tool_target", rows, "base"))
+        tool = next(iter(see(calibrated_mjcf(robot, text), "base", "tool", rows)))
+        np.testing.assert_allclose(tool @ robot.target, after, atol=1e-12)
+        moved = tool_poses(arm, np.zeros((1, 3)), robot.displacement)[0] @ robot.target
+        there = before @ np.linalg.inv(tool_poses(arm, np.zeros((1, 3)))[0]) @ moved
+        np.testing.assert_allclose(after, there, atol=2e-6)
+
+
 def test_a_file_is_read_with_what_it_includes(tmp_path):
     text = own_model()
     part = re.search(r"  <actuator>.*?</actuator>\n", text, re.DOTALL)[0]

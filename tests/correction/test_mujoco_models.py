@@ -33,7 +33,9 @@ def test_a_translated_urdf_has_the_same_poses_joints_and_links(name, configurati
 
 def test_bodies_and_axes_are_where_mujoco_has_them():
     model = compiled(TWO)
-    bodies = Bodies.at(model, {"j": np.pi / 2})
+    bodies = Bodies.of(model)
+    np.testing.assert_array_equal(bodies.pose(1)[:3, :3], np.eye(3))
+    bodies.move({"j": np.pi / 2})
     data = mujoco.MjData(model)
     data.qpos[0] = np.pi / 2
     mujoco.mj_forward(model, data)

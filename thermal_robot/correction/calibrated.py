@@ -40,6 +40,9 @@ class Calibrated:
         file can hold, so that they stay in the model.
     min_sigma
         Standard deviations that those in it are away from zero at least; ``None`` where nobody asked.
+    compared
+        (4, 4) the target on the tool frame as the campaign declares it, where the robot was compared with a simulator
+        of the user's own, which has it; ``None`` where it was compared with the URDF.
     """
 
     robot: Robot
@@ -51,6 +54,7 @@ class Calibrated:
     undetermined: tuple[Told, ...]
     kept: tuple[Told, ...]
     min_sigma: float | None = None
+    compared: Array | None = None
 
     @property
     def joints(self) -> Array:
@@ -81,7 +85,7 @@ class Calibrated:
     def links(self) -> Mapping[str, tuple[str, Array]]:
         """The link of the target, where that is not the tool frame itself: what carries it, and its placement there."""
         tool = self.robot.tool_frame
-        return {f"{tool}_target": (tool, self.target)} if (self.target != np.eye(4)).any() else {}
+        return {target_link(tool): (tool, self.target)} if (self.target != np.eye(4)).any() else {}
 
     def notes(self, holds: str) -> list[str]:
         """Return what a reader of a robot file must know, in lines; ``holds`` names such a file."""
@@ -94,6 +98,8 @@ class Calibrated:
             "Joint positions are those that are commanded, and so are the limits: they stay as they were.",
         ]
         parts = {"Written here:": self.held}
+        if self.compared is not None:
+            lines.append("It was compared with your simulator (sim.*), not with the URDF: correct that one by this.")
         if self.min_sigma is not None:
             small = f"Left out, as they are less than {self.min_sigma:g} standard deviations from zero:"
             parts[small] = self.undetermined
@@ -141,7 +147,13 @@ def calibrated(
         undetermined=gone,
         kept=tuple(told for told, own in zip(found.parameters, found.held, strict=True) if not own),
         min_sigma=min_sigma,
+        compared=model.frames.tool if model.simulated else None,
     )
+
+
+def target_link(tool_frame: str) -> str:
+    """Name of the link (body, site) that is the measured target, where a robot file has one."""
+    return f"{tool_frame}_target"
 
 
 def unit_twist(robot: Robot, element: int) -> Array:

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.correction.calibrated import Calibrated
+from thermal_robot.correction.calibrated import Calibrated, target_link
 from thermal_robot.correction.calibrated_urdf import calibrated_urdf
 from thermal_robot.correction.mujoco_models import Bodies, compiled, digits, known, mjcf_of_urdf
 from thermal_robot.errors import CampaignError
@@ -102,7 +102,8 @@ class _Patched:
                 raise CampaignError(
                     name, f"has no joint {joint!r}", found=own or "no joint", expected="the URDF's names"
                 )
-        bodies = Bodies.at(model, dict.fromkeys(moving, 0.0))
+        bodies = Bodies.of(model)
+        bodies.move(dict.fromkeys(moving, 0.0))
         base = known(model, "body", robot.robot.root_frame)
         content = encoded(path.read_text(encoding="utf-8") if path else str(mjcf))
         root = np.eye(4) if base is None else bodies.pose(base)
@@ -119,13 +120,42 @@ class _Patched:
             at, before, after = at @ nominal[k], before @ nominal[k], after @ placed[k]
             if k in chain.movable:
                 last = self._carrier(name, at, k)
-                found += self._moved(name, last, np.linalg.inv(at) @ self.bodies.pose(last), before, after)
-                before, after, frame = np.eye(4), np.eye(4), at
-        tool = known(self.model, "body", self.robot.robot.tool_frame)
-        if tool is not None and tool != last:
-            found += self._moved("", tool, np.linalg.inv(at) @ self.bodies.pose(tool), before, after)
-        target = np.linalg.inv(self.bodies.pose(last)) @ frame @ after @ self.robot.target
-        return [*found, self._site(last, target)]
+                found += self._moved(name, last, self._change(self.bodies.pose(last), at, before, after))
+                before, after = np.eye(4), np.eye(4)
+        stands = self._tool(at)
+        change = self._change(stands, at, before, after)
+        found += self._tool_moved(last, stands, change)
+        target, was = self.robot.target, known(self.model, "site", target_link(self.robot.robot.tool_frame))
+        if was is not None and self.robot.compared is not None:
+            # the campaign was compared with this target, wherever the declared one is
+            target = target @ np.linalg.inv(self.robot.compared) @ np.linalg.inv(stands) @ self.bodies.site(was)
+        return [*found, self._site(last, np.linalg.inv(self.bodies.pose(last)) @ stands @ change @ target)]
+
+    def _tool(self, at: Array) -> Array:
+        """(4, 4) pose of the tool frame: that of its body or site in the model, else where the URDF has it."""
+        name = self.robot.robot.tool_frame
+        body, site = (known(self.model, kind, name) for kind in ("body", "site"))
+        return self.bodies.pose(body) if body is not None else at if site is None else self.bodies.site(site)
+
+    def _tool_moved(self, last: int, stands: Array, change: Array) -> list[Edit]:
+        """Return the edit that places the tool frame anew, where it is a body or a site of its own."""
+        name = self.robot.robot.tool_frame
+        body, site = (known(self.model, kind, name) for kind in ("body", "site"))
+        if body is not None:
+            return [] if body == last else self._moved("", body, change)
+        tag = next((t for t in self.tags if t.path[-1] == "site" and t.attributes.get("name") == name), None)
+        if site is None or tag is None or np.array_equal(change, np.eye(4)):
+            return []
+        pose = np.linalg.inv(self.bodies.pose(int(self.model.site_bodyid[site]))) @ stands @ change
+        return [with_values(self.content, tag, {**_placed(pose), **_OTHER_WAYS})]
+
+    @staticmethod
+    def _change(held: Array, at: Array, before: Array, after: Array) -> Array:
+        """(4, 4) X = C⁻¹ R⁻¹ R' C: how what a joint's frame holds moves, in its own frame, as R becomes R'."""
+        if np.array_equal(before, after):
+            return np.eye(4)
+        behind = np.linalg.inv(at) @ held
+        return np.asarray(np.linalg.inv(behind) @ np.linalg.inv(before) @ after @ behind)
 
     def _carrier(self, joint: str, at: Array, k: int) -> int:
         """Return the body of a joint, whose axis must lie where the robot has it."""
@@ -141,22 +171,19 @@ class _Patched:
             raise CampaignError(self.name, problem, found=found, expected="a model of the same robot")
         return int(self.model.jnt_bodyid[number])
 
-    def _moved(self, joint: str, body: int, held: Array, before: Array, after: Array) -> list[Edit]:
-        """Return the change that places a body anew, as the robot's placements since the last joint are changed.
+    def _moved(self, joint: str, body: int, change: Array) -> list[Edit]:
+        """Return the edit that places a body anew: N X N⁻¹ L takes the place of L.
 
-        N X N⁻¹ L takes the place of L, with N the body's pose in its parent at zero and X = C⁻¹ R⁻¹ R' C, C the body's
-        constant pose behind the joint's frame: the body moves as that frame does.
+        N is the body's pose in its parent while its joint is at zero, which is L only where the joint has no ``ref``.
         """
-        if np.array_equal(before, after):
+        if np.array_equal(change, np.eye(4)):
             return []
-        change = np.linalg.inv(held) @ np.linalg.inv(before) @ after @ held
         inside = np.linalg.inv(self.bodies.pose(int(self.model.body_parentid[body]))) @ self.bodies.pose(body)
         own = np.eye(4)
         own[:3, :3] = quaternion_to_rotation(self.model.body_quat[body])
         own[:3, 3] = self.model.body_pos[body]
         pose = inside @ change @ np.linalg.inv(inside) @ own
-        tag = self._tag(joint, body)
-        return [with_values(self.content, tag, {**_placed(pose), **_OTHER_WAYS})]
+        return [with_values(self.content, self._tag(joint, body), {**_placed(pose), **_OTHER_WAYS})]
 
     def _tag(self, joint: str, body: int) -> Tag:
         """Return where a body stands in the text: by its name, or by the joint in it."""
@@ -179,7 +206,7 @@ class _Patched:
 
     def _site(self, body: int, pose: Array) -> Edit:
         """Return the insertion of the target into the body of the last joint."""
-        chain, tool = self.robot.robot.chain, f"{self.robot.robot.tool_frame}_target"
+        chain, tool = self.robot.robot.chain, target_link(self.robot.robot.tool_frame)
         carrier = self._tag(chain.names[int(chain.movable[-1])], body)
         for tag in self.tags:
             if tag.path[-1] == "site" and tag.attributes.get("name") == tool:

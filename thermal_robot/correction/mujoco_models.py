@@ -110,21 +110,24 @@ class Bodies:
     Attributes
     ----------
     model, data
-        ``mujoco.MjModel`` and ``mujoco.MjData``, its kinematics run.
+        ``mujoco.MjModel``, and its ``mujoco.MjData``, which changes as joints are moved.
     """
 
     model: Any
     data: Any
 
     @classmethod
-    def at(cls, model: Any, positions: Mapping[str, float]) -> Bodies:
-        """Run the kinematics of a model with joints at positions (rad or m) by name, the others as it has them."""
-        mujoco = mujoco_or_error()
-        data = mujoco.MjData(model)
+    def of(cls, model: Any) -> Bodies:
+        """Return those of a model, its joints where it starts."""
+        bodies = cls(model, mujoco_or_error().MjData(model))
+        bodies.move({})
+        return bodies
+
+    def move(self, positions: Mapping[str, float]) -> None:
+        """Put joints to positions (rad or m) by name; the others stay."""
         for name, position in positions.items():
-            data.qpos[model.joint(name).qposadr[0]] = position
-        mujoco.mj_kinematics(model, data)
-        return cls(model, data)
+            self.data.qpos[self.model.joint(name).qposadr[0]] = position
+        mujoco_or_error().mj_kinematics(self.model, self.data)
 
     def pose(self, body: int) -> Array:
         """(4, 4) of a body in the world, m."""
