@@ -6,6 +6,7 @@ from thermal_robot.correction.calibrated_urdf import calibrated_urdf
 from thermal_robot.correction.determined import determined
 from thermal_robot.correction.dh_table import dh_table
 from thermal_robot.correction.model import CorrectedModel
+from thermal_robot.correction.mujoco_models import mjcf_of_urdf
 from thermal_robot.correction.simulator import with_simulator
 from thermal_robot.correction.zero_offsets import zero_offsets
 
@@ -17,6 +18,7 @@ __all__ = [
     "calibrated_urdf",
     "determined",
     "dh_table",
+    "mjcf_of_urdf",
     "with_simulator",
     "zero_offsets",
 ]
