@@ -1,5 +1,7 @@
 """The files of the calibrated robot that the command line writes."""
 
+import sys
+
 import numpy as np
 import pandas as pd
 from commanded import refused
@@ -56,3 +58,10 @@ def test_options_that_make_no_sense_are_refused(run, diagnosed, tmp_path):
     refused(run("correct", model, "--from-mjcf", model, "--urdf", out), "--mjcf")
     refused(run("correct", model, "--mjcf", out, "--from-mjcf", tmp_path / "no.xml"), "no.xml")
     assert not out.exists()
+
+
+def test_without_mujoco_one_line_says_how_to_get_it(run, diagnosed, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "mujoco", None)
+    out = tmp_path / "r.xml"
+    refused(run("correct", diagnosed.model, "--mjcf", out, "--urdf", tmp_path / "r.urdf"), "thermal-robot[blind]")
+    assert not any(tmp_path.iterdir())

@@ -5,6 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from arms import arms
+from floor import NOISE, real_robot
+from hypothesis import given
 from readers import READERS, displaced, held, model_of
 from simulate import simulate
 
@@ -74,7 +77,7 @@ def test_the_written_robot_predicts_what_its_model_does(rv_m2, kind):
     campaign, _, (fresh, _) = simulate(rv_m2, [kind], seed=1, fresh=60)
     model = diagnose(campaign, only=[kind]).model
     warm = replace(fresh, covariates={**fresh.covariates, "temperature": np.full(60, 31.0)})
-    robot = calibrated(model, temperature=31.0)
+    robot = calibrated(model, temperature=31.0 if model.needs else None)
     assert robot.kept == ()
     again = load_robot(calibrated_urdf(robot), "tool0_target")
     poses = robot.base @ tool_poses(again, warm.q)
@@ -82,3 +85,36 @@ def test_the_written_robot_predicts_what_its_model_does(rv_m2, kind):
     np.testing.assert_allclose(poses[:, :3, 3], predicted, rtol=0, atol=1e-9)
     plain = tool_poses(rv_m2, warm.q) @ model.frames.tool
     assert np.abs((model.frames.base @ plain)[:, :3, 3] - predicted).max() > 1e-5
+
+
+WARM = np.where(np.arange(200) < 120, np.random.default_rng(0).uniform(16.0, 34.0, 200), 29.0)
+FLOOR = {
+    "joint_offset": {"zeros": [0.0, 1.5e-3, -1e-3, 8e-4, 0.0]},
+    "geometric": {"misplaced": 3e-4},
+    "thermal_elongation": {"temperature": WARM},
+}
+
+
+@pytest.mark.parametrize("kind", FLOOR)
+def test_the_written_robot_is_the_one_on_the_floor(rv_m2, kind):
+    """In poses that nothing was fitted to, at one temperature: as near to the robot as its model is."""
+    whole = real_robot(rv_m2, 3, samples=200, **FLOOR[kind])
+    model = diagnose(whole.take(np.arange(120))).model
+    assert [effect.name for effect, _ in model.effects] == [kind]
+    fresh = whole.take(np.arange(120, 200))
+    robot = calibrated(model, temperature=29.0 if model.needs else None)
+    poses = robot.base @ tool_poses(load_robot(calibrated_urdf(robot), "tool0_target"), fresh.q)
+    plain = model.frames.base @ tool_poses(rv_m2, fresh.q) @ model.frames.tool
+    left, before = (np.sqrt(((p[:, :3, 3] - fresh.position) ** 2).mean()) for p in (poses, plain))
+    np.testing.assert_allclose(poses[:, :3, 3], model.predict(fresh)[0], rtol=0, atol=1e-9)
+    assert before > 1.8 * NOISE
+    assert left < 1.25 * NOISE
+
+
+@given(arms())
+def test_any_arm_is_written_and_read(arm):
+    robot = displaced(arm, seed=8)
+    q = np.random.default_rng(9).uniform(np.maximum(arm.lower, -3.0), np.minimum(arm.upper, 3.0), (3, arm.n))
+    expected = tool_poses(arm, q, robot.displacement) @ robot.target
+    again = load_robot(calibrated_urdf(robot), f"{arm.tool_frame}_target")
+    np.testing.assert_allclose(tool_poses(again, q), expected, rtol=0, atol=1e-12)

@@ -15,10 +15,10 @@ from thermal_robot.prediction import Spread
 NOISE = 25e-6
 
 
-@pytest.fixture(scope="module")
-def bent(rv_m2):
+@pytest.fixture(scope="module", params=[None, 3e-5], ids=["position", "pose"])
+def bent(rv_m2, request):
     """A model of geometry, most of whose parameters no data can determine, and fresh rows with the truth."""
-    campaign, _, (fresh, place) = simulate(rv_m2, ["geometric"], seed=2, fresh=200)
+    campaign, _, (fresh, place) = simulate(rv_m2, ["geometric"], seed=2, fresh=200, turning=request.param)
     return diagnose(campaign, only=["geometric"]).model, campaign, fresh, place
 
 

@@ -6,6 +6,9 @@ from dataclasses import replace
 import numpy as np
 import pandas as pd
 import pytest
+from arms import arms
+from conftest import load_arm
+from hypothesis import given
 from readers import displaced
 
 from thermal_robot import CampaignError
@@ -67,10 +70,18 @@ def test_a_table_that_is_written_leads_to_the_models_poses(arm, convention, conf
         np.testing.assert_allclose(seen, expected, rtol=0, atol=1e-9)
 
 
-def test_the_table_of_a_sound_ur10_is_its_makers(rv_m2):
-    """Universal Robots' own table: d 0.1273 0 0 0.163941 0.1157 0.0922, a 0 −0.612 −0.5723, α ±90° where axes cross."""
-    from conftest import load_arm
+@given(arms())
+def test_any_arm_has_a_table(arm):
+    robot = displaced(arm, seed=8)
+    q = np.random.default_rng(9).uniform(np.maximum(arm.lower, -3.0), np.minimum(arm.upper, 3.0), (3, arm.n))
+    for convention in CONVENTIONS:
+        table = written(robot, convention)
+        seen = [led(table, dict(zip(arm.joint_names, row, strict=True))) for row in q]
+        np.testing.assert_allclose(seen, tool_poses(arm, q, robot.displacement) @ robot.target, rtol=0, atol=1e-9)
 
+
+def test_the_table_of_a_sound_ur10_is_its_makers():
+    """Universal Robots' own table: d 0.1273 0 0 0.163941 0.1157 0.0922, a 0 −0.612 −0.5723, α ±90° where axes cross."""
     arm = load_arm("ur10")
     table = dh_table(displaced(arm, 0, size=0.0, target=False))[1:-1]
     np.testing.assert_allclose(np.abs(table["a [m]"]), [0, 0.612, 0.5723, 0, 0, 0], atol=1e-9)

@@ -6,39 +6,16 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from conftest import load_arm
+from floor import NOISE, TARGET, real_robot
 from readers import displaced
-from simulate import random_motion
 
 from thermal_robot import CampaignError, diagnose, observe
-from thermal_robot.blind.reality import World
 from thermal_robot.campaign import Campaign
 from thermal_robot.correction import calibrated, calibrated_mjcf, with_simulator
 from thermal_robot.correction.mujoco_models import mjcf_of_urdf
 from thermal_robot.inference.frames import register
 from thermal_robot.kinematics import quaternion_to_rotation, tool_poses
 from thermal_robot.robot import load_robot
-
-NOISE = 25e-6
-TARGET = np.array([0.03, -0.02, 0.08])
-
-
-def real_robot(arm, seed, *, zeros=None, placements=None, warm=None, samples=100):
-    """A campaign of a robot of the trial's reality, which shares nothing with the program; its base is unknown."""
-    rng = np.random.default_rng(seed)
-    world = World(arm.urdf, arm.tool_frame)
-    q = rng.uniform(np.maximum(arm.lower, -2.2), np.minimum(arm.upper, 2.2), (samples, arm.n))
-    body = world.sound(samples)
-    if zeros is not None:
-        body.joints += zeros
-    if placements is not None:
-        body.placements[:] = placements(world, rng)
-    if warm is not None:
-        body.growth += warm
-    poses = world.poses(q, np.zeros(samples), body)[0]
-    base = random_motion(rng, 2.0)
-    place = (base @ poses @ np.append(TARGET, 1.0))[:, :3]
-    measured = place + NOISE * rng.normal(size=place.shape)
-    return Campaign("real", arm, q, measured, tool_known=True, target=TARGET, noise_position=NOISE)
 
 
 def gap(campaign):
@@ -90,14 +67,7 @@ def test_zeros_that_are_found_against_the_simulator_mend_it(tmp_path):
 
 def test_geometry_that_is_found_mends_the_simulator_where_nothing_was_measured():
     arm = load_arm("rv_m2")
-
-    def made(world, rng):
-        off = np.zeros((len(world.chain), 6))
-        movable = [k for k, joint in enumerate(world.chain) if joint.movable]
-        off[movable] = rng.normal(size=(len(movable), 6)) * 4e-4
-        return off
-
-    campaign = real_robot(arm, 5, placements=made, samples=240)
+    campaign = real_robot(arm, 5, misplaced=4e-4, samples=240)
     train, rest = campaign.take(np.arange(0, 240, 2)), campaign.take(np.arange(1, 240, 2))
     text = mjcf_of_urdf(arm.urdf)
     found = diagnose(with_simulator(train, text))

@@ -57,6 +57,13 @@ def test_a_link_is_added_once_and_then_placed_anew():
         rewritten(text, {"x": POSE})
 
 
+def test_names_may_hold_what_xml_escapes():
+    text = TEXT.format("").replace('"b"', '"a &amp; &lt;b&gt; &quot;c&quot;"')
+    name = 'a & <b> "c"'
+    after = rewritten(text, {}, links={f"{name}_target": (name, POSE)})
+    np.testing.assert_allclose(end(after, f"{name}_target"), POSE, atol=1e-15)
+
+
 def test_notes_stand_before_the_robot():
     text = "<?xml version='1.0'?>\n<!-- theirs -->\n" + TEXT.format("")
     after = rewritten(text, {}, notes=["one -- two", "three"])

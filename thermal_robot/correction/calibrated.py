@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from thermal_robot.correction.constant import Told, constant
 from thermal_robot.correction.determined import determined
 from thermal_robot.correction.model import CorrectedModel
+from thermal_robot.errors import CampaignError
 from thermal_robot.kinematics import Displacement, exp6
 from thermal_robot.kinematics.model import PRISMATIC
 from thermal_robot.kinematics.rewritten import xyz_rpy
@@ -34,7 +35,7 @@ class Calibrated:
     target
         (4, 4) pose of the measured target in the tool frame.
     temperature
-        °C at which its lengths hold.
+        °C at which its lengths hold; ``None`` where the model does not tell how they grow.
     held, undetermined, kept
         Parameters of the model that are in it; that were left out, as the data do not determine them; and that no robot
         file can hold, so that they stay in the model.
@@ -49,7 +50,7 @@ class Calibrated:
     displacement: Displacement
     base: Array
     target: Array
-    temperature: float
+    temperature: float | None
     held: tuple[Told, ...]
     undetermined: tuple[Told, ...]
     kept: tuple[Told, ...]
@@ -90,9 +91,10 @@ class Calibrated:
     def notes(self, holds: str) -> list[str]:
         """Return what a reader of a robot file must know, in lines; ``holds`` names such a file."""
         xyz, rpy = xyz_rpy(self.base)
+        warm = "" if self.temperature is None else f", its lengths at {self.temperature:g} °C"
         lines = [
             f"Calibrated by thermal_robot: the robot {self.robot.name!r} from {self.robot.root_frame!r} to "
-            f"{self.robot.tool_frame!r} as it was measured, at {self.temperature:g} °C. All in m, rad, K and s.",
+            f"{self.robot.tool_frame!r} as it was measured{warm}. All in m, rad, K and s.",
             f"In the measurement frame {self.robot.root_frame!r} stands at xyz=({xyz}) rpy=({rpy}).",
             *(f"The measured target is the link {link!r}." for link in self.links),
             "Joint positions are those that are commanded, and so are the limits: they stay as they were.",
@@ -119,7 +121,7 @@ def calibrated(
     model
         The corrected model.
     temperature
-        °C at which lengths are to hold, where the model says how they grow; by default the campaign's reference
+        °C at which lengths are to hold, where the model tells how they grow; by default the campaign's reference
         temperature, at which those of the nominal robot hold.
     min_sigma
         Keep only what is so many standard deviations from zero (:func:`~thermal_robot.correction.determined`); all
@@ -128,12 +130,16 @@ def calibrated(
     Raises
     ------
     CampaignError
-        If the temperature is none, or the model does not say what is determined.
+        If the temperature is none, or one is given and the model does not tell how the robot grows; or if it does not
+        say what is determined.
     """
     gone: tuple[Told, ...] = ()
     if min_sigma is not None:
         model, gone = determined(model, min_sigma, temperature)
     found = constant(model, temperature)
+    if temperature is not None and not found.grows:
+        problem = "the model does not tell how the robot grows"
+        raise CampaignError("temperature", problem, found=f"{temperature:g} °C", expected="none")
     moved = found.displacement
     left_out = {(told.effect, told.parameter) for told in gone}
     held = [told for told, own in zip(found.parameters, found.held, strict=True) if own]
@@ -142,7 +148,7 @@ def calibrated(
         displacement=Displacement(moved.joint, moved.segment),
         base=model.frames.base @ exp6(np.asarray(moved.base)),
         target=exp6(np.asarray(moved.tool)) @ model.frames.tool,
-        temperature=found.temperature,
+        temperature=found.temperature if found.grows else None,
         held=tuple(told for told in held if (told.effect, told.parameter) not in left_out),
         undetermined=gone,
         kept=tuple(told for told, own in zip(found.parameters, found.held, strict=True) if not own),

@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
@@ -217,7 +218,11 @@ class _Patched:
                     )
                 return with_values(self.content, tag, {**_placed(pose), **_OTHER_WAYS})
         values = "".join(f' {name}="{value}"' for name, value in _placed(pose).items())
-        return carrier.stop, carrier.stop, f'{indent(self.content, carrier.start)}  <site name="{tool}"{values}/>'
+        return (
+            carrier.stop,
+            carrier.stop,
+            f"{indent(self.content, carrier.start)}  <site name={quoteattr(tool)}{values}/>",
+        )
 
 
 def _placed(pose: Array) -> Mapping[str, str]:

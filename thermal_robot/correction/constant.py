@@ -79,6 +79,8 @@ class Constant:
         zero where it is not constant.
     joints
         n.
+    grows
+        Whether any of it follows the temperature.
     """
 
     temperature: float
@@ -86,6 +88,7 @@ class Constant:
     held: NDArray[np.bool_]
     responses: Array
     joints: int
+    grows: bool
 
     @property
     def displacement(self) -> Displacement:
@@ -120,25 +123,23 @@ def constant(model: CorrectedModel, temperature: float | None = None) -> Constan
     kinds = [rows_of_every_kind(model, warmth) for warmth in (None, degrees, degrees + _WARMER)]
     told: list[Told] = []
     found: list[tuple[str, Array | None, Array | None]] = []
+    grows = False
     std = _deviations(model)
     for effect, values in model.effects:
         for value, *read in zip(values, *(gate.checked(effect, each) for each in kinds), strict=True):
             first = read[0]
             told.append(Told(effect.name, first.name, float(value), float(std[len(told)]), first.unit))
             always, now, warmer = (_one_for_all(model.robot, parameter) for parameter in read)
-            found.append((f"{effect.name} {first.kind} {first.place}", _held(always, now, warmer), now))
+            follows = always is None and now is not None and warmer is not None and bool((now != warmer).any())
+            grows |= follows
+            found.append((f"{effect.name} {first.kind} {first.place}", now if follows else always, now))
     # the constant of a law that begins somewhere is nothing without the rest of it
     changing = {of for of, held, now in found if held is None and (now is None or now.any())}
     nothing = np.zeros(_size(model.robot))
     used = [held if of not in changing else None for of, held, _ in found]
     matrix = np.array([nothing if held is None else held for held in used]).reshape(len(told), len(nothing))
-    return Constant(degrees, tuple(told), np.array([h is not None for h in used], dtype=bool), matrix, model.robot.n)
-
-
-def _held(always: Array | None, now: Array | None, warmer: Array | None) -> Array | None:
-    """Return a response that is constant, or is so at one temperature and follows it; ``None`` for any other."""
-    follows = now is not None and warmer is not None and bool((now != warmer).any())
-    return always if always is not None else now if follows else None
+    is_held = np.array([held is not None for held in used], dtype=bool)
+    return Constant(degrees, tuple(told), is_held, matrix, model.robot.n, grows)
 
 
 def rows_of_every_kind(model: CorrectedModel, temperature: float | None = None, rows: int = ROWS) -> Observations:

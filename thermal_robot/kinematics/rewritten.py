@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
@@ -57,8 +58,9 @@ def rewritten(
             placed[joint] = pose
             continue
         _require_new(found, link, joint)
-        ends = f'<parent link="{parent}"/><child link="{link}"/>'
-        more += f'  <link name="{link}"/>\n  <joint name="{joint}" type="fixed">{ends}{_origin(pose)}</joint>\n'
+        ends = f"<parent link={quoteattr(parent)}/><child link={quoteattr(link)}/>"
+        made = f'<joint name={quoteattr(joint)} type="fixed">{ends}{_origin(pose)}</joint>'
+        more += f"  <link name={quoteattr(link)}/>\n  {made}\n"
     edits += [(robot.close, robot.close, more)] if more else []
     for name, pose in placed.items():
         if name not in joints:
