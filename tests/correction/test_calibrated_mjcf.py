@@ -180,6 +180,12 @@ WRONG = {
 }
 
 
+def test_a_text_of_another_encoding_is_refused(tmp_path):
+    (tmp_path / "own.xml").write_bytes(own_model().replace("keep", "ké").encode("latin-1"))
+    with pytest.raises(CampaignError, match=r"own\.xml.*UTF-8"):
+        calibrated_mjcf(displaced(load_robot(ARM, "tool"), 5), tmp_path / "own.xml")
+
+
 @pytest.mark.parametrize("word", WRONG)
 def test_another_robot_is_refused(word):
     text = framed(own_model()) if word == "<frame>" else own_model()

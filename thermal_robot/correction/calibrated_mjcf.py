@@ -6,6 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from xml.parsers.expat import ExpatError
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
@@ -106,9 +107,12 @@ class _Patched:
         bodies = Bodies.of(model)
         bodies.move(dict.fromkeys(moving, 0.0))
         base = known(model, "body", robot.robot.root_frame)
-        content = encoded(path.read_text(encoding="utf-8") if path else str(mjcf))
         root = np.eye(4) if base is None else bodies.pose(base)
-        return cls(robot, name, content, tags(content), model, bodies, root)
+        try:
+            content = encoded(path.read_text(encoding="utf-8") if path else str(mjcf))
+            return cls(robot, name, content, tags(content), model, bodies, root)
+        except (UnicodeDecodeError, ExpatError) as error:
+            raise CampaignError(name, "is no XML in UTF-8", found=str(error)) from None
 
     def edits(self) -> list[Edit]:
         """Return the changes: bodies of joints and of the tool frame that are placed anew, and the target."""

@@ -52,7 +52,9 @@ def determined(
         If the model does not say how far its parameters may be off, or ``min_sigma`` is no number of deviations.
     """
     if not 0.0 <= min_sigma < np.inf:
-        raise CampaignError("min_sigma", "is no number of standard deviations", found=f"{min_sigma}", expected="2")
+        raise CampaignError(
+            "min_sigma", "is no number of standard deviations", found=f"{min_sigma:g}", expected="a number such as 2"
+        )
     known, spread = constant(model, temperature), model.spread
     frames = frame_columns(rows_of_every_kind(model))[1]
     names = tuple(name for name, own in zip(frames, moves(frames), strict=True) if own)

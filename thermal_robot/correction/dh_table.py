@@ -35,6 +35,8 @@ CONVENTIONS = ("standard", "modified")
 """Of the table: Denavit and Hartenberg's own, and Craig's (*Introduction to Robotics*, 1986)."""
 NEARLY_PARALLEL = 0.1
 """Sine of the angle of two axes below which β takes the place of d: as where the errors of axes are told."""
+_DUST = 1e-14
+"""rad, m."""
 _ANGLES, _LENGTHS = ("theta", "alpha", "beta", "roll", "pitch", "yaw"), ("d", "a", "x", "y", "z")
 
 
@@ -91,7 +93,8 @@ def dh_table(robot: Calibrated, convention: Convention = "standard", units: Unit
     scales = {**dict.fromkeys(_ANGLES, units.angle_scale), **dict.fromkeys(_LENGTHS, units.length_scale)}
     names = {**dict.fromkeys(_ANGLES, units.angle), **dict.fromkeys(_LENGTHS, units.length)}
     for name, scale in scales.items():
-        table[name] = table[name] / scale
+        # what rounding leaves of a zero is no figure of a robot
+        table[name] = table[name].where(~(table[name].abs() < _DUST), 0.0) / scale
     table.insert(0, "convention", convention)
     return table.rename(columns={name: f"{name} [{unit}]" for name, unit in names.items()})
 
