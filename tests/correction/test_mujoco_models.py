@@ -5,6 +5,8 @@ import sys
 import mujoco
 import numpy as np
 import pytest
+from conftest import load_arm
+from coupled import joint, link, urdf
 from readers import by_mujoco, held, pose_of
 
 from thermal_robot import CampaignError
@@ -17,8 +19,6 @@ TWO = """<mujoco><worldbody><body name="a" pos="0 0 1"><geom size="0.1"/><joint 
 
 @pytest.mark.parametrize("name", ["coupled", "awkward", "ur10", "panda"])
 def test_a_translated_urdf_has_the_same_poses_joints_and_links(name, configurations):
-    from conftest import load_arm
-
     arm = load_arm(name)
     text = mjcf_of_urdf(arm.urdf)
     q = configurations(arm, 10)
@@ -29,6 +29,26 @@ def test_a_translated_urdf_has_the_same_poses_joints_and_links(name, configurati
     assert bodies | {"world"} == {*arm.urdf_links, "world"}
     assert {model.joint(k).name for k in range(model.njnt)} <= set(arm.urdf_joints)
     assert model.neq == arm.urdf.count("<mimic ")
+
+
+def test_a_mimicking_joint_follows_in_a_simulation():
+    """Let go, both fall to where the one is held: a spring pulls the driver, nothing the follower but the equality."""
+    limits, follows = (-3, 3), 'joint="a" multiplier="-0.5" offset="0.2"'
+    text = urdf(
+        *(link(name, 1.0, "0 0 0.1") for name in ("base", "one", "two")),
+        joint("a", "revolute", "base", "one", limits=limits),
+        joint("b", "revolute", "one", "two", "0 0 0.3", limits=limits, mimic=follows),
+    )
+    model = mujoco.MjModel.from_xml_string(mjcf_of_urdf(text))
+    data = mujoco.MjData(model)
+    model.opt.gravity[:] = 0.0
+    model.jnt_stiffness[model.joint("a").id], model.qpos_spring[0] = 50.0, 1.0
+    model.dof_damping[:] = 5.0
+    for _ in range(20000):
+        mujoco.mj_step(model, data)
+    a, b = (data.qpos[model.joint(name).qposadr[0]] for name in "ab")
+    assert a == pytest.approx(1.0, abs=0.01)
+    assert b == pytest.approx(0.2 - 0.5 * a, abs=1e-3)
 
 
 def test_bodies_and_axes_are_where_mujoco_has_them():

@@ -7,17 +7,20 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from xml.sax.saxutils import quoteattr
 
 import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.errors import CampaignError
-from thermal_robot.kinematics.markup import changed, encoded, tags, with_values
+from thermal_robot.kinematics.markup import Edit, changed, encoded, tags, with_values
+from thermal_robot.kinematics.mimic import Mimic, mimics
 
 Array = NDArray[np.float64]
 
 _NO_MASS = {"boundmass": 1e-9, "boundinertia": 1e-12, "balanceinertia": True, "fusestatic": False}
 """Of the compiler: links without masses are let be, and links that do not move stay bodies of their own."""
+_MIMIC = re.compile(r"<mimic\b[^>]*>(\s*</mimic>)?")
 _MESH = re.compile(r"<(visual|collision)\b(?:(?!</\1>).)*?<mesh\b.*?</\1>", re.DOTALL)
 
 
@@ -69,27 +72,40 @@ def mjcf_of_urdf(urdf: str) -> str:
     """
     mujoco = mujoco_or_error()
     try:
-        spec = mujoco.MjSpec.from_string(_MESH.sub("", urdf))
+        spec = mujoco.MjSpec.from_string(_MIMIC.sub("", _MESH.sub("", urdf)))
         for name, value in _NO_MASS.items():
             setattr(spec.compiler, name, value)
         model = spec.compile()
         text = spec.to_xml()
     except (ValueError, mujoco.FatalError) as error:
         raise CampaignError("the URDF", "MuJoCo does not take it", found=" ".join(str(error).split())) from None
-    return _exact(text, model)
+    return _exact(
+        text, model, [_equality(joint, mimic) for joint, mimic in mimics(urdf).items() if _both(model, joint, mimic)]
+    )
 
 
-def _exact(text: str, model: Any) -> str:
-    """Give a model that MuJoCo wrote, in six digits, all of them."""
+def _equality(joint: str, mimic: Mimic) -> str:
+    """Return what makes a joint follow another: MuJoCo 3.3.0 does not read that from a URDF."""
+    numbers = digits([mimic.offset, mimic.multiplier, 0, 0, 0])
+    return f'    <joint joint1={quoteattr(joint)} joint2={quoteattr(mimic.joint)} polycoef="{numbers}"/>\n'
+
+
+def _both(model: Any, joint: str, mimic: Mimic) -> bool:
+    """Tell whether both joints move: a fixed one is none of an MJCF."""
+    return known(model, "joint", joint) is not None and known(model, "joint", mimic.joint) is not None
+
+
+def _exact(text: str, model: Any, equalities: Sequence[str]) -> str:
+    """Give a model that MuJoCo wrote, in six digits, all of them; and its equalities."""
     content = encoded(text)
-    edits, equalities = [], iter(model.eq_data)
-    for tag in tags(content):
+    found = tags(content)
+    end = found[0].close
+    edits: list[Edit] = [(end, end, f"\n  <equality>\n{''.join(equalities)}  </equality>\n")] if equalities else []
+    for tag in found:
         values: dict[str, tuple[Array, Sequence[float]]] = {}
         if tag.path[-1] == "body":
             body = model.body(tag.attributes["name"])
             values = {"pos": (body.pos, (0.0, 0.0, 0.0)), "quat": (body.quat, (1.0, 0.0, 0.0, 0.0))}
-        elif tag.path[-2:] == ("equality", "joint"):
-            values = {"polycoef": (next(equalities)[:5], ())}
         elif tag.path[-1] == "joint":
             joint = model.joint(tag.attributes["name"])
             values = {"axis": (joint.axis, (0.0, 0.0, 1.0)), "range": (joint.range, (0.0, 0.0))}
