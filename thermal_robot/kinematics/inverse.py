@@ -1,0 +1,205 @@
+"""Joint positions at which a chain, displaced or not, brings a point of its tool to given poses.
+
+Two steps, both on the exact kinematics. First Levenberg-Marquardt on the point and the direction of the tool at once,
+
+    min_q |p* − p(q)|² + a² |log(R* Rᵀ(q))|²,    a the arm that weighs an angle against a length,
+
+within a box of joint positions, so that a joint at its limit stays there and the others do its work (a projected
+method: the coordinates at a bound that would leave it are held). Then Newton steps of least length on the point alone,
+Δq = J_p⁺ (p* − p): where not all six coordinates can be had (fewer than six joints, a singular pose, a limit) the point
+has priority, and the direction is the nearest that the first step found. An arm with more than six joints stays near
+where it starts, as each step is the shortest that does it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from thermal_robot.errors import RobotError
+from thermal_robot.kinematics.frames import ChainFrames, Displacement, as_rows, chain_frames
+from thermal_robot.kinematics.jacobians import frame_jacobians
+from thermal_robot.kinematics.lie import log3
+
+if TYPE_CHECKING:
+    from thermal_robot.robot import Robot
+
+Array = NDArray[np.float64]
+
+ARM = 0.05
+"""m; an error of direction counts as what it does at this distance: so short that the point goes first already."""
+STEPS = 60
+"""At most, of the first kind; from a good start four are enough, from anywhere thirty."""
+POINT_STEPS = 12
+"""At most, of the second kind; each squares the error."""
+EXACT = 1e-12
+"""m; a point as near as this is reached: a hundred times the rounding of an arm of a metre."""
+_DAMPING = 1e-6
+"""m²; of the first step. It is divided or multiplied by ten as steps succeed or fail."""
+_LEAST_DAMPING = 1e-15
+"""m²; below it rounding decides."""
+_GAIN = 1e-9
+"""Share of the cost that a step must take off, or the row has come as near as it can."""
+_SMALLEST = 1e-6
+"""Of the largest singular value of J_p: directions in which joints hardly move the point are not used."""
+
+
+@dataclass(frozen=True, eq=False)
+class Reached:
+    """Where a chain was brought.
+
+    Attributes
+    ----------
+    q
+        (N, n) rad or m.
+    position
+        (N, 3) m, root frame: what is left of the point, wanted − reached.
+    direction
+        (N, 3) rad, rotation vectors in the root frame: what is left of the direction.
+    """
+
+    q: Array
+    position: Array
+    direction: Array
+
+    @property
+    def miss(self) -> Array:
+        """(N,) m by which the point is missed."""
+        return np.asarray(np.linalg.norm(self.position, axis=1))
+
+    @property
+    def turned(self) -> Array:
+        """(N,) rad by which the direction is missed."""
+        return np.asarray(np.linalg.norm(self.direction, axis=1))
+
+
+def inverse_kinematics(
+    robot: Robot,
+    poses: ArrayLike,
+    start: ArrayLike,
+    *,
+    tool: ArrayLike | None = None,
+    displaced: Callable[[Array], Displacement | None] | None = None,
+    within: tuple[ArrayLike, ArrayLike] | None = None,
+) -> Reached:
+    """Find joint positions that bring the tool to poses, as near to a start as that is possible.
+
+    Parameters
+    ----------
+    robot
+        The robot.
+    poses
+        (N, 4, 4) wanted, root frame, m.
+    start
+        (N, n) rad or m from which each row begins; a good one makes it quick.
+    tool
+        (4, 4) pose, in the tool frame, of what is brought there; the tool frame itself by default.
+    displaced
+        What displaces the chain at (N, n) joint positions, as of a robot whose joints yield; nothing by default.
+    within
+        Lowest and highest joint positions, (n,) or (N, n), rad or m; the robot's limits by default. A start outside is
+        brought inside.
+
+    Returns
+    -------
+    Reached
+        Of every row the nearest that was found. Whether that is near enough is the caller's to say.
+
+    Raises
+    ------
+    RobotError
+        If an array has not the shape that the robot asks for.
+    """
+    q = as_rows(robot, start)
+    wanted = np.asarray(poses, dtype=float)
+    if wanted.shape != (len(q), 4, 4):
+        raise RobotError(f"poses of shape {wanted.shape} do not fit: expected {(len(q), 4, 4)}", name=robot.name)
+    low, high = (np.broadcast_to(np.asarray(end, dtype=float), q.shape) for end in within or (robot.lower, robot.upper))
+    chain = _Driven(robot, wanted, np.eye(4) if tool is None else np.asarray(tool, dtype=float), displaced, low, high)
+    q = _to_the_pose(chain, np.clip(q, low, high))
+    q = _to_the_point(chain, q)
+    error = chain.error(chain.frames(q))
+    return Reached(q, error[:, :3], error[:, 3:])
+
+
+@dataclass(frozen=True, eq=False)
+class _Driven:
+    """A chain, where it shall go, and what it may do."""
+
+    robot: Robot
+    wanted: Array
+    tool: Array
+    displaced: Callable[[Array], Displacement | None] | None
+    low: Array
+    high: Array
+
+    def frames(self, q: Array) -> ChainFrames:
+        return chain_frames(self.robot, q, None if self.displaced is None else self.displaced(q))
+
+    def error(self, frames: ChainFrames) -> Array:
+        """(N, 6) wanted − reached: m, and a rotation vector in rad; root frame."""
+        place = frames.tool_position + frames.tool_rotation @ self.tool[:3, 3]
+        rotation = frames.tool_rotation @ self.tool[:3, :3]
+        turn = log3(self.wanted[:, :3, :3] @ rotation.transpose(0, 2, 1))
+        return np.concatenate([self.wanted[:, :3, 3] - place, turn], axis=1)
+
+    def jacobian(self, frames: ChainFrames) -> Array:
+        """(N, 6, n) of the displaced chain; what the displacement itself changes with q is left to the next step."""
+        return frame_jacobians(self.robot, np.empty(0), frames=frames, point=self.tool[:3, 3])
+
+    def free(self, q: Array, downhill: Array) -> NDArray[np.bool_]:
+        """(N, n) which joints may go the way (N, n) that lowers the cost: not those at the end that it leads out of."""
+        return ~(((q <= self.low) & (downhill < 0.0)) | ((q >= self.high) & (downhill > 0.0)))
+
+
+def _to_the_pose(chain: _Driven, q: Array) -> Array:
+    """Levenberg-Marquardt within the box, all rows at once, each with a damping of its own."""
+    weights = np.array([1.0, 1.0, 1.0, ARM, ARM, ARM])
+    damping, going = np.full(len(q), _DAMPING), np.ones(len(q), dtype=bool)
+    frames = chain.frames(q)
+    error = weights * chain.error(frames)
+    cost = (error**2).sum(axis=1)
+    for _ in range(STEPS):
+        going &= cost > EXACT**2
+        if not going.any():
+            break
+        jacobian = weights[:, None] * chain.jacobian(frames)
+        downhill = np.einsum("nri,nr->ni", jacobian, error)
+        jacobian *= chain.free(q, downhill)[:, None, :]
+        downhill = np.einsum("nri,nr->ni", jacobian, error)
+        normal = np.einsum("nri,nrj->nij", jacobian, jacobian) + damping[:, None, None] * np.eye(q.shape[1])
+        step = np.linalg.solve(normal, downhill[..., None])[..., 0]
+        tried = np.where(going[:, None], np.clip(q + step, chain.low, chain.high), q)
+        frames = chain.frames(tried)
+        error_there = weights * chain.error(frames)
+        cost_there = (error_there**2).sum(axis=1)
+        better = going & (cost_there < cost)
+        going &= ~(better & (cost - cost_there < _GAIN * cost)) & (damping < 1.0)
+        damping = np.where(better, np.maximum(damping / 10.0, _LEAST_DAMPING), damping * 10.0)
+        q, error = np.where(better[:, None], tried, q), np.where(better[:, None], error_there, error)
+        cost = np.where(better, cost_there, cost)
+        if not better.all():
+            frames = chain.frames(q)
+    return q
+
+
+def _to_the_point(chain: _Driven, q: Array) -> Array:
+    """Newton steps of least length on the point; a joint that would leave the box is held."""
+    nearest, miss = q, np.full(len(q), np.inf)
+    for _ in range(POINT_STEPS):
+        frames = chain.frames(q)
+        error = chain.error(frames)[:, :3]
+        distance = np.linalg.norm(error, axis=1)
+        better = distance < miss
+        nearest, miss = np.where(better[:, None], q, nearest), np.minimum(distance, miss)
+        if not (miss > EXACT).any():
+            break
+        jacobian = chain.jacobian(frames)[:, :3]
+        jacobian = jacobian * chain.free(q, np.einsum("nri,nr->ni", jacobian, error))[:, None, :]
+        step = np.linalg.pinv(jacobian, rcond=_SMALLEST) @ error[..., None]
+        q = np.where((miss > EXACT)[:, None], np.clip(q + step[..., 0], chain.low, chain.high), nearest)
+    return nearest
