@@ -8,6 +8,7 @@ from thermal_robot.campaign.settings import Settings
 from thermal_robot.campaign.tabular import read_table
 from thermal_robot.campaign.units import Units, unit_of
 from thermal_robot.campaign.write import (
+    with_commands,
     with_prediction,
     write_campaign,
     write_predictions,
@@ -24,6 +25,7 @@ __all__ = [
     "read_samples",
     "read_table",
     "unit_of",
+    "with_commands",
     "with_prediction",
     "write_campaign",
     "write_predictions",

@@ -12,6 +12,8 @@ SIMULATED_ORIENTATION = ("sim.qw", "sim.qx", "sim.qy", "sim.qz")
 LABELS = ("session", "pose")
 STD = ("std.x", "std.y", "std.z")
 OUTSIDE = "outside"
+MISSED = "miss.direction"
+"""Columns that predictions and corrected commands have beside their own."""
 TILT = ("tilt.x", "tilt.y")
 CLOCK = ("time", "order")
 """Columns that tell when a row was measured; where both are there, the first."""

@@ -18,6 +18,7 @@ from thermal_robot.campaign.tabular import NO_PARQUET, PARQUET, WITH_PARQUET
 from thermal_robot.campaign.units import Units, covariate_scale
 from thermal_robot.errors import CampaignError, require
 from thermal_robot.files import whole, write_text
+from thermal_robot.robot import Robot
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -105,14 +106,56 @@ def with_prediction(
     units
         Lengths are given in their length unit.
     """
-    groups: list[tuple[Sequence[str], Any]] = [(names.POSITION, np.asarray(position) / units.length_scale)]
-    if orientation is not None:
-        groups.append((names.ORIENTATION, np.asarray(orientation)))
-    groups.append((names.STD, np.asarray(std) / units.length_scale))
-    predicted = {name: column for group, values in groups for name, column in zip(group, values.T, strict=True)}
-    predicted[names.OUTSIDE] = [" ".join(columns) for columns in outside]
-    taken = {*names.POSITION, *names.ORIENTATION, *predicted}
-    return samples[[name for name in samples.columns if str(name).strip() not in taken]].assign(**predicted)
+    place = dict(zip(names.POSITION, np.asarray(position).T / units.length_scale, strict=True))
+    turn = {} if orientation is None else dict(zip(names.ORIENTATION, np.asarray(orientation).T, strict=True))
+    return _beside(samples, {**place, **turn, **_known(std, outside, units)})
+
+
+def with_commands(
+    samples: pd.DataFrame,
+    robot: Robot,
+    q: ArrayLike,
+    std: ArrayLike,
+    outside: Sequence[Sequence[str]],
+    direction: ArrayLike,
+    units: Units,
+) -> pd.DataFrame:
+    """Return samples with corrected commands in the place of their joint positions.
+
+    Parameters
+    ----------
+    samples
+        N rows; their other columns are kept as they stand, but for those of measurements.
+    robot
+        Whose joints they are.
+    q
+        (N, n) rad or m: what to command.
+    std
+        (N, 3) m: one standard deviation per axis of where the target will be.
+    outside
+        Per row: names of the columns in which it leaves what was measured.
+    direction
+        (N,) rad by which the target's direction is missed.
+    units
+        Of the table's joints and lengths.
+    """
+    scales = [units.joint_scale(kind) for kind in robot.joint_types]
+    commanded = dict(zip(robot.joint_names, np.asarray(q).T / np.array(scales)[:, None], strict=True))
+    own = {str(name): commanded[str(name).strip()] for name in samples.columns if str(name).strip() in commanded}
+    missed = {names.MISSED: np.asarray(direction) / units.angle_scale}
+    return _beside(samples.assign(**own), {**_known(std, outside, units), **missed})
+
+
+def _known(std: ArrayLike, outside: Sequence[Sequence[str]], units: Units) -> dict[str, Any]:
+    """Return the columns that say how far a place may be off, and where nobody measured."""
+    columns: dict[str, Any] = dict(zip(names.STD, np.asarray(std).T / units.length_scale, strict=True))
+    return {**columns, names.OUTSIDE: [" ".join(left) for left in outside]}
+
+
+def _beside(samples: pd.DataFrame, columns: dict[str, Any]) -> pd.DataFrame:
+    """Return samples with further columns; theirs of these names, and measured ones, are left out."""
+    taken = {*names.POSITION, *names.ORIENTATION, *columns}
+    return samples[[name for name in samples.columns if str(name).strip() not in taken]].assign(**columns)
 
 
 def write_predictions(path: str | Path, predictions: pd.DataFrame) -> None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from thermal_robot.console import note
+from thermal_robot.commands.shared import told_later
 from thermal_robot.files import require_free, write_one
 
 DOES = "say where the robot will really be, by the corrected model"
@@ -37,11 +37,7 @@ def run(options: argparse.Namespace) -> None:
     model = CorrectedModel.load(options.model)
     read = read_table(Path(options.samples))
     samples = model.samples(read)
-    if model.counts_anew(samples):
-        note(
-            f"order in {Path(options.samples).name} counts its own rows; predicted as after the campaign",
-            options.loudness,
-        )
+    told_later(options, model, samples, options.samples)
     prediction = model.prediction(samples, noise=options.noise)
     own = read.frame(numbers=Path(options.output).suffix.lower() in PARQUET)
     table = model.predicted(own, prediction)

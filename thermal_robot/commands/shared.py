@@ -7,11 +7,12 @@ import time
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from thermal_robot.console import QUIET, stages
+from thermal_robot.console import QUIET, note, stages
 from thermal_robot.files import write_text
 
 if TYPE_CHECKING:
     from thermal_robot.campaign import Campaign
+    from thermal_robot.correction import CorrectedModel
     from thermal_robot.diagnosis import Diagnosis
 
 CAMPAIGN = "campaign.toml, its folder, or - for standard input (paths in it are then those of the current folder)"
@@ -50,3 +51,9 @@ def page(found: Diagnosis, path: Path) -> None:
     from thermal_robot.report import html
 
     write_text(path, html(found, generated=time.strftime("%Y-%m-%d %H:%M")))
+
+
+def told_later(options: argparse.Namespace, model: CorrectedModel, samples: Campaign, file: str) -> None:
+    """Say so where the rows of a table count as measured after the campaign, as their order counts anew."""
+    if model.counts_anew(samples):
+        note(f"order in {Path(file).name} counts its own rows; predicted as after the campaign", options.loudness)

@@ -3,6 +3,7 @@
 from thermal_robot.correction.calibrated import Calibrated, calibrated
 from thermal_robot.correction.calibrated_mjcf import calibrated_mjcf
 from thermal_robot.correction.calibrated_urdf import calibrated_urdf
+from thermal_robot.correction.commands import Commands
 from thermal_robot.correction.determined import determined
 from thermal_robot.correction.dh_table import dh_table
 from thermal_robot.correction.model import CorrectedModel
@@ -12,6 +13,7 @@ from thermal_robot.correction.zero_offsets import zero_offsets
 
 __all__ = [
     "Calibrated",
+    "Commands",
     "CorrectedModel",
     "calibrated",
     "calibrated_mjcf",

@@ -7,12 +7,11 @@ temperature is fixed: they are read again in rows of one temperature that has la
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.names import CLOCK, LABELS, PER_LINK, split_name
 from thermal_robot.campaign.settings import ABSOLUTE_ZERO
 from thermal_robot.correction.model import CorrectedModel
@@ -147,7 +146,7 @@ def rows_of_every_kind(model: CorrectedModel, temperature: float | None = None, 
 
     Joints and conditions are drawn where the model was measured; within the joints' limits where it does not say.
     """
-    robot, settings, rng = model.robot, model.settings, np.random.default_rng(0)
+    robot, rng = model.robot, np.random.default_rng(0)
     ranges = {} if model.spread is None else model.spread.ranges
     limits = zip(np.maximum(robot.lower, -_WIDEST), np.minimum(robot.upper, _WIDEST), strict=True)
     ends = [ranges.get(name, limit) for name, limit in zip(robot.joint_names, limits, strict=True)]
@@ -163,21 +162,11 @@ def rows_of_every_kind(model: CorrectedModel, temperature: float | None = None, 
         elif temperature is not None and name in CLOCK:
             values = values + _LATE
         covariates[name] = values
-    campaign = Campaign(
-        name="rows of every kind",
-        robot=robot,
-        q=q,
-        covariates=covariates,
+    campaign = replace(
+        model.samples_at(q, covariates),
         orientation=np.tile([1.0, 0.0, 0.0, 0.0], (rows, 1)) if model.measures == "pose" else None,
         labels={label: np.full(rows, "one to come") for label in LABELS},
         simulated_position=np.zeros((rows, 3)) if model.simulated else None,
-        base_known=settings.base_known,
-        tool_known=settings.tool_known,
-        target=np.array(settings.target),
-        payload_com=np.array(settings.payload_com),
-        reference_temperature=settings.reference_temperature,
-        gears=settings.gears,
-        units=settings.units,
     )
     return observe(campaign, model.frames)
 

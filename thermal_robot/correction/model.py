@@ -4,16 +4,17 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
-from thermal_robot.campaign import Campaign, Settings, read_samples, read_table, with_prediction
+from thermal_robot.campaign import Campaign, Settings, read_samples, read_table, with_commands, with_prediction
 from thermal_robot.campaign.table import Table
+from thermal_robot.correction.commands import Commands, corrected
 from thermal_robot.effects import Effect
 from thermal_robot.effects.apply import displacement
 from thermal_robot.errors import CampaignError, require
@@ -131,12 +132,7 @@ class CorrectedModel:
         CampaignError
             As :meth:`predict`.
         """
-        if not isinstance(samples, Campaign):
-            samples = self.samples(samples)
-        self._require(samples)
-        # the model reads just what it was fitted to, whatever else a table holds
-        read = {name: values for name, values in samples.covariates.items() if name in self.needs}
-        samples = self._in_sequence(replace(samples, covariates=read))
+        samples = self._ready(samples)
         nominal = observe(samples, self.frames)
         moved, instrument = displacement(nominal, self.effects)
         corrected = observe(samples, self.frames, displacement=moved)
@@ -149,6 +145,106 @@ class CorrectedModel:
         outside = self.spread.outside(samples)
         std = self.spread.std(corrected, self.effects, outside, noise)
         return Prediction(position, orientation, std, outside)
+
+    def corrected_commands(
+        self,
+        poses: Campaign | str | Path | pd.DataFrame | ArrayLike,
+        conditions: Mapping[str, ArrayLike] | None = None,
+    ) -> Commands:
+        """Return the commands that bring the real target to nominal poses.
+
+        Parameters
+        ----------
+        poses
+            Nominal joint positions: a table, or the path of one, read as by :meth:`samples`, with the conditions of
+            each row in its columns; or an array (N, n), rad or m.
+        conditions
+            With an array: by column name, one value for all rows or (N,), SI: ``{"temperature": 24.0}``.
+
+        Returns
+        -------
+        Commands
+            Joint positions, how far from the nominal pose the target may be then, and what of its direction is missed.
+            An arm with more than six joints stays near its nominal position; one with fewer brings the point to its
+            place, and turns the target as near as it can.
+
+        Raises
+        ------
+        CampaignError
+            As :meth:`predict`; and if a pose is out of reach for the real robot, whose row is named.
+        """
+        if conditions is not None or isinstance(poses, (np.ndarray, list, tuple)):
+            return self._commands(self.samples_at(poses, conditions or {}))
+        return self._commands(poses)
+
+    def commanded(self, samples: pd.DataFrame, commands: Commands) -> pd.DataFrame:
+        """Return samples with the commands in the place of their joint positions, in the units of the campaign.
+
+        Parameters
+        ----------
+        samples
+            Their other columns are kept as they stand, but for those of measurements.
+        commands
+            Of them.
+
+        Returns
+        -------
+        pandas.DataFrame
+            Then std.x std.y std.z, in ``outside`` the columns in which the row leaves what was measured, separated by
+            blanks, and in ``miss.direction`` the angle by which the target's direction is missed.
+        """
+        q, std, outside, missed = commands.q, commands.std, commands.outside, commands.direction
+        return with_commands(samples, self.robot, q, std, outside, missed, self.settings.units)
+
+    def _commands(self, samples: Campaign | str | Path | pd.DataFrame | ArrayLike) -> Commands:
+        return corrected(self._ready(samples), self.frames, self.effects, self.spread)
+
+    def samples_at(self, q: Any, conditions: Mapping[str, ArrayLike] | None = None) -> Campaign:
+        """Return samples to predict, from arrays instead of a table.
+
+        Parameters
+        ----------
+        q
+            (N, n) joint positions, rad or m; (n,) counts as one row.
+        conditions
+            By column name, one value for all rows or (N,), SI.
+
+        Raises
+        ------
+        CampaignError
+            If an array does not fit, or a value is none.
+        """
+        name, given = "<conditions>", {}
+        try:
+            rows = np.atleast_2d(np.asarray(q, dtype=float))
+            for key, value in (conditions or {}).items():
+                given[key] = np.broadcast_to(np.asarray(value, dtype=float), len(rows)).copy()
+        except (TypeError, ValueError) as error:
+            what = f"an array (N, {self.robot.n}), and for each condition one number or N"
+            raise CampaignError(name, "these are no rows of numbers", found=str(error), expected=what) from error
+        settings = self.settings
+        return Campaign(
+            name=name,
+            robot=self.robot,
+            q=rows,
+            covariates=given,
+            base_known=settings.base_known,
+            tool_known=settings.tool_known,
+            target=np.array(settings.target),
+            payload_com=np.array(settings.payload_com),
+            moves=settings.moves,
+            reference_temperature=settings.reference_temperature,
+            gears=settings.gears,
+            units=settings.units,
+        )
+
+    def _ready(self, samples: Any) -> Campaign:
+        """Return samples with what the model reads, and nothing else that a table may hold."""
+        if not isinstance(samples, Campaign):
+            samples = self.samples(samples)
+        self._require(samples)
+        read = {name: values for name, values in samples.covariates.items() if name in self.needs}
+        return self._in_sequence(replace(samples, covariates=read))
 
     def counts_anew(self, samples: Campaign) -> bool:
         """Tell whether the ``order`` of the samples merely numbers the rows of their own file.

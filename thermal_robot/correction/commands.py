@@ -1,0 +1,113 @@
+"""Commands for the robot as it really is: joint positions at which its tool reaches the nominal poses.
+
+The nominal pose of a row is where the nominal robot would bring the target at the row's joint positions, p₀(q₀), in the
+root frame, on the target as it was fitted. The real robot brings it to p(q) = p₀ displaced by all that the effects do
+in the chain, at the row's conditions. Wanted is the q with p(q) = p₀(q₀).
+
+What displaces the base counts too (a pedestal that yields, drift): the pose is meant where the base was when the
+frames were fitted. What an instrument adds does not: its scale says nothing of where the tool is, and a robot that was
+moved for it would miss. Where a campaign brought the predictions of a simulator, what the simulator says at q is taken
+to differ from what it said at q₀ as the URDF's poses do.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.campaign import Campaign
+from thermal_robot.effects import Effect
+from thermal_robot.effects.apply import displacement
+from thermal_robot.errors import CampaignError
+from thermal_robot.kinematics import Displacement, inverse_kinematics, tool_poses
+from thermal_robot.observations import Frames, observe
+from thermal_robot.prediction import Spread
+
+Array = NDArray[np.float64]
+
+MISSED = 1e-7
+"""m; a command that brings the target no nearer does not reach the pose: a hundredth of what any tracker sees."""
+FARTHEST = {"revolute": 0.2, "continuous": 0.2, "prismatic": 0.05}
+"""rad, m; a joint goes no farther from its nominal position: ten times the largest errors of robots. What asks for more
+lies at a singular pose, or is another posture, whose way there nobody has looked at."""
+
+
+@dataclass(frozen=True, eq=False)
+class Commands:
+    """Joint positions to command, and what will be reached.
+
+    Attributes
+    ----------
+    q
+        (N, n) rad or m, in the chain's order, within the joints' limits.
+    std
+        (N, 3) one standard deviation per axis of where the target will be, measurement frame, m; NaN where the model
+        does not tell.
+    outside
+        Per row: the joints and columns in which it leaves what was measured.
+    direction
+        (N,) rad by which the direction of the target is missed: 0 but for rounding, unless the arm has fewer than six
+        joints, or stands at a singular pose or at a limit.
+    """
+
+    q: Array
+    std: Array
+    outside: tuple[tuple[str, ...], ...]
+    direction: Array
+
+
+def corrected(
+    samples: Campaign, frames: Frames, effects: Sequence[tuple[Effect, Array]], spread: Spread | None
+) -> Commands:
+    """Return the commands that bring the real target to the nominal poses of samples.
+
+    Parameters
+    ----------
+    samples
+        Nominal joint positions (N, n) and the conditions of each row.
+    frames, effects, spread
+        Of the corrected model.
+
+    Raises
+    ------
+    CampaignError
+        If a pose cannot be reached within the limits; its row is named.
+    EffectError
+        If an effect cannot be told in these rows.
+    """
+    robot, tool = samples.robot, frames.tool
+    farthest = np.array([FARTHEST[kind] for kind in robot.joint_types])
+    # a row that was commanded beyond a limit is not pushed out any farther
+    low = np.minimum(np.maximum(samples.q - farthest, robot.lower), samples.q)
+    high = np.maximum(np.minimum(samples.q + farthest, robot.upper), samples.q)
+
+    def displaced(q: Array) -> Displacement:
+        there = replace(samples, q=q, travelled=samples.since_turn)
+        return displacement(observe(there, frames), effects)[0]
+
+    wanted = tool_poses(robot, samples.q) @ tool
+    found = inverse_kinematics(robot, wanted, samples.q, tool=tool, displaced=displaced, within=(low, high))
+    _require_reached(samples, found.miss)
+    there = replace(samples, q=found.q, travelled=samples.since_turn)
+    if spread is None:
+        return Commands(found.q, np.full((samples.samples, 3), np.nan), ((),) * samples.samples, found.turned)
+    outside = spread.outside(there)
+    std = spread.std(observe(there, frames, displacement=displaced(found.q)), effects, outside, noise=False)
+    return Commands(found.q, std, outside, found.turned)
+
+
+def _require_reached(samples: Campaign, miss: Array) -> None:
+    missed = np.flatnonzero(~(miss <= MISSED))
+    if missed.size:
+        row = int(missed[0])
+        more = f", and so are {missed.size - 1} more rows" if missed.size > 1 else ""
+        raise CampaignError(
+            samples.name,
+            f"the pose of this row is out of reach for the real robot{more}",
+            row=int(samples.rows[row]),
+            found=f"{1e3 * miss[row]:.3g} mm are left",
+            expected="a pose within the limits, and away from singular ones",
+        )
