@@ -153,6 +153,26 @@ def test_a_data_frame_comes_back_with_commands_in_its_own_units(rv_m2):
     assert (answer["part"] == "a bolt").all()
 
 
+@pytest.mark.parametrize("source", ["builtin:rv_m2", "example-robot-data:ur10"])
+def test_poses_in_space_are_reached_by_the_real_target(source):
+    robot = load_robot(source, "tool0")
+    samples = rows_of(robot, rows=10)
+    model = model_of(samples, ["joint_offset", "joint_compliance"], seed=8)
+    wanted = tool_poses(robot, samples.q) @ model.frames.tool
+    told = {name: 0.0 for name in samples.covariates}
+    found = model.corrected_commands(wanted, told)
+    there = replace(samples, covariates={name: np.zeros(10) for name in samples.covariates})
+    reached = really(model, there, found.q)
+    np.testing.assert_allclose(reached[:, :3, 3], wanted[:, :3, 3], rtol=0, atol=1e-9)
+    wanted[3, :3, 3] += 10.0
+    with pytest.raises(CampaignError, match="row 4: out of reach"):
+        model.corrected_commands(wanted, told)
+    with pytest.raises(CampaignError, match="no poses"):
+        model.corrected_commands(2.0 * wanted, told)
+    with pytest.raises(CampaignError, match="no rows of numbers"):
+        model.corrected_commands([[0.1], [0.1, 0.2]], told)
+
+
 ROBOTS = {"rv_m2": ("builtin:rv_m2", "tool0"), "ur10": ("example-robot-data:ur10", "tool0")}
 """Robots of the proof, with their tool frames."""
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from thermal_robot.errors import RobotError
-from thermal_robot.kinematics import Displacement, frame_jacobians, inverse_kinematics, tool_poses
+from thermal_robot.kinematics import Displacement, frame_jacobians, inverse_kinematics, nearest_postures, tool_poses
 from thermal_robot.robot import load_robot
 
 ROWS = 40
@@ -115,3 +115,26 @@ def test_shapes_that_do_not_fit_are_refused(rv_m2):
         inverse_kinematics(rv_m2, tool_poses(rv_m2, q)[:2], q)
     with pytest.raises(RobotError):
         inverse_kinematics(rv_m2, tool_poses(rv_m2, q), q[:, :4])
+
+
+@pytest.mark.parametrize("name", ["builtin:rv_m2", "example-robot-data:ur10", "example-robot-data:panda"])
+def test_poses_are_found_from_anywhere(name):
+    arm = load_robot(name, "panda_hand" if "panda" in name else "tool0")
+    q = inside(arm, ROWS)
+    wanted = tool_poses(arm, q) @ TOOL
+    found = nearest_postures(arm, wanted, tool=TOOL)
+    reached = tool_poses(arm, found.q) @ TOOL
+    np.testing.assert_allclose(reached[:, :3, 3], wanted[:, :3, 3], rtol=0, atol=1e-9)
+    assert np.quantile(found.turned, 0.9) < 1e-6
+    assert (found.q >= arm.lower).all()
+    assert (found.q <= arm.upper).all()
+
+
+def test_of_several_postures_the_nearest_is_taken():
+    arm = load_robot("example-robot-data:ur10", "tool0")
+    q = easy(arm, ROWS)
+    wanted = tool_poses(arm, q)
+    np.testing.assert_allclose(nearest_postures(arm, wanted, near=q).q, q, atol=1e-6)
+    middle = nearest_postures(arm, wanted)
+    assert middle.miss.max() < 1e-9
+    assert np.linalg.norm(middle.q, axis=1).mean() < np.linalg.norm(q, axis=1).mean()

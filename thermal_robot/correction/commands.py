@@ -16,20 +16,23 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from thermal_robot.campaign import Campaign
 from thermal_robot.effects import Effect
 from thermal_robot.effects.apply import displacement
 from thermal_robot.errors import CampaignError
-from thermal_robot.kinematics import Displacement, inverse_kinematics, tool_poses
+from thermal_robot.kinematics import Displacement, inverse_kinematics, nearest_postures, tool_poses
 from thermal_robot.observations import Frames, observe
 from thermal_robot.prediction import Spread
+from thermal_robot.robot import Robot
 
 Array = NDArray[np.float64]
 
 MISSED = 1e-7
 """m; a command that brings the target no nearer does not reach the pose: a hundredth of what any tracker sees."""
+ORTHOGONAL = 1e-6
+"""By which the axes of a pose may fail to be orthogonal and of length one: rounding to six digits."""
 FARTHEST = {"revolute": 0.2, "continuous": 0.2, "prismatic": 0.05}
 """rad, m; a joint goes no farther from its nominal position: ten times the largest errors of robots. What asks for more
 lies at a singular pose, or is another posture, whose way there nobody has looked at."""
@@ -97,6 +100,30 @@ def corrected(
     outside = spread.outside(there)
     std = spread.std(observe(there, frames, displacement=displaced(found.q)), effects, outside, noise=False)
     return Commands(found.q, std, outside, found.turned)
+
+
+def nominal_positions(robot: Robot, frames: Frames, poses: ArrayLike) -> Array:
+    """(N, n) joint positions, rad or m, at which the nominal robot brings the target to poses (N, 4, 4), root frame.
+
+    Raises
+    ------
+    CampaignError
+        If they are no poses, or one is out of reach; it is named by its row among them, which count from 1.
+    """
+    expected = "an array (N, 4, 4) of poses, m"
+    try:
+        wanted = np.asarray(poses, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise CampaignError("<poses>", "these are no poses", found=str(error), expected=expected) from error
+    turns = wanted[..., :3, :3]
+    if wanted.shape[1:] != (4, 4) or not np.allclose(turns @ turns.swapaxes(-1, -2), np.eye(3), atol=ORTHOGONAL):
+        raise CampaignError("<poses>", "these are no poses", found=f"shape {wanted.shape}", expected=expected)
+    found = nearest_postures(robot, wanted, tool=frames.tool)
+    missed = np.flatnonzero(~(found.miss <= MISSED))
+    if missed.size:
+        left = f"{1e3 * found.miss[missed[0]]:.3g} mm are left"
+        raise CampaignError("<poses>", "out of reach for the nominal robot", row=int(missed[0]) + 1, found=left)
+    return found.q
 
 
 def _require_reached(samples: Campaign, miss: Array) -> None:

@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from thermal_robot.campaign import Campaign, Settings, read_samples, read_table, with_commands, with_prediction
 from thermal_robot.campaign.table import Table
-from thermal_robot.correction.commands import Commands, corrected
+from thermal_robot.correction.commands import Commands, corrected, nominal_positions
 from thermal_robot.effects import Effect
 from thermal_robot.effects.apply import displacement
 from thermal_robot.errors import CampaignError, require
@@ -157,7 +157,8 @@ class CorrectedModel:
         ----------
         poses
             Nominal joint positions: a table, or the path of one, read as by :meth:`samples`, with the conditions of
-            each row in its columns; or an array (N, n), rad or m.
+            each row in its columns; or an array (N, n), rad or m; or (N, 4, 4), poses of the target in the root frame,
+            m, of which each is reached in the posture nearest to the middle of the joints' limits.
         conditions
             With an array: by column name, one value for all rows or (N,), SI: ``{"temperature": 24.0}``.
 
@@ -173,9 +174,11 @@ class CorrectedModel:
         CampaignError
             As :meth:`predict`; and if a pose is out of reach for the real robot, whose row is named.
         """
-        if conditions is not None or isinstance(poses, (np.ndarray, list, tuple)):
-            return self._commands(self.samples_at(poses, conditions or {}))
-        return self._commands(poses)
+        if conditions is None and not isinstance(poses, (np.ndarray, list, tuple)):
+            return self._commands(poses)
+        if np.asarray(poses, dtype=object).ndim == 3:
+            poses = nominal_positions(self.robot, self.frames, poses)  # type: ignore[arg-type]
+        return self._commands(self.samples_at(poses, conditions))
 
     def commanded(self, samples: pd.DataFrame, commands: Commands) -> pd.DataFrame:
         """Return samples with the commands in the place of their joint positions, in the units of the campaign.

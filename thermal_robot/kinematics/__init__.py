@@ -3,7 +3,7 @@
 from thermal_robot.kinematics.augmented import AugmentedModel, augmented_model, elongation_jacobian, growing
 from thermal_robot.kinematics.frames import ChainFrames, Displacement, chain_frames, tool_poses
 from thermal_robot.kinematics.gravity import gravity_torques, segment_loads, static_regressor
-from thermal_robot.kinematics.inverse import Reached, inverse_kinematics
+from thermal_robot.kinematics.inverse import Reached, inverse_kinematics, nearest_postures
 from thermal_robot.kinematics.jacobians import frame_jacobians, placement_sensitivities
 from thermal_robot.kinematics.lie import (
     align,
@@ -31,6 +31,7 @@ __all__ = [
     "growing",
     "inverse_kinematics",
     "log3",
+    "nearest_postures",
     "placement_sensitivities",
     "quaternion_to_rotation",
     "rotation_to_quaternion",

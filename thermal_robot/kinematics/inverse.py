@@ -38,6 +38,11 @@ POINT_STEPS = 12
 """At most, of the second kind; each squares the error."""
 EXACT = 1e-12
 """m; a point as near as this is reached: a hundred times the rounding of an arm of a metre."""
+STARTS = 24
+"""Places from which a pose is searched beside the given one: an arm of six joints has up to eight postures
+(sixteen with general axes), and from a random place a third of the searches ends at a limit."""
+_SAME = 1e-6
+"""rad; two postures whose directions are missed by as much are as good as each other."""
 _DAMPING = 1e-6
 """m²; of the first step. It is divided or multiplied by ten as steps succeed or fail."""
 _LEAST_DAMPING = 1e-15
@@ -124,6 +129,56 @@ def inverse_kinematics(
     q = _to_the_point(chain, q)
     error = chain.error(chain.frames(q))
     return Reached(q, error[:, :3], error[:, 3:])
+
+
+def nearest_postures(
+    robot: Robot, poses: ArrayLike, *, tool: ArrayLike | None = None, near: ArrayLike | None = None
+) -> Reached:
+    """Find joint positions that bring the tool to poses, from anywhere: of the postures that are found the nearest.
+
+    Parameters
+    ----------
+    robot, poses, tool
+        As for :func:`inverse_kinematics`.
+    near
+        (n,) or (N, n) rad or m near which the posture shall be; the middle of the limits by default.
+
+    Returns
+    -------
+    Reached
+        Each row is searched from ``near`` and from :data:`STARTS` other places within the limits. Of those that reach
+        the pose as well as the best, the nearest; where none does, the one with the smallest miss. A nearer one may
+        exist.
+
+    Raises
+    ------
+    RobotError
+        If an array has not the shape that the robot asks for.
+    """
+    low, high = np.maximum(robot.lower, -np.pi), np.minimum(robot.upper, np.pi)
+    rows = len(np.asarray(poses, dtype=float))
+    first = np.broadcast_to((low + high) / 2.0 if near is None else as_rows(robot, near), (rows, robot.n))
+    drawn = np.random.default_rng(0).uniform(low, high, (STARTS, robot.n))
+    best: Reached | None = None
+    for start in (first, *(np.broadcast_to(each, first.shape) for each in drawn)):
+        found = inverse_kinematics(robot, poses, start, tool=tool)
+        best = found if best is None else _better(best, found, first)
+    assert best is not None  # there is one start at least
+    return best
+
+
+def _better(one: Reached, other: Reached, near: Array) -> Reached:
+    """Return row by row the one that misses less, or where both miss as much the nearer one."""
+    cost = [np.maximum(each.miss, EXACT) + ARM * np.maximum(each.turned, _SAME) for each in (one, other)]
+    far = [np.linalg.norm(each.q - near, axis=1) for each in (one, other)]
+    alike = np.abs(cost[1] - cost[0]) <= ARM * _SAME
+    taken = np.where(alike, far[1] < far[0], cost[1] < cost[0])[:, None]
+    chosen = (np.where(taken, b, a) for a, b in zip(_parts(one), _parts(other), strict=True))
+    return Reached(*chosen)
+
+
+def _parts(found: Reached) -> tuple[Array, Array, Array]:
+    return found.q, found.position, found.direction
 
 
 @dataclass(frozen=True, eq=False)
