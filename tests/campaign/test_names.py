@@ -23,7 +23,7 @@ def test_a_name_is_a_quantity_and_a_place(column: str, parts: tuple[str, str]) -
 
 def test_a_reserved_name_means_one_thing() -> None:
     assert len(set(names.RESERVED)) == len(names.RESERVED)
-    assert {*"xyz", "qw", "sim.x", "sim.qz", "session", "pose", "time", "speed"} <= set(names.RESERVED)
+    assert {*"xyz", "qw", "sim.x", "sim.qz", "session", "pose", "path", "time", "speed"} <= set(names.RESERVED)
 
 
 def test_the_nearest_come_first_whatever_their_case() -> None:

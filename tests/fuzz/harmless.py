@@ -60,7 +60,7 @@ def numbers_written_otherwise(rng: Random, files: Files) -> Files:
     ways = (lambda c: f"{float(c):.17e}", lambda c: f"{float(c):.17G}", lambda c: f"+{c}".replace("+-", "-"),
     lambda c: f" {c} ",
             lambda c: f"00{c}" if c[0].isdigit() else c)  # fmt: skip
-    chosen = [j for j, name in enumerate(head) if name not in ("session", "pose")]
+    chosen = [j for j, name in enumerate(head) if name not in ("session", "pose", "path")]
     for row in body:
         for j in chosen:
             row[j] = rng.choice(ways)(row[j]) if is_number(row[j]) else row[j]
@@ -114,7 +114,7 @@ def other_units(rng: Random, files: Files) -> Files:
 def as_parquet_file(rng: Random, files: Files) -> Files:
     frame = as_frame(files)
     for name in frame.columns:
-        if name in ("session", "pose"):
+        if name in ("session", "pose", "path"):
             frame[name] = frame[name].astype(str)
     document = tomllib.loads(files["campaign.toml"].decode())
     document["measurements"]["file"] = "measurements.parquet"

@@ -45,6 +45,16 @@ def test_repeats_of_a_pose_are_never_on_both_sides(arm, jitter):
             assert (block[:, None] == block[None, :])[near].all()
 
 
+def test_points_of_two_paths_are_not_the_same_pose_whatever_they_are_called(rv_m2):
+    label = {"path": np.array(["a", "a", "b", "b", "a", ""]), "pose": np.array(["1", "2", "1", "", "1", "1"])}
+    campaign = Campaign("paths", rv_m2, commands(rv_m2, 6, np.random.default_rng(1)), labels=label)
+    assert campaign.pose_labels.tolist() == ["a / 1", "a / 2", "b / 1", "", "a / 1", "1"]
+    number = repeated_poses(campaign)
+    assert number[0] == number[4]
+    assert len({*number.tolist()}) == 5
+    assert repeated_poses(campaign.take([3, 5]))[0] != repeated_poses(campaign.take([3, 5]))[1]
+
+
 def test_rows_that_share_a_label_belong_together_however_far_apart(rv_m2):
     q = commands(rv_m2, 60, np.random.default_rng(1))
     label = np.array([f"p{k % 20}" for k in range(60)])

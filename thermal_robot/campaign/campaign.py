@@ -64,7 +64,7 @@ class Campaign:
     derived
         Names of those covariates that were not recorded but follow from the order of the rows.
     labels
-        (N,) text for ``"session"`` and ``"pose"`` where the table has them; ``""`` where a cell is empty.
+        (N,) text for ``"session"``, ``"pose"`` and ``"path"`` where the table has them; ``""`` where a cell is empty.
     simulated_position, simulated_orientation
         (N, 3) m and (N, 4) wxyz in the root frame: what the user's own simulator predicts; ``None`` if it is
         not given.
@@ -225,6 +225,18 @@ class Campaign:
     def clock(self) -> FloatArray | None:
         """(N,) ``time`` in s, or ``order`` where there is no time; ``None`` where there is neither."""
         return clock_of(self.covariates)
+
+    @cached_property
+    def pose_labels(self) -> TextArray | None:
+        """(N,) which commanded pose a row repeats, ``""`` where it has no label; ``None`` where no row is labelled.
+
+        Labels of poses count within their path: point 3 of one path is not that of another.
+        """
+        pose, path = self.labels.get("pose"), self.labels.get("path")
+        if pose is None or path is None:
+            return pose
+        of_path = np.char.add(np.char.add(path, " / "), pose)
+        return _read_only(np.where((pose != "") & (path != ""), of_path, pose))
 
     @cached_property
     def since_turn(self) -> Mapping[str, FloatArray]:

@@ -133,8 +133,7 @@ def _not_recorded(campaign: Campaign) -> Iterator[str]:
 def _repetition(campaign: Campaign) -> Iterator[Sequence[str]]:
     _, counts = np.unique(np.round(campaign.q, SAME_CONFIGURATION), axis=0, return_counts=True)
     yield "identical commands", _repeated(counts)
-    if "pose" in campaign.labels:
-        labels = campaign.labels["pose"]
+    if (labels := campaign.pose_labels) is not None:
         yield "same pose label", _repeated(np.unique(labels[labels != ""], return_counts=True)[1])
     if "session" in campaign.labels:
         sessions, counts = np.unique(campaign.labels["session"], return_counts=True)

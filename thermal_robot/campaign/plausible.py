@@ -145,7 +145,7 @@ def _speed(campaign: Campaign) -> Iterator[str]:
 
 
 def _pose_labels(campaign: Campaign) -> Iterator[str]:
-    labels = campaign.labels.get("pose")
+    labels = campaign.pose_labels
     if labels is None:
         return
     different = [

@@ -32,7 +32,7 @@ class Columns:
     extra
         Numeric columns that the format does not define.
     labels
-        ``session`` and ``pose`` where present.
+        ``session``, ``pose`` and ``path`` where present.
     has_orientation, has_simulated_position, has_simulated_orientation
         Whether these groups are there, each whole.
     warnings

@@ -31,6 +31,6 @@ class ExcessRepeatability(RandomEffect):
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return ``pose`` unless a pose is repeated; rows without a label stand alone."""
-        labels = observations.campaign.labels.get("pose")
+        labels = observations.campaign.pose_labels
         visits = np.round(observations.q / _SAME) if labels is None else labels[labels != ""]
         return () if len(np.unique(visits, axis=0)) < len(visits) else self.needs

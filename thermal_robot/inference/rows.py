@@ -33,7 +33,7 @@ def near_repeats(campaign: Campaign) -> Labels:
         ):
             break
         radius /= 2
-    stated = campaign.labels.get("pose")
+    stated = campaign.pose_labels
     if stated is not None and np.any(stated != ""):
         _, named = np.unique(stated, return_inverse=True)
         key = np.where(stated != "", named + count, labels)
@@ -106,7 +106,7 @@ def repeated_poses(campaign: Campaign) -> NDArray[np.int64]:
 
     A row whose label is empty stands alone.
     """
-    label = campaign.labels.get("pose")
+    label = campaign.pose_labels
     if label is None:
         same = np.round(campaign.q / settings.SAME_COMMAND).astype(np.int64)
         return np.asarray(np.unique(same, axis=0, return_inverse=True)[1]).ravel()
