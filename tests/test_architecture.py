@@ -26,6 +26,7 @@ ORDER = (
     "observations",
     "effects",
     "inference",
+    "iso9283",
     "prediction",
     "model_file",
     "correction",

@@ -7,9 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from thermal_robot.commands.shared import CAMPAIGN, diagnosis, folder, page, tell
+from thermal_robot.commands.shared import CAMPAIGN, deliver, diagnosis, page, read_from
 from thermal_robot.errors import CampaignError
-from thermal_robot.files import require_free, written
+from thermal_robot.files import require_free
 
 DOES = "say where the gap lies, what causes it, how far it shrinks"
 EXAMPLE = " campaign.toml --report diagnosis.html --model model.json"
@@ -29,18 +29,14 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Diagnose a campaign, print the result and write what is asked for."""
-    require_free((options.json, options.model, options.report), _read_from(options))
+    require_free((options.json, options.model, options.report), read_from(options))
     found = diagnosis(options)
     outputs: list[tuple[str | None, Callable[[Path], object]]] = [
         (options.json, found.to_json),
         (options.report, lambda path: page(found, path)),
         (options.model if found.usable else None, lambda path: found.model.save(path)),
     ]
-    # files come first: who reads what is printed may stop early
-    failed = written(outputs)
-    tell(options, str(found), found.summary)
-    if failed:
-        raise CampaignError(", ".join(failed), "cannot be written", found="; ".join(dict.fromkeys(failed.values())))
+    deliver(options, outputs, str(found), found.summary)
     if not found.usable:
         raise CampaignError(str(options.campaign), found.reason)
 
@@ -52,12 +48,3 @@ def take_back(options: argparse.Namespace) -> None:
             options.campaign = names.pop()
     if options.campaign is None:
         raise CampaignError("diagnose", "no campaign was named", expected="campaign.toml, or its folder")
-
-
-def _read_from(options: argparse.Namespace) -> list[Path]:
-    """Return the files that a campaign is read from."""
-    from thermal_robot.campaign.declaration import read_declaration
-
-    declaration = read_declaration(Path(options.campaign), folder(options))
-    robot = [declaration.robot] if isinstance(declaration.robot, Path) else []
-    return [declaration.file, declaration.table, *robot]

@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import argparse
 import time
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from thermal_robot.console import QUIET, note, stages
-from thermal_robot.files import write_text
+from thermal_robot.errors import CampaignError
+from thermal_robot.files import write_text, written
 
 if TYPE_CHECKING:
     from thermal_robot.campaign import Campaign
@@ -25,6 +27,22 @@ def tell(options: argparse.Namespace, text: str, brief: str = "") -> None:
         print(said)
 
 
+def deliver(
+    options: argparse.Namespace, outputs: Sequence[tuple[str | None, Callable[[Path], object]]], text: str, brief: str
+) -> None:
+    """Write what was asked for, then tell the text: files come first, who reads what is printed may stop early.
+
+    Raises
+    ------
+    CampaignError
+        Naming the files that could not be written; the others are.
+    """
+    failed = written(outputs)
+    tell(options, text, brief)
+    if failed:
+        raise CampaignError(", ".join(failed), "cannot be written", found="; ".join(dict.fromkeys(failed.values())))
+
+
 def read(options: argparse.Namespace) -> Campaign:
     """Read the campaign that was named."""
     from thermal_robot.campaign import read_campaign
@@ -35,6 +53,15 @@ def read(options: argparse.Namespace) -> Campaign:
 def folder(options: argparse.Namespace) -> Path | None:
     """Return the folder that a campaign's paths start from where it is not that of its file."""
     return Path() if options.piped else None
+
+
+def read_from(options: argparse.Namespace) -> list[Path]:
+    """Return the files that a campaign is read from."""
+    from thermal_robot.campaign.declaration import read_declaration
+
+    declaration = read_declaration(Path(options.campaign), folder(options))
+    robot = [declaration.robot] if isinstance(declaration.robot, Path) else []
+    return [declaration.file, declaration.table, *robot]
 
 
 def diagnosis(options: argparse.Namespace) -> Diagnosis:

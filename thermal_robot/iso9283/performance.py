@@ -1,0 +1,142 @@
+"""The result: criteria of every pose and path that was repeated; a dict, a data frame, a table for the reader."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+from thermal_robot.iso9283.attained import Three
+from thermal_robot.iso9283.parts import PathCriteria, PoseCriteria
+from thermal_robot.iso9283.table import cycles_of, drifts, millimetres, paths, poses, turns, variations, wrapped
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+SCHEMA = "thermal-robot/iso9283/1"
+
+
+@dataclass(frozen=True)
+class Performance:
+    """Criteria of ISO 9283:1998 that a campaign with repeats tells; SI, in the axes of the robot's base.
+
+    Attributes
+    ----------
+    campaign, robot, tool_frame
+        What was measured.
+    poses
+        Poses at rest, in the sequence in which they were met.
+    paths
+        Paths, likewise.
+    registered
+        The frames that were fitted to the same measurements: ``base``, ``tool``. AP and AT are then after
+        registration, and smaller than against frames that are measured by themselves. RP, vAP and RT do not depend on
+        it.
+    instrument
+        RP_l that the instrument alone would show, m; ``None`` where its noise is not given.
+    notes
+        What a reader must know, a sentence each.
+    """
+
+    campaign: str
+    robot: str
+    tool_frame: str
+    poses: tuple[PoseCriteria, ...]
+    paths: tuple[PathCriteria, ...] = ()
+    registered: tuple[str, ...] = ()
+    instrument: float | None = None
+    notes: tuple[str, ...] = ()
+
+    @property
+    def accuracy(self) -> float | None:
+        """AP_p of the worst pose, m."""
+        return max((p.accuracy.position for p in self.poses if p.accuracy), default=None)
+
+    @property
+    def corrected(self) -> float | None:
+        """AP_p of the worst pose against the corrected model, m."""
+        return max((p.corrected.position for p in self.poses if p.corrected), default=None)
+
+    @property
+    def repeatability(self) -> float | None:
+        """RP_l of the worst pose, m."""
+        return max((p.repeatability.position for p in self.poses), default=None)
+
+    @property
+    def summary(self) -> str:
+        """The worst figures in one line."""
+        said = [cycles_of(self.poses)] if self.poses else []
+        named = [("AP_p", self.accuracy), ("corrected", self.corrected), ("RP_l", self.repeatability)]
+        named += [("AT_p", max((p.accuracy.position for p in self.paths if p.accuracy), default=None))]
+        named += [("RT_p", max((p.repeatability.position for p in self.paths), default=None))]
+        said += [f"{name} {millimetres(value)}" for name, value in named if value is not None]
+        return f"ISO 9283, the worst of {'; '.join(said)}"
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return everything as plain values for JSON, SI."""
+        return {"schema": SCHEMA, **asdict(self)}
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return a data frame, one row a figure.
+
+        Returns
+        -------
+        pandas.DataFrame
+            ``label`` of the pose or path, ``cycles`` (of the direction, time or point with the fewest), ``criterion``
+            (``AP_p``, ``RP_l``, ``vAP_a`` …), ``value``, ``ci95_low``, ``ci95_high`` (NaN where there is no interval),
+            ``unit`` (m or rad). A criterion against the corrected model has ``corrected`` after its name.
+        """
+        import pandas as pd
+
+        columns = ["label", "cycles", "criterion", "value", "ci95_low", "ci95_high", "unit"]
+        return pd.DataFrame([*self._of_poses(), *self._of_paths()], columns=columns)
+
+    def _of_poses(self) -> Iterator[tuple[Any, ...]]:
+        for p in self.poses:
+            for name, found in (("AP_{}", p.accuracy), ("AP_{} corrected", p.corrected)):
+                if found:
+                    yield from _figures(p.pose, p.cycles, name, "p", found.position, found.angles)
+                    yield from _three(p.pose, p.cycles, name, "xyz", found.axes, "m")
+            spread = p.repeatability
+            yield from _figures(p.pose, p.cycles, "RP_{}", "l", spread.position, spread.angles, spread.ci95)
+            if p.variation:
+                fewest = min(p.variation_cycles)
+                yield from _figures(p.pose, fewest, "vAP_{}", "p", p.variation.position, p.variation.angles)
+            if p.drift:
+                fewest, d = min(p.drift_cycles), p.drift
+                if d.accuracy is not None:
+                    yield from _figures(p.pose, fewest, "dAP_{}", "p", d.accuracy, d.accuracy_angles)
+                yield from _figures(p.pose, fewest, "dRP_{}", "l", d.repeatability, d.repeatability_angles)
+                yield from _figures(p.pose, fewest, "shift", "", d.shift, None)
+
+    def _of_paths(self) -> Iterator[tuple[Any, ...]]:
+        for p in self.paths:
+            for name, found in (("AT_{}", p.accuracy), ("AT_{} corrected", p.corrected), ("RT_{}", p.repeatability)):
+                if found:
+                    yield from _figures(p.path, p.cycles, name, "p", found.position, found.angles)
+
+    def __str__(self) -> str:
+        title = f"Performance criteria of ISO 9283:1998: {self.robot}, {self.tool_frame}; {cycles_of(self.poses)}"
+        tables = [poses(self.poses), turns(self.poses), variations(self.poses), drifts(self.poses), paths(self.paths)]
+        blocks = [[wrapped(title, "")], *tables, [wrapped(note, "  - ") for note in self.notes]]
+        return "\n\n".join("\n".join(block) for block in blocks if block)
+
+
+def _figures(
+    label: str,
+    cycles: int,
+    name: str,
+    letter: str,
+    position: float,
+    angles: Three | None,
+    ci95: tuple[float, float] | None = None,
+) -> Iterator[tuple[Any, ...]]:
+    low, high = ci95 or (float("nan"), float("nan"))
+    yield label, cycles, name.format(letter), position, low, high, "m"
+    if angles is not None:
+        yield from _three(label, cycles, name, "abc", angles, "rad")
+
+
+def _three(label: str, cycles: int, name: str, letters: str, values: Three, unit: str) -> Iterator[tuple[Any, ...]]:
+    for letter, value in zip(letters, values, strict=True):
+        yield label, cycles, name.format(letter), value, float("nan"), float("nan"), unit

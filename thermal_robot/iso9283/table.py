@@ -1,0 +1,163 @@
+"""Tables of criteria as plain text: mm and mrad, the poses below each other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from math import floor, isfinite, log10
+from textwrap import fill
+
+from thermal_robot.iso9283.attained import Three
+from thermal_robot.iso9283.groups import CYCLES
+from thermal_robot.iso9283.parts import PathCriteria, PoseCriteria
+
+WIDTH = 96
+MILLI = 1e3
+MOST = 40
+"""Rows of a table at most: a screen; data frame and JSON have all."""
+_LEAST_DECIMALS, _MOST_DECIMALS = 3, 6
+_MISSING = "–"
+Cell = str | int | float | None
+
+
+def millimetres(value: float) -> str:
+    """Write a length with three digits, no fewer than a micrometre needs."""
+    return f"{_cell(value, _decimals([value]))} mm"
+
+
+def cycles_of(found: Sequence[PoseCriteria]) -> str:
+    """Say how many poses there are, and how often they were repeated, beside what the standard asks for."""
+    if not found:
+        return "no pose at rest is repeated"
+    counts = [p.cycles for p in found]
+    often = f"{counts[0]}" if min(counts) == max(counts) else f"{min(counts)} to {max(counts)}"
+    poses_ = "1 pose" if len(found) == 1 else f"{len(found)} poses"
+    return f"{poses_}, {often} cycles (the standard: {CYCLES})"
+
+
+def poses(found: Sequence[PoseCriteria]) -> list[str]:
+    """AP and RP of positions; nothing without poses."""
+    corrected = any(p.corrected for p in found)
+    head = [
+        "pose",
+        "n",
+        "dir",
+        "AP_p",
+        *(["corrected"] if corrected else []),
+        "AP_x",
+        "AP_y",
+        "AP_z",
+        "RP_l",
+        "low",
+        "high",
+    ]
+    rows: list[list[Cell]] = []
+    for p in found:
+        a = p.accuracy
+        away = a.position if a else None
+        after = [p.corrected.position if p.corrected else None] if corrected else []
+        low, high = p.repeatability.ci95 or (None, None)
+        rows.append(
+            [
+                p.pose,
+                p.cycles,
+                p.directions,
+                away,
+                *after,
+                *_of(a.axes if a else None),
+                p.repeatability.position,
+                low,
+                high,
+            ]
+        )
+    return _table(
+        "POSES: AP and RP in mm; n: cycles; dir: directions of approach; low, high: 95 % interval of RP_l", head, rows
+    )
+
+
+def turns(found: Sequence[PoseCriteria]) -> list[str]:
+    """AP and RP of orientations; nothing where only positions are known."""
+    rows: list[list[Cell]] = [
+        [p.pose, *_of(p.accuracy.angles if p.accuracy else None), *_of(p.repeatability.angles)]
+        for p in found
+        if p.repeatability.angles is not None
+    ]
+    head = ["pose", "AP_a", "AP_b", "AP_c", "±RP_a", "±RP_b", "±RP_c"]
+    return _table("POSES: angles about the axes of the base, in mrad", head, rows)
+
+
+def variations(found: Sequence[PoseCriteria]) -> list[str]:
+    """VAP; nothing where no pose was reached from several directions."""
+    shown = [(p, p.variation) for p in found if p.variation]
+    turned = any(v.angles is not None for _, v in shown)
+    rows: list[list[Cell]] = [
+        [p.pose, len(p.variation_cycles), min(p.variation_cycles), v.position, *(_of(v.angles) if turned else [])]
+        for p, v in shown
+    ]
+    head = ["pose", "dir", "n", "vAP_p", *(["vAP_a", "vAP_b", "vAP_c"] if turned else [])]
+    return _table(f"DIRECTIONS: vAP in mm{' and mrad' if turned else ''}; n: cycles from each, the least", head, rows)
+
+
+def drifts(found: Sequence[PoseCriteria]) -> list[str]:
+    """Drift; nothing where no pose was measured at several times."""
+    shown = [(p, p.drift) for p in found if p.drift]
+    rows: list[list[Cell]] = [
+        [p.pose, len(p.drift_cycles), min(p.drift_cycles), d.accuracy, d.repeatability, d.shift] for p, d in shown
+    ]
+    head = ["pose", "times", "n", "dAP_p", "dRP_l", "shift"]
+    return _table(
+        "DRIFT against the first time, in mm; n: cycles at each, the least; shift: of the barycentre", head, rows
+    )
+
+
+def paths(found: Sequence[PathCriteria]) -> list[str]:
+    """AT and RT; nothing without paths."""
+    corrected, turned = any(p.corrected for p in found), any(p.repeatability.angles for p in found)
+    angles = [f"{name}_{letter}" for name in ("AT", "RT") for letter in "abc"] if turned else []
+    head = ["path", "points", "n", "AT_p", *(["corrected"] if corrected else []), "RT_p", *angles]
+    rows: list[list[Cell]] = []
+    for p in found:
+        after = [p.corrected.position if p.corrected else None] if corrected else []
+        turns_ = [*_of(p.accuracy.angles if p.accuracy else None), *_of(p.repeatability.angles)] if turned else []
+        away = p.accuracy.position if p.accuracy else None
+        rows.append([p.path, p.points, p.cycles, away, *after, p.repeatability.position, *turns_])
+    return _table(
+        f"PATHS: AT and RT in mm{' and mrad' if turned else ''}; n: cycles of each point, the least", head, rows
+    )
+
+
+def wrapped(sentence: str, indent: str) -> str:
+    """Break a sentence into lines."""
+    return fill(sentence, WIDTH, initial_indent=indent, subsequent_indent=" " * len(indent), break_on_hyphens=False)
+
+
+def _of(values: Three | None) -> list[Cell]:
+    return [None] * 3 if values is None else [*values]
+
+
+def _table(heading: str, head: Sequence[str], rows: Sequence[Sequence[Cell]]) -> list[str]:
+    """Align columns, texts on the left, SI figures in thousandths with as many decimals as the smallest needs."""
+    if not rows:
+        return []
+    decimals = _decimals([cell for row in rows for cell in row if isinstance(cell, float)])
+    cells = [list(head), *([_cell(cell, decimals) for cell in row] for row in rows[:MOST])]
+    wide = [max(len(row[k]) for row in cells) for k in range(len(head))]
+    lines = [
+        "  " + "  ".join([row[0].ljust(wide[0]), *(c.rjust(w) for c, w in zip(row[1:], wide[1:], strict=True))])
+        for row in cells
+    ]
+    more = [f"  and {len(rows) - MOST} more, in the JSON and the CSV"] if len(rows) > MOST else []
+    return [heading, *lines, *more]
+
+
+def _cell(cell: Cell, decimals: int) -> str:
+    if cell is None:
+        return _MISSING
+    return f"{MILLI * cell:.{decimals}f}".replace("-", "−") if isinstance(cell, float) else str(cell)
+
+
+def _decimals(values: Sequence[float]) -> int:
+    """Decimals that leave two digits of the median, no fewer than a micrometre needs."""
+    sizes = sorted(MILLI * abs(value) for value in values if isfinite(value) and value != 0.0)
+    if not sizes:
+        return _LEAST_DECIMALS
+    return min(max(1 - floor(log10(sizes[len(sizes) // 2])), _LEAST_DECIMALS), _MOST_DECIMALS)
