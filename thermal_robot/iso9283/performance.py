@@ -8,7 +8,17 @@ from typing import TYPE_CHECKING, Any
 
 from thermal_robot.iso9283.attained import Three
 from thermal_robot.iso9283.parts import PathCriteria, PoseCriteria
-from thermal_robot.iso9283.table import cycles_of, drifts, millimetres, paths, poses, turns, variations, wrapped
+from thermal_robot.iso9283.table import (
+    cycles_of,
+    drifts,
+    millimetres,
+    path_turns,
+    paths,
+    poses,
+    turns,
+    variations,
+    wrapped,
+)
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -117,7 +127,8 @@ class Performance:
 
     def __str__(self) -> str:
         title = f"Performance criteria of ISO 9283:1998: {self.robot}, {self.tool_frame}; {cycles_of(self.poses)}"
-        tables = [poses(self.poses), turns(self.poses), variations(self.poses), drifts(self.poses), paths(self.paths)]
+        at_rest = [table(self.poses) for table in (poses, turns, variations, drifts)]
+        tables = [*at_rest, paths(self.paths), path_turns(self.paths)]
         blocks = [[wrapped(title, "")], *tables, [wrapped(note, "  - ") for note in self.notes]]
         return "\n\n".join("\n".join(block) for block in blocks if block)
 

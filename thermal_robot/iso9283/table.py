@@ -14,6 +14,10 @@ WIDTH = 96
 MILLI = 1e3
 MOST = 40
 """Rows of a table at most: a screen; data frame and JSON have all."""
+LONGEST_NAME = 20
+"""Letters of a label that a table shows, so that a line fits."""
+NOTHING = 1e-6
+"""mm and mrad: what is smaller is rounding, and asks for no decimals."""
 _LEAST_DECIMALS, _MOST_DECIMALS = 3, 6
 _MISSING = "–"
 Cell = str | int | float | None
@@ -110,19 +114,26 @@ def drifts(found: Sequence[PoseCriteria]) -> list[str]:
 
 
 def paths(found: Sequence[PathCriteria]) -> list[str]:
-    """AT and RT; nothing without paths."""
-    corrected, turned = any(p.corrected for p in found), any(p.repeatability.angles for p in found)
-    angles = [f"{name}_{letter}" for name in ("AT", "RT") for letter in "abc"] if turned else []
-    head = ["path", "points", "n", "AT_p", *(["corrected"] if corrected else []), "RT_p", *angles]
+    """AT and RT of positions; nothing without paths."""
+    corrected = any(p.corrected for p in found)
+    head = ["path", "points", "n", "AT_p", *(["corrected"] if corrected else []), "RT_p"]
     rows: list[list[Cell]] = []
     for p in found:
         after = [p.corrected.position if p.corrected else None] if corrected else []
-        turns_ = [*_of(p.accuracy.angles if p.accuracy else None), *_of(p.repeatability.angles)] if turned else []
         away = p.accuracy.position if p.accuracy else None
-        rows.append([p.path, p.points, p.cycles, away, *after, p.repeatability.position, *turns_])
-    return _table(
-        f"PATHS: AT and RT in mm{' and mrad' if turned else ''}; n: cycles of each point, the least", head, rows
-    )
+        rows.append([p.path, p.points, p.cycles, away, *after, p.repeatability.position])
+    return _table("PATHS: AT and RT in mm; n: cycles of each point, the least", head, rows)
+
+
+def path_turns(found: Sequence[PathCriteria]) -> list[str]:
+    """AT and RT of orientations; nothing where only positions are known."""
+    rows: list[list[Cell]] = [
+        [p.path, *_of(p.accuracy.angles if p.accuracy else None), *_of(p.repeatability.angles)]
+        for p in found
+        if p.repeatability.angles is not None
+    ]
+    head = ["path", "AT_a", "AT_b", "AT_c", "±RT_a", "±RT_b", "±RT_c"]
+    return _table("PATHS: angles about the axes of the base, in mrad", head, rows)
 
 
 def wrapped(sentence: str, indent: str) -> str:
@@ -152,12 +163,18 @@ def _table(heading: str, head: Sequence[str], rows: Sequence[Sequence[Cell]]) ->
 def _cell(cell: Cell, decimals: int) -> str:
     if cell is None:
         return _MISSING
-    return f"{MILLI * cell:.{decimals}f}".replace("-", "−") if isinstance(cell, float) else str(cell)
+    if isinstance(cell, str):
+        return cell if len(cell) <= LONGEST_NAME else f"{cell[: LONGEST_NAME - 1]}…"
+    if isinstance(cell, int):
+        return str(cell)
+    shown = f"{MILLI * cell:.{decimals}f}"
+    return (shown if float(shown) else f"{0.0:.{decimals}f}").replace("-", "−")
 
 
 def _decimals(values: Sequence[float]) -> int:
     """Decimals that leave two digits of the median, no fewer than a micrometre needs."""
-    sizes = sorted(MILLI * abs(value) for value in values if isfinite(value) and value != 0.0)
+    sizes = sorted(MILLI * abs(value) for value in values if isfinite(value))
+    sizes = [size for size in sizes if size > NOTHING]
     if not sizes:
         return _LEAST_DECIMALS
     return min(max(1 - floor(log10(sizes[len(sizes) // 2])), _LEAST_DECIMALS), _MOST_DECIMALS)

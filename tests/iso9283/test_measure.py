@@ -1,0 +1,134 @@
+"""From a campaign to criteria that were computed by hand."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from clouds import ELEVEN, TURNS, cell
+from simulate import random_motion
+
+from thermal_robot.errors import CampaignError
+from thermal_robot.iso9283 import performance
+from thermal_robot.observations import Frames, observe
+
+OFF = 1e-3 * np.array([[1, 2, 2], [2, 3, 6], [0, 3, 4], [0, 0, 0], [8, 0, 0]])
+"""Five poses 3, 7, 5, 0 and 8 mm away from their commands."""
+NUMBER = np.tile(np.arange(5), 10)
+CYCLE = np.repeat(np.arange(10), 5)
+
+
+@pytest.fixture(scope="module")
+def by_hand(rv_m2):
+    """Five poses, ten cycles: AP as :data:`OFF`, RP_l 11, 22, 33, 44 and 55 mm, RP_c 6 mrad."""
+    shift = OFF[NUMBER] + (1 + NUMBER)[:, None] * ELEVEN[CYCLE]
+    return cell(rv_m2, NUMBER, shift, turn=np.outer(TURNS[CYCLE], [0, 0, 1.0]))
+
+
+def test_accuracy_and_repeatability_of_every_pose(by_hand):
+    found = performance(by_hand)
+    assert [p.pose for p in found.poses] == ["P1", "P2", "P3", "P4", "P5"]
+    assert [p.cycles for p in found.poses] == [10] * 5
+    assert [p.accuracy.position for p in found.poses] == pytest.approx([3e-3, 7e-3, 5e-3, 0, 8e-3], abs=1e-12)
+    assert found.poses[1].accuracy.axes == pytest.approx((2e-3, 3e-3, 6e-3))
+    assert [p.repeatability.position for p in found.poses] == pytest.approx([11e-3, 22e-3, 33e-3, 44e-3, 55e-3])
+    for pose in found.poses:
+        assert pose.accuracy.angles == pytest.approx((0, 0, 0), abs=1e-8)
+        assert pose.repeatability.angles == pytest.approx((0, 0, 6e-3), abs=1e-8)
+        assert (pose.directions, pose.variation, pose.drift, pose.corrected) == (None, None, None, None)
+    assert (found.accuracy, found.repeatability, found.corrected) == pytest.approx((8e-3, 55e-3, None))
+    assert (found.registered, found.paths, found.instrument) == ((), (), None)
+
+
+def test_the_place_of_the_instrument_changes_nothing(rv_m2):
+    rng = np.random.default_rng(5)
+    shift = (OFF[NUMBER] + ELEVEN[CYCLE]) * 0.1
+    turn = np.outer(TURNS[CYCLE], [0.3, 0, 1.0])
+    tables = []
+    for base in (np.eye(4), random_motion(rng, 3.0), random_motion(rng, 3.0)):
+        campaign = cell(rv_m2, NUMBER, shift, frames=Frames(base, np.eye(4)), turn=turn, known=False)
+        tables.append(performance(campaign).to_frame())
+    assert tables[0]["value"].abs().max() > 1e-3
+    for table in tables[1:]:
+        np.testing.assert_allclose(table["value"], tables[0]["value"], rtol=1e-5, atol=1e-9)
+        np.testing.assert_allclose(table["ci95_high"], tables[0]["ci95_high"], rtol=1e-5)
+
+
+def test_registration_changes_accuracy_and_not_repeatability(by_hand):
+    known, fitted = performance(by_hand), performance(replace(by_hand, base_known=False, tool_known=False))
+    assert fitted.registered == ("base", "tool")
+    for one, other in zip(known.poses, fitted.poses, strict=True):
+        assert other.repeatability.position == pytest.approx(one.repeatability.position)
+    rms = [np.sqrt(np.mean([p.accuracy.position**2 for p in found.poses])) for found in (known, fitted)]
+    assert rms[1] < 0.8 * rms[0]
+
+
+def test_a_model_that_knows_half_leaves_half(by_hand):
+    found = observe(by_hand)
+    predicted = found.predicted_position + OFF[NUMBER] / 2
+    after = performance(by_hand, predicted=(predicted, None))
+    assert [p.corrected.position for p in after.poses] == pytest.approx([1.5e-3, 3.5e-3, 2.5e-3, 0, 4e-3], abs=1e-12)
+    assert after.corrected == pytest.approx(4e-3)
+    assert all(p.corrected.angles is None for p in after.poses)
+    assert after.poses[0].accuracy == performance(by_hand).poses[0].accuracy
+
+
+def test_directions_are_compared_where_each_was_taken_twice(rv_m2):
+    """From one side 3 mm off, from the other 4 mm across: 5 mm apart. One row came from a third."""
+    sides = np.array([0, 1] * 5 + [2])
+    shift = np.array([[3e-3, 0, 0], [0, 4e-3, 0], [0.5, 0, 0]])[sides]
+    signs = {"approach.joint_1": np.array([1.0, -1, -1])[sides], "approach.joint_2": np.array([1.0, 1, -1])[sides]}
+    pose = performance(cell(rv_m2, [0] * 11, shift, covariates=signs)).poses[0]
+    assert pose.directions == 3
+    assert pose.variation.position == pytest.approx(5e-3)
+    assert pose.variation_cycles == (5, 5)
+    one_way = {name: np.ones(11) for name in signs}
+    alone = performance(cell(rv_m2, [0] * 11, shift, covariates=one_way)).poses[0]
+    assert (alone.directions, alone.variation, alone.variation_cycles) == (1, None, ())
+
+
+def test_drift_over_sessions(rv_m2):
+    """AP 3 mm and RP 11 mm in the morning, 8 mm and 22 mm at noon, 5 mm and 5.5 mm in the evening."""
+    at = np.repeat([0, 1, 2], 10)
+    shift = OFF[[0, 4, 2]][at] + np.array([1, 2, 0.5])[at][:, None] * ELEVEN[np.tile(np.arange(10), 3)]
+    session = {"session": np.array(["morning", "noon", "evening"])[at]}
+    pose = performance(cell(rv_m2, [0] * 30, shift, labels=session)).poses[0]
+    assert pose.drift_cycles == (10, 10, 10)
+    assert pose.drift.accuracy == pytest.approx(5e-3)
+    assert pose.drift.repeatability == pytest.approx(11e-3)
+    assert pose.drift.shift == pytest.approx(1e-3 * np.sqrt(57))
+
+
+def test_a_path_is_as_bad_as_its_worst_point(rv_m2):
+    path = {"path": np.array(["seam"] * 50)}
+    shift = OFF[NUMBER] + (5 - NUMBER)[:, None] * ELEVEN[CYCLE]
+    campaign = cell(rv_m2, NUMBER, shift, labels=path)
+    found = performance(campaign, predicted=(observe(campaign).predicted_position + OFF[4], None))
+    (seam,) = found.paths
+    assert (seam.path, seam.points, seam.cycles, found.poses) == ("seam", 5, 10, ())
+    assert seam.accuracy.position == pytest.approx(8e-3)
+    assert seam.repeatability.position == pytest.approx(55e-3)
+    assert seam.corrected.position == pytest.approx(1e-3 * np.sqrt(89))  # of the third
+    assert (found.accuracy, found.repeatability) == (None, None)
+    assert performance(campaign.take(np.arange(48))).paths[0].cycles == 9
+
+
+def test_a_campaign_without_repeats_is_told_which_column_makes_them(rv_m2):
+    with pytest.raises(CampaignError, match="column 'pose': no pose is repeated; found 5 rows") as error:
+        performance(cell(rv_m2, np.arange(5)))
+    assert "\n" not in str(error.value)
+    bare = cell(rv_m2, [0, 0, 1])
+    with pytest.raises(CampaignError, match="nothing was measured"):
+        performance(replace(bare, position=None))
+    with pytest.raises(CampaignError, match="a campaign"):
+        performance("campaign.toml")
+
+
+def test_scatter_of_a_known_size_is_found(rv_m2):
+    """Normal scatter of 20 µm per axis: RP_l of endlessly many cycles is 72.3 µm, of 30 cycles 3 % less in the mean."""
+    rng = np.random.default_rng(8)
+    number = np.tile(np.arange(60), 30)
+    campaign = cell(rv_m2, number, 2e-5 * rng.normal(size=(1800, 3)))
+    found = [p.repeatability for p in performance(campaign).poses]
+    assert np.mean([r.position for r in found]) == pytest.approx(0.97 * 72.3e-6, rel=0.02)
+    held = [r.ci95[0] < 72.3e-6 < r.ci95[1] for r in found]
+    assert sum(held) >= 53
