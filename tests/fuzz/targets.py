@@ -152,9 +152,10 @@ def model(rng: Random) -> Files:
     return {**files, "model.json": again(rng, change, files["model.json"])}
 
 
-COMMANDS = ("demo", "check", "effects", "diagnose", "predict", "paper", "blind")
+COMMANDS = ("demo", "check", "effects", "diagnose", "predict", "iso9283", "paper", "blind")
 OPTIONS = (
     "--json",
+    "--csv",
     "--report",
     "--model",
     "--without",
@@ -179,7 +180,8 @@ def arguments(rng: Random) -> Files:
     """Some words of the command line; blind trials, which last, only where they are refused at once."""
     files = {**corpus.campaigns()[0], **corpus.models()[0]}
     commands = {
-        "check": ["campaign.toml"], "effects": ["campaign.toml"], "paper": ["--json", "out.json"],
+        "check": ["campaign.toml"], "effects": ["campaign.toml"], "iso9283": ["campaign.toml"],
+        "paper": ["--json", "out.json"],
         "blind": ["--seed", "x"],
         "diagnose": ["campaign.toml", "--json", "out.json"], "predict": ["model.json", "samples.csv", "-o",
         "out.csv"], "demo": ["-x"],

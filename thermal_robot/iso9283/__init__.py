@@ -3,7 +3,7 @@
 from thermal_robot.iso9283.accuracy import Accuracy, accuracy
 from thermal_robot.iso9283.attained import Attained
 from thermal_robot.iso9283.directions import Variation, variation
-from thermal_robot.iso9283.drift import Drift, drift
+from thermal_robot.iso9283.drift import Drift, drift_of
 from thermal_robot.iso9283.measure import performance
 from thermal_robot.iso9283.parts import PathCriteria, PoseCriteria
 from thermal_robot.iso9283.path import AlongPath, along_path
@@ -22,7 +22,7 @@ __all__ = [
     "Variation",
     "accuracy",
     "along_path",
-    "drift",
+    "drift_of",
     "performance",
     "repeatability",
     "variation",

@@ -34,7 +34,7 @@ class Drift:
     repeatability_angles: Three | None = None
 
 
-def drift(attained: Sequence[Attained], commanded: Sequence[Attained] | None = None) -> Drift:
+def drift_of(attained: Sequence[Attained], commanded: Sequence[Attained] | None = None) -> Drift:
     """Compute the drift of one pose.
 
     Parameters

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from thermal_robot.campaign import Campaign
 from thermal_robot.errors import CampaignError, require
 from thermal_robot.iso9283.directions import variation
-from thermal_robot.iso9283.drift import drift
+from thermal_robot.iso9283.drift import drift_of
 from thermal_robot.iso9283.groups import CYCLES, FEWEST, Repeats, directions, repeats, times
 from thermal_robot.iso9283.notes import notes_of
 from thermal_robot.iso9283.parts import PathCriteria, PoseCriteria
@@ -93,7 +93,7 @@ def _pose(seen: Seen, group: Repeats) -> PoseCriteria:
         corrected=seen.after(rows),
         variation=variation([seen.attained.take(part) for part in counting]) if several else None,
         variation_cycles=tuple(len(part) for part in counting) if several else (),
-        drift=drift(attained, commanded) if at else None,
+        drift=drift_of(attained, commanded) if at else None,
         drift_cycles=tuple(len(part) for part in at),
     )
 
