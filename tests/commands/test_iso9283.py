@@ -40,7 +40,7 @@ def test_the_table_and_its_files_say_the_same(run, repeated, tmp_path):
 def test_quiet_tells_the_worst_in_a_line_and_streams_are_served(run, repeated):
     status, out, _ = run("iso9283", "-q", repeated)
     assert (status, out.count("\n")) == (0, 1)
-    assert "3 poses, 10 cycles (the standard: 30); AP_p 0.700 mm; RP_l 0.110 mm" in out
+    assert "3 poses of 10 cycles (the standard: 30), and 1 path of 10 cycles (the standard: 10): AP_p 0.700 mm" in out
     status, out, _ = run("iso9283", repeated, "--csv", "-")
     assert (status, out.split(",")[0]) == (0, "label")
     status, out, _ = run("iso9283", repeated, "--json", "-")

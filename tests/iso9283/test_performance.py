@@ -66,7 +66,7 @@ def test_json_holds_the_same_figures(found):
 def test_the_text_tells_all_of_it_in_lines_that_fit(found):
     text = str(found)
     assert [line for line in text.splitlines() if len(line) > 96] == []
-    assert text.startswith("Performance criteria of ISO 9283:1998: rv_m2, tool0; 1 pose, 20 cycles (the standard: 30)")
+    assert text.startswith("Performance criteria of ISO 9283:1998: rv_m2, tool0; 1 pose of 20 cycles")
     for part in ("POSES: AP and RP", "POSES: angles", "DIRECTIONS", "DRIFT", "PATHS", "  - Fewer cycles"):
         assert f"\n\n{part}" in text or f"\n{part}" in text
     assert "AP_p 0.500 mm; corrected 0.100 mm; RP_l 0." in found.summary

@@ -12,6 +12,7 @@ from thermal_robot.iso9283.table import (
     millimetres,
     path_turns,
     paths,
+    paths_of,
     poses,
     turns,
     variations,
@@ -88,13 +89,15 @@ def test_a_long_table_ends_with_how_many_are_left_out():
 
 
 @pytest.mark.parametrize(
-    ("counts", "said"), [([30], "1 pose, 30 cycles"), ([30, 30], "2 poses, 30 "), ([5, 30, 12], "3 poses, 5 to 30 ")]
+    ("counts", "said"),
+    [([30], "1 pose of 30 cycles"), ([30, 30], "2 poses of 30 "), ([5, 30, 12], "3 poses of 5 to 30 ")],
 )
 def test_cycles_are_told_beside_those_of_the_standard(counts, said):
     told = cycles_of([replace(POSE, cycles=count) for count in counts])
     assert told.startswith(said)
     assert told.endswith("(the standard: 30)")
-    assert cycles_of([]) == "no pose at rest is repeated"
+    assert cycles_of([]) == paths_of([]) == ""
+    assert paths_of([PathCriteria("seam", 20, 9, AlongPath(2e-4))]) == "1 path of 9 cycles (the standard: 10)"
 
 
 def test_sentences_are_broken_at_the_width():

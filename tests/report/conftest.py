@@ -21,6 +21,16 @@ from thermal_robot.diagnosis.parts import (
 )
 from thermal_robot.diagnosis.result import Diagnosis
 from thermal_robot.effects.law_size import Size
+from thermal_robot.iso9283 import (
+    Accuracy,
+    AlongPath,
+    Drift,
+    PathCriteria,
+    Performance,
+    PoseCriteria,
+    Repeatability,
+    Variation,
+)
 
 JOINTS = (
     "shoulder_pan_joint",
@@ -301,12 +311,37 @@ def contained():
     )
 
 
+def repeated():
+    """Two poses and a path that were repeated, with everything that can be told of them."""
+    base, three = confounded(), (1e-4, -2e-4, 3e-4)
+    first = PoseCriteria(
+        "P1",
+        30,
+        3,
+        Repeatability(8e-5, (7e-5, 1e-4), three),
+        Accuracy(7.01e-4, (7.01e-4, 0.0, 0.0), three),
+        Accuracy(4e-5, (0.0, 0.0, 4e-5), three),
+        Variation(9e-5, (1e-4, 2e-4, 3e-4)),
+        (10, 10, 10),
+        Drift(3e-5, 1e-5, 5e-5, (1e-4, 2e-4, 3e-4), (1e-5, 2e-5, 3e-5)),
+        (10, 20),
+    )
+    second = PoseCriteria(
+        "P2", 25, 1, Repeatability(1.1e-4), Accuracy(3e-4, (0.0, 3e-4, 0.0)), Accuracy(6.2e-5, (0.0, 6.2e-5, 0.0))
+    )
+    seam = PathCriteria("seam", 20, 10, AlongPath(2e-4, three), AlongPath(1.5e-3, three), AlongPath(2.5e-4, three))
+    poses, notes = (first, second), ("Fewer cycles than the standard's 30: 1 of 2 poses.",)
+    criteria = Performance(base.campaign, base.robot, base.tool_frame, poses, (seam,), ("base", "tool"), 4e-5, notes)
+    return replace(base, performance=criteria)
+
+
 CASES = {
     "found": found,
     "nothing": nothing,
     "unexplained": unexplained,
     "confounded": confounded,
     "contained": contained,
+    "repeated": repeated,
 }
 
 

@@ -176,7 +176,7 @@ def test_a_real_diagnosis_is_valid_and_writes_all_that_is_declared(validator, dr
     real = json.loads(json.dumps(drifted.to_dict(), allow_nan=False))
     validator.validate(real)
     assert real["next"]["samples"]
-    by_hand = keys(json.loads(json.dumps(case("confounded").to_dict())))
+    by_hand = keys(json.loads(json.dumps(case("repeated").to_dict())))
     remainder = keys(json.loads(json.dumps(case("unexplained").to_dict())))
     law = keys(json.loads(json.dumps(law_case().to_dict())))
     assert declared(schema(), schema()) - keys(real) - by_hand - remainder - law == set()

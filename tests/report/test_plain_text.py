@@ -175,3 +175,23 @@ def test_zeros_inside_geometry_are_printed_with_what_is_not_seen(case):
         assert f"zero offset, {joint}" in inside
     assert "−7.100 ± 0.020 mrad" in inside
     assert "2 not seen apart from the others or the frames: zero offset, shoulder_pan_joint" in " ".join(inside.split())
+
+
+def test_criteria_of_the_standard_are_told_of_the_worst(case):
+    told = case("repeated")
+    lines = section(text(told), "ISO 9283")
+    assert [line.split() for line in lines[:4]] == [
+        ["pose", "accuracy", "AP", "701", "µm", "→", "62", "µm"],
+        ["pose", "repeatability", "RP", "110", "µm"],
+        ["path", "accuracy", "AT", "1.50", "mm", "→", "0.25", "mm"],
+        ["path", "repeatability", "RT", "200", "µm"],
+    ]
+    said = " ".join(" ".join(lines[4:]).split())
+    assert said.startswith("The worst of 2 poses of 25 to 30 cycles (the standard: 30), and 1 path of 10 cycles")
+    assert "After the arrow: corrected, of poses held out." in said
+    assert "after registration of base and tool to the same rows." in said
+    bare = replace(told.performance, poses=(replace(told.performance.poses[0], corrected=None),), paths=())
+    short = section(text(replace(told, performance=replace(bare, registered=()))), "ISO 9283")
+    assert len(short) == 3
+    assert short[2].strip() == "The worst of 1 pose of 30 cycles (the standard: 30)."
+    assert "ISO 9283" not in text(case("found"))

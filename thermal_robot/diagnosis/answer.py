@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.diagnosis.cautions import cautions
+from thermal_robot.diagnosis.criteria import criteria
 from thermal_robot.diagnosis.examine import Examined
 from thermal_robot.diagnosis.findings import by_share, findings, separates, titled
 from thermal_robot.diagnosis.held_out import Shrinkage
@@ -127,6 +128,7 @@ def answer(
         left_out=tuple(left_out),
         wanted=wanted(fit, found, groups, remaining, last.unexplained, probability),
         misfit=last.misfit,
+        performance=None if last.misfit else criteria(fit, shrinkage),
     )
 
 

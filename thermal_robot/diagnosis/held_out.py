@@ -39,6 +39,9 @@ class Shrinkage:
     shares
         By effect: share of the gap's mean square with its 95 % interval. For an effect of the fit it is the Shapley
         value, and these sum to the overall shrinkage; for another the gain from adding it to the fit.
+    left
+        (N, m) what the model left of each row while it was held out, root frame, m and rad; those set aside, too. NaN
+        where a row never was held out.
     """
 
     overall: HeldOut
@@ -46,6 +49,7 @@ class Shrinkage:
     after: Array
     with_aside: tuple[float, float]
     shares: dict[str, Share]
+    left: Array
 
 
 def held_out(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Shrinkage:
@@ -89,13 +93,14 @@ def shrinkage(explanation: Explanation, before: Linear, families: Sequence[str],
         (N,) label 0..B−1 of each row: which are held out together.
     """
     walks = _Walks.of(explanation, before, families, block)
-    far, near = walks.distances(()), walks.distances(walks.players)
+    left = walks.residuals(walks.players)
+    far, near = (np.linalg.norm(of[:, :3], axis=1) for of in (walks.residuals(()), left))
     value, interval = share(walks.gain((), walks.players), walks.left(()))
     kept = ~explanation.outliers
     aside = (_rms(far), _rms(near))
     overall = HeldOut("blocked", int(block.max()) + 1, _rms(far[kept]), _rms(near[kept]), value, interval, *aside)
     far[~kept] = near[~kept] = np.nan
-    return Shrinkage(overall, far, near, aside, _shares(walks, families))
+    return Shrinkage(overall, far, near, aside, _shares(walks, families), left)
 
 
 @dataclass(frozen=True, eq=False)
@@ -149,12 +154,12 @@ class _Walks:
     def gain(self, chosen: Sequence[int], more: Sequence[int]) -> Squares:
         return self.left(chosen) - self.left((*chosen, *more))
 
-    def distances(self, chosen: Sequence[int]) -> Array:
-        """(N,) distance of each row from its prediction while held out, m, outliers too; NaN where it never was."""
+    def residuals(self, chosen: Sequence[int]) -> Array:
+        """(N, m) what is left of each row while held out, root frame, m and rad; NaN where it never was."""
         walk = self._walk(chosen)
-        distance = np.full(len(walk.model.block), np.nan)
-        distance[walk.numbers] = np.linalg.norm(walk.residuals(chosen)[:, :3], axis=1)
-        return distance
+        left = np.full((len(walk.model.block), walk.model.linear.measures), np.nan)
+        left[walk.numbers] = walk.residuals(chosen)
+        return left
 
 
 def _rms(distance: Array) -> float:

@@ -21,6 +21,7 @@ from thermal_robot.files import write_text
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.next_samples import NextSamples
     from thermal_robot.inference.fit import Fit
+    from thermal_robot.iso9283 import Performance
 
 SCHEMA = "thermal-robot/diagnosis/2"
 
@@ -105,6 +106,8 @@ class Diagnosis:
         How far the verdict depends on the prior sizes; the fit behind the diagnosis.
     misfit
         Why nothing can be said of the robot: robot and table do not belong together; ``None`` where they do.
+    performance
+        Criteria of ISO 9283, AP before the correction and after it; ``None`` without repeats.
     """
 
     campaign: str
@@ -133,6 +136,7 @@ class Diagnosis:
     sensitivity: Sensitivity | None = None
     fit: Fit | None = None
     misfit: Misfit | None = None
+    performance: Performance | None = None
 
     @property
     def usable(self) -> bool:
@@ -230,6 +234,8 @@ class Diagnosis:
             },
             "next": {"separates": self.separates, "advice": self.advice, "samples": self._samples()},
         }
+        if self.performance is not None:
+            plain["performance"] = self.performance.to_dict()
         return dict(_jsonable(plain))
 
     def _samples(self) -> list[dict[str, Any]]:

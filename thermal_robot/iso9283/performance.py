@@ -14,6 +14,7 @@ from thermal_robot.iso9283.table import (
     millimetres,
     path_turns,
     paths,
+    paths_of,
     poses,
     turns,
     variations,
@@ -73,14 +74,32 @@ class Performance:
         return max((p.repeatability.position for p in self.poses), default=None)
 
     @property
+    def path_accuracy(self) -> float | None:
+        """AT_p of the worst path, m."""
+        return max((p.accuracy.position for p in self.paths if p.accuracy), default=None)
+
+    @property
+    def path_corrected(self) -> float | None:
+        """AT_p of the worst path against the corrected model, m."""
+        return max((p.corrected.position for p in self.paths if p.corrected), default=None)
+
+    @property
+    def path_repeatability(self) -> float | None:
+        """RT_p of the worst path, m."""
+        return max((p.repeatability.position for p in self.paths), default=None)
+
+    @property
     def summary(self) -> str:
         """The worst figures in one line."""
-        said = [cycles_of(self.poses)] if self.poses else []
         named = [("AP_p", self.accuracy), ("corrected", self.corrected), ("RP_l", self.repeatability)]
-        named += [("AT_p", max((p.accuracy.position for p in self.paths if p.accuracy), default=None))]
-        named += [("RT_p", max((p.repeatability.position for p in self.paths), default=None))]
-        said += [f"{name} {millimetres(value)}" for name, value in named if value is not None]
-        return f"ISO 9283, the worst of {'; '.join(said)}"
+        named += [("AT_p", self.path_accuracy), ("corrected", self.path_corrected), ("RT_p", self.path_repeatability)]
+        said = [f"{name} {millimetres(value)}" for name, value in named if value is not None]
+        return f"ISO 9283, the worst of {self.extent}: {'; '.join(said)}"
+
+    @property
+    def extent(self) -> str:
+        """How many poses and paths there are, and how often each was repeated."""
+        return ", and ".join(part for part in (cycles_of(self.poses), paths_of(self.paths)) if part)
 
     def to_dict(self) -> dict[str, Any]:
         """Return everything as plain values for JSON, SI."""
@@ -126,7 +145,7 @@ class Performance:
                     yield from _figures(p.path, p.cycles, name, "p", found.position, found.angles)
 
     def __str__(self) -> str:
-        title = f"Performance criteria of ISO 9283:1998: {self.robot}, {self.tool_frame}; {cycles_of(self.poses)}"
+        title = f"Performance criteria of ISO 9283:1998: {self.robot}, {self.tool_frame}; {self.extent}"
         at_rest = [table(self.poses) for table in (poses, turns, variations, drifts)]
         tables = [*at_rest, paths(self.paths), path_turns(self.paths)]
         blocks = [[wrapped(title, "")], *tables, [wrapped(note, "  - ") for note in self.notes]]

@@ -7,7 +7,7 @@ from math import floor, isfinite, log10
 from textwrap import fill
 
 from thermal_robot.iso9283.attained import Three
-from thermal_robot.iso9283.groups import CYCLES
+from thermal_robot.iso9283.groups import CYCLES, PATH_CYCLES
 from thermal_robot.iso9283.parts import PathCriteria, PoseCriteria
 
 WIDTH = 96
@@ -30,12 +30,19 @@ def millimetres(value: float) -> str:
 
 def cycles_of(found: Sequence[PoseCriteria]) -> str:
     """Say how many poses there are, and how often they were repeated, beside what the standard asks for."""
-    if not found:
-        return "no pose at rest is repeated"
-    counts = [p.cycles for p in found]
+    return _counted("pose", [p.cycles for p in found], CYCLES)
+
+
+def paths_of(found: Sequence[PathCriteria]) -> str:
+    """Say the same of paths."""
+    return _counted("path", [p.cycles for p in found], PATH_CYCLES)
+
+
+def _counted(name: str, counts: Sequence[int], standard: int) -> str:
+    if not counts:
+        return ""
     often = f"{counts[0]}" if min(counts) == max(counts) else f"{min(counts)} to {max(counts)}"
-    poses_ = "1 pose" if len(found) == 1 else f"{len(found)} poses"
-    return f"{poses_}, {often} cycles (the standard: {CYCLES})"
+    return f"{len(counts)} {name}{'s' if len(counts) > 1 else ''} of {often} cycles (the standard: {standard})"
 
 
 def poses(found: Sequence[PoseCriteria]) -> list[str]:

@@ -64,6 +64,7 @@ def text(diagnosis: Diagnosis) -> str:
         ["WHICH", *_which(diagnosis)],
         ["WHERE", *_where(diagnosis)],
         ["UNEXPLAINED", *(_wrap(s) for s in sentences(diagnosis))],
+        ["ISO 9283", *_criteria(diagnosis)],
         ["NEXT", *_next(diagnosis)],
         ["WARNINGS", *(_wrap(w, "  - ") for w in diagnosis.warnings)],
     ]
@@ -220,6 +221,29 @@ def bar(share: float, width: int = _BAR) -> str:
     """Draw a share as a bar of characters, full at one; nothing for what is not above zero."""
     halves = round(2 * width * min(max(share, 0.0), 1.0)) if share == share else 0
     return "█" * (halves // 2) + "▌" * (halves % 2)
+
+
+def _criteria(diagnosis: Diagnosis) -> Iterator[str]:
+    """Tell the standard's criteria of the worst pose and path; nothing without repeats."""
+    found = diagnosis.performance
+    if found is None:
+        return
+    lines = [
+        ("pose accuracy AP", found.accuracy, found.corrected),
+        ("pose repeatability RP", found.repeatability, None),
+    ]
+    lines += [("path accuracy AT", found.path_accuracy, found.path_corrected)]
+    lines += [("path repeatability RT", found.path_repeatability, None)]
+    for name, value, after in lines:
+        if value is not None:
+            shown = units.together((value, after), "m")
+            yield f"  {name:{_NAME}}{' → '.join(shown if after is not None else shown[:1])}"
+    said = [f"The worst of {found.extent}."]
+    if found.corrected is not None or found.path_corrected is not None:
+        said.append("After the arrow: corrected, of poses held out.")
+    if found.registered:
+        said.append(f"AP and AT are after registration of {' and '.join(found.registered)} to the same rows.")
+    yield _wrap(" ".join(said))
 
 
 def _next(diagnosis: Diagnosis) -> Iterator[str]:

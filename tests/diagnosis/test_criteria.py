@@ -1,0 +1,68 @@
+"""AP before the correction and after it, of poses that the model was not fitted to."""
+
+import json
+from dataclasses import replace
+
+import jsonschema
+import numpy as np
+import pytest
+from simulate import simulate
+
+from thermal_robot import diagnose
+from thermal_robot.iso9283 import performance
+from thermal_robot.report import schema, text
+
+NOISE = 12e-6
+
+
+@pytest.fixture(scope="module", params=[None, 3e-5], ids=["positions", "poses"])
+def repeated(request, rv_m2):
+    """A joint's zero is off; five of sixty poses are measured ten times."""
+    once = simulate(rv_m2, ["joint_offset"], samples=60, seed=11, noise=NOISE, ratio=(8, 12), turning=request.param)[0]
+    rows = np.r_[np.arange(60), np.repeat(np.arange(5), 9)]
+    again, rng = once.take(rows), np.random.default_rng(0)
+    noise = np.where(np.arange(105) < 60, 0.0, NOISE)[:, None] * rng.normal(size=(105, 3))
+    label = {"pose": np.array([f"p{k}" for k in rows])}
+    return replace(again, position=again.position + noise, labels=label, rows=np.arange(2, 107))
+
+
+@pytest.fixture(scope="module")
+def found(repeated):
+    return diagnose(repeated, only=["joint_offset"])
+
+
+def test_accuracy_before_is_that_of_the_campaign_and_after_of_poses_held_out(repeated, found):
+    told, alone = found.performance, performance(repeated)
+    fitted = performance(repeated, predicted=found.model.predict(repeated))
+    assert told.accuracy == pytest.approx(alone.accuracy, rel=1e-6)
+    assert told.repeatability == alone.repeatability
+    assert told.corrected < 0.5 * told.accuracy
+    # held out is a little worse than fitted, and no other world: the cycles are the same
+    for one, other in zip(told.poses, fitted.poses, strict=True):
+        assert one.corrected.position == pytest.approx(other.corrected.position, abs=NOISE)
+        assert one.corrected.position != other.corrected.position
+    assert "fitted without the poses" in told.notes[-1]
+    if repeated.orientation is not None:
+        before, after = (np.array([getattr(p, kind).angles for p in told.poses]) for kind in ("accuracy", "corrected"))
+        assert np.abs(after).max() < 0.5 * np.abs(before).max()
+
+
+def test_text_and_json_have_it(repeated, found):
+    plain = json.loads(json.dumps(found.to_dict()))
+    jsonschema.Draft202012Validator(schema()).validate(plain)
+    assert [p["cycles"] for p in plain["performance"]["poses"]] == [10] * 5
+    assert plain["performance"]["poses"][0]["corrected"]["position"] == found.performance.poses[0].corrected.position
+    assert "\n\nISO 9283\n" in text(found)
+
+
+def test_a_table_that_does_not_fit_the_robot_has_none(repeated):
+    spoilt = diagnose(replace(repeated, position=repeated.position[:, [1, 0, 2]]), only=["joint_offset"])
+    assert not spoilt.usable
+    assert spoilt.performance is None
+
+
+def test_without_repeats_there_is_none(repeated):
+    once = diagnose(repeated.take(np.arange(60)), only=["joint_offset"])
+    assert once.performance is None
+    assert "performance" not in once.to_dict()
+    assert "ISO 9283" not in text(once)
