@@ -16,7 +16,7 @@ SPREADS = 3.0
 FEWEST_FOR_INTERVAL = 3
 """Cycles from which an interval is told. Two lie equally far from their barycentre: nothing is known of the spread."""
 DRAWS = 1000
-"""Times that the test is repeated in simulation: the ends of the interval are then good to 2 % at 30 cycles."""
+"""Times that the test is repeated in simulation: the ends of the interval are then good to 1 % at 30 cycles."""
 _LEVEL = (0.025, 0.975)
 
 
@@ -30,7 +30,7 @@ class Repeatability:
         RP_l: mean distance and three of its standard deviations, m.
     ci95
         Interval in which RP_l lies that endlessly many cycles would give, with a probability of 95 %, m; ``None`` with
-        two cycles, or without scatter. RP_l of few cycles is too small in the mean, by a seventh with five: the
+        two cycles, or without scatter. RP_l of few cycles is too small in the mean, by a sixth with five: the
         interval counts that, and lies higher.
     angles
         RP_a, RP_b, RP_c: three standard deviations, to be read as ±, rad; ``None`` where only positions are known.
