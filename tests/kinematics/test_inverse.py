@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
+from conftest import load_arm
 
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics import Displacement, frame_jacobians, inverse_kinematics, nearest_postures, tool_poses
-from thermal_robot.robot import load_robot
 
 ROWS = 40
 TOOL = np.eye(4)
@@ -46,7 +46,7 @@ def test_the_start_is_the_answer_where_it_is_there_already(arm):
 
 @pytest.mark.parametrize("name", ["ur10", "panda"])
 def test_a_displaced_chain_reaches_the_nominal_pose(name):
-    arm = load_robot(f"example-robot-data:{name}", {"ur10": "tool0", "panda": "panda_hand"}[name])
+    arm = load_arm(name)
     rng, q = np.random.default_rng(2), easy(arm, ROWS)
     segments = 1e-3 * rng.normal(size=(len(arm.segments), 6))
 
@@ -74,7 +74,7 @@ def test_what_is_reported_is_what_is_left(rv_m2):
 
 
 def test_an_arm_with_seven_joints_stays_near():
-    arm = load_robot("example-robot-data:panda", "panda_hand")
+    arm = load_arm("panda")
     q = easy(arm, ROWS)
     wanted = tool_poses(arm, q)
     wanted[:, :3, 3] += 1e-3
@@ -97,7 +97,7 @@ def test_limits_are_kept_and_what_cannot_be_reached_is_told(rv_m2):
 
 
 def test_a_joint_at_its_end_leaves_the_work_to_the_others():
-    arm = load_robot("example-robot-data:panda", "panda_hand")
+    arm = load_arm("panda")
     q = inside(arm, ROWS)
     low, high = q - 0.5, q + 0.5
     high[:, 2] = q[:, 2]
@@ -117,9 +117,9 @@ def test_shapes_that_do_not_fit_are_refused(rv_m2):
         inverse_kinematics(rv_m2, tool_poses(rv_m2, q), q[:, :4])
 
 
-@pytest.mark.parametrize("name", ["builtin:rv_m2", "example-robot-data:ur10", "example-robot-data:panda"])
+@pytest.mark.parametrize("name", ["rv_m2", "ur10", "panda"])
 def test_poses_are_found_from_anywhere(name):
-    arm = load_robot(name, "panda_hand" if "panda" in name else "tool0")
+    arm = load_arm(name)
     q = inside(arm, ROWS)
     wanted = tool_poses(arm, q) @ TOOL
     found = nearest_postures(arm, wanted, tool=TOOL)
@@ -131,7 +131,7 @@ def test_poses_are_found_from_anywhere(name):
 
 
 def test_of_several_postures_the_nearest_is_taken():
-    arm = load_robot("example-robot-data:ur10", "tool0")
+    arm = load_arm("ur10")
     q = easy(arm, ROWS)
     wanted = tool_poses(arm, q)
     np.testing.assert_allclose(nearest_postures(arm, wanted, near=q).q, q, atol=1e-6)
