@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -37,10 +37,18 @@ _LARGEST_FILE = 1 << 16
 
 
 class Document:
-    """The parsed file together with its text, so that an error can name the line."""
+    """The parsed file together with its text, so that an error can name the line.
 
-    def __init__(self, file: Path) -> None:
-        self.file = str(file)
+    Parameters
+    ----------
+    file
+        Its path.
+    sections
+        Keys by section that it may have; a section without any has keys of the user's own.
+    """
+
+    def __init__(self, file: Path, sections: Mapping[str, tuple[str, ...]] = SECTIONS) -> None:
+        self.file, self.sections = str(file), sections
         try:
             if file.stat().st_size > _LARGEST_FILE:
                 raise CampaignError(self.file, "is larger than any campaign.toml", expected="at most 64 KiB")
@@ -78,13 +86,13 @@ class Document:
 
     def _refuse_unknown(self) -> None:
         for section, content in self.data.items():
-            if section not in SECTIONS:
+            if section not in self.sections:
                 raise CampaignError(
                     self.file,
-                    f"unknown section or key{did_you_mean(section, SECTIONS)}",
+                    f"unknown section or key{did_you_mean(section, self.sections)}",
                     row=self.row(section),
                     column=section,
-                    expected=f"one of the sections {', '.join(SECTIONS)}",
+                    expected=f"one of the sections {', '.join(self.sections)}",
                 )
             if not isinstance(content, dict):
                 raise CampaignError(
@@ -95,7 +103,7 @@ class Document:
                     found=shown(content),
                     expected=f"a section [{section}]",
                 )
-            known = SECTIONS[section]
+            known = self.sections[section]
             for key in content if known else ():
                 if key not in known:
                     raise CampaignError(

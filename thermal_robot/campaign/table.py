@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
@@ -85,6 +85,15 @@ class Table:
         if isinstance(cells, np.ndarray):
             return ["" if np.isnan(value) else f"{value:.15g}" for value in cells]
         return ["" if cell.lower() in _EMPTY else cell for cell in cells]
+
+    def take(self, kept: NDArray[np.bool_]) -> Table:
+        """Return the table of some of the rows, of (N,) booleans; they keep their numbers."""
+        index = np.flatnonzero(kept)
+        columns: dict[str, Cells] = {
+            name: cells[index] if isinstance(cells, np.ndarray) else [cells[int(i)] for i in index]
+            for name, cells in self.columns.items()
+        }
+        return replace(self, columns=columns, rows=self.rows[index])
 
     def frame(self, *, numbers: bool = False) -> pd.DataFrame:
         """Return the table as a data frame: cells as they stand, or ``numbers`` where a column has nothing else.

@@ -6,7 +6,8 @@ import codecs
 import csv
 import re
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -35,11 +36,48 @@ NO_PARQUET = "Parquet files need pyarrow, which is not installed"
 WITH_PARQUET = 'pip install "thermal-robot[parquet]", or the table as CSV'
 
 
-def read_table(path: Path) -> Table:
+SPACE = " "
+"""A separator of which any number is one, as of blanks and tabs in a list that is lined up for the eye."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How a text file is laid out that other programs wrote.
+
+    Attributes
+    ----------
+    separator
+        One character, :data:`SPACE`, or empty: the first line that holds anything tells.
+    skip
+        Lines before the header, or before the first row, that hold something else.
+    header
+        Whether there is a line of names; columns are called 1, 2, 3 … where there is none.
+    comment
+        Lines that begin so are left out; empty where there are none.
+    """
+
+    separator: str = ""
+    skip: int = 0
+    header: bool = True
+    comment: str = ""
+
+
+PLAIN = Layout()
+"""A header and rows, nothing else."""
+
+
+def read_table(path: Path, layout: Layout = PLAIN) -> Table:
     """Read a CSV or, by its ending, a Parquet file.
 
     Columns of a CSV file may be separated by commas, semicolons or tabs, with decimal commas where the
     separator is not a comma; a byte-order mark, Windows line ends and blank lines do no harm.
+
+    Parameters
+    ----------
+    path
+        The file.
+    layout
+        Of a text file, where it is not a header and rows alone.
 
     Raises
     ------
@@ -57,8 +95,10 @@ def read_table(path: Path) -> Table:
         return _read_parquet(path)
     encoding, warnings = _encoding(path)
     with path.open(encoding=encoding, errors="replace", newline="") as stream:
-        separator = _separator(stream)
-        header, cells, numbers = _records(file, csv.reader(stream, delimiter=separator, strict=True))
+        separator = layout.separator or _separator(_lines(stream, layout))
+        stream.seek(0)
+        lines = _lines(stream, layout, even=separator == SPACE)
+        header, cells, numbers = _records(file, csv.reader(lines, delimiter=separator, strict=True), layout.header)
     if len(numbers) < 2:
         raise CampaignError(file, "has a header but no rows", expected="one row per measurement")
     # A separator at the end of every line makes a column of nothing.
@@ -66,7 +106,8 @@ def read_table(path: Path) -> Table:
     _check_header(file, [header[i] for i in kept], number=numbers[0])
     columns = {header[i]: cells[i] for i in kept}
     comma = separator != "," and _has_decimal_comma(columns)
-    return Table(file, columns, np.array(numbers[1:], dtype=np.int64), numbers[0], comma, warnings)
+    rows = np.array(numbers[1:], dtype=np.int64)
+    return Table(file, columns, rows, numbers[0] if layout.header else None, comma, warnings)
 
 
 def table_from_frame(frame: pd.DataFrame, file: str = "<table>", *, first_row: int | None = None) -> Table:
@@ -167,17 +208,26 @@ def _encoding(path: Path) -> tuple[str, tuple[str, ...]]:
         return "cp1252", (odd,)
 
 
-def _separator(stream: TextIO) -> str:
-    """Return the separator of the header, the first line that holds anything, and go back to the start."""
-    header = ""
-    while not header.strip() and (line := stream.readline(_BLOCK)):
-        header = line
-    stream.seek(0)
+def _lines(stream: TextIO, layout: Layout, *, even: bool = False) -> Iterator[str]:
+    """Yield the lines; what is left out is blank, so that each keeps its number; of blanks one is left if ``even``."""
+    for number, line in enumerate(stream):
+        if number < layout.skip or (layout.comment and line.lstrip().startswith(layout.comment)):
+            yield "\n"
+        else:
+            yield f"{SPACE.join(line.split())}\n" if even else line
+
+
+def _separator(lines: Iterator[str]) -> str:
+    """Return the separator of the header, the first line that holds anything."""
+    header = next((line for line in lines if line.strip()), "")
     return ";" if ";" in header else "\t" if "\t" in header else ","
 
 
-def _records(file: str, reader: Any) -> tuple[list[str], list[list[str]], list[int]]:
-    """Return the header, the cells by column, and the numbers of the lines where header and rows start."""
+def _records(file: str, reader: Any, named: bool = True) -> tuple[list[str], list[list[str]], list[int]]:
+    """Return the header, the cells by column, and the numbers of the lines where header and rows start.
+
+    Where columns are not ``named``, the header is 1, 2, 3 … and stands in line 0.
+    """
     header: list[str] = []
     cells: list[list[str]] = []
     numbers: list[int] = []
@@ -189,13 +239,15 @@ def _records(file: str, reader: Any) -> tuple[list[str], list[list[str]], list[i
                 if start - (numbers[-1] if numbers else 0) > _MOST_BLANK_LINES:
                     raise CampaignError(file, f"more than {_MOST_BLANK_LINES} lines in succession are blank", row=start)
                 continue
+            if not header and not named:
+                header, cells, numbers = [str(k + 1) for k in range(len(fields))], [[] for _ in fields], [0]
             if header and len(fields) != len(header):
                 raise CampaignError(
                     file,
                     "wrong number of fields",
                     row=start,
                     found=str(len(fields)),
-                    expected=f"{len(header)} as in the header",
+                    expected=f"{len(header)} as in the {'header' if named else 'first row'}",
                 )
             numbers.append(start)
             if header:

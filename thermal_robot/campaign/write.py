@@ -27,7 +27,7 @@ TABLE_NAME = "measurements.csv"
 ROBOT_NAME = "robot.urdf"
 
 
-def write_campaign(campaign: Campaign, directory: str | Path) -> Path:
+def write_campaign(campaign: Campaign, directory: str | Path, *, comments: Sequence[str] = ()) -> Path:
     """Write a campaign so that reading it again gives the same arrays.
 
     Filled gaps are written with the values that filled them.
@@ -38,6 +38,8 @@ def write_campaign(campaign: Campaign, directory: str | Path) -> Path:
         With measured positions.
     directory
         Is made if need be; campaign.toml, measurements.csv and robot.urdf in it are replaced.
+    comments
+        Sentences that campaign.toml begins with.
 
     Returns
     -------
@@ -61,7 +63,8 @@ def write_campaign(campaign: Campaign, directory: str | Path) -> Path:
     try:
         folder.mkdir(parents=True, exist_ok=True)
         write_text(folder / ROBOT_NAME, campaign.robot.urdf)
-        write_text(file, tomli_w.dumps(_document(campaign)))
+        remarks = "".join(f"# {' '.join(comment.split())}\n" for comment in comments)
+        write_text(file, remarks + tomli_w.dumps(_document(campaign)))
     except OSError as error:
         raise CampaignError(str(folder), f"cannot be written: {error.strerror}") from error
     except ValueError as error:  # NUL in a name

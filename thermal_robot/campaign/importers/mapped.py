@@ -1,0 +1,153 @@
+"""A table of another program becomes a campaign, by a plan: every importer's last step."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.campaign import names
+from thermal_robot.campaign.campaign import Campaign
+from thermal_robot.campaign.importers.columns import JOINTS, Column, found
+from thermal_robot.campaign.importers.plan import Plan
+from thermal_robot.campaign.names import listed, split_name
+from thermal_robot.campaign.table import Cells, Table
+from thermal_robot.campaign.validate import build_campaign
+from thermal_robot.errors import CampaignError
+from thermal_robot.robot import Robot
+
+_FEW = 5
+"""Rows that a sentence names; who left out more looks for a cause, not for rows."""
+
+
+@dataclass(frozen=True)
+class Source:
+    """What a format makes of the files that it is given.
+
+    Attributes
+    ----------
+    table
+        Rows of commands and measurements, in the columns of that program.
+    plan
+        What the format says of these columns; the user's mapping counts for more.
+    notes
+        What was left out before, and why; what was found out. A sentence each.
+    comments
+        Sentences that belong into campaign.toml.
+    """
+
+    table: Table
+    plan: Plan
+    notes: tuple[str, ...] = ()
+    comments: tuple[str, ...] = ()
+
+
+def campaign_of(source: Source, plan: Plan, robot: Robot, name: str) -> tuple[Campaign, tuple[str, ...]]:
+    """Return the campaign of a table, and in sentences how many rows it has and what was left out.
+
+    Parameters
+    ----------
+    source
+        The table, with what its format says of it.
+    plan
+        All that is said of it, the user's mapping first.
+    robot
+        Whose joints the columns command.
+    name
+        Of the campaign.
+
+    Raises
+    ------
+    CampaignError
+        Whatever cannot be used, with row and column of the table.
+    """
+    table = source.table
+    columns = _columns(table, plan, robot)
+    measured = np.zeros(len(table.rows), dtype=bool)
+    for axis in names.POSITION:
+        if axis in columns:
+            measured |= ~np.isnan(columns[axis].numbers(table))
+    if not measured.any() and set(names.POSITION) <= set(columns):
+        raise CampaignError(table.file, "no row has a measured position", expected="x, y and z of a point")
+    notes = [f"{len(table.rows)} rows read, {int(measured.sum())} taken"]
+    if not measured.all() and set(names.POSITION) <= set(columns):
+        notes.append(f"{_rows(table, ~measured)} left out, without a measured position")
+        table = table.take(measured)
+    cells = _cells(table, columns, robot)
+    orientation = plan.get("orientation", "stated")
+    if orientation is not None:
+        cells.update(zip(names.ORIENTATION, orientation.quaternions(table).T, strict=True))
+    spare = _spare(table, columns.values(), () if orientation is None else orientation.columns)
+    if spare:
+        notes.append(f"columns left out: {listed(spare)}")
+    ready = Table(table.file, cells, table.rows, table.header, warnings=table.warnings)
+    campaign = build_campaign(ready, plan.settings(robot), robot, name=name)
+    # what follows from the order of the rows is not recorded: it will follow again
+    kept = {name: values for name, values in campaign.covariates.items() if name not in campaign.derived}
+    return replace(campaign, covariates=kept, derived=()), (*source.notes, *notes)
+
+
+def _columns(table: Table, plan: Plan, robot: Robot) -> dict[str, Column]:
+    """Return where each column comes from: as stated, else from the column of that name where there is one."""
+    stated = dict(plan.sections.get("columns", {}))
+    joints = stated.pop(JOINTS, ())
+    if joints and len(joints) != robot.n:
+        raise CampaignError(
+            plan.file or table.file,
+            "another number of joints than the chain has",
+            column=f"columns.{JOINTS}",
+            found=str(len(joints)),
+            expected=f"{robot.n}: {listed(robot.joint_names)}",
+        )
+    orientation = plan.get("orientation", "stated")
+    place = () if orientation is None else orientation.position
+    taken = () if orientation is None else names.ORIENTATION
+    own = {name: Column((name,)) for name in table.columns if _defined(name, robot) and name not in taken}
+    in_order = dict(zip(robot.joint_names, joints, strict=bool(joints)))
+    return {**own, **dict(zip(names.POSITION, place, strict=bool(place))), **in_order, **stated}
+
+
+def _defined(name: str, robot: Robot) -> bool:
+    """Return whether the format of a campaign defines a column of this name for the robot."""
+    quantity, place = split_name(name)
+    if quantity in names.PER_JOINT and place in robot.joint_names:
+        return True
+    linked = names.tilted(name) or (place if quantity in names.PER_LINK else "")
+    return name in robot.joint_names or name in names.RESERVED or linked in robot.urdf_links
+
+
+def _cells(table: Table, columns: dict[str, Column], robot: Robot) -> dict[str, Cells]:
+    """Return the campaign's columns; none of a command or a measurement may have a gap."""
+    whole = (*robot.joint_names, *names.POSITION)
+    cells: dict[str, Cells] = {}
+    for name in dict.fromkeys([*(n for n in whole if n in columns), *columns]):
+        if name in names.LABELS:
+            cells[name] = columns[name].text(table)
+            continue
+        values = columns[name].numbers(table)
+        gaps = np.isnan(values)
+        if name in whole and gaps.any():
+            raise CampaignError(
+                table.file,
+                f"a value is missing, for the column {name!r} of the campaign",
+                row=int(table.rows[int(np.argmax(gaps))]),
+                column=" + ".join(map(str, columns[name].sources)),
+                found="an empty cell",
+                expected="a number",
+            )
+        cells[name] = values
+    return cells
+
+
+def _spare(table: Table, columns: Iterable[Column], oriented: Iterable[Column]) -> list[str]:
+    used = {found(table, source) for column in (*columns, *oriented) for source in column.sources}
+    return [name for name in table.columns if name not in used]
+
+
+def _rows(table: Table, chosen: NDArray[np.bool_]) -> str:
+    """Say which rows, a few of them by number."""
+    numbers = table.rows[chosen]
+    more = "" if len(numbers) <= _FEW else " …"
+    return f"{len(numbers)} rows ({', '.join(map(str, numbers[:_FEW]))}{more})"

@@ -1,0 +1,96 @@
+"""Lists of measured points with names, as laser trackers and SpatialAnalyzer export them, joined with the commands.
+
+Source of SpatialAnalyzer's layout: New River Kinematics, *SpatialAnalyzer User's Manual*, "Exporting ASCII Formatted
+Points": a line holds the collection, the group and the target, or the last two, or the last, or none of them, then
+x y z, separated by blanks or commas; lines that begin with // are comments. What else can be exported (tolerances,
+uncertainties, time stamps) stands behind in an order that the manual does not give: it is left out here.
+
+A generic list has the same lines, or a header.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+from thermal_robot.campaign.importers.given import files_of
+from thermal_robot.campaign.importers.join import joined
+from thermal_robot.campaign.importers.mapped import Source
+from thermal_robot.campaign.importers.plan import Plan, planned
+from thermal_robot.campaign.names import listed
+from thermal_robot.campaign.table import Table
+from thermal_robot.campaign.tabular import SPACE, Layout, read_table
+from thermal_robot.errors import CampaignError
+
+DOES = "points of a laser tracker by name (SpatialAnalyzer, lists of names and x y z), and a table of commands"
+FILES = "POINTS COMMANDS.csv"
+COMMENT = "//"
+_NAMES = ("collection", "group", "target")
+_AXES = ("x", "y", "z")
+
+
+def read(files: Sequence[Path], plan: Plan) -> Source:
+    """Read points and commands, joined by the name of the point; without names, row by row.
+
+    Raises
+    ------
+    CampaignError
+        Another number of files, a line that is no point, points and commands that do not belong together.
+    """
+    files_of(files, FILES, 2, 2)
+    layout = plan.layout if plan.sections.get("table") else _laid_out(files[0])
+    table = _named(read_table(files[0], layout), plan)
+    key = plan.get("table", "key") or _NAMES[-1]
+    both, notes = joined(table, read_table(files[1]), key if key in table.columns else "")
+    sections = {"columns": {axis: axis for axis in _AXES}}
+    if key in table.columns:
+        sections["columns"]["pose"] = key
+    return Source(both, planned(sections), notes)
+
+
+def _laid_out(file: Path) -> Layout:
+    """Return how a list of points is laid out: its first line that is no comment tells."""
+    separators = {separator: Layout(separator, 0, False, COMMENT) for separator in (",", ";", "\t", SPACE)}
+    for layout in separators.values():
+        try:
+            table = read_table(file, layout)
+        except CampaignError:  # another number of fields in some line: not this separator
+            continue
+        if len(table.columns) >= len(_AXES):
+            first = table.take(table.rows == table.rows[0])
+            named = not any(first.first_text(name) is None for name in first.columns)
+            return Layout(layout.separator, 0, named, COMMENT)
+    raise CampaignError(
+        str(file), "is no list of points", expected="lines of names and x y z, separated by blanks, commas or tabs"
+    )
+
+
+def _named(table: Table, plan: Plan) -> Table:
+    """Return the table with its columns called collection, group, target, x, y, z as far as they are there."""
+    if table.header is not None:
+        axes = {name: name.lower() for name in table.columns if name.lower() in _AXES}
+        first = min((k for k, name in enumerate(table.columns) if name in axes), default=0)
+    else:
+        first = _names_before(table)
+        axes = dict(zip(list(table.columns)[first:], _AXES, strict=False))
+    if sorted(axes.values()) != list(_AXES) and not plan.sections.get("columns"):
+        raise CampaignError(
+            table.file,
+            "x, y and z of the points are not found",
+            row=table.header,
+            found=listed(table.columns) if table.header is not None else f"{len(table.columns)} fields in a line",
+            expected="at most three names, then x y z; or [columns] in the mapping",
+        )
+    titles = dict(zip(list(table.columns)[:first], _NAMES[max(0, len(_NAMES) - first) :], strict=False))
+    return replace(table, columns={{**titles, **axes}.get(name, name): cells for name, cells in table.columns.items()})
+
+
+def _names_before(table: Table) -> int:
+    """Return how many fields of a line are names: text, or whole numbers throughout where three fields remain."""
+    columns = list(table.columns)
+    for count, name in enumerate(columns[: len(_NAMES)]):
+        figures = table.first_text(name) is None
+        if figures and (len(columns) - count <= len(_AXES) or not all(map(str.isdigit, table.text(name)))):
+            return count
+    return min(len(_NAMES), len(columns))

@@ -1,0 +1,120 @@
+"""Samples of ROS robot_calibration: a static sensor saw features that the robot carries; or its poses, with a table.
+
+Source: github.com/mikeferguson/robot_calibration: ``robot_calibration_msgs/msg/CalibrationData.msg`` and
+``Observation.msg`` (joint_states; observations, each with a sensor_name and features, which are points with x y z), as
+text of ``rostopic echo`` or ``ros2 topic echo``, documents separated by ---; and the capture poses that
+``robot_calibration/src/util/poses_from_yaml.cpp`` reads: a list of joints, positions and features. In rad and m, as
+everywhere in ROS.
+
+The capture poses are commands alone: a second file has the measured points, row by row.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from thermal_robot.campaign.importers.given import files_of, is_yaml, read_yaml
+from thermal_robot.campaign.importers.join import joined
+from thermal_robot.campaign.importers.mapped import Source
+from thermal_robot.campaign.importers.plan import Plan, planned
+from thermal_robot.campaign.names import listed
+from thermal_robot.campaign.table import Table
+from thermal_robot.campaign.tabular import read_table
+from thermal_robot.errors import CampaignError
+
+DOES = "samples of ROS robot_calibration as YAML; or its capture poses, and a table of measured points"
+FILES = "SAMPLES.yaml, or POSES.yaml MEASURED.csv"
+_UNITS = {"measurements": {"angle_unit": "rad", "length_unit": "m"}}
+
+
+def read(files: Sequence[Path], plan: Plan) -> Source:
+    """Read samples; the first feature of ``[recording] sensor`` is the target unless ``feature`` says another.
+
+    Raises
+    ------
+    CampaignError
+        Another number of files, a YAML file that is none of the two kinds, a sensor that is not there.
+    """
+    files_of(files, FILES, 1, 2)
+    file = next((file for file in files if is_yaml(file)), files[0])
+    documents = read_yaml(file)
+    if len(documents) == 1 and isinstance(documents[0], list):
+        commands = _table(str(file), [_pose(str(file), k, pose) for k, pose in enumerate(documents[0])])
+        tables = [each for each in files if each != file]
+        if not tables:
+            raise CampaignError(
+                str(file), "holds poses and no measurements", expected="the table of measured points as a second file"
+            )
+        both, notes = joined(read_table(tables[0], plan.layout), commands)
+        return Source(both, planned(_UNITS), notes)
+    files_of(files, FILES, 1, 1)
+    sensor = plan.get("recording", "sensor") or _only_sensor(str(file), documents)
+    feature = plan.get("recording", "feature", 1)
+    rows = [_sample(str(file), k, sample, sensor, feature) for k, sample in enumerate(documents)]
+    return Source(
+        _table(str(file), rows), planned(_UNITS), (f"feature {feature} of sensor {sensor!r} taken as the target",)
+    )
+
+
+def _table(file: str, rows: Sequence[Mapping[str, float]]) -> Table:
+    """Return rows of figures by name as a table; the rows are counted from 1, as samples are."""
+    columns = {
+        name: np.array([row.get(name, np.nan) for row in rows]) for name in dict.fromkeys(n for r in rows for n in r)
+    }
+    return Table(file, columns, np.arange(1, len(rows) + 1))
+
+
+def _pose(file: str, index: int, pose: Any) -> dict[str, float]:
+    """Return a capture pose as joint positions by name."""
+    if not isinstance(pose, dict):
+        raise _odd(file, index, pose, "joints and positions")
+    return _positions(file, index, pose.get("joints"), pose.get("positions"))
+
+
+def _positions(file: str, index: int, names: Any, positions: Any) -> dict[str, float]:
+    fits = isinstance(names, list) and isinstance(positions, list) and len(names) == len(positions) > 0
+    if not fits or not all(isinstance(p, (int, float)) for p in positions):
+        raise _odd(file, index, {"joints": names, "positions": positions}, "as many positions as joints, numbers")
+    return {str(name): float(position) for name, position in zip(names, positions, strict=True)}
+
+
+def _sample(file: str, index: int, sample: Any, sensor: str, feature: int) -> dict[str, float]:
+    """Return one sample as joint positions and the measured point; without the point where it was not seen."""
+    state = sample.get("joint_states") if isinstance(sample, dict) else None
+    if not isinstance(state, dict):
+        raise _odd(file, index, sample, "joint_states and observations")
+    row = _positions(file, index, state.get("name"), state.get("position"))
+    seen = {each["sensor_name"]: each.get("features") or [] for each in _observations(sample)}
+    features = seen.get(sensor, [])
+    if len(features) < feature:
+        return row
+    point = features[feature - 1].get("point") if isinstance(features[feature - 1], dict) else None
+    if not isinstance(point, dict) or not all(isinstance(point.get(axis), (int, float)) for axis in "xyz"):
+        raise _odd(file, index, features[feature - 1], "a feature with a point of x, y and z")
+    return {**row, **{axis: float(point[axis]) for axis in "xyz"}}
+
+
+def _observations(sample: Any) -> list[Any]:
+    found = sample.get("observations") if isinstance(sample, dict) else None
+    return [each for each in found or [] if isinstance(each, dict) and isinstance(each.get("sensor_name"), str)]
+
+
+def _only_sensor(file: str, documents: Sequence[Any]) -> str:
+    """Return the sensor of all observations, where it is one."""
+    sensors = sorted({each["sensor_name"] for sample in documents for each in _observations(sample)})
+    if len(sensors) != 1:
+        raise CampaignError(
+            file,
+            "it is not clear which sensor measured" if sensors else "there are no observations",
+            found=listed(sensors) if sensors else None,
+            expected="[recording] sensor in the mapping" if sensors else "samples of robot_calibration",
+        )
+    return str(sensors[0])
+
+
+def _odd(file: str, index: int, found: Any, expected: str) -> CampaignError:
+    return CampaignError(file, "is no sample", key=f"[{index}]", found=repr(found)[:80], expected=expected)

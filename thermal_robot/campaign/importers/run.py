@@ -1,0 +1,70 @@
+"""Files of another program in, the folder of a campaign out."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from thermal_robot.campaign.campaign import Campaign
+from thermal_robot.campaign.declaration import FILE_NAME
+from thermal_robot.campaign.importers import FORMATS
+from thermal_robot.campaign.importers.mapped import campaign_of
+from thermal_robot.campaign.importers.plan import Plan
+from thermal_robot.campaign.write import ROBOT_NAME, TABLE_NAME, write_campaign
+from thermal_robot.errors import CampaignError
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A campaign that was imported.
+
+    Attributes
+    ----------
+    campaign
+        As it was written.
+    file
+        Its campaign.toml.
+    notes
+        How many rows were read, what was left out and why, what was found out; a sentence each.
+    """
+
+    campaign: Campaign
+    file: Path
+    notes: tuple[str, ...]
+
+
+def import_files(format: str, files: Sequence[Path], directory: Path, plan: Plan | None = None) -> Imported:
+    """Read files of a format and write them as a campaign.
+
+    Parameters
+    ----------
+    format
+        One of :data:`~thermal_robot.campaign.importers.FORMATS`.
+    files
+        As many as the format has.
+    directory
+        Of the campaign; is made if need be. campaign.toml, measurements.csv and robot.urdf in it are replaced.
+    plan
+        What the user says beyond the files; it counts for more than what the format says.
+
+    Raises
+    ------
+    CampaignError
+        Files that cannot be used or would be overwritten, a folder that cannot be written.
+    RobotError
+        A robot that cannot be loaded.
+    """
+    given = plan or Plan()
+    read = {Path(file).resolve() for file in files}
+    for name in (FILE_NAME, TABLE_NAME, ROBOT_NAME):
+        if (directory / name).resolve() in read:
+            raise CampaignError(
+                str(directory / name), "is read from, and would be overwritten", expected="another folder to write"
+            )
+    source = FORMATS[format].read(files, given)
+    full = given.over(source.plan)
+    campaign, notes = campaign_of(source, full, full.robot(), Path(directory).resolve().name)
+    origin = f"Imported by `thermal-robot import {format}` from {', '.join(Path(file).name for file in files)}."
+    file = write_campaign(campaign, directory, comments=(origin, *source.comments))
+    return Imported(campaign, file, notes)

@@ -1,0 +1,36 @@
+"""Any table, by a mapping: FILES are the table, or the measured and the commanded one, and ``--mapping`` says the rest.
+
+The mapping is described in docs/importers.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from thermal_robot.campaign.importers.columns import found
+from thermal_robot.campaign.importers.given import files_of
+from thermal_robot.campaign.importers.join import joined
+from thermal_robot.campaign.importers.mapped import Source
+from thermal_robot.campaign.importers.plan import Plan
+from thermal_robot.campaign.tabular import read_table
+
+DOES = "any table, by a mapping; or two, of what was measured and of what was commanded"
+FILES = "TABLE, or MEASURED COMMANDED"
+
+
+def read(files: Sequence[Path], plan: Plan) -> Source:
+    """Read one table, or two that are joined by the names in ``[table] key``, else row by row.
+
+    Raises
+    ------
+    CampaignError
+        No file or more than two, a table that cannot be read, tables that cannot be joined.
+    """
+    files_of(files, FILES, 1, 2)
+    table = read_table(files[0], plan.layout)
+    if len(files) == 1:
+        return Source(table, Plan())
+    key = plan.get("table", "key")
+    both, notes = joined(table, read_table(files[1]), "" if key is None else found(table, key))
+    return Source(both, Plan(), notes)
