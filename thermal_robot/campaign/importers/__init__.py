@@ -6,13 +6,14 @@ A format says what it reads (``DOES``), which files (``FILES``), and has ``read(
 
 from types import ModuleType
 
-from thermal_robot.campaign.importers import figaroh, ipa_ur10, jacobi, points, robot_calibration, table
+from thermal_robot.campaign.importers import figaroh, ipa_ur10, jacobi, points, robot_calibration, rosbag, table
 
 FORMATS: dict[str, ModuleType] = {
     "table": table,
     "points": points,
     "figaroh": figaroh,
     "robot_calibration": robot_calibration,
+    "rosbag": rosbag,
     "jacobi": jacobi,
     "ipa_ur10": ipa_ur10,
 }

@@ -2,7 +2,8 @@
 
 Sources: github.com/thanhndv212/figaroh-plus, ``src/figaroh/calibration/data_loader.py``, ``load_data`` (columns
 x1 y1 z1 phix1 phiy1 phiz1 for marker 1, and so on, then one per joint by its name in the URDF), ``config.py`` (both
-layouts of the YAML) and ``examples/tiago/config`` in github.com/thanhndv212/figaroh-examples. Positions are in m, joints in rad.
+layouts of the YAML) and ``examples/tiago/config`` in github.com/thanhndv212/figaroh-examples. Positions are in m,
+joints in rad.
 
 What phix phiy phiz are differs between versions: ``calibration_tools.py`` takes roll, pitch and yaw
 (``pin.rpy.matrixToRpy``), a later guide speaks of rotation vectors. They are left out unless ``[orientation]`` in the
