@@ -6,7 +6,7 @@ place of the instrument and the place of the target are fitted together to what 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -72,10 +72,13 @@ def lag(joints: Stream, target: Stream, robot: Robot, place: Array) -> Lag:
     CampaignError
         Recordings that do not show one motion, or hardly any.
     """
+    # clocks that count from 1970 leave too few digits for a derivative by time: from here on both begin at 0
+    begun = float(joints.time[0] - target.time[0])
+    joints, target = (replace(each, time=each.time - each.time[0]) for each in (joints, target))
     rough = _by_speed(joints, target, robot, place)
     speed = _speeds(target, target.time)
     inside = (target.time + rough > joints.time[0]) & (target.time + rough < joints.time[-1])
-    moving = np.flatnonzero(inside & (speed > MOVING * np.max(speed[inside])))
+    moving = np.flatnonzero(inside & (speed > MOVING * np.max(speed[inside], initial=0.0)))
     if len(moving) < LEAST:
         raise CampaignError(
             target.file,
@@ -97,11 +100,11 @@ def lag(joints: Stream, target: Stream, robot: Robot, place: Array) -> Lag:
     parts = np.array_split(np.arange(len(chosen)), BLOCKS)
     without = [_fitted(joints, target, robot, np.delete(chosen, part), whole)[0][0] for part in parts]
     deviation = np.sqrt((BLOCKS - 1) / BLOCKS * np.sum((np.array(without) - np.mean(without)) ** 2))
-    return Lag(float(whole[0]), float(deviation), left)
+    return Lag(begun + float(whole[0]), float(deviation), left)
 
 
 def _by_speed(joints: Stream, target: Stream, robot: Robot, place: Array) -> float:
-    """Return the lag at which the speeds are most alike, s."""
+    """Return the lag at which the speeds of recordings that begin at 0 are most alike, s."""
     from scipy.signal import correlate, correlation_lags
 
     spans = [stream.time[-1] - stream.time[0] for stream in (joints, target)]
@@ -110,18 +113,19 @@ def _by_speed(joints: Stream, target: Stream, robot: Robot, place: Array) -> flo
     grids = [np.arange(0.0, span, step) for span in spans]
     poses = tool_poses(robot, joints.values)
     reached = Stream(joints.file, joints.time, poses[:, :3, 3] + poses[:, :3, :3] @ place, ("x", "y", "z"))
-    one, other = (_speeds(s, s.time[0] + grid) for s, grid in ((reached, grids[0]), (target, grids[1])))
+    one, other = (_speeds(s, grid) for s, grid in ((reached, grids[0]), (target, grids[1])))
     one, other = one - one.mean(), other - other.mean()
     products = correlate(one, other, method="fft")
     best = int(np.argmax(products))
     steps = int(correlation_lags(len(one), len(other))[best])
-    return float(joints.time[0] - target.time[0] + steps * step)
+    return float(steps * step)
 
 
 def _speeds(stream: Stream, times: Array) -> Array:
     """Return (M,) m/s of the target at some instants, over two steps of them."""
     places = stream.at(times)[:, :3]
-    return np.linalg.norm(np.gradient(places, times, axis=0), axis=1)
+    speeds: Array = np.linalg.norm(np.gradient(places, times, axis=0), axis=1)
+    return speeds
 
 
 def _fitted(joints: Stream, target: Stream, robot: Robot, chosen: Any, start: Array) -> tuple[Array, float]:
@@ -142,7 +146,7 @@ def _fitted(joints: Stream, target: Stream, robot: Robot, chosen: Any, start: Ar
     middle = measured.mean(axis=0)
 
     def gap(figures: Array) -> Array:
-        seen = reached(figures) @ frame[:3, :3].T + frame[:3, 3] - middle
+        seen: Array = reached(figures) @ frame[:3, :3].T + frame[:3, 3] - middle
         away: Array = seen @ exp3(figures[1:4]).T + middle + figures[4:7] - measured
         return np.ravel(away)
 

@@ -150,4 +150,4 @@ def _rows(table: Table, chosen: NDArray[np.bool_]) -> str:
     """Say which rows, a few of them by number."""
     numbers = table.rows[chosen]
     more = "" if len(numbers) <= _FEW else " …"
-    return f"{len(numbers)} rows ({', '.join(map(str, numbers[:_FEW]))}{more})"
+    return f"{len(numbers)} row{'s' if len(numbers) > 1 else ''} ({', '.join(map(str, numbers[:_FEW]))}{more})"

@@ -21,6 +21,7 @@ from thermal_robot.campaign.importers.streams import Array, Stream, stream
 from thermal_robot.campaign.table import Table
 from thermal_robot.campaign.tabular import Layout, read_table
 from thermal_robot.errors import CampaignError
+from thermal_robot.files import is_file
 
 _NANOSECOND = 1e-9
 _CLOCKS = {"field.header.stamp": _NANOSECOND, "%time": _NANOSECOND, "__time": 1.0, "time": 1.0, "timestamp": 1.0}
@@ -48,9 +49,9 @@ def read_streams(file: Path, joints: Sequence[str]) -> tuple[Stream | None, Stre
     CampaignError
         A file that is no table, has no clock, or has some of the joints only.
     """
-    table = read_table(file)
-    if re.fullmatch(r"[\d.]+", next(iter(table.columns))):
+    if _begins_with_figures(file):
         return _without_header(read_table(file, _WITHOUT_HEADER), joints)
+    table = read_table(file)
     clock = next((name for name in _CLOCKS if name in table.columns), None)
     if clock is None:
         raise CampaignError(
@@ -60,6 +61,14 @@ def read_streams(file: Path, joints: Sequence[str]) -> tuple[Stream | None, Stre
     places = [columns and stream(str(file), time, _figures(table, list(columns.values())), list(columns))
               for columns in (_joints(table, joints), _target(table))]  # fmt: skip
     return places[0] or None, places[1] or None
+
+
+def _begins_with_figures(file: Path) -> bool:
+    """Return whether the first line begins with two whole numbers, a stamp, and is no header."""
+    if not is_file(file):
+        return False
+    with file.open("rb") as content:
+        return re.match(rb"\d+,\d+,", content.read(64)) is not None
 
 
 def _figures(table: Table, columns: Sequence[str]) -> Array:

@@ -1,0 +1,48 @@
+"""A row for each rest of the robot, in its middle; short rests and those that nobody measured are counted."""
+
+import numpy as np
+import pytest
+from campaign.importers.recordings import recorded
+
+from thermal_robot.campaign.importers.standstill import STANDSTILL, paired
+
+
+def test_a_pair_for_each_rest(rv_m2):
+    joints, target, path = recorded(rv_m2, np.random.default_rng(0), offset=7.0, start=0.0)
+    pairs = paired(joints, target, 7.0)
+    assert len(pairs.times) == len(path.poses)
+    np.testing.assert_allclose(pairs.joints, path.poses, atol=1.1e-5)
+    assert ((path.begins < pairs.times) & (pairs.times < path.ends)).all()
+
+
+def test_an_offset_that_is_not_known_pairs_moving_samples(rv_m2):
+    """What the estimate is good for: a second off, targets are centimetres away."""
+    joints, target, _ = recorded(rv_m2, np.random.default_rng(0), offset=7.0, start=0.0)
+    pairs = [paired(joints, target, lag) for lag in (7.0, 6.5, 6.0)]
+    common = set.intersection(*(set(p.times.tolist()) for p in pairs))
+    places = [p.target[[t in common for t in p.times]] for p in pairs]
+    assert np.abs(places[0] - places[1]).max() < 1e-3  # still at rest
+    assert np.abs(places[0] - places[2]).max() > 0.01
+
+
+def test_rests_that_are_too_short_or_unmeasured_are_counted(rv_m2):
+    joints, target, path = recorded(rv_m2, np.random.default_rng(0), offset=0.0, start=0.0, poses=10)
+    assert paired(joints, target, 0.0, standstill=5.0).short == 10
+    gap = (target.time < path.begins[4]) | (target.time > path.ends[4])
+    holed = type(target)("t", target.time[gap], target.values[gap], target.names)
+    pairs = paired(joints, holed, 0.0)
+    assert (len(pairs.times), pairs.lonely) == (9, 1)
+    far = paired(joints, holed, 0.0, tolerance=2.0)
+    assert (len(far.times), far.lonely) == (10, 0)
+
+
+@pytest.mark.parametrize("velocity", [1e-3, 5e-3])
+def test_a_robot_that_creeps_does_not_stand(rv_m2, velocity):
+    time = np.arange(0.0, 10.0, 0.01)
+    creeping = 2e-3 * time[:, None] * np.ones(rv_m2.n)
+    joints = recorded(rv_m2, np.random.default_rng(0), offset=0.0, poses=2)[0]
+    joints = type(joints)("j", time, creeping, joints.names)
+    target = type(joints)("t", time, np.zeros((len(time), 3)), ("x", "y", "z"))
+    pairs = paired(joints, target, 0.0, velocity=velocity)
+    assert len(pairs.times) == int(velocity > 2e-3)
+    assert STANDSTILL < 10.0

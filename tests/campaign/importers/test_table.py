@@ -1,0 +1,113 @@
+"""Any table by a mapping: names and numbers of columns, units, signs, sums, instants, orientations, skipped lines."""
+
+import numpy as np
+import pytest
+from campaign.importers.written import COMMANDS, complaint, imported, put
+
+MAPPING = """
+[robot]
+urdf = "robot.urdf"
+tool_frame = "tool"
+[measurements]
+angle_unit = "deg"
+length_unit = "mm"
+[frames]
+target = [0.0, 0.0, 80.0]
+[noise]
+position = 0.02
+[table]
+separator = "semicolon"
+skip = 2
+comment = "#"
+[columns]
+joints = ["J1", "J2", {column = "J3", scale = 1000.0}, {column = "J4", scale = -1.0, offset = 90.0}]
+x = "X"
+y = 6
+z = {sum = ["Z", "dZ"]}
+time = {column = "at", time = "%d.%m.%Y %H:%M:%S"}
+payload = {value = 5.0}
+session = "run"
+humidity = "RH"
+"""
+TABLE = """Log of cell 7
+made by hand
+J1;J2;J3;J4;X;Y;Z;dZ;at;run;RH;who
+# a comment; of any length
+10;20;0,03;40;1000,5;0;500;0,25;14.07.2020 16:39:04;a;40;me
+-10;15;0,06;400;900;100;510;0;14.07.2020 16:40:04;a;41;me
+5;5;0,06;40;;;;;14.07.2020 16:41:04;a;41;me
+50;-45;0,09;-40;800;200;520;-1;15.07.2020 16:39:04;b;42;me
+"""
+
+
+def test_a_mapping_says_what_the_columns_are(tmp_path, capsys):
+    folder = put(tmp_path, log__csv=TABLE, m__toml=MAPPING)
+    campaign, out = imported(capsys, folder, "table", "log.csv", "--mapping", str(folder / "m.toml"), robot=False)
+    degrees = np.rad2deg(campaign.q)
+    np.testing.assert_allclose(degrees[:, [0, 1, 3]], [[10, 20, 50], [-10, 15, -310], [50, -45, 130]])
+    np.testing.assert_allclose(campaign.q[:, 2], [0.03, 0.06, 0.09])
+    np.testing.assert_allclose(1e3 * campaign.position, [[1000.5, 0, 500.25], [900, 100, 510], [800, 200, 519]])
+    np.testing.assert_allclose(campaign.covariates["time"], [0, 60, 86400])
+    np.testing.assert_allclose(campaign.covariates["payload"], 5.0)
+    np.testing.assert_allclose(campaign.covariates["humidity"], [40, 41, 42])
+    assert campaign.labels["session"].tolist() == ["a", "a", "b"]
+    assert campaign.settings.noise_position == pytest.approx(2e-5)
+    np.testing.assert_allclose(campaign.target, [0, 0, 0.08])
+    assert "4 rows read, 3 taken; 1 row (7) left out, without a measured position; columns left out: 'who'" in out
+    assert (folder / "made" / "campaign.toml").read_text().startswith("# Imported by `thermal-robot import table` from")
+
+
+def test_a_list_without_header_is_known_by_numbers(tmp_path, capsys):
+    mapping = '[table]\nheader = false\nseparator = "space"\n[columns]\njoints = [1, 2, 3, 4]\nx = 5\ny = 6\nz = 7\n'
+    rows = "0.1  0.2 0.03   0.4 1 2\t3\n-0.1 0.3 0.06 3.5 4 5 6\n0.5 -0.4 0.09 -0.4 7 8 9\n"
+    folder = put(tmp_path, log__txt=rows, m__toml=mapping)
+    units = ("--angle-unit", "rad", "--length-unit", "m")
+    campaign, _ = imported(capsys, folder, "table", "log.txt", "--mapping", str(folder / "m.toml"), *units)
+    np.testing.assert_allclose(campaign.position, [[1, 2, 3], [4, 5, 6], [7, 8, 9]])
+    np.testing.assert_allclose(campaign.q[1], [-0.1, 0.3, 0.06, 3.5])
+
+
+def test_commands_and_measurements_in_two_tables(tmp_path, capsys):
+    commands = COMMANDS.replace("roll", "roll,name").replace("0.4\n", "0.4,P1\n").replace("3.5\n", "3.5,P2\n")
+    commands = commands.replace("-0.4,P1", "-0.4,P3")
+    measured = "point,x,y,z\nP3,7,8,9\nP1,1,2,3\nP9,0,0,0\nP2,4,5,6\nP1,1,2,3.5\n"
+    folder = put(tmp_path, c__csv=commands, p__csv=measured, m__toml='[table]\nkey = "point"\n')
+    units = ("--angle-unit", "rad", "--length-unit", "m", "--mapping", str(folder / "m.toml"))
+    campaign, out = imported(capsys, folder, "table", "p.csv", "c.csv", *units)
+    np.testing.assert_allclose(campaign.position[:, 2], [9, 3, 6, 3.5])
+    np.testing.assert_allclose(campaign.q[:, 3], [-0.4, 0.4, 3.5, 0.4])
+    assert "1 points left out, not commanded: 'P9'" in out
+
+
+@pytest.mark.parametrize(
+    ("was", "becomes", "words"),
+    [
+        ('x = "X"', 'x = "XX"', "log.csv, row 3, column 'XX': there is no such column; did you mean 'X'?"),
+        ('x = "X"', "x = 40", "log.csv, row 3, column '40': there is no such column"),
+        ('"J1", ', "", "m.toml, column 'columns.joints': another number of joints than the chain has; found 3"),
+        ("%d.%m.%Y", "%d/%m/%Y", "row 5, column 'at': no instant of this pattern; found '14.07.2020 16:39:04'"),
+        ("{value = 5.0}", "{value = 5.0, count = true}", "row 22, column 'columns.payload': wrong kind"),
+        ("[columns]", "[colums]", "m.toml, row 16, column 'colums': unknown section or key; did you mean"),
+        ("skip = 2", "skip = -1", "m.toml, row 14, column 'table.skip': wrong kind of value; found -1"),
+        ('"semicolon"', '";"', "found ';', expected \"comma\" or \"semicolon\" or \"tab\" or \"space\""),
+        ('length_unit = "mm"', "", "m.toml: no length_unit is stated, expected [measurements] length_unit"),
+        ('urdf = "robot.urdf"', "", "m.toml: no robot is named, expected --robot URDF"),
+    ],
+)  # fmt: skip
+def test_mistakes_are_told_by_file_row_and_column(tmp_path, capsys, was, becomes, words):
+    folder = put(tmp_path, log__csv=TABLE, m__toml=MAPPING.replace(was, becomes))
+    said = complaint(capsys, folder, "table", "log.csv", "--mapping", str(folder / "m.toml"), robot=False)
+    assert words in said
+
+
+@pytest.mark.parametrize(
+    ("was", "becomes", "words"),
+    [
+        ("1000,5;0;", "1000,5;;", "log.csv, row 5, column '6': a value is missing, for the column 'y' of the campaign"),
+        (";40;1000", ";forty;1000", "log.csv, row 5, column 'J4': text where a number should be; found 'forty'"),
+        (";who", ";", "log.csv, row 3: a column has no name"),
+    ],
+)
+def test_a_spoilt_table_is_told_by_its_own_rows_and_columns(tmp_path, capsys, was, becomes, words):
+    folder = put(tmp_path, log__csv=TABLE.replace(was, becomes), m__toml=MAPPING)
+    assert words in complaint(capsys, folder, "table", "log.csv", "--mapping", str(folder / "m.toml"), robot=False)
