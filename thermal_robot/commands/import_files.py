@@ -5,9 +5,10 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from thermal_robot.campaign.importers import FORMATS
+from thermal_robot.campaign.importers.formats import FORMATS
 from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS
 from thermal_robot.commands.shared import tell
+from thermal_robot.robot import ENDS
 
 DOES = "make a campaign of other programs' files"
 EXAMPLE = " table log.csv --mapping mapping.toml -o campaign"
@@ -37,7 +38,7 @@ def run(options: argparse.Namespace) -> None:
     from thermal_robot.campaign.importers.run import import_files
 
     said = {
-        "robot": {"urdf": options.robot, "tool_frame": options.tool, "root_frame": options.root},
+        "robot": dict(zip(("urdf", *ENDS), (options.robot, options.tool, options.root), strict=True)),
         "measurements": {"angle_unit": options.angle_unit, "length_unit": options.length_unit},
     }
     stated = {section: {k: v for k, v in content.items() if v is not None} for section, content in said.items()}

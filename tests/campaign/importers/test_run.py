@@ -1,23 +1,11 @@
-"""The registry of formats, and what an import writes and never overwrites."""
-
-import inspect
+"""What an import writes, and what it never overwrites."""
 
 import pytest
 from campaign.importers.written import COMMANDS, put
 
-from thermal_robot.campaign.importers import FORMATS
 from thermal_robot.campaign.importers.plan import planned
 from thermal_robot.campaign.importers.run import import_files
 from thermal_robot.errors import CampaignError
-
-
-@pytest.mark.parametrize("name", FORMATS)
-def test_a_format_says_what_it_reads_and_cites_its_source(name):
-    module = FORMATS[name]
-    assert module.DOES
-    assert module.FILES
-    assert list(inspect.signature(module.read).parameters) == ["files", "plan"]
-    assert name == "table" or "Source" in module.__doc__ or "ros_csv" in module.__doc__
 
 
 def test_a_campaign_that_is_read_from_is_not_overwritten(tmp_path):

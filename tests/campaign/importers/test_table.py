@@ -1,8 +1,13 @@
 """Any table by a mapping: names and numbers of columns, units, signs, sums, instants, orientations, skipped lines."""
 
+import re
+from pathlib import Path
+
 import numpy as np
 import pytest
 from campaign.importers.written import COMMANDS, complaint, imported, put
+
+import thermal_robot
 
 MAPPING = """
 [robot]
@@ -111,3 +116,16 @@ def test_mistakes_are_told_by_file_row_and_column(tmp_path, capsys, was, becomes
 def test_a_spoilt_table_is_told_by_its_own_rows_and_columns(tmp_path, capsys, was, becomes, words):
     folder = put(tmp_path, log__csv=TABLE.replace(was, becomes), m__toml=MAPPING)
     assert words in complaint(capsys, folder, "table", "log.csv", "--mapping", str(folder / "m.toml"), robot=False)
+
+
+def test_the_example_of_the_page_is_imported(tmp_path, capsys):
+    page = (Path(thermal_robot.__file__).parents[1] / "docs" / "importers.md").read_text(encoding="utf-8")
+    files = {kind: re.search(rf"^```{kind}\n(.*?)^```", page, flags=re.M | re.S)[1] for kind in ("csv", "toml")}
+    folder = put(tmp_path, log__csv=files["csv"], m__toml=files["toml"])
+    campaign, out = imported(capsys, folder, "table", "log.csv", "--mapping", str(folder / "m.toml"), robot=False)
+    assert "5 rows read, 4 taken; 1 row (5) left out" in out
+    np.testing.assert_allclose(np.rad2deg(campaign.q[0]), [-7.45, 60.52, -82.20, 63.23, -87.60])
+    np.testing.assert_allclose(1e3 * campaign.position[1], [-1151.046, -458.460, -1125.218])
+    np.testing.assert_allclose(campaign.covariates["time"], [0, 47, 147, 196])
+    np.testing.assert_allclose(campaign.covariates["payload"], [0, 0, 3, 3])
+    assert campaign.measures == "pose"

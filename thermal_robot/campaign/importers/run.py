@@ -8,7 +8,7 @@ from pathlib import Path
 
 from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.declaration import FILE_NAME
-from thermal_robot.campaign.importers import FORMATS
+from thermal_robot.campaign.importers.formats import FORMATS
 from thermal_robot.campaign.importers.mapped import campaign_of
 from thermal_robot.campaign.importers.plan import Plan
 from thermal_robot.campaign.write import ROBOT_NAME, TABLE_NAME, write_campaign
@@ -40,7 +40,7 @@ def import_files(format: str, files: Sequence[Path], directory: Path, plan: Plan
     Parameters
     ----------
     format
-        One of :data:`~thermal_robot.campaign.importers.FORMATS`.
+        One of :data:`~thermal_robot.campaign.importers.formats.FORMATS`.
     files
         As many as the format has.
     directory
