@@ -7,8 +7,6 @@ import numpy as np
 import pytest
 from campaign.importers.written import COMMANDS, complaint, imported, put
 
-import thermal_robot
-
 MAPPING = """
 [robot]
 urdf = "robot.urdf"
@@ -119,7 +117,7 @@ def test_a_spoilt_table_is_told_by_its_own_rows_and_columns(tmp_path, capsys, wa
 
 
 def test_the_example_of_the_page_is_imported(tmp_path, capsys):
-    page = (Path(thermal_robot.__file__).parents[1] / "docs" / "importers.md").read_text(encoding="utf-8")
+    page = (Path(__file__).parents[3] / "docs" / "importers.md").read_text(encoding="utf-8")
     files = {kind: re.search(rf"^```{kind}\n(.*?)^```", page, flags=re.M | re.S)[1] for kind in ("csv", "toml")}
     folder = put(tmp_path, log__csv=files["csv"], m__toml=files["toml"])
     campaign, out = imported(capsys, folder, "table", "log.csv", "--mapping", str(folder / "m.toml"), robot=False)
