@@ -131,7 +131,7 @@ def test_every_recording_gives_the_rests_of_the_robot(recording, tmp_path, capsy
     assert shown == pytest.approx(OFFSET, abs=1e-3)
     text = (tmp_path / "made" / "campaign.toml").read_text()
     assert f"# Clocks: the robot's clock shows {shown:.4f} ± " in text
-    middles = target.at((path.begins + path.ends) / 2 + 1.6e9 - OFFSET)
+    middles = target.between((path.begins + path.ends) / 2 + 1.6e9 - OFFSET)
     np.testing.assert_allclose(campaign.position[1:-1], middles[1:-1], atol=4e-4)
     assert campaign.covariates["time"][0] == 0.0
 
@@ -153,7 +153,7 @@ def test_other_units_are_declared(recording, tmp_path, capsys):
     assert cli.main(["import", "rosbag", *files, *ROBOT, *units, "-o", str(tmp_path / "made")]) == 0
     campaign = read_campaign(tmp_path / "made")
     np.testing.assert_allclose(campaign.q, path.poses, atol=1.2e-5)
-    assert np.linalg.norm(campaign.position - target.at(path.begins + 1.6e9 + 0.7 - OFFSET), axis=1).max() < 5e-4
+    assert np.linalg.norm(campaign.position - target.between(path.begins + 1.6e9 + 0.7 - OFFSET), axis=1).max() < 5e-4
     assert campaign.units.length == "mm"
 
 

@@ -123,7 +123,7 @@ def _by_speed(joints: Stream, target: Stream, robot: Robot, place: Array) -> flo
 
 def _speeds(stream: Stream, times: Array) -> Array:
     """Return (M,) m/s of the target at some instants, over two steps of them."""
-    places = stream.at(times)[:, :3]
+    places = stream.between(times)[:, :3]
     speeds: Array = np.linalg.norm(np.gradient(places, times, axis=0), axis=1)
     return speeds
 
@@ -138,7 +138,7 @@ def _fitted(joints: Stream, target: Stream, robot: Robot, chosen: Any, start: Ar
     times, measured = target.time[chosen], target.values[chosen, :3]
 
     def reached(figures: Array) -> Array:
-        poses = tool_poses(robot, joints.at(times + figures[0]))
+        poses = tool_poses(robot, joints.between(times + figures[0]))
         places: Array = poses[:, :3, 3] + poses[:, :3, :3] @ figures[7:]
         return places
 

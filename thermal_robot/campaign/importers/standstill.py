@@ -67,7 +67,7 @@ def paired(
         As the constants of this module.
     """
     times = joints.time
-    moved = joints.at(times + WINDOW / 2) - joints.at(times - WINDOW / 2)
+    moved = joints.between(times + WINDOW / 2) - joints.between(times - WINDOW / 2)
     still = np.abs(moved).max(axis=1) <= velocity * WINDOW
     edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
     begins, ends = edges[::2], edges[1::2] - 1

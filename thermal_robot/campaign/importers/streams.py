@@ -34,7 +34,7 @@ class Stream:
     values: Array
     names: tuple[str, ...]
 
-    def at(self, times: Array) -> Array:
+    def between(self, times: Array) -> Array:
         """Return (M, k) values between the samples, on straight lines; held beyond the ends."""
         return np.column_stack([np.interp(times, self.time, column) for column in self.values.T])
 
