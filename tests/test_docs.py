@@ -1,6 +1,7 @@
 """What README and docs say is true: links, paths and commands exist, the tutorial runs and prints what it shows."""
 
 import argparse
+import ast
 import contextlib
 import importlib
 import io
@@ -183,3 +184,29 @@ def named_files(line):
 def test_every_file_that_is_named_exists(page):
     named = {name for line in page.read_text(encoding="utf-8").splitlines() for name in named_files(line)}
     assert [name for name in sorted(named) if not (ROOT / name).exists()] == []
+
+
+def said_in_the_program():
+    """All texts of the package, what is put into them as `…`."""
+    texts = []
+    for module in sorted((ROOT / "thermal_robot").rglob("*.py")):
+        for node in ast.walk(ast.parse(module.read_text(encoding="utf-8"))):
+            if isinstance(node, ast.JoinedStr):
+                parts = (part.value if isinstance(part, ast.Constant) else "…" for part in node.values)
+                texts.append("".join(map(str, parts)))
+            elif isinstance(node, ast.Constant) and isinstance(node.value, str):
+                texts.append(node.value)
+    return texts
+
+
+def test_every_message_that_is_explained_is_one_of_the_program():
+    page = prose(ROOT / "docs" / "troubleshooting.md")
+    messages = re.findall(r"^\| `([^|]+)` \|", page, flags=re.M)
+    assert len(messages) >= 30
+    texts = said_in_the_program()
+    unknown = []
+    for message in messages:
+        pattern = ".+".join(re.escape(part) for part in message.split("…"))
+        if not any(re.search(pattern, text.replace("`", "")) for text in texts):
+            unknown.append(message)
+    assert unknown == []
