@@ -18,7 +18,9 @@ ORDER = (
     "errors",
     "files",
     "schema",
+    "tables",
     "kinematics",
+    "urdf_text",
     "robot",
     "assembly",
     "paper",
@@ -44,7 +46,7 @@ ORDER = (
 """Rooms from the ground up: each may import those before it."""
 FREE = {
     "report": {"errors", "files", "report"},
-    "assembly": {"errors", "kinematics", "robot", "assembly"},
+    "assembly": {"errors", "kinematics", "robot", "tables", "assembly"},
     "paper": {"errors", "kinematics", "robot", "assembly", "paper"},
 }
 """Rooms that may import less than what stands before them: one draws what it is given, two need no campaign."""

@@ -12,7 +12,8 @@ import yourdfpy
 from coupled import coupled
 
 from thermal_robot import kinematics as kin
-from thermal_robot import robot as robot_module
+from thermal_robot import urdf_text as urdf_text_module
+from thermal_robot.errors import RobotError
 from thermal_robot.robot import load_robot
 
 
@@ -90,7 +91,7 @@ def test_builtin_robots_are_found_inside_the_package_too(rv_m2, configurations, 
     package = tmp_path / "thermal_robot"
     (package / "robots").mkdir(parents=True)
     (package / "robots" / "rv_m2.urdf").write_text(rv_m2.urdf, encoding="utf-8")
-    monkeypatch.setattr(robot_module, "__file__", str(package / "robot.py"))
+    monkeypatch.setattr(urdf_text_module, "__file__", str(package / "urdf_text.py"))
     same_robot(rv_m2, load_robot("builtin:rv_m2", "tool0"), configurations)
     shutil.rmtree(package / "robots")
     (tmp_path / "robots").mkdir()
@@ -249,3 +250,34 @@ def test_a_segment_knows_the_joint_that_moves_it():
         "mount": None, "early": "swing", "turret": "turret", "swing": "swing", "stage_1": "stage_1",
         "stage_2": "stage_1", "stage_3": "stage_1", "half": "turret", "rack": "turret", "jaw": None, "tip_joint": None,
     }  # fmt: skip
+
+
+def test_forward_and_jacobian_are_pinocchios(rv_m2):
+    import pinocchio as pin
+
+    rng = np.random.default_rng(3)
+    q = rng.uniform(-1.0, 1.0, (4, rv_m2.n))
+    model, data = rv_m2.model, rv_m2.model.createData()
+    frame = model.getFrameId(rv_m2.tool_frame, pin.FrameType.BODY)
+    poses, jacobians = rv_m2.forward(q), rv_m2.jacobian(q)
+    for row, pose, jacobian in zip(q, poses, jacobians, strict=True):
+        wanted = pin.computeFrameJacobian(model, data, row, frame, pin.LOCAL_WORLD_ALIGNED)
+        pin.framesForwardKinematics(model, data, row)
+        np.testing.assert_allclose(pose, data.oMf[frame].homogeneous, atol=1e-12)
+        np.testing.assert_allclose(jacobian, wanted, atol=1e-12)
+        np.testing.assert_allclose(rv_m2.forward(row), pose, atol=1e-15)
+        np.testing.assert_allclose(rv_m2.jacobian(row), jacobian, atol=1e-15)
+
+
+@pytest.mark.parametrize("q", [[0.0] * 4, [[0.0] * 6], [np.nan] * 5, "home", [[[0.0] * 5]]])
+def test_positions_that_are_none_are_refused_in_a_sentence(rv_m2, q):
+    for ask in (rv_m2.forward, rv_m2.jacobian):
+        with pytest.raises(RobotError, match="joint positions") as refused:
+            ask(q)
+        assert "\n" not in str(refused.value)
+
+
+def test_a_notebook_shows_the_joints(rv_m2):
+    shown = rv_m2._repr_html_()
+    assert all(f">{joint}<" in shown for joint in rv_m2.joint_names)
+    assert f"{np.degrees(rv_m2.upper[0]):.4g}°" in shown

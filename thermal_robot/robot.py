@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-import difflib
-import re
-import xml.etree.ElementTree as ElementTree
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -15,16 +12,13 @@ from numpy.typing import ArrayLike, NDArray
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics.model import SHORTEST_SEGMENT, Chain, build_chain_model, leaf_links
 from thermal_robot.kinematics.numbers import require_numbers
+from thermal_robot.tables import html_table
+from thermal_robot.urdf_text import DESCRIPTION, WritesUrdf, urdf_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
 Array = NDArray[np.float64]
-
-BUILTIN = "builtin:"
-EXAMPLE_ROBOT_DATA = "example-robot-data:"
-
-_DESCRIPTION = "the robot description"
 
 _MOST_SHOWN = 12
 """Names in one message; a humanoid has dozens of fingers."""
@@ -32,19 +26,6 @@ STRONGEST_GRAVITY = 100.0
 """m/s²: four times that of any planet where a robot has been sent; a figure in mm/s² is above it."""
 ENDS = ("tool_frame", "root_frame")
 """Names of the links between which the chain lies, as a robot, a campaign and a model call them."""
-_LARGEST_FILE = 64 << 20
-"""Bytes: a URDF is text about links, of a few kilobytes each."""
-
-# The table of example-robot-data sends this name to the loader of another robot (5.1 and before).
-_LOADER_BY_ITS_NAME = {"ur3": "UR3Loader"}
-
-
-@runtime_checkable
-class WritesUrdf(Protocol):
-    """Anything that can write itself as URDF, such as a ``yourdfpy.URDF``."""
-
-    def write_xml_string(self) -> bytes | str:
-        """Return the XML text."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,6 +122,91 @@ class Robot:
         ends = f"{self.root_frame!r} to {self.tool_frame!r}"
         return f"Robot({self.name!r}, {ends}, {self.n} joints, {len(self.segments)} segments)"
 
+    def _repr_html_(self) -> str:
+        bounds = zip(self.joint_names, self.joint_types, self.lower, self.upper, strict=True)
+        rows = [(name, kind, _told(kind, low), _told(kind, high)) for name, kind, low, high in bounds]
+        weight = f", {self.mass:.3g} kg" if self.has_masses else ", no masses"
+        heading = f"{self.name}: {self.root_frame} to {self.tool_frame}, {len(self.segments)} segments{weight}"
+        return html_table(rows, head=("joint", "type", "lower limit", "upper limit"), heading=heading)
+
+    def forward(self, q: ArrayLike) -> Array:
+        """Return the pose of the tool frame in the root frame.
+
+        Parameters
+        ----------
+        q
+            (n,) joint positions of one configuration, or (N, n) of many; rad, m where a joint slides.
+
+        Returns
+        -------
+        ndarray
+            (4, 4), or (N, 4, 4): homogeneous matrices, lengths in m.
+
+        Raises
+        ------
+        RobotError
+            Another shape, or a position that is no finite number.
+
+        Examples
+        --------
+        >>> import thermal_robot as tr
+        >>> robot = tr.load_robot("builtin:rv_m2", "tool0")
+        >>> robot.forward([0.0] * 5).shape, robot.forward([[0.0] * 5] * 3).shape
+        ((4, 4), (3, 4, 4))
+        """
+        from thermal_robot.kinematics.frames import tool_poses
+
+        rows = self._configurations(q)
+        found = tool_poses(self, np.atleast_2d(rows))
+        return found if rows.ndim == 2 else np.asarray(found[0])
+
+    def jacobian(self, q: ArrayLike) -> Array:
+        """Return the Jacobian of the tool frame: velocity of its origin, then angular velocity, in root frame axes.
+
+        Pinocchio calls it ``LOCAL_WORLD_ALIGNED``.
+
+        Parameters
+        ----------
+        q
+            (n,) or (N, n), as for :meth:`forward`.
+
+        Returns
+        -------
+        ndarray
+            (6, n), or (N, 6, n): m and rad a rad, or a m where a joint slides.
+
+        Raises
+        ------
+        RobotError
+            Another shape, or a position that is no finite number.
+
+        Examples
+        --------
+        >>> import thermal_robot as tr
+        >>> robot = tr.load_robot("builtin:rv_m2", "tool0")
+        >>> robot.jacobian([0.0] * 5).shape
+        (6, 5)
+        """
+        from thermal_robot.kinematics.jacobians import frame_jacobians
+
+        rows = self._configurations(q)
+        found = frame_jacobians(self, np.atleast_2d(rows))
+        return found if rows.ndim == 2 else np.asarray(found[0])
+
+    def _configurations(self, q: ArrayLike) -> Array:
+        try:
+            rows = np.asarray(q, dtype=float)
+        except (TypeError, ValueError) as error:
+            raise RobotError(f"joint positions are numbers, got {q!r:.60}", name=self.name) from error
+        if rows.ndim not in (1, 2) or rows.shape[-1] != self.n:
+            expected = f"expected ({self.n},) or (N, {self.n})"
+            raise RobotError(
+                f"joint positions of shape {rows.shape} do not fit {self.name!r}: {expected}", name=self.name
+            )
+        if not np.isfinite(rows).all():
+            raise RobotError("joint positions are finite numbers, got NaN or an infinite one", name=self.name)
+        return rows
+
     def __reduce__(self) -> tuple[Callable[..., Robot], tuple[Any, ...]]:
         # Rebuilt from its text, so that a saved robot survives a change of Pinocchio's own format.
         return _build, (self.urdf, self.tool_frame, self.root_frame, self.gravity)
@@ -184,7 +250,7 @@ def load_robot(
         in the end itself, if gravity is not three numbers of a planet, or if a mass, an inertia, an origin, an axis or
         a limit is no number, or one that no robot has.
     """
-    text, source = _urdf_text(urdf)
+    text, source = urdf_text(urdf)
     for frame in (tool_frame, root_frame):
         if frame is not None and not isinstance(frame, str):
             raise RobotError(f"a frame is the name of a link, not {type(frame).__name__}")
@@ -200,8 +266,14 @@ def load_robot(
     return _build(text, tool_frame, root_frame, _three_finite_numbers(gravity), source)
 
 
+def _told(kind: str, limit: float) -> str:
+    if not np.isfinite(limit):
+        return "none"
+    return f"{limit:.4g} m" if kind == "prismatic" else f"{np.degrees(limit):.4g}°"
+
+
 def _build(
-    urdf: str, tool_frame: str, root_frame: str | None, gravity: Array | None, source: str = _DESCRIPTION
+    urdf: str, tool_frame: str, root_frame: str | None, gravity: Array | None, source: str = DESCRIPTION
 ) -> Robot:
     built = build_chain_model(urdf, tool_frame, root_frame, gravity, source)
     chain = built.chain
@@ -247,111 +319,3 @@ def _three_finite_numbers(gravity: ArrayLike | None) -> Array | None:
     if not np.all(np.abs(vector) <= STRONGEST_GRAVITY):
         raise RobotError(f"gravity must be at most {STRONGEST_GRAVITY:g} m/s² along each axis, got {gravity!r}")
     return vector
-
-
-def _urdf_text(urdf: str | Path | WritesUrdf) -> tuple[str, str]:
-    """XML text, and what to call it in an error."""
-    if isinstance(urdf, str):
-        text = urdf.lstrip("\ufeff \t\r\n")
-        if not text or text.startswith("<"):
-            return text, _DESCRIPTION
-        if urdf.startswith(BUILTIN):
-            return _read(_builtin_path(urdf.removeprefix(BUILTIN)))
-        if urdf.startswith(EXAMPLE_ROBOT_DATA):
-            return _read(_example_path(urdf.removeprefix(EXAMPLE_ROBOT_DATA)))
-        return _read(Path(urdf))
-    if isinstance(urdf, Path):
-        return _read(urdf)
-    if isinstance(urdf, WritesUrdf):
-        return _written(urdf), _DESCRIPTION
-    raise RobotError(f"a robot is a path, URDF text or a yourdfpy.URDF, not {type(urdf).__name__}")
-
-
-def _written(urdf: WritesUrdf) -> str:
-    """Text of a robot that writes itself, with the mimic tags that yourdfpy (to 0.0.60) reads but does not write."""
-    written = urdf.write_xml_string()
-    text = written.decode() if isinstance(written, bytes) else written
-    joints = getattr(getattr(urdf, "robot", None), "joints", ())
-    known = {joint.name: joint.mimic for joint in joints if getattr(joint, "mimic", None) is not None}
-    if not known or "<mimic" in text:
-        return text
-    tree = ElementTree.fromstring(text)
-    for joint in tree.iter("joint"):
-        mimic = known.get(joint.get("name"))
-        if mimic is not None:
-            values = {"joint": mimic.joint, "multiplier": str(mimic.multiplier), "offset": str(mimic.offset)}
-            ElementTree.SubElement(joint, "mimic", values)
-    return ElementTree.tostring(tree, encoding="unicode")
-
-
-def _read(path: Path) -> tuple[str, str]:
-    source = f"the robot file {str(path)!r}"
-    try:
-        if path.exists() and not path.is_dir():
-            if not path.is_file():
-                raise RobotError(f"{source} is a pipe or a device, not a file", name=str(path))
-            if path.stat().st_size > _LARGEST_FILE:
-                raise RobotError(f"{source} is larger than any URDF ({_LARGEST_FILE >> 20} MiB)", name=str(path))
-        return _decoded(path.read_bytes()).lstrip(), source
-    except IsADirectoryError:
-        problem = "is a folder, not a URDF file"
-    except FileNotFoundError:
-        problem = "does not exist"
-    except OSError as error:
-        problem = f"cannot be read: {error.strerror}"
-    except ValueError:  # a name that no file can have
-        problem = "does not exist"
-    raise RobotError(f"{source} {problem}", name=str(path))
-
-
-def _decoded(content: bytes) -> str:
-    """Text of a file, whatever it says of its encoding; bytes that are none become marks."""
-    if content.startswith((b"\xff\xfe", b"\xfe\xff")):
-        return content.decode("utf-16", errors="replace")
-    try:
-        return content.decode("utf-8-sig")
-    except UnicodeDecodeError:
-        declared = re.match(rb"\s*<\?xml[^>]*\sencoding\s*=\s*[\"']([\w.-]+)", content)
-        try:
-            return content.decode(declared[1].decode() if declared else "cp1252", errors="replace")
-        except LookupError:
-            return content.decode(errors="replace")
-
-
-def _builtin_path(name: str) -> Path:
-    package = Path(__file__).parent
-    # A wheel carries the folder inside the package, a checkout beside it.
-    folder = next((f for f in (package / "robots", package.parent / "robots") if f.is_dir()), package / "robots")
-    known = sorted(path.stem for path in folder.glob("*.urdf"))
-    if name not in known:
-        raise _unknown(name, known, "built-in robot")
-    return folder / f"{name}.urdf"
-
-
-def _example_path(name: str) -> Path:
-    try:
-        from example_robot_data import robots_loader
-    except ImportError as error:
-        raise RobotError(
-            f"robot {name!r} is in the package example-robot-data, which is not installed: "
-            'pip install "thermal-robot[robots]"',
-            name=name,
-        ) from error
-    if name not in robots_loader.ROBOTS:
-        raise _unknown(name, sorted(robots_loader.ROBOTS), "robot of example-robot-data")
-    loader = getattr(robots_loader, _LOADER_BY_ITS_NAME.get(name, ""), robots_loader.ROBOTS[name])
-    # The path only: an instance of the loader would read every mesh.
-    below = Path(loader.path, loader.urdf_subpath, loader.urdf_filename)
-    if not loader.urdf_filename:
-        raise RobotError(f"robot {name!r} of example-robot-data has no URDF file", name=name)
-    try:
-        return Path(loader.model_path or robots_loader.getModelPath(str(below))) / below
-    except OSError as error:
-        raise RobotError(
-            f"robot {name!r} of example-robot-data has no URDF file where its loader says", name=name
-        ) from error
-
-
-def _unknown(name: str, known: list[str], what: str) -> RobotError:
-    near = tuple(difflib.get_close_matches(name, known, n=5, cutoff=0.3)) or tuple(known)
-    return RobotError(f"there is no {what} {name!r}; nearest: {', '.join(near)}", name=name, candidates=near)

@@ -1,6 +1,7 @@
 """The only room that knows files, units and tables."""
 
-from thermal_robot.campaign.campaign import Campaign
+import thermal_robot.campaign.shown as shown
+from thermal_robot.campaign.campaign import Campaign, shown_by
 from thermal_robot.campaign.describe import describe
 from thermal_robot.campaign.from_table import campaign_from_table
 from thermal_robot.campaign.read import read_campaign, read_samples
@@ -14,6 +15,8 @@ from thermal_robot.campaign.write import (
     write_predictions,
     write_table,
 )
+
+shown_by(shown)
 
 __all__ = [
     "Campaign",

@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -27,12 +27,39 @@ from thermal_robot.campaign.units import Units
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot
 
+if TYPE_CHECKING:
+    import pandas as pd
+
 FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.int64]
 TextArray: TypeAlias = NDArray[np.str_]
 
 _PER_SAMPLE = ("q", "position", "orientation", "simulated_position", "simulated_orientation", "rows")
 _BY_NAME = ("covariates", "labels", "missing", "travelled")
+
+
+class Shower(Protocol):
+    """Who shows a campaign to pandas and to a notebook."""
+
+    def frame(self, campaign: Campaign, /) -> pd.DataFrame:
+        """Return its table, in the units of the file."""
+
+    def html(self, campaign: Campaign, /) -> str:
+        """Return what is said of it."""
+
+
+_showers: list[Shower] = []
+
+
+def shown_by(shower: Shower) -> None:
+    """Register who shows every campaign from now on."""
+    _showers[:] = [shower]
+
+
+def _shown() -> Shower:
+    if not _showers:
+        raise RuntimeError("nobody can show a campaign: import thermal_robot.campaign, or call shown_by")
+    return _showers[0]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -205,6 +232,27 @@ class Campaign:
             f"<Campaign {self.name!r}: {self.samples} samples {what}, {self.robot.n} joints, "
             f"{len(self.covariates)} covariate{'' if len(self.covariates) == 1 else 's'}>"
         )
+
+    def _repr_html_(self) -> str:
+        return _shown().html(self)
+
+    def to_frame(self) -> pd.DataFrame:
+        """Return the table as a pandas data frame, in the units of the file; :func:`campaign_from_table` reads it.
+
+        Returns
+        -------
+        DataFrame
+            The columns of the file that :func:`write_campaign` would write, filled gaps and derived directions
+            included; the index ``row`` counts as a text editor does.
+
+        Examples
+        --------
+        >>> import thermal_robot as tr
+        >>> table = tr.demo_campaign().to_frame()
+        >>> list(table.columns[:6]), len(table)
+        (['joint_1', 'joint_2', 'joint_3', 'joint_4', 'joint_5', 'x'], 120)
+        """
+        return _shown().frame(self)
 
     @property
     def samples(self) -> int:

@@ -13,6 +13,7 @@ from thermal_robot.campaign.names import split_name
 from thermal_robot.campaign.units import covariate_scale, unit_of
 from thermal_robot.campaign.validate import SAME_CONFIGURATION
 from thermal_robot.errors import require
+from thermal_robot.tables import html_table
 
 _MOST_SESSIONS = 8
 """Sessions named in one line; more would not fit beside each other on a terminal."""
@@ -36,6 +37,18 @@ def describe(campaign: Campaign) -> str:
         ["Warnings", *([f"  - {warning}" for warning in campaign.warnings] or ["  none"])],
     ]
     return "\n\n".join("\n".join(block) for block in blocks)
+
+
+def described_html(campaign: Campaign) -> str:
+    """Describe a campaign as tables of a notebook: what :func:`describe` says."""
+    head, *joints = _joints(campaign)
+    tables = [
+        html_table(_facts(campaign), heading=f"Campaign {campaign.name}"),
+        html_table(joints, head=head),
+        html_table([*_covariates(campaign), *_repetition(campaign)]),
+        html_table([[warning] for warning in campaign.warnings], heading="Warnings") if campaign.warnings else "",
+    ]
+    return "".join(tables)
 
 
 def _facts(campaign: Campaign) -> Iterator[Sequence[str]]:

@@ -77,7 +77,7 @@ def write_table(campaign: Campaign, path: str | Path) -> None:
     """Write the table of a campaign, or of samples, as CSV in the campaign's units, with all digits."""
     columns: list[str] = []
     data: list[Sequence[str]] = []
-    for name, values in _columns(campaign):
+    for name, values in table_columns(campaign):
         columns.append(name)
         data.append([repr(float(value)) for value in values])
     for name, labels in campaign.labels.items():
@@ -181,7 +181,7 @@ def write_predictions(path: str | Path, predictions: pd.DataFrame) -> None:
         raise CampaignError(str(path), f"cannot be written: {error.strerror}") from error
 
 
-def _columns(campaign: Campaign) -> Iterator[tuple[str, np.ndarray[Any, np.dtype[np.float64]]]]:
+def table_columns(campaign: Campaign) -> Iterator[tuple[str, np.ndarray[Any, np.dtype[np.float64]]]]:
     """Yield the numeric columns by name, in the units of the file."""
     robot, units = campaign.robot, campaign.units
     for j, (joint, kind) in enumerate(zip(robot.joint_names, robot.joint_types, strict=True)):

@@ -19,6 +19,8 @@ from thermal_robot.diagnosis.parts import Finding, Gap, Misfit, Rows, Sensitivit
 from thermal_robot.files import write_text
 
 if TYPE_CHECKING:
+    import pandas as pd
+
     from thermal_robot.diagnosis.next_samples import NextSamples
     from thermal_robot.inference.fit import Fit
     from thermal_robot.iso9283 import Performance
@@ -179,6 +181,33 @@ class Diagnosis:
         if self.fit is None:
             raise ValueError("this diagnosis was made without its fit")
         return self.fit
+
+    @property
+    def parameters(self) -> pd.DataFrame:
+        """Parameters of all effects that are told, SI: see :func:`~thermal_robot.diagnosis.tabled.parameters`."""
+        from thermal_robot.diagnosis.tabled import parameters
+
+        return parameters(self.effects)
+
+    @property
+    def residuals(self) -> pd.DataFrame:
+        """Gap and remainder row by row, SI: see :func:`~thermal_robot.diagnosis.tabled.residuals`."""
+        from thermal_robot.diagnosis.tabled import residuals
+
+        return residuals(self.rows)
+
+    @property
+    def covariance(self) -> pd.DataFrame:
+        """Covariance of the identified parameters, SI: see :func:`~thermal_robot.diagnosis.tabled.covariance`.
+
+        Its diagonal is the square of ``std`` in :attr:`parameters`. Not in it: zeros that are told inside a larger
+        effect, of which they are a part.
+        """
+        from thermal_robot.diagnosis.tabled import covariance
+
+        if self.model.spread is None:
+            raise ValueError("this diagnosis was made without the covariance of its parameters")
+        return covariance(self._fitted(), self.model.spread.covariance)
 
     @property
     def narrowed(self) -> bool:

@@ -18,7 +18,7 @@ from thermal_robot.kinematics.lie import exp6, skew
 from thermal_robot.kinematics.model import FIXED, REVOLUTE
 
 if TYPE_CHECKING:
-    from thermal_robot.robot import Robot
+    from thermal_robot.kinematics.chained import Chained
 
 Array = NDArray[np.float64]
 
@@ -73,7 +73,7 @@ class ChainFrames:
     tool_position: Array
 
 
-def chain_frames(robot: Robot, q: ArrayLike, displacement: Displacement | None = None) -> ChainFrames:
+def chain_frames(robot: Chained, q: ArrayLike, displacement: Displacement | None = None) -> ChainFrames:
     """Frames of every chain element and of the tool.
 
     Parameters
@@ -125,7 +125,7 @@ def chain_frames(robot: Robot, q: ArrayLike, displacement: Displacement | None =
     )
 
 
-def tool_poses(robot: Robot, q: ArrayLike, displacement: Displacement | None = None) -> Array:
+def tool_poses(robot: Chained, q: ArrayLike, displacement: Displacement | None = None) -> Array:
     """Pose of the tool frame in the root frame.
 
     Parameters
@@ -144,7 +144,7 @@ def tool_poses(robot: Robot, q: ArrayLike, displacement: Displacement | None = N
     return poses
 
 
-def as_rows(robot: Robot, q: ArrayLike) -> Array:
+def as_rows(robot: Chained, q: ArrayLike) -> Array:
     """Return the configurations as an (N, n) array of floats."""
     rows = np.atleast_2d(np.asarray(q, dtype=float))
     if rows.ndim != 2 or rows.shape[1] != robot.n:
@@ -171,7 +171,7 @@ class _Displaced:
     tool: Array | None
 
     @staticmethod
-    def of(robot: Robot, displacement: Displacement | None, rows: int) -> _Displaced:
+    def of(robot: Chained, displacement: Displacement | None, rows: int) -> _Displaced:
         if displacement is None:
             displacement = Displacement()
         joint = _channel(robot, "joint", displacement.joint, (robot.n,), rows)
@@ -197,7 +197,7 @@ class _Displaced:
         return np.broadcast_to(rotation, (3, 3, size)).copy(), np.broadcast_to(position, (3, size)).copy()
 
 
-def _channel(robot: Robot, name: str, value: ArrayLike | None, shape: tuple[int, ...], rows: int) -> Array | None:
+def _channel(robot: Chained, name: str, value: ArrayLike | None, shape: tuple[int, ...], rows: int) -> Array | None:
     if value is None:
         return None
     array = np.asarray(value, dtype=float)

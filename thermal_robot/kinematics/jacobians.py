@@ -12,13 +12,13 @@ from thermal_robot.kinematics.frames import ChainFrames, chain_frames, chunks
 from thermal_robot.kinematics.model import REVOLUTE
 
 if TYPE_CHECKING:
-    from thermal_robot.robot import Robot
+    from thermal_robot.kinematics.chained import Chained
 
 Array = NDArray[np.float64]
 
 
 def frame_jacobians(
-    robot: Robot, q: ArrayLike, *, frames: ChainFrames | None = None, point: ArrayLike | None = None
+    robot: Chained, q: ArrayLike, *, frames: ChainFrames | None = None, point: ArrayLike | None = None
 ) -> Array:
     """Geometric Jacobian: twist of the tool frame, in root axes at the point, for a unit speed of each joint.
 
@@ -65,7 +65,7 @@ def frame_jacobians(
 
 
 def placement_sensitivities(
-    robot: Robot, q: ArrayLike, *, frames: ChainFrames | None = None, point: ArrayLike | None = None
+    robot: Chained, q: ArrayLike, *, frames: ChainFrames | None = None, point: ArrayLike | None = None
 ) -> Array:
     """Twist of the tool frame, in root axes at the point, for a unit twist of each segment's placement.
 

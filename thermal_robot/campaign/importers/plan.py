@@ -27,7 +27,7 @@ from thermal_robot.campaign.settings import (
 from thermal_robot.campaign.tabular import SPACE, Layout
 from thermal_robot.campaign.units import Units
 from thermal_robot.errors import CampaignError
-from thermal_robot.robot import BUILTIN, EXAMPLE_ROBOT_DATA, Robot, load_robot
+from thermal_robot.robot import Robot, load_robot
 from thermal_robot.schema import (
     NOT_NEGATIVE,
     POSITIVE,
@@ -41,6 +41,7 @@ from thermal_robot.schema import (
     whole,
     word,
 )
+from thermal_robot.urdf_text import BUILTIN, EXAMPLE_ROBOT_DATA
 
 _SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": SPACE}
 _KNOWN = word(("known", "unknown"), WORD)

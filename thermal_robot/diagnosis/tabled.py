@@ -1,0 +1,106 @@
+"""A diagnosis as data frames: parameters, their covariance, and the gap row by row. SI throughout."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.inference import settings
+
+Array = NDArray[np.float64]
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from thermal_robot.diagnosis.parts import Finding, Rows
+    from thermal_robot.inference.fit import Fit
+
+LEVELS = ("effect", "parameter")
+_AXES = ("x", "y", "z", "rx", "ry", "rz")
+
+
+def parameters(findings: tuple[Finding, ...]) -> pd.DataFrame:
+    """Return a row for each parameter that is told of an effect, in the order of the findings.
+
+    Returns
+    -------
+    DataFrame
+        Index (effect, parameter); columns ``status``, ``value``, ``std`` (one sigma), ``unit`` and ``identified``.
+        Values are NaN where the data do not identify the parameter.
+    """
+    import pandas as pd
+
+    told = [(finding, estimate) for finding in findings for estimate in finding.parameters]
+    index = pd.MultiIndex.from_tuples([(f.name, e.name) for f, e in told], names=LEVELS)
+    nothing = float("nan")
+    return pd.DataFrame(
+        {
+            "status": [f.status for f, _ in told],
+            "value": np.array([nothing if e.value is None else e.value for _, e in told], dtype=float),
+            "std": np.array([nothing if e.std is None else e.std for _, e in told], dtype=float),
+            "unit": [e.unit for _, e in told],
+            "identified": np.array([e.identified for _, e in told], dtype=bool),
+        },
+        index=index,
+    )
+
+
+def covariance(fit: Fit, joint: Array) -> pd.DataFrame:
+    """Return the covariance of the identified parameters of the fit.
+
+    The deviations are those of :func:`parameters`, widened to what the remainder says of each effect
+    (:func:`~thermal_robot.diagnosis.deviations.as_remainder_says`); the correlations are those of the posterior of
+    all frames and parameters together, frames marginalised.
+
+    Parameters
+    ----------
+    fit
+        The fit.
+    joint
+        (K, K) covariance of frames and parameters together, those of the effects last, in the order of the fit.
+
+    Returns
+    -------
+    DataFrame
+        Index and columns (effect, parameter); entries in the product of the two parameters' SI units.
+    """
+    import pandas as pd
+
+    e = fit.explanation
+    names: list[tuple[str, str]] = []
+    spread, prior = [np.empty(0)], [np.empty(0)]
+    for b, (effect, _) in zip(e.best.blocks, fit.effects, strict=True):
+        item = e.linear.blocks[b]
+        names += [(effect.name, parameter.name) for parameter in item.parameters]
+        spread.append(np.sqrt(np.maximum(np.diag(e.values[b][1]), 0.0)))
+        prior.append(item.sizes * e.best.scales[b])
+    std = np.concatenate(spread)
+    kept = np.flatnonzero(std < settings.DETERMINED * np.concatenate(prior))
+    own = joint[len(joint) - len(std) :, len(joint) - len(std) :][np.ix_(kept, kept)]
+    size = std[kept] / np.sqrt(own.diagonal())
+    index = pd.MultiIndex.from_tuples([names[k] for k in kept], names=LEVELS)
+    return pd.DataFrame(own * np.outer(size, size), index=index, columns=index)
+
+
+def residuals(rows: Rows) -> pd.DataFrame:
+    """Return the gap and the remainder, row by row.
+
+    Returns
+    -------
+    DataFrame
+        Index ``row``, the number in the file. Columns ``gap.x`` … and ``remainder.x`` … in m, of poses also ``.rx``
+        ``.ry`` ``.rz`` in rad, in the root frame's axes; ``held_out.before`` and ``held_out.after``, the distance in m
+        of the row when it was held out (NaN where it was set aside); ``set_aside``.
+    """
+    import pandas as pd
+
+    axes = _AXES[: rows.gap.shape[1]]
+    columns = {
+        f"{kind}.{axis}": values[:, k]
+        for kind, values in (("gap", rows.gap), ("remainder", rows.remainder))
+        for k, axis in enumerate(axes)
+    }
+    held = {"held_out.before": rows.held_out_before, "held_out.after": rows.held_out_after}
+    return pd.DataFrame({**columns, **held, "set_aside": rows.outliers}, index=pd.Index(rows.rows, name="row"))

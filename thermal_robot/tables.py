@@ -1,0 +1,32 @@
+"""Rows of text as a table of a notebook."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Sequence
+from html import escape
+
+_CELL = 'style="text-align: left; vertical-align: top"'
+
+
+def html_table(rows: Iterable[Sequence[str]], *, head: Sequence[str] = (), heading: str = "") -> str:
+    """Return rows as an HTML table that takes its looks from the notebook around it.
+
+    Parameters
+    ----------
+    rows
+        Cells as plain text; they are escaped. Shorter rows are filled up.
+    head
+        Names of the columns; none where it is empty.
+    heading
+        Stands above the table.
+    """
+    cells = [list(row) for row in rows]
+    wide = max([len(row) for row in cells] + [len(head)], default=0)
+    caption = f"<caption {_CELL}><b>{escape(heading)}</b></caption>" if heading else ""
+    above = f"<thead>{_row(head, wide, 'th')}</thead>" if head else ""
+    return f"<table>{caption}{above}<tbody>{''.join(_row(row, wide, 'td') for row in cells)}</tbody></table>"
+
+
+def _row(cells: Sequence[str], wide: int, tag: str) -> str:
+    filled = [*cells, *[""] * (wide - len(cells))]
+    return f"<tr>{''.join(f'<{tag} {_CELL}>{escape(cell)}</{tag}>' for cell in filled)}</tr>"
