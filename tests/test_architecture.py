@@ -31,6 +31,7 @@ ORDER = (
     "model_file",
     "correction",
     "diagnosis",
+    "planning",
     "datasets",
     "report",
     "console",
