@@ -33,6 +33,7 @@ ORDER = (
     "model_file",
     "correction",
     "diagnosis",
+    "planning",
     "datasets",
     "report",
     "console",

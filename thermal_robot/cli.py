@@ -9,7 +9,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 
 from thermal_robot.blind import command as blind
-from thermal_robot.commands import check, correct, demo, diagnose, effects, import_files, iso9283, paper, predict
+from thermal_robot.commands import check, correct, demo, diagnose, effects, import_files, iso9283, paper, plan, predict
 from thermal_robot.console import NORMAL, add_loudness, heard
 from thermal_robot.errors import ThermalRobotError
 from thermal_robot.parser import BAD_INPUT, DONE, FAILED, INTERRUPTED, STATUSES, Parser
@@ -17,6 +17,7 @@ from thermal_robot.streams import piped
 
 COMMANDS = {
     "demo": demo,
+    "plan": plan,
     "check": check,
     "effects": effects,
     "diagnose": diagnose,

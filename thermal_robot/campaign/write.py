@@ -5,6 +5,7 @@ from __future__ import annotations
 import csv
 import os
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 TABLE_NAME = "measurements.csv"
+PLAN_NAME = "plan.csv"
 ROBOT_NAME = "robot.urdf"
 
 
@@ -57,6 +59,78 @@ def write_campaign(campaign: Campaign, directory: str | Path, *, comments: Seque
     folder = Path(directory)
     if campaign.position is None:
         raise CampaignError(str(folder), "samples without measured positions are no campaign")
+    file = _declare(campaign, folder, comments)
+    write_table(campaign, folder / TABLE_NAME)
+    return file
+
+
+def write_planned(
+    commands: Campaign, directory: str | Path, *, comments: Sequence[str] = (), derived: Sequence[str] = ()
+) -> Path:
+    """Write the folder of a campaign that is still to be measured.
+
+    Beside campaign.toml and the robot stand plan.csv, all that is planned, and measurements.csv, the same with empty
+    cells where something is to be recorded: the target's place and the temperatures.
+
+    Parameters
+    ----------
+    commands
+        A campaign without measured positions; one with orientations asks for these, too.
+    directory, comments
+        As for :func:`write_campaign`.
+    derived
+        Columns that follow from the order of the rows, and are left out.
+
+    Returns
+    -------
+    Path
+        Of the campaign.toml.
+
+    Raises
+    ------
+    CampaignError
+        A directory that cannot be written; one that holds a campaign.toml: somebody may have filled in its table.
+    """
+    folder = Path(directory)
+    if (folder / FILE_NAME).exists():
+        expected = "another folder, as its measurements would be overwritten"
+        raise CampaignError(str(folder), "there is a campaign already", expected=expected)
+    file = _declare(commands, folder, comments)
+    write_commands(commands, folder / PLAN_NAME, derived=derived)
+    write_commands(commands, folder / TABLE_NAME, derived=derived, recorded=True)
+    return file
+
+
+def write_commands(
+    commands: Campaign, path: str | Path, *, derived: Sequence[str] = (), recorded: bool = False
+) -> None:
+    """Write the table of what is to be commanded, with empty cells for what will be measured.
+
+    Parameters
+    ----------
+    commands
+        A campaign without measured positions.
+    path
+        File to write.
+    derived
+        Columns that are left out.
+    recorded
+        Whether the cells of temperatures stay empty, too: they are recorded, not commanded.
+    """
+    blank = [""] * commands.samples
+    measured = names.POSITION if commands.orientation is None else names.MEASURED
+    table: dict[str, Sequence[str]] = {}
+    for name, values in _columns(replace(commands, orientation=None)):
+        empty = recorded and names.split_name(name)[0] == "temperature"
+        if name not in derived:
+            table[name] = blank if empty else [f"{value:.9g}" for value in values]
+    table |= {name: [str(label) for label in labels] for name, labels in commands.labels.items()}
+    table |= dict.fromkeys(measured, blank)
+    _write_csv(Path(path), list(table), list(table.values()))
+
+
+def _declare(campaign: Campaign, folder: Path, comments: Sequence[str]) -> Path:
+    """Write campaign.toml and the robot; return the path of the former."""
     import tomli_w
 
     file = folder / FILE_NAME
@@ -69,7 +143,6 @@ def write_campaign(campaign: Campaign, directory: str | Path, *, comments: Seque
         raise CampaignError(str(folder), f"cannot be written: {error.strerror}") from error
     except ValueError as error:  # NUL in a name
         raise CampaignError(str(folder), f"cannot be written: {error}") from error
-    write_table(campaign, folder / TABLE_NAME)
     return file
 
 

@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.names import CLOCK
 from thermal_robot.diagnosis import settings
+from thermal_robot.diagnosis.optimal_design import joint_range, most_informative
 from thermal_robot.effects import gate
 from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.evidence import Combination
@@ -203,12 +204,8 @@ def candidates(fit: Fit, pool: int = 400, seed: int = 0, loads: Sequence[float] 
 
 
 def _range(campaign: Campaign) -> tuple[Array, Array]:
-    robot = campaign.robot
-    turns = np.array([kind != "prismatic" for kind in robot.joint_types])
-    round_ = turns & (robot.upper - robot.lower >= 2.0 * np.pi)
     used = campaign.q.min(axis=0), campaign.q.max(axis=0)
-    low = np.where(round_, np.maximum(robot.lower, -settings.WIDE), robot.lower)
-    high = np.where(round_, np.minimum(robot.upper, settings.WIDE), robot.upper)
+    low, high = joint_range(campaign.robot)
     low, high = np.where(np.isfinite(low), low, used[0]), np.where(np.isfinite(high), high, used[1])
     return np.minimum(low, used[0]), np.maximum(high, used[1])
 
@@ -323,8 +320,11 @@ def _chosen(
 ) -> tuple[list[int], list[tuple[int, ...]], list[float]]:
     """Choose rows greedily; return them, the explanations that each tells apart best, and the cumulative gain."""
     number = len(models)
+    if number == 1:
+        alone, learnt = most_informative(models[0].root, models[0].frames, count)
+        return alone, [(0,)] * count, learnt
     itself = np.eye(number, dtype=bool)[:, :, None]
-    so_far, learnt = np.zeros((number, number)), 0.0
+    so_far = np.zeros((number, number))
     chosen: list[int] = []
     pairs: list[tuple[int, ...]] = []
     gains: list[float] = []
@@ -337,21 +337,14 @@ def _chosen(
                 if i != j:
                     added[i, j] = _further(known[i], known[j], models[i].mean - models[j].mean, chosen)
         reached = so_far[:, :, None] + added
-        if number > 1:
-            expected = probability @ np.where(itself, np.inf, reached).min(axis=1)
-            score = expected + settings.TIE * information
-        else:
-            expected = information + learnt
-            score = information.copy()
+        expected = probability @ np.where(itself, np.inf, reached).min(axis=1)
+        score = expected + settings.TIE * information
         score[chosen] = -np.inf
         row = int(score.argmax())
         chosen.append(row)
         gains.append(float(expected[row]))
-        so_far, learnt = reached[:, :, row], learnt + float(information[row])
-        if number > 1:
-            weight = np.outer(probability, probability)
-            both = weight * (added[:, :, row] + added[:, :, row].T)
-            pairs.append(tuple(sorted(int(k) for k in np.unravel_index(both.argmax(), both.shape))))
-        else:
-            pairs.append((0,))
+        so_far = reached[:, :, row]
+        weight = np.outer(probability, probability)
+        both = weight * (added[:, :, row] + added[:, :, row].T)
+        pairs.append(tuple(sorted(int(k) for k in np.unravel_index(both.argmax(), both.shape))))
     return chosen, pairs, gains

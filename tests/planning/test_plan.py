@@ -1,0 +1,144 @@
+"""Poses of a plan: within limits, from both sides, better than chance, the same for the same seed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from thermal_robot import CampaignError, EffectError, load_robot, observe
+from thermal_robot.diagnosis.optimal_design import joint_range
+from thermal_robot.effects import library
+from thermal_robot.planning import plan
+from thermal_robot.planning.expected import Columns, expectations
+from thermal_robot.planning.schedule import approaches
+
+TARGET = (0.05, 0.03, 0.1)
+DETERMINED = ("joint_gain", "transmission_error", "backlash")
+NOISE = np.full(3, 20e-6)
+
+
+@pytest.mark.parametrize("repeats", [1, 3])
+def test_poses_are_within_limits(arm, repeats):
+    q = plan(arm, 30, ["joint_offset", "backlash"], repeats=repeats, seed=1).commands.q
+    assert q.shape == (30, arm.n)
+    assert np.all((q >= arm.lower) & (q <= arm.upper))
+    assert len(np.unique(q, axis=0)) == 30 // repeats
+
+
+@pytest.mark.parametrize("source", ["builtin:rv_m2", "example-robot-data:ur10"])
+@pytest.mark.parametrize("repeats", [1, 2, 4])
+def test_each_joint_comes_from_both_sides(source, repeats):
+    robot = load_robot(source, "tool0")
+    for seed in range(3):
+        q = plan(robot, 60, ["backlash"], repeats=repeats, seed=seed).commands.q
+        moved = np.diff(q, axis=0)
+        assert np.all(moved != 0.0)
+        rising = (moved > 0.0).mean(axis=0)
+        assert np.all((rising > 0.35) & (rising < 0.65))
+
+
+def test_repeats_are_labelled_and_count_among_the_rows(rv_m2):
+    commands = plan(rv_m2, 24, ["joint_gain"], repeats=4).commands
+    assert commands.samples == 24
+    names, counts = np.unique(commands.labels["pose"], return_counts=True)
+    assert counts.tolist() == [4] * 6
+    for name in names:
+        assert np.ptp(commands.q[commands.labels["pose"] == name], axis=0).max() == 0.0
+
+
+def test_the_same_seed_gives_the_same_plan(rv_m2, planned):
+    again, other = (plan(rv_m2, 60, target=TARGET, loads=(1.5,), seed=seed) for seed in (5, 6))
+    assert np.array_equal(again.commands.q, planned.commands.q)
+    assert again.to_dict() == planned.to_dict()
+    assert not np.array_equal(other.commands.q, planned.commands.q)
+
+
+def at_random(planned, seed):
+    """The same conditions with poses that nobody chose, and what is told then."""
+    commands, rng = planned.commands, np.random.default_rng(seed)
+    robot = commands.robot
+    q = rng.uniform(*joint_range(robot), commands.q.shape)
+    given = {n: v for n, v in commands.covariates.items() if not n.startswith("approach.")}
+    covariates = {**given, **approaches(q, robot.joint_names, given)}
+    seen = observe(replace(commands, q=q, covariates=covariates))
+    kinds = [library()[e.name].variants(seen)[0] for e in planned.effects if not e.lacks]
+    columns = Columns.of(seen, kinds, NOISE)
+    return columns.information, {e.name: e for e in expectations(columns)}
+
+
+def worst(expected):
+    """The largest deviation of parameters that every campaign determines, in their sizes."""
+    return max(p.sigma / p.size for name in DETERMINED for p in expected[name].parameters)
+
+
+@pytest.mark.parametrize("source", ["builtin:rv_m2", "example-robot-data:ur10"])
+def test_a_plan_tells_more_than_random_rows(source):
+    robot, ratios = load_robot(source, "tool0"), []
+    for seed in range(5):
+        planned = plan(robot, 60, target=TARGET, seed=seed)
+        mine = worst({e.name: e for e in planned.effects})
+        for k in range(3):
+            told, expected = at_random(planned, 100 * seed + k)
+            assert planned.information > told + 3.0
+            ratios.append(mine / worst(expected))
+    assert np.median(ratios) < 0.9
+    assert np.mean(np.array(ratios) < 1.0) >= 0.8
+
+
+def test_more_rows_and_less_noise_tell_more(rv_m2):
+    few, many, sharp = (
+        plan(rv_m2, rows, ["joint_gain"], noise=noise, target=TARGET)
+        for rows, noise in ((30, 2e-5), (120, 2e-5), (30, 1e-5))
+    )
+    least = [max(p.sigma for p in each.effect("joint_gain").parameters) for each in (few, many, sharp)]
+    assert least[1] < 0.6 * least[0]
+    assert least[2] < 0.6 * least[0]
+
+
+def test_the_plan_warms_then_cools_and_brings_each_load(planned):
+    warm = planned.commands.covariates["temperature"]
+    top = int(warm.argmax())
+    assert 24 < top < 48
+    assert np.all(np.diff(warm[: top + 1]) > 0.0)
+    assert np.all(np.diff(warm[top:]) < 0.0)
+    load = planned.commands.covariates["payload"]
+    assert set(load.tolist()) == {0.0, 1.5}
+    assert abs(np.corrcoef(load, planned.commands.covariates["time"])[0, 1]) < 0.35
+
+
+def test_without_warming_no_temperature_is_planned(rv_m2):
+    found = plan(rv_m2, 20, ["thermal_elongation", "joint_gain"], rise=0.0)
+    assert "temperature" not in found.commands.covariates
+    assert found.effect("thermal_elongation").lacks == ("temperature",)
+    assert not found.effect("thermal_elongation").told
+
+
+@pytest.mark.parametrize(
+    ("wrong", "named"),
+    [
+        ({"rows": 5}, "rows"),
+        ({"rows": 60.5}, "rows"),
+        ({"repeats": 7}, "repeats"),
+        ({"repeats": 60}, "repeats"),
+        ({"noise": 0.0}, "noise"),
+        ({"noise": float("nan")}, "noise"),
+        ({"rise": -1.0}, "rise"),
+        ({"loads": (-2.0,)}, "loads"),
+        ({"target": (0.0, 0.0)}, "target"),
+    ],
+)
+def test_numbers_that_no_campaign_has_are_refused(rv_m2, wrong, named):
+    with pytest.raises(CampaignError, match=named):
+        plan(rv_m2, **wrong)
+
+
+def test_an_effect_that_nobody_knows_is_refused(rv_m2):
+    with pytest.raises(EffectError, match="did you mean 'backlash'"):
+        plan(rv_m2, effects=["backlsh"])
+
+
+def test_a_slide_without_limits_is_refused():
+    text = """<robot name="r"><link name="a"/><link name="b"/><joint name="slide" type="prismatic"><parent link="a"/>
+    <child link="b"/><axis xyz="1 0 0"/></joint></robot>"""
+    with pytest.raises(CampaignError, match="slide"):
+        plan(load_robot(text, "b"))
