@@ -120,7 +120,7 @@ def write_commands(
     blank = [""] * commands.samples
     measured = names.POSITION if commands.orientation is None else names.MEASURED
     table: dict[str, Sequence[str]] = {}
-    for name, values in _columns(replace(commands, orientation=None)):
+    for name, values in table_columns(replace(commands, orientation=None)):
         empty = recorded and names.split_name(name)[0] == "temperature"
         if name not in derived:
             table[name] = blank if empty else [f"{value:.9g}" for value in values]
