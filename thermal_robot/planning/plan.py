@@ -175,7 +175,7 @@ class _Draft:
 def _planned(draft: _Draft, kinds: Sequence[Effect], rng: np.random.Generator) -> Plan:
     """Choose poses, then their order."""
     poses, places = draft.places.shape
-    each = max(settings.FEWEST_CHOICES, min(settings.CHOICES, settings.MOST_CANDIDATES // poses))
+    each = max(settings.FEWEST_CHOICES, min(settings.CHOICES, settings.MOST_CANDIDATES // (poses * places)))
     place = np.repeat(np.arange(poses), each)
     robot = draft.empty.robot
     offered = rng.uniform(*joint_range(robot), (len(place), robot.n))

@@ -11,8 +11,9 @@ WARMING, CONSTANT = 0.6, 0.2
 BLOCKS = 3
 """How often each payload comes round: so it is not confounded with time, and nobody changes it at each pose."""
 CHOICES, MOST_CANDIDATES, FEWEST_CHOICES = 60, 4000, 4
-"""Poses among which each place in the order is filled, but no more of all together than this, nor fewer than that."""
-FEWEST_ROWS, MOST_ROWS = 6, 2000
+"""Poses among which each place in the order is filled, but no more rows of all together than this, nor fewer poses
+than that."""
+FEWEST_ROWS, MOST_ROWS = 6, 1000
 """Rows that a plan may have: with fewer not even the frames are known, more are not planned but measured."""
 ORDERS, SWAPS = 16, 3000
 """Orders of the poses that are compared, and exchanges of two that are tried to make each balanced."""
