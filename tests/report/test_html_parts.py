@@ -2,6 +2,7 @@
 
 from importlib.metadata import PackageNotFoundError
 
+import numpy as np
 import pytest
 
 from thermal_robot.report import html_parts
@@ -34,13 +35,14 @@ def test_a_document_holds_its_title_its_style_and_its_body():
 
 def test_a_figure_says_what_it_shows():
     drawn = figure(Drawing(1.0, 1.0), "a bend")
-    assert drawn.startswith("<figure><svg")
-    assert drawn.endswith("</svg></figure>")
+    assert drawn.startswith('<figure><div class="tr-wide" role="region"')
+    assert drawn.endswith("</svg></div></figure>")
     assert 'aria-label="a bend"' in drawn
 
 
 def test_the_signature_names_program_version_and_date():
     assert signature("1 May").startswith("thermal-robot ")
+    assert f"numpy {np.__version__}" in signature(None)
     assert signature("1 May") == f"{signature(None)}, 1 May"
     assert signature("") == signature(None)
 

@@ -4,9 +4,10 @@ import re
 from dataclasses import replace
 from html import unescape
 
+import numpy as np
 import pytest
 
-from thermal_robot.report.page_tables import effects_table, numbers, outliers_table
+from thermal_robot.report.page_tables import effects_table, extremes_table, numbers, outliers_table
 
 
 def cells(table):
@@ -105,3 +106,26 @@ def test_the_largest_error_of_a_row_decides_the_unit_of_all(case, make_rows):
     diagnosis = replace(case("found"), outliers=(5,))
     assert "gap (mm)" in outliers_table(replace(diagnosis, rows=rows))
     assert "gap (µm)" in outliers_table(replace(diagnosis, rows=small))
+
+
+def test_extremes_are_those_of_the_rows(case):
+    """A gap of 3, 4 and 0 µm in half of the rows and 30, 40 and 0 in the other: rms and largest are known."""
+    diagnosis = case("found")
+    gap = np.tile([[3e-6, 4e-6, 0.0], [30e-6, 40e-6, 0.0]], (60, 1))
+    rows = replace(diagnosis.rows, gap=gap, remainder=0.1 * gap, outliers=np.zeros(120, dtype=bool))
+    told = {row[0]: row[1:] for row in cells(extremes_table(replace(diagnosis, rows=rows)))}
+    assert told["gap in µm"][:3] == ["rms", "95 % below", "largest"]
+    assert told["all rows, before"] == ["35.5", "50.0", "50.0", "21.3", "28.4", "0"]
+    assert told["all rows, after"][2] == "5.00"
+
+
+def test_rows_set_aside_are_no_extremes(case):
+    diagnosis = case("found")
+    gap = np.full((120, 3), 1e-6)
+    gap[7] = 1.0
+    aside = np.arange(120) == 7
+    distance = np.full(120, 1e-6)
+    held = {"held_out_before": distance, "held_out_after": distance}
+    rows = replace(diagnosis.rows, gap=gap, remainder=gap, outliers=aside, **held)
+    told = cells(extremes_table(replace(diagnosis, rows=rows)))
+    assert [row[3] for row in told[1:]] == ["1.73", "1.73", "1.00", "1.00"]

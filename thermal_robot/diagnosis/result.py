@@ -197,6 +197,13 @@ class Diagnosis:
         return residuals(self.rows)
 
     @property
+    def frames(self) -> pd.DataFrame:
+        """Base and target as declared or fitted, SI: see :func:`~thermal_robot.diagnosis.tabled.fitted_frames`."""
+        from thermal_robot.diagnosis.tabled import fitted_frames
+
+        return fitted_frames(self.model)
+
+    @property
     def covariance(self) -> pd.DataFrame:
         """Covariance of the identified parameters, SI: see :func:`~thermal_robot.diagnosis.tabled.covariance`.
 

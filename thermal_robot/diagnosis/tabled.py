@@ -8,12 +8,14 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.inference import settings
+from thermal_robot.kinematics import rotation_to_rpy
 
 Array = NDArray[np.float64]
 
 if TYPE_CHECKING:
     import pandas as pd
 
+    from thermal_robot.correction import CorrectedModel
     from thermal_robot.diagnosis.parts import Finding, Rows
     from thermal_robot.inference.fit import Fit
 
@@ -82,6 +84,22 @@ def covariance(fit: Fit, joint: Array) -> pd.DataFrame:
     size = std[kept] / np.sqrt(own.diagonal())
     index = pd.MultiIndex.from_tuples([names[k] for k in kept], names=LEVELS)
     return pd.DataFrame(own * np.outer(size, size), index=index, columns=index)
+
+
+def fitted_frames(model: CorrectedModel) -> pd.DataFrame:
+    """Return where the robot stands and where the target sits, as they were declared or fitted.
+
+    Returns
+    -------
+    DataFrame
+        Index ``base`` (the root frame in the measurement frame) and ``tool`` (the target in the tool frame); columns
+        ``x`` ``y`` ``z`` in m, and ``roll`` ``pitch`` ``yaw`` in rad, as in a URDF.
+    """
+    import pandas as pd
+
+    poses = {"base": model.frames.base, "tool": model.frames.tool}
+    told = [[*pose[:3, 3], *rotation_to_rpy(pose[:3, :3])] for pose in poses.values()]
+    return pd.DataFrame(told, index=list(poses), columns=["x", "y", "z", "roll", "pitch", "yaw"])
 
 
 def residuals(rows: Rows) -> pd.DataFrame:

@@ -14,6 +14,10 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 
+_MADE_BY = ("thermal-robot", "pin", "numpy", "scipy")
+"""Packages on which the figures of a page depend."""
+
+
 def document(title: str, body: str) -> str:
     """Return a complete page that needs nothing beside itself and prints on A4.
 
@@ -39,7 +43,20 @@ def css(name: str) -> str:
 
 def figure(drawn: Figure, label: str) -> str:
     """Return a figure as HTML; ``label`` says what it shows, for those who cannot see it."""
-    return f"<figure>{svg(drawn, label)}</figure>"
+    return f"<figure>{wide(svg(drawn, label), label)}</figure>"
+
+
+def wide(content: str, label: str) -> str:
+    """Return a table or figure in a box of its own, which scrolls where the screen is narrower than what it holds.
+
+    Parameters
+    ----------
+    content
+        HTML.
+    label
+        What it is, as plain text: the box can be reached by keyboard, and says so.
+    """
+    return f'<div class="tr-wide" role="region" tabindex="0" aria-label="{escape(label)}">{content}</div>'
 
 
 def paragraph(sentence: str, strong: bool = False) -> str:
@@ -54,9 +71,18 @@ def bullets(items: Iterable[str]) -> str:
 
 
 def signature(generated: str | None) -> str:
-    """Say, as plain text, which program made a page, and when if that is to be told."""
+    """Say, as plain text, which program made a page, on which libraries, and when if that is to be told."""
+    told = ", ".join(filter(None, (_MADE_BY[0] + _version(_MADE_BY[0]), *map(_named, _MADE_BY[1:]))))
+    return f"{told}, {generated}" if generated else told
+
+
+def _named(package: str) -> str:
+    found = _version(package)
+    return package + found if found else ""
+
+
+def _version(package: str) -> str:
     try:
-        name = f"thermal-robot {version('thermal-robot')}"
+        return f" {version(package)}"
     except PackageNotFoundError:  # run from a source tree that is not installed
-        name = "thermal-robot"
-    return f"{name}, {generated}" if generated else name
+        return ""

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING
 
 from thermal_robot.report.details import details
 from thermal_robot.report.html_parts import bullets, css, document, figure, paragraph, signature
-from thermal_robot.report.page_tables import effects_table, numbers, outliers_table
+from thermal_robot.report.page_model import model_section
+from thermal_robot.report.page_tables import effects_table, extremes_table, numbers, outliers_table
 from thermal_robot.report.plots_how_far import plot_how_far
 from thermal_robot.report.plots_map import plot_map
 from thermal_robot.report.plots_overview import overview
@@ -95,7 +96,8 @@ def _whole(diagnosis: Diagnosis, generated: str | None) -> Iterator[str]:
     if told := hardest(diagnosis):
         yield paragraph(f"Rows held out in the hardest way: {told}.")
     yield paragraph(f"Noise alone would leave {noise_of(diagnosis)}.")
-    yield figure(plot_how_far(diagnosis), "Distribution of the gap before and after") + "</section>"
+    yield figure(plot_how_far(diagnosis), "Distribution of the gap before and after")
+    yield extremes_table(diagnosis) + "</section>"
     yield "<section><h2>Which</h2>"
     yield figure(plot_which(diagnosis), "Share of the gap and probability of every effect")
     yield effects_table(diagnosis)
@@ -110,6 +112,7 @@ def _whole(diagnosis: Diagnosis, generated: str | None) -> Iterator[str]:
         for law in laws(diagnosis):
             yield figure(diagnosis.explain(law.name), f"{law.name}: the error there against what it follows")
     yield "</section>"
+    yield from model_section(diagnosis)
     yield from _next(diagnosis)
     if diagnosis.outliers:
         yield f"<section><h2>Set aside</h2>{outliers_table(diagnosis)}</section>"

@@ -7,13 +7,17 @@ from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
+from numpy.typing import NDArray
 
 from thermal_robot.report import units
+from thermal_robot.report.html_parts import wide
 from thermal_robot.report.words import STATUS, by_status, in_joints, law, needs, parameters, places, rivals, told_as
 
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.parts import Finding
     from thermal_robot.diagnosis.result import Diagnosis
+
+Array = NDArray[np.float64]
 
 _MOST_OUTLIERS = 40
 
@@ -49,12 +53,46 @@ def _unbroken(line: str) -> str:
     return escape(line).replace(" %", "&nbsp;%")
 
 
+def extremes_table(diagnosis: Diagnosis) -> str:
+    """Show rms, 95 % quantile and maximum of the distance, and the rms along each axis, before and after.
+
+    Rows set aside are left out. Rows held out have no axes of their own in a diagnosis: their distances are told.
+    """
+    rows = diagnosis.rows
+    kept = ~rows.outliers
+    linear = {"before": rows.gap[kept, :3], "after": rows.remainder[kept, :3]}
+    held = {"before": rows.held_out_before, "after": rows.held_out_after}
+    told = [(f"all rows, {name}", *_sizes(np.linalg.norm(gap, axis=1)), *_along(gap)) for name, gap in linear.items()]
+    told += [(f"rows held out, {name}", *_sizes(d[np.isfinite(d)]), *[np.nan] * 3) for name, d in held.items()]
+    shown = [row for row in told if np.isfinite(row[1])]
+    best = units.scale("m", float(np.nanmax([row[1:] for row in shown], initial=0.0)))
+    heads = "rms", "95 % below", "largest", "rms along x", "along y", "along z"
+    head = f"<th>gap in {best.unit}</th>" + "".join(f"<th class=tr-n>{h}</th>" for h in heads)
+    body = []
+    for name, *sizes in shown:
+        cells = (units.number(float(v) * best.factor) if np.isfinite(v) else "" for v in sizes)
+        body.append(f"<tr><td>{name}</td>{''.join(f'<td class=tr-n>{escape(c)}</td>' for c in cells)}</tr>")
+    table = f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(body)}</tbody></table>"
+    return wide(table, "The gap before and after: rms, 95 % quantile, largest, along each axis")
+
+
+def _sizes(distance: Array) -> tuple[float, float, float]:
+    """Return rms, 95 % quantile and maximum of distances; NaN without any."""
+    if not len(distance):
+        return (float("nan"),) * 3
+    return float(np.sqrt(np.mean(distance**2))), float(np.quantile(distance, 0.95)), float(distance.max())
+
+
+def _along(gap: Array) -> tuple[float, ...]:
+    return tuple(np.sqrt(np.mean(gap**2, axis=0)).tolist()) if len(gap) else (float("nan"),) * 3
+
+
 def effects_table(diagnosis: Diagnosis) -> str:
     """Show every candidate: status, probability, share, and below it what is known of it."""
     head = "<th>effect</th><th>status</th><th class=tr-n>probability</th>"
     head += "<th class=tr-n>share of the gap, on rows held out (95 %)</th>"
     body = "".join(_effect(f, diagnosis) for f in by_status(diagnosis))
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>"
+    return wide(f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>", "Every effect")
 
 
 def _effect(finding: Finding, diagnosis: Diagnosis) -> str:
@@ -129,4 +167,5 @@ def outliers_table(diagnosis: Diagnosis) -> str:
         body.append(f"<tr><td class=tr-n>{int(rows.rows[i])}</td>{values}</tr>")
     more = len(chosen) - len(body)
     rest = f"<p class=tr-muted>and {more} more, listed in the JSON</p>" if more > 0 else ""
-    return f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(body)}</tbody></table>{rest}"
+    table = f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(body)}</tbody></table>"
+    return wide(table, "Rows that were set aside") + rest

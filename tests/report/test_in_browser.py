@@ -1,0 +1,100 @@
+"""The page in a browser, on a desk and on a telephone: nothing is cut off, nothing complains, nothing is fetched."""
+
+import json
+import os
+import re
+import shutil
+import subprocess
+import threading
+from functools import partial
+from html import unescape
+from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
+
+import pytest
+
+import thermal_robot as tr
+from thermal_robot.report import html
+
+BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
+OPTIONS = (
+    "--headless --no-sandbox --disable-gpu --disable-quic --no-first-run --disable-background-networking "
+    "--disable-component-update --disable-sync --enable-logging=stderr --virtual-time-budget=3000"
+).split()
+WRAPPER = """<!DOCTYPE html><body style="margin:0"><iframe src="page.html" width="WIDTH" height="2000" style="border:0"
+onload="measure(this)"></iframe><pre id="said"></pre><script>
+function measure(frame) {
+  const page = frame.contentDocument, root = page.documentElement;
+  const out = [...page.querySelectorAll("main *")].filter(e => !e.parentElement.closest(".tr-wide, svg"))
+    .filter(e => e.getBoundingClientRect().right > root.clientWidth + 1).map(e => e.tagName + "." + e.className);
+  const letters = [...page.querySelectorAll("svg.tr-figure text, p, td, dd")]
+    .filter(e => e.textContent.trim()).map(e => e.getBoundingClientRect().height).filter(h => h > 0);
+  document.getElementById("said").textContent = JSON.stringify(
+    {seen: root.clientWidth, needed: root.scrollWidth, out: out, smallest: Math.min(...letters)});
+}
+</script></body>"""
+
+pytestmark = pytest.mark.skipif(BROWSER is None, reason="no chromium on the PATH")
+
+
+class Handler(SimpleHTTPRequestHandler):
+    """Serves a folder and remembers what was asked for."""
+
+    asked: tuple[str, ...] = ()
+
+    def do_GET(self):
+        type(self).asked = (*type(self).asked, self.path)
+        super().do_GET()
+
+    def log_message(self, *_):
+        """Stay quiet."""
+
+
+@pytest.fixture(scope="module")
+def served(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("page")
+    (folder / "page.html").write_text(html(tr.diagnose(tr.demo_campaign())), encoding="utf-8")
+    server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Handler, directory=str(folder)))
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    yield folder, f"http://127.0.0.1:{server.server_port}"
+    server.shutdown()
+    server.server_close()
+
+
+def seen(served, width, profile):
+    """What the browser measures, and what it complains of."""
+    folder, address = served
+    (folder / f"at_{width}.html").write_text(WRAPPER.replace("WIDTH", str(width)), encoding="utf-8")
+    command = [BROWSER, *OPTIONS, f"--user-data-dir={profile}", "--window-size=1600,2100", "--dump-dom"]
+    env = {**os.environ, "HOME": str(profile)}
+    done = subprocess.run(
+        [*command, f"{address}/at_{width}.html"], capture_output=True, text=True, check=False, timeout=120, env=env
+    )
+    said = re.search(r'<pre id="said">(.+?)</pre>', done.stdout, flags=re.S)
+    assert said, done.stderr[-2000:]
+    return json.loads(unescape(said[1])), [line for line in done.stderr.splitlines() if "CONSOLE" in line]
+
+
+@pytest.mark.parametrize("width", [1400, 400])
+def test_nothing_is_cut_off_and_nothing_complains(served, width, tmp_path):
+    page, complaints = seen(served, width, tmp_path)
+    assert page["seen"] <= width
+    assert page["needed"] <= page["seen"], "the page scrolls sideways"
+    assert page["out"] == []
+    assert page["smallest"] >= 8.0, "letters of less than 8 pixels"
+    assert [line for line in complaints if "favicon" not in line] == []
+
+
+def test_nothing_else_is_fetched(served, tmp_path):
+    seen(served, 400, tmp_path)
+    assert {re.sub(r"at_\d+", "at", path) for path in Handler.asked} <= {"/at.html", "/page.html", "/favicon.ico"}
+
+
+def test_a_page_that_is_too_broad_is_noticed(served, tmp_path):
+    folder, address = served
+    (folder / "broad").mkdir()
+    whole = (folder / "page.html").read_text(encoding="utf-8")
+    broad = whole.replace("<header>", '<header><div style="width: 900px">broad</div>')
+    (folder / "broad" / "page.html").write_text(broad, encoding="utf-8")
+    page, _ = seen((folder / "broad", f"{address}/broad"), 400, tmp_path)
+    assert page["needed"] > page["seen"]
+    assert page["out"]

@@ -1,0 +1,77 @@
+"""The page's section on the model: fitted frames, and parameters that are known together only."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from html import escape
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from thermal_robot.report.html_parts import paragraph, wide
+
+if TYPE_CHECKING:
+    from thermal_robot.diagnosis.result import Diagnosis
+
+_STRONG = 0.5  # of a correlation: below it a third parameter changes little by what is known of another
+_MOST = 10
+_FRAMES = {"base": "root frame of the robot, as the instrument sees it", "tool": "target, in the tool frame"}
+
+
+def model_section(diagnosis: Diagnosis) -> Iterator[str]:
+    """Yield fitted frames, strongest correlations, and the criteria of ISO 9283 where there are repeats."""
+    fitted = diagnosis.usable and diagnosis.fit is not None
+    if not fitted and diagnosis.performance is None:
+        return
+    yield "<section><h2>The model</h2>"
+    if fitted:
+        yield frames_table(diagnosis)
+        yield correlations_table(diagnosis) if diagnosis.model.spread is not None else ""
+    if diagnosis.performance is not None:
+        yield wide(f"<pre>{escape(str(diagnosis.performance))}</pre>", "Performance criteria of ISO 9283")
+    yield "</section>"
+
+
+def frames_table(diagnosis: Diagnosis) -> str:
+    """Show where the robot stands and where the target sits: mm, and roll, pitch and yaw in degrees."""
+    head = "<th>frame</th>" + "".join(
+        f"<th class=tr-n>{name}</th>" for name in ("x (mm)", "y (mm)", "z (mm)", "roll (°)", "pitch (°)", "yaw (°)")
+    )
+    body = ""
+    for name, pose in diagnosis.frames.iterrows():
+        told = [f"{1e3 * v:.3f}" for v in pose[["x", "y", "z"]]]
+        # without measured orientations the target's direction on the tool means nothing
+        seen = name == "base" or diagnosis.measures == "pose"
+        told += [f"{np.degrees(v):.4f}" if seen else "" for v in pose[["roll", "pitch", "yaw"]]]
+        cells = "".join(f"<td class=tr-n>{value.replace('-', '−')}</td>" for value in told)
+        body += f"<tr><td>{_FRAMES[str(name)]}</td>{cells}</tr>"
+    return wide(f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>", "Fitted frames")
+
+
+def correlations_table(diagnosis: Diagnosis) -> str:
+    """Show the strongest correlations between the parameters, at most ten; in words how many are not shown."""
+    covariance = diagnosis.covariance
+    if len(covariance) < 2:
+        return ""
+    std = np.sqrt(covariance.to_numpy().diagonal())
+    correlation = covariance.to_numpy() / np.outer(std, std)
+    first, second = np.triu_indices(len(std), 1)
+    size = np.abs(correlation[first, second])
+    order = np.argsort(-size, kind="stable")
+    strong = [k for k in order if size[k] > _STRONG]
+    if not strong:
+        return paragraph(f"No two parameters have a correlation beyond ±{_STRONG}.")
+    rows = ""
+    for k in strong[:_MOST]:
+        pair = "".join(f"<td>{escape(_called(covariance.index[i]))}</td>" for i in (first[k], second[k]))
+        rows += f"<tr>{pair}<td class=tr-n>{correlation[first[k], second[k]]:.2f}</td></tr>".replace(">-", ">−")
+    head = "<th>parameter</th><th>known only together with</th><th class=tr-n>correlation</th>"
+    hidden = len(strong) - min(len(strong), _MOST)
+    more = f" and {hidden} beyond ±{_STRONG}" if hidden else ""
+    rest = paragraph(f"Not shown: {len(size) - len(strong)} correlations within ±{_STRONG}{more}.")
+    table = f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
+    return wide(table, "Strongest correlations of the parameters") + rest
+
+
+def _called(name: tuple[str, str]) -> str:
+    return f"{name[1]} ({name[0]})"
