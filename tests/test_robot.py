@@ -3,7 +3,6 @@
 import dataclasses
 import io
 import pickle
-import shutil
 
 import numpy as np
 import pinocchio
@@ -12,7 +11,6 @@ import yourdfpy
 from coupled import coupled
 
 from thermal_robot import kinematics as kin
-from thermal_robot import urdf_text as urdf_text_module
 from thermal_robot.errors import RobotError
 from thermal_robot.robot import load_robot
 
@@ -85,18 +83,6 @@ def test_a_file_is_read_by_its_name_its_path_or_its_text(rv_m2, configurations, 
     file.write_text("\ufeff" + rv_m2.urdf, encoding="utf-8")
     for source in (file, str(file), rv_m2.urdf, "\n  " + rv_m2.urdf):
         same_robot(rv_m2, load_robot(source, "tool0"), configurations)
-
-
-def test_builtin_robots_are_found_inside_the_package_too(rv_m2, configurations, tmp_path, monkeypatch):
-    package = tmp_path / "thermal_robot"
-    (package / "robots").mkdir(parents=True)
-    (package / "robots" / "rv_m2.urdf").write_text(rv_m2.urdf, encoding="utf-8")
-    monkeypatch.setattr(urdf_text_module, "__file__", str(package / "urdf_text.py"))
-    same_robot(rv_m2, load_robot("builtin:rv_m2", "tool0"), configurations)
-    shutil.rmtree(package / "robots")
-    (tmp_path / "robots").mkdir()
-    (tmp_path / "robots" / "rv_m2.urdf").write_text(rv_m2.urdf, encoding="utf-8")
-    same_robot(rv_m2, load_robot("builtin:rv_m2", "tool0"), configurations)
 
 
 @pytest.mark.parametrize(("name", "forearm"), [("ur3", 0.21325), ("ur5", 0.39225), ("ur10", 0.5723)])

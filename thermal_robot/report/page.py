@@ -96,9 +96,8 @@ def _whole(diagnosis: Diagnosis, generated: str | None) -> Iterator[str]:
     if told := hardest(diagnosis):
         yield paragraph(f"Rows held out in the hardest way: {told}.")
     yield paragraph(f"Noise alone would leave {noise_of(diagnosis)}.")
-    yield figure(plot_how_far(diagnosis), "Distribution of the gap before and after")
-    yield extremes_table(diagnosis) + "</section>"
-    yield "<section><h2>Which</h2>"
+    yield figure(plot_how_far(diagnosis), "Distribution of the gap before and after") + extremes_table(diagnosis)
+    yield "</section><section><h2>Which</h2>"
     yield figure(plot_which(diagnosis), "Share of the gap and probability of every effect")
     yield effects_table(diagnosis)
     yield (paragraph(told) if (told := one_sigma(diagnosis)) else "") + "</section>"

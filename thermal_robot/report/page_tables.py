@@ -62,21 +62,22 @@ def extremes_table(diagnosis: Diagnosis) -> str:
     kept = ~rows.outliers
     linear = {"before": rows.gap[kept, :3], "after": rows.remainder[kept, :3]}
     held = {"before": rows.held_out_before, "after": rows.held_out_after}
-    told = [(f"all rows, {name}", *_sizes(np.linalg.norm(gap, axis=1)), *_along(gap)) for name, gap in linear.items()]
-    told += [(f"rows held out, {name}", *_sizes(d[np.isfinite(d)]), *[np.nan] * 3) for name, d in held.items()]
-    shown = [row for row in told if np.isfinite(row[1])]
-    best = units.scale("m", float(np.nanmax([row[1:] for row in shown], initial=0.0)))
+    nothing = (float("nan"),) * 3
+    told = {f"all rows, {name}": _sizes(np.linalg.norm(gap, axis=1)) + _along(gap) for name, gap in linear.items()}
+    told |= {f"rows held out, {name}": _sizes(d[np.isfinite(d)]) + nothing for name, d in held.items()}
+    shown = {name: sizes for name, sizes in told.items() if np.isfinite(sizes[0])}
+    best = units.scale("m", float(np.nanmax(list(shown.values()), initial=0.0)))
     heads = "rms", "95 % below", "largest", "rms along x", "along y", "along z"
     head = f"<th>gap in {best.unit}</th>" + "".join(f"<th class=tr-n>{h}</th>" for h in heads)
     body = []
-    for name, *sizes in shown:
-        cells = (units.number(float(v) * best.factor) if np.isfinite(v) else "" for v in sizes)
+    for name, sizes in shown.items():
+        cells = (units.number(v * best.factor) if np.isfinite(v) else "" for v in sizes)
         body.append(f"<tr><td>{name}</td>{''.join(f'<td class=tr-n>{escape(c)}</td>' for c in cells)}</tr>")
     table = f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(body)}</tbody></table>"
     return wide(table, "The gap before and after: rms, 95 % quantile, largest, along each axis")
 
 
-def _sizes(distance: Array) -> tuple[float, float, float]:
+def _sizes(distance: Array) -> tuple[float, ...]:
     """Return rms, 95 % quantile and maximum of distances; NaN without any."""
     if not len(distance):
         return (float("nan"),) * 3
