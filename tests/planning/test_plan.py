@@ -124,6 +124,11 @@ def test_without_warming_no_temperature_is_planned(rv_m2):
         ({"noise": float("nan")}, "noise"),
         ({"rise": -1.0}, "rise"),
         ({"loads": (-2.0,)}, "loads"),
+        ({"loads": 2.0}, "loads"),
+        ({"loads": ("3 kg",)}, "loads"),
+        ({"noise": "20 um"}, "noise"),
+        ({"noise_orientation": None}, "noise_orientation"),
+        ({"rise": True}, "rise"),
         ({"target": (0.0, 0.0)}, "target"),
     ],
 )

@@ -214,6 +214,10 @@ def _best_order(
     return best
 
 
+def _number(value: object) -> bool:
+    return isinstance(value, (int, float, np.integer, np.floating)) and not isinstance(value, bool)
+
+
 def _check(
     robot: Robot, rows: int, repeats: int, noise: float, turn: float, rise: float, loads: Sequence[float]
 ) -> None:
@@ -228,12 +232,12 @@ def _check(
     if not isinstance(repeats, (int, np.integer)) or not 1 <= repeats <= rows // 2 or rows % repeats:
         refuse("repeats", repeats, f"a whole number that divides the {rows} rows into two poses or more")
     for name, value in (("noise", noise), ("noise_orientation", turn)):
-        if not 0.0 < value < np.inf:
+        if not _number(value) or not 0.0 < value < np.inf:
             refuse(name, value, "a number above 0")
-    if not 0.0 <= rise <= 100.0:
+    if not _number(rise) or not 0.0 <= rise <= 100.0:
         refuse("rise", rise, "from 0 to 100 K")
-    if not all(0.0 < load < np.inf for load in loads):
-        refuse("loads", list(loads), "payloads above 0 kg")
+    if not isinstance(loads, (list, tuple, np.ndarray)) or not all(_number(m) and 0.0 < m < np.inf for m in loads):
+        refuse("loads", loads, "a list of payloads above 0 kg")
     for joint, low, high in zip(robot.joint_names, *joint_range(robot), strict=True):
         if not np.isfinite(high - low):
             refuse(joint, "no limits", "a <limit> in the URDF for a joint that slides")
