@@ -156,9 +156,7 @@ class Robot:
         """
         from thermal_robot.kinematics.frames import tool_poses
 
-        rows = self._configurations(q)
-        found = tool_poses(self, np.atleast_2d(rows))
-        return found if rows.ndim == 2 else np.asarray(found[0])
+        return self._at(tool_poses, q)
 
     def jacobian(self, q: ArrayLike) -> Array:
         """Return the Jacobian of the tool frame: velocity of its origin, then angular velocity, in root frame axes.
@@ -189,8 +187,12 @@ class Robot:
         """
         from thermal_robot.kinematics.jacobians import frame_jacobians
 
+        return self._at(frame_jacobians, q)
+
+    def _at(self, function: Callable[[Robot, Array], Array], q: ArrayLike) -> Array:
+        """Return what a function of many configurations says of these, or of this one."""
         rows = self._configurations(q)
-        found = frame_jacobians(self, np.atleast_2d(rows))
+        found = function(self, np.atleast_2d(rows))
         return found if rows.ndim == 2 else np.asarray(found[0])
 
     def _configurations(self, q: ArrayLike) -> Array:
