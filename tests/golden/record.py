@@ -26,6 +26,8 @@ TOLERANCE = 1e-9
 """Relative: BLAS rounds by about 1e-16, the fits' condition numbers reach 1e6."""
 NOTHING = 1e-11
 """Below this a figure is rounding of nothing: p-values and shares that underflow."""
+CHANCES = ("probability",)
+"""Compared absolutely: beside nothing the relative change of a probability is the change of an evidence of 1e4 nats."""
 _WORDS = ("summary", "advice", "warnings", "reasons", "describes", "name", "schema", "next", "where", "title", "random")
 _SMALL = ("ur5_jacobi", "wam_jacobi", "ipa_ur10_d")
 
@@ -87,7 +89,8 @@ def differences(old: object, new: object, tolerance: float, path: str = "") -> l
         pairs = enumerate(zip(old, new, strict=True))
         return [line for k, (a, b) in pairs for line in differences(a, b, tolerance, f"{path}[{k}]")]
     if isinstance(old, (int, float)) and isinstance(new, (int, float)):
-        same = math.isclose(old, new, rel_tol=tolerance, abs_tol=NOTHING)
+        floor = tolerance if path.endswith(CHANCES) else NOTHING
+        same = math.isclose(old, new, rel_tol=tolerance, abs_tol=floor)
         return [] if same else [f"{path}: {old!r} became {new!r}"]
     return [] if old == new else [f"{path}: {old!r} became {new!r}"]
 

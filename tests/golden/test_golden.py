@@ -109,6 +109,8 @@ def test_the_demo_is_no_measured_campaign(monkeypatch):
         ({"a": 1e-13}, {}, []),
         ({}, {"a": 1e-3}, ["/a: 0.0 became 0.001"]),
         ({"a": float("nan")}, {"a": 1.0}, ["/a: nan became 1.0"]),
+        ({"probability": 1.80763633126e-06}, {"probability": 1.80762545937e-06}, []),
+        ({"probability": 1e-6}, {"probability": 3e-6}, ["/probability: 1e-06 became 3e-06"]),
     ],
 )
 def test_a_difference_is_one_line(old, new, said_of_it):
