@@ -22,6 +22,7 @@ ORDER = (
     "kinematics",
     "urdf_text",
     "robot",
+    "solids",
     "assembly",
     "paper",
     "campaign",

@@ -9,7 +9,7 @@ import time
 
 import pytest
 
-from thermal_robot.files import whole, write_bytes, write_text
+from thermal_robot.files import checksum, whole, write_bytes, write_text
 
 
 def test_what_is_written_takes_the_place_at_once(tmp_path):
@@ -146,3 +146,10 @@ def test_a_full_disk_is_an_error_for_every_file_and_leaves_what_was_there(tmp_pa
     assert set(raised) == KINDS
     assert all("too large" in reason for reason in raised.values()), raised
     assert {file.name: file.read_text() for file in tmp_path.iterdir()} == dict.fromkeys(KINDS, "before")
+
+
+def test_a_checksum_is_that_of_the_standard(tmp_path):
+    """The SHA-256 of "abc" as FIPS 180-4 prints it."""
+    file = tmp_path / "abc.txt"
+    file.write_bytes(b"abc")
+    assert checksum(file) == "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad"

@@ -21,8 +21,9 @@ def test_builtin_robots_are_found_inside_the_package_and_beside_it(rv_m2, tmp_pa
 def test_text_is_taken_as_it_is_and_a_file_tells_its_name(rv_m2, tmp_path):
     file = tmp_path / "arm.urdf"
     file.write_text(rv_m2.urdf, encoding="utf-8")
-    assert urdf_text(rv_m2.urdf) == (rv_m2.urdf, DESCRIPTION)
-    text, source = urdf_text(file)
+    assert urdf_text(rv_m2.urdf) == (rv_m2.urdf, DESCRIPTION, None)
+    text, source, folder = urdf_text(file)
+    assert folder == file.resolve().parent
     assert text == rv_m2.urdf
     assert str(file) in source
 

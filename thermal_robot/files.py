@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import os
 import secrets
 from collections.abc import Callable, Iterator, Sequence
@@ -153,3 +154,14 @@ def _flush(folder: Path) -> None:
             os.fsync(number)
         finally:
             os.close(number)
+
+
+def checksum(path: Path) -> str:
+    """Return the SHA-256 of a file's content, in hexadecimal digits.
+
+    Raises
+    ------
+    OSError
+        If it cannot be read.
+    """
+    return hashlib.sha256(path.read_bytes()).hexdigest()

@@ -90,6 +90,8 @@ class Robot:
         ``pinocchio.Model`` reduced to the movable joints, mimicking ones too.
     urdf_links, urdf_joints
         Names of all links and of all joints of the URDF, in the chain or not, fixed joints too.
+    folder
+        Of the URDF's file, from which its meshes are named; ``None`` where it came as text.
     """
 
     name: str
@@ -107,6 +109,7 @@ class Robot:
     model: Any
     urdf_links: tuple[str, ...]
     urdf_joints: tuple[str, ...]
+    folder: Path | None = None
 
     @property
     def n(self) -> int:
@@ -211,7 +214,7 @@ class Robot:
 
     def __reduce__(self) -> tuple[Callable[..., Robot], tuple[Any, ...]]:
         # Rebuilt from its text, so that a saved robot survives a change of Pinocchio's own format.
-        return _build, (self.urdf, self.tool_frame, self.root_frame, self.gravity)
+        return _build, (self.urdf, self.tool_frame, self.root_frame, self.gravity, DESCRIPTION, self.folder)
 
 
 def load_robot(
@@ -252,7 +255,7 @@ def load_robot(
         in the end itself, if gravity is not three numbers of a planet, or if a mass, an inertia, an origin, an axis or
         a limit is no number, or one that no robot has.
     """
-    text, source = urdf_text(urdf)
+    text, source, folder = urdf_text(urdf)
     for frame in (tool_frame, root_frame):
         if frame is not None and not isinstance(frame, str):
             raise RobotError(f"a frame is the name of a link, not {type(frame).__name__}")
@@ -265,7 +268,7 @@ def load_robot(
             f"no tool frame is given; the links at the ends of this robot are {shown}",
             candidates=leaves,
         )
-    return _build(text, tool_frame, root_frame, _three_finite_numbers(gravity), source)
+    return _build(text, tool_frame, root_frame, _three_finite_numbers(gravity), source, folder)
 
 
 def _told(kind: str, limit: float) -> str:
@@ -275,7 +278,12 @@ def _told(kind: str, limit: float) -> str:
 
 
 def _build(
-    urdf: str, tool_frame: str, root_frame: str | None, gravity: Array | None, source: str = DESCRIPTION
+    urdf: str,
+    tool_frame: str,
+    root_frame: str | None,
+    gravity: Array | None,
+    source: str = DESCRIPTION,
+    folder: Path | None = None,
 ) -> Robot:
     built = build_chain_model(urdf, tool_frame, root_frame, gravity, source)
     chain = built.chain
@@ -295,6 +303,7 @@ def _build(
         model=built.model,
         urdf_links=built.urdf_links,
         urdf_joints=built.urdf_joints,
+        folder=folder,
     )
 
 

@@ -6,7 +6,7 @@ import difflib
 import re
 import xml.etree.ElementTree as ElementTree
 from pathlib import Path
-from typing import Protocol, runtime_checkable
+from typing import NamedTuple, Protocol, runtime_checkable
 
 from thermal_robot.errors import RobotError
 
@@ -30,12 +30,20 @@ class WritesUrdf(Protocol):
         """Return the XML text."""
 
 
-def urdf_text(urdf: str | Path | WritesUrdf) -> tuple[str, str]:
-    """XML text, and what to call it in an error."""
+class Source(NamedTuple):
+    """XML text, what to call it in an error, and the folder that its meshes are named from; ``None`` without a file."""
+
+    text: str
+    called: str
+    folder: Path | None = None
+
+
+def urdf_text(urdf: str | Path | WritesUrdf) -> Source:
+    """Return the text of a robot and where it comes from; see :func:`~thermal_robot.robot.load_robot` for errors."""
     if isinstance(urdf, str):
         text = urdf.lstrip("\ufeff \t\r\n")
         if not text or text.startswith("<"):
-            return text, DESCRIPTION
+            return Source(text, DESCRIPTION)
         if urdf.startswith(BUILTIN):
             return _read(_builtin_path(urdf.removeprefix(BUILTIN)))
         if urdf.startswith(EXAMPLE_ROBOT_DATA):
@@ -44,7 +52,7 @@ def urdf_text(urdf: str | Path | WritesUrdf) -> tuple[str, str]:
     if isinstance(urdf, Path):
         return _read(urdf)
     if isinstance(urdf, WritesUrdf):
-        return _written(urdf), DESCRIPTION
+        return Source(_written(urdf), DESCRIPTION)
     raise RobotError(f"a robot is a path, URDF text or a yourdfpy.URDF, not {type(urdf).__name__}")
 
 
@@ -65,7 +73,7 @@ def _written(urdf: WritesUrdf) -> str:
     return ElementTree.tostring(tree, encoding="unicode")
 
 
-def _read(path: Path) -> tuple[str, str]:
+def _read(path: Path) -> Source:
     source = f"the robot file {str(path)!r}"
     try:
         if path.exists() and not path.is_dir():
@@ -73,7 +81,7 @@ def _read(path: Path) -> tuple[str, str]:
                 raise RobotError(f"{source} is a pipe or a device, not a file", name=str(path))
             if path.stat().st_size > _LARGEST_FILE:
                 raise RobotError(f"{source} is larger than any URDF ({_LARGEST_FILE >> 20} MiB)", name=str(path))
-        return _decoded(path.read_bytes()).lstrip(), source
+        return Source(_decoded(path.read_bytes()).lstrip(), source, path.resolve().parent)
     except IsADirectoryError:
         problem = "is a folder, not a URDF file"
     except FileNotFoundError:

@@ -1,6 +1,8 @@
 """What commands share: how loud they are, and where the paths of a campaign start."""
 
+import hashlib
 import json
+import re
 
 from commanded import refused
 
@@ -47,3 +49,13 @@ def test_a_campaign_on_standard_input_has_its_paths_in_the_current_folder(run, f
     refused(run("check", "-"), "standard input, [robot]", "'tool_0'", "tool0")
     stdin(folder / "measurements.csv")
     refused(run("check", "-"), "standard input", "TOML")
+
+
+def test_a_report_names_its_files_with_their_checksums(run, folder, tmp_path):
+    page = tmp_path / "page.html"
+    assert run("diagnose", folder, "--only", "thermal_elongation", "drift", "--report", page)[0] == 0
+    told = page.read_text(encoding="utf-8")
+    listed = dict(re.findall(r"<li>(\S+) <code>(\w+)</code></li>", told))
+    assert {"campaign.toml", "robot.urdf"} <= set(listed)
+    for name, checksum in listed.items():
+        assert checksum == hashlib.sha256((folder / name).read_bytes()).hexdigest()

@@ -1,5 +1,7 @@
 """The pieces of a page: text is escaped, nothing is drawn of nothing."""
 
+import base64
+import hashlib
 from importlib.metadata import PackageNotFoundError
 
 import numpy as np
@@ -7,7 +9,7 @@ import pytest
 
 from thermal_robot.report import html_parts
 from thermal_robot.report.drawing import Drawing
-from thermal_robot.report.html_parts import bullets, css, document, figure, paragraph, signature
+from thermal_robot.report.html_parts import bullets, checksums, css, document, figure, paragraph, signature
 
 UGLY = "<script>&\"'"
 SAFE = "&lt;script&gt;&amp;&quot;&#x27;"
@@ -58,3 +60,17 @@ def test_a_source_tree_that_is_not_installed_signs_without_a_version(monkeypatch
 def test_a_style_sheet_that_does_not_exist_is_an_error():
     with pytest.raises(FileNotFoundError):
         css("nothing.css")
+
+
+def test_a_document_lets_the_browser_run_its_own_script_alone():
+    code = "document.title = '1';"
+    page = document("A title", "<p>text</p>", code)
+    allowed = base64.b64encode(hashlib.sha256(code.encode()).digest()).decode()
+    assert f"script-src 'sha256-{allowed}'" in page
+    assert page.count("<script") == 1
+    assert "script-src 'none'" in document("A title", "<p>text</p>")
+
+
+def test_checksums_stand_beside_the_names_of_their_files():
+    assert checksums({}) == ""
+    assert checksums({"a<b.csv": "0a1b"}).endswith("<li>a&lt;b.csv <code>0a1b</code></li></ul>")

@@ -28,8 +28,19 @@ function measure(frame) {
     .filter(e => e.getBoundingClientRect().right > root.clientWidth + 1).map(e => e.tagName + "." + e.className);
   const letters = [...page.querySelectorAll("svg.tr-figure text, p, td, dd")]
     .filter(e => e.textContent.trim()).map(e => e.getBoundingClientRect().height).filter(h => h > 0);
+  const canvas = page.querySelector("#tr-arm canvas"), row = page.querySelector("[data-tr=row]");
+  frame.contentWindow.requestAnimationFrame = paint => paint();
+  const painted = () => canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data
+    .reduce((sum, value, k) => sum + (k % 4 === 3 && value > 0), 0) / (canvas.width * canvas.height);
+  const first = canvas.toDataURL(), told = page.querySelector("[data-tr=told]").textContent, filled = painted();
+  canvas.dispatchEvent(new KeyboardEvent("keydown", {key: "ArrowLeft"}));
+  const turned = canvas.toDataURL();
+  row.value = 7;
+  row.dispatchEvent(new Event("input"));
+  const moved = canvas.toDataURL(), later = page.querySelector("[data-tr=told]").textContent;
   document.getElementById("said").textContent = JSON.stringify(
-    {seen: root.clientWidth, needed: root.scrollWidth, out: out, smallest: Math.min(...letters)});
+    {seen: root.clientWidth, needed: root.scrollWidth, out: out, smallest: Math.min(...letters),
+     filled: filled, drawings: new Set([first, turned, moved]).size, told: [told, later]});
 }
 </script></body>"""
 
@@ -81,6 +92,9 @@ def test_nothing_is_cut_off_and_nothing_complains(served, width, tmp_path):
     assert page["needed"] <= page["seen"], "the page scrolls sideways"
     assert page["out"] == []
     assert page["smallest"] >= 8.0, "letters of less than 8 pixels"
+    assert 0.05 < page["filled"] < 0.6, "the arm fills a part of its drawing"
+    assert page["drawings"] == 3, "it turns, and takes the posture of another row"
+    assert page["told"][0] != page["told"][1]
     assert [line for line in complaints if "favicon" not in line] == []
 
 

@@ -232,7 +232,8 @@ def test_the_gap_with_rows_set_aside_is_told_where_there_are_any(case):
 def test_a_law_is_drawn_where_its_fit_is_at_hand(law_case, monkeypatch):
     drawn = []
     monkeypatch.setattr(Diagnosis, "explain", lambda self, name: drawn.append(name))
-    monkeypatch.setattr("thermal_robot.report.page.model_section", lambda _: ())  # it wants a whole fit
+    for part in ("model_section", "arm_figure"):  # they want a whole fit
+        monkeypatch.setattr(f"thermal_robot.report.page.{part}", lambda _: "")
     page = html(replace(law_case(), fit=object()))
     assert drawn == ["discovered.1"]
     assert page.count("<svg") == 6

@@ -29,11 +29,12 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 
 def run(options: argparse.Namespace) -> None:
     """Diagnose a campaign, print the result and write what is asked for."""
-    require_free((options.json, options.model, options.report), read_from(options))
+    files = read_from(options)
+    require_free((options.json, options.model, options.report), files)
     found = diagnosis(options)
     outputs: list[tuple[str | None, Callable[[Path], object]]] = [
         (options.json, found.to_json),
-        (options.report, lambda path: page(found, path)),
+        (options.report, lambda path: page(found, path, files)),
         (options.model if found.usable else None, lambda path: found.model.save(path)),
     ]
     deliver(options, outputs, str(found), found.summary)

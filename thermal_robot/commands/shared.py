@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import argparse
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 from thermal_robot.console import QUIET, note, stages
 from thermal_robot.errors import CampaignError
-from thermal_robot.files import write_text, written
+from thermal_robot.files import checksum, write_text, written
 
 if TYPE_CHECKING:
     from thermal_robot.campaign import Campaign
@@ -73,11 +73,12 @@ def diagnosis(options: argparse.Namespace) -> Diagnosis:
         return diagnose(read(options), only=options.only, without=options.without, progress=progress)
 
 
-def page(found: Diagnosis, path: Path) -> None:
-    """Write the page of a diagnosis, with the hour in its footer."""
+def page(found: Diagnosis, path: Path, files: Iterable[Path] = ()) -> None:
+    """Write the page of a diagnosis; in its footer the hour, and checksums of the files that it was made from."""
     from thermal_robot.report import html
 
-    write_text(path, html(found, generated=time.strftime("%Y-%m-%d %H:%M")))
+    made_from = {file.name: checksum(file) for file in files if file.is_file()}  # a pipe was read once
+    write_text(path, html(found, time.strftime("%Y-%m-%d %H:%M"), made_from))
 
 
 def told_later(options: argparse.Namespace, model: CorrectedModel, samples: Campaign, file: str) -> None:

@@ -1,4 +1,4 @@
-"""What one effect of a diagnosis explains, place by place: the values behind a figure."""
+"""The values behind figures: what one effect of a diagnosis explains, place by place, and the arm in some rows."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.effects.effect import in_words
+from thermal_robot.solids import Solid
 
 Array = NDArray[np.float64]
 
@@ -72,3 +73,34 @@ class Explained:
     effect: str
     places: tuple[Place, ...]
     left_out: int
+
+
+@dataclass(frozen=True, eq=False)
+class Arm:
+    """L links of a chain in R postures.
+
+    Attributes
+    ----------
+    links
+        L names, from the root frame to the tool frame.
+    link_shares
+        (L,) share 0..1 of the gap's mean square that enters in each.
+    poses
+        (R, L, 4, 4) of each in the root frame, as the model has it at what was commanded; m.
+    joints
+        Names of the J movable joints, those that mimic another too.
+    joint_shares
+        (J,) share that enters at each.
+    moves
+        (J,) which of the links each joint moves first.
+    solids
+        What links look like; nothing of those without a shape.
+    """
+
+    links: tuple[str, ...]
+    link_shares: Array
+    poses: Array
+    joints: tuple[str, ...]
+    joint_shares: Array
+    moves: NDArray[np.int64]
+    solids: tuple[Solid, ...]

@@ -20,7 +20,9 @@ from thermal_robot.files import write_text
 
 if TYPE_CHECKING:
     import pandas as pd
+    from numpy.typing import ArrayLike
 
+    from thermal_robot.diagnosis.explained import Arm
     from thermal_robot.diagnosis.next_samples import NextSamples
     from thermal_robot.inference.fit import Fit
     from thermal_robot.iso9283 import Performance
@@ -181,6 +183,25 @@ class Diagnosis:
         if self.fit is None:
             raise ValueError("this diagnosis was made without its fit")
         return self.fit
+
+    def arm(self, rows: ArrayLike) -> Arm | None:
+        """Return how the arm stood in some of :attr:`rows`, with the shares of its places, for a drawing.
+
+        Parameters
+        ----------
+        rows
+            (R,) positions in :attr:`rows`, from 0 on.
+
+        Returns
+        -------
+        Arm or None
+            ``None`` where nothing is known of places: this diagnosis is not usable, or was made without its fit.
+        """
+        from thermal_robot.diagnosis.arm import arm
+
+        if not self.usable or self.fit is None:
+            return None
+        return arm(self.model.robot, self.rows.q[np.asarray(rows, dtype=np.int64)], self.where)
 
     @property
     def parameters(self) -> pd.DataFrame:

@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from base64 import b64encode
+from collections.abc import Iterable, Mapping
+from hashlib import sha256
 from html import escape
 from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
@@ -18,8 +20,10 @@ _MADE_BY = ("thermal-robot", "pin", "numpy", "scipy")
 """Packages on which the figures of a page depend."""
 
 
-def document(title: str, body: str) -> str:
-    """Return a complete page that needs nothing beside itself and prints on A4.
+def document(title: str, body: str, script: str = "") -> str:
+    """Return a complete page that needs nothing beside itself, prints on A4, and runs no script but its own.
+
+    Its content security policy says so to the browser: nothing is fetched, whatever a name within the page holds.
 
     Parameters
     ----------
@@ -27,12 +31,18 @@ def document(title: str, body: str) -> str:
         Plain text for the browser's bar.
     body
         HTML.
+    script
+        JavaScript that ships with this room; none where empty.
     """
+    runs = f"'sha256-{b64encode(sha256(script.encode()).digest()).decode()}'" if script else "'none'"
+    policy = f"default-src 'none'; style-src 'unsafe-inline'; img-src data:; script-src {runs}"
+    code = f"<script>{script}</script>\n" if script else ""
     return (
         f'<!DOCTYPE html>\n<html lang="en">\n<head>\n<meta charset="utf-8">\n'
+        f'<meta http-equiv="Content-Security-Policy" content="{policy}">\n'
         f'<meta name="viewport" content="width=device-width, initial-scale=1">\n'
         f"<title>{escape(title)}</title>\n<style>\n{css('page.css')}{css('page_whole.css')}</style>\n</head>\n"
-        f'<body>\n<main class="thermal-robot">\n{body}\n</main>\n</body>\n</html>\n'
+        f'<body>\n<main class="thermal-robot">\n{body}\n</main>\n{code}</body>\n</html>\n'
     )
 
 
@@ -68,6 +78,12 @@ def bullets(items: Iterable[str]) -> str:
     """Return lines of plain text as a list; empty where there is none."""
     lines = "".join(f"<li>{escape(item)}</li>" for item in items)
     return f"<ul>{lines}</ul>" if lines else ""
+
+
+def checksums(files: Mapping[str, str]) -> str:
+    """List the files that a page was made from, each with the SHA-256 of its content; empty without any."""
+    lines = "".join(f"<li>{escape(name)} <code>{escape(told)}</code></li>" for name, told in files.items())
+    return f'<p>Made from these files (SHA-256):</p><ul class="tr-files">{lines}</ul>' if lines else ""
 
 
 def signature(generated: str | None) -> str:

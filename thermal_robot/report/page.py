@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from html import escape
 from typing import TYPE_CHECKING
 
 from thermal_robot.report.details import details
-from thermal_robot.report.html_parts import bullets, css, document, figure, paragraph, signature
+from thermal_robot.report.html_parts import bullets, checksums, css, document, figure, paragraph, signature
+from thermal_robot.report.page_arm import arm_figure, script
 from thermal_robot.report.page_model import model_section
 from thermal_robot.report.page_tables import effects_table, extremes_table, numbers, outliers_table
 from thermal_robot.report.plots_how_far import plot_how_far
@@ -34,7 +35,7 @@ if TYPE_CHECKING:
     from thermal_robot.diagnosis.result import Diagnosis
 
 
-def html(diagnosis: Diagnosis, generated: str | None = None) -> str:
+def html(diagnosis: Diagnosis, generated: str | None = None, files: Mapping[str, str] | None = None) -> str:
     """Write a diagnosis as a page that needs nothing beside itself and prints on A4.
 
     Parameters
@@ -44,14 +45,17 @@ def html(diagnosis: Diagnosis, generated: str | None = None) -> str:
     generated
         When it was made, in the words that shall stand in the footer; nothing is said where absent, so that equal
         diagnoses give equal pages.
+    files
+        Names of the files that the diagnosis was made from, with the SHA-256 of each, for the footer.
 
     Returns
     -------
     str
         A complete HTML document.
     """
-    name = diagnosis.campaign or diagnosis.robot
-    return document(f"Diagnosis of {name}", "\n".join(_whole(diagnosis, generated)))
+    name, arm = diagnosis.campaign or diagnosis.robot, arm_figure(diagnosis)
+    body = "\n".join(_whole(diagnosis, arm, checksums(files or {}) + escape(signature(generated))))
+    return document(f"Diagnosis of {name}", body, script() if arm else "")
 
 
 def fragment(diagnosis: Diagnosis) -> str:
@@ -77,7 +81,7 @@ def fragment(diagnosis: Diagnosis) -> str:
     return f'<div class="thermal-robot">\n<style>\n{css("page.css")}</style>\n{body}\n</div>'
 
 
-def _whole(diagnosis: Diagnosis, generated: str | None) -> Iterator[str]:
+def _whole(diagnosis: Diagnosis, arm: str, footer: str) -> Iterator[str]:
     yield '<header><div class="tr-kicker">Where the gap lies, what causes it, how far it shrinks</div>'
     yield f"<h1>{escape(diagnosis.summary)}</h1>"
     yield from map(paragraph, details(diagnosis))
@@ -101,7 +105,7 @@ def _whole(diagnosis: Diagnosis, generated: str | None) -> Iterator[str]:
     yield figure(plot_which(diagnosis), "Share of the gap and probability of every effect")
     yield effects_table(diagnosis)
     yield (paragraph(told) if (told := one_sigma(diagnosis)) else "") + "</section>"
-    yield "<section><h2>Where</h2>"
+    yield f"<section><h2>Where</h2>{arm}"
     yield figure(plot_where(diagnosis), "Shares of the gap along the chain, by axis and by quantity")
     yield figure(plot_map(diagnosis), "The gap as arrows at the positions of the tool") + "</section>"
     yield "<section><h2>Unexplained</h2>"
@@ -117,7 +121,7 @@ def _whole(diagnosis: Diagnosis, generated: str | None) -> Iterator[str]:
         yield f"<section><h2>Set aside</h2>{outliers_table(diagnosis)}</section>"
     if diagnosis.warnings:
         yield f"<section><h2>Warnings</h2>{bullets(diagnosis.warnings)}</section>"
-    yield f"<footer>{escape(signature(generated))}</footer>"
+    yield f"<footer>{footer}</footer>"
 
 
 def _facts(diagnosis: Diagnosis) -> str:

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 from matplotlib.transforms import ScaledTranslation, blended_transform_factory
+from numpy.typing import NDArray
 
 from thermal_robot.report import units
 from thermal_robot.report.drawing import (
@@ -128,21 +129,38 @@ def draw_map(axes: Axes, diagnosis: Diagnosis, across: int, up: int) -> None:
     tidy(axes, grid="both")
 
 
-def _view(diagnosis: Diagnosis, across: int, up: int) -> _View | None:
-    """Return the arrows in a plane; ``None`` where all rows were set aside or are at one place, or no gap is left."""
+def mapped(diagnosis: Diagnosis) -> NDArray[np.int64]:
+    """Return which of the diagnosis' rows can be mapped: those that were not set aside and have a place."""
     rows = diagnosis.rows
-    used = np.flatnonzero(~rows.outliers & np.isfinite(rows.position).all(axis=1))
+    return np.flatnonzero(~rows.outliers & np.isfinite(rows.position).all(axis=1))
+
+
+def exaggeration(diagnosis: Diagnosis, used: NDArray[np.int64], longest: float) -> float | None:
+    """Return a round number of times that arrows are drawn longer than the gap; ``None`` without places or a gap.
+
+    An arrow of the gap's 95th percentile is then at most the fraction ``longest`` of the workspace's extent, unless it
+    is longer as it stands.
+    """
     if not used.size:
         return None
-    typical = float(np.quantile(np.linalg.norm(rows.gap[used, :3], axis=1), 0.95))
-    extent = float(np.ptp(rows.position[used], axis=0).max())
-    if typical <= 0.0 or extent <= 0.0:
+    typical = _typical(diagnosis, used)
+    extent = float(np.ptp(diagnosis.rows.position[used], axis=0).max())
+    return max(round_down(longest * extent / typical), 1.0) if typical > 0.0 and extent > 0.0 else None
+
+
+def _typical(diagnosis: Diagnosis, used: NDArray[np.int64]) -> float:
+    return float(np.quantile(np.linalg.norm(diagnosis.rows.gap[used, :3], axis=1), 0.95))
+
+
+def _view(diagnosis: Diagnosis, across: int, up: int) -> _View | None:
+    """Return the arrows in a plane; ``None`` where all rows were set aside or are at one place, or no gap is left."""
+    rows, used = diagnosis.rows, mapped(diagnosis)
+    factor = exaggeration(diagnosis, used, _LONGEST)
+    if factor is None:
         return None
-    factor = max(round_down(_LONGEST * extent / typical), 1.0)
     plane = np.ix_(used[thinned(len(used), _ARROWS)], np.array([across, up]))
-    return _View(
-        rows.position[plane], rows.gap[plane] * factor, rows.remainder[plane] * factor, factor, round_down(typical)
-    )
+    sample = round_down(_typical(diagnosis, used))
+    return _View(rows.position[plane], rows.gap[plane] * factor, rows.remainder[plane] * factor, factor, sample)
 
 
 def _frame(axes: Axes, view: _View) -> None:
