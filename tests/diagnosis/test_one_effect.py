@@ -237,3 +237,43 @@ def test_the_report_does_not_load_the_diagnosis():
 
     text = Path(module.__file__).read_text(encoding="utf-8")
     assert "import pyplot" not in text
+
+
+def above_its_zero(observed):
+    return 100.0 + observed.covariates["temperature"]
+
+
+@dataclass(frozen=True)
+class Follows(Effect):
+    """An error in one joint that is proportional to a temperature whose zero is far away."""
+
+    name = "follows"
+    needs = ("temperature",)
+    joint: str = "joint_1"
+    places: tuple[str, ...] = ()
+
+    def parameters(self, observations):
+        index = observations.robot.joint_names.index(self.joint)
+        response = at_joint(index, above_its_zero(observations))
+        return (Parameter("slope", "rad/K", 1e-5, "joint", self.joint, (response,)),)
+
+
+@pytest.mark.parametrize(("joint", "centred"), [("joint_1", True), ("joint_3", False)])
+def test_a_constant_that_an_unknown_base_takes_up_squeezes_no_figure(rv_m2, joint, centred):
+    campaign, _, _ = simulate(rv_m2, [], seed=5)
+    effect, slope, frames = Follows(joint=joint), np.array([2e-5]), register(campaign)
+    nominal = observe(campaign, frames)
+    moved = observe(campaign, frames, displacement=displacement(nominal, [(effect, slope)])[0])
+    shift = moved.predicted_position - nominal.predicted_position
+    campaign = replace(campaign, position=campaign.position + shift)
+    truth = slope * above_its_zero(campaign)
+    found = explained(fit(campaign, (effect,)), "follows")
+    (place,) = found.places
+    assert place.centred is centred
+    assert np.polyfit(*place.line, 1)[0] == pytest.approx(2e-5, rel=0.1)
+    assert np.mean(place.line[1]) == pytest.approx(0.0 if centred else truth.mean(), abs=0.15 * np.ptp(truth))
+    (axes,) = explain_figure(found).axes
+    law = next(line for line in axes.get_lines() if line.get_label() == "fitted law").get_ydata()
+    filled = np.ptp(law) / np.ptp(axes.get_ylim())
+    assert (filled > 0.4) if centred else (filled < 0.1)
+    assert axes.get_ylabel().startswith("error less its mean (" if centred else "error (")

@@ -35,6 +35,8 @@ class Place:
         (n,) the error with the effect left in, without it, and one sigma of noise of both.
     line
         (2, k) the fitted law: quantity and error.
+    centred
+        Whether errors are told less their mean, which the unknown frames take up as well.
     """
 
     kind: str
@@ -49,6 +51,7 @@ class Place:
     after: Array
     spread: Array
     line: Array
+    centred: bool = False
 
     @property
     def words(self) -> str:

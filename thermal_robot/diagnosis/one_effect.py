@@ -5,6 +5,9 @@ These are the data of component-plus-residual plots (Ezekiel 1924; Larsen and Mc
 D the displacement of the target for a unit error there, in units of the noise:
 
     before = D'(r + c) / D'D        after = D'r / D'D        spread = 1 / √(D'D)
+
+A constant error that the unknown frames take up as well is a matter of convention, and may be a hundred times what the
+error changes by: it is left out, so that the change can be seen.
 """
 
 from __future__ import annotations
@@ -21,6 +24,7 @@ from thermal_robot.effects.effect import Channel, Driver
 from thermal_robot.effects.gate import driver
 from thermal_robot.effects.quantities import quantities, unit
 from thermal_robot.errors import EffectError
+from thermal_robot.inference.algebra import orthonormal, without
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.settings import FEW_LEVELS, TINY
@@ -74,6 +78,8 @@ def _shown(
     after = np.einsum("nm,nm->n", direction, remainder)[rows] / length2[rows]
     name, name_unit, values = _driver(observations, effect, parameters, error)
     values, error = values[rows], error[rows]
+    constant = _undetermined(e.linear.frames[rows] / noise[:, None], direction[rows], error)
+    error = error - constant
     return Place(
         first.kind,
         first.place,
@@ -87,7 +93,22 @@ def _shown(
         after,
         1.0 / np.sqrt(length2[rows]),
         _line(values, error),
+        constant != 0.0,
     )
+
+
+def _undetermined(frames: Array, direction: Array, error: Array) -> float:
+    """Return the constant of (n,) errors that nobody knows, and that hides how they change; 0 where there is none.
+
+    It is known to 1 / |D⊥|, with D⊥ the (n, m) displacement for a unit error beyond the span of (n, m, F) frames, both
+    in units of the noise. One that is known worse than the errors differ from each other is left out where all errors
+    lie on one side of zero.
+    """
+    change = float(np.ptp(error))
+    if not frames.shape[2] or change == 0.0 or error.min() <= 0.0 <= error.max():
+        return 0.0
+    beyond = without(direction.ravel(), orthonormal(frames.reshape(direction.size, -1)))
+    return float(error.mean()) if float(np.linalg.norm(beyond)) * change < 1.0 else 0.0
 
 
 def _error(observations: Observations, parameters: list[tuple[Parameter, float]]) -> tuple[Array, Array, str]:

@@ -46,7 +46,8 @@ def explain_figure(explained: Explained) -> Figure:
     Figure
         Grey: the error at the place as measured, with everything else that was found taken off. Blue: with this effect
         taken off, too. The line is the fitted law. Rows in which the place hardly moves the target are left out,
-        and the axes end where a hundredth of the points lies beyond.
+        and the axes end where a hundredth of the points lies beyond. "Less its mean": a constant that the unknown
+        frames take up as well says nothing.
     """
     places = explained.places
     count = max(len(places), 1)
@@ -64,7 +65,7 @@ def explain_figure(explained: Explained) -> Figure:
         axes.set_ylim(low * scale.factor, high * scale.factor)
         axes.set_title(_heading(place), loc="left", fontsize=NORMAL, color=INK, fontweight="bold", pad=6)
         if k % across == 0 or place.unit != places[k - 1].unit:
-            axes.set_ylabel(f"error ({scale.unit}{place.unit.removeprefix(_si(place))})")
+            axes.set_ylabel(f"{_error(explained)} ({scale.unit}{place.unit.removeprefix(_si(place))})")
         else:
             axes.tick_params(labelleft=False)
     more = f"; {explained.left_out} smaller places are not shown" if explained.left_out else ""
@@ -85,6 +86,11 @@ def explain_figure(explained: Explained) -> Figure:
             if handle is not None:
                 handle.set_alpha(1.0)
     return figure
+
+
+def _error(explained: Explained) -> str:
+    """Call the error by its name: less a constant where the frames take that up at a place."""
+    return "error less its mean" if any(place.centred for place in explained.places) else "error"
 
 
 def _si(place: Place) -> str:
