@@ -32,6 +32,7 @@ ORDER = (
     "prediction",
     "model_file",
     "correction",
+    "simulation",
     "diagnosis",
     "planning",
     "datasets",
