@@ -33,6 +33,7 @@ ORDER = (
     "prediction",
     "model_file",
     "correction",
+    "simulation",
     "diagnosis",
     "planning",
     "datasets",

@@ -12,7 +12,7 @@ from coupled import coupled
 
 from thermal_robot import kinematics as kin
 from thermal_robot.errors import RobotError
-from thermal_robot.robot import load_robot
+from thermal_robot.robot import WIDE, joint_range, load_robot
 
 
 def parsed(urdf):
@@ -267,3 +267,12 @@ def test_a_notebook_shows_the_joints(rv_m2):
     shown = rv_m2._repr_html_()
     assert all(f">{joint}<" in shown for joint in rv_m2.joint_names)
     assert f"{np.degrees(rv_m2.upper[0]):.4g}°" in shown
+
+
+def test_a_joint_that_turns_round_is_kept_within_reach(arm):
+    low, high = joint_range(arm)
+    assert np.all(low >= arm.lower)
+    assert np.all(high <= arm.upper)
+    for kind, a, b in zip(arm.joint_types, low, high, strict=True):
+        if kind == "continuous":
+            assert (a, b) == (-WIDE, WIDE)

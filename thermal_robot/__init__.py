@@ -10,6 +10,7 @@ from thermal_robot.effects import Effect
 from thermal_robot.errors import CampaignError, EffectError, EstimationError, RobotError, ThermalRobotError
 from thermal_robot.observations import Observations, observe
 from thermal_robot.robot import Robot, load_robot
+from thermal_robot.simulation import simulate
 
 told_by(report)
 __version__ = "0.2.0"
@@ -34,5 +35,6 @@ __all__ = [
     "observe",
     "read_campaign",
     "read_samples",
+    "simulate",
     "write_campaign",
 ]

@@ -24,6 +24,8 @@ _MOST_SHOWN = 12
 """Names in one message; a humanoid has dozens of fingers."""
 STRONGEST_GRAVITY = 100.0
 """m/s²: four times that of any planet where a robot has been sent; a figure in mm/s² is above it."""
+WIDE = 2.4
+"""rad: as far as a joint without a limit is sent; nearly once round."""
 ENDS = ("tool_frame", "root_frame")
 """Names of the links between which the chain lies, as a robot, a campaign and a model call them."""
 
@@ -269,6 +271,14 @@ def load_robot(
             candidates=leaves,
         )
     return _build(text, tool_frame, root_frame, _three_finite_numbers(gravity), source, folder)
+
+
+def joint_range(robot: Robot) -> tuple[Array, Array]:
+    """(n,) and (n,): the limits, rad or m, and 2.4 rad for a joint that can turn once round; infinite where none."""
+    turns = np.array([kind != "prismatic" for kind in robot.joint_types])
+    round_ = turns & (robot.upper - robot.lower >= 2.0 * np.pi)
+    low = np.where(round_, np.maximum(robot.lower, -WIDE), robot.lower)
+    return low, np.where(round_, np.minimum(robot.upper, WIDE), robot.upper)
 
 
 def _told(kind: str, limit: float) -> str:

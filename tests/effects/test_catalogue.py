@@ -18,6 +18,7 @@ from thermal_robot.effects import (
     catalogue,
     choose,
     library,
+    named,
     random_effects,
 )
 from thermal_robot.effects.apply import displacement
@@ -210,3 +211,12 @@ def test_choosing_keeps_the_order_of_the_library():
     assert {e.name for e in choose(without=["drift"])} == set(library()) - {"drift"}
     with pytest.raises(EffectError, match="no effect is left"):
         choose(["drift"], ["drift"])
+
+
+def test_an_effect_is_found_by_its_name_one_that_scatters_too():
+    everything = {**library(), **{effect.name: effect for effect in random_effects()}}
+    assert {name: named(name) for name in everything} == everything
+    with pytest.raises(EffectError, match="no effect is named 'joint_ofset'; did you mean 'joint_offset'"):
+        named("joint_ofset")
+    with pytest.raises(EffectError, match=r"no effect is named 'quux'; there are .*encoder_resolution"):
+        named("quux")

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from thermal_robot import CampaignError, EffectError, load_robot, observe
-from thermal_robot.diagnosis.optimal_design import joint_range
 from thermal_robot.effects import library
 from thermal_robot.planning import plan
 from thermal_robot.planning.expected import Columns, expectations
-from thermal_robot.planning.schedule import approaches
+from thermal_robot.robot import joint_range
+from thermal_robot.simulation.schedule import approaches
 
 TARGET = (0.05, 0.03, 0.1)
 DETERMINED = ("joint_gain", "transmission_error", "backlash")

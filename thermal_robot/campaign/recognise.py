@@ -11,7 +11,7 @@ from thermal_robot.campaign.table import Table
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot
 
-_TYPING_ERROR = 0.85
+TYPING_ERROR = 0.85
 """Likeness (0..1, by :mod:`difflib`) from which a column of the user's own is taken for a typing error of a name that
 the format defines: ``tme`` for ``time``, a letter lost in the shortest name, has 0.86; honest columns such as
 ``pressure`` or ``humidity`` stay below 0.6."""
@@ -137,7 +137,7 @@ def _doubts_of_extra(column: str, robot: Robot) -> list[str]:
         *names.RESERVED,
         *(f"{quantity}.{joint}" for quantity in names.PER_JOINT for joint in robot.joint_names),
     ]
-    meant = did_you_mean(column, known, cutoff=_TYPING_ERROR)
+    meant = did_you_mean(column, known, cutoff=TYPING_ERROR)
     return [f"column {column!r} is not defined by the format and is kept as an extra covariate{meant}"] if meant else []
 
 

@@ -84,10 +84,10 @@ def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str,
     if measured:
         _require_enough(table.file, campaign)
     warnings = (*table.warnings, *columns.warnings, *gaps, *doubts(campaign))
-    return replace(_arrived(campaign), warnings=warnings)
+    return replace(arrived(campaign), warnings=warnings)
 
 
-def _arrived(campaign: Campaign) -> Campaign:
+def arrived(campaign: Campaign) -> Campaign:
     """Return the campaign with the directions of approach, where nobody recorded any but the order tells them."""
     recorded = any(split_name(name)[0] == "approach" for name in campaign.covariates)
     if recorded or campaign.moves != "direct":

@@ -25,13 +25,14 @@ from numpy.typing import NDArray
 from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.names import CLOCK
 from thermal_robot.diagnosis import settings
-from thermal_robot.diagnosis.optimal_design import joint_range, most_informative
+from thermal_robot.diagnosis.optimal_design import most_informative
 from thermal_robot.effects import gate
 from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.evidence import Combination
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.problem import Linear, whitened
 from thermal_robot.observations import Observations, observe
+from thermal_robot.robot import joint_range
 
 if TYPE_CHECKING:
     import pandas as pd

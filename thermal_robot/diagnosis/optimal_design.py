@@ -10,9 +10,6 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.diagnosis import settings
-from thermal_robot.robot import Robot
-
 Array = NDArray[np.float64]
 
 
@@ -64,11 +61,3 @@ def _learnt(root: Array, row: Array) -> Array:
         return root
     _, value, along = np.linalg.svd(row, full_matrices=False)
     return np.asarray(root - ((root @ along.T) * (1.0 - 1.0 / np.sqrt(1.0 + value**2))) @ along)
-
-
-def joint_range(robot: Robot) -> tuple[Array, Array]:
-    """(n,) and (n,): the limits, rad or m, and 2.4 rad for a joint that can turn once round; infinite where none."""
-    turns = np.array([kind != "prismatic" for kind in robot.joint_types])
-    round_ = turns & (robot.upper - robot.lower >= 2.0 * np.pi)
-    low = np.where(round_, np.maximum(robot.lower, -settings.WIDE), robot.lower)
-    return low, np.where(round_, np.minimum(robot.upper, settings.WIDE), robot.upper)

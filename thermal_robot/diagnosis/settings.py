@@ -6,8 +6,6 @@ LEAST_LEADING = 1e-3
 """Explanations that are less probable are not worth a measurement."""
 DECIDED, WORTHWHILE = 0.9, 1.0
 """An explanation so probable is decided where further samples would bring less than so many nats for any rival."""
-WIDE = 2.4
-"""rad: as far as a joint without a limit is sent; nearly once round."""
 BEYOND = 5.0
 """K outside the campaign's temperatures: a hall on another day."""
 LOOSE = 0.1

@@ -3,7 +3,7 @@
 from thermal_robot.effects.backlash import Backlash
 from thermal_robot.effects.base_compliance import BaseCompliance
 from thermal_robot.effects.base_frame import BaseFrame
-from thermal_robot.effects.catalogue import RANDOM, choose, library, random_effects
+from thermal_robot.effects.catalogue import RANDOM, choose, library, named, random_effects
 from thermal_robot.effects.drift import Drift
 from thermal_robot.effects.effect import (
     Effect,
@@ -22,6 +22,7 @@ from thermal_robot.effects.instrument_scale import InstrumentScale
 from thermal_robot.effects.joint_compliance import JointCompliance
 from thermal_robot.effects.joint_gain import JointGain
 from thermal_robot.effects.joint_offset import JointOffset
+from thermal_robot.effects.joint_ripple import JointRipple
 from thermal_robot.effects.link_compliance import LinkCompliance
 from thermal_robot.effects.random_effect import RandomEffect
 from thermal_robot.effects.thermal_bending import ThermalBending
@@ -44,6 +45,7 @@ __all__ = [
     "JointCompliance",
     "JointGain",
     "JointOffset",
+    "JointRipple",
     "LinkCompliance",
     "Parameter",
     "RandomEffect",
@@ -60,5 +62,6 @@ __all__ = [
     "at_tool",
     "choose",
     "library",
+    "named",
     "random_effects",
 ]

@@ -117,6 +117,26 @@ def restored(name: str, arguments: str) -> Effect:
         raise EffectError(f"effect {name!r} does not take the arguments {arguments}: {error}") from error
 
 
+def named(name: str) -> Effect:
+    """Return an effect by its name, one that scatters too.
+
+    Raises
+    ------
+    EffectError
+        If there is none; says which name was probably meant.
+    """
+    known = {**library(), **{effect.name: effect for effect in random_effects()}}
+    if name not in known:
+        raise _unknown(name, known)
+    return known[name]
+
+
+def _unknown(name: str, known: Iterable[str]) -> EffectError:
+    there = dict.fromkeys((*known, *RANDOM))
+    meant = did_you_mean(name, there) or f"; there are {', '.join(sorted(there))}"
+    return EffectError(f"no effect is named {name!r}{meant}")
+
+
 def choose(
     only: str | Iterable[str] = (), without: str | Iterable[str] = (), own: Iterable[Effect] = ()
 ) -> tuple[Effect, ...]:
@@ -143,8 +163,7 @@ def choose(
     only, without = ((names,) if isinstance(names, str) else tuple(names) for names in (only, without))
     for name in (*only, *without):
         if name not in known and name not in RANDOM:
-            meant = did_you_mean(name, (*known, *RANDOM)) or f"; there are {', '.join(sorted((*known, *RANDOM)))}"
-            raise EffectError(f"no effect is named {name!r}{meant}")
+            raise _unknown(name, known)
     chosen = tuple(e for name, e in known.items() if (not only or name in only) and name not in without)
     if not chosen:
         raise EffectError("no effect is left to consider")

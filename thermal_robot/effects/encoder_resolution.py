@@ -6,6 +6,10 @@ from dataclasses import dataclass
 from math import sqrt
 from typing import ClassVar, Literal
 
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.effects.effect import Array
 from thermal_robot.effects.random_effect import RandomEffect
 
 
@@ -23,3 +27,8 @@ class EncoderResolution(RandomEffect):
     component: ClassVar[Literal["pose", "visit"]] = "pose"
     label: ClassVar[str] = "step"
     factor: ClassVar[float] = sqrt(12.0)
+
+    def drawn(self, command: Array, pose: NDArray[np.int64], size: float, rng: np.random.Generator) -> Array:
+        """Return how far the nearest step is from each command; chance has only where the encoder's zero lies."""
+        first = size * rng.uniform()
+        return first + size * np.round((command - first) / size) - command if size else np.zeros_like(command)

@@ -5,7 +5,10 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar, Literal
 
-from thermal_robot.effects.effect import Effect, Parameter
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.effects.effect import Array, Effect, Parameter
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -30,3 +33,29 @@ class RandomEffect(Effect):
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """Return none: a mean does not depend on it."""
         return ()
+
+    def joints(self, chain: tuple[str, ...]) -> tuple[str, ...]:
+        """Return the joints of a chain that it may be in, in their order."""
+        return tuple(j for j in chain if j in (self.places or chain) and j not in self.excluded)
+
+    def drawn(self, command: Array, pose: NDArray[np.int64], size: float, rng: np.random.Generator) -> Array:
+        """Return one draw of a joint's deviations: normal, with the standard deviation that the parameter says.
+
+        Parameters
+        ----------
+        command
+            (N,) of the joint, rad or m.
+        pose
+            (N,) number of the commanded pose that each row is a visit to.
+        size
+            The parameter, rad or m.
+        rng
+            Source of chance.
+
+        Returns
+        -------
+        ndarray
+            (N,) where the joint stands less its command, rad or m.
+        """
+        which = np.arange(len(pose)) if self.component == "visit" else np.unique(pose, return_inverse=True)[1]
+        return np.asarray(size / self.factor * rng.normal(size=len(pose))[which])

@@ -15,13 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign, Units
-from thermal_robot.diagnosis.optimal_design import joint_range, most_informative
+from thermal_robot.diagnosis.optimal_design import most_informative
 from thermal_robot.effects import Effect, choose, gate
 from thermal_robot.errors import CampaignError, require
 from thermal_robot.observations import observe
-from thermal_robot.planning import schedule, settings
+from thermal_robot.planning import settings
 from thermal_robot.planning.expected import Columns, Expected, expectations
-from thermal_robot.robot import Robot
+from thermal_robot.robot import Robot, joint_range
+from thermal_robot.simulation import schedule
+from thermal_robot.simulation.settings import RISE
 
 Array = NDArray[np.float64]
 
@@ -73,7 +75,7 @@ def plan(
     noise_orientation: float = settings.NOISE_TURN,
     target: Sequence[float] = (0.0, 0.0, 0.0),
     loads: Sequence[float] = (),
-    rise: float = settings.RISE,
+    rise: float = RISE,
     base_known: bool = False,
     tool_known: bool = False,
     units: Units | None = None,

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from thermal_robot.planning import settings
-from thermal_robot.planning.schedule import balanced, conditions, in_turn, visits
+from thermal_robot.simulation import settings
+from thermal_robot.simulation.schedule import balanced, conditions, in_turn, visits
 
 
 @pytest.mark.parametrize(("rows", "repeats"), [(12, 1), (12, 2), (12, 3), (12, 6), (30, 5)])

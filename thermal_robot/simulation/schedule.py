@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.campaign.turning import arrivals
-from thermal_robot.planning import settings
+from thermal_robot.simulation import settings
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -53,7 +53,7 @@ def balanced(poses: Array, places: Rows, rng: np.random.Generator) -> Rows:
     """(P,) an order of poses (P, n) in which each joint comes from either side about equally often.
 
     Two poses are exchanged wherever that brings the least balanced joint nearer to half; it stops once all are within
-    :data:`~thermal_robot.planning.settings.BALANCED`.
+    :data:`~thermal_robot.simulation.settings.BALANCED`.
     """
     order = np.arange(len(poses))
     worst = _unbalanced(poses, places, order)
