@@ -40,6 +40,7 @@ ORDER = (
     "streams",
     "parser",
     "blind",
+    "viewer",
     "commands",
     "cli",
     "__main__",
@@ -197,6 +198,7 @@ def test_every_module_says_what_it_is_for(path):
 
 def test_a_light_import_loads_nothing_heavy():
     heavy = ["pandas", "matplotlib", "scipy.stats", "yourdfpy", "rich", "jsonschema", "pyarrow", "tomli_w"]
+    heavy += ["trimesh", "viser"]
     code = f"import sys, thermal_robot; print([m for m in {heavy!r} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

@@ -36,16 +36,32 @@ def urdf_text(urdf: str | Path | WritesUrdf) -> tuple[str, str]:
         text = urdf.lstrip("\ufeff \t\r\n")
         if not text or text.startswith("<"):
             return text, DESCRIPTION
-        if urdf.startswith(BUILTIN):
-            return _read(_builtin_path(urdf.removeprefix(BUILTIN)))
-        if urdf.startswith(EXAMPLE_ROBOT_DATA):
-            return _read(_example_path(urdf.removeprefix(EXAMPLE_ROBOT_DATA)))
-        return _read(Path(urdf))
+        return _read(urdf_file(urdf))
     if isinstance(urdf, Path):
         return _read(urdf)
     if isinstance(urdf, WritesUrdf):
         return _written(urdf), DESCRIPTION
     raise RobotError(f"a robot is a path, URDF text or a yourdfpy.URDF, not {type(urdf).__name__}")
+
+
+def urdf_file(named: str | Path) -> Path:
+    """Return the file of a robot that is named; whether it exists is seen when it is read.
+
+    Parameters
+    ----------
+    named
+        Path of a file, ``"builtin:"`` and a name, or ``"example-robot-data:"`` and a name.
+
+    Raises
+    ------
+    RobotError
+        If no robot has this name.
+    """
+    if isinstance(named, str) and named.startswith(BUILTIN):
+        return _builtin_path(named.removeprefix(BUILTIN))
+    if isinstance(named, str) and named.startswith(EXAMPLE_ROBOT_DATA):
+        return _example_path(named.removeprefix(EXAMPLE_ROBOT_DATA))
+    return Path(named)
 
 
 def _written(urdf: WritesUrdf) -> str:
