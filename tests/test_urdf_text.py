@@ -4,7 +4,7 @@ import pytest
 
 from thermal_robot import urdf_text as module
 from thermal_robot.errors import RobotError
-from thermal_robot.urdf_text import DESCRIPTION, urdf_text
+from thermal_robot.urdf_text import DESCRIPTION, urdf_file, urdf_text
 
 
 def test_builtin_robots_are_found_inside_the_package_and_beside_it(rv_m2, tmp_path, monkeypatch):
@@ -46,3 +46,11 @@ def test_a_name_that_does_not_exist_is_answered_with_those_that_do(source, said)
     with pytest.raises(RobotError, match=said) as refused:
         urdf_text(source)
     assert "\n" not in str(refused.value)
+
+
+def test_the_file_of_a_robot_is_where_its_text_comes_from(rv_m2, tmp_path):
+    assert urdf_file("builtin:rv_m2").read_text(encoding="utf-8").strip() == rv_m2.urdf.strip()
+    for named in (tmp_path / "arm.urdf", str(tmp_path / "arm.urdf")):
+        assert urdf_file(named) == tmp_path / "arm.urdf"
+    with pytest.raises(RobotError, match="rv_m2"):
+        urdf_file("builtin:rv_m3")

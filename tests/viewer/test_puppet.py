@@ -1,10 +1,11 @@
 """The robot in the scene: nodes that take the poses of a row, in the colours of the places."""
 
+from dataclasses import replace
 from pathlib import Path
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from scene_nodes import Nodes
 
 from thermal_robot.kinematics import quaternion_to_rotation
 from thermal_robot.viewer import panel
@@ -12,31 +13,6 @@ from thermal_robot.viewer.colours import colours
 from thermal_robot.viewer.puppet import Puppet
 from thermal_robot.viewer.settings import NO_SHARE
 from thermal_robot.viewer.solids import solids
-
-
-class Nodes:
-    """Keeps what is added, as the scene of a server does."""
-
-    def __init__(self):
-        self.added = {}
-
-    def _keep(self, name, **given):
-        assert name not in self.added
-        assert name.startswith("/")
-        parent = name.rsplit("/", 1)[0]
-        assert parent in ("/links", "/joints") or parent in self.added, f"{name} has no parent"
-        self.added[name] = SimpleNamespace(position=np.zeros(3), wxyz=np.array([1.0, 0.0, 0.0, 0.0]), visible=True)
-        vars(self.added[name]).update(given)
-        return self.added[name]
-
-    def add_frame(self, name, **given):
-        return self._keep(name, **given)
-
-    def add_mesh_simple(self, name, vertices, faces, **given):
-        return self._keep(name, vertices=vertices, faces=faces, **given)
-
-    def add_label(self, name, text, **given):
-        return self._keep(name, text=text, **given)
 
 
 @pytest.fixture
@@ -92,7 +68,5 @@ def test_the_line_to_the_measured_point_ends_there(puppet, nodes, scene):
 
 @pytest.mark.parametrize("kind", ["tool", "base", "instrument"])
 def test_a_place_beside_joints_and_links_is_named_too(nodes, scene, kind):
-    from dataclasses import replace
-
     Puppet(nodes, replace(scene, shares={(kind, kind): 0.3}), ())
     assert [node.text for node in nodes.added.values() if hasattr(node, "text")] == [f"{kind} 30.0 %"]

@@ -8,7 +8,7 @@ import pytest
 import trimesh
 from conftest import load_arm
 
-from thermal_robot.errors import Note
+from thermal_robot.errors import Note, RobotError
 from thermal_robot.kinematics import link_poses
 from thermal_robot.urdf_text import urdf_file
 from thermal_robot.viewer.solids import ring, rod, solids
@@ -71,6 +71,19 @@ def test_the_rail_of_a_slide_reaches_its_joint_at_every_position():
       <child link="b"/><axis xyz="0 2 0"/><limit lower="-0.2" upper="0.5" effort="1" velocity="1"/></joint></robot>"""
     rail = {s.link: s for s in solids(text, Path(), 1.0)}["b"]
     np.testing.assert_allclose(bounds(rail)[:, 1], [-0.5, 0.2], atol=1e-9)
+
+
+@pytest.mark.parametrize("encoding", ["utf-8", "latin-1", "utf-16"])
+def test_what_the_text_says_of_its_encoding_does_not_matter(encoding):
+    text = f'<?xml version="1.0" encoding="{encoding}"?>\n<robot name="r"><link name="Träger"><visual><geometry>'
+    text += '<sphere radius="0.2"/></geometry></visual></link></robot>'
+    assert [solid.link for solid in solids(text, Path(), 1.0)] == ["Träger"]
+
+
+def test_shapes_that_cannot_be_read_are_said_so():
+    text = '<robot name="r"><link name="a"><visual><geometry><sphere radius="big"/></geometry></visual></link></robot>'
+    with pytest.raises(RobotError, match=r"<visual> elements, cannot be read.*big"):
+        solids(text, Path(), 1.0)
 
 
 @pytest.mark.parametrize("name", ["ur10", "panda", "kinova"])

@@ -82,13 +82,13 @@ def test_arrows_are_as_long_as_the_slider_says(opened, scene):
 def test_boxes_show_and_hide(opened, scene):
     window = opened(scene)
     nodes = window._server.scene._handle_from_node_name
-    assert (nodes["/gap/others"].visible, nodes["/after/row"].visible) == (True, False)
+    assert (nodes["/gap/all"].visible, nodes["/after/row"].visible) == (True, False)
     window._after.value = True
     window._all.value = False
     window._changed()
     shown = {name for name, node in nodes.items() if name.startswith(("/gap", "/after")) and node.visible}
     assert {"/gap/row", "/after/row"} <= shown
-    assert not {"/gap/others", "/after/others"} & shown
+    assert not {"/gap/all", "/after/all"} & shown
 
 
 def test_a_campaign_of_one_row_is_shown(opened, scene):

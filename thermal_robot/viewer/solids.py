@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import io
 import logging
+import re
 import warnings
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -13,13 +14,14 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.errors import Note
+from thermal_robot.errors import Note, RobotError
 from thermal_robot.viewer.meshes import find_mesh
 from thermal_robot.viewer.settings import KNOT, STICK
 
 Array = NDArray[np.float64]
 
-SHORTEST = 1e-6
+_DECLARATION = re.compile(r"^\s*<\?xml.*?\?>", re.DOTALL)
+_SHORTEST = 1e-6
 """m: what is shorter has no direction."""
 
 
@@ -59,6 +61,11 @@ def solids(urdf: str, folder: Path, size: float) -> tuple[Solid, ...]:
     tuple
         At most one solid a link, in the order of the URDF. A link whose meshes are missing is a stick to each joint
         that it carries; so are all links where none has a shape. A :class:`~thermal_robot.errors.Note` names a file.
+
+    Raises
+    ------
+    RobotError
+        If what the URDF says of shapes cannot be read.
     """
     import trimesh
 
@@ -97,8 +104,12 @@ def _parsed(urdf: str) -> Any:
 
     # it tells programmers what it does not know; what matters of that was said when the robot was loaded
     logging.getLogger("yourdfpy").setLevel(logging.CRITICAL)
-    file = io.BytesIO(urdf.encode())
-    return yourdfpy.URDF.load(file, build_scene_graph=False, load_meshes=False).robot
+    # the text is decoded already, whatever it says of its encoding
+    file = io.BytesIO(_DECLARATION.sub("", urdf, count=1).encode())
+    try:
+        return yourdfpy.URDF.load(file, build_scene_graph=False, load_meshes=False).robot
+    except Exception as error:  # of the XML, of numbers, of elements that are missing: each in its own way
+        raise RobotError(f"the shapes of the robot's links, its <visual> elements, cannot be read: {error}") from error
 
 
 def _drawn(robot: Any, folder: Path) -> tuple[dict[str, list[Any]], dict[str, list[str]]]:
@@ -110,7 +121,7 @@ def _drawn(robot: Any, folder: Path) -> tuple[dict[str, list[Any]], dict[str, li
             shape = _shape(visual.geometry, folder)
             if shape is not None:
                 drawn.setdefault(link.name, []).append(shape.apply_transform(_pose(visual.origin)))
-            elif visual.geometry.mesh is not None:
+            elif visual.geometry is not None and visual.geometry.mesh is not None:
                 absent.setdefault(link.name, []).append(visual.geometry.mesh.filename)
     return drawn, absent
 
@@ -119,6 +130,8 @@ def _shape(geometry: Any, folder: Path) -> Any:
     """Return the shape of one visual in its own frame; ``None`` where there is none, or no file that can be read."""
     import trimesh
 
+    if geometry is None:
+        return None
     if geometry.box is not None:
         return trimesh.creation.box(geometry.box.size)
     if geometry.cylinder is not None:
@@ -152,7 +165,7 @@ def _sticks(link: str, joints: Iterable[Any], size: float) -> list[Any]:
             axis = np.asarray(joint.axis, dtype=float) / np.linalg.norm(joint.axis)
             # where the joint's origin comes to lie behind the link, at either limit
             start, end = (-axis * (bound or 0.0) for bound in (joint.limit.lower, joint.limit.upper))
-        if np.linalg.norm(end - start) > SHORTEST:
+        if np.linalg.norm(end - start) > _SHORTEST:
             parts.append(rod(start, end, STICK * size))
     return parts
 

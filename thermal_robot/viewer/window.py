@@ -13,12 +13,12 @@ from numpy.typing import NDArray
 
 from thermal_robot.kinematics import rotation_to_quaternion
 from thermal_robot.viewer import panel
-from thermal_robot.viewer.arrows import arrows, readable, turned_along, unit_arrow
+from thermal_robot.viewer.arrows import readable, turned_along
+from thermal_robot.viewer.cloud import Cloud
 from thermal_robot.viewer.colours import Colour
 from thermal_robot.viewer.puppet import Puppet
 from thermal_robot.viewer.scene import Scene
 from thermal_robot.viewer.settings import (
-    ASIDE,
     CHOSEN,
     CHOSEN_AFTER,
     FAINT,
@@ -59,6 +59,7 @@ class Window:
         with self._server.atomic():
             self._look()
             self._puppet = Puppet(self._server.scene, scene, shapes)
+            self._clouds = self._add_clouds()
             self._add_controls()
             self._show()
 
@@ -128,35 +129,26 @@ class Window:
     def _show(self) -> None:
         self._puppet.pose(self.row)
         self._told.content = panel.of_row(self.scene, self.row, self.magnification)
-        scene, everywhere, after = self.scene, self._all.value, self._after.value
-        self._draw("/gap", scene.gap, (CHOSEN, GAP), (True, everywhere))
-        if scene.remainder is not None:
-            self._draw("/after", scene.remainder, (CHOSEN_AFTER, REMAINDER), (after, after and everywhere))
+        here, everywhere, after = np.array([self.row]), self._all.value, self._after.value
+        for (one, many), shown in zip(self._clouds, (True, after), strict=False):
+            one.show(here, self.magnification, shown)
+            many.show(self._drawn, self.magnification, shown and everywhere)
 
-    def _draw(self, name: str, vectors: Array, colour: tuple[Colour, Colour], shown: tuple[bool, bool]) -> None:
-        """Draw the arrow of the row that is shown, and those of all others."""
-        aside, others = self.scene.aside, self._drawn[self._drawn != self.row]
-        here = np.array([self.row])
-        self._add(f"{name}/row", here, vectors, np.array([colour[0]]), shown[0], THICKER)
-        self._add(f"{name}/others", others, vectors, np.where(aside[others, None], ASIDE, colour[1]), shown[1])
-
-    def _add(
-        self, name: str, rows: NDArray[Any], vectors: Array, colour: Array, shown: bool, thicker: float = 1.0
-    ) -> None:
-        scene = self.scene
-        drawn = arrows(scene.predicted[rows], vectors[rows], self.magnification, scene.size, thicker)
-        self._server.scene.add_batched_meshes_simple(
-            name,
-            *unit_arrow(),
-            drawn.turns,
-            drawn.starts,
-            batched_scales=drawn.stretches,
-            batched_colors=colour.astype(np.uint8),
-            visible=shown,
-            cast_shadow=False,
-            receive_shadow=False,
-            lod="off",
-        )
+    def _add_clouds(self) -> list[tuple[Cloud, Cloud]]:
+        """Return the arrows of the row that is shown and those of all rows: before the correction, and after it."""
+        scene, nodes = self.scene, self._server.scene
+        kinds: list[tuple[str, Array | None, Colour, Colour]] = [
+            ("/gap", scene.gap, CHOSEN, GAP),
+            ("/after", scene.remainder, CHOSEN_AFTER, REMAINDER),
+        ]
+        return [
+            (
+                Cloud(nodes, f"{name}/row", scene, vectors, dark, THICKER),
+                Cloud(nodes, f"{name}/all", scene, vectors, pale),
+            )
+            for name, vectors, dark, pale in kinds
+            if vectors is not None
+        ]
 
 
 def _server(label: str, port: int) -> Any:
