@@ -70,3 +70,12 @@ def test_the_line_to_the_measured_point_ends_there(puppet, nodes, scene):
 def test_a_place_beside_joints_and_links_is_named_too(nodes, scene, kind):
     Puppet(nodes, replace(scene, shares={(kind, kind): 0.3}), ())
     assert [node.text for node in nodes.added.values() if hasattr(node, "text")] == [f"{kind} 30.0 %"]
+
+
+def test_the_foot_has_the_colour_of_the_base(nodes, scene):
+    shares = {("base", "base"): 0.5, ("joint", "joint_2"): 0.1}
+    Puppet(nodes, replace(scene, shares=shares), solids(scene.robot.urdf, Path(), scene.size))
+    found = {link: nodes.added.get(f"/links/{k}/shape") for k, link in enumerate(scene.robot.urdf_links)}
+    coloured = {link for link, node in found.items() if node is not None and node.color != NO_SHARE}
+    assert coloured == {"base_link"}
+    assert found["base_link"].color == colours(shares)["base", "base"]

@@ -35,11 +35,13 @@ class Puppet:
     def __init__(self, nodes: Any, scene: Scene, shapes: Sequence[Solid]) -> None:
         self._nodes, self._scene = nodes, scene
         self._colours = colours(scene.shares)
+        chain = scene.robot.chain
+        self._standing = chain.parent_links[: chain.movable[0] + 1]
         self._links = {}
         for k, link in enumerate(scene.robot.urdf_links):
             self._links[k] = nodes.add_frame(f"/links/{k}", show_axes=False)
             for shape in (s for s in shapes if s.link == link):
-                self._mesh(f"/links/{k}/shape", shape.vertices, shape.faces, self._colour("link", link))
+                self._mesh(f"/links/{k}/shape", shape.vertices, shape.faces, self._colour_of_link(link))
         self._joints = [self._joint(j, name) for j, name in enumerate(scene.robot.joint_names)]
         if np.linalg.norm(scene.target) > POINTER * scene.size:
             tool = scene.robot.urdf_links.index(scene.robot.tool_frame)
@@ -80,10 +82,18 @@ class Puppet:
             at = at if shape is None else 0.5 * (shape.vertices.min(axis=0) + shape.vertices.max(axis=0))
         else:
             node = f"/links/{robot.urdf_links.index(robot.root_frame)}"
-        return self._nodes.add_label(f"{node}/name_{kind}", text, position=at, anchor="center-left")
+        # a joint lies where a link begins: one name to its left, the other to its right
+        anchor = "center-right" if kind == "joint" else "center-left"
+        return self._nodes.add_label(f"{node}/name_{kind}", text, position=at, anchor=anchor)
 
     def _mesh(self, name: str, vertices: Array, faces: NDArray[np.int64], colour: Colour) -> None:
         self._nodes.add_mesh_simple(name, vertices, faces, color=colour, flat_shading=False)
+
+    def _colour_of_link(self, link: str) -> Colour:
+        """Return the colour of a link; what stands still below the first joint is the base, unless it has its own."""
+        if link in self._standing and ("link", link) not in self._colours:
+            return self._colour("base", "base")
+        return self._colour("link", link)
 
     def _colour(self, kind: str, name: str) -> Colour:
         return self._colours.get((kind, name), NO_SHARE)

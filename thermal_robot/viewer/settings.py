@@ -17,7 +17,7 @@ LONG_ARROW = 0.08
 """Length of a large gap as it is drawn at first, as a share of the scene: seen at once, and hides no robot."""
 LARGE_GAP = 0.9
 """Quantile of the gaps that is drawn so long: gross errors must not shrink all others to nothing."""
-LONGEST_ARROW = 0.4
+LONGEST_ARROW = 0.2
 """Share of the scene at which an arrow is cut: a gross error of millimetres would be a pole of several metres."""
 STRONGER = 10.0
 """How many times further the slider of the magnification goes than where it stands at first."""
