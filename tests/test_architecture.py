@@ -22,7 +22,7 @@ ORDER = (
     "kinematics",
     "urdf_text",
     "robot",
-    "solids",
+    "shapes",
     "assembly",
     "paper",
     "campaign",
@@ -42,6 +42,7 @@ ORDER = (
     "streams",
     "parser",
     "blind",
+    "viewer",
     "commands",
     "cli",
     "__main__",
@@ -199,6 +200,7 @@ def test_every_module_says_what_it_is_for(path):
 
 def test_a_light_import_loads_nothing_heavy():
     heavy = ["pandas", "matplotlib", "scipy.stats", "yourdfpy", "rich", "jsonschema", "pyarrow", "tomli_w"]
+    heavy += ["trimesh", "viser"]
     code = f"import sys, thermal_robot; print([m for m in {heavy!r} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"

@@ -93,7 +93,7 @@ def test_every_command_and_option_exists(page):
     known = options()
     for command, rest in re.findall(r"thermal-robot ([a-z][a-z0-9]*)\b([^`\n]*)", page.read_text(encoding="utf-8")):
         assert command in known, f"thermal-robot {command}"
-        used = set(re.findall(r"(?<!\S)\[?(--?[a-z]\w*)", rest.split("#")[0]))
+        used = set(re.findall(r"(?<!\S)\[?(--?[a-z][\w-]*)", rest.split("#")[0]))
         assert used <= known[command], f"thermal-robot {command}{rest}"
 
 

@@ -9,7 +9,19 @@ from collections.abc import Sequence
 from contextlib import suppress
 
 from thermal_robot.blind import command as blind
-from thermal_robot.commands import check, correct, demo, diagnose, effects, import_files, iso9283, paper, plan, predict
+from thermal_robot.commands import (
+    check,
+    correct,
+    demo,
+    diagnose,
+    effects,
+    import_files,
+    iso9283,
+    paper,
+    plan,
+    predict,
+    view,
+)
 from thermal_robot.console import NORMAL, add_loudness, heard
 from thermal_robot.errors import ThermalRobotError
 from thermal_robot.parser import BAD_INPUT, DONE, FAILED, INTERRUPTED, STATUSES, Parser
@@ -21,6 +33,7 @@ COMMANDS = {
     "check": check,
     "effects": effects,
     "diagnose": diagnose,
+    "view": view,
     "predict": predict,
     "correct": correct,
     "iso9283": iso9283,

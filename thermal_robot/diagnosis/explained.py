@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.effects.effect import in_words
-from thermal_robot.solids import Solid
+from thermal_robot.shapes.hulls import Hull
 
 Array = NDArray[np.float64]
 
@@ -96,7 +96,7 @@ class Arm:
         (J,) share that enters at each.
     moves
         (J,) which of the links each joint moves first.
-    solids
+    hulls
         What links look like; nothing of those without a shape.
     """
 
@@ -106,4 +106,4 @@ class Arm:
     joints: tuple[str, ...]
     joint_shares: Array
     moves: NDArray[np.int64]
-    solids: tuple[Solid, ...]
+    hulls: tuple[Hull, ...]

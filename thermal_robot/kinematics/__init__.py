@@ -14,6 +14,7 @@ from thermal_robot.kinematics.lie import (
     rotation_to_quaternion,
     rotation_to_rpy,
 )
+from thermal_robot.kinematics.links import link_poses
 
 __all__ = [
     "AugmentedModel",
@@ -30,6 +31,7 @@ __all__ = [
     "gravity_torques",
     "growing",
     "inverse_kinematics",
+    "link_poses",
     "log3",
     "nearest_postures",
     "placement_sensitivities",

@@ -69,7 +69,7 @@ def _values(diagnosis: Diagnosis, arm: Arm, chosen: NDArray[np.int64]) -> dict[s
     index = {name: k for k, name in enumerate(arm.links)}
     shapes = [
         {"link": index[s.link], "corners": _short(s.corners, "corners"), "faces": s.faces.ravel().tolist()}
-        for s in arm.solids
+        for s in arm.hulls
     ]
     postures = [
         {

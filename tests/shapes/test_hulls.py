@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from thermal_robot import load_robot
-from thermal_robot.solids import hull, solids
+from thermal_robot.shapes.hulls import hull, hulls
 
 ONE = """<robot name="one"><link name="ground"/><link name="arm">{visual}</link>
 <joint name="turn" type="revolute"><parent link="ground"/><child link="arm"/><axis xyz="0 0 1"/>
@@ -21,10 +21,10 @@ def shaped(geometry, origin="0 0 0", tmp_path=None):
     visual = f'<visual><origin xyz="{origin}" rpy="0 0 0"/><geometry>{geometry}</geometry></visual>'
     text = ONE.format(visual=visual)
     if tmp_path is None:
-        return solids(load_robot(text, "arm"))
+        return hulls(load_robot(text, "arm"))
     file = tmp_path / "one.urdf"
     file.write_text(text, encoding="utf-8")
-    return solids(load_robot(file, "arm"))
+    return hulls(load_robot(file, "arm"))
 
 
 @pytest.mark.parametrize(
@@ -79,13 +79,13 @@ def test_what_is_flat_has_no_hull():
 
 
 def test_every_link_of_the_reference_robot_has_a_shape(rv_m2):
-    assert {s.link for s in solids(rv_m2)} == set(rv_m2.chain.parent_links)
+    assert {s.link for s in hulls(rv_m2)} == set(rv_m2.chain.parent_links)
 
 
 def test_the_meshes_of_an_example_robot_are_read():
     pytest.importorskip("example_robot_data", reason="the extra robots is not installed")
     robot = load_robot("example-robot-data:ur10", "tool0")
-    shown = {s.link: s for s in solids(robot)}
+    shown = {s.link: s for s in hulls(robot)}
     assert {"base_link", "shoulder_link", "upper_arm_link", "forearm_link"} <= set(shown)
     # the upper arm is 612 mm between its joints, and has a housing around each
     assert 0.612 < np.ptp(shown["upper_arm_link"].corners, axis=0).max() < 0.9

@@ -1,0 +1,17 @@
+"""A diagnosed campaign, and its scene."""
+
+import pytest
+
+from thermal_robot.datasets import demo_campaign
+from thermal_robot.diagnosis import diagnose
+from thermal_robot.viewer.scene import scene_of_diagnosis
+
+
+@pytest.fixture(scope="session")
+def found():
+    return diagnose(demo_campaign())
+
+
+@pytest.fixture(scope="session")
+def scene(found):
+    return scene_of_diagnosis(found)
