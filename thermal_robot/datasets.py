@@ -13,5 +13,12 @@ def demo_directory() -> Path:
 
 
 def demo_campaign() -> Campaign:
-    """Read the demo's campaign: simulated, with a stated seed."""
+    """Read the demo's campaign: simulated, with a stated seed.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> tr.demo_campaign()
+    <Campaign 'demo': 120 samples of position, 5 joints, 8 covariates>
+    """
     return read_campaign(demo_directory())

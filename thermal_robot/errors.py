@@ -9,7 +9,17 @@ _LONGEST = 1000  # characters of a message: a terminal shows it on a dozen lines
 
 
 class ThermalRobotError(Exception):
-    """Root of the errors that are the user's to mend; each prints as one line that a person can read."""
+    """Root of the errors that are the user's to mend; each prints as one line that a person can read.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> try:
+    ...     tr.read_campaign("no_such_folder")
+    ... except tr.ThermalRobotError as error:
+    ...     print(error)
+    no_such_folder...
+    """
 
     def __str__(self) -> str:
         # a name or a value may be a million characters long, or of bytes that are no text
@@ -41,6 +51,15 @@ class RobotError(ThermalRobotError):
         The file, frame or joint that offends.
     candidates
         Names that would have been accepted, nearest first.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> try:
+    ...     tr.load_robot("builtin:rv_m2", "tol0")
+    ... except tr.RobotError as error:
+    ...     print(error.candidates[0])
+    tool0
     """
 
     def __init__(self, message: str, *, name: str = "", candidates: Sequence[str] = ()) -> None:
@@ -66,6 +85,15 @@ class CampaignError(ThermalRobotError):
         Path of a value in a file that is no table, such as ``effects[2].values[3]``.
     found, expected
         What stands there and what should.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> try:
+    ...     tr.demo_campaign().drop_covariate("humidity")
+    ... except tr.CampaignError as error:
+    ...     print(error.problem, error.column)
+    no such covariate humidity
     """
 
     def __init__(
@@ -90,11 +118,31 @@ class CampaignError(ThermalRobotError):
 
 
 class EffectError(ThermalRobotError):
-    """An effect that breaks its contract, or a name that no effect has."""
+    """An effect that breaks its contract, or a name that no effect has.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> try:
+    ...     tr.diagnose(tr.demo_campaign(), only=["backlsh"])
+    ... except tr.EffectError as error:
+    ...     print(error)
+    no effect is named 'backlsh'; did you mean 'backlash'?
+    """
 
 
 class EstimationError(ThermalRobotError):
-    """Data that do not determine what was asked of them."""
+    """Data that do not determine what was asked of them.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> try:
+    ...     tr.diagnose(tr.demo_campaign().take([0, 1]))
+    ... except tr.EstimationError as error:
+    ...     print(error)
+    2 different poses are too few: 9 unknowns of the frames need at least 7 of them, and effects many more
+    """
 
 
 class SealError(ThermalRobotError):

@@ -87,6 +87,13 @@ class Observations:
         What is known so far to be displaced in the chain.
     parameters
         Of the effects that were asked for them here last: the settings of an effect in single places share them.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> seen = tr.observe(tr.demo_campaign())
+    >>> seen.q.shape, seen.joint_sensitivity.shape, seen.varies("temperature")
+    ((120, 5), (120, 6, 5), True)
     """
 
     campaign: Campaign
@@ -267,6 +274,13 @@ def observe(
     -----
     With ``sim.*`` columns the prediction is the simulator's pose plus what the displacement does to the URDF's pose:
     the simulator says where the nominal robot is, the URDF how an error moves it.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> sound = tr.simulate("builtin:rv_m2", tool_frame="tool0", rows=10)
+    >>> bool(abs(tr.observe(sound).gap).max() < 1e-12)
+    True
     """
     require("observe()", campaign, (Campaign,), "a campaign")
     require("observe(), frames", frames, (Frames, type(None)), "Frames, or None for those that the file declares")

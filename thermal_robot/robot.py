@@ -94,6 +94,15 @@ class Robot:
         Names of all links and of all joints of the URDF, in the chain or not, fixed joints too.
     folder
         Of the URDF's file, from which its meshes are named; ``None`` where it came as text.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> robot = tr.load_robot("builtin:rv_m2", "tool0")
+    >>> robot
+    Robot('rv_m2', 'base_link' to 'tool0', 5 joints, 7 segments)
+    >>> robot.n, robot.joint_names[0], round(robot.mass, 1)
+    (5, 'joint_1', 20.0)
     """
 
     name: str
@@ -256,6 +265,18 @@ def load_robot(
         that is not revolute, continuous, prismatic or fixed, if one of its joints mimics one that does not exist, or
         in the end itself, if gravity is not three numbers of a planet, or if a mass, an inertia, an origin, an axis or
         a limit is no number, or one that no robot has.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> tr.load_robot("builtin:rv_m2", "tool0").joint_names
+    ('joint_1', 'joint_2', 'joint_3', 'joint_4', 'joint_5')
+
+    Without a tool frame, those that there are get named:
+
+    >>> tr.load_robot("builtin:rv_m2", "")
+    Traceback (most recent call last):
+    thermal_robot.errors.RobotError: no tool frame is given; the links at the ends of this robot are tool0
     """
     text, source, folder = urdf_text(urdf)
     for frame in (tool_frame, root_frame):

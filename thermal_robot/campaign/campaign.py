@@ -126,6 +126,15 @@ class Campaign:
     ------
     CampaignError
         Arrays whose shapes do not fit together, figures that are not finite, values of another kind.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> campaign = tr.demo_campaign()
+    >>> campaign.samples, campaign.measures, campaign.settings.tool_frame, campaign.pose_labels
+    (120, 'position', 'tool0', None)
+    >>> campaign.clock.shape, campaign.since_turn["joint_2"].shape, campaign.reach > 1.0
+    ((120,), (120,), True)
     """
 
     name: str
@@ -325,6 +334,13 @@ class Campaign:
         ----------
         rows
             (N,) booleans, or indices in any order, repeats allowed.
+
+        Examples
+        --------
+        >>> campaign = tr.demo_campaign()
+        >>> warm = campaign.take(campaign.covariates["temperature"] > 25.0)
+        >>> 0 < warm.samples < campaign.samples
+        True
         """
         index = np.asarray(rows)
         if index.size == 0:
@@ -350,6 +366,11 @@ class Campaign:
         ------
         CampaignError
             The campaign has no such column.
+
+        Examples
+        --------
+        >>> "payload" in tr.demo_campaign().drop_covariate("payload").covariates
+        False
         """
         if name not in self.covariates and name not in self.labels:
             present = ", ".join([*self.covariates, *self.labels]) or "none"

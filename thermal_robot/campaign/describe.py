@@ -27,6 +27,14 @@ def describe(campaign: Campaign) -> str:
     str
         Plain text of several lines: robot, what was measured, frames, noise, joints against their limits,
         covariates with their ranges and gaps, repeats, sessions, warnings.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> print(tr.describe(tr.demo_campaign()))
+    Campaign demo
+      robot   rv_m2, chain from base_link to tool0, 5 movable joints
+    ...
     """
     require("describe()", campaign, (Campaign,), "a campaign")
     blocks = [

@@ -90,6 +90,17 @@ def campaign_from_table(
     ------
     CampaignError
         As for a file, which is called ``<table>``.
+
+    Examples
+    --------
+    >>> import pandas as pd
+    >>> import thermal_robot as tr
+    >>> robot = tr.load_robot("builtin:rv_m2", "tool0")
+    >>> q = [[0.1 * k, 0.2, -0.3 * k, 0.1, 0.0] for k in range(1, 6)]
+    >>> table = pd.DataFrame(q, columns=robot.joint_names)
+    >>> table[["x", "y", "z"]] = 1e3 * robot.forward(q)[:, :3, 3]
+    >>> tr.campaign_from_table(robot, table, length_unit="mm", base="known", tool="known")
+    <Campaign 'table': 5 samples of position, 5 joints, 0 covariates>
     """
     import pandas as pd
 

@@ -40,6 +40,13 @@ def read_campaign(path: str | Path, *, folder: str | Path | None = None) -> Camp
         A file that cannot be used: names file, row and column, what was found and what was expected.
     RobotError
         A robot that cannot be loaded, or has no such frame.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> file = tr.write_campaign(tr.demo_campaign(), "hall_3")
+    >>> tr.read_campaign(file)
+    <Campaign 'hall_3': 120 samples of position, 5 joints, 8 covariates>
     """
     require("read_campaign()", path, (str, os.PathLike), f"the path of a {FILE_NAME}, or of its folder")
     if path == "":  # which Path takes for the folder that one stands in
@@ -86,6 +93,13 @@ def read_samples(
         A table that cannot be used.
     TypeError
         Settings without a robot.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> campaign = tr.demo_campaign()
+    >>> tr.read_samples(campaign.to_frame().head(3), campaign)
+    <Campaign 'table': 3 samples to predict, 5 joints, 8 covariates>
     """
     if isinstance(settings, Campaign):
         robot = robot or settings.robot

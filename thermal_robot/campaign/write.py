@@ -53,6 +53,13 @@ def write_campaign(campaign: Campaign, directory: str | Path, *, comments: Seque
     CampaignError
         Samples without measured positions, which :func:`write_table` writes; a directory that cannot be
         written.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> file = tr.write_campaign(tr.demo_campaign(), "hall_3", comments=["Before the gear was changed."])
+    >>> sorted(path.name for path in file.parent.iterdir())
+    ['campaign.toml', 'measurements.csv', 'robot.urdf']
     """
     require("write_campaign()", campaign, (Campaign,), "a campaign")
     require("write_campaign()", directory, (str, os.PathLike), "the path of a folder")

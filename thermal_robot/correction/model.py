@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike, NDArray
 from thermal_robot.campaign import Campaign, Settings, read_samples, read_table, with_commands, with_prediction
 from thermal_robot.campaign.table import Table
 from thermal_robot.correction.commands import Commands, corrected, nominal_positions
+from thermal_robot.correction.required import require_finite, require_needed
 from thermal_robot.effects import Effect
 from thermal_robot.effects.apply import displacement
 from thermal_robot.errors import CampaignError, require
@@ -53,6 +54,13 @@ class CorrectedModel:
         First and last ``order`` of the campaign, where it had that column.
     spread
         How far its predictions may be off; ``None`` where a file of version 0.2 does not say.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> model = tr.diagnose(tr.demo_campaign()).model
+    >>> sorted(effect.name for effect, values in model.effects), model.measures
+    (['backlash', 'thermal_elongation'], 'position')
     """
 
     robot: Robot
@@ -94,6 +102,11 @@ class CorrectedModel:
             is so large that no finite position follows.
         EffectError
             If an effect of the model cannot be told in these rows.
+
+        Examples
+        --------
+        >>> tr.diagnose(tr.demo_campaign()).model.predict(tr.demo_campaign())[0].shape
+        (120, 3)
         """
         if isinstance(samples, (Campaign, str, os.PathLike)):
             return self.prediction(samples)[:2]
@@ -114,6 +127,12 @@ class CorrectedModel:
         pandas.DataFrame
             Then x y z, qw qx qy qz where the campaign measured orientation, std.x std.y std.z, and in ``outside`` the
             columns in which the row leaves what was measured, separated by blanks.
+
+        Examples
+        --------
+        >>> model, table = tr.diagnose(tr.demo_campaign()).model, tr.demo_campaign().to_frame()
+        >>> list(model.predicted(table, model.prediction(table)).columns[-7:])
+        ['x', 'y', 'z', 'std.x', 'std.y', 'std.z', 'outside']
         """
         return with_prediction(samples, *prediction, self.settings.units)
 
@@ -131,13 +150,19 @@ class CorrectedModel:
         ------
         CampaignError
             As :meth:`predict`.
+
+        Examples
+        --------
+        >>> prediction = tr.diagnose(tr.demo_campaign()).model.prediction(tr.demo_campaign())
+        >>> bool(prediction.std.max() < 1e-4)
+        True
         """
         samples = self._ready(samples)
         nominal = observe(samples, self.frames)
         moved, instrument = displacement(nominal, self.effects)
         corrected = observe(samples, self.frames, displacement=moved)
         position = corrected.predicted_position + (0.0 if instrument is None else instrument)
-        self._require_finite(samples, position)
+        require_finite(samples, position)
         turned = self.measures == "pose"
         orientation = rotation_to_quaternion(self.frames.base[:3, :3] @ corrected.rotation) if turned else None
         if self.spread is None:
@@ -173,6 +198,13 @@ class CorrectedModel:
         ------
         CampaignError
             As :meth:`predict`; and if a pose is out of reach for the real robot, whose row is named.
+
+        Examples
+        --------
+        >>> model = tr.diagnose(tr.demo_campaign()).model
+        >>> warm = {**dict.fromkeys(model.needs, 1.0), "temperature": 26.0}
+        >>> model.corrected_commands([[0.1, 0.2, -0.3, 0.4, 0.5]], warm).q.round(4).tolist()
+        [[0.1, 0.2016, -0.3037, 0.4023, 0.5]]
         """
         if conditions is None and not isinstance(poses, (np.ndarray, list, tuple)):
             return self._commands(poses)
@@ -195,6 +227,12 @@ class CorrectedModel:
         pandas.DataFrame
             Then std.x std.y std.z, in ``outside`` the columns in which the row leaves what was measured, separated by
             blanks, and in ``miss.direction`` the angle by which the target's direction is missed.
+
+        Examples
+        --------
+        >>> model, table = tr.diagnose(tr.demo_campaign()).model, tr.demo_campaign().to_frame().head(2)
+        >>> model.commanded(table, model.corrected_commands(table)).shape
+        (2, 18)
         """
         q, std, outside, missed = commands.q, commands.std, commands.outside, commands.direction
         return with_commands(samples, self.robot, q, std, outside, missed, self.settings.units)
@@ -216,6 +254,12 @@ class CorrectedModel:
         ------
         CampaignError
             If an array does not fit, or a value is none.
+
+        Examples
+        --------
+        >>> model = tr.diagnose(tr.demo_campaign()).model
+        >>> model.samples_at([0.1, 0.2, -0.3, 0.4, 0.5], {"temperature": 26.0})
+        <Campaign '<conditions>': 1 samples to predict, 5 joints, 1 covariate>
         """
         name, given = "<conditions>", {}
         try:
@@ -245,7 +289,7 @@ class CorrectedModel:
         """Return samples with what the model reads, and nothing else that a table may hold."""
         if not isinstance(samples, Campaign):
             samples = self.samples(samples)
-        self._require(samples)
+        require_needed(samples, self.needs, [effect.name for effect, _ in self.effects], self.simulated)
         read = {name: values for name, values in samples.covariates.items() if name in self.needs}
         return self._in_sequence(replace(samples, covariates=read))
 
@@ -253,6 +297,11 @@ class CorrectedModel:
         """Tell whether the ``order`` of the samples merely numbers the rows of their own file.
 
         It does if it starts where the campaign's did, has no gaps, and ends earlier. False if the model needs none.
+
+        Examples
+        --------
+        >>> tr.diagnose(tr.demo_campaign()).model.counts_anew(tr.demo_campaign())
+        False
         """
         order = samples.covariates.get("order")
         if order is None or self.last_order is None or "order" not in self.needs:
@@ -271,34 +320,6 @@ class CorrectedModel:
         late = np.full(samples.samples, self.last_order[1])
         return replace(samples, covariates={**samples.covariates, "order": late})
 
-    def _require(self, samples: Campaign) -> None:
-        for column in self.needs:
-            held = ", ".join(e.name for e, _ in self.effects)
-            reason = f"the model ({held}) needs this column"
-            if column not in samples.covariates:
-                raise CampaignError(samples.name, reason, column=column, found="no such column", expected="numbers")
-            gaps = np.flatnonzero(samples.missing.get(column, np.zeros(0, dtype=bool)))
-            if gaps.size:
-                row = int(samples.rows[gaps[0]])
-                raise CampaignError(
-                    samples.name, reason, row=row, column=column, found="an empty cell", expected="a number"
-                )
-        if self.simulated and samples.simulated_position is None:
-            raise CampaignError(
-                samples.name,
-                "the model corrects the prediction of your simulator",
-                column="sim.x",
-                found="no such column",
-                expected="sim.x, sim.y, sim.z",
-            )
-
-    @staticmethod
-    def _require_finite(samples: Campaign, position: Array) -> None:
-        wrong = np.flatnonzero(~np.isfinite(position).all(axis=1))
-        if wrong.size:
-            row = int(samples.rows[wrong[0]])
-            raise CampaignError(samples.name, "the values of this row lead to no finite position", row=row)
-
     def samples(self, table: str | Path | pd.DataFrame | Table) -> Campaign:
         """Read a table of commands and conditions in the units of the campaign that the model was fitted to.
 
@@ -306,6 +327,11 @@ class CorrectedModel:
         ------
         CampaignError
             A table that cannot be used.
+
+        Examples
+        --------
+        >>> tr.diagnose(tr.demo_campaign()).model.samples(tr.demo_campaign().to_frame().head(4))
+        <Campaign 'table': 4 samples to predict, 5 joints, 8 covariates>
         """
         if isinstance(table, (str, os.PathLike)):
             table = read_table(Path(table))
@@ -313,7 +339,13 @@ class CorrectedModel:
         return replace(samples, name=table.file) if isinstance(table, Table) else samples
 
     def to_dict(self) -> dict[str, Any]:
-        """Return everything, the URDF's text and a checksum included, as plain values."""
+        """Return everything, the URDF's text and a checksum included, as plain values.
+
+        Examples
+        --------
+        >>> "effects" in tr.diagnose(tr.demo_campaign()).model.to_dict()
+        True
+        """
         return written(vars(self))
 
     @classmethod
@@ -328,11 +360,21 @@ class CorrectedModel:
             If a value is not what it must be, which is named, or was changed after it was written.
         EffectError
             If it holds an effect that is not installed.
+
+        Examples
+        --------
+        >>> tr.CorrectedModel.from_dict(tr.diagnose(tr.demo_campaign()).model.to_dict()).measures
+        'position'
         """
         return cls(**fields_of(plain, effects, file))
 
     def save(self, path: str | Path) -> None:
-        """Write the model to a JSON file that stands alone; it appears whole or not at all."""
+        """Write the model to a JSON file that stands alone; it appears whole or not at all.
+
+        Examples
+        --------
+        >>> tr.diagnose(tr.demo_campaign()).model.save("model.json")
+        """
         write_text(path, json.dumps(self.to_dict(), indent=1) + "\n")
 
     @classmethod
@@ -346,6 +388,12 @@ class CorrectedModel:
             the value that is wrong is named by its place, as ``effects[2].values[3]``.
         EffectError
             If it holds an effect that is not installed.
+
+        Examples
+        --------
+        >>> tr.diagnose(tr.demo_campaign()).model.save("model.json")
+        >>> tr.CorrectedModel.load("model.json").robot.name
+        'rv_m2'
         """
         require("load()", path, (str, os.PathLike), "the path of a file that save() wrote")
         return cls.from_dict(read(Path(path)), effects, file=str(path))

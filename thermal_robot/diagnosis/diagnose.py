@@ -73,6 +73,15 @@ def diagnose(
         If an effect's name is not known.
     EstimationError
         If there are too few measurements for the unknown frames.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> found = tr.diagnose(tr.demo_campaign())
+    >>> found
+    Diagnosis('demo': thermal_elongation, backlash)
+    >>> print(found.summary)
+    The gap of 62.6 µm comes from thermal elongation of the links and lost motion in the joints (90 % sure); ...
     """
     expected = "a campaign, or the path of one; campaign_from_table makes one of a DataFrame"
     require("diagnose()", campaign, (Campaign, str, os.PathLike), expected)

@@ -112,6 +112,19 @@ class Diagnosis:
         Why nothing can be said of the robot: robot and table do not belong together; ``None`` where they do.
     performance
         Criteria of ISO 9283, AP before the correction and after it; ``None`` without repeats.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> found = tr.diagnose(tr.demo_campaign())
+    >>> found.verdict, found.usable, found.reason, found.narrowed, found.outliers
+    (('thermal_elongation', 'backlash'), True, '', False, (8, 24, 74, 90))
+    >>> found.gap.rms_after < found.gap.rms_before
+    True
+    >>> list(found.parameters.columns)
+    ['status', 'value', 'std', 'unit', 'identified']
+    >>> found.covariance.shape, found.residuals.shape, found.frames.shape
+    ((6, 6), (120, 9), (2, 6))
     """
 
     campaign: str
@@ -168,13 +181,25 @@ class Diagnosis:
         ------
         EffectError
             If the effect is not part of the fit.
+
+        Examples
+        --------
+        >>> figure = tr.diagnose(tr.demo_campaign()).explain("backlash")
+        >>> figure.savefig("backlash.png")
         """
         from thermal_robot.diagnosis.one_effect import explained
 
         return _teller().explain_figure(explained(self._fitted(), effect))
 
     def next_samples(self, count: int = 10) -> NextSamples:
-        """Choose samples that would best separate the leading explanations; ``to_table()`` makes a table of them."""
+        """Choose samples that would best separate the leading explanations; ``to_table()`` makes a table of them.
+
+        Examples
+        --------
+        >>> samples = tr.diagnose(tr.demo_campaign()).next_samples(3)
+        >>> len(samples.to_table())
+        3
+        """
         from thermal_robot.diagnosis.next_samples import next_samples
 
         return next_samples(self._fitted(), count)
@@ -196,6 +221,12 @@ class Diagnosis:
         -------
         Arm or None
             ``None`` where nothing is known of places: this diagnosis is not usable, or was made without its fit.
+
+        Examples
+        --------
+        >>> arm = tr.diagnose(tr.demo_campaign()).arm([0, 1])
+        >>> arm.poses.shape
+        (2, 8, 4, 4)
         """
         from thermal_robot.diagnosis.arm import arm
 
@@ -243,20 +274,44 @@ class Diagnosis:
         return bool(self.left_out)
 
     def finding(self, effect: str) -> Finding:
-        """Return the finding of one effect; ``KeyError`` for a name that was not a candidate."""
+        """Return the finding of one effect; ``KeyError`` for a name that was not a candidate.
+
+        Examples
+        --------
+        >>> tr.diagnose(tr.demo_campaign()).finding("backlash").status
+        'found'
+        """
         return {f.name: f for f in self.effects}[effect]
 
     def title(self, effect: str) -> str:
-        """Return an effect's name in plain words."""
+        """Return an effect's name in plain words.
+
+        Examples
+        --------
+        >>> tr.diagnose(tr.demo_campaign()).title("backlash")
+        'lost motion in the joints'
+        """
         own = next((f.title for f in self.effects if f.name == effect), "")
         return own or effect.replace("_", " ")
 
     def is_frame(self, effect: str) -> bool:
-        """Tell whether an effect displaces a frame that is unknown."""
+        """Tell whether an effect displaces a frame that is unknown.
+
+        Examples
+        --------
+        >>> tr.diagnose(tr.demo_campaign()).is_frame("backlash")
+        False
+        """
         return is_frame(self.effects, effect)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return the JSON object of the format ``thermal-robot/diagnosis/2``."""
+        """Return the JSON object of the format ``thermal-robot/diagnosis/2``.
+
+        Examples
+        --------
+        >>> list(tr.diagnose(tr.demo_campaign()).to_dict())
+        ['schema', 'campaign', 'gap', 'verdict', 'effects', 'where', 'unexplained', 'next']
+        """
         left = self.unexplained
         plain: dict[str, Any] = {
             "schema": SCHEMA,
@@ -299,7 +354,12 @@ class Diagnosis:
         return [] if self.fit is None or not self.usable else self.next_samples().to_list()
 
     def to_json(self, path: str | Path) -> None:
-        """Write :meth:`to_dict` to a file, which appears whole or not at all."""
+        """Write :meth:`to_dict` to a file, which appears whole or not at all.
+
+        Examples
+        --------
+        >>> tr.diagnose(tr.demo_campaign()).to_json("diagnosis.json")
+        """
         write_text(path, json.dumps(self.to_dict(), indent=2, ensure_ascii=False) + "\n")
 
     def __repr__(self) -> str:

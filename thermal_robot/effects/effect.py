@@ -153,6 +153,19 @@ class Effect(ABC):
         parameters, and those of the sound places would count against it.
     excluded
         Names of the joints or links whose parameters are not kept, whatever ``places`` says.
+
+    Examples
+    --------
+    >>> from dataclasses import dataclass
+    >>> import thermal_robot as tr
+    >>> from thermal_robot.effects import Parameter, at_joint
+    >>> @dataclass(frozen=True)
+    ... class WristLate(tr.Effect):
+    ...     name = "wrist_late"
+    ...     def parameters(self, observations):
+    ...         return (Parameter("lag", "rad", 1e-3, "joint", "joint_5", (at_joint(4, 1.0),)),)
+    >>> tr.simulate("builtin:rv_m2", {WristLate(): 2e-3}, tool_frame="tool0", rows=8, measures="pose")
+    <Campaign 'simulated': 8 samples of pose, 5 joints, 7 covariates>
     """
 
     places: tuple[str, ...] = field(default=(), kw_only=True)

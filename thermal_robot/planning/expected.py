@@ -38,6 +38,15 @@ class ExpectedParameter:
     sigma, beside
         Its standard deviation afterwards, with the frames unknown: were this effect the only one at work, and were all
         of them.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> from thermal_robot.planning import plan
+    >>> found = plan(tr.load_robot("builtin:rv_m2", "tool0"), rows=12, effects=["joint_gain"])
+    >>> known = found.effect("joint_gain").parameters[1]
+    >>> known.place, known.told, known.sigma < known.size
+    ('joint_2', True, True)
     """
 
     label: str
@@ -72,6 +81,14 @@ class Expected:
         and ``"unknown frames"``.
     lacks
         What the campaign would have to record for it to be testable; it then has no parameters.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> from thermal_robot.planning import plan
+    >>> found = plan(tr.load_robot("builtin:rv_m2", "tool0"), rows=12, effects=["joint_gain", "tracking_lag"])
+    >>> found.effect("tracking_lag").lacks[0]
+    'velocity.joint_1'
     """
 
     name: str

@@ -35,6 +35,14 @@ def write_plan(plan: Plan, path: str | Path) -> Path:
     ------
     CampaignError
         What cannot be written; a folder that holds a campaign already.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> from thermal_robot.planning import plan, write_plan
+    >>> found = plan(tr.load_robot("builtin:rv_m2", "tool0"), rows=12, effects=["joint_gain"])
+    >>> sorted(path.name for path in write_plan(found, "hall_3").parent.iterdir())
+    ['campaign.toml', 'measurements.csv', 'plan.csv', 'robot.urdf']
     """
     derived = [name for name in plan.commands.covariates if name.startswith("approach.")]
     if Path(path).suffix.lower() != TABLE:

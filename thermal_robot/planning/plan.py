@@ -43,6 +43,13 @@ class Plan:
         Of all rows about the parameters of all effects, nats.
     repeats
         How often each pose is measured.
+
+    Examples
+    --------
+    >>> from thermal_robot.planning import plan
+    >>> found = plan(tr.load_robot("builtin:rv_m2", "tool0"), rows=12, effects=["joint_gain"], repeats=2)
+    >>> [expected.name for expected in found.effects], found.repeats
+    (['joint_gain'], 2)
     """
 
     commands: Campaign
@@ -51,11 +58,27 @@ class Plan:
     repeats: int
 
     def effect(self, name: str) -> Expected:
-        """Return what is expected of one effect; ``KeyError`` where it was not considered."""
+        """Return what is expected of one effect; ``KeyError`` where it was not considered.
+
+        Examples
+        --------
+        >>> from thermal_robot.planning import plan
+        >>> found = plan(tr.load_robot("builtin:rv_m2", "tool0"), rows=12, effects=["joint_gain", "backlash"])
+        >>> found.effect("backlash").title
+        'lost motion in the joints'
+        """
         return {expected.name: expected for expected in self.effects}[name]
 
     def to_dict(self) -> dict[str, Any]:
-        """Return plain values, SI, ready for JSON."""
+        """Return plain values, SI, ready for JSON.
+
+        Examples
+        --------
+        >>> from thermal_robot.planning import plan
+        >>> found = plan(tr.load_robot("builtin:rv_m2", "tool0"), rows=12, effects=["joint_gain"])
+        >>> list(found.to_dict())
+        ['information', 'repeats', 'effects', 'joints', 'conditions']
+        """
         q, names = self.commands.q, self.commands.robot.joint_names
         joints = {name: q[:, j].tolist() for j, name in enumerate(names)}
         given = {name: values.tolist() for name, values in self.commands.covariates.items()}
@@ -121,6 +144,14 @@ def plan(
         A number that no campaign has; a joint that slides without limits.
     EffectError
         A name that no effect has, or none that these rows could tell.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> from thermal_robot.planning import plan
+    >>> found = plan(tr.load_robot("builtin:rv_m2", "tool0"), rows=12, effects=["joint_gain", "backlash"])
+    >>> found.commands
+    <Campaign 'plan': 12 samples to predict, 5 joints, 7 covariates>
     """
     require("plan()", robot, (Robot,), "a robot, from load_robot")
     _check(robot, rows, repeats, noise, noise_orientation, rise, loads)

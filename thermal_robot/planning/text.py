@@ -19,6 +19,15 @@ def text(plan: Plan) -> str:
     ``1 sigma`` and ``worst`` are the median and the largest over the parameters that are told, else over all, were the
     effect alone at work; ``beside all`` is the median were all of them; ``told`` counts the parameters known to less
     than half their expected size.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> from thermal_robot.planning import plan, text
+    >>> print(text(plan(tr.load_robot("builtin:rv_m2", "tool0"), rows=12, effects=["joint_gain"])))
+    12 rows: 12 poses. Joints come from below in ...
+    ...
+    joint_gain ...
     """
     rows = [_HEAD, *(line for expected in plan.effects for line in _lines(expected))]
     widths = [max(len(row[k]) for row in rows) for k in range(len(_HEAD))]
