@@ -6,6 +6,7 @@ from scene_nodes import Nodes
 from thermal_robot.kinematics import quaternion_to_rotation
 from thermal_robot.viewer.arrows import longest
 from thermal_robot.viewer.cloud import Cloud
+from thermal_robot.viewer.colours import linear
 from thermal_robot.viewer.settings import ASIDE, GAP
 
 
@@ -27,8 +28,8 @@ def test_rows_set_aside_are_grey(scene):
     nodes, rows = Nodes(), np.arange(len(scene.q))
     Cloud(nodes, "/gap/all", scene, scene.gap, GAP).show(rows, 1.0, True)
     colours = nodes.added["/gap/all"].batched_colors
-    np.testing.assert_array_equal((colours == ASIDE).all(axis=1), scene.aside)
-    np.testing.assert_array_equal((colours == GAP).all(axis=1), ~scene.aside)
+    np.testing.assert_array_equal((colours == linear(ASIDE)).all(axis=1), scene.aside)
+    np.testing.assert_array_equal((colours == linear(GAP)).all(axis=1), ~scene.aside)
 
 
 def test_another_row_and_magnification_move_the_same_node(scene):

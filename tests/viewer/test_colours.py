@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from thermal_robot.viewer.colours import between, colours
+from thermal_robot.viewer.colours import between, colours, linear
 from thermal_robot.viewer.settings import FULL_SHARE, NO_SHARE
 
 
@@ -29,3 +29,11 @@ def test_where_no_place_matters_all_are_pale():
 def test_a_colour_is_one_whatever_the_share():
     for part in (-1.0, 0.0, 0.5, 1.0, 7.0):
         assert all(0 <= value <= 255 for value in between(part))
+
+
+def test_half_the_light_is_more_than_half_of_what_a_screen_takes():
+    """Printed pairs of sRGB: 188 is half the light, 118 is 18 %, the grey card of photographers."""
+    assert linear([0, 255, 188]).tolist() == [0, 255, 128]
+    assert linear([118]).item() == round(0.18 * 255)
+    every = linear(np.arange(256)).astype(int)
+    assert (np.diff(every) >= 0).all()

@@ -43,10 +43,18 @@ def test_it_says_where_it_is_served_and_prints_nothing(opened, scene, capsys):
     assert capsys.readouterr() == ("", "")
 
 
-def test_nobody_can_ask_for_a_public_address(opened, scene):
+def test_a_browser_that_asks_for_a_public_address_gets_none(opened, scene):
+    from viser import _messages
+
     window = opened(scene)
-    assert window._server.request_share_url() is None
-    assert window._server._share_tunnel is None
+    server, asked = window._server, []
+    stays = server.request_share_url
+    vars(server)["request_share_url"] = lambda: asked.append(stays())
+    for heard in server._websock_server._incoming_handlers[_messages.ShareUrlRequest]:
+        heard(0, _messages.ShareUrlRequest())
+    server._thread_executor.shutdown(wait=True)  # until it has been answered
+    assert asked == [None]  # what is asked for is what was put in its place
+    assert server._share_tunnel is None
 
 
 def test_steps_go_to_rows_and_stay_within_the_table(opened, scene):

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.viewer.arrows import arrows, unit_arrow
-from thermal_robot.viewer.colours import Colour
+from thermal_robot.viewer.colours import Colour, linear
 from thermal_robot.viewer.scene import Scene
 from thermal_robot.viewer.settings import ASIDE
 
@@ -38,7 +38,7 @@ class Cloud:
         self, nodes: Any, name: str, scene: Scene, vectors: Array, colour: Colour, thicker: float = 1.0
     ) -> None:
         self._nodes, self._name, self._scene, self._vectors, self._thicker = nodes, name, scene, vectors, thicker
-        self._colours = np.where(scene.aside[:, None], ASIDE, colour).astype(np.uint8)
+        self._colours = linear(np.where(scene.aside[:, None], ASIDE, colour).astype(np.uint8))
         self._node: Any = None
 
     def show(self, rows: NDArray[np.intp], magnification: float, visible: bool) -> None:

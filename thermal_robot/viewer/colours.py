@@ -4,6 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 
+import numpy as np
+from numpy.typing import NDArray
+
 from thermal_robot.viewer.settings import FULL_SHARE, LEAST_FULL, NO_SHARE
 
 Colour = tuple[int, int, int]
@@ -31,3 +34,18 @@ def between(part: float) -> Colour:
     part = min(max(part, 0.0), 1.0)
     red, green, blue = (round(a + part * (b - a)) for a, b in zip(NO_SHARE, FULL_SHARE, strict=True))
     return red, green, blue
+
+
+def linear(colours: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """Return the light of colours, 0..255 of the brightest: what a screen makes of them (IEC 61966-2-1).
+
+    Viser takes the colours of single objects as a screen does, and those of many copies of an object as light.
+
+    Parameters
+    ----------
+    colours
+        (..., 3) red, green and blue, 0..255, as a screen takes them.
+    """
+    given = np.asarray(colours, dtype=float) / 255.0
+    light = np.where(given <= 0.04045, given / 12.92, ((given + 0.055) / 1.055) ** 2.4)
+    return np.round(255.0 * light).astype(np.uint8)

@@ -57,5 +57,7 @@ CHOSEN, CHOSEN_AFTER = (194, 62, 0), (10, 55, 110)
 """Colours of the arrows of the row that is shown, before and after: the same, darker."""
 THICKER = 2.5
 """How many times as thick as the others they are."""
+SKY = 0.4
+"""Of viser's light from all sides, which pales colours until they are no longer those of the list beside them."""
 FAINT = (225, 229, 233)
 """Colour of the floor's lines, 0.5 m apart: seen, and no more."""

@@ -27,6 +27,7 @@ from thermal_robot.viewer.settings import (
     HOST,
     MOST_ARROWS,
     REMAINDER,
+    SKY,
     STRONGER,
     THICKER,
 )
@@ -80,6 +81,7 @@ class Window:
         camera = self._server.initial_camera
         camera.look_at = tuple(scene.centre)
         camera.position = tuple(scene.eye)
+        nodes.configure_environment_map(environment_intensity=SKY)
         nodes.add_grid(
             "/floor",
             width=GRID * scene.size,
