@@ -1,8 +1,13 @@
 """Pages of the documentation: their fenced blocks, and whether what they show is what is printed."""
 
+import contextlib
+import io
 import re
+import shlex
 
 import pytest
+
+from thermal_robot import cli
 
 FIGURE = r"[−-]?\d+(?:\.\d+)?(?:e-?\d+)?"
 
@@ -10,6 +15,45 @@ FIGURE = r"[−-]?\d+(?:\.\d+)?(?:e-?\d+)?"
 def blocks(page):
     """(language, text) of every fenced block, in order."""
     return re.findall(r"^```(\w+)\n(.*?)^```", page.read_text(encoding="utf-8"), flags=re.M | re.S)
+
+
+def run(page, folder, names=None):
+    """Run the blocks of a page in the current folder; return how many texts were compared with what was printed.
+
+    Python and commands are run, in order; a block that begins with ``# name.ending`` is written to that file. A text
+    is what the block before it prints. A command that ends with another status than 0 must say so in such a text.
+    """
+    names, printed, refused, checked = {} if names is None else names, "", "", 0
+    for language, text in blocks(page):
+        file = re.match(r"# (\w+\.\w+)\n", text)
+        if language == "text":
+            shown_lines_are_printed(text, printed)
+            refused, checked = "", checked + 1
+            continue
+        assert not refused, f"nothing is shown of a failure: {refused}"
+        if file:
+            (folder / file[1]).write_text(text, encoding="utf-8")
+        elif language == "csv":
+            (folder / "samples.csv").write_text(text, encoding="utf-8")
+        else:
+            printed, refused = _printed(language, text, page.name, names)
+    assert not refused
+    return checked
+
+
+def _printed(language, text, name, names):
+    """What a block prints, and what it says of a failure."""
+    out, failed = io.StringIO(), ""
+    with contextlib.redirect_stdout(out):
+        if language == "python":
+            exec(compile(text, name, "exec"), names)
+            return out.getvalue(), ""
+        for line in text.splitlines():
+            program, *arguments = shlex.split(line)
+            assert program == "thermal-robot"
+            if cli.main(arguments) != cli.DONE:
+                failed = line
+    return out.getvalue(), failed
 
 
 def masked(line):

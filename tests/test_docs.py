@@ -2,20 +2,23 @@
 
 import argparse
 import ast
-import contextlib
 import importlib
-import io
 import pkgutil
 import re
-import shlex
+import sys
 from pathlib import Path
 
 import numpy as np
 import pytest
-from pages import blocks, shown_lines_are_printed
+from pages import run, shown_lines_are_printed
 
 import thermal_robot
 from thermal_robot import cli
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
 
 ROOT = Path(__file__).parents[1]
 PAGES = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", ROOT / "CHANGELOG.md", *sorted((ROOT / "docs").glob("*.md"))]
@@ -128,27 +131,26 @@ def test_a_line_that_is_not_printed_is_noticed():
 
 
 @pytest.mark.slow
-def test_the_tutorial_runs_and_prints_what_it_shows(tmp_path, monkeypatch):
+@pytest.mark.parametrize(("name", "texts"), [("tutorial", 8), ("tracker", 7), ("add_an_effect", 4)])
+def test_a_page_runs_and_prints_what_it_shows(name, texts, tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    names, printed, checked = {}, "", 0
-    for language, text in blocks(ROOT / "docs" / "tutorial.md"):
-        if language == "csv":
-            (tmp_path / "samples.csv").write_text(text, encoding="utf-8")
-        elif language == "text":
-            shown_lines_are_printed(text, printed)
-            checked += 1
-        else:
-            out = io.StringIO()
-            with contextlib.redirect_stdout(out):
-                if language == "python":
-                    exec(compile(text, "tutorial.md", "exec"), names)
-                else:
-                    for line in text.splitlines():
-                        program, *arguments = shlex.split(line)
-                        assert program == "thermal-robot"
-                        assert cli.main(arguments) == cli.DONE
-            printed = out.getvalue()
-    assert checked >= 8
+    monkeypatch.syspath_prepend(str(tmp_path))
+    assert run(ROOT / "docs" / f"{name}.md", tmp_path) >= texts
+    for declared in tmp_path.glob("pyproject.toml"):
+        offered = tomllib.loads(declared.read_text(encoding="utf-8"))["project"]["entry-points"][
+            "thermal_robot.effects"
+        ]
+        for effect, where in offered.items():
+            module, attribute = where.split(":")
+            assert getattr(importlib.import_module(module), attribute).name == effect
+
+
+def test_a_page_that_fails_without_saying_so_is_noticed(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    page = tmp_path / "page.md"
+    page.write_text("```bash\nthermal-robot check absent\n```\n", encoding="utf-8")
+    with pytest.raises(AssertionError):
+        run(page, tmp_path)
 
 
 def test_every_room_has_a_line_in_contributing():
