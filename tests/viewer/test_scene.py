@@ -8,6 +8,8 @@ import pytest
 
 from thermal_robot.campaign import Campaign
 from thermal_robot.datasets import demo_campaign
+from thermal_robot.diagnosis.parts import DataFault, Misfit
+from thermal_robot.diagnosis.result import told
 from thermal_robot.errors import CampaignError
 from thermal_robot.kinematics import tool_poses
 from thermal_robot.viewer.scene import scene_of_campaign, scene_of_diagnosis, shares_of
@@ -62,8 +64,8 @@ def test_axes_of_slides_and_coupled_joints_are_those_along_which_they_move(awkwa
 def test_shares_are_those_of_the_diagnosis_largest_first(found, scene):
     shares = list(scene.shares.values())
     assert shares == sorted(shares, reverse=True)
-    for kind, told in (("joint", found.where.joints), ("link", found.where.links)):
-        assert {name: s for (k, name), s in scene.shares.items() if k == kind} == told
+    for kind, known in (("joint", found.where.joints), ("link", found.where.links)):
+        assert {name: s for (k, name), s in scene.shares.items() if k == kind} == known
     by_effects = sum(place.share for f in found.effects for place in f.locations if f.name in found.verdict)
     assert sum(shares) == pytest.approx(by_effects)
 
@@ -85,6 +87,17 @@ def test_without_a_diagnosis_there_is_the_gap_alone():
 def test_what_was_not_measured_cannot_be_seen():
     with pytest.raises(CampaignError, match="nothing was measured"):
         scene_of_campaign(replace(demo_campaign(), position=None))
+
+
+def test_where_the_table_does_not_fit_the_robot_the_gap_is_shown_and_the_reason_told(found):
+    fault = DataFault(("shifted rows",), "rows are shifted", "shift them back", 0.1, 1e-4)
+    unusable = told(replace(found, misfit=Misfit(fault)))
+    scene = scene_of_diagnosis(unusable)
+    assert scene.summary == unusable.reason
+    assert "Shift them back" in scene.summary
+    assert scene.remainder is None
+    assert scene.shares == {}
+    np.testing.assert_array_equal(scene.gap, found.rows.gap[:, :3])
 
 
 def test_a_diagnosis_without_its_fit_is_refused(found):

@@ -46,7 +46,7 @@ of the arrows has, and which differ in brightness for those who see no colours."
 GAP, REMAINDER, ASIDE = (230, 159, 0), (31, 111, 181), (150, 158, 166)
 """Colours of the arrows: before and after the correction as in the figures of the report, and rows set aside."""
 
-ASIDE_OF, BACK_BY, ABOVE = 0.70, 0.25, 0.35
+ASIDE_OF, BACK_BY, ABOVE = 0.58, 0.20, 0.25
 """Where the eye is, from the middle of the scene, in sizes of the scene: across the arm, towards where it reaches, and
 upwards. All of the scene is in sight, and the arm does not point at the eye."""
 SMALL_REACH = 0.05
