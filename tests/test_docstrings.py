@@ -7,19 +7,24 @@ from types import FunctionType
 import pytest
 
 import thermal_robot
-from thermal_robot import planning
+from thermal_robot import correction, effects, iso9283, planning
 
-ROOMS = (thermal_robot, planning)
+ROOMS = (thermal_robot, planning, correction)
 """Packages whose names are public, and all have an example."""
+ALSO = [(effects, name) for name in effects.__all__ if name.islower()]
+ALSO += [(iso9283, "Performance"), (iso9283, "performance")]
+"""Names of other packages that have one, too: what makes effects and chooses among them, and what a standard says."""
 IN_FULL = (
     thermal_robot.Campaign,
     thermal_robot.CorrectedModel,
     thermal_robot.Diagnosis,
     thermal_robot.Robot,
     planning.Plan,
+    iso9283.Performance,
 )
 """Classes of which each method has one of its own."""
 PUBLIC = {name: getattr(room, name) for room in ROOMS for name in room.__all__}
+PUBLIC |= {name: getattr(room, name) for room, name in ALSO}
 
 
 def examples():

@@ -27,6 +27,25 @@ def test_a_campaign_lends_its_commands_and_conditions():
     assert set(cold.covariates["temperature"]) == {15.0}
 
 
+def test_one_pose_is_one_row_and_repeats_as_often_as_asked(planar):
+    q = np.array([0.3, 1.0])
+    for given in (q, list(q), [q], [list(q)]):
+        np.testing.assert_array_equal(simulate(planar, commands=given).q, [q])
+    again = simulate(planar, commands=q, repeats=30)
+    np.testing.assert_array_equal(again.q, np.tile(q, (30, 1)))
+    assert set(again.labels["pose"]) == {"1"}
+
+
+def test_another_order_or_another_session_brings_other_approaches(planar):
+    q = [[0.0, 0.0], [1.0, 1.0], [0.5, 2.0]]
+    side = [
+        simulate(planar, commands=q, conditions=c).covariates["approach.shoulder"].tolist()
+        for c in ({}, {"time": [2.0, 1.0, 0.0]}, {"session": ["a", "b", "b"]})
+    ]
+    assert side == [[0.0, 1.0, -1.0], [-1.0, 1.0, 0.0], [0.0, 0.0, -1.0]]
+    assert "approach.shoulder" not in simulate(planar, commands=q, conditions={"time": None}).covariates
+
+
 def test_a_plan_is_measured_as_it_was_planned(rv_m2):
     planned = plan(rv_m2, 12, ["joint_gain"], repeats=2, orientation=True, target=TARGET).commands
     found = simulate(rv_m2, commands=planned, noise=2e-5)
@@ -61,6 +80,8 @@ def test_a_slide_without_limits_needs_commands():
         ({"rows": 7, "commands": [[0.0] * 5]}, "either rows or commands"),
         ({"commands": [[0.0] * 4]}, "expected a list of 5 values"),
         ({"commands": []}, "there is no row"),
+        ({"commands": "x"}, "no positions; found str, expected rows of 5 joint positions, or a campaign"),
+        ({"commands": [[float("nan")] * 5]}, r"commands\[0\]\[0\]: is NaN"),
         ({"conditions": {"temprature": 20.0}}, "did you mean 'temperature'"),
         ({"conditions": {"velocity.joint_9": 1.0}}, "no such joint"),
         ({"conditions": {"temperature.arm": 20.0}}, "no such link; did you mean 'forearm'"),

@@ -123,6 +123,8 @@ def test_a_robot_is_loaded_where_there_is_none_yet(rv_m2):
     np.testing.assert_array_equal(by_name.position, simulate(rv_m2, rows=5).position)
     with pytest.raises(RobotError, match="no tool frame is given; the links at the ends of this robot are tool0"):
         simulate("builtin:rv_m2")
+    with pytest.raises(CampaignError, match=r"simulate\(campaign.robot, ..., commands=campaign\)"):
+        simulate(by_name)
 
 
 @pytest.mark.parametrize(

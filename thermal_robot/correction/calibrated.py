@@ -44,6 +44,14 @@ class Calibrated:
     compared
         (4, 4) the target on the tool frame as the campaign declares it, where the robot was compared with a simulator
         of the user's own, which has it; ``None`` where it was compared with the URDF.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> from thermal_robot.correction import calibrated
+    >>> warm = calibrated(tr.diagnose(tr.demo_campaign()).model, temperature=26.0)
+    >>> warm.temperature, len(warm.held), {told.effect for told in warm.kept}
+    (26.0, 5, {'backlash'})
     """
 
     robot: Robot
@@ -132,6 +140,14 @@ def calibrated(
     CampaignError
         If the temperature is none, or one is given and the model does not tell how the robot grows; or if it does not
         say what is determined.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> from thermal_robot.correction import calibrated
+    >>> warm = calibrated(tr.diagnose(tr.demo_campaign()).model, temperature=26.0)
+    >>> print(warm.notes("a URDF")[0])
+    Calibrated by thermal_robot: the robot 'rv_m2' from 'base_link' to 'tool0' as it was measured, ...
     """
     gone: tuple[Told, ...] = ()
     if min_sigma is not None:

@@ -55,6 +55,14 @@ def calibrated_mjcf(robot: Calibrated, mjcf: str | Path | None = None) -> str:
     CampaignError
         If MuJoCo is not installed or does not take the model; if that has not the robot's joints, or not where the
         robot has them; or if a body's tag does not stand in the text alone: in an included file, in a ``<frame>``.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> from thermal_robot.correction import calibrated, calibrated_mjcf
+    >>> warm = calibrated(tr.diagnose(tr.demo_campaign()).model, temperature=26.0)
+    >>> "tool0_target" in calibrated_mjcf(warm)
+    True
     """
     notes = [*robot.notes("an MJCF"), *_BEYOND]
     if mjcf is None:

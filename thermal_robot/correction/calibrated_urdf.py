@@ -28,5 +28,13 @@ def calibrated_urdf(robot: Calibrated) -> str:
     ------
     RobotError
         If the robot has another link of the target's name.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> from thermal_robot.correction import calibrated, calibrated_urdf
+    >>> warm = calibrated(tr.diagnose(tr.demo_campaign()).model, temperature=26.0)
+    >>> tr.load_robot(calibrated_urdf(warm), "tool0_target").n
+    5
     """
     return rewritten(robot.robot.urdf, robot.origins, links=robot.links, notes=robot.notes("a URDF"))

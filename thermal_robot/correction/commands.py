@@ -54,6 +54,14 @@ class Commands:
     direction
         (N,) rad by which the direction of the target is missed: 0 but for rounding, unless the arm has fewer than six
         joints, or stands at a singular pose or at a limit.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> campaign = tr.demo_campaign()
+    >>> commands = tr.diagnose(campaign).model.corrected_commands(campaign.take([0, 1]))
+    >>> commands.q.shape, commands.std.shape, commands.outside
+    ((2, 5), (2, 3), ((), ()))
     """
 
     q: Array

@@ -50,6 +50,14 @@ def determined(
     ------
     CampaignError
         If the model does not say how far its parameters may be off, or ``min_sigma`` is no number of deviations.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> from thermal_robot.correction import determined
+    >>> model, left_out = determined(tr.diagnose(tr.demo_campaign()).model, min_sigma=2.0)
+    >>> left_out
+    ()
     """
     if not 0.0 <= min_sigma < np.inf:
         raise CampaignError(

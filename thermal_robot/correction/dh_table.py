@@ -65,6 +65,14 @@ def dh_table(robot: Calibrated, convention: Convention = "standard", units: Unit
     ------
     CampaignError
         If there is no such convention.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> from thermal_robot.correction import calibrated, dh_table
+    >>> table = dh_table(calibrated(tr.diagnose(tr.demo_campaign()).model, temperature=26.0))
+    >>> list(table["joint"])
+    ['base_link', 'joint_1', 'joint_2', 'joint_3', 'joint_4', 'joint_5', 'tool0']
     """
     import pandas as pd
 

@@ -69,6 +69,13 @@ def mjcf_of_urdf(urdf: str) -> str:
     ------
     CampaignError
         If MuJoCo is not installed, or does not take the robot.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> from thermal_robot.correction import mjcf_of_urdf
+    >>> mjcf_of_urdf(tr.load_robot("builtin:rv_m2", "tool0").urdf)[:20]
+    '<mujoco model="rv_m2'
     """
     mujoco = mujoco_or_error()
     try:

@@ -44,6 +44,15 @@ def with_simulator(campaign: Campaign, mjcf: str | Path) -> Campaign:
     ------
     CampaignError
         If MuJoCo is not installed or does not take the model, or that lacks a joint or the tool frame.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> from thermal_robot.correction import mjcf_of_urdf, with_simulator
+    >>> sound = tr.simulate("builtin:rv_m2", tool_frame="tool0", rows=10)
+    >>> seen = with_simulator(sound, mjcf_of_urdf(sound.robot.urdf))
+    >>> bool(abs(seen.simulated_position - sound.position).max() < 1e-9)
+    True
     """
     path = Path(mjcf) if isinstance(mjcf, Path) or not mjcf.lstrip().startswith("<") else None
     name, model, robot = str(path or "the MJCF"), compiled(path or mjcf), campaign.robot

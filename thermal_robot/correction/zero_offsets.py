@@ -59,6 +59,16 @@ def zero_offsets(
     ------
     CampaignError
         As :func:`~thermal_robot.correction.calibrated`.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> from thermal_robot.correction import zero_offsets
+    >>> off = {"joint_offset": {"joint_2": 1e-3}}
+    >>> campaign = tr.simulate("builtin:rv_m2", off, tool_frame="tool0", rows=40, noise=1e-5, base_known=False)
+    >>> table = zero_offsets(tr.diagnose(campaign).model)
+    >>> table["zero"][1], round(float(table["add_to_command"][1]), 4)
+    ('determined', -0.001)
     """
     import pandas as pd
 

@@ -57,7 +57,14 @@ RANDOM = tuple(kind.name for kind in _RANDOM)
 
 
 def random_effects() -> tuple[RandomEffect, ...]:
-    """Return the effects that scatter: told from what remains, not fitted."""
+    """Return the effects that scatter: told from what remains, not fitted.
+
+    Examples
+    --------
+    >>> from thermal_robot.effects import random_effects
+    >>> [effect.name for effect in random_effects()]
+    ['encoder_resolution', 'excess_repeatability']
+    """
     return tuple(kind() for kind in _RANDOM)
 
 
@@ -69,6 +76,12 @@ def library() -> dict[str, Effect]:
     Note
         If an entry point cannot be loaded, gives something that is not an effect, or a name that is already taken; it
         is left out.
+
+    Examples
+    --------
+    >>> from thermal_robot.effects import library
+    >>> library()["backlash"].title
+    'lost motion in the joints'
     """
     found: dict[str, Effect] = {kind.name: kind() for kind in _SYSTEMATIC}
     for point in entry_points(group="thermal_robot.effects"):
@@ -124,6 +137,15 @@ def named(name: str) -> Effect:
     ------
     EffectError
         If there is none; says which name was probably meant.
+
+    Examples
+    --------
+    >>> from thermal_robot.effects import named
+    >>> named("drift").needs
+    ()
+    >>> named("drft")
+    Traceback (most recent call last):
+    thermal_robot.errors.EffectError: no effect is named 'drft'; did you mean 'drift'?
     """
     known = {**library(), **{effect.name: effect for effect in random_effects()}}
     if name not in known:
@@ -155,6 +177,12 @@ def choose(
     ------
     EffectError
         If a name is not known, taken twice, or nothing is left; if one of ``own`` is not an effect.
+
+    Examples
+    --------
+    >>> from thermal_robot.effects import choose
+    >>> [effect.name for effect in choose(only=["drift", "backlash"])]
+    ['backlash', 'drift']
     """
     known = library()
     for effect in own:

@@ -81,27 +81,62 @@ class Response:
 
 
 def at_joint(index: int, values: Any) -> Response:
-    """Displacement of joint ``index``: rad or m, scalar or (N,)."""
+    """Displacement of joint ``index``: rad or m, scalar or (N,).
+
+    Examples
+    --------
+    >>> from thermal_robot.effects import at_joint
+    >>> at_joint(2, 1.0)
+    Response(channel='joint', index=2, values=array(1.))
+    """
     return Response("joint", index, np.asarray(values, dtype=float))
 
 
 def at_segment(index: int, twist: Any) -> Response:
-    """Twist of the placement of segment ``index`` in its own frame: (6,) or (N, 6)."""
+    """Twist of the placement of segment ``index`` in its own frame: (6,) or (N, 6).
+
+    Examples
+    --------
+    >>> from thermal_robot.effects import at_segment
+    >>> at_segment(1, [1, 0, 0, 0, 0, 0]).values  # it grows along x
+    array([1., 0., 0., 0., 0., 0.])
+    """
     return Response("segment", index, np.asarray(twist, dtype=float))
 
 
 def at_base(twist: Any) -> Response:
-    """Twist of the base in the root frame: (6,) or (N, 6)."""
+    """Twist of the base in the root frame: (6,) or (N, 6).
+
+    Examples
+    --------
+    >>> from thermal_robot.effects import at_base
+    >>> at_base([0, 0, 0, 0, 0, 1]).channel  # it turns about z
+    'base'
+    """
     return Response("base", 0, np.asarray(twist, dtype=float))
 
 
 def at_tool(twist: Any) -> Response:
-    """Twist of the tool in the tool frame: (6,) or (N, 6)."""
+    """Twist of the tool in the tool frame: (6,) or (N, 6).
+
+    Examples
+    --------
+    >>> from thermal_robot.effects import at_tool
+    >>> at_tool([0, 0, 1, 0, 0, 0]).channel  # it is longer along z
+    'tool'
+    """
     return Response("tool", 0, np.asarray(twist, dtype=float))
 
 
 def at_instrument(displacement: Any) -> Response:
-    """Displacement of the measured point in the measurement frame: (N, 3), m."""
+    """Displacement of the measured point in the measurement frame: (N, 3), m.
+
+    Examples
+    --------
+    >>> from thermal_robot.effects import at_instrument
+    >>> at_instrument([[0, 0, 1e-5]] * 4).values.shape
+    (4, 3)
+    """
     return Response("instrument", 0, np.asarray(displacement, dtype=float))
 
 

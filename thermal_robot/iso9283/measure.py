@@ -50,6 +50,15 @@ def performance(
         If nothing was measured or repeated, or predictions do not fit the rows.
     EstimationError
         If there are too few rows for the unknown frames.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> from thermal_robot.iso9283 import performance
+    >>> tested = tr.simulate("builtin:rv_m2", {"excess_repeatability": 1e-4}, tool_frame="tool0", rows=90, repeats=30)
+    >>> found = performance(tested)
+    >>> found.summary
+    'ISO 9283, the worst of 3 poses of 30 cycles (the standard: 30): AP_p ... mm; RP_l ... mm'
     """
     require("performance()", campaign, (Campaign,), "a campaign")
     if campaign.position is None:

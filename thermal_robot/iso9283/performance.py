@@ -47,6 +47,17 @@ class Performance:
         RP_l that the instrument alone would show, m; ``None`` where its noise is not given.
     notes
         What a reader must know, a sentence each.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> from thermal_robot.iso9283 import performance
+    >>> tested = tr.simulate("builtin:rv_m2", {"excess_repeatability": 1e-4}, tool_frame="tool0", rows=90, repeats=30)
+    >>> found = performance(tested)
+    >>> len(found.poses), found.extent, found.repeatability > found.accuracy
+    (3, '3 poses of 30 cycles (the standard: 30)', True)
+    >>> found.corrected, found.path_accuracy, found.path_corrected, found.path_repeatability
+    (None, None, None, None)
     """
 
     campaign: str
@@ -102,7 +113,15 @@ class Performance:
         return ", and ".join(part for part in (cycles_of(self.poses), paths_of(self.paths)) if part)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return everything as plain values for JSON, SI."""
+        """Return everything as plain values for JSON, SI.
+
+        Examples
+        --------
+        >>> from thermal_robot.iso9283 import performance
+        >>> tested = tr.simulate("builtin:rv_m2", tool_frame="tool0", rows=20, repeats=10, noise=2e-5)
+        >>> list(performance(tested).to_dict())[:4]
+        ['schema', 'campaign', 'robot', 'tool_frame']
+        """
         return {"schema": SCHEMA, **asdict(self)}
 
     def to_frame(self) -> pd.DataFrame:
@@ -114,6 +133,13 @@ class Performance:
             ``label`` of the pose or path, ``cycles`` (of the direction, time or point with the fewest), ``criterion``
             (``AP_p``, ``RP_l``, ``vAP_a`` …), ``value``, ``ci95_low``, ``ci95_high`` (NaN where there is no interval),
             ``unit`` (m or rad). A criterion against the corrected model has ``corrected`` after its name.
+
+        Examples
+        --------
+        >>> from thermal_robot.iso9283 import performance
+        >>> tested = tr.simulate("builtin:rv_m2", tool_frame="tool0", rows=20, repeats=10, noise=2e-5)
+        >>> sorted(set(performance(tested).to_frame()["criterion"]))
+        ['AP_p', 'AP_x', 'AP_y', 'AP_z', 'RP_l']
         """
         import pandas as pd
 

@@ -72,11 +72,7 @@ def _poses(robot: Robot, rows: Any, repeats: Any, commands: Any, rng: np.random.
     if commands is not None:
         if rows is not None:
             raise CampaignError(CALL, "too much is said of the rows", expected="either rows or commands")
-        given = np.asarray(commands).tolist() if isinstance(commands, np.ndarray) else commands
-        poses = fitted(matrix((None, robot.n)), given, CALL, "commands")
-        if not len(poses):
-            raise CampaignError(CALL, "there is no row", column="commands", expected=f"rows of {robot.n} positions")
-        return poses, times
+        return _given(robot, commands), times
     count = fitted(whole(1), settings.ROWS if rows is None else rows, CALL, "rows")
     if count % times:
         expected = f"a number of rows of which {times} visit each pose"
@@ -87,6 +83,20 @@ def _poses(robot: Robot, rows: Any, repeats: Any, commands: Any, rng: np.random.
             expected = "a <limit> in the URDF for a joint that slides, or commands of your own"
             raise CampaignError(CALL, "no poses can be drawn", column=joint, found="no limits", expected=expected)
     return rng.uniform(low, high, (count // times, robot.n)), times
+
+
+def _given(robot: Robot, commands: Any) -> Array:
+    """Return (P, n) positions that a user gave; (n,) counts as one row."""
+    rows = f"rows of {robot.n} joint positions, or a campaign, which read_samples makes of a table"
+    if not isinstance(commands, (list, tuple, np.ndarray)):
+        raise CampaignError(CALL, "no positions", column="commands", found=type(commands).__name__, expected=rows)
+    if len(commands) == robot.n and not any(isinstance(each, (list, tuple, np.ndarray)) for each in commands):
+        commands = [commands]
+    plain = [each.tolist() if isinstance(each, np.ndarray) else each for each in commands]
+    poses: Array = fitted(matrix((None, robot.n)), plain, CALL, "commands")
+    if not len(poses):
+        raise CampaignError(CALL, "there is no row", column="commands", expected=rows)
+    return poses
 
 
 def _under(plan: Campaign, conditions: Any) -> Campaign:

@@ -39,7 +39,7 @@ class Instrument:
         turned = np.tile([1.0, 0.0, 0.0, 0.0], (plan.samples, 1)) if self.turns else None
         return replace(plan, orientation=turned)
 
-    def reads(self, position: Array, rotation: Array, rng: np.random.Generator) -> tuple[Array, Array | None]:
+    def reading(self, position: Array, rotation: Array, rng: np.random.Generator) -> tuple[Array, Array | None]:
         """Return one reading of poses in the measurement frame.
 
         Parameters

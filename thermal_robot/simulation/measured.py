@@ -56,7 +56,7 @@ def measured(
     position = real.predicted_position + (0.0 if shift is None else shift)
     if not np.isfinite(position).all():
         raise CampaignError(CALL, "these values lead to no finite position", column="effects", expected="smaller ones")
-    read, orientation = instrument.reads(position, frames.base[:3, :3] @ real.rotation, readings)
+    read, orientation = instrument.reading(position, frames.base[:3, :3] @ real.rotation, readings)
     found = replace(
         plan,
         position=read,

@@ -71,8 +71,8 @@ def simulate(
     repeats
         How often each pose is measured: once a round, labelled ``pose``.
     commands
-        (P, n) joint positions instead of drawn ones, rad or m; or a campaign, such as that of a plan or one that was
-        measured, whose commands, conditions and declarations are taken over.
+        (P, n) joint positions instead of drawn ones, rad or m, or (n,) of one pose; or a campaign, such as that of a
+        plan or one that was measured, whose commands, conditions and declarations are taken over.
     conditions
         Columns beside the commands, SI: one value for all rows or (N,); ``None`` leaves a column out. Without a
         campaign a row a minute is measured while the robot warms by 6 K from 20 °C and cools again (``time``,
@@ -131,6 +131,9 @@ def simulate(
 
 
 def _loaded(robot: Any, tool_frame: str) -> Robot:
+    if isinstance(robot, Campaign):
+        expected = "its robot, and the campaign in commands: simulate(campaign.robot, ..., commands=campaign)"
+        raise CampaignError(CALL, "a campaign is no robot", column="robot", expected=expected)
     if not isinstance(robot, Robot):
         return load_robot(robot, tool_frame)
     if tool_frame in ("", robot.tool_frame):
