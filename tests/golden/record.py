@@ -29,12 +29,12 @@ NOTHING = 1e-11
 CHANCES = ("probability",)
 """Compared absolutely: beside nothing the relative change of a probability is the change of an evidence of 1e4 nats."""
 _WORDS = ("summary", "advice", "warnings", "reasons", "describes", "name", "schema", "next", "where", "title", "random")
-_SMALL = ("ur5_jacobi", "wam_jacobi", "ipa_ur10_d")
+REAL = ("ur5_jacobi", "wam_jacobi", "ipa_ur10_d")
 
 
 def names() -> list[str]:
     """Return the campaigns that are held: 22 open cases, three real ones, and the demo."""
-    return [*(f"open_cases/case_{k:03d}" for k in range(22)), *_SMALL, "demo"]
+    return [*(f"open_cases/case_{k:03d}" for k in range(22)), *REAL, "demo"]
 
 
 def campaign(name: str) -> Path:
