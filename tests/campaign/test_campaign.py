@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import dataclasses
 import pickle
 from pathlib import Path
 
@@ -109,3 +110,26 @@ def test_settings_hold_all_that_is_not_in_the_table(tmp_path: Path) -> None:
         gears={"lift": 101.0},
     )
     assert settings.noise_position == pytest.approx(2e-5)
+
+
+def test_noise_of_rows_is_relative_to_their_root_mean_square(tmp_path: Path) -> None:
+    campaign = dataclasses.replace(
+        full(tmp_path / "c"), noise_position=None, noise_of_rows=np.array([1e-5, 5e-5, 7e-5])
+    )
+    assert campaign.noise_position == pytest.approx(5e-5)
+    relative = campaign.relative_noise
+    assert relative is not None
+    np.testing.assert_allclose(relative, [[f] * 3 + [1.0] * 3 for f in (0.2, 1.0, 1.4)])
+    part = campaign.take([2, 0])
+    assert part.relative_noise is not None
+    np.testing.assert_array_equal(part.relative_noise, relative[[2, 0]])
+    alike = dataclasses.replace(campaign, noise_position=None, noise_of_rows=np.full(3, 0.1 + 0.2))
+    assert alike.noise_position == 0.1 + 0.2
+    assert alike.relative_noise is None
+
+
+@pytest.mark.parametrize(("sigmas", "words"), [([1e-5, 0.0, 1e-5], "index 1"), ([1e-5], "wrong shape")])
+def test_a_noise_of_rows_that_is_none_is_refused(tmp_path: Path, sigmas: list[float], words: str) -> None:
+    with pytest.raises(CampaignError, match=words) as caught:
+        dataclasses.replace(full(tmp_path / "c"), noise_of_rows=np.array(sigmas))
+    assert caught.value.column == "noise_of_rows"

@@ -19,6 +19,7 @@ from thermal_robot.campaign.checked import (
     checked_mapping,
     checked_noise,
     checked_number,
+    checked_sigmas,
     checked_sizes,
 )
 from thermal_robot.campaign.settings import MOVES, STANDARD_TEMPERATURE, Settings, as_vector
@@ -34,7 +35,7 @@ FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.int64]
 TextArray: TypeAlias = NDArray[np.str_]
 
-_PER_SAMPLE = ("q", "position", "orientation", "simulated_position", "simulated_orientation", "rows")
+_PER_SAMPLE = ("q", "position", "orientation", "simulated_position", "simulated_orientation", "noise_of_rows", "rows")
 _BY_NAME = ("covariates", "labels", "missing", "travelled")
 
 
@@ -101,6 +102,9 @@ class Campaign:
         (3,) the measured point in the tool frame, m; a start value unless ``tool_known``.
     noise_position, noise_orientation
         One sigma per axis of the instrument, m and rad; ``None`` when not given.
+    noise_of_rows
+        (N,) one sigma per axis of the measured position of each row, m; ``None`` where one holds for all.
+        ``noise_position`` is then their root mean square, unless it is given.
     payload_com
         (3,) centre of mass of the payload in the tool frame, m.
     moves
@@ -144,6 +148,7 @@ class Campaign:
     target: FloatArray = field(default_factory=lambda: np.zeros(3))
     noise_position: float | None = None
     noise_orientation: float | None = None
+    noise_of_rows: FloatArray | None = None
     payload_com: FloatArray = field(default_factory=lambda: np.zeros(3))
     moves: str = "direct"
     reference_temperature: float = STANDARD_TEMPERATURE
@@ -190,11 +195,23 @@ class Campaign:
             object.__setattr__(self, key, arrays)
         for key in ("noise_position", "noise_orientation"):
             object.__setattr__(self, key, checked_noise(file, key, getattr(self, key)))
+        if self.noise_of_rows is not None:
+            self._weigh_rows(file, samples)
         for key in ("priors", "gears"):
             object.__setattr__(self, key, checked_sizes(file, key, getattr(self, key)))
         warmth = checked_number(file, "reference_temperature", self.reference_temperature)
         object.__setattr__(self, "reference_temperature", warmth)
         self._require_possible(file)
+
+    def _weigh_rows(self, file: str, samples: int) -> None:
+        """Take the noise of each row; where none is given for all, it is their root mean square."""
+        sigmas = checked_sigmas(file, "noise_of_rows", self.noise_of_rows, samples)
+        object.__setattr__(self, "noise_of_rows", sigmas)
+        if self.noise_position is None and samples:
+            # of equal ones it is they themselves, to the last digit
+            alike = bool(sigmas.min() == sigmas.max())
+            whole = float(sigmas[0]) if alike else float(np.sqrt((sigmas**2).mean()))
+            object.__setattr__(self, "noise_position", whole)
 
     def _require_possible(self, file: str) -> None:
         """Refuse what no table may say either."""
@@ -268,6 +285,20 @@ class Campaign:
     def reach(self) -> float:
         """Diagonal of the volume that was measured, m."""
         return float(np.linalg.norm(np.ptp(np.asarray(self.position), axis=0)))
+
+    @cached_property
+    def relative_noise(self) -> FloatArray | None:
+        """(N, m) one sigma of each figure of a row over that of all rows; ``None`` where it is one for all.
+
+        m is 3, or 6 where orientations were measured, whose noise is the same in all rows.
+        """
+        if self.noise_of_rows is None or not self.noise_position:
+            return None
+        factor = self.noise_of_rows / self.noise_position
+        if bool((factor == 1.0).all()):
+            return None
+        turns = 0 if self.orientation is None else 3
+        return _read_only(np.column_stack([factor] * 3 + [np.ones(len(factor))] * turns))
 
     @property
     def clock(self) -> FloatArray | None:

@@ -72,8 +72,7 @@ def _facts(campaign: Campaign) -> Iterator[Sequence[str]]:
         yield "base frame", "unknown: measured in the instrument's own frame, place and direction are fitted"
     target = f"{_triple(campaign.target / units.length_scale)} {units.length} on {robot.tool_frame}"
     yield "target", f"known: {target}" if campaign.tool_known else f"unknown: fitted, starting from {target}"
-    noise = campaign.noise_position
-    yield "noise of position", _noise(None if noise is None else noise / units.length_scale, units.length)
+    yield "noise of position", _noise_of_position(campaign)
     if campaign.measures == "pose":
         yield "noise of orientation", _noise(campaign.noise_orientation, "rad")
     if "payload" in campaign.covariates:
@@ -171,6 +170,15 @@ def _unit(campaign: Campaign, column: str) -> str:
     if column in campaign.extra:
         return "as given"
     return "0..1" if column == "speed" else unit_of(column, campaign.robot, campaign.units)
+
+
+def _noise_of_position(campaign: Campaign) -> str:
+    units, each = campaign.units, campaign.noise_of_rows
+    if each is None:
+        noise = campaign.noise_position
+        return _noise(None if noise is None else noise / units.length_scale, units.length)
+    low, high = each.min() / units.length_scale, each.max() / units.length_scale
+    return f"{low:.4g} .. {high:.4g} {units.length} per axis (one sigma), of each row"
 
 
 def _noise(sigma: float | None, unit: str) -> str:

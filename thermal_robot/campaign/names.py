@@ -10,6 +10,8 @@ ORIENTATION = ("qw", "qx", "qy", "qz")
 SIMULATED_POSITION = ("sim.x", "sim.y", "sim.z")
 SIMULATED_ORIENTATION = ("sim.qw", "sim.qx", "sim.qy", "sim.qz")
 LABELS = ("session", "pose", "path")
+NOISE = "noise"
+"""Column of the instrument's one sigma of each row."""
 STD = ("std.x", "std.y", "std.z")
 OUTSIDE = "outside"
 MISSED = "miss.direction"
@@ -22,7 +24,7 @@ PER_JOINT = ("approach", "velocity", "acceleration", "torque", "encoder")
 PER_LINK = ("temperature",)
 MEASURED = (*POSITION, *ORIENTATION)
 SIMULATED = (*SIMULATED_POSITION, *SIMULATED_ORIENTATION)
-RESERVED = (*MEASURED, *SIMULATED, *LABELS, *PLAIN_COVARIATES)
+RESERVED = (*MEASURED, *SIMULATED, *LABELS, *PLAIN_COVARIATES, NOISE)
 """Names that mean the same in every campaign."""
 
 _LIKE = 0.5

@@ -35,6 +35,8 @@ class Columns:
         ``session``, ``pose`` and ``path`` where present.
     has_orientation, has_simulated_position, has_simulated_orientation
         Whether these groups are there, each whole.
+    has_noise
+        Whether the noise of each row is there.
     warnings
         Columns left out, and names that look like typing errors.
     """
@@ -45,6 +47,7 @@ class Columns:
     has_orientation: bool
     has_simulated_position: bool
     has_simulated_orientation: bool
+    has_noise: bool
     warnings: tuple[str, ...]
 
 
@@ -75,7 +78,10 @@ def recognise(table: Table, robot: Robot, *, measured: bool) -> Columns:
     if has_simulated_orientation and not has_simulated_position:
         _require(table, names.SIMULATED_POSITION, "a simulated orientation needs a simulated position")
 
+    has_noise = measured and names.NOISE in table.columns and not table.is_empty(names.NOISE)
     taken = {*robot.joint_names, *names.MEASURED, *names.SIMULATED, *names.LABELS}
+    if has_noise or not measured:
+        taken.add(names.NOISE)
     covariates: list[str] = []
     extra: list[str] = []
     warnings: list[str] = []
@@ -95,6 +101,7 @@ def recognise(table: Table, robot: Robot, *, measured: bool) -> Columns:
         has_orientation,
         has_simulated_position,
         has_simulated_orientation,
+        has_noise,
         tuple(warnings),
     )
 

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign, FloatArray
-from thermal_robot.campaign.figures import LARGEST_COMMAND, first_beyond, impossible, no_orientation
+from thermal_robot.campaign.figures import LARGEST_COMMAND, SMALLEST, first_beyond, impossible, no_orientation
 from thermal_robot.campaign.fill import fill
 from thermal_robot.campaign.names import CLOCK, split_name
 from thermal_robot.campaign.plausible import doubts
@@ -69,8 +69,9 @@ def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str,
         base_known=settings.base_known,
         tool_known=settings.tool_known,
         target=np.array(settings.target),
-        noise_position=settings.noise_position,
+        noise_position=None if columns.has_noise else settings.noise_position,
         noise_orientation=settings.noise_orientation,
+        noise_of_rows=_noise(table, settings) if columns.has_noise else None,
         payload_com=np.array(settings.payload_com),
         moves=settings.moves,
         reference_temperature=settings.reference_temperature,
@@ -163,6 +164,25 @@ def _vectors(table: Table, group: Sequence[str], units: Units) -> FloatArray:
     """(N, 3) m."""
     vectors: FloatArray = np.column_stack([table.numbers(column) for column in group]) * units.length_scale
     return vectors
+
+
+def _noise(table: Table, settings: Settings) -> FloatArray:
+    """(N,) m: one sigma of each row; an empty cell is that of all rows, where it is stated."""
+    sigmas: FloatArray = table.numbers(names.NOISE, gaps=True) * settings.units.length_scale
+    sigmas = np.where(np.isnan(sigmas) & (settings.noise_position is not None), settings.noise_position or 0.0, sigmas)
+    refused = ~(sigmas >= SMALLEST)
+    if refused.any():
+        index = int(np.argmax(refused))
+        empty = bool(np.isnan(sigmas[index]))
+        raise CampaignError(
+            table.file,
+            "a value is missing" if empty else "no standard deviation",
+            row=int(table.rows[index]),
+            column=names.NOISE,
+            found="an empty cell" if empty else f"{table.numbers(names.NOISE, gaps=True)[index]:.15g}",
+            expected="one sigma above 0" + (", or [noise] position for the rows without one" if empty else ""),
+        )
+    return sigmas
 
 
 def _quaternions(table: Table, group: Sequence[str]) -> FloatArray:

@@ -267,6 +267,8 @@ def table_columns(campaign: Campaign) -> Iterator[tuple[str, np.ndarray[Any, np.
     ):
         if values is not None:
             yield from zip(group, values.T / scale, strict=True)
+    if campaign.noise_of_rows is not None:
+        yield names.NOISE, campaign.noise_of_rows / units.length_scale
     for name, values in campaign.covariates.items():
         yield name, values / covariate_scale(name, robot, units)
 
@@ -286,7 +288,7 @@ def _document(campaign: Campaign) -> dict[str, Any]:
     settings = campaign.settings
     scale = settings.units.length_scale
     noise: dict[str, float] = {}
-    if settings.noise_position is not None:
+    if settings.noise_position is not None and campaign.noise_of_rows is None:
         noise["position"] = settings.noise_position / scale
     if settings.noise_orientation is not None:
         noise["orientation"] = settings.noise_orientation

@@ -80,6 +80,14 @@ class Form:
         kind, name = self.place
         return (name, *self.further) if kind == "joint" else ()
 
+    def over(self, relative: Array | None) -> Form:
+        """Return the form with what each row sees of it over the row's relative noise (N, m), ``None`` for all one."""
+        if relative is None:
+            return self
+        if not self.anew and bool((relative == relative[:, :1]).all()):
+            return replace(self, functions=self.functions / relative[:, :1])
+        return replace(self, moves=self.moves / relative[:, :, None])
+
     def beside(self, other: Form, part: float) -> Form:
         """Return the form with that of another joint beside it, whose rms is a part of that of all so far."""
         length = [np.sqrt((form.moves**2).sum(axis=2).mean()) for form in (self, other)]

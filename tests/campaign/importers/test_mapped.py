@@ -65,3 +65,10 @@ def test_a_matrix_gives_the_position_unless_columns_say_another(rv_m2):
     np.testing.assert_allclose(found.orientation, [[1, 0, 0, 0]] * 4)
     found, _ = campaign(rv_m2, given, orientation=matrix, columns={"x": "joint_1"})
     np.testing.assert_allclose(found.position[:, 0], found.q[:, 0])
+
+
+def test_the_noise_of_each_row_comes_from_a_column_of_another_name(rv_m2):
+    given = table(uncertainty=np.array([2.0, 4.0, 2.0, 6.0]))
+    found, notes = campaign(rv_m2, given, columns={"noise": {"column": "uncertainty", "scale": 0.5e-5}})
+    np.testing.assert_allclose(found.noise_of_rows, [1e-5, 2e-5, 1e-5, 3e-5], rtol=1e-12)
+    assert notes == ("before", "4 rows read, 4 taken")
