@@ -5,12 +5,14 @@ from __future__ import annotations
 import dataclasses
 import pickle
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from campaign.files import URDF, full
 
 from thermal_robot.campaign import Campaign, Settings, Units
+from thermal_robot.campaign.targets import posed
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot, load_robot
 
@@ -133,3 +135,16 @@ def test_a_noise_of_rows_that_is_none_is_refused(tmp_path: Path, sigmas: list[fl
     with pytest.raises(CampaignError, match=words) as caught:
         dataclasses.replace(full(tmp_path / "c"), noise_of_rows=np.array(sigmas))
     assert caught.value.column == "noise_of_rows"
+
+
+@pytest.mark.parametrize("given", ["three", 3])
+def test_targets_that_are_none_or_of_other_rows_are_refused(tmp_path: Path, given: Any) -> None:
+    campaign = full(tmp_path / "c")
+    with pytest.raises(CampaignError, match="wrong kind of value"):
+        dataclasses.replace(campaign, targets=given)
+    points = np.random.default_rng(0).normal(size=(1, 4, 3)) + np.arange(5.0)[:, None, None]
+    told = posed((1, 2, 3, 4), points)
+    assert told is not None
+    with pytest.raises(CampaignError, match=r"targets.*other rows than the commands, expected 3 rows"):
+        dataclasses.replace(campaign, targets=told.targets)
+    assert dataclasses.replace(campaign, targets=told.targets.take(np.arange(3))).samples == 3

@@ -5,7 +5,9 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from conftest import load_arm
 from scipy.stats import chi2
+from several import FLAT, LONG, simulated
 from simulate import simulate
 from time_constants import DRIFT, LAG, NOISE, campaign
 
@@ -108,3 +110,19 @@ def test_rows_of_unlike_noise_leave_a_diagnosis_as_it_is(rv_m2):
     for own, other in zip(found["effects"][0]["parameters"], half["effects"][0]["parameters"], strict=True):
         if other["identified"]:
             assert own["value"] == pytest.approx(other["value"], abs=other["std"] / 5)
+
+
+@pytest.mark.parametrize(("targets", "lost"), [(FLAT, 0.0), (LONG, 0.15)], ids=["three", "four of which some are lost"])
+def test_parameters_that_several_targets_tell_are_off_by_what_is_said_of_them(targets, lost):
+    """Of the last joints, whose turns the targets tell; along the rod they tell it far worse than across."""
+    arm, joints, z2 = load_arm("ur10"), ["wrist_2_joint", "wrist_3_joint"], []
+    for seed in range(20):
+        data, truth = simulated(arm, ["joint_gain"], targets, seed, ratio=(6.0, 8.0), places=joints, lost=lost)
+        known = fit(data, choose(("joint_gain",), (), ()))
+        (block,) = known.explanation.best.blocks
+        values, covariance = known.explanation.values[block]
+        true = truth["parts"]["joint_gain"]["values"]
+        for k, parameter in enumerate(known.explanation.linear.blocks[block].parameters):
+            if parameter.place in joints:
+                z2.append(float((values[k] - true.get(parameter.name, 0.0)) ** 2 / covariance[k, k]))
+    assert chi2.ppf(0.001, len(z2)) < sum(z2) < chi2.ppf(0.999, len(z2))

@@ -63,6 +63,18 @@ def tilted(column: str) -> str | None:
     return link if quantity == "tilt" and link and axis in ("x", "y") else None
 
 
+def target_of(column: str) -> tuple[str, int] | None:
+    """Return axis and number of ``x.1``; ``None`` for other columns."""
+    axis, number = split_name(column)
+    plain = axis in POSITION and number.isascii() and number.isdigit() and not number.startswith("0")
+    return (axis, int(number)) if plain else None
+
+
+def axes_of(target: int) -> tuple[str, str, str]:
+    """Return the columns of one of several targets."""
+    return f"x.{target}", f"y.{target}", f"z.{target}"
+
+
 def split_name(column: str) -> tuple[str, str]:
     """Return quantity and place of ``approach.elbow_joint``; the place is empty without a dot."""
     quantity, _, place = column.partition(".")

@@ -86,7 +86,8 @@ class Form:
             return self
         if not self.anew and bool((relative == relative[:, :1]).all()):
             return replace(self, functions=self.functions / relative[:, :1])
-        return replace(self, moves=self.moves / relative[:, :, None])
+        alike = bool((relative == relative[:1]).all())  # the same for all rows, if not for all figures
+        return replace(self, moves=self.moves / (relative[0, :, None] if alike else relative[:, :, None]))
 
     def beside(self, other: Form, part: float) -> Form:
         """Return the form with that of another joint beside it, whose rms is a part of that of all so far."""
