@@ -199,6 +199,10 @@ class Observations:
         turned = self.rotation.transpose(0, 2, 1) @ twists[:, 3:]
         return np.concatenate([twists[:, :3], turned], axis=1)
 
+    def in_root_axes(self, turns: Array) -> Array:
+        """(N, 3) turns as the gap has them, rotation vectors in rad, about the axes of the root frame."""
+        return turns if self.campaign.targets is None else np.einsum("nij,nj->ni", self.rotation, turns)
+
     @cached_property
     def lever(self) -> Array:
         """(N, 3) from the tool frame's origin to the target, root frame axes, m."""
