@@ -75,6 +75,16 @@ def test_a_pose_is_off_by_what_is_said_of_it(targets, missing):
     assert found.targets.sigma == pytest.approx(noise, rel=0.05)
 
 
+def test_the_common_frame_does_not_depend_on_the_order_of_the_rows():
+    rng = np.random.default_rng(8)
+    points = without(seen(rng, noise=1e-5)[0], rng)
+    order = rng.permutation(len(points))
+    one, other = posed(NUMBERS, points), posed(NUMBERS, points[order])
+    np.testing.assert_allclose(other.targets.places, one.targets.places, atol=1e-10)
+    turns = [quaternion_to_rotation(each.orientation) for each in (one, other)]
+    np.testing.assert_allclose(turns[1], turns[0][order], atol=1e-9)
+
+
 def test_a_target_that_is_wrong_in_a_few_rows_keeps_its_place():
     rng = np.random.default_rng(3)
     points, _, _ = seen(rng, 60, 5, 1e-5)

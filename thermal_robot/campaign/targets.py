@@ -117,8 +117,7 @@ def posed(numbers: tuple[int, ...], points: Array) -> Posed | None:
     if np.isnan(found).any():
         return None
     middle = found - found.mean(axis=0)
-    axes = np.linalg.svd(middle)[2]
-    places = middle @ (axes * np.sign(np.linalg.det(axes))).T
+    places = middle @ _axes(middle).T
     turn, shift = _moved(places, np.nan_to_num(points), seen)
     left = np.where(seen[:, :, None], np.nan_to_num(points) - shift[:, None] - places @ turn.transpose(0, 2, 1), 0.0)
     freedom = 3 * seen.sum(axis=1) - 6
@@ -128,6 +127,14 @@ def posed(numbers: tuple[int, ...], points: Array) -> Posed | None:
     typical = np.sqrt((spread.reshape(-1, 2, 3) ** 2).mean(axis=(0, 2)))
     targets = Targets(numbers, points, places, spread, typical, sigma)
     return Posed(targets, shift, rotation_to_quaternion(turn), deviation)
+
+
+def _axes(middle: Array) -> Array:
+    """(3, 3) principal axes of the targets, right-handed: the farthest along each of the first two is in front."""
+    axes = np.linalg.svd(middle)[2][:2]
+    along = middle @ axes.T
+    axes = axes * np.sign(along[np.abs(along).argmax(axis=0), [0, 1]])[:, None]
+    return np.vstack([axes, np.cross(*axes)])
 
 
 def _seen(points: Array) -> Mask:
