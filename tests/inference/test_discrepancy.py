@@ -70,6 +70,15 @@ def test_products_are_those_beside_the_dense_covariance(case, tau):
     np.testing.assert_allclose(again, found, rtol=0, atol=1e-12 * np.abs(expected).max())
 
 
+def test_no_columns_have_no_products(case):
+    """As where both frames are known and no effect is found."""
+    spectrum, inside, _, _, _ = case
+    none = np.zeros((len(inside), 0))
+    assert Smooth(spectrum, 1.0).products(none).shape == (0, 0)
+    assert spectrum.spread(1.0, none).shape == (0, 0)
+    assert Smooth(spectrum, 1.0).whitened(none).shape == none.shape
+
+
 @pytest.mark.parametrize("tau", TAUS)
 def test_columns_are_spread_by_the_dense_covariance(case, tau):
     spectrum, inside, _, _, rng = case

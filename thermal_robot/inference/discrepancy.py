@@ -199,7 +199,7 @@ class Spectrum:
         """Return BᵀS of each part, or, where B is wide, the part's rows of S; S the columns that differ."""
         stack = stack if isinstance(stack, Stack) else Stack.around(stack, len(self.axes))
         found = [np.zeros((len(own), len(stack.different))) for own in self.own]
-        for chunk, rows in stack.chunks():
+        for chunk, rows in stack.chunks() if stack.different else ():
             for k, (part, own) in enumerate(zip(self.parts, self.apart(rows), strict=True)):
                 if part.wide:
                     flat = own.reshape(-1, own.shape[2])
@@ -272,7 +272,10 @@ class Spectrum:
             over = power if part.wide else power / np.maximum(value, settings.SMOOTH_FLOOR)
             found.append(vector @ (over[:, None] * (vector.T @ along)))
         if self.parts[0].wide:
-            rows = [own.reshape(len(self.parts[0].used), -1, own.shape[1]) for own in found]
+            rows = [
+                own.reshape(len(self.parts[0].used), own.shape[0] // len(self.parts[0].used), own.shape[1])
+                for own in found
+            ]
             return np.asarray(stack + self.joined(rows).reshape(stack.shape))
         return stack + self.back(self.parts, found).reshape(stack.shape)
 
