@@ -5,9 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 from helpers import commanded, without_masses
+from several import FLAT, table_of
 
 from thermal_robot import observations
-from thermal_robot.campaign import Campaign
+from thermal_robot.campaign import Campaign, campaign_from_table
 from thermal_robot.kinematics import (
     Displacement,
     exp3,
@@ -91,8 +92,8 @@ def response(campaign, frames, displace):
     return (below - above) / (2 * STEP)
 
 
-def test_sensitivities_are_how_the_target_answers(robot, frames):
-    campaign = measured_exactly(robot, frames)
+def answers(robot, frames, campaign):
+    """Assert that every sensitivity is the difference of the gap."""
     seen = observe(campaign, frames)
     for j, unit in enumerate(np.eye(robot.n)):
         moved = response(campaign, frames, lambda h, u=unit: Displacement(joint=h * u))
@@ -107,6 +108,10 @@ def test_sensitivities_are_how_the_target_answers(robot, frames):
             twists[s] = unit
             moved = response(campaign, frames, lambda h, t=twists: Displacement(segment=h * t))
             np.testing.assert_allclose(seen.segment_sensitivity[:, :, s, axis], moved, atol=TOLERANCE)
+
+
+def test_sensitivities_are_how_the_target_answers(robot, frames):
+    answers(robot, frames, measured_exactly(robot, frames))
 
 
 def test_a_base_that_stands_elsewhere_is_a_twist_of_the_base(rv_m2, frames):
@@ -218,3 +223,24 @@ def test_the_last_segment_carries_the_payload(rv_m2):
     bare = observe(commanded(rv_m2))
     weight = np.linalg.norm((seen.segment_load - bare.segment_load)[:, :, :3], axis=2)
     np.testing.assert_allclose(weight, np.tile(9.81 * payload[:, None], (1, len(rv_m2.segments))), rtol=1e-12)
+
+
+def several(robot, frames):
+    """Exact poses that several targets tell."""
+    poses = measured_exactly(robot, frames, rows=6)
+    table = table_of(poses, FLAT, np.random.default_rng(0), noise=0.0)
+    return replace(poses, targets=campaign_from_table(robot, table).targets)
+
+
+def test_what_several_targets_tell_turns_about_the_axes_of_their_frame(rv_m2, frames):
+    rng = np.random.default_rng(5)
+    campaign = shifted(several(rv_m2, frames), 1e-3 * rng.normal(size=(6, 3)), 0.1 * rng.normal(size=(6, 3)))
+    plain, seen = observe(replace(campaign, targets=None), frames), observe(campaign, frames)
+    np.testing.assert_array_equal(seen.gap[:, :3], plain.gap[:, :3])
+    measured = quaternion_to_rotation(campaign.orientation)
+    again = frames.base[:3, :3] @ seen.rotation @ exp3(seen.gap[:, 3:])
+    np.testing.assert_allclose(again, measured, atol=1e-12)
+
+
+def test_sensitivities_are_how_the_frame_of_several_targets_answers(rv_m2, frames):
+    answers(rv_m2, frames, several(rv_m2, frames))

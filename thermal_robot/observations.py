@@ -193,7 +193,22 @@ class Observations:
         if campaign.orientation is None:
             return linear
         measured = base[:3, :3].T @ quaternion_to_rotation(campaign.orientation)
-        return np.hstack([linear, log3(measured @ self.rotation.transpose(0, 2, 1))])
+        turn = log3(measured @ self.rotation.transpose(0, 2, 1))
+        return self._own_axes(np.hstack([linear, turn])[:, :, None])[:, :, 0]
+
+    def _own_axes(self, twists: Array) -> Array:
+        """(N, 6, K) twists whose turns are about the target's own axes where several targets tell its pose.
+
+        There the noise of the turn differs by these axes; else they stay about those of the root frame.
+        """
+        if self.campaign.targets is None:
+            return twists
+        turned = self.rotation.transpose(0, 2, 1) @ twists[:, 3:]
+        return np.concatenate([twists[:, :3], turned], axis=1)
+
+    def in_root_axes(self, turns: Array) -> Array:
+        """(N, 3) turns as the gap has them, rotation vectors in rad, about the axes of the root frame."""
+        return turns if self.campaign.targets is None else np.einsum("nij,nj->ni", self.rotation, turns)
 
     @cached_property
     def lever(self) -> Array:
@@ -203,23 +218,25 @@ class Observations:
     @cached_property
     def joint_sensitivity(self) -> Array:
         """(N, 6, n) LOCAL_WORLD_ALIGNED Jacobian at the target."""
-        return frame_jacobians(self.robot, self.q, frames=self.chain, point=self.frames.tool[:3, 3])
+        found = frame_jacobians(self.robot, self.q, frames=self.chain, point=self.frames.tool[:3, 3])
+        return self._own_axes(found)
 
     @cached_property
     def segment_sensitivity(self) -> Array:
         """(N, 6, S, 6) twist of the target (LOCAL_WORLD_ALIGNED) a unit twist of each segment's placement."""
-        return placement_sensitivities(self.robot, self.q, frames=self.chain, point=self.frames.tool[:3, 3])
+        found = placement_sensitivities(self.robot, self.q, frames=self.chain, point=self.frames.tool[:3, 3])
+        return self._own_axes(found.reshape(len(found), 6, -1)).reshape(found.shape)
 
     @cached_property
     def base_sensitivity(self) -> Array:
         """(N, 6, 6) twist of the target a unit twist of the base, root frame."""
         point = self.chain.tool_position + self.lever
-        return _twist_map(np.broadcast_to(np.eye(3), (len(point), 3, 3)), point)
+        return self._own_axes(_twist_map(np.broadcast_to(np.eye(3), (len(point), 3, 3)), point))
 
     @cached_property
     def tool_sensitivity(self) -> Array:
         """(N, 6, 6) twist of the target a unit twist of the tool, tool frame."""
-        return _twist_map(self.chain.tool_rotation, self.lever)
+        return self._own_axes(_twist_map(self.chain.tool_rotation, self.lever))
 
 
 _HOLDING: list[ref[Observations]] = []

@@ -2,14 +2,17 @@
 
 from __future__ import annotations
 
+import dataclasses
 import pickle
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 from campaign.files import URDF, full
 
 from thermal_robot.campaign import Campaign, Settings, Units
+from thermal_robot.campaign.targets import posed
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot, load_robot
 
@@ -109,3 +112,39 @@ def test_settings_hold_all_that_is_not_in_the_table(tmp_path: Path) -> None:
         gears={"lift": 101.0},
     )
     assert settings.noise_position == pytest.approx(2e-5)
+
+
+def test_noise_of_rows_is_relative_to_their_root_mean_square(tmp_path: Path) -> None:
+    campaign = dataclasses.replace(
+        full(tmp_path / "c"), noise_position=None, noise_of_rows=np.array([1e-5, 5e-5, 7e-5])
+    )
+    assert campaign.noise_position == pytest.approx(5e-5)
+    relative = campaign.relative_noise
+    assert relative is not None
+    np.testing.assert_allclose(relative, [[f] * 3 + [1.0] * 3 for f in (0.2, 1.0, 1.4)])
+    part = campaign.take([2, 0])
+    assert part.relative_noise is not None
+    np.testing.assert_array_equal(part.relative_noise, relative[[2, 0]])
+    alike = dataclasses.replace(campaign, noise_position=None, noise_of_rows=np.full(3, 0.1 + 0.2))
+    assert alike.noise_position == 0.1 + 0.2
+    assert alike.relative_noise is None
+
+
+@pytest.mark.parametrize(("sigmas", "words"), [([1e-5, 0.0, 1e-5], "index 1"), ([1e-5], "wrong shape")])
+def test_a_noise_of_rows_that_is_none_is_refused(tmp_path: Path, sigmas: list[float], words: str) -> None:
+    with pytest.raises(CampaignError, match=words) as caught:
+        dataclasses.replace(full(tmp_path / "c"), noise_of_rows=np.array(sigmas))
+    assert caught.value.column == "noise_of_rows"
+
+
+@pytest.mark.parametrize("given", ["three", 3])
+def test_targets_that_are_none_or_of_other_rows_are_refused(tmp_path: Path, given: Any) -> None:
+    campaign = full(tmp_path / "c")
+    with pytest.raises(CampaignError, match="wrong kind of value"):
+        dataclasses.replace(campaign, targets=given)
+    points = np.random.default_rng(0).normal(size=(1, 4, 3)) + np.arange(5.0)[:, None, None]
+    told = posed((1, 2, 3, 4), points)
+    assert told is not None
+    with pytest.raises(CampaignError, match=r"targets.*other rows than the commands, expected 3 rows"):
+        dataclasses.replace(campaign, targets=told.targets)
+    assert dataclasses.replace(campaign, targets=told.targets.take(np.arange(3))).samples == 3

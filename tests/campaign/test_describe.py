@@ -96,3 +96,8 @@ def test_many_sessions_are_counted(tmp_path: Path) -> None:
     text = describe(read_campaign(put(tmp_path / "c", ROWS.split("\n")[0] + ",session\n" + rows)))
     assert "12: day 00 (1 row)" in text
     assert "day 07 (1 row) and 4 more" in text
+
+
+def test_tells_the_noise_of_each_row(tmp_path: Path) -> None:
+    text = _squeezed(describe(read_campaign(put(tmp_path / "c", add(ROWS, noise="0.02 0.5 0.03")))))
+    assert "noise of position 0.02 .. 0.5 mm per axis (one sigma), of each row" in text

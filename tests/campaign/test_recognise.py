@@ -146,3 +146,10 @@ def test_a_column_of_ones_own_is_no_typing_error(tmp_path: Path) -> None:
     campaign = read(tmp_path, table=table)
     assert campaign.extra == ("note", "pressure", "humidity", "coolant", "shift")
     assert campaign.warnings == ()
+
+
+@pytest.mark.parametrize("meant", ["Noise", "nois"])
+def test_a_noise_that_is_written_otherwise_is_asked_about(tmp_path: Path, meant: str) -> None:
+    campaign = read(tmp_path, table=with_column(meant, "1", "2", "3"))
+    assert campaign.noise_of_rows is None
+    assert "did you mean 'noise'" in " ".join(campaign.warnings)

@@ -89,3 +89,7 @@ def test_other_words_are_refused(arguments: tuple[str, str], column: str, found:
     with pytest.raises(CampaignError, match="unknown unit") as caught:
         Units(*arguments)
     assert (caught.value.column, caught.value.found) == (column, found)
+
+
+def test_the_noise_of_a_row_is_a_length(rv_m2: Robot) -> None:
+    assert unit_of("noise", rv_m2, Units("deg", "mm")) == "mm"

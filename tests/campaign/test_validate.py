@@ -32,6 +32,10 @@ REFUSED = [
     (with_column("approach.lift", "1", "0", "0.5"), 4, "approach.lift", "0.5", ["impossible", "-1, 0 or 1"]),
     (with_column("payload", "0", "-2", "3"), 3, "payload", "-2", ["impossible value", "not negative"]),
     (with_column("temperature", "20", "20", "-300"), 4, "temperature", "-300", ["impossible value", "°C"]),
+    (with_column("noise", "0.02", "0", "0.02"), 3, "noise", "0", ["no standard deviation", "one sigma above 0"]),
+    (with_column("noise", "0.02", "0.02", "-1"), 4, "noise", "-1", ["no standard deviation", "one sigma above 0"]),
+    (with_column("noise", "0.02", "inf", "1"), 3, "noise", "'inf'", ["not a finite number"]),
+    (with_column("noise", "0.02", "good", "1"), 3, "noise", "'good'", ["text where a number should be"]),
 ]
 
 
@@ -142,3 +146,30 @@ def test_recorded_or_unknown_moves_are_not_guessed(tmp_path: Path) -> None:
     assert unknown.derived == ()
     assert not any(name.startswith("approach.") for name in unknown.covariates)
     assert unknown.settings.moves == "unknown"
+
+
+def test_the_noise_of_each_row_takes_the_place_of_that_of_all(tmp_path: Path) -> None:
+    campaign = read(tmp_path, table=with_column("noise", "0.03", "0.04", "0.05"))
+    each = campaign.noise_of_rows
+    assert each is not None
+    np.testing.assert_allclose(each, [3e-5, 4e-5, 5e-5], rtol=1e-12)
+    assert campaign.noise_position == pytest.approx(np.sqrt(50.0 / 3.0) * 1e-5)
+    assert "noise" not in campaign.covariates
+
+
+def test_a_row_without_a_noise_of_its_own_has_that_of_all_or_is_refused(tmp_path: Path) -> None:
+    table, stated = with_column("noise", "0.03", "", "0.05"), "position = 0.02"
+    assert stated in TOML
+    each = read(tmp_path, table=table).noise_of_rows
+    assert each is not None
+    np.testing.assert_allclose(each, [3e-5, 2e-5, 5e-5], rtol=1e-12)
+    error = refusal(tmp_path, table=table, toml=TOML.replace(stated, ""))
+    assert (error.row, error.column, error.found) == (3, "noise", "an empty cell")
+    assert "[noise] position for the rows without one" in str(error)
+
+
+def test_an_empty_column_of_noise_is_none(tmp_path: Path) -> None:
+    campaign = read(tmp_path, table=with_column("noise", "", "", ""))
+    assert campaign.noise_of_rows is None
+    assert campaign.noise_position == pytest.approx(2e-5)
+    assert "column 'noise' is empty and counts as absent" in " ".join(campaign.warnings)

@@ -103,3 +103,24 @@ def test_predictions_keep_every_digit(tmp_path: Path) -> None:
     write_predictions(tmp_path / "p.csv", predicted(positions))
     again = pd.read_csv(tmp_path / "p.csv", dtype=str).astype(float)
     np.testing.assert_array_equal(again[["x", "y", "z"]], positions)
+
+
+def test_the_noise_of_each_row_is_written_and_read_again(tmp_path: Path) -> None:
+    whole = full(tmp_path / "c")
+    sigmas = np.array([2e-5, 7e-5, 3e-5])
+    campaign = dataclasses.replace(whole, noise_position=None, noise_of_rows=sigmas)
+    file = write_campaign(campaign, tmp_path / "copy")
+    again = read_campaign(file)
+    np.testing.assert_allclose(again.noise_of_rows, sigmas, rtol=1e-12)
+    assert again.noise_position == pytest.approx(campaign.noise_position, rel=1e-12)
+    np.testing.assert_allclose(campaign.to_frame()["noise"], sigmas / campaign.units.length_scale, rtol=1e-12)
+    assert "position =" not in file.read_text()
+
+
+def test_samples_to_predict_may_have_a_noise_that_says_nothing(tmp_path: Path) -> None:
+    campaign = full(tmp_path / "c")
+    table = pd.read_csv(tmp_path / "c" / "measurements.csv").assign(noise="unknown")
+    table.to_csv(tmp_path / "s.csv", index=False)
+    samples = read_samples(tmp_path / "s.csv", campaign)
+    assert samples.noise_of_rows is None
+    assert "noise" not in samples.extra

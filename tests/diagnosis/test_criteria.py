@@ -6,9 +6,11 @@ from dataclasses import replace
 import jsonschema
 import numpy as np
 import pytest
+from several import FLAT, table_of
 from simulate import simulate
 
 from thermal_robot import diagnose
+from thermal_robot.campaign import campaign_from_table
 from thermal_robot.iso9283 import performance
 from thermal_robot.report import schema, text
 
@@ -66,3 +68,17 @@ def test_without_repeats_there_is_none(repeated):
     assert once.performance is None
     assert "performance" not in once.to_dict()
     assert "ISO 9283" not in text(once)
+
+
+def test_what_several_targets_tell_is_turned_back_about_the_axes_of_the_frame(rv_m2):
+    """The turn of a pose that is corrected is the same, whichever axes the gap has."""
+    poses = simulate(rv_m2, ["joint_offset"], samples=30, seed=5, noise=25e-9, turning=1e-12, ratio=(3e4, 6e4))[0]
+    table = table_of(poses.take(np.repeat(np.arange(30), 4)), FLAT, np.random.default_rng(0))
+    several = campaign_from_table(rv_m2, table, noise_position=25e-6)
+    told, plain = (diagnose(one, only=["joint_offset"]) for one in (several, replace(several, targets=None)))
+    before, after, other = (
+        np.array([getattr(pose, kind).angles for pose in each.performance.poses])
+        for each, kind in ((told, "accuracy"), (told, "corrected"), (plain, "corrected"))
+    )
+    np.testing.assert_allclose(after, other, atol=0.02 * np.abs(before).max())
+    assert np.abs(after).max() < 0.5 * np.abs(before).max()

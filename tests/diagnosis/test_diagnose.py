@@ -5,14 +5,16 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
+from several import FLAT, LONG, simulated, table_of
 from simulate import simulate
 from threadpoolctl import threadpool_info, threadpool_limits
 
 from thermal_robot import CampaignError, EffectError, diagnose
-from thermal_robot.campaign import write_campaign
+from thermal_robot.campaign import campaign_from_table, write_campaign
 from thermal_robot.effects import RANDOM, library
 from thermal_robot.inference.columns import frame_columns, moved_by
 from thermal_robot.inference.frames import register
+from thermal_robot.kinematics import Displacement, rotation_to_quaternion
 from thermal_robot.observations import observe
 
 ALONE = [name for name in library() if name not in ("base_frame", "tool_frame", "joint_ripple")]
@@ -321,3 +323,35 @@ def test_the_sentences_belong_to_what_was_found(campaign):
     found = diagnose(campaign)
     assert all(found.title(name).split()[0] in found.summary for name in found.verdict[:1])
     assert bool(found.advice) == (found.wanted is not None)
+
+
+two_arms = pytest.mark.parametrize("arm", ["rv_m2", "ur10"], indirect=True)
+
+
+@two_arms
+@pytest.mark.parametrize("effects", [["joint_offset"], ["thermal_elongation"], []], ids=lambda e: e[0] if e else "none")
+@pytest.mark.parametrize("lost", [0.0, 0.1])
+def test_several_targets_of_each_pose_tell_the_effect(arm, effects, lost):
+    """Nothing else, nothing unexplained, and what remains is the noise of their middle."""
+    data, _ = simulated(arm, effects, LONG, 3, samples=80, lost=lost)
+    found = diagnose(data).to_dict()
+    assert found["verdict"]["effects"] == effects
+    assert not found["verdict"]["unexplained"]
+    assert found["campaign"]["measures"] == "pose"
+    assert found["gap"]["rms_after"] == pytest.approx(found["gap"]["noise_floor"], rel=0.15)
+
+
+@two_arms
+def test_several_targets_of_one_visit_are_no_visits(arm):
+    """A joint that scatters anew at each visit moves all targets at once: it is found, and its size is right."""
+    rng, sigma, joint = np.random.default_rng(4), 3e-4, 2
+    poses = simulate(arm, samples=40, seed=4, noise=25e-9, turning=1e-12)[0]
+    visits = poses.take(np.repeat(np.arange(40), 3))
+    error = np.zeros_like(visits.q)
+    error[:, joint] = sigma * rng.normal(size=120)
+    moved = observe(visits, displacement=Displacement(joint=error))
+    exact = replace(visits, position=moved.position, orientation=rotation_to_quaternion(moved.rotation))
+    found = diagnose(campaign_from_table(arm, table_of(exact, FLAT, rng), noise_position=NOISE))
+    (wear,) = [e for e in found.to_dict()["effects"] if e["status"] == "found"]
+    assert wear["locations"][0]["name"] == arm.joint_names[joint]
+    assert wear["parameters"][0]["value"] == pytest.approx(sigma, rel=0.25)

@@ -14,11 +14,11 @@ from conftest import AWKWARD
 from coupled import COUPLED, PARALLELOGRAM
 from simulate import conditions
 
-from thermal_robot.campaign import Campaign, Units, read_campaign, write_campaign
+from thermal_robot.campaign import Campaign, Units, campaign_from_table, read_campaign, write_campaign
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.datasets import demo_directory
 from thermal_robot.effects import library
-from thermal_robot.kinematics import rotation_to_quaternion, tool_poses
+from thermal_robot.kinematics import quaternion_to_rotation, rotation_to_quaternion, tool_poses
 from thermal_robot.observations import Frames, observe
 from thermal_robot.robot import load_robot
 
@@ -47,7 +47,7 @@ def campaigns() -> tuple[Files, ...]:
         demo.take(np.arange(ROWS)),
         *(made(*arm) for arm in ((AWKWARD, "tip"), (COUPLED, "tip"), (PARALLELOGRAM, "tool"))),
     ]
-    return (*(files_of(campaign) for campaign in sound), every_column())
+    return (*(files_of(campaign) for campaign in sound), every_column(), several_targets())
 
 
 UNITS = Units("deg", "mm")
@@ -64,6 +64,21 @@ def made(urdf: str, tool: str, *, units: Units = UNITS, seed: int = 7) -> Campai
         covariates=conditions(robot, q, rng, 3.0), labels={"session": np.repeat(["a", "b"], ROWS // 2)},
         noise_position=2e-5, noise_orientation=3e-5, payload_com=np.array([0.0, 0.0, 0.05]), units=units,
     )  # fmt: skip
+
+
+def several_targets() -> Files:
+    """Four targets of each pose, of which some rows lack one, and a noise for each row."""
+    one, rng = made(AWKWARD, "tip"), np.random.default_rng(9)
+    places = np.array([[0.1, 0.0, 0.0], [-0.05, 0.08, 0.0], [-0.05, -0.08, 0.02], [0.0, 0.0, 0.12]])
+    table = one.to_frame().drop(columns=["x", "y", "z", "qw", "qx", "qy", "qz"])
+    points = one.position[:, None] + places @ quaternion_to_rotation(one.orientation).transpose(0, 2, 1)
+    points = points + 2e-5 * rng.normal(size=points.shape)
+    points[3, 1] = points[8, 3] = np.nan
+    for k in range(4):
+        for a, axis in enumerate("xyz"):
+            table[f"{axis}.{k + 1}"] = points[:, k, a] / one.units.length_scale
+    table["noise"] = rng.choice([0.02, 0.05], len(table))
+    return files_of(campaign_from_table(one.robot, table, angle_unit="deg", length_unit="mm"))
 
 
 def every_column() -> Files:

@@ -11,7 +11,7 @@ from simulate import simulate
 
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import frame_columns
-from thermal_robot.inference.discrepancy import Form, Smooth, Spectrum, forms
+from thermal_robot.inference.discrepancy import Form, Smooth, Spectrum, decomposed, forms
 from thermal_robot.inference.explain import explain
 from thermal_robot.inference.frames import register
 from thermal_robot.inference.problem import Linear
@@ -68,6 +68,15 @@ def test_products_are_those_beside_the_dense_covariance(case, tau):
     # from columns that were carried over once
     again = spectrum.products(tau, spectrum.along(stack), stack.T @ stack)
     np.testing.assert_allclose(again, found, rtol=0, atol=1e-12 * np.abs(expected).max())
+
+
+def test_no_columns_have_no_products(case):
+    """As where both frames are known and no effect is found."""
+    spectrum, inside, _, _, _ = case
+    none = np.zeros((len(inside), 0))
+    assert Smooth(spectrum, 1.0).products(none).shape == (0, 0)
+    assert spectrum.spread(1.0, none).shape == (0, 0)
+    assert Smooth(spectrum, 1.0).whitened(none).shape == none.shape
 
 
 @pytest.mark.parametrize("tau", TAUS)
@@ -258,3 +267,28 @@ def test_noise_is_not_followed():
         drawn = replace(linear, gap=NOISE * rng.normal(size=linear.gap.shape))
         beliefs.append(explain(drawn, Noise(NOISE), forms=offered).discrepancy.probability)
     assert np.mean(np.array(beliefs) < 0.5) >= 0.95, np.sort(beliefs)[-10:]
+
+
+@pytest.mark.parametrize("turning", [None, 3e-5], ids=["positions", "poses"])
+@pytest.mark.parametrize("number", [0, 3, 4, -1], ids=["tool", "places", "one place", "anew"])
+def test_a_form_over_the_noise_of_each_row_is_the_dense_one_over_it(rv_m2, number, turning):
+    """K of rows in units of their own noise is D⁻¹ K D⁻¹, up to its mean on the diagonal."""
+    data = replace(simulate(rv_m2, samples=12, seed=2, turning=turning)[0], priors={})
+    form = forms(observe(data, register(data)))[number]
+    measures = 3 if turning is None else 6
+    relative = np.ones((12, measures))
+    relative[:, :3] = np.random.default_rng(0).uniform(0.3, 3.0, (12, 1))
+    noise = np.repeat([2e-5, 3e-5], 3)[:measures]
+
+    def dense_of(one):
+        spectrum = decomposed(one, np.ones(12), noise)
+        return spectrum.spread(1.0, np.eye(12 * measures)) if isinstance(spectrum, Spectrum) else grouped(spectrum)
+
+    def grouped(found):
+        inverse = found.whitened(1.0, np.eye(12 * measures))
+        return np.linalg.inv(inverse @ inverse)
+
+    plain, over = (dense_of(one) - np.eye(12 * measures) for one in (form, form.over(relative)))
+    expected = plain / np.outer(relative.ravel(), relative.ravel())
+    np.testing.assert_allclose(over / np.trace(over), expected / np.trace(expected), atol=1e-9)
+    assert form.over(None) is form

@@ -1,7 +1,13 @@
 """A fit ends where its choice stays and its constants are the likeliest, not at a point of a grid."""
 
+import json
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from conftest import load_arm
+from scipy.stats import chi2
+from several import FLAT, LONG, simulated
 from simulate import simulate
 from time_constants import DRIFT, LAG, NOISE, campaign
 
@@ -60,3 +66,63 @@ def test_large_effects_are_the_verdict_at_constants_drawn_at_random(kind, shorte
         arm = ["rv_m2", "ur10", "panda", "ur5"][seed % 4]
         named.append(diagnose(campaign(arm, seed, kind, constant, rng.uniform(10.0, 40.0))).verdict)
     assert named.count((kind,)) >= 15, named
+
+
+def unlike(data, times, seed):
+    """The campaign with every second row measured by an instrument so many times as noisy."""
+    rng, factor = np.random.default_rng([seed, 5]), np.where(np.arange(data.samples) % 2, times, 1.0)
+    further = rng.normal(size=(data.samples, 3)) * data.noise_position * np.sqrt(factor**2 - 1.0)[:, None]
+    sigmas = data.noise_position * factor
+    return replace(data, position=data.position + further, noise_position=None, noise_of_rows=sigmas)
+
+
+def test_rows_of_unlike_noise_count_by_it(rv_m2):
+    """Parameters are off by what is said of them, and by far less than where all rows count alike."""
+    off, said, alike = [], [], []
+    for seed in range(40):
+        data, truth, _ = simulate(rv_m2, ["instrument_scale"], seed=seed, samples=40, ratio=(12.0, 15.0))
+        data = unlike(data, 10.0, seed)
+        (true,) = truth["parts"]["instrument_scale"]["values"].values()
+        for one, errors in ((data, off), (replace(data, noise_of_rows=None), alike)):
+            known = fit(one, choose(("instrument_scale",), (), ()))
+            value, covariance = known.explanation.values[known.explanation.best.blocks[0]]
+            errors.append(float(value[0]) - true)
+            if errors is off:
+                said.append(float(np.sqrt(covariance[0, 0])))
+    z2 = float(np.mean((np.array(off) / said) ** 2))
+    assert chi2.ppf(0.001, 40) < 40 * z2 < chi2.ppf(0.999, 40)
+    assert np.std(off) < 0.4 * np.std(alike)
+
+
+def test_one_noise_in_every_row_is_the_noise_of_all(rv_m2):
+    data = simulate(rv_m2, ["joint_offset"], seed=4, samples=60)[0]
+    each = replace(data, noise_position=None, noise_of_rows=np.full(60, data.noise_position))
+    whole, same = (json.dumps(diagnose(one).to_dict(), sort_keys=True) for one in (data, each))
+    assert same == whole
+
+
+def test_rows_of_unlike_noise_leave_a_diagnosis_as_it_is(rv_m2):
+    """A thousand times the noise in every second row is as good as their absence."""
+    data = simulate(rv_m2, ["joint_offset"], seed=4, samples=120)[0]
+    found = diagnose(unlike(data, 1e3, 0)).to_dict()
+    half = diagnose(data.take(np.arange(0, 120, 2))).to_dict()
+    assert found["verdict"]["effects"] == half["verdict"]["effects"] == ["joint_offset"]
+    for own, other in zip(found["effects"][0]["parameters"], half["effects"][0]["parameters"], strict=True):
+        if other["identified"]:
+            assert own["value"] == pytest.approx(other["value"], abs=other["std"] / 5)
+
+
+@pytest.mark.parametrize(("targets", "lost"), [(FLAT, 0.0), (LONG, 0.15)], ids=["three", "four of which some are lost"])
+def test_parameters_that_several_targets_tell_are_off_by_what_is_said_of_them(targets, lost):
+    """Of the last joints, whose turns the targets tell; along the rod they tell it far worse than across."""
+    arm, joints, z2 = load_arm("ur10"), ["wrist_2_joint", "wrist_3_joint"], []
+    for seed in range(20):
+        data, truth = simulated(arm, ["joint_gain"], targets, seed, ratio=(6.0, 8.0), places=joints, lost=lost)
+        known = fit(data, choose(("joint_gain",), (), ()))
+        (block,) = known.explanation.best.blocks
+        values, covariance = known.explanation.values[block]
+        true = truth["parts"]["joint_gain"]["values"]
+        for k, parameter in enumerate(known.explanation.linear.blocks[block].parameters):
+            if parameter.place in joints:
+                z2.append(float((values[k] - true.get(parameter.name, 0.0)) ** 2 / covariance[k, k]))
+    assert chi2.ppf(0.001, len(z2)) < sum(z2) < chi2.ppf(0.999, len(z2))

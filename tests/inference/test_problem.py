@@ -219,3 +219,16 @@ def test_two_effects_of_which_one_contains_the_other_are_never_named_together(ar
         found = diagnose(campaign)
         assert found.verdict == ("geometric",)
         assert found.finding(both[1]).status != "found"
+
+
+def test_each_row_is_whitened_by_its_own_noise():
+    linear, even = small_problem(3)
+    relative = np.random.default_rng(3).uniform(0.5, 5.0, linear.gap.shape)
+    scaled = Linear(
+        linear.gap * relative,
+        linear.frames * relative[:, :, None],
+        tuple(columns_of(b.columns * relative[:, :, None], b.sizes) for b in linear.blocks),
+    )
+    own = replace(even, relative=relative)
+    np.testing.assert_allclose(whitened(scaled, own), whitened(linear, even), rtol=1e-12)
+    np.testing.assert_array_equal(own.sigma([2, 4]), even.noise * relative[[2, 4]])

@@ -144,3 +144,28 @@ def test_steps_are_the_verdict_where_poses_repeat():
         named.append(diagnose(data).verdict)
     # thirty errors of a pose, each seen four times, may look like systematic effects by chance
     assert named.count(("encoder_resolution",)) >= 13, named
+
+
+@pytest.mark.parametrize("repeats", [1, 3])
+def test_rows_of_unlike_noise_are_no_scatter(repeats):
+    """Whether the noisy rows are visits of a pose beside quiet ones, or whole poses."""
+    for seed in range(3):
+        data, _ = visited("rv_m2", seed, repeats, 90 // repeats, 1e-9, stepped=False)
+        rng = np.random.default_rng([seed, 3])
+        sigmas = NOISE * rng.choice([1.0, 8.0], data.samples)
+        further = rng.normal(size=data.position.shape) * np.sqrt(sigmas**2 - NOISE**2)[:, None]
+        data = replace(data, position=data.position + further, noise_position=None, noise_of_rows=sigmas)
+        assert gap_of(data)[0].kept == ()
+
+
+def test_a_joint_that_scatters_is_measured_in_rows_of_unlike_noise():
+    """Its standard deviation, as of quiet rows alone."""
+    for seed in range(2):
+        data, step = visited("rv_m2", seed, 1, 200, 4.0, stepped=False)
+        rng = np.random.default_rng([seed, 4])
+        sigmas = NOISE * rng.choice([1.0, 20.0], data.samples)
+        further = rng.normal(size=data.position.shape) * np.sqrt(sigmas**2 - NOISE**2)[:, None]
+        data = replace(data, position=data.position + further, noise_position=None, noise_of_rows=sigmas)
+        (kept,) = gap_of(data)[0].kept
+        assert kept.component.joint == 1
+        assert kept.component.sigma == pytest.approx(step / np.sqrt(12.0), rel=0.25)

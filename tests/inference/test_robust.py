@@ -144,3 +144,18 @@ def test_no_stated_noise_is_less_than_rounding():
     """Somebody wrote 1e-12 mm: a billion times finer than any instrument, and than the figures of a table."""
     assert Noise(1e-15, 0.5e-9).parts(6) == (1e-9, 1e-9)
     assert Noise(None, None).parts(6) == (None, None)
+
+
+@measured
+def test_rows_with_a_noise_of_their_own_are_judged_by_it(measures):
+    """However unlike the rows are, the noise is found, none is a gross error, and what is one to its own noise is."""
+    rng = np.random.default_rng(8)
+    relative = np.ones((900, measures))
+    relative[:, :3] = np.repeat([0.2, 1.0, 30.0], 300)[:, None]
+    noise = Noise(None, None, relative)
+    rows = relative * noise_of(rng, 900, measures)
+    rows[0] += 40.0 * relative[0] * SIGMA[:measures]  # less than the noise of the last ones
+    white, aside = reweigh(rows, noise, np.ones(900, dtype=bool), 0.0, measures)
+    np.testing.assert_allclose(white.noise, SIGMA[:measures], rtol=0.1)
+    assert np.flatnonzero(aside).tolist() == [0]
+    np.testing.assert_allclose((rows[1:] / white.sigma()[1:]).std(axis=0), 1.0, atol=0.1)

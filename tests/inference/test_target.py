@@ -172,3 +172,14 @@ def test_a_seat_does_not_count_what_the_design_can_do():
     gap, design, _ = drawn(rng)
     target = Target.of(gap, design)
     assert target.seat(design[:, :, :1]).gains([np.ones((ROWS, 1))])[0] == -np.inf
+
+
+def test_rows_count_by_their_own_noise():
+    """What a law gains in rows of unlike noise is what it gains in the same rows over their noise."""
+    rng = np.random.default_rng(5)
+    relative = np.repeat(rng.uniform(0.1, 10.0, (80, 1)), 3, axis=1)
+    gap, design, law = rng.normal(size=(80, 3)), rng.normal(size=(80, 3, 4)), rng.normal(size=(80, 3, 2))
+    even = Target.of(gap, design).worth(law)
+    own = Target.of(gap * relative, design * relative[:, :, None], relative=relative).worth(law * relative[:, :, None])
+    assert own.gain == pytest.approx(even.gain, rel=1e-9)
+    assert own.p_value == pytest.approx(even.p_value, rel=1e-9)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from thermal_robot.campaign import noise
 from thermal_robot.campaign.checked import (
     check_covariate,
     check_joints,
@@ -19,9 +20,11 @@ from thermal_robot.campaign.checked import (
     checked_mapping,
     checked_noise,
     checked_number,
+    checked_sigmas,
     checked_sizes,
 )
 from thermal_robot.campaign.settings import MOVES, STANDARD_TEMPERATURE, Settings, as_vector
+from thermal_robot.campaign.targets import Targets
 from thermal_robot.campaign.turning import clock_of, since_turns
 from thermal_robot.campaign.units import Units
 from thermal_robot.errors import CampaignError
@@ -34,7 +37,7 @@ FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.int64]
 TextArray: TypeAlias = NDArray[np.str_]
 
-_PER_SAMPLE = ("q", "position", "orientation", "simulated_position", "simulated_orientation", "rows")
+_PER_SAMPLE = ("q", "position", "orientation", "simulated_position", "simulated_orientation", "noise_of_rows", "rows")
 _BY_NAME = ("covariates", "labels", "missing", "travelled")
 
 
@@ -101,6 +104,10 @@ class Campaign:
         (3,) the measured point in the tool frame, m; a start value unless ``tool_known``.
     noise_position, noise_orientation
         One sigma per axis of the instrument, m and rad; ``None`` when not given.
+    noise_of_rows
+        (N,) that of a point in each row, m, their root mean square in all if none is given; ``None`` for one in all.
+    targets
+        Several targets of each pose, whose common frame ``position`` and ``orientation`` are; ``None`` for one.
     payload_com
         (3,) centre of mass of the payload in the tool frame, m.
     moves
@@ -153,6 +160,8 @@ class Campaign:
     target: FloatArray = field(default_factory=lambda: np.zeros(3))
     noise_position: float | None = None
     noise_orientation: float | None = None
+    noise_of_rows: FloatArray | None = None
+    targets: Targets | None = None
     payload_com: FloatArray = field(default_factory=lambda: np.zeros(3))
     moves: str = "direct"
     reference_temperature: float = STANDARD_TEMPERATURE
@@ -199,11 +208,25 @@ class Campaign:
             object.__setattr__(self, key, arrays)
         for key in ("noise_position", "noise_orientation"):
             object.__setattr__(self, key, checked_noise(file, key, getattr(self, key)))
+        self._weigh_rows(file, samples)
         for key in ("priors", "gears"):
             object.__setattr__(self, key, checked_sizes(file, key, getattr(self, key)))
         warmth = checked_number(file, "reference_temperature", self.reference_temperature)
         object.__setattr__(self, "reference_temperature", warmth)
         self._require_possible(file)
+
+    def _weigh_rows(self, file: str, samples: int) -> None:
+        """Take targets and the noise of each row; where none is given for all, it is their root mean square."""
+        if self.targets is not None and len(self.targets.points) != samples:
+            raise CampaignError(file, "other rows than the commands", column="targets", expected=f"{samples} rows")
+        if self.noise_of_rows is None:
+            return
+        sigmas = checked_sigmas(file, "noise_of_rows", self.noise_of_rows, samples)
+        object.__setattr__(self, "noise_of_rows", sigmas)
+        if self.noise_position is None and samples:
+            place, turn = noise.of_all(sigmas, self.targets)
+            object.__setattr__(self, "noise_position", place)
+            object.__setattr__(self, "noise_orientation", turn or self.noise_orientation)
 
     def _require_possible(self, file: str) -> None:
         """Refuse what no table may say either."""
@@ -216,7 +239,8 @@ class Campaign:
 
     def _require_kinds(self, file: str) -> None:
         """Refuse what is not of its kind, and has no shape."""
-        kinds = {"robot": (Robot, "a robot, from load_robot"), "units": (Units, "Units")}
+        kinds: dict[str, Any] = {"robot": (Robot, "a robot, from load_robot"), "units": (Units, "Units")}
+        kinds["targets"] = ((Targets, type(None)), "Targets, as read from columns x.1 …, or None")
         for key, (kind, expected) in kinds.items():
             if not isinstance(getattr(self, key), kind):
                 found = type(getattr(self, key)).__name__
@@ -277,6 +301,11 @@ class Campaign:
     def reach(self) -> float:
         """Diagonal of the volume that was measured, m."""
         return float(np.linalg.norm(np.ptp(np.asarray(self.position), axis=0)))
+
+    @cached_property
+    def relative_noise(self) -> FloatArray | None:
+        """(N, m) one sigma of each figure of a row over that of all rows; see :mod:`thermal_robot.campaign.noise`."""
+        return noise.relative(self.noise_of_rows, self.noise_position, self.targets, self.orientation is not None)
 
     @property
     def clock(self) -> FloatArray | None:
@@ -357,6 +386,8 @@ class Campaign:
         for key in _BY_NAME:
             held = self.since_turn if key == "travelled" else getattr(self, key)
             changes[key] = {name: _read_only(value[index]) for name, value in held.items()}
+        if self.targets is not None:
+            changes["targets"] = self.targets.take(index)
         return dataclasses.replace(self, **changes)
 
     def drop_covariate(self, name: str) -> Campaign:

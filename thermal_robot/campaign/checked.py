@@ -126,6 +126,23 @@ def checked_noise(file: str, key: str, sigma: Any) -> float | None:
     return checked_number(file, key, sigma, least=SMALLEST, expected="a number above 0, or None")
 
 
+def checked_sigmas(file: str, key: str, sigmas: Any, samples: int) -> NDArray[np.float64]:
+    """Return (N,) standard deviations, read-only.
+
+    Raises
+    ------
+    CampaignError
+        Another shape, or one that is not above 0: naming the first.
+    """
+    values = checked_array(file, key, sigmas, (samples,), np.float64)
+    refused = values < SMALLEST
+    if refused.any():
+        row = int(np.argmax(refused))
+        found, expected = f"{values[row]:.15g} at index {row}", "a number above 0"
+        raise CampaignError(file, "no standard deviation", column=key, found=found, expected=expected)
+    return values
+
+
 def checked_sizes(file: str, key: str, sizes: Any) -> dict[str, float]:
     """Return numbers above 0 by name."""
     above = "a number above 0"

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.names import split_name
+from thermal_robot.campaign.noise import of_a_point
 from thermal_robot.campaign.units import covariate_scale, unit_of
 from thermal_robot.campaign.validate import SAME_CONFIGURATION
 from thermal_robot.errors import require
@@ -71,6 +72,7 @@ def _facts(campaign: Campaign) -> Iterator[Sequence[str]]:
         yield "samples", f"{campaign.samples}, to be predicted"
         return
     what = "position and orientation" if campaign.measures == "pose" else "position only"
+    what = what if campaign.targets is None else f"{len(campaign.targets.numbers)} targets, which tell a pose"
     yield "measurements", f"{campaign.samples}, {what}, in {units.length}"
     extent = np.ptp(campaign.position, axis=0) / units.length_scale
     yield "measured volume", f"{extent[0]:.6g} x {extent[1]:.6g} x {extent[2]:.6g} {units.length}"
@@ -78,10 +80,12 @@ def _facts(campaign: Campaign) -> Iterator[Sequence[str]]:
         yield "base frame", f"known: measured in {robot.root_frame}"
     else:
         yield "base frame", "unknown: measured in the instrument's own frame, place and direction are fitted"
+    if campaign.targets is not None:
+        moving = campaign.targets.sigma / units.length_scale
+        yield "targets", f"move against each other by {moving:.4g} {units.length} per axis (one sigma)"
     target = f"{_triple(campaign.target / units.length_scale)} {units.length} on {robot.tool_frame}"
     yield "target", f"known: {target}" if campaign.tool_known else f"unknown: fitted, starting from {target}"
-    noise = campaign.noise_position
-    yield "noise of position", _noise(None if noise is None else noise / units.length_scale, units.length)
+    yield "noise of position", _noise_of_position(campaign)
     if campaign.measures == "pose":
         yield "noise of orientation", _noise(campaign.noise_orientation, "rad")
     if "payload" in campaign.covariates:
@@ -179,6 +183,16 @@ def _unit(campaign: Campaign, column: str) -> str:
     if column in campaign.extra:
         return "as given"
     return "0..1" if column == "speed" else unit_of(column, campaign.robot, campaign.units)
+
+
+def _noise_of_position(campaign: Campaign) -> str:
+    units, each = campaign.units, campaign.noise_of_rows
+    if each is None:
+        noise = campaign.noise_position
+        point = None if noise is None else of_a_point(noise, campaign.targets)
+        return _noise(None if point is None else point / units.length_scale, units.length)
+    low, high = each.min() / units.length_scale, each.max() / units.length_scale
+    return f"{low:.4g} .. {high:.4g} {units.length} per axis (one sigma), of each row"
 
 
 def _noise(sigma: float | None, unit: str) -> str:

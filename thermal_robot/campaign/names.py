@@ -10,6 +10,8 @@ ORIENTATION = ("qw", "qx", "qy", "qz")
 SIMULATED_POSITION = ("sim.x", "sim.y", "sim.z")
 SIMULATED_ORIENTATION = ("sim.qw", "sim.qx", "sim.qy", "sim.qz")
 LABELS = ("session", "pose", "path")
+NOISE = "noise"
+"""Column of the instrument's one sigma of each row."""
 STD = ("std.x", "std.y", "std.z")
 OUTSIDE = "outside"
 MISSED = "miss.direction"
@@ -22,7 +24,7 @@ PER_JOINT = ("approach", "velocity", "acceleration", "torque", "encoder")
 PER_LINK = ("temperature",)
 MEASURED = (*POSITION, *ORIENTATION)
 SIMULATED = (*SIMULATED_POSITION, *SIMULATED_ORIENTATION)
-RESERVED = (*MEASURED, *SIMULATED, *LABELS, *PLAIN_COVARIATES)
+RESERVED = (*MEASURED, *SIMULATED, *LABELS, *PLAIN_COVARIATES, NOISE)
 """Names that mean the same in every campaign."""
 
 _LIKE = 0.5
@@ -59,6 +61,18 @@ def tilted(column: str) -> str | None:
     quantity, place = split_name(column)
     link, _, axis = place.rpartition(".")
     return link if quantity == "tilt" and link and axis in ("x", "y") else None
+
+
+def target_of(column: str) -> tuple[str, int] | None:
+    """Return axis and number of ``x.1``; ``None`` for other columns."""
+    axis, number = split_name(column)
+    plain = axis in POSITION and number.isascii() and number.isdigit() and not number.startswith("0")
+    return (axis, int(number)) if plain else None
+
+
+def axes_of(target: int) -> tuple[str, str, str]:
+    """Return the columns of one of several targets."""
+    return f"x.{target}", f"y.{target}", f"z.{target}"
 
 
 def split_name(column: str) -> tuple[str, str]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from thermal_robot.campaign import names
 from thermal_robot.campaign.names import did_you_mean, listed, nearest, split_name
 from thermal_robot.campaign.table import Table
+from thermal_robot.campaign.targets import FEWEST
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot
 
@@ -35,6 +36,10 @@ class Columns:
         ``session``, ``pose`` and ``path`` where present.
     has_orientation, has_simulated_position, has_simulated_orientation
         Whether these groups are there, each whole.
+    has_noise
+        Whether the noise of each row is there.
+    targets
+        Numbers of several targets of one pose, in their order; empty where there is one.
     warnings
         Columns left out, and names that look like typing errors.
     """
@@ -45,6 +50,8 @@ class Columns:
     has_orientation: bool
     has_simulated_position: bool
     has_simulated_orientation: bool
+    has_noise: bool
+    targets: tuple[int, ...]
     warnings: tuple[str, ...]
 
 
@@ -67,20 +74,24 @@ def recognise(table: Table, robot: Robot, *, measured: bool) -> Columns:
     """
     _refuse_two_meanings(table, robot)
     _require_joints(table, robot)
-    if measured:
+    targets, lost = _targets(table, robot) if measured else ((), [])
+    if measured and not targets:
         _require(table, names.POSITION, "a measured position needs x, y and z")
-    has_orientation = measured and _whole_group(table, names.ORIENTATION)
+    has_orientation = measured and not targets and _whole_group(table, names.ORIENTATION)
     has_simulated_position = _whole_group(table, names.SIMULATED_POSITION)
     has_simulated_orientation = _whole_group(table, names.SIMULATED_ORIENTATION)
     if has_simulated_orientation and not has_simulated_position:
         _require(table, names.SIMULATED_POSITION, "a simulated orientation needs a simulated position")
 
+    has_noise = measured and names.NOISE in table.columns and not table.is_empty(names.NOISE)
     taken = {*robot.joint_names, *names.MEASURED, *names.SIMULATED, *names.LABELS}
+    if has_noise or not measured:
+        taken.add(names.NOISE)
     covariates: list[str] = []
     extra: list[str] = []
-    warnings: list[str] = []
+    warnings: list[str] = [*lost]
     for column in table.columns:
-        if column in taken:
+        if column in taken or names.target_of(column):
             continue
         part, doubts = _judge(table, column, robot)
         warnings += doubts
@@ -95,8 +106,43 @@ def recognise(table: Table, robot: Robot, *, measured: bool) -> Columns:
         has_orientation,
         has_simulated_position,
         has_simulated_orientation,
+        has_noise,
+        targets,
         tuple(warnings),
     )
+
+
+def _targets(table: Table, robot: Robot) -> tuple[tuple[int, ...], list[str]]:
+    """Return the numbers of several targets, and what is left out for them; none where there is one.
+
+    Raises
+    ------
+    CampaignError
+        An axis that lacks, too few targets, or one without a number beside them.
+    """
+    named = (names.target_of(column) for column in table.columns if column not in robot.joint_names)
+    numbers = sorted({target[1] for target in named if target})
+    for number in numbers:
+        _whole_group(table, names.axes_of(number))
+    empty = [n for n in numbers if all(table.is_empty(column) for column in names.axes_of(n))]
+    numbers = [n for n in numbers if n not in empty]
+    if not numbers:
+        return (), []
+    beside = [column for column in names.POSITION if column in table.columns]
+    if beside or len(numbers) < FEWEST:
+        raise CampaignError(
+            table.file,
+            "a target without a number stands beside those with one" if beside else "too few targets to tell a pose",
+            row=table.header,
+            column=(beside or names.axes_of(numbers[0]))[0],
+            found=f"{len(numbers)} with a number" if beside else f"{len(numbers)}",
+            expected=f"at least {FEWEST} as x.1 y.1 z.1, x.2 …; or one, as x y z",
+        )
+    lost = [f"target {number} is seen in no row and counts as absent" for number in empty]
+    turned = [column for column in names.ORIENTATION if column in table.columns]
+    if turned:
+        lost.append(f"columns {listed(turned)} are left out: several targets tell the orientation")
+    return tuple(numbers), lost
 
 
 def _judge(table: Table, column: str, robot: Robot) -> tuple[str, list[str]]:
@@ -148,7 +194,11 @@ def _ignored(column: str, reason: str, place: str, candidates: Iterable[str]) ->
 def _refuse_two_meanings(table: Table, robot: Robot) -> None:
     for column in table.columns:
         quantity, place = split_name(column)
-        reserved = column in names.RESERVED or (quantity in names.PER_JOINT and place in robot.joint_names)
+        reserved = (
+            column in names.RESERVED
+            or names.target_of(column)
+            or (quantity in names.PER_JOINT and place in robot.joint_names)
+        )
         if column in robot.joint_names and reserved:
             raise CampaignError(
                 table.file,

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 
-from thermal_robot.campaign.names import PER_JOINT, PER_LINK, POSITION, SIMULATED_POSITION, split_name, tilted
+from thermal_robot.campaign.names import NOISE, PER_JOINT, PER_LINK, POSITION, SIMULATED_POSITION, split_name, tilted
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot
 
@@ -93,7 +93,7 @@ def unit_of(column: str, robot: Robot, units: Units = SI) -> str:
     """
     if column in robot.joint_names:
         return units.joint_unit(_joint_type(column, robot))
-    if column in (*POSITION, *SIMULATED_POSITION):
+    if column in (*POSITION, *SIMULATED_POSITION, NOISE):
         return units.length
     if tilted(column) is not None:
         return units.angle

@@ -4,19 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign, FloatArray
-from thermal_robot.campaign.figures import LARGEST_COMMAND, first_beyond, impossible, no_orientation
+from thermal_robot.campaign.figures import LARGEST_COMMAND, SMALLEST, first_beyond, impossible, no_orientation
 from thermal_robot.campaign.fill import fill
 from thermal_robot.campaign.names import CLOCK, split_name
+from thermal_robot.campaign.noise import told_by
+from thermal_robot.campaign.of_targets import of_targets
 from thermal_robot.campaign.plausible import doubts
 from thermal_robot.campaign.recognise import Columns, recognise
 from thermal_robot.campaign.settings import Settings
 from thermal_robot.campaign.table import Table
+from thermal_robot.campaign.targets import Posed, Targets
 from thermal_robot.campaign.turning import arrivals
 from thermal_robot.campaign.units import Units, covariate_scale
 from thermal_robot.errors import CampaignError
@@ -52,13 +56,19 @@ def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str,
     """
     columns = recognise(table, robot, measured=measured)
     units = settings.units
+    told: Posed | None = None
+    left_out: list[str] = []
+    if columns.targets:
+        table, told, left_out = of_targets(table, columns, settings)
     covariates, missing, gaps = _covariates(table, columns, robot, units)
     campaign = Campaign(
         name=name,
         robot=robot,
         q=_commands(table, robot, units),
-        position=_vectors(table, names.POSITION, units) if measured else None,
-        orientation=_quaternions(table, names.ORIENTATION) if columns.has_orientation else None,
+        position=told.position if told else _vectors(table, names.POSITION, units) if measured else None,
+        orientation=(
+            told.orientation if told else _quaternions(table, names.ORIENTATION) if columns.has_orientation else None
+        ),
         covariates=covariates,
         extra=columns.extra,
         labels={label: np.array(table.text(label), dtype=np.str_) for label in columns.labels},
@@ -69,8 +79,7 @@ def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str,
         base_known=settings.base_known,
         tool_known=settings.tool_known,
         target=np.array(settings.target),
-        noise_position=settings.noise_position,
-        noise_orientation=settings.noise_orientation,
+        **_noise(table, columns, settings, told.targets if told else None),
         payload_com=np.array(settings.payload_com),
         moves=settings.moves,
         reference_temperature=settings.reference_temperature,
@@ -83,7 +92,7 @@ def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str,
     )
     if measured:
         _require_enough(table.file, campaign)
-    warnings = (*table.warnings, *columns.warnings, *gaps, *doubts(campaign))
+    warnings = (*table.warnings, *columns.warnings, *left_out, *gaps, *doubts(campaign))
     return replace(arrived(campaign), warnings=warnings)
 
 
@@ -163,6 +172,35 @@ def _vectors(table: Table, group: Sequence[str], units: Units) -> FloatArray:
     """(N, 3) m."""
     vectors: FloatArray = np.column_stack([table.numbers(column) for column in group]) * units.length_scale
     return vectors
+
+
+def _noise(table: Table, columns: Columns, settings: Settings, targets: Targets | None) -> dict[str, Any]:
+    """Return what a campaign says of its noise, and its targets: of several, their noise tells that of their pose."""
+    place, turn = settings.noise_position, settings.noise_orientation
+    if targets is not None:
+        place, turn = (None, None) if place is None else told_by(place, targets)
+    each = _noise_of_rows(table, settings) if columns.has_noise else None
+    known = {"noise_of_rows": each, "targets": targets}
+    return {"noise_position": place if each is None else None, "noise_orientation": turn, **known}
+
+
+def _noise_of_rows(table: Table, settings: Settings) -> FloatArray:
+    """(N,) m: one sigma of each row; an empty cell is that of all rows, where it is stated."""
+    sigmas: FloatArray = table.numbers(names.NOISE, gaps=True) * settings.units.length_scale
+    sigmas = np.where(np.isnan(sigmas) & (settings.noise_position is not None), settings.noise_position or 0.0, sigmas)
+    refused = ~(sigmas >= SMALLEST)
+    if refused.any():
+        index = int(np.argmax(refused))
+        empty = bool(np.isnan(sigmas[index]))
+        raise CampaignError(
+            table.file,
+            "a value is missing" if empty else "no standard deviation",
+            row=int(table.rows[index]),
+            column=names.NOISE,
+            found="an empty cell" if empty else f"{table.numbers(names.NOISE, gaps=True)[index]:.15g}",
+            expected="one sigma above 0" + (", or [noise] position for the rows without one" if empty else ""),
+        )
+    return sigmas
 
 
 def _quaternions(table: Table, group: Sequence[str]) -> FloatArray:

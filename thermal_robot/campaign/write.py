@@ -15,6 +15,7 @@ from numpy.typing import ArrayLike
 from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.declaration import FILE_NAME
+from thermal_robot.campaign.noise import of_a_point
 from thermal_robot.campaign.tabular import NO_PARQUET, PARQUET, WITH_PARQUET
 from thermal_robot.campaign.units import Units, covariate_scale
 from thermal_robot.errors import CampaignError, require
@@ -159,7 +160,7 @@ def write_table(campaign: Campaign, path: str | Path) -> None:
     data: list[Sequence[str]] = []
     for name, values in table_columns(campaign):
         columns.append(name)
-        data.append([repr(float(value)) for value in values])
+        data.append(["" if np.isnan(value) else repr(float(value)) for value in values])
     for name, labels in campaign.labels.items():
         columns.append(name)
         data.append([str(label) for label in labels])
@@ -266,14 +267,20 @@ def table_columns(campaign: Campaign) -> Iterator[tuple[str, np.ndarray[Any, np.
     robot, units = campaign.robot, campaign.units
     for j, (joint, kind) in enumerate(zip(robot.joint_names, robot.joint_types, strict=True)):
         yield joint, campaign.q[:, j] / units.joint_scale(kind)
+    several = campaign.targets
+    if several is not None:
+        for number, points in zip(several.numbers, several.points.transpose(1, 2, 0), strict=True):
+            yield from zip(names.axes_of(number), points / units.length_scale, strict=True)
     for group, values, scale in (
-        (names.POSITION, campaign.position, units.length_scale),
-        (names.ORIENTATION, campaign.orientation, 1.0),
+        (names.POSITION, None if several else campaign.position, units.length_scale),
+        (names.ORIENTATION, None if several else campaign.orientation, 1.0),
         (names.SIMULATED_POSITION, campaign.simulated_position, units.length_scale),
         (names.SIMULATED_ORIENTATION, campaign.simulated_orientation, 1.0),
     ):
         if values is not None:
             yield from zip(group, values.T / scale, strict=True)
+    if campaign.noise_of_rows is not None:
+        yield names.NOISE, campaign.noise_of_rows / units.length_scale
     for name, values in campaign.covariates.items():
         yield name, values / covariate_scale(name, robot, units)
 
@@ -293,9 +300,10 @@ def _document(campaign: Campaign) -> dict[str, Any]:
     settings = campaign.settings
     scale = settings.units.length_scale
     noise: dict[str, float] = {}
-    if settings.noise_position is not None:
-        noise["position"] = settings.noise_position / scale
-    if settings.noise_orientation is not None:
+    several = campaign.targets
+    if settings.noise_position is not None and campaign.noise_of_rows is None:
+        noise["position"] = of_a_point(settings.noise_position, several) / scale
+    if settings.noise_orientation is not None and several is None:
         noise["orientation"] = settings.noise_orientation
     document: dict[str, Any] = {
         "robot": {

@@ -44,9 +44,11 @@ def beside_scatter(
         Effects and laws that the scatter had imitated are no longer in the fit.
     """
     e = fit.explanation
-    covariance = chance.scatter.covariance(fit.corrected.joint_sensitivity)
-    linear = generalised(e.linear, covariance, chance.scatter.noise)
-    noise = Noise(*(float(s) for s in chance.scatter.noise[::3]))
+    scatter, sensitivity = chance.scatter, fit.corrected.joint_sensitivity
+    covariance = scatter.covariance(sensitivity, replace(e.whitening, noise=scatter.noise).sigma())
+    linear = generalised(e.linear, covariance, scatter.noise)
+    place, *turn = (float(s) for s in scatter.noise[::3])
+    noise = Noise(place, turn[0] if turn else None)
     # of many rows each choice takes minutes: then only what was chosen is asked whether it stays
     asked = range(len(linear.blocks)) if fit.campaign.samples <= settings.MANY_ROWS else e.best.blocks
     linear = replace(linear, blocks=tuple(linear.blocks[b] for b in asked))
@@ -59,7 +61,8 @@ def beside_scatter(
     refused = {**refused, **{name: Refused(probability) for name, probability in chances.items()}}
     fit = refit(fit, feigned, [linear.blocks[b].effect for b in again.best.blocks], progress)
     chance = random_gap(fit)
-    covariance = chance.scatter.covariance(fit.corrected.joint_sensitivity)[:, :3, :3]
+    sigma = replace(fit.explanation.whitening, noise=chance.scatter.noise).sigma()
+    covariance = chance.scatter.covariance(fit.corrected.joint_sensitivity, sigma)[:, :3, :3]
     floor = float(np.sqrt(np.trace(covariance, axis1=1, axis2=2).mean() / 3.0))
     left = Unexplained(not chance.explains_size, 0.0, chance.p_value)
     if left.flagged:

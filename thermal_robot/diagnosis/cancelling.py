@@ -83,7 +83,7 @@ def _moved(fit: Fit) -> Iterator[tuple[str, list[tuple[str, str]], Array]]:
     In units of the noise, with the unknown frames projected out.
     """
     e = fit.explanation
-    noise = np.tile(e.whitening.noise * e.best.noise, len(e.linear.gap))[:, None]
+    noise = np.broadcast_to(e.whitening.sigma() * e.best.noise, e.linear.gap.shape).reshape(-1, 1)
     basis = orthonormal(e.linear.frames.reshape(len(noise), e.linear.frames.shape[2]) / noise)
     for b, (effect, values) in zip(e.best.blocks, fit.effects, strict=True):
         item = e.linear.blocks[b]

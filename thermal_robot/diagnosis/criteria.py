@@ -35,7 +35,7 @@ def criteria(fit: Fit, shrinkage: Shrinkage) -> Performance | None:
     position = np.asarray(campaign.position) - left[:, :3] @ base.T
     orientation = None
     if campaign.orientation is not None:
-        back = base @ exp3(-np.nan_to_num(left[:, 3:])) @ base.T
+        back = base @ exp3(-fit.corrected.in_root_axes(np.nan_to_num(left[:, 3:]))) @ base.T
         orientation = rotation_to_quaternion(back @ quaternion_to_rotation(campaign.orientation))
     found = performance(campaign, frames=frames, predicted=(position, orientation))
     return replace(found, notes=(*found.notes, _HELD_OUT))

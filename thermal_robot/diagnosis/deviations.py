@@ -83,7 +83,7 @@ def _beside_discrepancy(fit: Fit, model: Model) -> Array:
     form = e.discrepancy.form
     if form is None or form.anew:
         return np.zeros((len(model.tight),) * 2)
-    spectrum = Spectrum.of(form, e.whitening.weights, e.whitening.noise)
+    spectrum = Spectrum.of(form.over(e.whitening.relative), e.whitening.weights, e.whitening.noise)
     unit, variance = model.tight**-0.5, e.best.noise**2
     stack = whitened(model.linear, replace(e.whitening, smooth=None))[:, :-1]
     columns = without(stack[:, model.flat :], orthonormal(stack[:, : model.flat])) * unit

@@ -89,11 +89,12 @@ def earned(fit: Fit) -> dict[str, Earned]:
             continue
         judged = model.kept[walk.numbers]
         number = walk.numbers[judged]
-        left = walk.residuals(every)[judged] / model.whitening.noise
+        noise = model.whitening.sigma(number)
+        left = walk.residuals(every)[judged] / noise
         for k, (effect, _) in enumerate(fit.effects):
             if isinstance(effect, Discovered) and effect.shape == "levels" and effect.quantity == name:
                 continue
-            without = walk.residuals([b for b in every if b != k])[judged] / model.whitening.noise
+            without = walk.residuals([b for b in every if b != k])[judged] / noise
             found[effect.name].append(_gained(name, left, without - left, block[number]))
     return {name: _earned(schemes) for name, schemes in found.items()}
 

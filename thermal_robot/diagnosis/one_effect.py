@@ -71,7 +71,7 @@ def _shown(
     observations, e = fit.corrected, fit.explanation
     first = parameters[0][0]
     error, moves, unit = _error(observations, parameters)
-    noise = e.whitening.noise * e.best.noise
+    noise = e.whitening.sigma() * e.best.noise
     direction, remainder = moves / noise, observations.gap / noise
     length2 = np.einsum("nm,nm->n", direction, direction)
     rows = rows & (length2 > 1e-12 * length2.max(initial=0.0))

@@ -130,7 +130,7 @@ class Model:
 
     def _white(self, rows: NDArray[np.int64]) -> Array:
         """(r, m, K + 1) columns and gap of some rows, whitened as if independent."""
-        root = np.sqrt(self.whitening.weights[rows])[:, None] / self.whitening.noise
+        root = np.sqrt(self.whitening.weights[rows])[:, None] / self.whitening.sigma(rows)
         return np.asarray(self.linear.stack[rows] * root[:, :, None])
 
     def _as_if_apart(self, rows: Rows) -> Array:

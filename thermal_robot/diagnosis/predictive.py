@@ -17,6 +17,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis.one_walk import Model, Walk
 from thermal_robot.diagnosis.settings import LOOSE
 from thermal_robot.inference import settings
@@ -46,13 +47,26 @@ def uncertainty(fit: Fit, needs: tuple[str, ...], floor: float) -> Spread:
     covariance, wider = _covariances(fit, model)
     left, rows = _held_out(fit, model)
     told = by_parameters(sensitivity(fit.corrected, [effect for effect, _ in fit.effects])[rows], covariance)
-    total = _size(left, told, ~fit.explanation.outliers[rows])
-    noise = np.full(3, campaign.noise_position or floor)
+    quiet, share = _quiet(campaign, rows)
+    total = _size(left[quiet], told[quiet], ~fit.explanation.outliers[rows[quiet]])
+    noise = np.full(3, share * (campaign.noise_position or floor))
     values = {name: campaign.q[:, j] for j, name in enumerate(campaign.robot.joint_names)}
     values.update({name: campaign.covariates[name] for name in needs if name in campaign.covariates})
     ranges = {name: (float(v.min()), float(v.max())) for name, v in values.items()}
     beyond = np.sqrt(np.maximum(total**2 - noise**2, 0.0))
-    return Spread(covariance, beyond, np.sqrt(np.maximum(total**2 - beyond**2, 0.0)), ranges, wider)
+    return Spread(covariance, beyond, np.sqrt(np.maximum(total**2 - beyond**2, 0.0)) / share, ranges, wider)
+
+
+def _quiet(campaign: Campaign, rows: NDArray[np.int64]) -> tuple[NDArray[np.bool_], float]:
+    """(H,) the less noisy half of some rows, which shows best what is no noise, and its share of the noise of all.
+
+    Where all rows are alike it is all of them.
+    """
+    if campaign.relative_noise is None:
+        return np.ones(len(rows), dtype=bool), 1.0
+    relative = campaign.relative_noise[rows, 0]
+    quiet = relative <= np.median(relative)
+    return quiet, float(np.sqrt((relative[quiet] ** 2).mean()))
 
 
 def _covariances(fit: Fit, model: Model) -> tuple[Array, Array | None]:
@@ -71,7 +85,8 @@ def _covariances(fit: Fit, model: Model) -> tuple[Array, Array | None]:
     if form is None or form.anew:
         return np.asarray((size * inner)[own]), None
     stack = whitened(model.linear, replace(e.whitening, smooth=None))[:, :-1] * (unit * e.discrepancy.noise / variance)
-    alike = Spectrum.of(form, e.whitening.weights, e.whitening.noise).spread(e.discrepancy.tau, stack)
+    spectrum = Spectrum.of(form.over(e.whitening.relative), e.whitening.weights, e.whitening.noise)
+    alike = spectrum.spread(e.discrepancy.tau, stack)
     return np.asarray((size * inner)[own]), np.asarray((size * _symmetric(inner @ (alike + prior) @ inner))[own])
 
 

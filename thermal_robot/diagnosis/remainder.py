@@ -63,7 +63,7 @@ def remainder(fit: Fit) -> Remainder:
     columns = [e.linear.frames[rows]]
     for b in e.best.blocks:
         columns.append(e.linear.blocks[b].columns[rows] * e.linear.blocks[b].sizes)
-    root = np.broadcast_to(1.0 / e.whitening.noise, (len(rows), len(e.whitening.noise)))
+    root = np.broadcast_to(1.0 / e.whitening.sigma(rows), (len(rows), len(e.whitening.noise)))
     design = np.concatenate(columns, axis=2) * root[:, :, None]
     basis = orthonormal(design.reshape(root.size, design.shape[2]))
     # of the exact model, not the linear one: where effects are large and noise is small they differ

@@ -109,8 +109,9 @@ def residuals(rows: Rows) -> pd.DataFrame:
     -------
     DataFrame
         Index ``row``, the number in the file. Columns ``gap.x`` … and ``remainder.x`` … in m, of poses also ``.rx``
-        ``.ry`` ``.rz`` in rad, in the root frame's axes; ``held_out.before`` and ``held_out.after``, the distance in m
-        of the row when it was held out (NaN where it was set aside); ``set_aside``.
+        ``.ry`` ``.rz`` in rad, in the root frame's axes, the turn of several targets in those of their common frame;
+        ``held_out.before`` and ``held_out.after``, the distance in m of the row when it was held out (NaN where it was
+        set aside); ``set_aside``.
     """
     import pandas as pd
 

@@ -151,7 +151,7 @@ def worthwhile(fit: Fit, laws: Sequence[Discovered]) -> tuple[Effect, ...] | Non
     new = range(known, len(blocks))
     found = explain(
         linear,
-        Noise(fit.campaign.noise_position, fit.campaign.noise_orientation),
+        Noise.of(thin.observations.campaign),
         families=[b.effect.name for b in blocks],
         log_prior=log_priors([b.effect for b in blocks]),
         starts=[best, *((*best, k) for k in new), *((*before, k) for k in new)],

@@ -80,6 +80,15 @@ class Form:
         kind, name = self.place
         return (name, *self.further) if kind == "joint" else ()
 
+    def over(self, relative: Array | None) -> Form:
+        """Return the form with what each row sees of it over the row's relative noise (N, m), ``None`` for all one."""
+        if relative is None:
+            return self
+        if not self.anew and bool((relative == relative[:, :1]).all()):
+            return replace(self, functions=self.functions / relative[:, :1])
+        alike = bool((relative == relative[:1]).all())  # the same for all rows, if not for all figures
+        return replace(self, moves=self.moves / (relative[0, :, None] if alike else relative[:, :, None]))
+
     def beside(self, other: Form, part: float) -> Form:
         """Return the form with that of another joint beside it, whose rms is a part of that of all so far."""
         length = [np.sqrt((form.moves**2).sum(axis=2).mean()) for form in (self, other)]
@@ -190,7 +199,7 @@ class Spectrum:
         """Return BᵀS of each part, or, where B is wide, the part's rows of S; S the columns that differ."""
         stack = stack if isinstance(stack, Stack) else Stack.around(stack, len(self.axes))
         found = [np.zeros((len(own), len(stack.different))) for own in self.own]
-        for chunk, rows in stack.chunks():
+        for chunk, rows in stack.chunks() if stack.different else ():
             for k, (part, own) in enumerate(zip(self.parts, self.apart(rows), strict=True)):
                 if part.wide:
                     flat = own.reshape(-1, own.shape[2])
@@ -263,7 +272,10 @@ class Spectrum:
             over = power if part.wide else power / np.maximum(value, settings.SMOOTH_FLOOR)
             found.append(vector @ (over[:, None] * (vector.T @ along)))
         if self.parts[0].wide:
-            rows = [own.reshape(len(self.parts[0].used), -1, own.shape[1]) for own in found]
+            rows = [
+                own.reshape(len(self.parts[0].used), own.shape[0] // len(self.parts[0].used), own.shape[1])
+                for own in found
+            ]
             return np.asarray(stack + self.joined(rows).reshape(stack.shape))
         return stack + self.back(self.parts, found).reshape(stack.shape)
 

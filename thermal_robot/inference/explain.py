@@ -97,7 +97,7 @@ class Explanation:
 
     def far(self, rows: NDArray[np.bool_]) -> NDArray[np.bool_]:
         """(N,) True for those of the given rows whose residual is larger than noise allows."""
-        beyond = self.whitening.noise * self.best.noise * np.hypot(1.0, self.discrepancy.tau)
+        beyond = self.whitening.sigma() * self.best.noise * np.hypot(1.0, self.discrepancy.tau)
         distance2 = ((self.remainder / beyond) ** 2).sum(axis=1)
         return np.asarray(rows & (distance2 > distance_limit(self.linear.measures, len(rows))))
 

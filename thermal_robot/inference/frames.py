@@ -153,7 +153,8 @@ def moved(frames: Frames, step: Array, names: tuple[str, ...]) -> Frames:
 
 
 def _refine(campaign: Campaign, frames: Frames, robust: bool) -> Frames:
-    """Gauss-Newton on position and orientation, each at the scale of its own median."""
+    """Gauss-Newton on position and orientation, each at the scale of its own median; noisier rows count less."""
+    relative = np.ones((1, 1)) if campaign.relative_noise is None else campaign.relative_noise
     for _ in range(settings.REFINE_ROUNDS):
         observations = observe(campaign, frames)
         columns, names = frame_columns(observations)
@@ -163,6 +164,7 @@ def _refine(campaign: Campaign, frames: Frames, robust: bool) -> Frames:
             distance = np.linalg.norm(gap[:, part], axis=1)
             weight = np.sqrt(_soft(distance)) if robust else np.ones(len(distance))
             root_weight[:, part] = weight[:, None] / (np.median(distance) + settings.NO_DISTANCE)
+        root_weight = root_weight / relative
         design = (columns * root_weight[:, :, None]).reshape(-1, len(names))
         step = solve(design.T @ design, design.T @ (gap * root_weight).ravel())
         frames = moved(frames, step, names)

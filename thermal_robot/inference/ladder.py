@@ -59,7 +59,7 @@ class Ladder:
         w = self.whitening
         used = np.flatnonzero(w.weights > 0)
         stack = self.stack or Stack.of(self.linear.columns)
-        self._stack = stack.weighed(used, np.sqrt(w.weights[used])[:, None] / w.noise)
+        self._stack = stack.weighed(used, np.sqrt(w.weights[used])[:, None] / w.sigma(used))
         self._products, self._equations = self._stack.products(), self._stack.equations
         self._first = np.unique(self._stack.number, return_index=True)[1]
         plain = normal_equations(self.linear, w, self._products, self._equations)
@@ -87,7 +87,8 @@ class Ladder:
         Products with all columns are kept where they are few: not those with what is anew in every pose.
         """
         self.forms.append(form)
-        spectrum = decomposed(form, self.whitening.weights, self.whitening.noise)
+        w = self.whitening
+        spectrum = decomposed(form.over(w.relative), w.weights, w.noise)
         self._spectra.append(spectrum)
         self._along.append(None if form.anew else spectrum.along(self._stack))
         number, each = len(self.forms) - 1, log_prior - float(np.log(len(settings.TAUS)))

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,12 +84,19 @@ class Whitening:
         Degrees of freedom of the prior on the noise; 0 where none is stated.
     smooth
         The correlated part of the rows' covariance, where there is a discrepancy.
+    relative
+        (N, m) noise of each figure of a row over that of its component; ``None`` where all rows are alike.
     """
 
     weights: Array
     noise: Array
     held: float
     smooth: Smooth | None = None
+    relative: Array | None = None
+
+    def sigma(self, rows: NDArray[Any] | slice = slice(None)) -> Array:
+        """(n, m) one sigma of each figure of some rows, m and rad; (1, m) where all rows are alike."""
+        return self.noise[None] if self.relative is None else self.noise * self.relative[rows]
 
 
 def gram(linear: Linear, whitening: Whitening) -> Gram:
@@ -187,7 +195,7 @@ def whitened(linear: Linear, whitening: Whitening) -> Array:
     """(rows·m, f + P + 1) frames, parameters and gap of the rows with weight, in units of noise."""
     used = np.flatnonzero(whitening.weights > 0)
     stack = linear.rows(used)
-    stack *= (np.sqrt(whitening.weights[used])[:, None] / whitening.noise)[:, :, None]
+    stack *= (np.sqrt(whitening.weights[used])[:, None] / whitening.sigma(used))[:, :, None]
     flat = stack.reshape(-1, stack.shape[2])
     return flat if whitening.smooth is None else whitening.smooth.whitened(flat)
 
@@ -247,5 +255,5 @@ def discrepancy_mean(whitening: Whitening, remainder: Array) -> Array:
         return np.zeros_like(remainder)
     used = np.flatnonzero(whitening.weights > 0)
     root = np.sqrt(whitening.weights[used])
-    left = (remainder[used] / whitening.noise * root[:, None]).ravel()
-    return np.asarray(whitening.smooth.mean(left) * whitening.noise)
+    left = (remainder[used] / whitening.sigma(used) * root[:, None]).ravel()
+    return np.asarray(whitening.smooth.mean(left) * whitening.sigma())

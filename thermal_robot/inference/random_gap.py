@@ -100,8 +100,9 @@ def random_gap(fit: Fit) -> RandomGap:
         Without repeats the two kinds are one.
     """
     e, observed = fit.explanation, fit.corrected
-    gap, sensitivity = observed.gap, observed.joint_sensitivity
-    m = gap.shape[1]
+    m = observed.gap.shape[1]
+    even = _even(fit)
+    gap, sensitivity = observed.gap / even, observed.joint_sensitivity[:, :m] / even[:, :, None]
     given = (fit.campaign.noise_position, fit.campaign.noise_orientation)[: m // 3]
     noise = np.repeat([g or e.whitening.noise[3 * k] for k, g in enumerate(given)], 3)
     pose, held = repeated_poses(fit.campaign), [bool(g) for g in given]
@@ -121,14 +122,14 @@ def random_gap(fit: Fit) -> RandomGap:
         )
         if not any(c.chosen for c in scatter.components):
             break
-        gap = _refitted(fit, scatter, used)
+        gap = _refitted(fit, scatter, used, even)
         # rows set aside as gross errors may be no more than this scatter
         within = _distance2(scatter, gap, sensitivity, scatter.noise) <= distance_limit(m, len(gap))
         if 2 * within.sum() < len(within):
             break  # most rows lie beyond any scatter: robot and table do not belong together
         used = within & asked
     scatter, used, carried = _stands(scatter, gap, sensitivity, noise, pose, held, freedom, used)
-    laws, steps, kept = _judge(fit, scatter, gap[used], pose, used, noise, freedom)
+    laws, steps, kept = _judge(fit, scatter, gap[used], sensitivity[used], pose, used, noise, freedom)
     likely = stepped(seen(tuple(steps.values())), again=len(scatter.kinds) > 1)
     real = tuple(k.component for k in kept if k.component.kind == "visit" or likely >= settings.SCATTER_SURE)
     p_value, explains = _chance_of_size(scatter, real, gap[used], sensitivity[used], noise, held, freedom)
@@ -178,7 +179,20 @@ def _in_joints(fit: Fit) -> list[tuple[str, int]]:
     return [(kind, names.index(joint)) for joint in form.joints]
 
 
-def _refitted(fit: Fit, scatter: Scatter, used: NDArray[np.bool_]) -> Array:
+def _even(fit: Fit) -> Array:
+    """(N, m) what figures and sensitivities are divided by, so that all rows have the same noise.
+
+    Of rows that repeat a pose it is their root mean square: what the pose brings then cancels in their contrasts, as it
+    must, and the mean square of a contrast stays that of the noise.
+    """
+    relative = fit.campaign.relative_noise
+    if relative is None:
+        return np.ones_like(fit.corrected.gap)
+    pose = repeated_poses(fit.campaign)
+    return np.sqrt(_Mean(pose, np.ones(len(pose)))(relative**2))[pose]
+
+
+def _refitted(fit: Fit, scatter: Scatter, used: NDArray[np.bool_], even: Array) -> Array:
     """(N, m) remainder once frames and explanation are fitted in the covariance of the scatter.
 
     Generalised least squares. If the noise were taken for the instrument's alone, a joint that scatters would pull the
@@ -187,10 +201,10 @@ def _refitted(fit: Fit, scatter: Scatter, used: NDArray[np.bool_]) -> Array:
     e = fit.explanation
     blocks = [e.linear.blocks[b].columns * e.linear.blocks[b].sizes for b in e.best.blocks]
     design = np.concatenate([e.linear.frames, *blocks], axis=2)
-    gap = fit.corrected.gap
+    gap, design = fit.corrected.gap / even, design / even[:, :, None]
     if not design.shape[2]:
         return gap
-    covariance = scatter.covariance(fit.corrected.joint_sensitivity[used])
+    covariance = scatter.covariance(fit.corrected.joint_sensitivity[used, : gap.shape[1]] / even[used, :, None])
     white = generalised(Linear(gap[used], design[used], ()), covariance, np.ones(gap.shape[1]))
     columns = white.frames.reshape(-1, design.shape[2])
     return np.asarray(gap - design @ solve(columns.T @ columns, columns.T @ white.gap.ravel()))
@@ -222,6 +236,7 @@ def _judge(
     fit: Fit,
     scatter: Scatter,
     gap: Array,
+    sensitivity: Array,
     pose: NDArray[np.int64],
     used: NDArray[np.bool_],
     noise: Array,
@@ -231,7 +246,7 @@ def _judge(
 
     What was fitted took errors of the poses with it: a share of so many parameters in all that was measured of them.
     """
-    names, sensitivity = fit.campaign.robot.joint_names, fit.corrected.joint_sensitivity
+    names = fit.campaign.robot.joint_names
     recorded = {name: values[used] for name, values in quantities(fit.corrected).items()}
     number = np.unique(pose[used], return_inverse=True)[1].ravel()
     taken = freedom / (gap.shape[1] * (int(number.max()) + 1))
@@ -240,7 +255,7 @@ def _judge(
     kept: list[Kept] = []
     for c in (c for c in scatter.components if c.chosen):
         if c.kind == "visit":
-            errors, spread = joint_errors(scatter, gap, sensitivity[used], c.joint)
+            errors, spread = joint_errors(scatter, gap, sensitivity, c.joint)
             weight = 1.0 / (spread**2 + c.sigma**2)
             mean = _Mean(number, weight)
             common, counts = mean(errors)[number], np.bincount(number)[number] > 1
@@ -249,7 +264,7 @@ def _judge(
             law = followed(errors, weight, within, number[counts])
         else:
             mean = _Mean(number, np.ones(len(number)))
-            errors, variance = _pose_errors(scatter, gap, sensitivity[used], mean, c.joint, noise)
+            errors, variance = _pose_errors(scatter, gap, sensitivity, mean, c.joint, noise)
             weight, command = 1.0 / (variance + c.sigma**2), mean(fit.campaign.q[used, c.joint])
             law = followed(errors, weight, {name: mean(v) for name, v in recorded.items()})
         if law:

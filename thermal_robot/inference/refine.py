@@ -107,9 +107,9 @@ def heard(explanation: Explanation) -> Whitening:
         whitening = replace(whitening, smooth=None)
     if whitening.smooth is not None or not aside.any():
         return whitening
-    noise = whitening.noise * explanation.best.noise
+    noise = whitening.sigma() * explanation.best.noise
     distance2 = ((explanation.remainder / noise) ** 2).sum(axis=1)
-    return replace(whitening, weights=np.where(aside, tail_weight(distance2, len(noise)), whitening.weights))
+    return replace(whitening, weights=np.where(aside, tail_weight(distance2, noise.shape[1]), whitening.weights))
 
 
 def _moved(

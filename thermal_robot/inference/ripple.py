@@ -189,7 +189,8 @@ class _Pursuit:
 
     def _target(self, found: Sequence[_Wave]) -> Target:
         columns = block(self.observations, _ripple(found)).columns
-        return Target.of(self.gap, np.concatenate([self.design, columns], axis=2), self.changed)
+        design = np.concatenate([self.design, columns], axis=2)
+        return Target.of(self.gap, design, self.changed, self.observations.campaign.relative_noise)
 
     def _moves(self, joint: str) -> tuple[Array, Array]:
         """(N,) positions of a joint, and (N, m, 1) what a unit of it moves."""

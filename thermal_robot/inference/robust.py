@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
+from thermal_robot.campaign import Campaign
 from thermal_robot.inference import settings
 from thermal_robot.inference.problem import Linear, Whitening
 
@@ -16,10 +17,19 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Noise:
-    """The instrument's one-sigma per axis, m and rad; ``None`` where it is not given."""
+    """The instrument's one-sigma per axis, m and rad; ``None`` where it is not given.
+
+    ``relative`` (N, m) is that of each figure of a row over it; ``None`` where all rows are alike.
+    """
 
     position: float | None = None
     orientation: float | None = None
+    relative: Array | None = None
+
+    @classmethod
+    def of(cls, campaign: Campaign) -> Noise:
+        """Return what a campaign states."""
+        return cls(campaign.noise_position, campaign.noise_orientation, campaign.relative_noise)
 
     def parts(self, measures: int) -> tuple[float | None, ...]:
         """Return the noise of positions, and with six components that of orientations; none is less than rounding."""
@@ -32,11 +42,13 @@ def distance_limit(measures: int, rows: int) -> float:
     return settings.GROSS_FACTOR * float(chdtri(measures, settings.GROSS_LEVEL / max(rows, 1)))
 
 
-def robust_noise(remainder: Array, leverage: float = 0.0) -> Array:
+def robust_noise(remainder: Array, leverage: float = 0.0, relative: Array | None = None) -> Array:
     """Return one sigma per axis of positions and of orientations, from the median squared length of a residual.
 
-    The ``leverage``, the share of the equations that the fit has taken up, is given back to the noise.
+    The ``leverage``, the share of the equations that the fit has taken up, is given back to the noise. Where the noise
+    of the figures differs, ``relative`` (N, m) says how.
     """
+    remainder = remainder if relative is None else remainder / relative
     parts = remainder.reshape(len(remainder), -1, 3)
     middle = np.median((parts**2).sum(axis=2), axis=0) / float(chdtri(3, 0.5))
     return np.asarray(np.maximum(np.sqrt(middle / (1.0 - leverage)), settings.ROUNDING))
@@ -57,8 +69,9 @@ def settled_noise(measured: Array, noise: Noise, measures: int) -> tuple[Array, 
 def first_whitening(linear: Linear, noise: Noise, use: NDArray[np.bool_]) -> Whitening:
     """Give all rows in use the same weight, and take the noise from the median of the gap."""
     weights = use.astype(float)
-    sigma, held = settled_noise(robust_noise(linear.gap[use]), noise, linear.measures)
-    return Whitening(weights, sigma, held)
+    own = None if noise.relative is None else noise.relative[use]
+    sigma, held = settled_noise(robust_noise(linear.gap[use], relative=own), noise, linear.measures)
+    return Whitening(weights, sigma, held, relative=noise.relative)
 
 
 def reweigh(
@@ -86,6 +99,7 @@ def reweigh(
     aside
         (N,) rows set aside.
     """
+    remainder = remainder if noise.relative is None else remainder / noise.relative
     measured = robust_noise(remainder[use], leverage)
     sigma, held = settled_noise(measured, noise, measures)
     # where more is left than noise, a row is far only if it is far from the others
@@ -96,7 +110,7 @@ def reweigh(
         worst = np.argsort(np.where(use, -distance2, np.inf))[: int(settings.MOST_OUTLIERS * use.sum())]
         aside = np.isin(np.arange(len(use)), worst) & aside
     weights = np.where(use & ~aside, tail_weight(distance2, measures), 0.0)
-    return Whitening(weights, sigma, held), aside
+    return Whitening(weights, sigma, held, relative=noise.relative), aside
 
 
 def tail_weight(distance2: Array, measures: int) -> Array:

@@ -86,10 +86,10 @@ class Scatter:
     def covariance(self, sensitivity: Array, noise: Array | None = None) -> Array:
         """(N, m, m) covariance of single rows: N = diag(noise²) + Σ_j σ_j² J_j J_jᵀ over the chosen components.
 
-        ``noise`` (m,) takes the place of the estimated one.
+        ``noise`` (m,), or (N, m) where it differs by row, takes the place of the estimated one.
         """
-        result = np.zeros((len(sensitivity), len(self.noise), len(self.noise)))
-        result[:] = np.diag((self.noise if noise is None else noise) ** 2)
+        variance = np.broadcast_to((self.noise if noise is None else noise) ** 2, (len(sensitivity), len(self.noise)))
+        result = variance[:, :, None] * np.eye(len(self.noise))
         for c in self.components:
             if c.chosen:
                 column = sensitivity[:, : len(self.noise), c.joint] * c.sigma

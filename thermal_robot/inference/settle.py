@@ -97,7 +97,7 @@ def settle(
     campaign, observations, whole = start.campaign, start, dict(variants)
     whole.update({e.name: tuple(dict.fromkeys((*whole.get(e.name, ()), e))) for e in begin})
     variants = dict(whole)
-    noise = Noise(campaign.noise_position, campaign.noise_orientation)
+    noise = Noise.of(campaign)
     held: list[tuple[Effect, Array]] = []
     before: Explanation | None = None
     outliers = known.explanation.outliers if known else None

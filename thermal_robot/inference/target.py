@@ -58,11 +58,17 @@ class Target:
     basis: Array
 
     @classmethod
-    def of(cls, gap: Array, design: Array, trusted: NDArray[np.bool_] | None = None) -> Target:
+    def of(
+        cls, gap: Array, design: Array, trusted: NDArray[np.bool_] | None = None, relative: Array | None = None
+    ) -> Target:
         """Project a design (N, m, K) out of a gap (N, m), robustly: rows far from the rest weigh little (Cauchy).
 
-        Rows that are ``trusted`` (N,) weigh fully in the residual, however far they are.
+        Rows that are ``trusted`` (N,) weigh fully in the residual, however far they are. Where the noise of the figures
+        differs, ``relative`` (N, m) says how.
         """
+        if relative is not None:
+            even = cls.of(gap / relative, design / relative[:, :, None], trusted)
+            return cls(even.white, even.root / relative, even.basis)
         measures = gap.shape[1]
         noise = np.repeat(robust_noise(gap), 3)
         weight = np.ones(len(gap))

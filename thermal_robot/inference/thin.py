@@ -65,9 +65,10 @@ class Thin:
         """
         columns = [self.linear.blocks[b].columns for b in blocks]
         design = np.concatenate([self.linear.frames, *columns], axis=2)
-        first = Target.of(self.linear.gap, design, self.changed)
+        relative = self.observations.campaign.relative_noise
+        first = Target.of(self.linear.gap, design, self.changed, relative)
         if not sound:
             return first
         distance = np.linalg.norm(first.white.reshape(first.root.shape) / first.root, axis=1)
         near = distance <= np.quantile(distance, 1.0 - settings.FEW_ASIDE)
-        return Target.of(self.linear.gap, design, near | self.changed)
+        return Target.of(self.linear.gap, design, near | self.changed, relative)

@@ -7,6 +7,7 @@ from thermal_robot.campaign.importers.mapped import Source, campaign_of
 from thermal_robot.campaign.importers.plan import Plan, planned
 from thermal_robot.campaign.table import Table
 from thermal_robot.errors import CampaignError
+from thermal_robot.kinematics import exp3
 
 UNITS = {"measurements": {"angle_unit": "rad", "length_unit": "m"}}
 
@@ -65,3 +66,23 @@ def test_a_matrix_gives_the_position_unless_columns_say_another(rv_m2):
     np.testing.assert_allclose(found.orientation, [[1, 0, 0, 0]] * 4)
     found, _ = campaign(rv_m2, given, orientation=matrix, columns={"x": "joint_1"})
     np.testing.assert_allclose(found.position[:, 0], found.q[:, 0])
+
+
+def test_the_noise_of_each_row_comes_from_a_column_of_another_name(rv_m2):
+    given = table(uncertainty=np.array([2.0, 4.0, 2.0, 6.0]))
+    found, notes = campaign(rv_m2, given, columns={"noise": {"column": "uncertainty", "scale": 0.5e-5}})
+    np.testing.assert_allclose(found.noise_of_rows, [1e-5, 2e-5, 1e-5, 3e-5], rtol=1e-12)
+    assert notes == ("before", "4 rows read, 4 taken")
+
+
+def test_several_targets_come_from_columns_of_other_names_and_rows_without_any_are_left_out(rv_m2):
+    rng, places = np.random.default_rng(0), np.array([[0.1, 0.0, 0.0], [0.0, 0.1, 0.0], [0.0, 0.0, 0.1]])
+    points = rng.normal(size=(6, 1, 3)) + places @ exp3(rng.normal(size=(6, 3))).transpose(0, 2, 1)
+    points[2] = np.nan
+    plain = {name: values for name, values in table(6).columns.items() if name not in "xyz"}
+    seen = {f"T{k}{a}": points[:, k, "xyz".index(a)] for k in range(3) for a in "xyz"}
+    named = {f"{a}.{k + 1}": f"T{k}{a}" for k in range(3) for a in "xyz"}
+    found, notes = campaign(rv_m2, Table("t.csv", {**plain, **seen}, np.arange(2, 8), 1), columns=named)
+    assert found.rows.tolist() == [2, 3, 5, 6, 7]
+    assert "1 row (4) left out, without a measured position" in notes
+    np.testing.assert_allclose(found.targets.points, points[[0, 1, 3, 4, 5]])

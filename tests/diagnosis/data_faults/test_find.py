@@ -7,10 +7,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 from conftest import load_arm
+from several import LONG, table_of
 from simulate import simulate
 from spoilt_tables import SPOILT, measured_at, paired_late, with_joints
 
 from thermal_robot import read_campaign
+from thermal_robot.campaign import campaign_from_table
 from thermal_robot.diagnosis.data_faults import data_fault
 from thermal_robot.diagnosis.data_faults.find import KINDS
 
@@ -98,3 +100,19 @@ def test_rows_paired_late_are_found_beside_errors_of_a_light_arm():
     found = data_fault(measured_at(campaign, np.where(struck, np.arange(60) - 1, np.arange(60))))
     assert "shifted rows" in found.kinds
     assert (np.isin(campaign.rows, found.rows) != struck).mean() < 0.05
+
+
+@pytest.mark.parametrize(("kind", "order"), [("exchanged axes", "yxz"), ("mirrored axis", "xyz")])
+def test_a_fault_of_the_axes_is_named_where_several_targets_tell_the_pose(kind, order):
+    """It mirrors the turn that they tell with them."""
+    arm = load_arm("ur10")
+    exact = simulate(arm, ["joint_offset"], samples=60, seed=4, noise=NOISE * 1e-3, turning=1e-12, ratio=(3e3, 6e3))[0]
+    table = table_of(exact, LONG, np.random.default_rng(0))
+    struck = table.copy()
+    for k in range(1, 5):
+        struck[[f"{axis}.{k}" for axis in "xyz"]] = table[[f"{axis}.{k}" for axis in order]].to_numpy()
+        struck[f"z.{k}"] *= -1.0 if kind == "mirrored axis" else 1.0
+    assert data_fault(campaign_from_table(arm, table)) is None
+    found = data_fault(campaign_from_table(arm, struck))
+    assert kind in found.kinds
+    assert found.rms_after < 20.0 * NOISE

@@ -66,13 +66,14 @@ def campaign_of(source: Source, plan: Plan, robot: Robot, name: str) -> tuple[Ca
     table = source.table
     columns = _columns(table, plan, robot)
     measured = np.zeros(len(table.rows), dtype=bool)
-    for axis in names.POSITION:
-        if axis in columns:
-            measured |= ~np.isnan(columns[axis].numbers(table))
-    if not measured.any() and set(names.POSITION) <= set(columns):
+    places = [name for name in columns if name in names.POSITION or names.target_of(name)]
+    for axis in places:
+        measured |= ~np.isnan(columns[axis].numbers(table))
+    whole = set(names.POSITION) <= set(columns) or any(map(names.target_of, places))
+    if not measured.any() and whole:
         raise CampaignError(table.file, "no row has a measured position", expected="x, y and z of a point")
     notes = [f"{len(table.rows)} rows read, {int(measured.sum())} taken"]
-    if not measured.all() and set(names.POSITION) <= set(columns):
+    if not measured.all() and whole:
         notes.append(f"{_rows(table, ~measured)} left out, without a measured position")
         table = table.take(measured)
     cells = _cells(table, columns, robot)
@@ -115,7 +116,8 @@ def _defined(name: str, robot: Robot) -> bool:
     if quantity in names.PER_JOINT and place in robot.joint_names:
         return True
     linked = names.tilted(name) or (place if quantity in names.PER_LINK else "")
-    return name in robot.joint_names or name in names.RESERVED or linked in robot.urdf_links
+    reserved = name in names.RESERVED or names.target_of(name) is not None
+    return name in robot.joint_names or reserved or linked in robot.urdf_links
 
 
 def _cells(table: Table, columns: dict[str, Column], robot: Robot) -> dict[str, Cells]:

@@ -63,7 +63,8 @@ class Readings:
             campaign.robot,
             campaign.q,
             np.asarray(campaign.position),
-            campaign.orientation,
+            # what axes do to several targets they do to the turn that these tell: their middle says enough
+            campaign.orientation if campaign.targets is None else None,
             campaign.simulated_position,
             campaign.covariates.get("time"),
             campaign.base_known,

@@ -1,0 +1,200 @@
+"""Several targets of one pose: where they sit on the tool, and the pose of their common frame in each row.
+
+In row i target k is seen at y_ik = t_i + R_i s_k + noise, with its unknown place s_k on the tool the same in all rows.
+The places are those to which all rows together are nearest once each is moved rigidly (generalised Procrustes analysis:
+Gower, *Psychometrika* 40, 1975); what is free in them is a rigid motion of all, which the unknown tool frame takes up.
+The common frame has its origin in their mean and the axes of their principal moments. Of a row, (R_i, t_i) then tells
+all that its targets say of the robot: the rest is how they move against each other.
+
+To first order the twist (t, ω) of that frame, in its own axes, has the covariance σ² (Σ_k J_kᵀ J_k)⁻¹ over the targets
+that are seen, with J_k = [1, −[s_k]×]. Where all are seen its six figures are independent; where some are not, what
+they then have in common is left out.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtri
+
+from thermal_robot.kinematics import rotation_to_quaternion
+
+Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
+
+FEWEST = 3
+"""Targets without which a pose can turn about the line through two."""
+LINE = 0.01
+"""Width over length of what is seen below which it is a line: the turn about it would be known a hundred times worse
+than the others."""
+ROUNDS = 100
+"""Rounds of the analysis at most; a few are enough where the noise is small beside the distances."""
+SETTLED = 1e-12
+"""Share of the targets' extent by which their places still move when they are found: rounding moves them by 1e-15."""
+TAIL = 3.0
+"""Times the median distance from which on a target counts less for its place (Cauchy): one row in a few is gross."""
+TINY = 1e-30
+"""m, where exact figures leave no distance."""
+
+
+@dataclass(frozen=True, eq=False)
+class Targets:
+    """What was seen of K targets in N rows.
+
+    Attributes
+    ----------
+    numbers
+        K numbers, as of ``x.1``.
+    points
+        (N, K, 3) measured places, measurement frame, m; NaN where one was not seen.
+    places
+        (K, 3) in their common frame, m.
+    spread
+        (N, 6) one sigma of the common frame's place, 1, and of its turn about its own axes, 1/m, over that of a target.
+    typical
+        (2,) root mean squares of both, over the rows with which the targets were read.
+    sigma
+        One sigma per axis by which the targets move against each other, m: the median over the rows.
+    """
+
+    numbers: tuple[int, ...]
+    points: Array
+    places: Array
+    spread: Array
+    typical: Array
+    sigma: float
+
+    def take(self, rows: NDArray[np.int64] | Mask) -> Targets:
+        """Return those of some rows; places and what is typical stay."""
+        return Targets(self.numbers, self.points[rows], self.places, self.spread[rows], self.typical, self.sigma)
+
+
+@dataclass(frozen=True, eq=False)
+class Posed:
+    """Targets, and what they tell of each row.
+
+    Attributes
+    ----------
+    targets
+        Of the rows that tell a pose.
+    position, orientation
+        (N, 3) m and (N, 4) unit quaternions wxyz of their common frame.
+    deviation
+        (N,) one sigma per axis by which the targets of each row are off their places, m.
+    """
+
+    targets: Targets
+    position: Array
+    orientation: Array
+    deviation: Array
+
+
+def telling(points: Array) -> Mask:
+    """(N,) the rows in which three or more of the targets (N, K, 3) are seen that do not lie on a line."""
+    seen = _seen(points)
+    return np.asarray((seen.sum(axis=1) >= FEWEST) & _wide(np.nan_to_num(points), seen))
+
+
+def posed(numbers: tuple[int, ...], points: Array) -> Posed | None:
+    """Find the places of the targets, and the pose of their common frame in each row.
+
+    Parameters
+    ----------
+    numbers
+        K numbers.
+    points
+        (N, K, 3) measured places, m, of rows that are :func:`telling`; NaN where a target was not seen.
+
+    Returns
+    -------
+    Posed
+        ``None`` where a target is never seen beside three others whose places are known.
+    """
+    seen = _seen(points)
+    found = _places(np.nan_to_num(points), seen)
+    if np.isnan(found).any():
+        return None
+    middle = found - found.mean(axis=0)
+    places = middle @ _axes(middle).T
+    turn, shift = _moved(places, np.nan_to_num(points), seen)
+    left = np.where(seen[:, :, None], np.nan_to_num(points) - shift[:, None] - places @ turn.transpose(0, 2, 1), 0.0)
+    freedom = 3 * seen.sum(axis=1) - 6
+    deviation = np.sqrt((left**2).sum(axis=(1, 2)) / freedom)
+    sigma = float(np.median(deviation * np.sqrt(freedom / chdtri(freedom, 0.5))))
+    spread = _spread(places, seen)
+    typical = np.sqrt((spread.reshape(-1, 2, 3) ** 2).mean(axis=(0, 2)))
+    targets = Targets(numbers, points, places, spread, typical, sigma)
+    return Posed(targets, shift, rotation_to_quaternion(turn), deviation)
+
+
+def _axes(middle: Array) -> Array:
+    """(3, 3) principal axes of the targets, right-handed: the farthest along each of the first two is in front."""
+    axes = np.linalg.svd(middle)[2][:2]
+    along = middle @ axes.T
+    axes = axes * np.sign(along[np.abs(along).argmax(axis=0), [0, 1]])[:, None]
+    return np.vstack([axes, np.cross(*axes)])
+
+
+def _seen(points: Array) -> Mask:
+    return np.asarray(np.isfinite(points).all(axis=2))
+
+
+def _wide(points: Array, seen: Mask) -> Mask:
+    """(N,) whether what is seen of (N, K, 3) points is wider than a line."""
+    count = np.maximum(seen.sum(axis=1), 1)[:, None]
+    apart = np.where(seen[:, :, None], points - ((seen[:, :, None] * points).sum(axis=1) / count)[:, None], 0.0)
+    extent = np.linalg.svd(apart, compute_uv=False)
+    return np.asarray(extent[:, 1] > LINE * extent[:, 0]) if extent.shape[1] > 1 else np.zeros(len(points), dtype=bool)
+
+
+def _places(points: Array, seen: Mask) -> Array:
+    """(K, 3) places of the targets in the axes of the row that shows most of them; NaN of one that cannot be linked."""
+    first = int(np.argmax(seen.sum(axis=1)))
+    places = np.where(seen[first][:, None], points[first], np.nan)
+    extent = float(np.linalg.norm(np.ptp(points[first][seen[first]], axis=0)))
+    for _ in range(ROUNDS):
+        known = np.isfinite(places).all(axis=1)
+        use = seen & known
+        rows = (use.sum(axis=1) >= FEWEST) & _wide(points, use)
+        turn, shift = _moved(np.nan_to_num(places), points[rows], use[rows])
+        local = (points[rows] - shift[:, None]) @ turn
+        distance = np.linalg.norm(local - np.nan_to_num(places), axis=2)
+        scale = TAIL * float(np.median(distance[use[rows]])) + TINY
+        weight = seen[rows] * np.where(known, 1.0 / (1.0 + (distance / scale) ** 2), 1.0)
+        total = weight.sum(axis=0)[:, None]
+        before = places
+        places = np.where(total > 0.0, (weight[:, :, None] * local).sum(axis=0) / np.maximum(total, TINY), np.nan)
+        linked = bool((np.isfinite(places) == np.isfinite(before)).all())
+        if linked and np.nanmax(np.abs(places - before)) < SETTLED * extent:
+            break
+    return np.asarray(places)
+
+
+def _moved(places: Array, points: Array, seen: Mask) -> tuple[Array, Array]:
+    """(N, 3, 3) and (N, 3): the motions that bring the places (K, 3) onto the points seen, least squares.
+
+    Umeyama, *IEEE PAMI* 13 (1991), without scale; reflections excluded.
+    """
+    share = seen / seen.sum(axis=1)[:, None]
+    to_mean = np.einsum("nk,nka->na", share, points)
+    from_mean = share @ places
+    apart = places - from_mean[:, None]
+    u, _, vt = np.linalg.svd(np.einsum("nk,nka,nkb->nab", share, points - to_mean[:, None], apart))
+    sign = np.ones((len(points), 3))
+    sign[:, 2] = np.linalg.det(u) * np.linalg.det(vt)
+    turn = (u * sign[:, None]) @ vt
+    return turn, to_mean - np.einsum("nab,nb->na", turn, from_mean)
+
+
+def _spread(places: Array, seen: Mask) -> Array:
+    """(N, 6) of :class:`Targets`; of the place the root mean square over its axes, as the frame turns with the tool."""
+    jacobian = np.zeros((len(places), 3, 6))
+    jacobian[:, :, :3] = np.eye(3)
+    # the k-th axis of the turn moves a target by e_k × s
+    jacobian[:, :, 3:] = np.cross(np.eye(3)[None], places[:, None]).transpose(0, 2, 1)
+    each = jacobian.transpose(0, 2, 1) @ jacobian
+    variance = np.linalg.inv(np.einsum("nk,kab->nab", seen.astype(float), each)).diagonal(axis1=1, axis2=2).copy()
+    variance[:, :3] = variance[:, :3].mean(axis=1, keepdims=True)
+    return np.asarray(np.sqrt(variance))
