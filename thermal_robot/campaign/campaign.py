@@ -6,7 +6,7 @@ import dataclasses
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -24,6 +24,7 @@ from thermal_robot.campaign.checked import (
     checked_sizes,
 )
 from thermal_robot.campaign.settings import MOVES, STANDARD_TEMPERATURE, Settings, as_vector
+from thermal_robot.campaign.shower import shower
 from thermal_robot.campaign.targets import Targets
 from thermal_robot.campaign.turning import clock_of, since_turns
 from thermal_robot.campaign.units import Units
@@ -39,30 +40,6 @@ TextArray: TypeAlias = NDArray[np.str_]
 
 _PER_SAMPLE = ("q", "position", "orientation", "simulated_position", "simulated_orientation", "noise_of_rows", "rows")
 _BY_NAME = ("covariates", "labels", "missing", "travelled")
-
-
-class Shower(Protocol):
-    """Who shows a campaign to pandas and to a notebook."""
-
-    def frame(self, campaign: Campaign, /) -> pd.DataFrame:
-        """Return its table, in the units of the file."""
-
-    def html(self, campaign: Campaign, /) -> str:
-        """Return what is said of it."""
-
-
-_showers: list[Shower] = []
-
-
-def shown_by(shower: Shower) -> None:
-    """Register who shows every campaign from now on."""
-    _showers[:] = [shower]
-
-
-def _shown() -> Shower:
-    if not _showers:
-        raise RuntimeError("nobody can show a campaign: import thermal_robot.campaign, or call shown_by")
-    return _showers[0]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -267,7 +244,7 @@ class Campaign:
         )
 
     def _repr_html_(self) -> str:
-        return _shown().html(self)
+        return shower().html(self)
 
     def to_frame(self) -> pd.DataFrame:
         """Return the table as a pandas data frame, in the units of the file; :func:`campaign_from_table` reads it.
@@ -285,7 +262,7 @@ class Campaign:
         >>> list(table.columns[:6]), len(table)
         (['joint_1', 'joint_2', 'joint_3', 'joint_4', 'joint_5', 'x'], 120)
         """
-        return _shown().frame(self)
+        return shower().frame(self)
 
     @property
     def samples(self) -> int:

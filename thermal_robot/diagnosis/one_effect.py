@@ -71,14 +71,14 @@ def _shown(
     observations, e = fit.corrected, fit.explanation
     first = parameters[0][0]
     error, moves, unit = _error(observations, parameters)
-    noise = e.whitening.sigma() * e.best.noise
+    noise = np.broadcast_to(e.whitening.sigma() * e.best.noise, observations.gap.shape)
     direction, remainder = moves / noise, observations.gap / noise
     length2 = np.einsum("nm,nm->n", direction, direction)
     rows = rows & (length2 > 1e-12 * length2.max(initial=0.0))
     after = np.einsum("nm,nm->n", direction, remainder)[rows] / length2[rows]
     name, name_unit, values = _driver(observations, effect, parameters, error)
     values, error = values[rows], error[rows]
-    constant = _undetermined(e.linear.frames[rows] / noise[:, None], direction[rows], error)
+    constant = _undetermined(e.linear.frames[rows] / noise[rows, :, None], direction[rows], error)
     error = error - constant
     return Place(
         first.kind,
