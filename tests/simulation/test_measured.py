@@ -1,7 +1,10 @@
 """What effects do, computed by hand on an arm of two links; joints that scatter; effects as a model has them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
+from several import FLAT, simulated
 
 from thermal_robot import (
     CorrectedModel,
@@ -77,3 +80,16 @@ def test_effects_together_are_the_model_that_has_them(rv_m2):
     np.testing.assert_array_equal(found.orientation, orientation)
     again = simulate(rv_m2, model.effects, base=base, tool=tool, measures="pose")
     np.testing.assert_array_equal(again.position, found.position)
+
+
+def test_targets_and_noises_of_the_campaign_that_lent_its_commands_are_gone(rv_m2):
+    lent = simulate(rv_m2, rows=40, noise=1e-5, measures="pose", seed=2)
+    lent = replace(lent, noise_of_rows=np.full(40, 2e-5))
+    found = simulate(rv_m2, commands=lent, noise=1e-5, seed=3)
+    assert found.noise_of_rows is None
+    assert found.noise_position == 1e-5
+    several, _ = simulated(rv_m2, ["joint_offset"], FLAT, 1)
+    assert several.targets is not None
+    found = simulate(rv_m2, commands=several, seed=3)
+    assert found.targets is None
+    assert {"x", "y", "z", "qw"} <= set(found.to_frame())

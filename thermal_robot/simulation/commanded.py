@@ -63,7 +63,8 @@ def _of_campaign(robot: Robot, rows: Any, repeats: Any, commands: Campaign) -> C
         raise CampaignError(
             CALL, "the campaign commands other joints", column="commands", found=found, expected=expected
         )
-    return replace(commands, robot=robot, position=None, orientation=None, warnings=())
+    told = replace(commands, position=None, orientation=None, targets=None, noise_of_rows=None)
+    return replace(told, robot=robot, warnings=())
 
 
 def _poses(robot: Robot, rows: Any, repeats: Any, commands: Any, rng: np.random.Generator) -> tuple[Array, int]:
