@@ -52,7 +52,7 @@ def ipa_ur10_a(tmp_path_factory):
     file = tmp_path_factory.mktemp("ipa") / "diagnosis.json"
     before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss
     command = [sys.executable, "-m", "thermal_robot.cli", "diagnose", str(FOLDER / "ipa_ur10_a"), "--json", str(file)]
-    subprocess.run(command, check=True, capture_output=True, timeout=600)
+    subprocess.run(command, check=True, capture_output=True, timeout=1800)
     peak = resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss * (1 if sys.platform == "darwin" else 1024)
     assert peak >= before
     return json.loads(file.read_text(encoding="utf-8")), peak
