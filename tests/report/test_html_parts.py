@@ -2,6 +2,7 @@
 
 import base64
 import hashlib
+import re
 from importlib.metadata import PackageNotFoundError
 
 import numpy as np
@@ -9,7 +10,7 @@ import pytest
 
 from thermal_robot.report import html_parts
 from thermal_robot.report.drawing import Drawing
-from thermal_robot.report.html_parts import bullets, checksums, css, document, figure, paragraph, signature
+from thermal_robot.report.html_parts import bullets, checksums, css, document, figure, paragraph, row, signature, table
 
 UGLY = "<script>&\"'"
 SAFE = "&lt;script&gt;&amp;&quot;&#x27;"
@@ -74,3 +75,13 @@ def test_a_document_lets_the_browser_run_its_own_script_alone():
 def test_checksums_stand_beside_the_names_of_their_files():
     assert checksums({}) == ""
     assert checksums({"a<b.csv": "0a1b"}).endswith("<li>a&lt;b.csv <code>0a1b</code></li></ul>")
+
+
+def test_a_table_keeps_its_cells_in_order_and_numbers_to_the_right():
+    made = table(("name", "cases"), [row(("one", "1")), row(("two", UGLY))])
+    assert re.findall(r"<t[hd](?: [^>]*)?>([^<]*)<", made) == ["name", "cases", "one", "1", "two", SAFE]
+    assert made.count("<tr>") == 3
+    assert made.count("tr-n") == 3
+    assert "tr-n" not in table(("name", "said"), [row(("one", "two"), words=2)], words=2)
+    assert row(("1", "2"), words=0).count("tr-n") == 2
+    assert SAFE in table((UGLY,), [])

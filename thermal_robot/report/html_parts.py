@@ -69,6 +69,29 @@ def wide(content: str, label: str) -> str:
     return f'<div class="tr-wide" role="region" tabindex="0" aria-label="{escape(label)}">{content}</div>'
 
 
+def row(cells: Iterable[str], words: int = 1) -> str:
+    """Return a row of a table: the first cells are words, as HTML, the others numbers, as plain text."""
+    shown = list(cells)
+    told = "".join(f"<td>{cell}</td>" for cell in shown[:words])
+    return f"<tr>{told}{''.join(f'<td class=tr-n>{escape(cell)}</td>' for cell in shown[words:])}</tr>"
+
+
+def table(heads: Iterable[str], rows: Iterable[str], words: int = 1) -> str:
+    """Return a table.
+
+    Parameters
+    ----------
+    heads
+        Names of the columns, plain text.
+    rows
+        As :func:`row` makes them.
+    words
+        How many of the columns hold words; the others hold numbers, which end where their heads do.
+    """
+    shown = "".join(f"<th{'' if k < words else ' class=tr-n'}>{escape(head)}</th>" for k, head in enumerate(heads))
+    return f"<table><thead><tr>{shown}</tr></thead><tbody>{''.join(rows)}</tbody></table>"
+
+
 def paragraph(sentence: str, strong: bool = False) -> str:
     """Return a sentence of plain text as a paragraph."""
     return f"<p><strong>{escape(sentence)}</strong></p>" if strong else f"<p>{escape(sentence)}</p>"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thermal_robot.report.html_parts import paragraph, wide
+from thermal_robot.report.html_parts import paragraph, row, table, wide
 
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.result import Diagnosis
@@ -34,18 +34,15 @@ def model_section(diagnosis: Diagnosis) -> Iterator[str]:
 
 def frames_table(diagnosis: Diagnosis) -> str:
     """Show where the robot stands and where the target sits: mm, and roll, pitch and yaw in degrees."""
-    head = "<th>frame</th>" + "".join(
-        f"<th class=tr-n>{name}</th>" for name in ("x (mm)", "y (mm)", "z (mm)", "roll (°)", "pitch (°)", "yaw (°)")
-    )
-    body = ""
+    heads = "frame", "x (mm)", "y (mm)", "z (mm)", "roll (°)", "pitch (°)", "yaw (°)"
+    rows = []
     for name, pose in diagnosis.frames.iterrows():
         told = [f"{1e3 * v:.3f}" for v in pose[["x", "y", "z"]]]
         # without measured orientations the target's direction on the tool means nothing
         seen = name == "base" or diagnosis.measures == "pose"
         told += [f"{np.degrees(v):.4f}" if seen else "" for v in pose[["roll", "pitch", "yaw"]]]
-        cells = "".join(f"<td class=tr-n>{value.replace('-', '−')}</td>" for value in told)
-        body += f"<tr><td>{_FRAMES[str(name)]}</td>{cells}</tr>"
-    return wide(f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>", "Fitted frames")
+        rows.append(row((_FRAMES[str(name)], *(value.replace("-", "−") for value in told))))
+    return wide(table(heads, rows), "Fitted frames")
 
 
 def correlations_table(diagnosis: Diagnosis) -> str:
@@ -61,16 +58,15 @@ def correlations_table(diagnosis: Diagnosis) -> str:
     strong = [k for k in order if size[k] > _STRONG]
     if not strong:
         return paragraph(f"No two parameters have a correlation beyond ±{_STRONG}.")
-    rows = ""
+    rows = []
     for k in strong[:_MOST]:
-        pair = "".join(f"<td>{escape(_called(covariance.index[i]))}</td>" for i in (first[k], second[k]))
-        rows += f"<tr>{pair}<td class=tr-n>{correlation[first[k], second[k]]:.2f}</td></tr>".replace(">-", ">−")
-    head = "<th>parameter</th><th>known only together with</th><th class=tr-n>correlation</th>"
+        pair = (escape(_called(covariance.index[i])) for i in (first[k], second[k]))
+        rows.append(row((*pair, f"{correlation[first[k], second[k]]:.2f}".replace("-", "−")), words=2))
+    heads = "parameter", "known only together with", "correlation"
     hidden = len(strong) - min(len(strong), _MOST)
     more = f" and {hidden} beyond ±{_STRONG}" if hidden else ""
     rest = paragraph(f"Not shown: {len(size) - len(strong)} correlations within ±{_STRONG}{more}.")
-    table = f"<table><thead><tr>{head}</tr></thead><tbody>{rows}</tbody></table>"
-    return wide(table, "Strongest correlations of the parameters") + rest
+    return wide(table(heads, rows, words=2), "Strongest correlations of the parameters") + rest
 
 
 def _called(name: tuple[str, str]) -> str:

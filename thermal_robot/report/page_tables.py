@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.report import units
-from thermal_robot.report.html_parts import wide
+from thermal_robot.report.html_parts import row, table, wide
 from thermal_robot.report.words import STATUS, by_status, in_joints, law, needs, parameters, places, rivals, told_as
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 _MOST_OUTLIERS = 40
+_MOST_ROWS = 0.95  # share of the rows below which a quantile tells their distance, as metrology asks for it
 
 
 def numbers(diagnosis: Diagnosis) -> str:
@@ -67,21 +68,20 @@ def extremes_table(diagnosis: Diagnosis) -> str:
     told |= {f"rows held out, {name}": _sizes(d[np.isfinite(d)]) + nothing for name, d in held.items()}
     shown = {name: sizes for name, sizes in told.items() if np.isfinite(sizes[0])}
     best = units.scale("m", float(np.nanmax(list(shown.values()), initial=0.0)))
-    heads = "rms", "95 % below", "largest", "rms along x", "along y", "along z"
-    head = f"<th>gap in {best.unit}</th>" + "".join(f"<th class=tr-n>{h}</th>" for h in heads)
-    body = []
-    for name, sizes in shown.items():
-        cells = (units.number(v * best.factor) if np.isfinite(v) else "" for v in sizes)
-        body.append(f"<tr><td>{name}</td>{''.join(f'<td class=tr-n>{escape(c)}</td>' for c in cells)}</tr>")
-    table = f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(body)}</tbody></table>"
-    return wide(table, "The gap before and after: rms, 95 % quantile, largest, along each axis")
+    below = f"{100.0 * _MOST_ROWS:g} % below"
+    heads = f"gap in {best.unit}", "rms", below, "largest", "rms along x", "along y", "along z"
+    body = (
+        row((name, *(units.number(v * best.factor) if np.isfinite(v) else "" for v in sizes)))
+        for name, sizes in shown.items()
+    )
+    return wide(table(heads, body), "The gap before and after: rms, 95 % quantile, largest, along each axis")
 
 
 def _sizes(distance: Array) -> tuple[float, ...]:
     """Return rms, 95 % quantile and maximum of distances; NaN without any."""
     if not len(distance):
         return (float("nan"),) * 3
-    return float(np.sqrt(np.mean(distance**2))), float(np.quantile(distance, 0.95)), float(distance.max())
+    return float(np.sqrt(np.mean(distance**2))), float(np.quantile(distance, _MOST_ROWS)), float(distance.max())
 
 
 def _along(gap: Array) -> tuple[float, ...]:
@@ -90,10 +90,8 @@ def _along(gap: Array) -> tuple[float, ...]:
 
 def effects_table(diagnosis: Diagnosis) -> str:
     """Show every candidate: status, probability, share, and below it what is known of it."""
-    head = "<th>effect</th><th>status</th><th class=tr-n>probability</th>"
-    head += "<th class=tr-n>share of the gap, on rows held out (95 %)</th>"
-    body = "".join(_effect(f, diagnosis) for f in by_status(diagnosis))
-    return wide(f"<table><thead><tr>{head}</tr></thead><tbody>{body}</tbody></table>", "Every effect")
+    heads = "effect", "status", "probability", "share of the gap, on rows held out (95 %)"
+    return wide(table(heads, (_effect(f, diagnosis) for f in by_status(diagnosis)), words=2), "Every effect")
 
 
 def _effect(finding: Finding, diagnosis: Diagnosis) -> str:
@@ -132,7 +130,7 @@ def _known(finding: Finding, diagnosis: Diagnosis) -> Iterator[str]:
     if known.heading:
         yield _line(known.heading)
     if known.shown:
-        yield f"<table><tbody>{''.join(_row(r) for r in known.shown)}</tbody></table>"
+        yield f"<table><tbody>{''.join(row(map(escape, r), words=len(r)) for r in known.shown)}</tbody></table>"
     if known.more:
         yield _line(f"and {known.more} more, listed in the JSON")
     if known.undetermined:
@@ -145,10 +143,6 @@ def _line(sentence: str) -> str:
     return f"<div>{escape(sentence)}</div>"
 
 
-def _row(cells: Iterable[str]) -> str:
-    return f"<tr>{''.join(f'<td>{escape(c)}</td>' for c in cells)}</tr>"
-
-
 def outliers_table(diagnosis: Diagnosis) -> str:
     """Show the rows that were set aside: how far off they are, before and after."""
     rows = diagnosis.rows
@@ -156,17 +150,13 @@ def outliers_table(diagnosis: Diagnosis) -> str:
     before = np.linalg.norm(rows.gap[chosen, :3], axis=1)
     after = np.linalg.norm(rows.remainder[chosen, :3], axis=1)
     best = units.scale("m", float(max(before.max(initial=0.0), after.max(initial=0.0))))
-    head = (
-        "<th class=tr-n>row in the file</th>"
-        + "".join(f"<th class=tr-n>{h} ({best.unit})</th>" for h in ("gap", "remainder"))
-        + "".join(f"<th class=tr-n>remainder {a} ({best.unit})</th>" for a in "xyz")
-    )
+    sizes = ("gap", "remainder", *(f"remainder {a}" for a in "xyz"))
+    heads = ("row in the file", *(f"{size} ({best.unit})" for size in sizes))
     body = []
     for k, i in enumerate(chosen[:_MOST_OUTLIERS]):
         cells = (before[k], after[k], *rows.remainder[i, :3])
-        values = "".join(f"<td class=tr-n>{units.number(float(v) * best.factor)}</td>" for v in cells)
-        body.append(f"<tr><td class=tr-n>{int(rows.rows[i])}</td>{values}</tr>")
+        values = (units.number(float(v) * best.factor) for v in cells)
+        body.append(row((str(int(rows.rows[i])), *values), words=0))
     more = len(chosen) - len(body)
     rest = f"<p class=tr-muted>and {more} more, listed in the JSON</p>" if more > 0 else ""
-    table = f"<table><thead><tr>{head}</tr></thead><tbody>{''.join(body)}</tbody></table>"
-    return wide(table, "Rows that were set aside") + rest
+    return wide(table(heads, body, words=0), "Rows that were set aside") + rest

@@ -6,12 +6,12 @@ from collections.abc import Iterable, Iterator, Mapping
 from html import escape
 from typing import Any
 
-from thermal_robot.blind.report.parts import row, section, table
+from thermal_robot.blind.report.parts import section
 from thermal_robot.blind.report.plots import calibration_figure, confusion_figure, shrinkage_figure
 from thermal_robot.blind.report.plots_power import power_figure
 from thermal_robot.blind.report.words import coefficients, count, facts, interval, kind, miss, needed, question
 from thermal_robot.report import units
-from thermal_robot.report.html_parts import bullets, document, figure, paragraph, signature
+from thermal_robot.report.html_parts import bullets, document, figure, paragraph, row, signature, table
 
 Plain = Mapping[str, Any]
 
@@ -143,7 +143,7 @@ def _real(cases: Iterable[Plain]) -> str:
         f"<td class=tr-word>{'right' if c['right'] else '<strong>wrong</strong>'}</td></tr>"
         for c in cases
     )
-    return table(("case", "asked", "answered", ""), rows, numbers=False)
+    return table(("case", "asked", "answered", ""), rows, words=4)
 
 
 def _misses(misses: Iterable[Plain]) -> str:
@@ -152,4 +152,4 @@ def _misses(misses: Iterable[Plain]) -> str:
         true, said = miss(case)
         cells = (case["id"], kind(case["kind"]), case["robot"], true, said)
         rows.append(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>")
-    return table(("case", "kind", "robot", "true", "said"), rows, numbers=False)
+    return table(("case", "kind", "robot", "true", "said"), rows, words=5)
