@@ -1,8 +1,13 @@
 """`thermal-robot plan`: a folder to be measured, a table, JSON, and errors of one line."""
 
+import argparse
+import inspect
 import json
 
 import pytest
+
+from thermal_robot.commands.plan import add_arguments
+from thermal_robot.planning import plan
 
 ROBOT = ("plan", "builtin:rv_m2", "--tool", "tool0", "--rows", "20", "--effects", "joint_gain", "backlash")
 
@@ -51,3 +56,16 @@ def test_bad_input_is_one_line(run, arguments, named):
     status, out, err = run("plan", *arguments)
     assert (status, out, err.count("\n")) == (2, "", 1)
     assert named in err
+
+
+def test_what_is_left_out_is_what_the_function_leaves_out():
+    """The command is loaded without the planner: its defaults are written down twice, and held together here."""
+    parser = argparse.ArgumentParser()
+    add_arguments(parser)
+    told = vars(parser.parse_args(["robot.urdf"]))
+    meant = {name: p.default for name, p in inspect.signature(plan).parameters.items()}
+    for option in ("rows", "repeats", "orientation", "seed"):
+        assert told[option] == meant[option], option
+    assert 1e-3 * told["noise"] == pytest.approx(meant["noise"])
+    assert told["warming"] == meant["rise"]
+    assert (told["loads"], told["target"]) == (list(meant["loads"]), list(meant["target"]))
