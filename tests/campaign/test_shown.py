@@ -42,3 +42,13 @@ def test_a_notebook_shows_joints_and_warnings(campaign):
     assert all(joint in shown for joint in campaign.robot.joint_names)
     assert campaign.name in shown
     assert shown.count("<table>") == shown.count("</table>") >= 3
+
+
+def test_a_frame_carries_its_units(campaign):
+    table = campaign.to_frame()
+    again = tr.campaign_from_table(campaign.robot, table)
+    np.testing.assert_allclose(again.position, campaign.position, atol=1e-15)
+    # who says otherwise has changed the table
+    table[["x", "y", "z"]] *= 1e-3
+    again = tr.campaign_from_table(campaign.robot, table, length_unit="m")
+    np.testing.assert_allclose(again.position, campaign.position, atol=1e-12)

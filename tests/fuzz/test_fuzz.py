@@ -28,7 +28,7 @@ def test_a_trial_is_known_by_its_number(name):
 
 
 @pytest.mark.parametrize(
-    "files", corpus.campaigns(), ids=["demo", "awkward", "coupled", "parallelogram", "every-column"]
+    "files", corpus.campaigns(), ids=["demo", "awkward", "coupled", "parallelogram", "every-column", "several-targets"]
 )
 def test_what_is_spoilt_was_sound(files, tmp_path):
     corpus.put(files, tmp_path)

@@ -115,8 +115,8 @@ class Campaign:
     --------
     >>> import thermal_robot as tr
     >>> campaign = tr.demo_campaign()
-    >>> campaign.samples, campaign.measures, campaign.settings.tool_frame, campaign.pose_labels
-    (120, 'position', 'tool0', None)
+    >>> campaign.samples, campaign.measures, campaign.settings.tool_frame, campaign.pose_labels, campaign.relative_noise
+    (120, 'position', 'tool0', None, None)
     >>> campaign.clock.shape, campaign.since_turn["joint_2"].shape, campaign.reach > 1.0
     ((120,), (120,), True)
     """

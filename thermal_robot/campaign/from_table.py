@@ -24,7 +24,7 @@ from thermal_robot.campaign.settings import (
     as_vector,
 )
 from thermal_robot.campaign.tabular import table_from_frame
-from thermal_robot.campaign.units import Units
+from thermal_robot.campaign.units import SI, Units
 from thermal_robot.campaign.validate import build_campaign
 from thermal_robot.errors import CampaignError, require
 from thermal_robot.robot import Robot
@@ -41,8 +41,8 @@ def campaign_from_table(
     robot: Robot,
     table: pd.DataFrame,
     *,
-    angle_unit: str = "rad",
-    length_unit: str = "m",
+    angle_unit: str | None = None,
+    length_unit: str | None = None,
     base: str = "unknown",
     tool: str = "unknown",
     target: Sequence[float] = (0.0, 0.0, 0.0),
@@ -65,7 +65,8 @@ def campaign_from_table(
     table
         One row per measurement. Messages speak of its rows by their integer index.
     angle_unit, length_unit
-        Units of the columns; ``length_unit`` also of ``target``, ``noise_position`` and ``payload_com``.
+        Units of the columns; ``length_unit`` also of ``target``, ``noise_position`` and ``payload_com``. By default
+        those that the table carries in its ``attrs``, as one of :meth:`Campaign.to_frame` does, else rad and m.
     base, tool
         ``"unknown"`` or ``"known"``, as under ``[frames]`` in campaign.toml.
     target
@@ -107,6 +108,8 @@ def campaign_from_table(
     require("campaign_from_table(), robot", robot, (Robot,), "a robot, as load_robot gives it")
     require("campaign_from_table(), table", table, (pd.DataFrame,), "a pandas DataFrame")
     frame = word(("known", "unknown"), WORD)
+    angle_unit = table.attrs.get("angle_unit", SI.angle) if angle_unit is None else angle_unit
+    length_unit = table.attrs.get("length_unit", SI.length) if length_unit is None else length_unit
     units = Units(_given("angle_unit", angle_unit, ANGLE_UNIT), _given("length_unit", length_unit, LENGTH_UNIT))
     settings = Settings(
         urdf="",

@@ -13,11 +13,16 @@ if TYPE_CHECKING:
 
 
 def frame(campaign: Campaign) -> pd.DataFrame:
-    """Return the table as :func:`~thermal_robot.campaign.write.write_table` would write it."""
+    """Return the table as :func:`~thermal_robot.campaign.write.write_table` would write it.
+
+    Its ``attrs`` hold the units, so that :func:`~thermal_robot.campaign_from_table` need not be told them.
+    """
     import pandas as pd
 
     labels = {name: labels.astype(object) for name, labels in campaign.labels.items()}
-    return pd.DataFrame({**dict(table_columns(campaign)), **labels}, index=pd.Index(campaign.rows, name="row"))
+    shown = pd.DataFrame({**dict(table_columns(campaign)), **labels}, index=pd.Index(campaign.rows, name="row"))
+    shown.attrs = {"angle_unit": campaign.units.angle, "length_unit": campaign.units.length}
+    return shown
 
 
 def html(campaign: Campaign) -> str:

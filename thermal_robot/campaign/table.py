@@ -68,10 +68,12 @@ class Table:
         index = first_beyond(np.nan_to_num(values, nan=0.0, posinf=np.inf, neginf=-np.inf) if gaps else values)
         if index is not None:
             value = values[index]
+            unfilled = len(values) > 1 and bool(np.isnan(values).all())
+            empty = "the column is still to be filled in" if unfilled else "a value is missing"
             finite = "not a finite number" if np.isinf(value) else "larger than anything that is measured"
             raise CampaignError(
                 self.file,
-                "a value is missing" if np.isnan(value) else finite,
+                empty if np.isnan(value) else finite,
                 row=int(self.rows[index]),
                 column=column,
                 found=self._as_found(cells[index]),

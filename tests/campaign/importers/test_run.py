@@ -27,3 +27,23 @@ def test_a_campaign_that_is_read_from_is_not_overwritten(tmp_path):
     assert done.file == folder / "new" / "campaign.toml"
     assert done.campaign.name == "new"
     assert done.notes == ("3 rows read, 3 taken",)
+
+
+def test_a_campaign_that_was_not_imported_is_not_replaced(tmp_path):
+    header, *rows = COMMANDS.split()
+    lines = [f"{header},x,y,z", *(f"{row},{k},1,2" for k, row in enumerate(rows))]
+    folder = put(tmp_path, measurements__csv="\n".join(lines))
+    plan = planned({
+        "robot": {"urdf": str(folder / "robot.urdf"), "tool_frame": "tool"},
+        "measurements": {"angle_unit": "rad", "length_unit": "mm"},
+    })  # fmt: skip
+    again = folder / "again"
+    file = import_files("table", [folder / "measurements.csv"], again, plan).file
+    first = file.read_text(encoding="utf-8")
+    import_files("table", [folder / "measurements.csv"], again, plan)
+    assert file.read_text(encoding="utf-8") == first
+    own = first.partition("\n")[2]
+    file.write_text(own, encoding="utf-8")
+    with pytest.raises(CampaignError, match="there is a campaign already"):
+        import_files("table", [folder / "measurements.csv"], again, plan)
+    assert file.read_text(encoding="utf-8") == own

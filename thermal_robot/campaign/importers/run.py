@@ -14,6 +14,9 @@ from thermal_robot.campaign.importers.plan import Plan
 from thermal_robot.campaign.write import ROBOT_NAME, TABLE_NAME, write_campaign
 from thermal_robot.errors import CampaignError
 
+IMPORTED = "Imported by `thermal-robot import"
+"""What the first line of a campaign.toml says that was imported."""
+
 
 @dataclass(frozen=True)
 class Imported:
@@ -44,14 +47,15 @@ def import_files(format: str, files: Sequence[Path], directory: Path, plan: Plan
     files
         As many as the format has.
     directory
-        Of the campaign; is made if need be. campaign.toml, measurements.csv and robot.urdf in it are replaced.
+        Of the campaign; is made if need be. A campaign in it is replaced where it was imported, too.
     plan
         What the user says beyond the files; it counts for more than what the format says.
 
     Raises
     ------
     CampaignError
-        Files that cannot be used or would be overwritten, a folder that cannot be written.
+        Files that cannot be used or would be overwritten, a folder that cannot be written, or that holds a campaign
+        which was not imported.
     RobotError
         A robot that cannot be loaded.
     """
@@ -62,9 +66,17 @@ def import_files(format: str, files: Sequence[Path], directory: Path, plan: Plan
             raise CampaignError(
                 str(directory / name), "is read from, and would be overwritten", expected="another folder to write"
             )
+    _require_imported(directory / FILE_NAME)
     source = FORMATS[format].read(files, given)
     full = given.over(source.plan)
     campaign, notes = campaign_of(source, full, full.robot(), Path(directory).resolve().name)
-    origin = f"Imported by `thermal-robot import {format}` from {', '.join(Path(file).name for file in files)}."
+    origin = f"{IMPORTED} {format}` from {', '.join(Path(file).name for file in files)}."
     file = write_campaign(campaign, directory, comments=(origin, *source.comments))
     return Imported(campaign, file, notes)
+
+
+def _require_imported(file: Path) -> None:
+    """Refuse to replace a campaign that somebody else wrote: it may hold what was measured, and nothing else does."""
+    if file.is_file() and not file.read_text(encoding="utf-8", errors="replace").startswith(f"# {IMPORTED}"):
+        expected = "another folder: what is there was not imported, and would be overwritten"
+        raise CampaignError(str(file), "there is a campaign already", expected=expected)
