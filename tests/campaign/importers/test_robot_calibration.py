@@ -44,6 +44,16 @@ def test_samples(tmp_path, capsys):
     assert "feature 1 of sensor 'camera' taken as the target; 5 rows read, 4 taken; 1 row (3) left out" in out
 
 
+def test_samples_in_one_list_are_those_of_documents_of_their_own(tmp_path, capsys):
+    each = [part for part in samples(4).split("---\n") if part.strip()]
+    whole = "".join("- " + part.strip().replace("\n", "\n  ") + "\n" for part in each)
+    folder = put(tmp_path, s__yaml=samples(4), list__yaml=whole)
+    apart, _ = imported(capsys, folder, "robot_calibration", "s.yaml")
+    together, _ = imported(capsys, folder, "robot_calibration", "list.yaml")
+    np.testing.assert_array_equal(together.position, apart.position)
+    np.testing.assert_array_equal(together.q, apart.q)
+
+
 def test_another_sensor_and_feature(tmp_path, capsys):
     both = samples(4).replace(
         "  - sensor_name: camera", "  - {sensor_name: arm, features: []}\n  - sensor_name: camera"

@@ -130,7 +130,7 @@ def test_every_recording_gives_the_rests_of_the_robot(recording, tmp_path, capsy
     shown = float(out.split("clock shows ")[1].split(" ")[0])
     assert shown == pytest.approx(OFFSET, abs=1e-3)
     text = (tmp_path / "made" / "campaign.toml").read_text()
-    assert f"# Clocks: the robot's clock shows {shown:.4f} ± " in text
+    assert f"# Clocks: the robot's clock shows {shown:.6f} ± " in text
     middles = target.between((path.begins + path.ends) / 2 + 1.6e9 - OFFSET)
     np.testing.assert_allclose(campaign.position[1:-1], middles[1:-1], atol=4e-4)
     assert campaign.covariates["time"][0] == 0.0

@@ -42,6 +42,8 @@ def read(files: Sequence[Path], plan: Plan) -> Source:
     files_of(files, FILES, 1, 2)
     file = next((file for file in files if is_yaml(file)), files[0])
     documents = read_yaml(file)
+    if len(documents) == 1 and isinstance(documents[0], list) and any(_is_sample(item) for item in documents[0]):
+        documents = documents[0]  # samples in one list rather than in documents of their own
     if len(documents) == 1 and isinstance(documents[0], list):
         commands = _table(str(file), [_pose(str(file), k, pose) for k, pose in enumerate(documents[0])])
         tables = [each for each in files if each != file]
@@ -58,6 +60,10 @@ def read(files: Sequence[Path], plan: Plan) -> Source:
     return Source(
         _table(str(file), rows), planned(_UNITS), (f"feature {feature} of sensor {sensor!r} taken as the target",)
     )
+
+
+def _is_sample(item: Any) -> bool:
+    return isinstance(item, dict) and "observations" in item
 
 
 def _table(file: str, rows: Sequence[Mapping[str, float]]) -> Table:

@@ -52,7 +52,7 @@ def read(files: Sequence[Path], plan: Plan) -> Source:
         estimate = lag(joints.scaled(scales[0]), target.scaled(scales[1]), robot, np.array(settings.target))
         known = estimate.value
         clocks = (
-            f"the robot's clock shows {estimate.value:.4f} ± {estimate.std:.4f} s more than the instrument's, "
+            f"the robot's clock shows {estimate.value:.6f} ± {estimate.std:.6f} s more than the instrument's, "
             f"estimated from the motion, of which {1e3 * estimate.left:.2g} mm rms are left"
         )
     else:
