@@ -39,10 +39,20 @@ def test_a_failure_leaves_what_was_there_and_nothing_else(tmp_path, ends):
     assert list(tmp_path.iterdir()) == [file]
 
 
-def test_no_folder_is_an_error_and_leaves_nothing(tmp_path):
-    with pytest.raises(OSError, match="No such file"):
-        write_text(tmp_path / "nowhere" / "model.json", "text")
+@pytest.mark.parametrize("write", [lambda path: write_text(path, "text"), lambda path: write_bytes(path, b"text")])
+def test_no_folder_is_an_error_that_names_the_file_and_leaves_nothing(tmp_path, write):
+    file = tmp_path / "nowhere" / "model.json"
+    with pytest.raises(FileNotFoundError, match="No such file") as caught:
+        write(file)
+    assert (caught.value.filename, caught.value.filename2) == (str(file), None)
+    assert ".thermal-robot-" not in str(caught.value)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_an_error_of_another_file_keeps_its_name(tmp_path):
+    with pytest.raises(FileNotFoundError) as caught, whole(tmp_path / "copy.txt") as place:
+        place.write_bytes((tmp_path / "original.txt").read_bytes())
+    assert caught.value.filename == str(tmp_path / "original.txt")
 
 
 WRITER = """

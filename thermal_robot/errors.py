@@ -23,7 +23,7 @@ class ThermalRobotError(Exception):
 
     def __str__(self) -> str:
         # a name or a value may be a million characters long, or of bytes that are no text
-        line = " ".join(super().__str__().split()).encode(errors="backslashreplace").decode()
+        line = " ".join(Exception.__str__(self).split()).encode(errors="backslashreplace").decode()
         line = "".join(letter if letter.isprintable() else repr(letter)[1:-1] for letter in line)
         half = _LONGEST // 2 - 2
         return line if len(line) <= _LONGEST else f"{line[:half]} … {line[-half:]}"
@@ -129,6 +129,10 @@ class EffectError(ThermalRobotError):
     ...     print(error)
     no effect is named 'backlsh'; did you mean 'backlash'?
     """
+
+
+class UnknownEffectError(EffectError, KeyError):
+    """A name that no effect of an answer has, asked for as a key is."""
 
 
 class EstimationError(ThermalRobotError):

@@ -35,7 +35,7 @@ def whole(path: str | Path) -> Iterator[Path]:
     Raises
     ------
     OSError
-        If the folder or the disk does not take it; ``path`` is then as it was.
+        If the folder or the disk does not take it, naming ``path``, which is then as it was.
     """
     asked = Path(path)
     if asked.is_relative_to("/dev") or (asked.exists() and not asked.is_file()):
@@ -51,9 +51,11 @@ def whole(path: str | Path) -> Iterator[Path]:
         if target.exists():
             beside.chmod(target.stat().st_mode & 0o7777)
         beside.replace(target)
-    except BaseException:
+    except BaseException as error:
         with suppress(OSError):
             beside.unlink()
+        if isinstance(error, OSError) and str(beside) in (error.filename, error.filename2):
+            error.filename, error.filename2 = str(path), None  # whoever reads this never heard of the other file
         raise
     _flush(target.parent)
 

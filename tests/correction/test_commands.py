@@ -138,6 +138,33 @@ def test_what_is_out_of_reach_is_an_error_with_its_row(rv_m2):
         back.corrected_commands(replace(samples, q=at_limit))
 
 
+def test_no_command_lies_beyond_a_limit(rv_m2):
+    samples = rows_of(rv_m2, rows=6)
+    effect = model_of(samples, ["joint_offset"]).effects[0][0]
+    model = model_of(samples, ["joint_offset"])
+    model = replace(model, effects=((effect, np.array([0.0, 1e-3, 0.0, 0.0, 0.0])),))
+
+    def at(position):
+        q = samples.q.copy()
+        q[4, 1] = position
+        return replace(samples, q=q)
+
+    upper = rv_m2.upper[1]
+    # the real joint is ahead of its command: at its limit, and beyond it by what the zero is off, a command lies within
+    for position in (upper, upper + 0.9e-3):
+        found = model.corrected_commands(at(position)).q
+        assert (found <= rv_m2.upper).all()
+        np.testing.assert_allclose(found[4, 1], position - 1e-3, atol=1e-9)
+    with pytest.raises(CampaignError, match=r"row 6, column 'joint_2': .*beyond its limit"):
+        model.corrected_commands(at(upper + 2e-3))
+    with pytest.raises(CampaignError, match=r"row 6, column 'joint_2': .*found 4 rad, expected.*1\.745"):
+        model.corrected_commands(at(4.0))
+    with pytest.raises(CampaignError, match=r"found 229.183 deg \(4 rad\), expected a position from"):
+        model.corrected_commands(replace(at(4.0), units=type(samples.units)("deg", "mm")))
+    with pytest.raises(CampaignError, match=r"nor in 5 more rows.*arrays are in rad"):
+        model.corrected_commands(np.degrees(samples.q), {name: 0.0 for name in samples.covariates})
+
+
 def test_a_data_frame_comes_back_with_commands_in_its_own_units(rv_m2):
     samples = rows_of(rv_m2, rows=6)
     samples = replace(samples, units=type(samples.units)("deg", "um"))

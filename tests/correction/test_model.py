@@ -253,3 +253,9 @@ def test_a_table_is_predicted_as_its_file_is(hall, tmp_path):
     assert list(of_table.columns) == [*kept, "x", "y", "z", "std.x", "std.y", "std.z", "outside"]
     pd.testing.assert_frame_equal(of_table[kept], frame[kept])
     np.testing.assert_array_equal(model.predict(tmp_path / "fresh.csv")[0], of_file.position)
+
+
+def test_it_shows_itself_in_one_line(hall):
+    model = hall[1]
+    assert repr(model) == "CorrectedModel('rv_m2': backlash, thermal_elongation)"
+    assert repr(replace(model, effects=())) == "CorrectedModel('rv_m2': no effect)"

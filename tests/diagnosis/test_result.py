@@ -9,6 +9,7 @@ from helpers import numbers
 
 from thermal_robot.diagnosis import result
 from thermal_robot.diagnosis.result import told, told_by
+from thermal_robot.errors import EffectError
 from thermal_robot.report import schema
 
 
@@ -94,6 +95,10 @@ def test_effects_are_asked_for_by_name(hall):
     assert hall.finding("backlash").name == "backlash"
     with pytest.raises(KeyError):
         hall.finding("gremlins")
+    with pytest.raises(EffectError, match=r"^no effect named 'backlsh' was considered; did you mean 'backlash'\?$"):
+        hall.finding("backlsh")
+    with pytest.raises(EffectError, match=r"no effect named 'xx' was considered; there are .*joint_gain"):
+        hall.finding("xx")
     assert hall.title("backlash") == hall.finding("backlash").title != ""
     assert hall.title("somebodys_own") == "somebodys own"
     assert hall.is_frame("base_frame")

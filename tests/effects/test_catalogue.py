@@ -22,6 +22,7 @@ from thermal_robot.effects import (
     random_effects,
 )
 from thermal_robot.effects.apply import displacement
+from thermal_robot.effects.catalogue import of_effect
 from thermal_robot.observations import Frames, observe
 
 
@@ -220,3 +221,15 @@ def test_an_effect_is_found_by_its_name_one_that_scatters_too():
         named("joint_ofset")
     with pytest.raises(EffectError, match=r"no effect is named 'quux'; there are .*encoder_resolution"):
         named("quux")
+
+
+def test_an_answer_is_looked_up_by_its_effect():
+    said = {"drift": 1, "backlash": 2}
+    assert of_effect(said, "backlash") == 2
+    for error in (EffectError, KeyError):  # both kinds of user find it
+        with pytest.raises(error, match=r"^no effect named 'drft' was considered; did you mean 'drift'\?$"):
+            of_effect(said, "drft")
+    with pytest.raises(KeyError, match=r"^no effect named 'xyz' was considered; there are backlash, drift$"):
+        of_effect(said, "xyz")
+    with pytest.raises(KeyError, match=r"there are none$"):
+        of_effect({}, "drift")

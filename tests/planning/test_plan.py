@@ -111,6 +111,8 @@ def test_without_warming_no_temperature_is_planned(rv_m2):
     assert "temperature" not in found.commands.covariates
     assert found.effect("thermal_elongation").lacks == ("temperature",)
     assert not found.effect("thermal_elongation").told
+    with pytest.raises(EffectError, match="'joint_gian' was considered; did you mean 'joint_gain'"):
+        found.effect("joint_gian")
 
 
 @pytest.mark.parametrize(

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from thermal_robot.campaign import Campaign
+from thermal_robot.campaign.units import SI
 from thermal_robot.effects import Effect
 from thermal_robot.effects.apply import displacement
 from thermal_robot.errors import CampaignError
@@ -31,6 +32,8 @@ Array = NDArray[np.float64]
 
 MISSED = 1e-7
 """m; a command that brings the target no nearer does not reach the pose: a hundredth of what any tracker sees."""
+ROUNDED = 1e-9
+"""rad, m by which a position may lie beyond its limit as it was rounded; less than a hundredth of :data:`MISSED`."""
 ORTHOGONAL = 1e-6
 """By which the axes of a pose may fail to be orthogonal and of length one: rounding to six digits."""
 FARTHEST = {"revolute": 0.2, "continuous": 0.2, "prismatic": 0.05}
@@ -85,13 +88,13 @@ def corrected(
     Raises
     ------
     CampaignError
-        If a pose cannot be reached within the limits; its row is named.
+        If a pose cannot be reached within the limits; its row is named; so is a joint beyond its limit.
     EffectError
         If an effect cannot be told in these rows.
     """
     robot, tool = samples.robot, frames.tool
     farthest = np.array([FARTHEST[kind] for kind in robot.joint_types])
-    # a row that was commanded beyond a limit is not pushed out any farther
+    # a row beyond a limit is solved as it stands; the correction may bring it back
     low = np.minimum(np.maximum(samples.q - farthest, robot.lower), samples.q)
     high = np.maximum(np.minimum(samples.q + farthest, robot.upper), samples.q)
 
@@ -101,13 +104,15 @@ def corrected(
 
     wanted = tool_poses(robot, samples.q) @ tool
     found = inverse_kinematics(robot, wanted, samples.q, tool=tool, displaced=displaced, within=(low, high))
+    _require_within_limits(samples, found.q)
     _require_reached(samples, found.miss)
-    there = replace(samples, q=found.q, travelled=samples.since_turn)
+    q = np.clip(found.q, robot.lower, robot.upper)
+    there = replace(samples, q=q, travelled=samples.since_turn)
     if spread is None:
-        return Commands(found.q, np.full((samples.samples, 3), np.nan), ((),) * samples.samples, found.turned)
+        return Commands(q, np.full((samples.samples, 3), np.nan), ((),) * samples.samples, found.turned)
     outside = spread.outside(there)
-    std = spread.std(observe(there, frames, displacement=displaced(found.q)), effects, outside, noise=False)
-    return Commands(found.q, std, outside, found.turned)
+    std = spread.std(observe(there, frames, displacement=displaced(q)), effects, outside, noise=False)
+    return Commands(q, std, outside, found.turned)
 
 
 def nominal_positions(robot: Robot, frames: Frames, poses: ArrayLike) -> Array:
@@ -132,6 +137,32 @@ def nominal_positions(robot: Robot, frames: Frames, poses: ArrayLike) -> Array:
         left = f"{1e3 * found.miss[missed[0]]:.3g} mm are left"
         raise CampaignError("<poses>", "out of reach for the nominal robot", row=int(missed[0]) + 1, found=left)
     return found.q
+
+
+def _require_within_limits(samples: Campaign, q: Array) -> None:
+    """Refuse rows beyond a limit that no correction brings back: only such have commands (N, n) beyond one."""
+    robot = samples.robot
+    wrong = np.argwhere(np.maximum(robot.lower - q, q - robot.upper) > ROUNDED)
+    if len(wrong):
+        row, joint = (int(k) for k in wrong[0])
+        more = len(np.unique(wrong[:, 0])) - 1
+        low, high = (_in_units(samples, joint, end[joint]) for end in (robot.lower, robot.upper))
+        raise CampaignError(
+            samples.name,
+            "the joint cannot stand beyond its limit" + (f", nor in {more} more rows" if more else ""),
+            row=int(samples.rows[row]),
+            column=robot.joint_names[joint],
+            found=_in_units(samples, joint, samples.q[row, joint]),
+            expected=f"a position from {low} to {high} (arrays are in rad and m)",
+        )
+
+
+def _in_units(samples: Campaign, joint: int, position: float) -> str:
+    """Return a joint's position as the campaign's tables have it, and as arrays have it where that differs."""
+    kind = samples.robot.joint_types[joint]
+    units = dict.fromkeys((samples.units, SI))
+    own, *si = dict.fromkeys(f"{position / u.joint_scale(kind):.6g} {u.joint_unit(kind)}" for u in units)
+    return f"{own} ({si[0]})" if si else own
 
 
 def _require_reached(samples: Campaign, miss: Array) -> None:

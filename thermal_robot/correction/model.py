@@ -14,11 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from thermal_robot.campaign import Campaign, Settings, read_samples, read_table, with_commands, with_prediction
 from thermal_robot.campaign.table import Table
+from thermal_robot.correction.arrays import of_arrays
 from thermal_robot.correction.commands import Commands, corrected, nominal_positions
 from thermal_robot.correction.required import require_finite, require_needed
 from thermal_robot.effects import Effect
 from thermal_robot.effects.apply import displacement
-from thermal_robot.errors import CampaignError, require
+from thermal_robot.errors import require
 from thermal_robot.files import write_text
 from thermal_robot.kinematics import rotation_to_quaternion
 from thermal_robot.model_file import fields_of, read, written
@@ -32,7 +33,7 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class CorrectedModel:
     """Nominal robot, fitted frames, and effects with their parameter values; predicts where the target is.
 
@@ -59,8 +60,8 @@ class CorrectedModel:
     --------
     >>> import thermal_robot as tr
     >>> model = tr.diagnose(tr.demo_campaign()).model
-    >>> sorted(effect.name for effect, values in model.effects), model.measures
-    (['backlash', 'thermal_elongation'], 'position')
+    >>> model, model.measures
+    (CorrectedModel('rv_m2': backlash, thermal_elongation), 'position')
     """
 
     robot: Robot
@@ -253,7 +254,7 @@ class CorrectedModel:
         Raises
         ------
         CampaignError
-            If an array does not fit, or a value is none.
+            If an array does not fit, or a value is none; if nothing knows a condition's name.
 
         Examples
         --------
@@ -261,29 +262,7 @@ class CorrectedModel:
         >>> model.samples_at([0.1, 0.2, -0.3, 0.4, 0.5], {"temperature": 26.0})
         <Campaign '<conditions>': 1 samples to predict, 5 joints, 1 covariate>
         """
-        name, given = "<conditions>", {}
-        try:
-            rows = np.atleast_2d(np.asarray(q, dtype=float))
-            for key, value in (conditions or {}).items():
-                given[key] = np.broadcast_to(np.asarray(value, dtype=float), len(rows)).copy()
-        except (TypeError, ValueError) as error:
-            what = f"an array (N, {self.robot.n}), and for each condition one number or N"
-            raise CampaignError(name, "these are no rows of numbers", found=str(error), expected=what) from error
-        settings = self.settings
-        return Campaign(
-            name=name,
-            robot=self.robot,
-            q=rows,
-            covariates=given,
-            base_known=settings.base_known,
-            tool_known=settings.tool_known,
-            target=np.array(settings.target),
-            payload_com=np.array(settings.payload_com),
-            moves=settings.moves,
-            reference_temperature=settings.reference_temperature,
-            gears=settings.gears,
-            units=settings.units,
-        )
+        return of_arrays(self.robot, self.settings, q, conditions or {}, self.needs)
 
     def _ready(self, samples: Any) -> Campaign:
         """Return samples with what the model reads, and nothing else that a table may hold."""
@@ -397,3 +376,7 @@ class CorrectedModel:
         """
         require("load()", path, (str, os.PathLike), "the path of a file that save() wrote")
         return cls.from_dict(read(Path(path)), effects, file=str(path))
+
+    def __repr__(self) -> str:
+        held = ", ".join(effect.name for effect, _ in self.effects) or "no effect"
+        return f"CorrectedModel({self.robot.name!r}: {held})"

@@ -7,7 +7,6 @@ This module knows nothing of reports. The package registers one with :func:`told
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
@@ -16,6 +15,8 @@ import numpy as np
 
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.diagnosis.parts import Finding, Gap, Misfit, Rows, Sensitivity, Unexplained, Wanted, Where, is_frame
+from thermal_robot.diagnosis.plain import gap_as_json, jsonable
+from thermal_robot.effects.catalogue import of_effect
 from thermal_robot.files import write_text
 
 if TYPE_CHECKING:
@@ -274,14 +275,19 @@ class Diagnosis:
         return bool(self.left_out)
 
     def finding(self, effect: str) -> Finding:
-        """Return the finding of one effect; ``KeyError`` for a name that was not a candidate.
+        """Return the finding of one effect.
+
+        Raises
+        ------
+        UnknownEffectError
+            If it was not a candidate; says which name was probably meant. It is a ``KeyError``, too.
 
         Examples
         --------
         >>> tr.diagnose(tr.demo_campaign()).finding("backlash").status
         'found'
         """
-        return {f.name: f for f in self.effects}[effect]
+        return of_effect({f.name: f for f in self.effects}, effect)
 
     def title(self, effect: str) -> str:
         """Return an effect's name in plain words.
@@ -324,7 +330,7 @@ class Diagnosis:
                 outliers=self.outliers,
                 warnings=self.warnings,
             ),
-            "gap": _gap_as_json(self.gap),
+            "gap": gap_as_json(self.gap),
             "verdict": {
                 "usable": self.usable,
                 "reason": self.reason,
@@ -348,7 +354,7 @@ class Diagnosis:
         }
         if self.performance is not None:
             plain["performance"] = self.performance.to_dict()
-        return dict(_jsonable(plain))
+        return dict(jsonable(plain))
 
     def _samples(self) -> list[dict[str, Any]]:
         return [] if self.fit is None or not self.usable else self.next_samples().to_list()
@@ -370,31 +376,3 @@ class Diagnosis:
 
     def _repr_html_(self) -> str:
         return _teller().fragment(self)
-
-
-def _gap_as_json(gap: Gap) -> dict[str, Any]:
-    orientation = None
-    if gap.orientation_before is not None:
-        orientation = {"rms_before": gap.orientation_before, "rms_after": gap.orientation_after}
-    return {
-        "rms_before": gap.rms_before,
-        "rms_after": gap.rms_after,
-        "noise_floor": gap.noise_floor,
-        "noise_source": gap.noise_source,
-        "orientation": orientation,
-        "held_out": asdict(gap.held_out),
-        "schemes": [asdict(scheme) for scheme in gap.schemes],
-        "hardest": None if gap.hardest is None else gap.hardest.name,
-    }
-
-
-def _jsonable(value: Any) -> Any:
-    if isinstance(value, Mapping):
-        return {str(k): _jsonable(v) for k, v in value.items()}
-    if isinstance(value, (list, tuple)):
-        return [_jsonable(v) for v in value]
-    if isinstance(value, np.generic):
-        value = value.item()
-    if isinstance(value, float) and not np.isfinite(value):
-        return None
-    return value

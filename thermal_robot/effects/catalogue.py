@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import json
 import warnings
-from collections.abc import Iterable
+from collections.abc import Iterable, Mapping
 from functools import cache
 from importlib.metadata import EntryPoint, entry_points
+from typing import TypeVar
 
 from thermal_robot.campaign.names import did_you_mean
 from thermal_robot.effects.arguments import with_arguments
@@ -30,8 +31,9 @@ from thermal_robot.effects.thermal_elongation import ThermalElongation
 from thermal_robot.effects.tool_frame import ToolFrame
 from thermal_robot.effects.tracking_lag import TrackingLag
 from thermal_robot.effects.transmission_error import TransmissionError
-from thermal_robot.errors import EffectError, Note
+from thermal_robot.errors import EffectError, Note, UnknownEffectError
 
+_Said = TypeVar("_Said")
 _SYSTEMATIC: tuple[type[Effect], ...] = (
     BaseFrame,
     ToolFrame,
@@ -151,6 +153,27 @@ def named(name: str) -> Effect:
     if name not in known:
         raise _unknown(name, known)
     return known[name]
+
+
+def of_effect(answers: Mapping[str, _Said], name: str) -> _Said:
+    """Return what an answer says of one effect.
+
+    Parameters
+    ----------
+    answers
+        By the names of those that were considered.
+    name
+        Of the effect.
+
+    Raises
+    ------
+    UnknownEffectError
+        If it was not considered; says which name was probably meant.
+    """
+    if name not in answers:
+        meant = did_you_mean(str(name), answers) or f"; there are {', '.join(sorted(answers)) or 'none'}"
+        raise UnknownEffectError(f"no effect named {name!r} was considered{meant}")
+    return answers[name]
 
 
 def _unknown(name: str, known: Iterable[str]) -> EffectError:

@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from thermal_robot.campaign import Campaign, Units
 from thermal_robot.diagnosis.optimal_design import most_informative
 from thermal_robot.effects import Effect, choose, gate
+from thermal_robot.effects.catalogue import of_effect
 from thermal_robot.errors import CampaignError, require
 from thermal_robot.observations import observe
 from thermal_robot.planning import settings
@@ -58,7 +59,12 @@ class Plan:
     repeats: int
 
     def effect(self, name: str) -> Expected:
-        """Return what is expected of one effect; ``KeyError`` where it was not considered.
+        """Return what is expected of one effect.
+
+        Raises
+        ------
+        UnknownEffectError
+            If it was not considered; says which name was probably meant. It is a ``KeyError``, too.
 
         Examples
         --------
@@ -67,7 +73,7 @@ class Plan:
         >>> found.effect("backlash").title
         'lost motion in the joints'
         """
-        return {expected.name: expected for expected in self.effects}[name]
+        return of_effect({expected.name: expected for expected in self.effects}, name)
 
     def to_dict(self) -> dict[str, Any]:
         """Return plain values, SI, ready for JSON.
