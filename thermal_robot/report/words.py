@@ -125,6 +125,12 @@ def set_aside(diagnosis: Diagnosis) -> str:
     return f"as outliers: {rows_in_words(diagnosis.outliers)}" if diagnosis.outliers else "no row"
 
 
+def struck(diagnosis: Diagnosis) -> str:
+    """Say which rows a fault of the table struck; empty where it struck all, or there is none."""
+    fault = diagnosis.misfit.fault if diagnosis.misfit else None
+    return rows_in_words(fault.rows) if fault and fault.rows else ""
+
+
 def rows_used(diagnosis: Diagnosis) -> str:
     """Say how many rows were set aside, and how many were not: ``116 of 120 rows, 4 set aside``."""
     aside, samples = len(diagnosis.outliers), diagnosis.samples
