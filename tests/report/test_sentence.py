@@ -76,6 +76,19 @@ def test_a_remainder_of_unknown_size_is_called_more_than_noise(case):
     assert "and leaves 120 µm, which is more than noise." in told(case("unexplained"), noise_source="remainder")
 
 
+def test_noise_that_nobody_stated_is_claimed_by_no_headline(case, law_case):
+    one = told(case("found"), noise_source="remainder")
+    assert one.endswith("and leaves 30.5 µm, which may or may not be noise: the campaign states none.")
+    none = told(case("nothing"), noise_source="remainder")
+    assert none.startswith("No effect was found, and no pattern in the gap of 27.1 µm: whether it is noise cannot")
+    for diagnosis in invented(case, law_case):
+        text = told(diagnosis, noise_source="remainder")
+        assert "which is noise" not in text
+        assert "noise alone" not in text
+        assert "(noise: " not in text.replace("(noise: not stated)", "")
+        assert len(text.split()) <= MOST_WORDS
+
+
 def test_what_no_effect_explains_is_said_to_be(case):
     base = replace(case("unexplained"), verdict=())
     assert headline(base) == (

@@ -246,6 +246,11 @@ class Gap:
     schemes: tuple[FoldScheme, ...] = ()
     hardest: FoldScheme | None = None
 
+    @property
+    def noise_known(self) -> bool:
+        """Whether the noise is known apart from the remainder itself: stated, or seen where commands are repeated."""
+        return self.noise_source != "remainder"
+
 
 @dataclass(frozen=True)
 class Where:

@@ -16,6 +16,7 @@ _MOST_CAUSES = 3  # that a headline names; the others are counted
 _MOST_OF_A_NAME = 9  # words: of a longer title the headline says the beginning
 _WEIGHTY = 0.01  # of the gap on held-out rows: an effect with less is counted among the smaller ones
 _CARRIES = 1.5  # times what is left of the fitted rows: more on held-out rows is not called noise
+_UNKNOWN = ", which may or may not be noise: the campaign states none"
 _SURE = 0.995  # a probability above it would be rounded to 100 %, which is never claimed
 # m: from which length on it is read times so much in which unit; what rounds to 1 mm is never written as 1e+03 µm
 _LENGTHS = ((0.9995, 1.0, "m"), (0.9995e-3, 1e3, "mm"), (0.0, 1e6, "µm"))
@@ -44,7 +45,13 @@ def _wordings(diagnosis: Diagnosis) -> Iterator[str]:
         yield _misfit(diagnosis.misfit, diagnosis.reach)
     elif not diagnosis.verdict and not left.flagged:
         floor = length(diagnosis.gap.noise_floor)
-        yield f"No gap beyond the noise: the {size} between model and robot is what noise alone leaves ({floor})."
+        if diagnosis.gap.noise_known:
+            yield f"No gap beyond the noise: the {size} between model and robot is what noise alone leaves ({floor})."
+        else:
+            yield (
+                f"No effect was found, and no pattern in the gap of {size}: whether it is noise cannot be told, as the "
+                "campaign states none and repeats no command."
+            )
     elif not diagnosis.verdict:
         which = "none of the effects that were considered" if diagnosis.narrowed else "no known effect"
         for place in (_place(left), ""):
@@ -151,9 +158,10 @@ def _rest(diagnosis: Diagnosis, remaining: Unexplained) -> str:
     gap, floor = diagnosis.gap, length(diagnosis.gap.noise_floor)
     if not remaining.flagged:
         if gap.held_out.rms_after < _CARRIES * max(gap.rms_after, gap.noise_floor):
-            return f", which is noise ({floor})"
-        return f", while {length(gap.rms_after)} is left on the rows it was fitted to (noise: {floor})"
-    if gap.noise_source == "remainder" or remaining.rms == 0.0:
+            return f", which is noise ({floor})" if gap.noise_known else _UNKNOWN
+        told = floor if gap.noise_known else "not stated"
+        return f", while {length(gap.rms_after)} is left on the rows it was fitted to (noise: {told})"
+    if not gap.noise_known or remaining.rms == 0.0:
         return ", which is more than noise"
     return f", of which {length(remaining.rms)} is not explained"
 
