@@ -57,7 +57,8 @@ def _wordings(diagnosis: Diagnosis) -> Iterator[str]:
         for place in (_place(left), ""):
             yield f"The gap of {size} is explained by {which}{place}."
     elif not (causes := systematic(diagnosis)):
-        rest = f", of which {length(remaining.rms)} is not explained" if remaining.flagged and remaining.rms else ""
+        gap = diagnosis.gap
+        rest = _unexplained(diagnosis, remaining, gap.rms_before, gap.held_out.rms_before_with_aside)
         names = listed([_name(diagnosis, f) for f in scattering(diagnosis)])
         yield f"The gap of {size} is scatter: {names} ({_sure(diagnosis)}){rest}; no correction removes scatter."
     else:
@@ -149,7 +150,8 @@ def _how_far(diagnosis: Diagnosis, remaining: Unexplained, several: bool) -> Ite
     yield f"{full} and leaves {leaves}{_rest(diagnosis, remaining)}{hard}"
     short = f"correcting removes {100 * held.shrinkage:.1f} % on held-out data and leaves {leaves}"
     yield f"{short}{_rest(diagnosis, remaining)}{hard}"
-    more = ", more than noise" if remaining.flagged else ""
+    apart = remaining.flagged and remaining.rms > held.rms_after  # of rows set aside: the others are not called more
+    more = (", outliers left out" if apart else ", more than noise") if remaining.flagged else ""
     yield f"{short}{more}{hard}"
     yield f"correcting leaves {leaves} on held-out data{more}{hard}"
 
@@ -161,9 +163,24 @@ def _rest(diagnosis: Diagnosis, remaining: Unexplained) -> str:
             return f", which is noise ({floor})" if gap.noise_known else _UNKNOWN
         told = floor if gap.noise_known else "not stated"
         return f", while {length(gap.rms_after)} is left on the rows it was fitted to (noise: {told})"
-    if not gap.noise_known or remaining.rms == 0.0:
-        return ", which is more than noise"
-    return f", of which {length(remaining.rms)} is not explained"
+    held = gap.held_out
+    return _unexplained(diagnosis, remaining, held.rms_after, held.rms_after_with_aside) or ", which is more than noise"
+
+
+def _unexplained(diagnosis: Diagnosis, remaining: Unexplained, of: float, with_aside: float | None) -> str:
+    """Say how much of a size is not explained; empty where nothing is, or nobody knows how much.
+
+    Where rows set aside are unexplained, too, they count in what remains but not in the size: it is told with them.
+    """
+    if not remaining.flagged or remaining.rms == 0.0:
+        return ""
+    if remaining.rms > of:
+        count = len(diagnosis.outliers)
+        if with_aside is None or not count:
+            return ""
+        aside = "the row" if count == 1 else f"the {count} rows"
+        return f", or {length(with_aside)} with {aside} set aside in it, which nothing explains"
+    return f", of which {length(remaining.rms)} is not explained" if diagnosis.gap.noise_known else ""
 
 
 def length(metres: float) -> str:
