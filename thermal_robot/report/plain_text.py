@@ -199,6 +199,7 @@ def _where(diagnosis: Diagnosis) -> Iterator[str]:
     yield from _bars("axis of the root frame", where.axes, ranked=False)
     yield from _bars("joint", where.joints)
     yield from _bars("link", where.links)
+    yield from _bars("beyond joints and links", where.beyond)
     yield from _bars("recorded quantity: what a law of it alone would explain", where.covariates)
 
 
