@@ -21,6 +21,9 @@ def test_each_place_has_its_share(arm):
     assert dict(zip(shown.links, shown.link_shares, strict=True))[link] == 0.3
     assert shown.joint_shares.sum() == 0.4
     assert shown.link_shares.sum() == 0.3
+    assert (shown.base_share, shown.tool_share, shown.instrument_share) == (0.0, 0.0, 0.0)
+    ends = drawn.arm(robot, np.zeros((1, robot.n)), Where({}, {}, {}, {}, {"base": 0.2, "instrument": 0.1}))
+    assert (ends.base_share, ends.tool_share, ends.instrument_share) == (0.2, 0.0, 0.1)
     assert shown.links[-1] == robot.tool_frame
     # what a joint moves is the child of its placement
     assert [robot.chain.parent_links[k - 1] for k in shown.moves] == [

@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import thermal_robot as tr
+from thermal_robot.diagnosis.tabled import fitted_frames
 
 
 @pytest.fixture(scope="module")
@@ -69,6 +70,25 @@ def test_residuals_have_the_rms_that_is_told(diagnosis):
         distance = np.linalg.norm(kept[[f"{kind}.{axis}" for axis in "xyz"]], axis=1)
         np.testing.assert_allclose(np.sqrt(np.mean(distance**2)), wanted, rtol=1e-9)
     assert table.index[table["set_aside"]].tolist() == list(diagnosis.outliers)
+
+
+ANGLES = ["roll", "pitch", "yaw"]
+
+
+def test_a_point_has_no_direction_on_the_tool(diagnosis):
+    frames = diagnosis.frames
+    assert frames.loc["tool", ANGLES].isna().all()
+    assert frames.loc["base"].notna().all()
+    assert frames.loc["tool", ["x", "y", "z"]].notna().all()
+
+
+def test_a_direction_that_was_measured_or_declared_is_told(diagnosis):
+    import dataclasses
+
+    model = diagnosis.model
+    declared = dataclasses.replace(model.settings, tool_known=True)
+    for known in (dataclasses.replace(model, measures="pose"), dataclasses.replace(model, settings=declared)):
+        assert fitted_frames(known).loc["tool", ANGLES].notna().all()
 
 
 def test_one_without_its_fit_says_so(diagnosis):

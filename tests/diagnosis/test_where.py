@@ -7,7 +7,7 @@ import pytest
 from helpers import with_law
 from simulate import simulate
 
-from thermal_robot.diagnosis.parts import Unexplained
+from thermal_robot.diagnosis.parts import Unexplained, Where
 from thermal_robot.diagnosis.where import locate, without_laws
 from thermal_robot.effects import choose
 from thermal_robot.effects.law import Discovered
@@ -48,6 +48,21 @@ def test_one_coefficient_for_all_links_sits_in_all_of_them(rv_m2):
     assert {(p.kind, p.name) for p in locations["thermal_elongation"]} == {("link", name) for name in long}
     assert sum(where.links.values()) == pytest.approx(1.0)
     assert list(where.links) == [n for n in dict.fromkeys(s.parent_link for s in rv_m2.segments) if n in long]
+
+
+@pytest.mark.parametrize(("name", "kind"), [("drift", "base"), ("instrument_scale", "instrument")])
+def test_what_errs_beyond_joints_and_links_has_its_share(rv_m2, name, kind):
+    where, locations, _, _ = located(rv_m2, name, 0.8)
+    assert where.beyond == {kind: pytest.approx(0.8)}
+    assert where.joints == where.links == {}
+    assert where.places == {(kind, kind): pytest.approx(0.8)}
+    assert {(p.kind, p.name) for p in locations[name]} == {(kind, kind)}
+
+
+def test_places_are_all_there_are_largest_first():
+    where = Where({}, {"a": 0.1}, {"b": 0.5}, {}, {"base": 0.2, "tool": 0.05})
+    shares = {("link", "b"): 0.5, ("base", "base"): 0.2, ("joint", "a"): 0.1, ("tool", "tool"): 0.05}
+    assert list(where.places.items()) == list(shares.items())
 
 
 def test_axes_are_shares_of_the_gaps_mean_square(rv_m2):

@@ -7,9 +7,19 @@ from html.parser import HTMLParser
 
 import pytest
 
-from thermal_robot.diagnosis.parts import Dependence, Estimate, Finding, FoldScheme, Location, Unexplained, Where
+from thermal_robot.diagnosis.parts import (
+    DataFault,
+    Dependence,
+    Estimate,
+    Finding,
+    FoldScheme,
+    Location,
+    Misfit,
+    Unexplained,
+    Where,
+)
 from thermal_robot.diagnosis.result import Diagnosis
-from thermal_robot.report import fragment, html, html_parts
+from thermal_robot.report import advice, fragment, headline, html, html_parts
 
 KINDS = ("found", "nothing", "unexplained", "confounded")
 EMPTY = {"meta", "link", "br", "img", "input", "hr"}
@@ -245,3 +255,33 @@ def test_a_law_is_drawn_where_its_fit_is_at_hand(law_case, monkeypatch):
 def test_the_next_step_is_told_with_what_it_would_separate(case):
     words = Reader(html(case("found"))).words
     assert f"{case('found').advice} to tell apart: thermal_elongation, drift" in words
+
+
+@pytest.fixture
+def misfit(case):
+    """Positions in mm that were declared as m, in two rows."""
+    base = replace(case("unexplained"), warnings=("the target lies 62.6 m away",))
+    fault = DataFault(("metric unit",), "positions stand in mm, not in m", "correct length_unit", 413.0, 8e-5, (3, 7))
+    base = replace(base, misfit=Misfit(fault))
+    return replace(base, summary=headline(base), advice=advice(base))
+
+
+def test_of_a_table_at_fault_nothing_is_said_of_the_robot(misfit, case, write):
+    page = write(misfit)
+    words = Reader(page).words
+    for said in (misfit.summary, misfit.advice, "robot and table do not belong together", "rows 3, 7", "62.6 m away"):
+        assert said in words
+    assert words.count(misfit.advice) == 1
+    assert "<svg" not in page
+    assert "<table" not in page
+    sound = Reader(write(case("unexplained"))).words
+    for told in ("Gap before", "412 µm", "thermal_elongation", "elbow_joint", "nexplained"):
+        assert told in sound
+        assert told not in words
+
+
+def test_the_page_of_a_table_at_fault_ends_with_its_files(misfit):
+    page = html(misfit, files={"campaign.toml": "0123abcd"})
+    assert re.findall(r"<h2>(.*?)</h2>", page) == ["Next", "Warnings"]
+    assert "0123abcd</code></li></ul>" in page
+    assert "script-src 'none'" in page

@@ -2,6 +2,7 @@
 
 import json
 import re
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -43,9 +44,19 @@ def test_places_are_named_with_their_shares(diagnosis, values):
     named = {place["named"] for place in (*values["joints"], *values["links"]) if place["named"]}
     joint = max(diagnosis.where.joints, key=diagnosis.where.joints.get)
     assert f"{joint} {100 * diagnosis.where.joints[joint]:.1f} %" in named
-    every = [p["share"] for p in (*values["joints"], *values["links"])]
-    told = sum((*diagnosis.where.joints.values(), *diagnosis.where.links.values()))
-    assert sum(every) == pytest.approx(told, abs=1e-3)
+    every = [p["share"] for p in (*values["joints"], *values["links"], values["base"], values["tool"])]
+    assert sum(every) == pytest.approx(sum(diagnosis.where.places.values()), abs=1e-3)
+
+
+def test_base_and_tool_are_places_of_the_drawing(diagnosis):
+    where = replace(diagnosis.where, beyond={"base": 0.18, "tool": 0.6, "instrument": 0.031})
+    drawn = arm_figure(replace(diagnosis, where=where))
+    values = json.loads(re.search(r'id="tr-arm-data">(.*?)</script>', drawn, flags=re.S)[1])
+    assert values["base"] == {"share": 0.18, "named": "base 18.0 %"}
+    assert values["tool"] == {"share": 0.6, "named": "tool 60.0 %"}
+    assert "60.0 % of the gap enters there" in drawn
+    assert "At the instrument: 3.1 %, not drawn." in drawn
+    assert "instrument" not in arm_figure(diagnosis)
 
 
 def test_arrows_are_no_longer_than_fits_the_workspace(diagnosis, values):

@@ -113,6 +113,15 @@ def test_where_draws_shares_as_bars(case):
     assert "    none above 0.5 %" in lines  # joints
 
 
+def test_where_tells_base_tool_and_instrument(case):
+    base = case("found")
+    told = section(text(replace(base, where=replace(base.where, beyond={"base": 0.18, "tool": 0.03}))), "WHERE")
+    at = told.index("  beyond joints and links")
+    assert [line.split()[0] for line in told[at + 1 : at + 3]] == ["base", "tool"]
+    assert told[at + 1].endswith("18.0 %")
+    assert "beyond" not in text(base)
+
+
 def test_rows_set_aside_are_listed_up_to_ten(case):
     assert "set aside  as outliers: rows 17, 80" in text(case("found"))
     assert "set aside  no row" in text(case("nothing"))

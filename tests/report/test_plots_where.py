@@ -7,7 +7,7 @@ from report.looking import bars, tick_labels
 
 from thermal_robot.diagnosis.parts import Where
 from thermal_robot.report import plot_where
-from thermal_robot.report.drawing import AFTER, MUTED, THIRD
+from thermal_robot.report.drawing import AFTER, BEFORE, MUTED, THIRD
 
 
 def test_where_follows_the_chain_from_root_to_tool(case):
@@ -65,6 +65,16 @@ def test_joints_without_a_share_keep_their_place_in_the_chain(case):
     chain, _ = plot_where(replace(base, where=where)).axes
     assert tick_labels(chain) == list(base.joint_names)
     assert bars(chain, AFTER) == pytest.approx([0.0, 0.0, 50.0, 0.0, 0.0, 0.0])
+
+
+def test_what_lies_beyond_joints_and_links_is_drawn_below_them(case):
+    base = case("found")
+    beyond = {"base": 0.18, "instrument": 0.02}
+    chain, _ = plot_where(replace(base, where=replace(base.where, beyond=beyond))).axes
+    assert tick_labels(chain)[-2:] == ["base", "instrument"]
+    assert bars(chain, BEFORE) == pytest.approx([18.0, 2.0])
+    alone, _ = plot_where(replace(base, where=Where(base.where.axes, {}, {}, {}, beyond))).axes
+    assert tick_labels(alone) == ["base", "instrument"]
 
 
 def test_the_eight_largest_quantities_are_drawn(case):

@@ -1,5 +1,6 @@
 """The headline: what is said of each kind of diagnosis, and never more than that."""
 
+import re
 from dataclasses import replace
 from itertools import product
 
@@ -74,6 +75,48 @@ def test_a_remainder_is_told_with_its_size(case):
 
 def test_a_remainder_of_unknown_size_is_called_more_than_noise(case):
     assert "and leaves 120 µm, which is more than noise." in told(case("unexplained"), noise_source="remainder")
+
+
+def test_what_is_unexplained_of_rows_set_aside_is_no_part_of_what_the_others_leave(case):
+    base = case("unexplained")
+    apart = replace(base, unexplained=replace(base.unexplained, rms=9.4e-4))
+    assert headline(apart).endswith(
+        "and leaves 120 µm, or 182 µm with the 2 rows set aside in it, which nothing explains."
+    )
+    assert "or 182 µm with the row set aside in it" in headline(replace(apart, outliers=(17,)))
+    unknown = replace(apart.gap, held_out=replace(apart.gap.held_out, rms_after_with_aside=None))
+    assert headline(replace(apart, gap=unknown)).endswith("and leaves 120 µm, which is more than noise.")
+    random = Finding("scatter", "found", 0.99, 0.0, title="joints that scatter", random=True)
+    scattered = headline(replace(apart, effects=(random,), verdict=("scatter",)))
+    assert "(98 % sure), or 452 µm with the 2 rows set aside in it, which nothing explains; no" in scattered
+
+
+def test_no_part_is_larger_than_the_whole(case, law_case):
+    rng = np.random.default_rng(1)
+    for diagnosis in invented(case, law_case):
+        left = replace(diagnosis.unexplained, rms=float(10 ** rng.uniform(-5, -2.5)))
+        text = headline(replace(diagnosis, unexplained=left if left.flagged else diagnosis.unexplained))
+        assert len(text.split()) <= MOST_WORDS
+        leaves = re.search(r"leaves ([\d.]+ [mµ]?m), of which ([\d.]+ [mµ]?m)", text)
+        assert leaves is None or _metres(leaves[2]) <= _metres(leaves[1])
+
+
+def _metres(text):
+    value, unit = text.split()
+    return float(value) * {"m": 1.0, "mm": 1e-3, "µm": 1e-6}[unit]
+
+
+def test_noise_that_nobody_stated_is_claimed_by_no_headline(case, law_case):
+    one = told(case("found"), noise_source="remainder")
+    assert one.endswith("and leaves 30.5 µm, which may or may not be noise: the campaign states none.")
+    none = told(case("nothing"), noise_source="remainder")
+    assert none.startswith("No effect was found, and no pattern in the gap of 27.1 µm: whether it is noise cannot")
+    for diagnosis in invented(case, law_case):
+        text = told(diagnosis, noise_source="remainder")
+        assert "which is noise" not in text
+        assert "noise alone" not in text
+        assert "(noise: " not in text.replace("(noise: not stated)", "")
+        assert len(text.split()) <= MOST_WORDS
 
 
 def test_what_no_effect_explains_is_said_to_be(case):

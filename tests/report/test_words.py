@@ -224,6 +224,13 @@ def test_nothing_left_is_said_with_its_chance(case):
     ]
 
 
+def test_what_is_left_is_not_compared_with_a_noise_that_nobody_knows(case):
+    base = case("found")
+    said = list(sentences(replace(base, gap=replace(base.gap, noise_source="remainder"))))
+    assert said[0] == "No pattern was found in what remains (p = 0.43)."
+    assert "cannot be told" in said[1]
+
+
 def test_what_is_left_is_told_in_whole_sentences(case):
     said = list(sentences(case("unexplained")))
     assert len(said) == 5

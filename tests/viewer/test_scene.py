@@ -12,7 +12,7 @@ from thermal_robot.diagnosis.parts import DataFault, Misfit
 from thermal_robot.diagnosis.result import told
 from thermal_robot.errors import CampaignError
 from thermal_robot.kinematics import tool_poses
-from thermal_robot.viewer.scene import scene_of_campaign, scene_of_diagnosis, shares_of
+from thermal_robot.viewer.scene import scene_of_campaign, scene_of_diagnosis
 
 
 def test_the_gap_leads_from_predicted_to_measured(found, scene):
@@ -71,9 +71,8 @@ def test_shares_are_those_of_the_diagnosis_largest_first(found, scene):
 
 
 def test_a_tool_that_errs_has_a_share(found):
-    finding = found.effects[0]
-    tool = replace(finding, locations=(replace(finding.locations[0], kind="tool", name="tool", share=0.25),))
-    assert shares_of(replace(found, effects=(tool, *found.effects[1:])))["tool", "tool"] == 0.25
+    beyond = replace(found.where, beyond={"tool": 0.25})
+    assert scene_of_diagnosis(replace(found, where=beyond)).shares["tool", "tool"] == 0.25
 
 
 def test_without_a_diagnosis_there_is_the_gap_alone():

@@ -31,4 +31,7 @@ def arm(robot: Robot, q: ArrayLike, where: Where) -> Arm:
         joint_shares=np.array([where.joints.get(name, 0.0) for name in joints]),
         moves=np.asarray(chain.movable) + 1,
         hulls=hulls(robot),
+        base_share=where.beyond.get("base", 0.0),
+        tool_share=where.beyond.get("tool", 0.0),
+        instrument_share=where.beyond.get("instrument", 0.0),
     )

@@ -98,6 +98,8 @@ class Arm:
         (J,) which of the links each joint moves first.
     hulls
         What links look like; nothing of those without a shape.
+    base_share, tool_share, instrument_share
+        Share that enters where the robot stands, between tool frame and target, and at the instrument.
     """
 
     links: tuple[str, ...]
@@ -107,3 +109,6 @@ class Arm:
     joint_shares: Array
     moves: NDArray[np.int64]
     hulls: tuple[Hull, ...]
+    base_share: float = 0.0
+    tool_share: float = 0.0
+    instrument_share: float = 0.0

@@ -246,19 +246,33 @@ class Gap:
     schemes: tuple[FoldScheme, ...] = ()
     hardest: FoldScheme | None = None
 
+    @property
+    def noise_known(self) -> bool:
+        """Whether the noise is known apart from the remainder itself: stated, or seen where commands are repeated."""
+        return self.noise_source != "remainder"
+
 
 @dataclass(frozen=True)
 class Where:
     """Shares 0..1 of the gap's mean square: by axis of the root frame, joint, link, and recorded quantity.
 
-    Axes sum to one. Joints and links share the part that the fit explains. The share of a quantity is what a smooth law
-    of it alone would explain; these shares overlap.
+    Axes sum to one. Joints, links, and what lies beyond them (``base``, ``tool``, ``instrument``) share the part that
+    the fit explains. The share of a quantity is what a smooth law of it alone would explain; these shares overlap.
     """
 
     axes: Mapping[str, float]
     joints: Mapping[str, float]
     links: Mapping[str, float]
     covariates: Mapping[str, float]
+    beyond: Mapping[str, float] = field(default_factory=dict)
+
+    @property
+    def places(self) -> dict[tuple[str, str], float]:
+        """Shares of all places, by kind and name, largest first: they sum to the part that the fit explains."""
+        chain = (("joint", self.joints), ("link", self.links))
+        shares = {(kind, name): share for kind, found in chain for name, share in found.items()}
+        shares |= {(kind, kind): share for kind, share in self.beyond.items()}
+        return dict(sorted(shares.items(), key=lambda item: -item[1]))
 
 
 @dataclass(frozen=True)

@@ -93,13 +93,17 @@ def fitted_frames(model: CorrectedModel) -> pd.DataFrame:
     -------
     DataFrame
         Index ``base`` (the root frame in the measurement frame) and ``tool`` (the target in the tool frame); columns
-        ``x`` ``y`` ``z`` in m, and ``roll`` ``pitch`` ``yaw`` in rad, as in a URDF.
+        ``x`` ``y`` ``z`` in m, and ``roll`` ``pitch`` ``yaw`` in rad, as in a URDF. Those of a target of which
+        positions alone were measured are NaN: a point has no direction, unless the campaign declares one as known.
     """
     import pandas as pd
 
-    poses = {"base": model.frames.base, "tool": model.frames.tool}
-    told = [[*pose[:3, 3], *rotation_to_rpy(pose[:3, :3])] for pose in poses.values()]
-    return pd.DataFrame(told, index=list(poses), columns=["x", "y", "z", "roll", "pitch", "yaw"])
+    turned = {"base": True, "tool": model.measures == "pose" or model.settings.tool_known}
+    told = [
+        [*pose[:3, 3], *(rotation_to_rpy(pose[:3, :3]) if turned[name] else np.full(3, np.nan))]
+        for name, pose in (("base", model.frames.base), ("tool", model.frames.tool))
+    ]
+    return pd.DataFrame(told, index=list(turned), columns=["x", "y", "z", "roll", "pitch", "yaw"])
 
 
 def residuals(rows: Rows) -> pd.DataFrame:

@@ -21,6 +21,8 @@ from thermal_robot.observations import Observations
 
 Array = NDArray[np.float64]
 
+_BEYOND = ("base", "tool", "instrument")
+
 
 def without_laws(fit: Fit, left: Unexplained) -> Unexplained:
     """Return what the known effects of a fit leave, given what the whole fit leaves, its laws included.
@@ -61,7 +63,7 @@ def locate(fit: Fit, shrinkage: dict[str, float]) -> tuple[Where, dict[str, tupl
     Returns
     -------
     where
-        Shares over axes, joints, links and quantities.
+        Shares over axes, joints, links, base, tool and instrument, and quantities.
     locations
         By effect: its places, largest first. The share of a place is proportional to the mean square displacement that
         its parameters cause, with the unknown frames projected out.
@@ -72,7 +74,7 @@ def locate(fit: Fit, shrinkage: dict[str, float]) -> tuple[Where, dict[str, tupl
     frames = e.linear.frames[rows].reshape(-1, e.linear.frames.shape[2]) if e.linear.frames.shape[2] else None
     basis = orthonormal(frames) if frames is not None else None
     locations: dict[str, tuple[Location, ...]] = {}
-    by_kind: dict[str, dict[str, float]] = {"joint": defaultdict(float), "link": defaultdict(float)}
+    by_kind: dict[str, dict[str, float]] = defaultdict(lambda: defaultdict(float))
     for b, (effect, values) in zip(e.best.blocks, fit.effects, strict=True):
         block = e.linear.blocks[b]
         power: dict[tuple[str, str], float] = {}
@@ -86,14 +88,14 @@ def locate(fit: Fit, shrinkage: dict[str, float]) -> tuple[Where, dict[str, tupl
         found = [Location(kind, name, min(share * part / total, 1.0)) for (kind, name), part in power.items()]
         locations[effect.name] = tuple(sorted(found, key=lambda place: -place.share))
         for place in found:
-            if place.kind in by_kind:
-                by_kind[place.kind][place.name] += place.share
+            by_kind[place.kind][place.name] += place.share
     links = dict.fromkeys(segment.parent_link for segment in fit.corrected.robot.segments)
     order = {"joint": fit.corrected.robot.joint_names, "link": tuple(links)}
     joints, bodies = (
         {name: by_kind[kind][name] for name in order[kind] if name in by_kind[kind]} for kind in ("joint", "link")
     )
-    return Where(_axes(gap), joints, bodies, _covariates(fit, gap, rows)), locations
+    beyond = {kind: sum(by_kind[kind].values()) for kind in _BEYOND if kind in by_kind}
+    return Where(_axes(gap), joints, bodies, _covariates(fit, gap, rows), beyond), locations
 
 
 def _displaced(observations: Observations, block: Block, values: Array) -> dict[tuple[str, str], Array]:

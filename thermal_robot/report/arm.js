@@ -26,7 +26,7 @@
   const high = [0, 1, 2].map(k => Math.max(...seen.map(p => p[k])));
   const centre = low.map((v, k) => (v + high[k]) / 2);
   const radius = Math.max(...seen.map(p => Math.hypot(...less(p, centre))), 1e-3);
-  const most = Math.max(...data.links.map(l => l.share), ...data.joints.map(j => j.share));
+  const most = Math.max(...[...data.links, ...data.joints, data.base, data.tool].map(place => place.share));
 
   const rgb = text => text.trim().replace("#", "").match(/../g).map(h => parseInt(h, 16));
   const css = (c, shade = 1, alpha = 1) =>
@@ -79,8 +79,9 @@
 
     const row = data.rows[slider.value], frames = poses(row);
     floor(line);
+    plate(onto, items);
     body(frames, onto, towards, right, up, items, line);
-    line(origin(frames[frames.length - 1]), row.at, css(colours.muted), 2);
+    line(origin(frames[frames.length - 1]), row.at, css(byShare(data.tool.share)), 5);
     for (const [name, gap] of [["before", "before"], ["after", "after"]]) {
       if (!part(name).checked) continue;
       for (const other of data.rows) if (other !== row) arrow(other.at, other[gap], css(colours[name], 1, 0.75), 1.3);
@@ -95,7 +96,7 @@
       pen.fillStyle = css(byShare(disc.share)); pen.strokeStyle = css(colours.paper); pen.lineWidth = 1.5;
       pen.fill(); pen.stroke();
     }
-    words(discs, frames, onto);
+    words(discs, frames, onto, row.at);
     told.textContent = row.told;
     times.textContent = `${(data.factor * longer.value).toLocaleString("en").replace(/,/g, "\u2009")} times larger`;
   };
@@ -106,6 +107,16 @@
       line([k * step, -4 * step, 0], [k * step, 4 * step, 0], colour, 1, -10 * radius);
       line([-4 * step, k * step, 0], [4 * step, k * step, 0], colour, 1, -10 * radius);
     }
+  };
+
+  /* the base: a plate under the root */
+  const plate = (onto, items) => {
+    const wide = 0.16 * radius, turns = [...Array(48).keys()].map(k => k * Math.PI / 24);
+    const points = turns.map(a => onto([wide * Math.cos(a), wide * Math.sin(a), 0]));
+    items.push({ depth: -5 * radius, paint: () => {
+      pen.fillStyle = css(byShare(data.base.share)); pen.strokeStyle = css(colours.paper); pen.lineWidth = 1.5;
+      pen.beginPath(); points.forEach(p => pen.lineTo(p[0], p[1])); pen.closePath(); pen.fill(); pen.stroke();
+    } });
   };
 
   const body = (frames, onto, towards, right, up, items, line) => {
@@ -135,11 +146,13 @@
   };
 
   /* the places with the largest shares are named beside them, from top to bottom, none over another */
-  const words = (discs, frames, onto) => {
+  const words = (discs, frames, onto, target) => {
     const middle = k => along(origin(frames[k]), less(origin(frames[k + 1]), origin(frames[k])), 0.5);
     const links = data.links.map((link, k) => ({ ...link, k })).filter(link => link.k + 1 < frames.length)
       .map(link => ({ ...link, at: onto(middle(link.k)) }));
-    const named = [...discs, ...links].filter(place => place.named)
+    const last = origin(frames[frames.length - 1]);
+    const ends = [{ ...data.base, at: onto([0, 0, 0]) }, { ...data.tool, at: onto(along(last, less(target, last), 0.5)) }];
+    const named = [...discs, ...links, ...ends].filter(place => place.named)
       .sort((a, b) => b.share - a.share).slice(0, width < 560 ? 3 : 5).sort((a, b) => a.at[1] - b.at[1]);
     pen.font = "12px system-ui, sans-serif"; pen.textBaseline = "middle";
     let next = 12;

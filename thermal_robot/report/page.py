@@ -27,6 +27,7 @@ from thermal_robot.report.words import (
     rows_used,
     sentences,
     set_aside,
+    struck,
     verdict,
     with_aside,
 )
@@ -37,6 +38,8 @@ if TYPE_CHECKING:
 
 def html(diagnosis: Diagnosis, generated: str | None = None, files: Mapping[str, str] | None = None) -> str:
     """Write a diagnosis as a page that needs nothing beside itself and prints on A4.
+
+    Of a table that does not fit the robot it says what is wrong with it and what to do, and nothing of the robot.
 
     Parameters
     ----------
@@ -61,6 +64,8 @@ def html(diagnosis: Diagnosis, generated: str | None = None, files: Mapping[str,
 def fragment(diagnosis: Diagnosis) -> str:
     """Write a diagnosis as a piece of HTML for a notebook: verdict, numbers, one figure, effects.
 
+    Of a table that does not fit the robot it says what is wrong with it and what to do, and nothing of the robot.
+
     Returns
     -------
     str
@@ -69,16 +74,21 @@ def fragment(diagnosis: Diagnosis) -> str:
     body = "\n".join(
         (
             paragraph(diagnosis.summary, strong=True),
-            *map(paragraph, details(diagnosis)),
-            numbers(diagnosis),
-            figure(overview(diagnosis, headline=False), f"Overview: {diagnosis.summary}"),
-            effects_table(diagnosis),
-            '<p class="tr-kicker">Unexplained</p>',
-            *_unexplained(diagnosis),
+            *(_in_short(diagnosis) if diagnosis.usable else (paragraph(diagnosis.advice), _facts(diagnosis))),
             *(['<p class="tr-kicker">Warnings</p>', bullets(diagnosis.warnings)] if diagnosis.warnings else []),
         )
     )
     return f'<div class="thermal-robot">\n<style>\n{css("page.css")}</style>\n{body}\n</div>'
+
+
+def _in_short(diagnosis: Diagnosis) -> Iterator[str]:
+    """Yield what a notebook shows of a robot between the verdict and the warnings."""
+    yield from map(paragraph, details(diagnosis))
+    yield numbers(diagnosis)
+    yield figure(overview(diagnosis, headline=False), f"Overview: {diagnosis.summary}")
+    yield effects_table(diagnosis)
+    yield '<p class="tr-kicker">Unexplained</p>'
+    yield from _unexplained(diagnosis)
 
 
 def _whole(diagnosis: Diagnosis, arm: str, footer: str) -> Iterator[str]:
@@ -86,8 +96,19 @@ def _whole(diagnosis: Diagnosis, arm: str, footer: str) -> Iterator[str]:
     yield f"<h1>{escape(diagnosis.summary)}</h1>"
     yield from map(paragraph, details(diagnosis))
     yield _facts(diagnosis)
-    yield numbers(diagnosis)
-    yield "</header>"
+    yield (numbers(diagnosis) if diagnosis.usable else "") + "</header>"
+    if diagnosis.usable:
+        yield from _of_the_robot(diagnosis, arm)
+    yield from _next(diagnosis)
+    if diagnosis.usable and diagnosis.outliers:
+        yield f"<section><h2>Set aside</h2>{outliers_table(diagnosis)}</section>"
+    if diagnosis.warnings:
+        yield f"<section><h2>Warnings</h2>{bullets(diagnosis.warnings)}</section>"
+    yield f"<footer>{footer}</footer>"
+
+
+def _of_the_robot(diagnosis: Diagnosis, arm: str) -> Iterator[str]:
+    """Yield the sections that hold only where robot and table describe the same motion."""
     yield "<section><h2>How far</h2>"
     held = diagnosis.gap.held_out
     yield paragraph(
@@ -116,20 +137,14 @@ def _whole(diagnosis: Diagnosis, arm: str, footer: str) -> Iterator[str]:
             yield figure(diagnosis.explain(law.name), f"{law.name}: the error there against what it follows")
     yield "</section>"
     yield from model_section(diagnosis)
-    yield from _next(diagnosis)
-    if diagnosis.outliers:
-        yield f"<section><h2>Set aside</h2>{outliers_table(diagnosis)}</section>"
-    if diagnosis.warnings:
-        yield f"<section><h2>Warnings</h2>{bullets(diagnosis.warnings)}</section>"
-    yield f"<footer>{footer}</footer>"
 
 
 def _facts(diagnosis: Diagnosis) -> str:
-    facts = {"Verdict": verdict(diagnosis), "Campaign": campaign(diagnosis), "Set aside": set_aside(diagnosis)}
-    facts["Rows used"] = rows_used(diagnosis)
-    if told := left_out(diagnosis):
-        facts["Left out"] = told
-    return f"<dl>{''.join(f'<dt>{k}</dt><dd>{escape(v)}</dd>' for k, v in facts.items())}</dl>"
+    facts = {"Verdict": verdict(diagnosis), "Campaign": campaign(diagnosis)}
+    if diagnosis.usable:
+        facts |= {"Set aside": set_aside(diagnosis), "Rows used": rows_used(diagnosis), "Left out": left_out(diagnosis)}
+    facts["Struck"] = struck(diagnosis)
+    return f"<dl>{''.join(f'<dt>{k}</dt><dd>{escape(v)}</dd>' for k, v in facts.items() if v)}</dl>"
 
 
 def _unexplained(diagnosis: Diagnosis) -> Iterator[str]:
@@ -138,8 +153,8 @@ def _unexplained(diagnosis: Diagnosis) -> Iterator[str]:
 
 
 def _next(diagnosis: Diagnosis) -> Iterator[str]:
-    if not diagnosis.advice and not diagnosis.separates:
+    apart = [f"to tell apart: {', '.join(group)}" for group in (diagnosis.separates if diagnosis.usable else ())]
+    if not diagnosis.advice and not apart:
         return
-    apart = [f"to tell apart: {', '.join(group)}" for group in diagnosis.separates]
     advice = paragraph(diagnosis.advice) if diagnosis.advice else ""
     yield f"<section><h2>Next</h2>{advice}{bullets(apart)}</section>"

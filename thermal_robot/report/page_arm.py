@@ -81,7 +81,8 @@ def _values(diagnosis: Diagnosis, arm: Arm, chosen: NDArray[np.int64]) -> dict[s
         }
         for k, i in enumerate(chosen)
     ]
-    return {"links": links, "joints": joints, "solids": shapes, "rows": postures}
+    ends = {"base": _place("base", arm.base_share), "tool": _place("tool", arm.tool_share)}
+    return {"links": links, "joints": joints, "solids": shapes, "rows": postures, **ends}
 
 
 def _place(name: str, share: float) -> dict[str, Any]:
@@ -123,8 +124,13 @@ def _controls(drawn: int, rows: int, left: int) -> str:
 
 
 def _key(arm: Arm) -> str:
-    most = float(max(arm.link_shares.max(initial=0.0), arm.joint_shares.max(initial=0.0)))
+    every = (*arm.link_shares, *arm.joint_shares, arm.base_share, arm.tool_share)
+    most, seen = float(max(every)), arm.instrument_share
+    beside = f" At the instrument: {units.percent(seen)}, not drawn." if seen >= _WORTH else ""
     if most < _WORTH:
-        return "<figcaption>Drag to turn. No place on the arm carries a share of the gap.</figcaption>"
+        return f"<figcaption>Drag to turn. No place on the arm carries a share of the gap.{beside}</figcaption>"
     ramp = f'0 % <i class="tr-ramp"></i> {escape(units.percent(most))} of the gap enters there'
-    return f"<figcaption>Drag to turn. Links and joints: {ramp}.</figcaption>"
+    return (
+        "<figcaption>Drag to turn. Links, joints, the base (plate) and the tool (line from its frame to the target): "
+        f"{ramp}.{escape(beside)}</figcaption>"
+    )

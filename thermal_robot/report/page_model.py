@@ -38,9 +38,7 @@ def frames_table(diagnosis: Diagnosis) -> str:
     rows = []
     for name, pose in diagnosis.frames.iterrows():
         told = [f"{1e3 * v:.3f}" for v in pose[["x", "y", "z"]]]
-        # without measured orientations the target's direction on the tool means nothing
-        seen = name == "base" or diagnosis.measures == "pose"
-        told += [f"{np.degrees(v):.4f}" if seen else "" for v in pose[["roll", "pitch", "yaw"]]]
+        told += [f"{np.degrees(v):.4f}" if np.isfinite(v) else "" for v in pose[["roll", "pitch", "yaw"]]]
         rows.append(row((_FRAMES[str(name)], *(value.replace("-", "−") for value in told))))
     return wide(table(heads, rows), "Fitted frames")
 

@@ -23,10 +23,10 @@ from thermal_robot.report.words import (
     parameters,
     places,
     rivals,
-    rows_in_words,
     rows_used,
     sentences,
     set_aside,
+    struck,
     told_as,
     verdict,
     with_aside,
@@ -74,11 +74,11 @@ def text(diagnosis: Diagnosis) -> str:
 def _unusable(diagnosis: Diagnosis) -> Iterator[list[str]]:
     """Say what is wrong with the table, and nothing of the robot."""
     yield [_wrap(diagnosis.summary, "")]
-    struck = diagnosis.misfit.fault.rows if diagnosis.misfit and diagnosis.misfit.fault else ()
+    told = struck(diagnosis)
     yield [
         _wrap(verdict(diagnosis), f"{'verdict':11}"),
         _wrap(campaign(diagnosis), f"{'campaign':11}"),
-        *([_wrap(rows_in_words(struck), f"{'struck':11}")] if struck else []),
+        *([_wrap(told, f"{'struck':11}")] if told else []),
     ]
     yield ["NEXT", _wrap(diagnosis.advice)]
     if diagnosis.warnings:
@@ -199,6 +199,7 @@ def _where(diagnosis: Diagnosis) -> Iterator[str]:
     yield from _bars("axis of the root frame", where.axes, ranked=False)
     yield from _bars("joint", where.joints)
     yield from _bars("link", where.links)
+    yield from _bars("beyond joints and links", where.beyond)
     yield from _bars("recorded quantity: what a law of it alone would explain", where.covariates)
 
 

@@ -20,7 +20,11 @@ if TYPE_CHECKING:
 
 def overview(diagnosis: Diagnosis, *, headline: bool = True) -> Figure:
     """Draw how far, which, where, and the map of the gap, under the sentence of the verdict if ``headline``."""
-    lines = max(len(diagnosis.effects), len(diagnosis.joint_names) + len(diagnosis.where.links), 12)
+    lines = max(
+        len(diagnosis.effects),
+        len(diagnosis.joint_names) + len(diagnosis.where.links) + len(diagnosis.where.beyond),
+        12,
+    )
     figure = Drawing(12.5, 5.4 + 0.2 * lines)
     (how_far, which), (where, map_) = figure.subplots(2, 2)
     draw_how_far(how_far, diagnosis)

@@ -10,6 +10,7 @@ import numpy as np
 from thermal_robot.report import units
 from thermal_robot.report.drawing import (
     AFTER,
+    BEFORE,
     FAINT,
     INK,
     MUTED,
@@ -35,7 +36,7 @@ _BETWEEN = 0.6  # lines
 
 
 def plot_where(diagnosis: Diagnosis) -> Figure:
-    """Draw the shares of the gap's mean square: joints and links from root to tool, axes, quantities."""
+    """Draw the shares of the gap's mean square: places of the arm and beyond it, axes, quantities."""
     chain, other = _chain(diagnosis), _other(diagnosis)
     right = _lines(other)
     left = _lines(chain) if _placed(chain) else min(right, 4.0)
@@ -58,7 +59,7 @@ def plot_where(diagnosis: Diagnosis) -> Figure:
 
 
 def draw_where(axes: Axes, diagnosis: Diagnosis) -> None:
-    """Draw joints and links into a panel, the root above, the tool below."""
+    """Draw joints and links into a panel, the root above, the tool below, then what lies beyond them."""
     chain = _chain(diagnosis)
     if not _placed(chain):
         note(axes, "No effect was found,\nso none is placed along the chain.")
@@ -74,11 +75,12 @@ def _chain(diagnosis: Diagnosis) -> list[_Group]:
     where = diagnosis.where
     names = dict.fromkeys((*diagnosis.joint_names, *where.joints)) if where.joints else {}
     joints = {name: where.joints.get(name, 0.0) for name in names}
-    return [
-        (f"{kind}, from root to tool", shares, colour)
-        for kind, shares, colour in (("joints", joints, AFTER), ("links", where.links, THIRD))
-        if shares
-    ]
+    groups = (
+        ("joints, from root to tool", joints, AFTER),
+        ("links, from root to tool", where.links, THIRD),
+        ("beyond joints and links", where.beyond, BEFORE),
+    )
+    return [group for group in groups if group[1]]
 
 
 def _other(diagnosis: Diagnosis) -> list[_Group]:

@@ -16,6 +16,7 @@ _MOST_CAUSES = 3  # that a headline names; the others are counted
 _MOST_OF_A_NAME = 9  # words: of a longer title the headline says the beginning
 _WEIGHTY = 0.01  # of the gap on held-out rows: an effect with less is counted among the smaller ones
 _CARRIES = 1.5  # times what is left of the fitted rows: more on held-out rows is not called noise
+_UNKNOWN = ", which may or may not be noise: the campaign states none"
 _SURE = 0.995  # a probability above it would be rounded to 100 %, which is never claimed
 # m: from which length on it is read times so much in which unit; what rounds to 1 mm is never written as 1e+03 µm
 _LENGTHS = ((0.9995, 1.0, "m"), (0.9995e-3, 1e3, "mm"), (0.0, 1e6, "µm"))
@@ -44,13 +45,20 @@ def _wordings(diagnosis: Diagnosis) -> Iterator[str]:
         yield _misfit(diagnosis.misfit, diagnosis.reach)
     elif not diagnosis.verdict and not left.flagged:
         floor = length(diagnosis.gap.noise_floor)
-        yield f"No gap beyond the noise: the {size} between model and robot is what noise alone leaves ({floor})."
+        if diagnosis.gap.noise_known:
+            yield f"No gap beyond the noise: the {size} between model and robot is what noise alone leaves ({floor})."
+        else:
+            yield (
+                f"No effect was found, and no pattern in the gap of {size}: whether it is noise cannot be told, as the "
+                "campaign states none and repeats no command."
+            )
     elif not diagnosis.verdict:
         which = "none of the effects that were considered" if diagnosis.narrowed else "no known effect"
         for place in (_place(left), ""):
             yield f"The gap of {size} is explained by {which}{place}."
     elif not (causes := systematic(diagnosis)):
-        rest = f", of which {length(remaining.rms)} is not explained" if remaining.flagged and remaining.rms else ""
+        gap = diagnosis.gap
+        rest = _unexplained(diagnosis, remaining, gap.rms_before, gap.held_out.rms_before_with_aside)
         names = listed([_name(diagnosis, f) for f in scattering(diagnosis)])
         yield f"The gap of {size} is scatter: {names} ({_sure(diagnosis)}){rest}; no correction removes scatter."
     else:
@@ -142,7 +150,8 @@ def _how_far(diagnosis: Diagnosis, remaining: Unexplained, several: bool) -> Ite
     yield f"{full} and leaves {leaves}{_rest(diagnosis, remaining)}{hard}"
     short = f"correcting removes {100 * held.shrinkage:.1f} % on held-out data and leaves {leaves}"
     yield f"{short}{_rest(diagnosis, remaining)}{hard}"
-    more = ", more than noise" if remaining.flagged else ""
+    apart = remaining.flagged and remaining.rms > held.rms_after  # of rows set aside: the others are not called more
+    more = (", outliers left out" if apart else ", more than noise") if remaining.flagged else ""
     yield f"{short}{more}{hard}"
     yield f"correcting leaves {leaves} on held-out data{more}{hard}"
 
@@ -151,11 +160,27 @@ def _rest(diagnosis: Diagnosis, remaining: Unexplained) -> str:
     gap, floor = diagnosis.gap, length(diagnosis.gap.noise_floor)
     if not remaining.flagged:
         if gap.held_out.rms_after < _CARRIES * max(gap.rms_after, gap.noise_floor):
-            return f", which is noise ({floor})"
-        return f", while {length(gap.rms_after)} is left on the rows it was fitted to (noise: {floor})"
-    if gap.noise_source == "remainder" or remaining.rms == 0.0:
-        return ", which is more than noise"
-    return f", of which {length(remaining.rms)} is not explained"
+            return f", which is noise ({floor})" if gap.noise_known else _UNKNOWN
+        told = floor if gap.noise_known else "not stated"
+        return f", while {length(gap.rms_after)} is left on the rows it was fitted to (noise: {told})"
+    held = gap.held_out
+    return _unexplained(diagnosis, remaining, held.rms_after, held.rms_after_with_aside) or ", which is more than noise"
+
+
+def _unexplained(diagnosis: Diagnosis, remaining: Unexplained, of: float, with_aside: float | None) -> str:
+    """Say how much of a size is not explained; empty where nothing is, or nobody knows how much.
+
+    Where rows set aside are unexplained, too, they count in what remains but not in the size: it is told with them.
+    """
+    if not remaining.flagged or remaining.rms == 0.0:
+        return ""
+    if remaining.rms > of:
+        count = len(diagnosis.outliers)
+        if with_aside is None or not count:
+            return ""
+        aside = "the row" if count == 1 else f"the {count} rows"
+        return f", or {length(with_aside)} with {aside} set aside in it, which nothing explains"
+    return f", of which {length(remaining.rms)} is not explained" if diagnosis.gap.noise_known else ""
 
 
 def length(metres: float) -> str:

@@ -125,6 +125,12 @@ def set_aside(diagnosis: Diagnosis) -> str:
     return f"as outliers: {rows_in_words(diagnosis.outliers)}" if diagnosis.outliers else "no row"
 
 
+def struck(diagnosis: Diagnosis) -> str:
+    """Say which rows a fault of the table struck; empty where it struck all, or there is none."""
+    fault = diagnosis.misfit.fault if diagnosis.misfit else None
+    return rows_in_words(fault.rows) if fault and fault.rows else ""
+
+
 def rows_used(diagnosis: Diagnosis) -> str:
     """Say how many rows were set aside, and how many were not: ``116 of 120 rows, 4 set aside``."""
     aside, samples = len(diagnosis.outliers), diagnosis.samples
@@ -262,9 +268,13 @@ def sentences(diagnosis: Diagnosis) -> Iterator[str]:
     left = diagnosis.unexplained
     if not left.flagged:
         chance = units.p_value(left.p_value)
-        yield f"Nothing: what remains is no larger and no more structured than the noise ({chance})."
+        if diagnosis.gap.noise_known:
+            yield f"Nothing: what remains is no larger and no more structured than the noise ({chance})."
+        else:
+            yield f"No pattern was found in what remains ({chance})."
+            yield "Whether it is as small as the noise cannot be told: the campaign states none and repeats no command."
         return
-    known = "" if diagnosis.gap.noise_source == "remainder" else " beyond the noise"
+    known = " beyond the noise" if diagnosis.gap.noise_known else ""
     size = f"{units.quantity(left.rms, 'm')} rms{known}" if left.rms > 0 else "a remainder"
     yield f"The known effects leave {size} that chance does not explain ({units.p_value(left.p_value)})."
     for reason in left.reasons:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 
@@ -132,23 +131,9 @@ def scene_of_diagnosis(diagnosis: Diagnosis) -> Scene:
     rows = diagnosis.rows
     if not diagnosis.usable:
         return _scene(diagnosis.fit.nominal, diagnosis.reason, None, rows.outliers, {})
-    return _scene(diagnosis.fit.nominal, diagnosis.summary, rows.remainder[:, :3], rows.outliers, shares_of(diagnosis))
-
-
-def shares_of(diagnosis: Diagnosis) -> dict[tuple[str, str], float]:
-    """Return each place's share of the gap's mean square, by kind and name, largest first.
-
-    Joints and links as ``Diagnosis.where`` has them; base, tool and instrument as the sum over the effects that act
-    there.
-    """
-    where = diagnosis.where
-    shares = {(kind, name): share for kind in ("joint", "link") for name, share in getattr(where, f"{kind}s").items()}
-    further: dict[tuple[str, str], float] = defaultdict(float)
-    for finding in diagnosis.effects:
-        for place in finding.locations if finding.name in diagnosis.verdict else ():
-            if place.kind not in ("joint", "link"):
-                further[place.kind, place.name] += place.share
-    return dict(sorted({**shares, **further}.items(), key=lambda item: -item[1]))
+    return _scene(
+        diagnosis.fit.nominal, diagnosis.summary, rows.remainder[:, :3], rows.outliers, diagnosis.where.places
+    )
 
 
 def _scene(
