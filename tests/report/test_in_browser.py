@@ -32,6 +32,24 @@ function measure(frame) {
   frame.contentWindow.requestAnimationFrame = paint => paint();
   const painted = () => canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data
     .reduce((sum, value, k) => sum + (k % 4 === 3 && value > 0), 0) / (canvas.width * canvas.height);
+  /* strongest colour along the edges of the drawing, however it is turned; paper and floor are grey */
+  const copy = page.createElement("canvas");
+  [copy.width, copy.height] = [canvas.width, canvas.height];
+  const pen = copy.getContext("2d", {willReadFrequently: true}), edges = [];
+  const inked = () => {
+    pen.clearRect(0, 0, copy.width, copy.height);
+    pen.drawImage(canvas, 0, 0);
+    const strips = [[0, 0, copy.width, 2], [0, copy.height - 2, copy.width, 2], [0, 0, 2, copy.height],
+      [copy.width - 2, 0, 2, copy.height]].map(strip => pen.getImageData(...strip).data);
+    return Math.max(...strips.map(d => d.reduce(
+      (most, v, k) => k % 4 || d[k + 3] < 60 ? most : Math.max(most, Math.abs(v - d[k + 2])), 0)));
+  };
+  for (const key of ["ArrowUp", "ArrowDown"])
+    for (let k = 0; k < 63; k++) {
+      canvas.dispatchEvent(new KeyboardEvent("keydown", {key: k < 20 ? key : "ArrowLeft"}));
+      edges.push(inked());
+    }
+  page.querySelector("[data-tr=reset]").click();
   const first = canvas.toDataURL(), told = page.querySelector("[data-tr=told]").textContent, filled = painted();
   canvas.dispatchEvent(new KeyboardEvent("keydown", {key: "ArrowLeft"}));
   const turned = canvas.toDataURL();
@@ -40,7 +58,7 @@ function measure(frame) {
   const moved = canvas.toDataURL(), later = page.querySelector("[data-tr=told]").textContent;
   document.getElementById("said").textContent = JSON.stringify(
     {seen: root.clientWidth, needed: root.scrollWidth, out: out, smallest: Math.min(...letters),
-     filled: filled, drawings: new Set([first, turned, moved]).size, told: [told, later]});
+     filled: filled, edges: Math.max(...edges), drawings: new Set([first, turned, moved]).size, told: [told, later]});
 }
 </script></body>"""
 
@@ -93,6 +111,7 @@ def test_nothing_is_cut_off_and_nothing_complains(served, width, tmp_path):
     assert page["out"] == []
     assert page["smallest"] >= 8.0, "letters of less than 8 pixels"
     assert 0.05 < page["filled"] < 0.6, "the arm fills a part of its drawing"
+    assert page["edges"] < 40, "an arrow leaves the drawing"
     assert page["drawings"] == 3, "it turns, and takes the posture of another row"
     assert page["told"][0] != page["told"][1]
     assert [line for line in complaints if "favicon" not in line] == []
