@@ -24,6 +24,7 @@ WRAPPER = """<!DOCTYPE html><body style="margin:0"><iframe src="page.html" width
 onload="measure(this)"></iframe><pre id="said"></pre><script>
 function measure(frame) {
   const page = frame.contentDocument, root = page.documentElement;
+  const [width, needed] = [root.clientWidth, root.scrollWidth];
   const out = [...page.querySelectorAll("main *")].filter(e => !e.parentElement.closest(".tr-wide, svg"))
     .filter(e => e.getBoundingClientRect().right > root.clientWidth + 1).map(e => e.tagName + "." + e.className);
   const letters = [...page.querySelectorAll("svg.tr-figure text, p, td, dd")]
@@ -56,9 +57,17 @@ function measure(frame) {
   row.value = 7;
   row.dispatchEvent(new Event("input"));
   const moved = canvas.toDataURL(), later = page.querySelector("[data-tr=told]").textContent;
+  const caption = page.querySelector("#tr-arm"), screen = caption.innerText;
+  const rules = [...page.styleSheets].flatMap(sheet => [...sheet.cssRules]).filter(r => r.media?.mediaText === "print");
+  page.head.append(Object.assign(page.createElement("style"),
+    {textContent: rules.flatMap(r => [...r.cssRules]).map(r => r.cssText).join(" ")}));
+  const paper = caption.innerText, shown = [...page.querySelectorAll("#tr-arm input, #tr-arm button")]
+    .filter(e => e.getBoundingClientRect().width > 0).length;
+  page.querySelector("[data-tr=after]").click();
   document.getElementById("said").textContent = JSON.stringify(
-    {seen: root.clientWidth, needed: root.scrollWidth, out: out, smallest: Math.min(...letters),
-     filled: filled, edges: Math.max(...edges), drawings: new Set([first, turned, moved]).size, told: [told, later]});
+    {seen: width, needed: needed, out: out, smallest: Math.min(...letters),
+     filled: filled, edges: Math.max(...edges), drawings: new Set([first, turned, moved]).size, told: [told, later],
+     screen: screen, paper: paper, without: caption.innerText, controls: shown});
 }
 </script></body>"""
 
@@ -115,6 +124,17 @@ def test_nothing_is_cut_off_and_nothing_complains(served, width, tmp_path):
     assert page["drawings"] == 3, "it turns, and takes the posture of another row"
     assert page["told"][0] != page["told"][1]
     assert [line for line in complaints if "favicon" not in line] == []
+
+
+def test_on_paper_the_drawing_says_what_it_shows_and_offers_nothing(served, tmp_path):
+    page, _ = seen(served, 1400, tmp_path)
+    words = " ".join(page["paper"].split())
+    assert page["told"][1] in words
+    assert re.search(r"gap before after arrows [\d ]+ times larger", words)
+    assert "Drag to turn" in page["screen"]
+    assert "Drag to turn" not in words
+    assert page["controls"] == 0
+    assert "gap before arrows" in " ".join(page["without"].split()), "arrows that are switched off have no key"
 
 
 def test_nothing_else_is_fetched(served, tmp_path):
