@@ -24,6 +24,7 @@ WRAPPER = """<!DOCTYPE html><body style="margin:0"><iframe src="page.html" width
 onload="measure(this)"></iframe><pre id="said"></pre><script>
 function measure(frame) {
   const page = frame.contentDocument, root = page.documentElement;
+  const [width, needed] = [root.clientWidth, root.scrollWidth];
   const out = [...page.querySelectorAll("main *")].filter(e => !e.parentElement.closest(".tr-wide, svg"))
     .filter(e => e.getBoundingClientRect().right > root.clientWidth + 1).map(e => e.tagName + "." + e.className);
   const letters = [...page.querySelectorAll("svg.tr-figure text, p, td, dd")]
@@ -32,15 +33,41 @@ function measure(frame) {
   frame.contentWindow.requestAnimationFrame = paint => paint();
   const painted = () => canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height).data
     .reduce((sum, value, k) => sum + (k % 4 === 3 && value > 0), 0) / (canvas.width * canvas.height);
+  /* strongest colour along the edges of the drawing, however it is turned; paper and floor are grey */
+  const copy = page.createElement("canvas");
+  [copy.width, copy.height] = [canvas.width, canvas.height];
+  const pen = copy.getContext("2d", {willReadFrequently: true}), edges = [];
+  const inked = () => {
+    pen.clearRect(0, 0, copy.width, copy.height);
+    pen.drawImage(canvas, 0, 0);
+    const strips = [[0, 0, copy.width, 2], [0, copy.height - 2, copy.width, 2], [0, 0, 2, copy.height],
+      [copy.width - 2, 0, 2, copy.height]].map(strip => pen.getImageData(...strip).data);
+    return Math.max(...strips.map(d => d.reduce(
+      (most, v, k) => k % 4 || d[k + 3] < 60 ? most : Math.max(most, Math.abs(v - d[k + 2])), 0)));
+  };
+  for (const key of ["ArrowUp", "ArrowDown"])
+    for (let k = 0; k < 63; k++) {
+      canvas.dispatchEvent(new KeyboardEvent("keydown", {key: k < 20 ? key : "ArrowLeft"}));
+      edges.push(inked());
+    }
+  page.querySelector("[data-tr=reset]").click();
   const first = canvas.toDataURL(), told = page.querySelector("[data-tr=told]").textContent, filled = painted();
   canvas.dispatchEvent(new KeyboardEvent("keydown", {key: "ArrowLeft"}));
   const turned = canvas.toDataURL();
   row.value = 7;
   row.dispatchEvent(new Event("input"));
   const moved = canvas.toDataURL(), later = page.querySelector("[data-tr=told]").textContent;
+  const caption = page.querySelector("#tr-arm"), screen = caption.innerText;
+  const rules = [...page.styleSheets].flatMap(sheet => [...sheet.cssRules]).filter(r => r.media?.mediaText === "print");
+  page.head.append(Object.assign(page.createElement("style"),
+    {textContent: rules.flatMap(r => [...r.cssRules]).map(r => r.cssText).join(" ")}));
+  const paper = caption.innerText, shown = [...page.querySelectorAll("#tr-arm input, #tr-arm button")]
+    .filter(e => e.getBoundingClientRect().width > 0).length;
+  page.querySelector("[data-tr=after]").click();
   document.getElementById("said").textContent = JSON.stringify(
-    {seen: root.clientWidth, needed: root.scrollWidth, out: out, smallest: Math.min(...letters),
-     filled: filled, drawings: new Set([first, turned, moved]).size, told: [told, later]});
+    {seen: width, needed: needed, out: out, smallest: Math.min(...letters),
+     filled: filled, edges: Math.max(...edges), drawings: new Set([first, turned, moved]).size, told: [told, later],
+     screen: screen, paper: paper, without: caption.innerText, controls: shown});
 }
 </script></body>"""
 
@@ -93,9 +120,21 @@ def test_nothing_is_cut_off_and_nothing_complains(served, width, tmp_path):
     assert page["out"] == []
     assert page["smallest"] >= 8.0, "letters of less than 8 pixels"
     assert 0.05 < page["filled"] < 0.6, "the arm fills a part of its drawing"
+    assert page["edges"] < 40, "an arrow leaves the drawing"
     assert page["drawings"] == 3, "it turns, and takes the posture of another row"
     assert page["told"][0] != page["told"][1]
     assert [line for line in complaints if "favicon" not in line] == []
+
+
+def test_on_paper_the_drawing_says_what_it_shows_and_offers_nothing(served, tmp_path):
+    page, _ = seen(served, 1400, tmp_path)
+    words = " ".join(page["paper"].split())
+    assert page["told"][1] in words
+    assert re.search(r"gap before after arrows [\d ]+ times larger", words)
+    assert "Drag to turn" in page["screen"]
+    assert "Drag to turn" not in words
+    assert page["controls"] == 0
+    assert "gap before arrows" in " ".join(page["without"].split()), "arrows that are switched off have no key"
 
 
 def test_nothing_else_is_fetched(served, tmp_path):

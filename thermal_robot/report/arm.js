@@ -20,12 +20,14 @@
   const origin = t => [t[3], t[7], t[11]];
   const poses = row => data.links.map((_, k) => row.poses.slice(12 * k, 12 * k + 12));
 
-  /* what is to be seen stays within a ball, however it is turned */
-  const seen = data.rows.flatMap(row => [row.at, ...poses(row).map(origin)]).concat([[0, 0, 0]]);
-  const low = [0, 1, 2].map(k => Math.min(...seen.map(p => p[k])));
-  const high = [0, 1, 2].map(k => Math.max(...seen.map(p => p[k])));
-  const centre = low.map((v, k) => (v + high[k]) / 2);
-  const radius = Math.max(...seen.map(p => Math.hypot(...less(p, centre))), 1e-3);
+  /* what is to be seen, arrows too, stays within a ball, however it is turned: the least one, found by going ever
+     smaller steps towards the farthest point (Badoiu and Clarkson 2003) */
+  const ends = row => [row.before, row.after].map(gap => along(row.at, gap, data.factor));
+  const seen = data.rows.flatMap(row => [row.at, ...ends(row), ...poses(row).map(origin)]).concat([[0, 0, 0]]);
+  const far = from => seen.map(p => Math.hypot(...less(p, from))).reduce((a, d, k) => d > a[0] ? [d, k] : a, [1e-3, 0]);
+  let centre = seen[0];
+  for (let k = 2; k < 200; k++) centre = along(centre, less(seen[far(centre)[1]], centre), 1 / k);
+  const radius = far(centre)[0];
   const most = Math.max(...[...data.links, ...data.joints, data.base, data.tool].map(place => place.share));
 
   const rgb = text => text.trim().replace("#", "").match(/../g).map(h => parseInt(h, 16));
@@ -48,7 +50,7 @@
     const right = [-Math.sin(yaw), Math.cos(yaw), 0];
     const towards = [Math.cos(yaw) * Math.cos(pitch), Math.sin(yaw) * Math.cos(pitch), Math.sin(pitch)];
     const up = cross(towards, right);
-    const scale = zoom * 0.53 * Math.min(width, height * 1.15) / radius;
+    const scale = zoom * 0.485 * Math.min(width, height) / radius;
     const onto = p => {
       const d = less(p, centre);
       return [width / 2 + scale * dot(d, right), height / 2 - scale * dot(d, up), dot(d, towards)];

@@ -23,6 +23,7 @@ Array = NDArray[np.float64]
 _ROWS = 150  # of a long campaign that are drawn: their postures are most of what the drawing weighs
 _WORTH = 0.005  # share of the gap from which on a place is named in the drawing
 _LONGEST = 0.12  # of the workspace's extent, for an arrow of the gap's 95th percentile: there are arrows of all rows
+_TURN = '<span class="tr-screen">Drag to turn. </span>'  # paper cannot be turned
 _ROUND = {"poses": 4, "at": 4, "corners": 4}  # decimals of m: a tenth of a millimetre is less than a pixel
 
 
@@ -111,7 +112,7 @@ def _controls(drawn: int, rows: int, left: int) -> str:
     said = f"({'; '.join(filter(None, (some, aside)))})" if some or aside else ""
     return (
         '<div class="tr-controls">'
-        f'<label>row <input data-tr="row" type="range" min="0" max="{drawn - 1}" value="0"></label>'
+        f'<label class="tr-screen">row <input data-tr="row" type="range" min="0" max="{drawn - 1}" value="0"></label>'
         f'<output data-tr="told"></output><span>{escape(said)}</span>'
         '<label><input data-tr="before" type="checkbox" checked><i class="tr-is-before"></i>gap before</label>'
         '<label><input data-tr="after" type="checkbox" checked><i class="tr-is-after"></i>after</label>'
@@ -128,9 +129,9 @@ def _key(arm: Arm) -> str:
     most, seen = float(max(every)), arm.instrument_share
     beside = f" At the instrument: {units.percent(seen)}, not drawn." if seen >= _WORTH else ""
     if most < _WORTH:
-        return f"<figcaption>Drag to turn. No place on the arm carries a share of the gap.{beside}</figcaption>"
+        return f"<figcaption>{_TURN}No place on the arm carries a share of the gap.{beside}</figcaption>"
     ramp = f'0 % <i class="tr-ramp"></i> {escape(units.percent(most))} of the gap enters there'
     return (
-        "<figcaption>Drag to turn. Links, joints, the base (plate) and the tool (line from its frame to the target): "
+        f"<figcaption>{_TURN}Links, joints, the base (plate) and the tool (line from its frame to the target): "
         f"{ramp}.{escape(beside)}</figcaption>"
     )
