@@ -93,6 +93,7 @@ WRONG = {
     "diagnose a table": (lambda demo: tr.diagnose(TABLE), "found DataFrame, expected .* campaign_from_table makes one"),
     "diagnose only a number": (lambda demo: tr.diagnose(demo, only=3), "only: .*found int, expected names of effects"),
     "diagnose only numbers": (lambda demo: tr.diagnose(demo, only=[3]), "only: .*found int, expected names of effects"),
+    "diagnose only nothing": (lambda demo: tr.diagnose(demo, only=[]), "only: names no effect, expected at least one"),
     "diagnose with a name": (lambda demo: tr.diagnose(demo, effects="drift"), "found str, expected a list of your own"),
     "read a number": (lambda demo: tr.read_campaign(3), "found int, expected the path of a campaign.toml"),
     "a table of no robot": (

@@ -4,6 +4,7 @@ import sys
 
 import numpy as np
 import pandas as pd
+import pytest
 from commanded import refused
 from readers import by_mujoco, held
 
@@ -17,10 +18,10 @@ from thermal_robot.robot import load_robot
 def test_every_file_holds_the_same_robot(run, diagnosed, tmp_path):
     files = {name: tmp_path / f"{name}.{'csv' if name in ('dh', 'offsets') else 'xml'}" for name in robot_files.OUTPUTS}
     options = [word for name, file in files.items() for word in (f"--{name}", file)]
-    assert run("correct", diagnosed.model, *options, "--temperature", "30") == (0, "", "")
+    assert run("correct", diagnosed.model, *options, "--temperature", "26") == (0, "", "")
     model = CorrectedModel.load(diagnosed.model)
     q = np.zeros((1, 5))
-    poses, displaced = tool_poses(load_robot(files["urdf"], "tool0_target"), q), calibrated(model, temperature=30.0)
+    poses, displaced = tool_poses(load_robot(files["urdf"], "tool0_target"), q), calibrated(model, temperature=26.0)
     expected = tool_poses(model.robot, q, displaced.displacement) @ model.frames.tool
     np.testing.assert_allclose(poses, expected, atol=1e-12)
     seen = by_mujoco(files["mjcf"].read_text(), "base_link", "tool0_target", held(model.robot, q))
@@ -30,7 +31,7 @@ def test_every_file_holds_the_same_robot(run, diagnosed, tmp_path):
     assert set(table["convention"]) == {"standard"}
     assert "d [mm]" in table
     assert list(pd.read_csv(files["offsets"])["joint"]) == list(model.robot.joint_names)
-    assert "at 30 °C" in files["urdf"].read_text(encoding="utf-8")
+    assert "at 26 °C" in files["urdf"].read_text(encoding="utf-8")
 
 
 def test_a_file_of_a_robot_is_printed(run, diagnosed, tmp_path):
@@ -40,6 +41,28 @@ def test_a_file_of_a_robot_is_printed(run, diagnosed, tmp_path):
     assert status == 0
     assert out.startswith("convention,joint,type,")
     assert "\nmodified," in out
+
+
+@pytest.mark.parametrize("words", [["--temperature", "30"], ["--min-sigma", "2"], ["--modified"]])
+def test_options_of_robot_files_are_refused_beside_commands_alone(run, folder, diagnosed, tmp_path, words):
+    out = tmp_path / "c.csv"
+    refused(run("correct", diagnosed.model, folder / "fresh.csv", "-o", out, *words), words[0], "is of use with --")
+    assert not out.exists()
+
+
+def test_lengths_far_from_what_was_measured_are_told_to_be_extrapolated(run, diagnosed, tmp_path):
+    model, out = CorrectedModel.load(diagnosed.model), tmp_path / "r.urdf"
+    low, high = model.spread.ranges["temperature"]
+    said = f"lengths at 600 °C are extrapolated: it was measured at {low:.3g} to {high:.3g} °C"
+    assert run("correct", diagnosed.model, "--urdf", out, "--temperature", "600") == (
+        0,
+        "",
+        f"thermal-robot: note: {said}\n",
+    )
+    assert said[1:] in out.read_text(encoding="utf-8")
+    for told in ([], ["--temperature", f"{(low + high) / 2.0}"]):
+        assert run("correct", diagnosed.model, "--urdf", out, *told) == (0, "", "")
+        assert "extrapolated" not in out.read_text(encoding="utf-8")
 
 
 def test_what_is_left_out_is_listed(run, diagnosed, tmp_path):
@@ -56,6 +79,7 @@ def test_options_that_make_no_sense_are_refused(run, diagnosed, tmp_path):
     refused(run("correct", model, "--urdf", out, "--min-sigma", "-1"), "min_sigma", "standard deviations")
     refused(run("correct", model, "--urdf", out, "--temperature", "-400"), "temperature", "°C")
     refused(run("correct", model, "--from-mjcf", model, "--urdf", out), "--mjcf")
+    refused(run("correct", model, "--urdf", out, "--modified"), "--modified", "of use with --dh only")
     refused(run("correct", model, "--mjcf", out, "--from-mjcf", tmp_path / "no.xml"), "no.xml")
     assert not out.exists()
 

@@ -25,7 +25,7 @@ MIXTURES = {
 on_arms = pytest.mark.parametrize("arm", ["ur10", pytest.param("panda", marks=pytest.mark.slow)], indirect=True)
 
 
-def corrected(robot, effects, seed=1, turning=None, only=()):
+def corrected(robot, effects, seed=1, turning=None, only=None):
     campaign, _, (fresh, place) = simulate(robot, effects, seed=seed, turning=turning, fresh=100)
     return campaign, diagnose(campaign, only=only).model, fresh, place
 

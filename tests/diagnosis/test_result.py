@@ -9,7 +9,7 @@ from helpers import numbers
 
 from thermal_robot.diagnosis import result
 from thermal_robot.diagnosis.result import told, told_by
-from thermal_robot.errors import EffectError
+from thermal_robot.errors import CampaignError, EffectError
 from thermal_robot.report import schema
 
 
@@ -89,6 +89,9 @@ def test_without_a_fit_nothing_is_proposed(hall):
         with pytest.raises(ValueError, match="without its fit"):
             ask()
     assert len(hall.next_samples(3).samples) == 3
+    for count in (0, -1, 2.5):
+        with pytest.raises(CampaignError, match=rf"cannot propose so many; found {count}, expected a whole number"):
+            hall.next_samples(count)
 
 
 def test_effects_are_asked_for_by_name(hall):

@@ -71,7 +71,7 @@ def answer(request: dict[str, Any]) -> dict[str, Any]:
         # what the library does not have need not be taken out of it
         without = [name for name in request["without"] if name in library()]
         start = time.perf_counter()
-        found = diagnose(folder / CAMPAIGN, only=request["only"], without=without)
+        found = diagnose(folder / CAMPAIGN, only=request["only"] or None, without=without)
         reply["seconds"] = time.perf_counter() - start
         reply["said"] = found.to_dict()
         at = "prediction"

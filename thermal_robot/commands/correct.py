@@ -44,6 +44,7 @@ def run(options: argparse.Namespace) -> None:
     if not any(named):
         wanted = "poses.csv -o commands.csv, --urdf, --mjcf, --dh or --offsets"
         raise CampaignError("correct", "nothing to write was named", expected=wanted)
+    robot_files.require_of_use(options)
     read = [options.poses, *(getattr(options, name) for name in robot_files.READS)]
     require_free(named, [options.model, *(file for file in read if file)])
     model = CorrectedModel.load(options.model)

@@ -14,7 +14,7 @@ EXAMPLE = ""
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Define the options of ``thermal-robot demo``."""
     parser.add_argument("--report", metavar="F.html", default="demo.html", help="page to draw (default: %(default)s)")
-    parser.set_defaults(run=run, writes=("report",), only=(), without=())
+    parser.set_defaults(run=run, writes=("report",), only=None, without=())
 
 
 def run(options: argparse.Namespace) -> None:

@@ -21,8 +21,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--json", metavar="F", help="write the diagnosis as JSON ('-' prints it instead of the text)")
     parser.add_argument("--report", metavar="F.html", help="write a page with figures ('-' prints it)")
     parser.add_argument("--model", metavar="F", help="save the corrected model for `predict` ('-' prints it)")
-    choice: dict[str, Any] = {"metavar": "EFFECT", "nargs": "+", "action": "extend", "default": []}
-    parser.add_argument("--without", **choice, help="leave effects out; `thermal-robot effects` lists their names")
+    choice: dict[str, Any] = {"metavar": "EFFECT", "nargs": "+", "action": "extend"}
+    parser.add_argument(
+        "--without", **choice, default=[], help="leave effects out; `thermal-robot effects` lists their names"
+    )
     parser.add_argument("--only", **choice, help="consider these only; both options take several names")
     parser.set_defaults(run=run, prepare=take_back, reads=("campaign",), writes=("json", "report", "model"))
 

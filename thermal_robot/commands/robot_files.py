@@ -8,6 +8,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from thermal_robot.console import note
 from thermal_robot.errors import CampaignError
 from thermal_robot.files import write_text
 
@@ -36,6 +37,32 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
 
 
+_OF_USE_WITH = {
+    "from_mjcf": ("mjcf",),
+    "modified": ("dh",),
+    "min_sigma": OUTPUTS,
+    "temperature": OUTPUTS,
+}
+"""Options that bear on a file of the robot, and with which of :data:`OUTPUTS`."""
+
+
+def require_of_use(options: argparse.Namespace) -> None:
+    """Refuse an option that bears on no file that was asked for.
+
+    Raises
+    ------
+    CampaignError
+        Naming the option, and those with which it is of use.
+    """
+    for name, outputs in _OF_USE_WITH.items():
+        given = getattr(options, name)
+        if given is not None and given is not False and not any(getattr(options, output) for output in outputs):
+            *some, last = (f"--{output}" for output in outputs)
+            listed = f"{', '.join(some)} or {last}" if some else last
+            problem = f"is of use with {listed} only"
+            raise CampaignError(f"--{name.replace('_', '-')}", problem, expected="one of them, or this option left out")
+
+
 def outputs(options: argparse.Namespace, model: CorrectedModel) -> list[tuple[str | None, Callable[[Path], object]]]:
     """Return each file that was asked for and what writes it; what they hold is computed here.
 
@@ -53,10 +80,10 @@ def outputs(options: argparse.Namespace, model: CorrectedModel) -> list[tuple[st
     """
     from thermal_robot.correction import calibrated, calibrated_mjcf, calibrated_urdf, dh_table, zero_offsets
 
-    if options.from_mjcf and not options.mjcf:
-        raise CampaignError("--from-mjcf", "is of use with --mjcf only", expected="--mjcf, the file to write")
     how = {"temperature": options.temperature, "min_sigma": options.min_sigma}
     robot = calibrated(model, **how)
+    if robot.beyond:
+        note(robot.beyond, options.loudness)
     own = Path(options.from_mjcf) if options.from_mjcf else None
     units = model.settings.units
     made: dict[str, Callable[[], str]] = {

@@ -28,7 +28,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--port", metavar="N", type=port, default=8080, help="of this machine (8080; the next free one)"
     )
     parser.add_argument("--open", action="store_true", help="open the page in the default browser")
-    parser.set_defaults(run=run, reads=("campaign",), writes=(), only=(), without=())
+    parser.set_defaults(run=run, reads=("campaign",), writes=(), only=None, without=())
 
 
 def port(text: str) -> int:

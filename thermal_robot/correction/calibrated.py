@@ -8,9 +8,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.campaign.names import PER_LINK, split_name
 from thermal_robot.correction.constant import Told, constant
 from thermal_robot.correction.determined import determined
 from thermal_robot.correction.model import CorrectedModel
+from thermal_robot.effects import settings
 from thermal_robot.errors import CampaignError
 from thermal_robot.kinematics import Displacement, exp6
 from thermal_robot.kinematics.model import PRISMATIC
@@ -44,6 +46,8 @@ class Calibrated:
     compared
         (4, 4) the target on the tool frame as the campaign declares it, where the robot was compared with a simulator
         of the user's own, which has it; ``None`` where it was compared with the URDF.
+    beyond
+        In a sentence, that the temperature lies outside those that were measured; empty where it does not.
 
     Examples
     --------
@@ -64,6 +68,7 @@ class Calibrated:
     kept: tuple[Told, ...]
     min_sigma: float | None = None
     compared: Array | None = None
+    beyond: str = ""
 
     @property
     def joints(self) -> Array:
@@ -108,6 +113,8 @@ class Calibrated:
             "Joint positions are those that are commanded, and so are the limits: they stay as they were.",
         ]
         parts = {"Written here:": self.held}
+        if self.beyond:
+            lines.append(f"{self.beyond[:1].upper()}{self.beyond[1:]}.")
         if self.compared is not None:
             lines.append("It was compared with your simulator (sim.*), not with the URDF: correct that one by this.")
         if self.min_sigma is not None:
@@ -170,7 +177,19 @@ def calibrated(
         kept=tuple(told for told, own in zip(found.parameters, found.held, strict=True) if not own),
         min_sigma=min_sigma,
         compared=model.frames.tool if model.simulated else None,
+        beyond="" if temperature is None else _beyond(model, found.temperature),
     )
+
+
+def _beyond(model: CorrectedModel, temperature: float) -> str:
+    """Say where a temperature lies outside those that were measured."""
+    ranges = {} if model.spread is None else model.spread.ranges
+    known = [ends for column, ends in ranges.items() if split_name(column)[0] in PER_LINK]
+    low, high = min((low for low, _ in known), default=-np.inf), max((high for _, high in known), default=np.inf)
+    beside = settings.BESIDE * (high - low) if known else 0.0
+    if low - beside <= temperature <= high + beside:
+        return ""
+    return f"lengths at {temperature:g} °C are extrapolated: it was measured at {low:.3g} to {high:.3g} °C"
 
 
 def target_link(tool_frame: str) -> str:

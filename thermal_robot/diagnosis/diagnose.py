@@ -42,7 +42,7 @@ from thermal_robot.inference.random_gap import random_gap
 def diagnose(
     campaign: Campaign | str | Path,
     *,
-    only: Iterable[str] = (),
+    only: Iterable[str] | None = None,
     without: Iterable[str] = (),
     effects: Sequence[Effect] = (),
     progress: Callable[[str], None] = lambda _: None,
@@ -54,7 +54,7 @@ def diagnose(
     campaign
         A campaign, or the path of one.
     only, without
-        Names of effects to consider, or to leave out; one name may stand by itself.
+        Names of effects to consider (all where it is left out), or to leave out; one name may stand by itself.
     effects
         Effects of your own, considered beside those of the library.
     progress
@@ -68,7 +68,7 @@ def diagnose(
     Raises
     ------
     CampaignError, RobotError
-        If the campaign cannot be used.
+        If the campaign cannot be used, or ``only`` is empty.
     EffectError
         If an effect's name is not known.
     EstimationError
@@ -87,7 +87,9 @@ def diagnose(
     require("diagnose()", campaign, (Campaign, str, os.PathLike), expected)
     require("diagnose(), effects", effects, (list, tuple), "a list of your own effects; names go to only")
     require("diagnose(), progress", progress, (Callable,), "a function that takes the words of a stage")
-    only, without = _names("only", only), _names("without", without)
+    if only is not None and not (only := _names("only", only)):
+        raise CampaignError("diagnose(), only", "names no effect", expected="at least one, or only left out for all")
+    only, without = only or (), _names("without", without)
     if not isinstance(campaign, Campaign):
         progress("reading the campaign")
         campaign = read_campaign(campaign)

@@ -27,6 +27,7 @@ from thermal_robot.campaign.names import CLOCK
 from thermal_robot.diagnosis import settings
 from thermal_robot.diagnosis.optimal_design import most_informative
 from thermal_robot.effects import gate
+from thermal_robot.errors import CampaignError
 from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.evidence import Combination
 from thermal_robot.inference.fit import Fit
@@ -132,13 +133,21 @@ def next_samples(fit: Fit, count: int = 10, pool: int = 400, seed: int = 0, load
     -------
     NextSamples
         Empty where no sample would be informative.
+
+    Raises
+    ------
+    CampaignError
+        If ``count`` is no whole number above 0.
     """
+    if not isinstance(count, (int, np.integer)) or count < 1:
+        expected = "a whole number above 0"
+        raise CampaignError("next_samples()", "cannot propose so many", found=repr(count), expected=expected)
     offered = candidates(fit, pool, seed, loads)
     leading, probability = _leading(fit)
     models = _expected(fit, observe(offered, fit.corrected.frames), leading)
-    chosen, pairs, gains = _chosen(models, probability, min(count, pool))
+    chosen, pairs, gains = _chosen(models, probability, min(int(count), pool))
     if len(models) > 1 and probability[0] > settings.DECIDED and max(gains, default=0.0) < settings.WORTHWHILE:
-        chosen, pairs, gains = _chosen(models[:1], np.ones(1), min(count, pool))
+        chosen, pairs, gains = _chosen(models[:1], np.ones(1), min(int(count), pool))
     if max(gains, default=0.0) <= 0.0:
         chosen, pairs, gains = [], [], []  # there is nothing to learn
     names = [_effects(fit, c) for c in leading]
