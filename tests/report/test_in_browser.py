@@ -10,10 +10,12 @@ from functools import partial
 from html import unescape
 from http.server import SimpleHTTPRequestHandler, ThreadingHTTPServer
 
+import numpy as np
 import pytest
+from matplotlib.image import imread
 
 import thermal_robot as tr
-from thermal_robot.report import html
+from thermal_robot.report import html, html_parts
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 OPTIONS = (
@@ -140,6 +142,31 @@ def test_on_paper_the_drawing_says_what_it_shows_and_offers_nothing(served, tmp_
 def test_nothing_else_is_fetched(served, tmp_path):
     seen(served, 400, tmp_path)
     assert {re.sub(r"at_\d+", "at", path) for path in Handler.asked} <= {"/at.html", "/page.html", "/favicon.ico"}
+
+
+SCROLLED = """<!DOCTYPE html><body style="margin:0"><iframe src="wide.html" width="400" height="600" style="border:0"
+onload="this.contentDocument.querySelectorAll('.tr-wide')[1].scrollLeft = 9999"></iframe></body>"""
+
+
+def test_a_shadow_tells_on_which_side_there_is_more(served, tmp_path):
+    """Boxes that are wide, wide and scrolled to their end, and narrow: where pixels are darker than paper."""
+    folder, address = served
+    boxes = [html_parts.wide(f'<div style="width: {px}px; height: 100px"></div>', "a box") for px in (900, 900, 50)]
+    height = 100  # of a box, pixels
+    page = html_parts.document("boxes", "".join(boxes))
+    (folder / "wide.html").write_text(page, encoding="utf-8")
+    (folder / "scrolled.html").write_text(SCROLLED, encoding="utf-8")
+    shot = tmp_path / "shot.png"
+    command = [BROWSER, *OPTIONS, "--hide-scrollbars", f"--user-data-dir={tmp_path}", f"--screenshot={shot}"]
+    env = {**os.environ, "HOME": str(tmp_path)}
+    subprocess.run([*command, f"{address}/scrolled.html"], capture_output=True, check=True, timeout=120, env=env)
+    dark = imread(shot)[:, :400, :3].max(axis=2) < 0.9
+    top = int(np.flatnonzero(dark.any(axis=1))[0])
+    first, second, third = (np.flatnonzero(dark[top + k : top + k + 90].any(axis=0)) for k in (0, height, 2 * height))
+    assert first.min() > 300, "more on the right"
+    assert second.max() < 100, "more on the left"
+    assert not third.size
+    assert not dark[top + 2 * height :].any()
 
 
 def test_a_page_that_is_too_broad_is_noticed(served, tmp_path):
