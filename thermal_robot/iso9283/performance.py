@@ -9,8 +9,10 @@ from typing import TYPE_CHECKING, Any
 from thermal_robot.iso9283.attained import Three
 from thermal_robot.iso9283.parts import PathCriteria, PoseCriteria
 from thermal_robot.iso9283.table import (
+    Table,
     cycles_of,
     drifts,
+    lines,
     millimetres,
     path_turns,
     paths,
@@ -58,6 +60,8 @@ class Performance:
     (3, '3 poses of 30 cycles (the standard: 30)', True)
     >>> found.corrected, found.path_accuracy, found.path_corrected, found.path_repeatability
     (None, None, None, None)
+    >>> found.tables[0].head[:4], len(found.tables[0].rows)
+    (('pose', 'n', 'dir', 'AP_p'), 3)
     """
 
     campaign: str
@@ -170,11 +174,15 @@ class Performance:
                 if found:
                     yield from _figures(p.path, p.cycles, name, "p", found.position, found.angles)
 
+    @property
+    def tables(self) -> tuple[Table, ...]:
+        """The criteria as tables of texts, in mm and mrad: those of poses, then those of paths, none that is empty."""
+        at_rest = [table(self.poses) for table in (poses, turns, variations, drifts)]
+        return tuple(t for t in (*at_rest, paths(self.paths), path_turns(self.paths)) if t.rows)
+
     def __str__(self) -> str:
         title = f"Performance criteria of ISO 9283:1998: {self.robot}, {self.tool_frame}; {self.extent}"
-        at_rest = [table(self.poses) for table in (poses, turns, variations, drifts)]
-        tables = [*at_rest, paths(self.paths), path_turns(self.paths)]
-        blocks = [[wrapped(title, "")], *tables, [wrapped(note, "  - ") for note in self.notes]]
+        blocks = [[wrapped(title, "")], *map(lines, self.tables), [wrapped(note, "  - ") for note in self.notes]]
         return "\n\n".join("\n".join(block) for block in blocks if block)
 
 

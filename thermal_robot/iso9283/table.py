@@ -1,8 +1,9 @@
-"""Tables of criteria as plain text: mm and mrad, the poses below each other."""
+"""Tables of criteria: mm and mrad, the poses below each other; their cells are texts, for a terminal or a page."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 from math import floor, isfinite, log10
 from textwrap import fill
 
@@ -21,6 +22,33 @@ NOTHING = 1e-6
 _LEAST_DECIMALS, _MOST_DECIMALS = 3, 6
 _MISSING = "–"
 Cell = str | int | float | None
+
+
+@dataclass(frozen=True)
+class Table:
+    """Criteria of poses or paths, one below the other; one without rows shows nothing.
+
+    Attributes
+    ----------
+    heading
+        What it shows, in which unit.
+    head
+        Names of the columns, the label's first.
+    rows
+        Their cells as texts.
+    more
+        How many poses or paths are not shown.
+    """
+
+    heading: str = ""
+    head: tuple[str, ...] = ()
+    rows: tuple[tuple[str, ...], ...] = ()
+    more: int = 0
+
+    @property
+    def rest(self) -> str:
+        """What is not shown, and where that is; empty where all is."""
+        return f"and {self.more} more, in the JSON and the CSV" if self.more else ""
 
 
 def millimetres(value: float) -> str:
@@ -45,7 +73,7 @@ def _counted(name: str, counts: Sequence[int], standard: int) -> str:
     return f"{len(counts)} {name}{'s' if len(counts) > 1 else ''} of {often} cycles (the standard: {standard})"
 
 
-def poses(found: Sequence[PoseCriteria]) -> list[str]:
+def poses(found: Sequence[PoseCriteria]) -> Table:
     """AP and RP of positions; nothing without poses."""
     corrected = any(p.corrected for p in found)
     head = [
@@ -85,7 +113,7 @@ def poses(found: Sequence[PoseCriteria]) -> list[str]:
     )
 
 
-def turns(found: Sequence[PoseCriteria]) -> list[str]:
+def turns(found: Sequence[PoseCriteria]) -> Table:
     """AP and RP of orientations; nothing where only positions are known."""
     rows: list[list[Cell]] = [
         [p.pose, *_of(p.accuracy.angles if p.accuracy else None), *_of(p.repeatability.angles)]
@@ -96,7 +124,7 @@ def turns(found: Sequence[PoseCriteria]) -> list[str]:
     return _table("POSES: angles about the axes of the base, in mrad", head, rows)
 
 
-def variations(found: Sequence[PoseCriteria]) -> list[str]:
+def variations(found: Sequence[PoseCriteria]) -> Table:
     """VAP; nothing where no pose was reached from several directions."""
     shown = [(p, p.variation) for p in found if p.variation]
     turned = any(v.angles is not None for _, v in shown)
@@ -108,7 +136,7 @@ def variations(found: Sequence[PoseCriteria]) -> list[str]:
     return _table(f"DIRECTIONS: vAP in mm{' and mrad' if turned else ''}; n: cycles from each, the least", head, rows)
 
 
-def drifts(found: Sequence[PoseCriteria]) -> list[str]:
+def drifts(found: Sequence[PoseCriteria]) -> Table:
     """Drift; nothing where no pose was measured at several times."""
     shown = [(p, p.drift) for p in found if p.drift]
     rows: list[list[Cell]] = [
@@ -120,7 +148,7 @@ def drifts(found: Sequence[PoseCriteria]) -> list[str]:
     )
 
 
-def paths(found: Sequence[PathCriteria]) -> list[str]:
+def paths(found: Sequence[PathCriteria]) -> Table:
     """AT and RT of positions; nothing without paths."""
     corrected = any(p.corrected for p in found)
     head = ["path", "points", "n", "AT_p", *(["corrected"] if corrected else []), "RT_p"]
@@ -132,7 +160,7 @@ def paths(found: Sequence[PathCriteria]) -> list[str]:
     return _table("PATHS: AT and RT in mm; n: cycles of each point, the least", head, rows)
 
 
-def path_turns(found: Sequence[PathCriteria]) -> list[str]:
+def path_turns(found: Sequence[PathCriteria]) -> Table:
     """AT and RT of orientations; nothing where only positions are known."""
     rows: list[list[Cell]] = [
         [p.path, *_of(p.accuracy.angles if p.accuracy else None), *_of(p.repeatability.angles)]
@@ -152,19 +180,26 @@ def _of(values: Three | None) -> list[Cell]:
     return [None] * 3 if values is None else [*values]
 
 
-def _table(heading: str, head: Sequence[str], rows: Sequence[Sequence[Cell]]) -> list[str]:
-    """Align columns, texts on the left, SI figures in thousandths with as many decimals as the smallest needs."""
+def _table(heading: str, head: Sequence[str], rows: Sequence[Sequence[Cell]]) -> Table:
+    """Write SI figures in thousandths with as many decimals as the smallest needs."""
     if not rows:
-        return []
+        return Table()
     decimals = _decimals([cell for row in rows for cell in row if isinstance(cell, float)])
-    cells = [list(head), *([_cell(cell, decimals) for cell in row] for row in rows[:MOST])]
-    wide = [max(len(row[k]) for row in cells) for k in range(len(head))]
-    lines = [
+    shown = tuple(tuple(_cell(cell, decimals) for cell in row) for row in rows[:MOST])
+    return Table(heading, tuple(head), shown, len(rows) - len(shown))
+
+
+def lines(table: Table) -> list[str]:
+    """Align the columns of a table as plain text, labels on the left, figures on the right; nothing without rows."""
+    if not table.rows:
+        return []
+    cells = (table.head, *table.rows)
+    wide = [max(len(row[k]) for row in cells) for k in range(len(table.head))]
+    aligned = [
         "  " + "  ".join([row[0].ljust(wide[0]), *(c.rjust(w) for c, w in zip(row[1:], wide[1:], strict=True))])
         for row in cells
     ]
-    more = [f"  and {len(rows) - MOST} more, in the JSON and the CSV"] if len(rows) > MOST else []
-    return [heading, *lines, *more]
+    return [table.heading, *aligned, *([f"  {table.rest}"] if table.rest else [])]
 
 
 def _cell(cell: Cell, decimals: int) -> str:

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from thermal_robot.report.details import details
 from thermal_robot.report.html_parts import bullets, checksums, css, document, figure, paragraph, signature
 from thermal_robot.report.page_arm import arm_figure, script
+from thermal_robot.report.page_criteria import criteria_section
 from thermal_robot.report.page_model import model_section
 from thermal_robot.report.page_tables import effects_table, extremes_table, numbers, outliers_table
 from thermal_robot.report.plots_how_far import plot_how_far
@@ -137,6 +138,7 @@ def _of_the_robot(diagnosis: Diagnosis, arm: str) -> Iterator[str]:
             yield figure(diagnosis.explain(law.name), f"{law.name}: the error there against what it follows")
     yield "</section>"
     yield from model_section(diagnosis)
+    yield from criteria_section(diagnosis)
 
 
 def _facts(diagnosis: Diagnosis) -> str:

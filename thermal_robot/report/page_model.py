@@ -19,17 +19,11 @@ _FRAMES = {"base": "root frame of the robot, as the instrument sees it", "tool":
 
 
 def model_section(diagnosis: Diagnosis) -> Iterator[str]:
-    """Yield fitted frames, strongest correlations, and the criteria of ISO 9283 where there are repeats."""
-    fitted = diagnosis.usable and diagnosis.fit is not None
-    if not fitted and diagnosis.performance is None:
+    """Yield fitted frames and strongest correlations; nothing without a fit."""
+    if not diagnosis.usable or diagnosis.fit is None:
         return
-    yield "<section><h2>The model</h2>"
-    if fitted:
-        yield frames_table(diagnosis)
-        yield correlations_table(diagnosis) if diagnosis.model.spread is not None else ""
-    if diagnosis.performance is not None:
-        yield wide(f"<pre>{escape(str(diagnosis.performance))}</pre>", "Performance criteria of ISO 9283")
-    yield "</section>"
+    yield f"<section><h2>The model</h2>{frames_table(diagnosis)}"
+    yield (correlations_table(diagnosis) if diagnosis.model.spread is not None else "") + "</section>"
 
 
 def frames_table(diagnosis: Diagnosis) -> str:
