@@ -150,8 +150,8 @@ def _spread(value: Any, path: str) -> Spread:
     prior = np.array(held["prior"], dtype=float) if "prior" in held else None
     if prior is not None and len(prior) > len(held["covariance"]):
         raise MisfitError(below(path, "prior"), value["prior"], "a deviation for each parameter of the effects")
-    sigmas = (np.array(held[name]) for name in ("beyond", "noise"))
-    return Spread(held["covariance"], *sigmas, held["ranges"], held.get("wider"), prior)
+    beyond, noise = (np.array(held[name]) for name in ("beyond", "noise"))
+    return Spread(held["covariance"], beyond, noise, held["ranges"], held.get("wider"), prior)
 
 
 def _written_robot(robot: Robot) -> dict[str, Any]:

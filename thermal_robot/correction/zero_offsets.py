@@ -127,7 +127,8 @@ def _coordinates(model: CorrectedModel, known: Constant, used: NDArray[np.int64]
     whole = moved_by(observations, [*zeros, *rest, *own]).reshape(equations, -1)
     length = np.linalg.norm(whole, axis=0) + settings.TINY
     left = (without(whole, orthonormal(frames)) if frames.size else whole) / length
-    hidden = np.linalg.norm(left, axis=0) < _SEEN
+    # what moves the target by rounding alone is hidden, too: a joint on whose axis it sits
+    hidden = (np.linalg.norm(left, axis=0) < _SEEN) | (length < _SEEN * length.max(initial=0.0))
     change, said = np.zeros((robot.n, len(own))), [UNSEEN if unseen else NONE for unseen in hidden[: robot.n]]
     if not own or hidden[-len(own) :].all():
         return change, said
