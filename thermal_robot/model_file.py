@@ -141,14 +141,17 @@ def _covariance(value: Any, path: str) -> Array:
 
 def _spread(value: Any, path: str) -> Spread:
     """Take what makes a prediction uncertain."""
-    sigmas = listed(NOT_NEGATIVE, 3, "three standard deviations")
-    known = {"covariance": _covariance, "beyond": sigmas, "noise": sigmas, "ranges": mapping(_ends)}
-    held = record({**known, "wider": _covariance}, may_lack=("wider",))(value, path)
+    three = listed(NOT_NEGATIVE, 3, "three standard deviations")
+    known = {"covariance": _covariance, "beyond": three, "noise": three, "ranges": mapping(_ends)}
+    more = {"wider": _covariance, "prior": listed(NOT_NEGATIVE)}
+    held = record({**known, **more}, may_lack=tuple(more))(value, path)
     if held.get("wider", held["covariance"]).shape != held["covariance"].shape:
         raise MisfitError(below(path, "wider"), value["wider"], "a matrix of the shape of covariance")
-    return Spread(
-        held["covariance"], np.array(held["beyond"]), np.array(held["noise"]), held["ranges"], held.get("wider")
-    )
+    prior = np.array(held["prior"], dtype=float) if "prior" in held else None
+    if prior is not None and len(prior) > len(held["covariance"]):
+        raise MisfitError(below(path, "prior"), value["prior"], "a deviation for each parameter of the effects")
+    beyond, noise = (np.array(held[name]) for name in ("beyond", "noise"))
+    return Spread(held["covariance"], beyond, noise, held["ranges"], held.get("wider"), prior)
 
 
 def _written_robot(robot: Robot) -> dict[str, Any]:

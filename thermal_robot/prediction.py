@@ -34,6 +34,9 @@ class Spread:
         Least and largest value that was measured, by joint and by column that the model needs, SI.
     wider
         (K, K) the same covariance for rows outside these ranges; ``None`` where it is no other.
+    prior
+        (P,) standard deviation that each of the effects' parameters was expected to have before the data, in its unit;
+        ``None`` where a file of an older program does not say.
     """
 
     covariance: Array
@@ -41,12 +44,14 @@ class Spread:
     noise: Array
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     wider: Array | None = None
+    prior: Array | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return lists and numbers, ready for JSON."""
         arrays = {name: getattr(self, name).tolist() for name in ("covariance", "beyond", "noise")}
-        wider = {} if self.wider is None else {"wider": self.wider.tolist()}
-        return {**arrays, **wider, "ranges": {name: list(ends) for name, ends in self.ranges.items()}}
+        more = {"wider": self.wider, "prior": self.prior}
+        told = {name: values.tolist() for name, values in more.items() if values is not None}
+        return {**arrays, **told, "ranges": {name: list(ends) for name, ends in self.ranges.items()}}
 
     def std(
         self,

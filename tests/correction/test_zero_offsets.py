@@ -9,7 +9,8 @@ from conftest import load_arm
 from readers import model_of
 from simulate import simulate
 
-from thermal_robot import diagnose
+from thermal_robot import CorrectedModel, diagnose, load_robot
+from thermal_robot import simulate as run_of
 from thermal_robot.campaign import Units
 from thermal_robot.correction import zero_offsets
 from thermal_robot.correction.zero_offsets import NONE, TOLD, UNSEEN
@@ -36,7 +37,9 @@ def test_units_and_deviations_are_those_of_the_campaign(awkward):
     model = model_of(
         awkward, (JointOffset(), offsets), base_known=True, tool_known=True, units=Units("deg", "mm"), frames=ASIDE
     )
-    model = replace(model, spread=Spread(np.diag(np.arange(1.0, n + 1) ** 2) * 1e-8, np.zeros(3), np.zeros(3)))
+    model = replace(
+        model, spread=Spread(np.diag(np.arange(1.0, n + 1) ** 2) * 1e-8, *np.zeros((2, 3)), prior=np.full(n, 0.01))
+    )
     table = zero_offsets(model)
     slides = np.array([kind == "prismatic" for kind in awkward.joint_types])
     assert table["unit"].tolist() == np.where(slides, "mm", "deg").tolist()
@@ -100,6 +103,39 @@ def test_geometry_that_is_a_zero_is_told_as_one(rv_m2):
     whole = replace(model, effects=((geometry, np.array(values)),))
     table = zero_offsets(whole)
     np.testing.assert_allclose(table["add_to_command"], [0, 0, -2e-3, 0, 0], atol=1e-12)
+
+
+def wide(model, std, prior=None):
+    """The model with such deviations of its zeros."""
+    return replace(model, spread=Spread(np.diag(np.square(std)), np.zeros(3), np.zeros(3), prior=prior))
+
+
+def test_a_zero_that_the_data_leave_as_wide_as_it_was_is_not_determined(rv_m2):
+    model = model_of(rv_m2, (JointOffset(), np.full(5, 2e-3)), base_known=True, tool_known=True, frames=ASIDE)
+    std = np.array([4.9e-4, 5.1e-4, 1e-4, 9e-4, 1e-5])
+    table = zero_offsets(wide(model, std, np.full(5, 1e-3)))
+    assert table["zero"].tolist() == [TOLD, UNSEEN, TOLD, UNSEEN, TOLD]
+    np.testing.assert_allclose(table["add_to_command"], [-2e-3, 0.0, -2e-3, 0.0, -2e-3])
+    assert table["std"].isna().tolist() == [False, True, False, True, False]
+    assert zero_offsets(wide(model, std, np.full(5, 1e-2)))["zero"].tolist() == [TOLD] * 5
+    # a file of an older program: what the effect expects of itself, which is 1 mrad
+    assert zero_offsets(wide(model, std))["zero"].tolist() == [TOLD, UNSEEN, TOLD, UNSEEN, TOLD]
+
+
+@pytest.mark.parametrize("effects", [["joint_offset"], ["geometric", "joint_offset"]])
+def test_what_a_diagnosis_does_not_identify_is_not_to_be_entered(effects, tmp_path):
+    zeros = {"joint_offset": {"shoulder_lift_joint": 2e-3, "elbow_joint": -1.5e-3}}
+    ur5 = load_robot("example-robot-data:ur5", "tool0")
+    verdicts = []
+    for seed in range(4):
+        campaign = run_of(ur5, zeros, rows=40, noise=2e-4, seed=seed, base_known=False)
+        found = diagnose(campaign, only=effects)
+        found.model.save(tmp_path / "model.json")
+        told = zero_offsets(CorrectedModel.load(tmp_path / "model.json")).set_index("joint")["zero"] == TOLD
+        identified = {p.name.split(", ")[1] for p in found.finding("joint_offset").parameters if p.identified}
+        assert set(told.index[told]) == identified
+        verdicts += [len(identified) < len(found.finding("joint_offset").parameters)]
+    assert any(verdicts)  # and some are not
 
 
 def test_small_zeros_are_left_out_on_request(rv_m2):

@@ -19,7 +19,7 @@ from thermal_robot.effects import Parameter, at_joint, at_segment, gate
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import orthonormal, without
 from thermal_robot.inference.columns import frame_columns, moved_by
-from thermal_robot.inference.inside import distinct
+from thermal_robot.inference.inside import distinct, identified
 from thermal_robot.robot import Robot
 
 if TYPE_CHECKING:
@@ -53,7 +53,9 @@ def zero_offsets(
         A row for each joint that is commanded. ``joint``; ``add_to_command``: the joint is where it was meant to be
         once this is added to its command (it stands at its command minus this); ``std``, one standard deviation, empty
         where the model does not tell; ``unit``, that of the joint's column in the campaign; ``zero``: ``determined``,
-        ``not determined`` (the unknown base or tool can take it up) or ``not in the model``, both with an offset of 0.
+        ``not determined`` (the unknown base or tool can take it up, or the data leave half or more of the deviation
+        that was expected before them: the rule by which a diagnosis calls a parameter identified) or
+        ``not in the model``, both with an offset of 0.
 
     Raises
     ------
@@ -82,12 +84,9 @@ def zero_offsets(
     units, robot = model.settings.units, model.robot
     scales = np.array([units.joint_scale(kind) for kind in robot.joint_types])
     values = change @ np.array([known.parameters[k].value for k in used])
-    std = np.full(robot.n, np.nan)
-    if model.spread is not None and len(model.spread.covariance) >= len(known.parameters):
-        numbers = len(model.spread.covariance) - len(known.parameters) + used
-        covariance = model.spread.covariance[np.ix_(numbers, numbers)]
-        std = np.sqrt(np.maximum((change @ covariance * change).sum(axis=1), 0.0))
-    told = np.array([word == TOLD for word in said])
+    std, expected = _deviations(model, known, used, change)
+    told = np.array([word == TOLD for word in said]) & (np.isnan(std) | identified(std, expected))
+    said = [UNSEEN if word == TOLD and not own else word for word, own in zip(said, told, strict=True)]
     return pd.DataFrame(
         {
             "joint": robot.joint_names,
@@ -97,6 +96,23 @@ def zero_offsets(
             "zero": said,
         }
     )
+
+
+def _deviations(model: CorrectedModel, known: Constant, used: NDArray[np.int64], change: Array) -> tuple[Array, Array]:
+    """(n,) standard deviation of each joint's zero, NaN where the model does not tell, and what it was before the data.
+
+    A model of an older program does not say how large its parameters were expected to be: the effects do.
+    """
+    spread, count = model.spread, len(known.parameters)
+    if spread is None or len(spread.covariance) < count:
+        return np.full(len(change), np.nan), np.full(len(change), np.nan)
+    numbers = len(spread.covariance) - count + used
+    variance = (change @ spread.covariance[np.ix_(numbers, numbers)] * change).sum(axis=1)
+    prior = spread.prior
+    if prior is None or len(prior) != count:
+        seen = rows_of_every_kind(model)
+        prior = np.array([p.size for effect, _ in model.effects for p in gate.checked(effect, seen)])
+    return np.sqrt(np.maximum(variance, 0.0)), np.linalg.norm(change * prior[used], axis=1)
 
 
 def _coordinates(model: CorrectedModel, known: Constant, used: NDArray[np.int64]) -> tuple[Array, list[str]]:
@@ -111,7 +127,8 @@ def _coordinates(model: CorrectedModel, known: Constant, used: NDArray[np.int64]
     whole = moved_by(observations, [*zeros, *rest, *own]).reshape(equations, -1)
     length = np.linalg.norm(whole, axis=0) + settings.TINY
     left = (without(whole, orthonormal(frames)) if frames.size else whole) / length
-    hidden = np.linalg.norm(left, axis=0) < _SEEN
+    # what moves the target by rounding alone is hidden, too: a joint on whose axis it sits
+    hidden = (np.linalg.norm(left, axis=0) < _SEEN) | (length < _SEEN * length.max(initial=0.0))
     change, said = np.zeros((robot.n, len(own))), [UNSEEN if unseen else NONE for unseen in hidden[: robot.n]]
     if not own or hidden[-len(own) :].all():
         return change, said

@@ -15,9 +15,8 @@ from thermal_robot.effects import Effect
 from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.effects.law_size import Size, in_joints, sizes
 from thermal_robot.effects.law_words import called, usually
-from thermal_robot.inference import settings
 from thermal_robot.inference.fit import Fit
-from thermal_robot.inference.inside import divided
+from thermal_robot.inference.inside import divided, identified
 
 Array = NDArray[np.float64]
 Shares = dict[str, tuple[float, tuple[float, float]]]
@@ -132,8 +131,9 @@ def _estimates(fit: Fit, block: int) -> tuple[Estimate, ...]:
     spread = np.sqrt(np.maximum(np.diag(e.values[block][1]), 0.0))
     prior = item.sizes * e.best.scales[block]
     result = []
-    for parameter, value, std, size in zip(item.parameters, values, spread, prior, strict=True):
-        known = bool(std < settings.DETERMINED * size)
+    for parameter, value, std, known in zip(
+        item.parameters, values, spread, identified(spread, prior).tolist(), strict=True
+    ):
         result.append(
             Estimate(
                 parameter.name, float(value) if known else None, float(std) if known else None, parameter.unit, known
@@ -162,7 +162,7 @@ def _told_inside(fit: Fit) -> dict[str, _Inside]:
     found = {}
     for effect, _ in fit.effects:
         for part in divided(fit, effect.name):
-            known = part.spread < settings.DETERMINED * part.prior
+            known = identified(part.spread, part.prior)
             estimates = tuple(
                 Estimate(p.name, float(v) if k else None, float(s) if k else None, p.unit, bool(k))
                 for p, v, s, k in zip(part.parameters, part.values, part.spread, known, strict=True)

@@ -54,7 +54,10 @@ def uncertainty(fit: Fit, needs: tuple[str, ...], floor: float) -> Spread:
     values.update({name: campaign.covariates[name] for name in needs if name in campaign.covariates})
     ranges = {name: (float(v.min()), float(v.max())) for name, v in values.items()}
     beyond = np.sqrt(np.maximum(total**2 - noise**2, 0.0))
-    return Spread(covariance, beyond, np.sqrt(np.maximum(total**2 - beyond**2, 0.0)) / share, ranges, wider)
+    noise = np.sqrt(np.maximum(total**2 - beyond**2, 0.0)) / share
+    e = fit.explanation
+    expected = [e.linear.blocks[b].sizes * e.best.scales[b] for b in e.best.blocks]
+    return Spread(covariance, beyond, noise, ranges, wider, np.concatenate([*expected, np.zeros(0)]))
 
 
 def _quiet(campaign: Campaign, rows: NDArray[np.int64]) -> tuple[NDArray[np.bool_], float]:

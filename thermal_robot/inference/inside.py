@@ -137,6 +137,11 @@ def _coordinates(fit: Fit, item: Block, wanted: Sequence[Parameter]) -> tuple[Ar
     return problem.bases[0], across, left < np.maximum(settings.CONTAINED * length, settings.CONTAINED_LEFT)
 
 
+def identified(spread: Array, prior: Array) -> NDArray[np.bool_]:
+    """Tell which parameters the data identify, by their posterior and prior standard deviations."""
+    return np.asarray(np.asarray(spread) < settings.DETERMINED * np.asarray(prior))
+
+
 def distinct(across: Array, within: NDArray[np.bool_]) -> list[int]:
     """Return the numbers of the columns that are independent of those before them, as many as there are rows."""
     basis = np.zeros((len(across), 0))
