@@ -30,7 +30,7 @@ def test_a_folder_that_is_filled_in_is_the_campaign_that_was_planned(rv_m2, tmp_
     commands = made.commands
     file = write_plan(made, tmp_path / "cell")
     assert file == tmp_path / "cell" / "campaign.toml"
-    with pytest.raises(CampaignError, match=r"row 2.*missing"):
+    with pytest.raises(CampaignError, match=r"row 2.*still to be filled in"):
         read_campaign(file)
     place = observe(commands).predicted_position
     filled_in(tmp_path / "cell", 1e3 * place, commands.covariates["temperature"])
