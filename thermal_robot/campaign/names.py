@@ -63,6 +63,14 @@ def tilted(column: str) -> str | None:
     return link if quantity == "tilt" and link and axis in ("x", "y") else None
 
 
+def conditions(joints: Iterable[str], links: Iterable[str]) -> dict[str, None]:
+    """Return the columns of conditions that the format defines for a robot, in order: keys of a dict."""
+    joints, links = tuple(joints), tuple(links)
+    per_joint = (f"{quantity}.{joint}" for quantity in PER_JOINT for joint in joints)
+    per_link = (f"{quantity}.{link}" for quantity in PER_LINK for link in links)
+    return dict.fromkeys((*PLAIN_COVARIATES, *per_joint, *per_link, *(f"tilt.{k}.{a}" for k in links for a in "xy")))
+
+
 def target_of(column: str) -> tuple[str, int] | None:
     """Return axis and number of ``x.1``; ``None`` for other columns."""
     axis, number = split_name(column)

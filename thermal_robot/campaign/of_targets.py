@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermal_robot.campaign import names
 from thermal_robot.campaign.recognise import Columns
@@ -16,8 +15,6 @@ ASTRAY = 10.0
 """Times the usual deviation from which on targets of a row are said not to keep their places: noise comes to five."""
 LOOSE = 2.0
 """Times the stated noise from which on targets are said to move against each other."""
-_FEW = 5
-"""Rows that a sentence names."""
 
 
 def of_targets(table: Table, columns: Columns, settings: Settings) -> tuple[Table, Posed, list[str]]:
@@ -51,7 +48,7 @@ def of_targets(table: Table, columns: Columns, settings: Settings) -> tuple[Tabl
     warnings = []
     if not kept.all():
         several = f"fewer than {FEWEST} targets, or targets on a line"
-        warnings.append(f"{_rows(table.rows[~kept])} left out: {several} tell no pose")
+        warnings.append(f"{table.told(~kept)} left out: {several} tell no pose")
     taken = table.take(kept)
     return taken, told, [*warnings, *_doubts(taken, told, settings)]
 
@@ -107,7 +104,7 @@ def _doubts(table: Table, told: Posed, settings: Settings) -> list[str]:
     if astray.any():
         most = float(told.deviation.max()) / scale
         found.append(
-            f"the targets do not keep their places on the tool in {_rows(table.rows[astray])}, by up to {most:.3g} "
+            f"the targets do not keep their places on the tool in {table.told(astray)}, by up to {most:.3g} "
             f"{unit}: is one of them exchanged for another, or has one moved?"
         )
     if settings.noise_position and sigma > LOOSE * settings.noise_position:
@@ -116,9 +113,3 @@ def _doubts(table: Table, told: Posed, settings: Settings) -> list[str]:
             f"stated noise of {settings.noise_position / scale:.3g} {unit}"
         )
     return found
-
-
-def _rows(numbers: NDArray[np.int64]) -> str:
-    more = "" if len(numbers) <= _FEW else " …"
-    shown = ", ".join(map(str, numbers[:_FEW]))
-    return f"{len(numbers)} row{'s' if len(numbers) > 1 else ''} ({shown}{more})"

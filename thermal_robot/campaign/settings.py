@@ -6,6 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, TypeAlias
 
+import numpy as np
+
 from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, SI, Units
 from thermal_robot.robot import STRONGEST_GRAVITY
 from thermal_robot.schema import Kind, boolean, fitted, listed, mapping, number, optional, record, text, word
@@ -117,6 +119,19 @@ class Settings:
             "payload_com": list(self.payload_com),
             "priors": dict(self.priors),
             "gears": dict(self.gears),
+        }
+
+    def of_rows(self) -> dict[str, Any]:
+        """Return the fields of a :class:`~thermal_robot.Campaign` that say how its rows are meant, by name."""
+        return {
+            "base_known": self.base_known,
+            "tool_known": self.tool_known,
+            "target": np.array(self.target),
+            "payload_com": np.array(self.payload_com),
+            "moves": self.moves,
+            "reference_temperature": self.reference_temperature,
+            "gears": self.gears,
+            "units": self.units,
         }
 
     @classmethod

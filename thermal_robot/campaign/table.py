@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 Cells: TypeAlias = "Sequence[str] | NDArray[np.float64]"
 """A column: text as it stands in the file, or numbers where the source has a type of its own."""
 
+_FEW = 5  # rows that a sentence names
 _EMPTY = frozenset({"", "nan", "na", "n/a", "null", "none", "<na>"})
 
 
@@ -47,6 +48,12 @@ class Table:
     header: int | None = None
     decimal_comma: bool = False
     warnings: tuple[str, ...] = ()
+
+    def told(self, chosen: NDArray[np.bool_]) -> str:
+        """Say which rows were chosen (N,), a few of them by number: ``3 rows (4, 7, 9)``."""
+        numbers = self.rows[chosen]
+        more = "" if len(numbers) <= _FEW else " …"
+        return f"{len(numbers)} row{'s' if len(numbers) > 1 else ''} ({', '.join(map(str, numbers[:_FEW]))}{more})"
 
     def numbers(self, column: str, *, gaps: bool = False) -> NDArray[np.float64]:
         """Return a column as (N,) numbers in the file's unit.

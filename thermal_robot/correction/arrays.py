@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike
 
-from thermal_robot.campaign import Campaign, Settings
-from thermal_robot.campaign.names import PER_JOINT, PER_LINK, PLAIN_COVARIATES, did_you_mean
+from thermal_robot.campaign import Campaign, Settings, names
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot
 
@@ -47,33 +46,17 @@ def of_arrays(
     except (TypeError, ValueError) as error:
         what = f"an array (N, {robot.n}), and for each condition one number or N"
         raise CampaignError(NAME, "these are no rows of numbers", found=str(error), expected=what) from error
-    return Campaign(
-        name=NAME,
-        robot=robot,
-        q=rows,
-        covariates=given,
-        base_known=settings.base_known,
-        tool_known=settings.tool_known,
-        target=np.array(settings.target),
-        payload_com=np.array(settings.payload_com),
-        moves=settings.moves,
-        reference_temperature=settings.reference_temperature,
-        gears=settings.gears,
-        units=settings.units,
-    )
+    return Campaign(name=NAME, robot=robot, q=rows, covariates=given, **settings.of_rows())
 
 
 def _require_known(robot: Robot, conditions: Mapping[str, ArrayLike], needs: Collection[str]) -> None:
     """Refuse a condition that neither the model needs nor any campaign has."""
-    known = dict.fromkeys((*needs, *PLAIN_COVARIATES))
-    known |= dict.fromkeys(f"{column}.{joint}" for column in PER_JOINT for joint in robot.joint_names)
-    known |= dict.fromkeys(f"{column}.{link}" for column in PER_LINK for link in robot.urdf_links)
-    known |= dict.fromkeys(f"tilt.{link}.{axis}" for link in robot.urdf_links for axis in "xy")
+    known = dict.fromkeys(needs) | names.conditions(robot.joint_names, robot.urdf_links)
     for name in conditions:
         if name not in known:
             raise CampaignError(
                 NAME,
-                f"nothing has this name{did_you_mean(str(name), known)}",
+                f"nothing has this name{names.did_you_mean(str(name), known)}",
                 column=str(name),
                 expected=", ".join(needs) or "none, as the model needs no condition",
             )

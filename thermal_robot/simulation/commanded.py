@@ -63,8 +63,9 @@ def _of_campaign(robot: Robot, rows: Any, repeats: Any, commands: Campaign) -> C
         raise CampaignError(
             CALL, "the campaign commands other joints", column="commands", found=found, expected=expected
         )
-    told = replace(commands, position=None, orientation=None, targets=None, noise_of_rows=None)
-    return replace(told, robot=robot, warnings=())
+    return replace(
+        commands, robot=robot, position=None, orientation=None, targets=None, noise_of_rows=None, warnings=()
+    )
 
 
 def _poses(robot: Robot, rows: Any, repeats: Any, commands: Any, rng: np.random.Generator) -> tuple[Array, int]:
@@ -140,9 +141,9 @@ def _known(name: str, robot: Robot) -> bool:
         **dict.fromkeys(columns.PER_JOINT, robot.joint_names),
         **dict.fromkeys(columns.PER_LINK, robot.urdf_links),
     }
-    known = [f"{quantity}.{place}" for quantity, own in places.items() for place in own]
+    known = columns.conditions(robot.joint_names, robot.urdf_links)
     quantity, place = split_name(name)
-    if name in (*columns.PLAIN_COVARIATES, *columns.LABELS, *known) or tilted(name) in ("", *robot.urdf_links):
+    if name in known or name in columns.LABELS:
         return True
     if place and quantity in places:
         what = "the chain has no such joint" if quantity in columns.PER_JOINT else "the robot has no such link"
@@ -150,7 +151,9 @@ def _known(name: str, robot: Robot) -> bool:
         raise CampaignError(
             CALL, f"{what}{near}", column=name, expected=f"{quantity}. and one of {listed(places[quantity])}"
         )
-    meant = did_you_mean(name, (*columns.PLAIN_COVARIATES, *columns.LABELS, *known), cutoff=TYPING_ERROR)
+    # a tilt of what is no link is a column of the user's own
+    offered = [*(column for column in known if not tilted(column)), *columns.LABELS]
+    meant = did_you_mean(name, offered, cutoff=TYPING_ERROR)
     if meant:
         raise CampaignError(CALL, f"there is no such condition{meant}", column=name)
     return False

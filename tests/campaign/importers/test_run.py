@@ -8,7 +8,8 @@ from thermal_robot.campaign.importers.run import import_files
 from thermal_robot.errors import CampaignError
 
 
-def test_a_campaign_that_is_read_from_is_not_overwritten(tmp_path):
+def sources(tmp_path):
+    """A folder with a table to import, and how."""
     header, *rows = COMMANDS.split()
     lines = [f"{header},x,y,z", *(f"{row},{k},1,2" for k, row in enumerate(rows))]
     folder = put(tmp_path, measurements__csv="\n".join(lines))
@@ -16,6 +17,11 @@ def test_a_campaign_that_is_read_from_is_not_overwritten(tmp_path):
         "robot": {"urdf": str(folder / "robot.urdf"), "tool_frame": "tool"},
         "measurements": {"angle_unit": "rad", "length_unit": "mm"},
     })  # fmt: skip
+    return folder, plan
+
+
+def test_a_campaign_that_is_read_from_is_not_overwritten(tmp_path):
+    folder, plan = sources(tmp_path)
     with pytest.raises(CampaignError, match="is read from, and would be overwritten"):
         import_files("table", [folder / "measurements.csv"], folder, plan)
     done = import_files("table", [folder / "measurements.csv"], folder / "new", plan)
@@ -30,13 +36,7 @@ def test_a_campaign_that_is_read_from_is_not_overwritten(tmp_path):
 
 
 def test_a_campaign_that_was_not_imported_is_not_replaced(tmp_path):
-    header, *rows = COMMANDS.split()
-    lines = [f"{header},x,y,z", *(f"{row},{k},1,2" for k, row in enumerate(rows))]
-    folder = put(tmp_path, measurements__csv="\n".join(lines))
-    plan = planned({
-        "robot": {"urdf": str(folder / "robot.urdf"), "tool_frame": "tool"},
-        "measurements": {"angle_unit": "rad", "length_unit": "mm"},
-    })  # fmt: skip
+    folder, plan = sources(tmp_path)
     again = folder / "again"
     file = import_files("table", [folder / "measurements.csv"], again, plan).file
     first = file.read_text(encoding="utf-8")

@@ -6,19 +6,17 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.importers.columns import JOINTS, Column, found
 from thermal_robot.campaign.importers.plan import Plan
-from thermal_robot.campaign.names import listed, split_name
+from thermal_robot.campaign.names import listed
 from thermal_robot.campaign.table import Cells, Table
 from thermal_robot.campaign.validate import build_campaign
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot
 
-_FEW = 5
 """Rows that a sentence names; who left out more looks for a cause, not for rows."""
 
 
@@ -74,7 +72,7 @@ def campaign_of(source: Source, plan: Plan, robot: Robot, name: str) -> tuple[Ca
         raise CampaignError(table.file, "no row has a measured position", expected="x, y and z of a point")
     notes = [f"{len(table.rows)} rows read, {int(measured.sum())} taken"]
     if not measured.all() and whole:
-        notes.append(f"{_rows(table, ~measured)} left out, without a measured position")
+        notes.append(f"{table.told(~measured)} left out, without a measured position")
         table = table.take(measured)
     cells = _cells(table, columns, robot)
     orientation = plan.get("orientation", "stated")
@@ -112,12 +110,8 @@ def _columns(table: Table, plan: Plan, robot: Robot) -> dict[str, Column]:
 
 def _defined(name: str, robot: Robot) -> bool:
     """Return whether the format of a campaign defines a column of this name for the robot."""
-    quantity, place = split_name(name)
-    if quantity in names.PER_JOINT and place in robot.joint_names:
-        return True
-    linked = names.tilted(name) or (place if quantity in names.PER_LINK else "")
-    reserved = name in names.RESERVED or names.target_of(name) is not None
-    return name in robot.joint_names or reserved or linked in robot.urdf_links
+    known = (*names.RESERVED, *robot.joint_names, *names.conditions(robot.joint_names, robot.urdf_links))
+    return name in known or names.target_of(name) is not None
 
 
 def _cells(table: Table, columns: dict[str, Column], robot: Robot) -> dict[str, Cells]:
@@ -146,10 +140,3 @@ def _cells(table: Table, columns: dict[str, Column], robot: Robot) -> dict[str, 
 def _spare(table: Table, columns: Iterable[Column], oriented: Iterable[Column]) -> list[str]:
     used = {found(table, source) for column in (*columns, *oriented) for source in column.sources}
     return [name for name in table.columns if name not in used]
-
-
-def _rows(table: Table, chosen: NDArray[np.bool_]) -> str:
-    """Say which rows, a few of them by number."""
-    numbers = table.rows[chosen]
-    more = "" if len(numbers) <= _FEW else " …"
-    return f"{len(numbers)} row{'s' if len(numbers) > 1 else ''} ({', '.join(map(str, numbers[:_FEW]))}{more})"
