@@ -1,11 +1,9 @@
 """What figures share: names are no formulas, axes are read at sight, long campaigns are thinned fairly."""
 
-from itertools import pairwise
-
 import numpy as np
 import pytest
 
-from thermal_robot.report.drawing import Drawing, log_axis, note, plain, round_down, thinned, tidy, title
+from thermal_robot.report.drawing import Drawing, log_axis, note, plain, thinned, tidy, title
 
 
 def test_a_drawing_shows_itself_without_a_display():
@@ -65,16 +63,6 @@ def test_few_points_are_all_drawn_and_many_are_thinned_fairly():
     assert np.array_equal(many, thinned(60000))
     counts, _ = np.histogram(many, bins=10, range=(0, 60000))
     assert np.all(np.abs(counts - 600) < 5.0 * np.sqrt(600))
-
-
-def test_rounding_down_gives_the_next_round_number_below():
-    values = np.geomspace(1e-7, 1e4, 300)
-    rounded = [round_down(v) for v in values]
-    for value, found in zip(values, rounded, strict=True):
-        assert f"{found:.0e}"[0] in "125"
-        assert found <= value < 2.5001 * found
-    assert all(a <= b for a, b in pairwise(rounded))
-    assert [round_down(v) for v in (1.0, 0.2, 0.0005, 0.3)] == pytest.approx([1.0, 0.2, 0.0005, 0.2])
 
 
 def test_a_figure_is_written_whole_under_the_name_that_matplotlib_gives_it(tmp_path):

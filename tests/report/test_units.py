@@ -2,6 +2,7 @@
 
 import math
 import re
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -153,3 +154,13 @@ def test_what_is_no_number_is_not_written_as_one(value):
 )
 def test_a_size_is_written_with_its_deviation(value, std, unit, written):
     assert units.measured(value, std, unit) == written
+
+
+def test_rounding_down_gives_the_next_round_number_below():
+    values = np.geomspace(1e-7, 1e4, 300)
+    rounded = [units.round_down(v) for v in values]
+    for value, found in zip(values, rounded, strict=True):
+        assert f"{found:.0e}"[0] in "125"
+        assert found <= value < 2.5001 * found
+    assert all(a <= b for a, b in pairwise(rounded))
+    assert [units.round_down(v) for v in (1.0, 0.2, 0.0005, 0.3)] == pytest.approx([1.0, 0.2, 0.0005, 0.2])

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 
 from thermal_robot.commands.shared import CAMPAIGN, diagnosis, read, tell
 from thermal_robot.errors import CampaignError
+from thermal_robot.viewer.settings import PORT
 
 if TYPE_CHECKING:
     from thermal_robot.viewer.scene import Scene
@@ -24,9 +25,8 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Define the options of ``thermal-robot view``."""
     parser.add_argument("campaign", help=CAMPAIGN)
     parser.add_argument("--no-diagnosis", action="store_true", help="show the gap alone, at once")
-    parser.add_argument(
-        "--port", metavar="N", type=port, default=8080, help="of this machine (8080; the next free one)"
-    )
+    free = f"of this machine ({PORT}; the next free one)"
+    parser.add_argument("--port", metavar="N", type=port, default=PORT, help=free)
     parser.add_argument("--open", action="store_true", help="open the page in the default browser")
     parser.set_defaults(run=run, reads=("campaign",), writes=(), only=None, without=())
 

@@ -84,10 +84,10 @@
     plate(onto, items);
     body(frames, onto, towards, right, up, items, line);
     line(origin(frames[frames.length - 1]), row.at, css(byShare(data.tool.share)), 5);
-    for (const [name, gap] of [["before", "before"], ["after", "after"]]) {
-      if (!part(name).checked) continue;
-      for (const other of data.rows) if (other !== row) arrow(other.at, other[gap], css(colours[name], 1, 0.75), 1.3);
-      arrow(row.at, row[gap], css(colours[name]), 3, 2 * radius);
+    for (const gap of ["before", "after"]) {
+      if (!part(gap).checked) continue;
+      for (const other of data.rows) if (other !== row) arrow(other.at, other[gap], css(colours[gap], 1, 0.75), 1.3);
+      arrow(row.at, row[gap], css(colours[gap]), 3, 2 * radius);
     }
     pen.setTransform(canvas.width / width, 0, 0, canvas.height / height, 0, 0);
     pen.clearRect(0, 0, width, height);

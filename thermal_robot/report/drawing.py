@@ -106,9 +106,3 @@ def thinned(count: int, most: int = _DRAWN) -> NDArray[np.int64]:
     if count <= most:
         return np.arange(count)
     return np.sort(np.random.default_rng(0).permutation(count)[:most])
-
-
-def round_down(value: float) -> float:
-    """Return the largest 1, 2 or 5 times a power of ten that is not above a positive value."""
-    power = 10.0 ** np.floor(np.log10(value))
-    return float(next(s * power for s in (5.0, 2.0, 1.0) if s * power <= value * (1.0 + 1e-9)))

@@ -24,7 +24,7 @@ _ROWS = 150  # of a long campaign that are drawn: their postures are most of wha
 _WORTH = 0.005  # share of the gap from which on a place is named in the drawing
 _LONGEST = 0.12  # of the workspace's extent, for an arrow of the gap's 95th percentile: there are arrows of all rows
 _TURN = '<span class="tr-screen">Drag to turn. </span>'  # paper cannot be turned
-_ROUND = {"poses": 4, "at": 4, "corners": 4}  # decimals of m: a tenth of a millimetre is less than a pixel
+_DECIMALS = 4  # of m: a tenth of a millimetre is less than a pixel
 
 
 def script() -> str:
@@ -69,13 +69,12 @@ def _values(diagnosis: Diagnosis, arm: Arm, chosen: NDArray[np.int64]) -> dict[s
     ]
     index = {name: k for k, name in enumerate(arm.links)}
     shapes = [
-        {"link": index[s.link], "corners": _short(s.corners, "corners"), "faces": s.faces.ravel().tolist()}
-        for s in arm.hulls
+        {"link": index[s.link], "corners": _short(s.corners), "faces": s.faces.ravel().tolist()} for s in arm.hulls
     ]
     postures = [
         {
-            "poses": _short(arm.poses[k, :, :3], "poses"),
-            "at": _short(rows.position[i], "at"),
+            "poses": _short(arm.poses[k, :, :3]),
+            "at": _short(rows.position[i]),
             "before": _digits(rows.gap[i, :3]),
             "after": _digits(rows.remainder[i, :3]),
             "told": _told(diagnosis, int(i)),
@@ -91,8 +90,8 @@ def _place(name: str, share: float) -> dict[str, Any]:
     return {"share": round(float(share), 4), "named": named}
 
 
-def _short(values: Array, what: str) -> list[float]:
-    return np.round(values, _ROUND[what]).ravel().tolist()
+def _short(values: Array) -> list[float]:
+    return np.round(values, _DECIMALS).ravel().tolist()
 
 
 def _digits(gap: Array) -> list[float]:

@@ -18,7 +18,6 @@ from thermal_robot.report.drawing import (
     Array,
     Drawing,
     note,
-    round_down,
     thinned,
     tidy,
     title,
@@ -145,7 +144,7 @@ def exaggeration(diagnosis: Diagnosis, used: NDArray[np.int64], longest: float) 
         return None
     typical = _typical(diagnosis, used)
     extent = float(np.ptp(diagnosis.rows.position[used], axis=0).max())
-    return max(round_down(longest * extent / typical), 1.0) if typical > 0.0 and extent > 0.0 else None
+    return max(units.round_down(longest * extent / typical), 1.0) if typical > 0.0 and extent > 0.0 else None
 
 
 def _typical(diagnosis: Diagnosis, used: NDArray[np.int64]) -> float:
@@ -159,7 +158,7 @@ def _view(diagnosis: Diagnosis, across: int, up: int) -> _View | None:
     if factor is None:
         return None
     plane = np.ix_(used[thinned(len(used), _ARROWS)], np.array([across, up]))
-    sample = round_down(_typical(diagnosis, used))
+    sample = units.round_down(_typical(diagnosis, used))
     return _View(rows.position[plane], rows.gap[plane] * factor, rows.remainder[plane] * factor, factor, sample)
 
 

@@ -148,3 +148,9 @@ def p_value(value: float) -> str:
         mantissa, exponent = f"{value:.0e}".split("e")
         return f"p = {mantissa}e{int(exponent)}"
     return f"p = {value:.2g}"
+
+
+def round_down(value: float) -> float:
+    """Return the largest 1, 2 or 5 times a power of ten that is not above a positive value."""
+    power = 10.0 ** floor(log10(value))
+    return float(next(s * power for s in (5.0, 2.0, 1.0) if s * power <= value * (1.0 + 1e-9)))

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.kinematics import rotation_to_quaternion
+from thermal_robot.report.units import round_down
 from thermal_robot.viewer.settings import (
     HEAD_LENGTH,
     HEAD_RADIUS,
@@ -22,7 +23,6 @@ from thermal_robot.viewer.settings import (
 Array = NDArray[np.float64]
 
 _SIDES = 16
-_STEPS = (1.0, 2.0, 5.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,9 +104,7 @@ def readable(displacements: Array, size: float) -> float:
     large = float(np.quantile(np.linalg.norm(displacements, axis=1), LARGE_GAP)) if len(displacements) else 0.0
     if large <= 0.0:
         return 1.0
-    wanted = max(LONG_ARROW * size / large, 1.0)
-    decade = 10.0 ** np.floor(np.log10(wanted))
-    return float(max(step for step in _STEPS if step * decade <= wanted) * decade)
+    return round_down(max(LONG_ARROW * size / large, 1.0))
 
 
 def turned_along(directions: Array) -> Array:

@@ -151,5 +151,5 @@ def _misses(misses: Iterable[Plain]) -> str:
     for case in misses:
         true, said = miss(case)
         cells = (case["id"], kind(case["kind"]), case["robot"], true, said)
-        rows.append(f"<tr>{''.join(f'<td>{escape(cell)}</td>' for cell in cells)}</tr>")
+        rows.append(row(map(escape, cells), words=len(cells)))
     return table(("case", "kind", "robot", "true", "said"), rows, words=5)
