@@ -1,0 +1,9 @@
+"""Every number that was chosen for the engines of the batch functions."""
+
+CHUNK = 1024
+"""Configurations worked on at a time: few enough for the frames of an arm to stay in a core's own cache (100 kB an
+element), many enough for NumPy's calls to cost little beside them."""
+CACHE = 1_000_000
+"""Bytes that the frames of a chunk may take; a long chain is worked on in shorter chunks."""
+SHORTEST_CHUNK = 64
+"""Configurations; with fewer, NumPy's calls cost more than what they work on."""
