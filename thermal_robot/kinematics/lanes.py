@@ -86,7 +86,7 @@ def poses(robot: Chained, q: Array, moved: Displaced, out: Array) -> None:
         with written(out, part) as block:
             block[3] = np.array([0.0, 0.0, 0.0, 1.0])[:, None]
             frames = [pair[k % 2] for k in range(elements - 1)] + [block[:3]]
-            walk(robot.chain, q, moved, part, frames, frames[-1])
+            walk(robot.chain, q, moved, part, frames, frames[-1], keep=False)
 
 
 @contextmanager

@@ -1,6 +1,6 @@
 """Every number that was chosen for the engines of the batch functions."""
 
-CHUNK = 1024
+CHUNK = 2048
 """Configurations worked on at a time: few enough for the frames of an arm to stay in a core's own cache (100 kB an
 element), many enough for NumPy's calls to cost little beside them."""
 CACHE = 1_000_000

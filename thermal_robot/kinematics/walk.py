@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from thermal_robot.kinematics.displaced import Displaced
 from thermal_robot.kinematics.model import FIXED, PRISMATIC, Chain
 from thermal_robot.kinematics.scratch import scratch
+from thermal_robot.kinematics.turns import sines_and_cosines
 
 Array = NDArray[np.float64]
 
@@ -33,15 +34,15 @@ class Step:
     slides
         (3,) axis of a prismatic joint; ``None`` for any other.
     turns
-        Columns (a, b, w) of the rotation: a revolute joint turns a towards b about w.
+        Columns (a, b) of the rotation, where a revolute joint turns a towards b; (b, a); and the others of a frame.
     aligned
-        (4, 4), transposed: constant rotation that puts w on the axis of the joint; ``None`` where it is there.
+        (4, 4), transposed: constant rotation that puts the third axis on that of the joint; ``None`` where it is there.
     """
 
     place: Array
     joint: int | None
     slides: Array | None
-    turns: tuple[int, int, int]
+    turns: tuple[slice, slice, slice]
     aligned: Array | None
 
 
@@ -74,7 +75,7 @@ def _made(chain: Chain) -> Steps:
         place = np.eye(4)
         place[:3, :3], place[:3, 3] = chain.rotations[k], chain.translations[k]
         place, axis = place if back is None else back @ place, chain.axes[k]
-        turns, aligned, back = (0, 1, 2), None, None
+        turns, aligned, back = _columns(0, 1), None, None
         if chain.kinds[k] not in (FIXED, PRISMATIC):
             turns, aligned = _about(axis)
             back = None if aligned is None else aligned.T
@@ -98,22 +99,36 @@ def _transposed(matrix: Array) -> Array:
     return np.ascontiguousarray(matrix.T)
 
 
-def _about(axis: Array) -> tuple[tuple[int, int, int], Array | None]:
+def _about(axis: Array) -> tuple[tuple[slice, slice, slice], Array | None]:
     """Which columns a rotation about the axis turns, and after which constant rotation."""
     w = int(np.argmax(np.abs(axis)))
     a, b = (w + 1) % 3, (w + 2) % 3
     if np.abs(axis[w]) == 1.0 and np.count_nonzero(axis) == 1:
-        return ((a, b, w) if axis[w] > 0.0 else (b, a, w)), None
+        return _columns(*((a, b) if axis[w] > 0.0 else (b, a))), None
     first = np.zeros(3)
     first[a] = 1.0
     first -= (first @ axis) * axis
     first /= np.linalg.norm(first)
     aligned = np.eye(4)
     aligned[:3, 0], aligned[:3, 1], aligned[:3, 2] = first, np.cross(axis, first), axis
-    return (0, 1, 2), aligned
+    return _columns(0, 1), aligned
 
 
-def walk(chain: Chain, q: Array, moved: Displaced, part: slice, frames: Array | Sequence[Array], tool: Array) -> None:
+def _columns(a: int, b: int) -> tuple[slice, slice, slice]:
+    pair, swapped = (slice(i, j + 1 if j > i else j - 1 if j else None, j - i) for i, j in ((a, b), (b, a)))
+    return pair, swapped, slice(3 - a - b, 4, a + b)
+
+
+def walk(
+    chain: Chain,
+    q: Array,
+    moved: Displaced,
+    part: slice,
+    frames: Array | Sequence[Array],
+    tool: Array,
+    *,
+    keep: bool = True,
+) -> None:
     """Write the frames of a chunk of configurations.
 
     Parameters
@@ -131,13 +146,15 @@ def walk(chain: Chain, q: Array, moved: Displaced, part: slice, frames: Array | 
         ones must not be the same.
     tool
         (3, 4, C) to write to.
+    keep
+        Whether all frames are wanted; if not, ``frames`` are only worked in.
     """
     taken, size = steps(chain), part.stop - part.start
     joints = _joints(chain, taken, q, moved, part)
-    sines, cosines = scratch("sines", *joints.shape), scratch("cosines", *joints.shape)
-    np.sin(joints, out=sines)
-    np.cos(joints, out=cosines)
-    free, term = scratch("walk", 3, 4, size), scratch("term", 3, size)
+    sines, cosines = scratch("sines", len(joints), 2, size), scratch("cosines", *joints.shape)
+    sines_and_cosines(joints, sines[:, 0], cosines)
+    np.negative(sines[:, 0], out=sines[:, 1])
+    free, term = scratch("walk", 3, 4, size) if keep else None, scratch("term", 3, size)
     here: Array | None = None if moved.base is None else np.broadcast_to(_rows_of(moved.base, part)[:3], (3, 4, size))
     for k, step in enumerate(taken.each):
         frame = frames[k]
@@ -149,11 +166,11 @@ def walk(chain: Chain, q: Array, moved: Displaced, part: slice, frames: Array | 
             frame[...] = _followed(frame, _rows_of(moved.segment[k], part))
         here = frame
         if step.joint is not None:
-            here = free
+            here = frame if free is None else free
             if step.slides is not None:
                 _slide(frame, step.slides, joints[step.joint], here, term)
             else:
-                _turn(frame, step, sines[step.joint], cosines[step.joint], here, term)
+                _turn(frame, step, sines[step.joint], cosines[step.joint], here)
     if taken.last is not None and here is not None:
         np.matmul(taken.last, here, out=tool)
     elif tool is not here:
@@ -176,23 +193,23 @@ def _joints(chain: Chain, taken: Steps, q: Array, moved: Displaced, part: slice)
     return joints
 
 
-def _turn(frame: Array, step: Step, sine: Array, cosine: Array, out: Array, term: Array) -> None:
-    """Turn every frame about its own constant axis."""
+def _turn(frame: Array, step: Step, sines: Array, cosine: Array, out: Array) -> None:
+    """Turn every frame about its own constant axis; ``sines`` are (2, C), the sine and its negative."""
     if step.aligned is not None:
         frame = np.matmul(step.aligned, frame, out=scratch("aligned", *frame.shape))
-    a, b, w = step.turns
-    np.multiply(frame[:, a], cosine, out=out[:, a])
-    np.multiply(frame[:, b], sine, out=term)
-    out[:, a] += term
-    np.multiply(frame[:, b], cosine, out=out[:, b])
-    np.multiply(frame[:, a], sine, out=term)
-    out[:, b] -= term
-    out[:, w], out[:, 3] = frame[:, w], frame[:, 3]
+    pair, swapped, rest = step.turns
+    cosine_part, sine_part = scratch("cosine part", 3, 2, len(cosine)), scratch("sine part", 3, 2, len(cosine))
+    np.multiply(frame[:, pair], cosine, out=cosine_part)
+    np.multiply(frame[:, swapped], sines, out=sine_part)
+    np.add(cosine_part, sine_part, out=out[:, pair])
+    if out is not frame:
+        out[:, rest] = frame[:, rest]
 
 
 def _slide(frame: Array, axis: Array, distance: Array, out: Array, term: Array) -> None:
     """Move every frame along its own constant axis."""
-    out[...] = frame
+    if out is not frame:
+        out[...] = frame
     np.matmul(axis, frame[:, :3], out=term)
     term *= distance
     out[:, 3] += term
