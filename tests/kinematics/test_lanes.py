@@ -1,10 +1,9 @@
-"""The engine of NumPy: what has no number stays without, neighbours do not matter, products are right."""
+"""The engine of NumPy: what has no number stays without, neighbours do not matter."""
 
 import numpy as np
 import pytest
 
 from thermal_robot import kinematics as kin
-from thermal_robot.kinematics import lanes
 
 ROWS = 5000
 CALLS = (kin.tool_poses, kin.frame_jacobians, kin.placement_sensitivities, kin.gravity_torques)
@@ -26,13 +25,6 @@ def test_rows_may_come_in_any_order(arm, configurations, call):
     q = configurations(arm, ROWS)
     order = np.random.default_rng(0).permutation(ROWS)
     np.testing.assert_allclose(call(arm, q[order]), call(arm, q)[order], rtol=0.0, atol=1e-12)
-
-
-def test_cross_product():
-    a, b = np.random.default_rng(1).normal(size=(2, 3, 40))
-    out, term = np.empty((3, 40)), np.empty(40)
-    lanes.cross(a, b, out, term)
-    np.testing.assert_allclose(out, np.cross(a, b, axis=0), rtol=0.0, atol=1e-15)
 
 
 def test_frames_at_hand_are_not_computed_again(rv_m2, configurations):

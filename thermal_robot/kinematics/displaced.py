@@ -74,6 +74,10 @@ class Displaced:
         )
 
 
+NOWHERE = Displaced(None, {}, None, None)
+"""Nothing displaced."""
+
+
 def _channel(robot: Chained, name: str, value: ArrayLike | None, shape: tuple[int, ...], rows: int) -> Array | None:
     if value is None:
         return None

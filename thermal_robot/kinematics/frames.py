@@ -10,8 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics import lanes
+from thermal_robot.kinematics.blocks import Places
 from thermal_robot.kinematics.displaced import Displaced, Displacement
-from thermal_robot.kinematics.scratch import chunks, result
+from thermal_robot.kinematics.engines import engine_for
+from thermal_robot.kinematics.scratch import chunks, result, rows_last
 from thermal_robot.kinematics.walk import walk
 
 if TYPE_CHECKING:
@@ -40,10 +42,10 @@ class ChainFrames:
     tool_rotation: Array
     tool_position: Array
 
-    def rows_last(self) -> lanes.Places:
+    def rows_last(self) -> Places:
         """Return the same with the N last, as the engines want them."""
         arrays = (self.rotations, self.positions, self.tool_rotation, self.tool_position)
-        return lanes.Places(*(np.moveaxis(array, 0, -1) for array in arrays))
+        return Places(*map(rows_last, arrays))
 
 
 def chain_frames(robot: Chained, q: ArrayLike, displacement: Displacement | None = None) -> ChainFrames:
@@ -97,13 +99,18 @@ def tool_poses(
     """
     q = as_rows(robot, q)
     out = result(out, len(q), 4, 4)
-    lanes.poses(robot, q, Displaced.of(robot, displacement, len(q)), out)
+    if displacement is None:
+        engine_for(robot, len(q)).poses(robot, q, out)
+    else:
+        lanes.poses(robot, q, out, Displaced.of(robot, displacement, len(q)))
     return out
 
 
 def as_rows(robot: Chained, q: ArrayLike) -> Array:
     """Return the configurations as an (N, n) array of floats."""
-    rows = np.atleast_2d(np.asarray(q, dtype=float))
+    rows = np.asarray(q, dtype=float)
+    if rows.ndim < 2:
+        rows = rows.reshape(1, -1)
     if rows.ndim != 2 or rows.shape[1] != robot.n:
         raise RobotError(
             f"joint positions of shape {np.shape(q)} do not fit robot {robot.name!r} of {robot.n} joints: "

@@ -9,9 +9,10 @@ from numpy.typing import ArrayLike, NDArray
 
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics import lanes
+from thermal_robot.kinematics.engines import engine_for
 from thermal_robot.kinematics.frames import ChainFrames, as_rows, chain_frames
 from thermal_robot.kinematics.model import REVOLUTE
-from thermal_robot.kinematics.scratch import result, scratch
+from thermal_robot.kinematics.scratch import result
 
 if TYPE_CHECKING:
     from thermal_robot.robot import Robot
@@ -58,20 +59,13 @@ def gravity_torques(
     RobotError
         If an array has not the shape that the robot asks for.
     """
-    q, given = (as_rows(robot, q), None) if frames is None else (frames.tool_position, frames.rows_last())
+    q = as_rows(robot, q) if frames is None else frames.tool_position
     mass, com = _payload(payload, payload_com, len(q))
     out = result(out, len(q), robot.n)
-
-    def write(places: lanes.Places, part: slice) -> None:
-        held = mass[part] if mass.ndim else mass
-        moment = scratch("moment", *places.tool_position.shape)
-        np.matmul(com, places.tool_rotation, out=moment)
-        moment += places.tool_position
-        moment *= held
-        with lanes.written(out, part) as block:
-            lanes.gravity(robot.chain, robot.gravity, places, held, moment, block)
-
-    lanes.visit(robot, q, given, write)
+    if frames is None:
+        engine_for(robot, len(q)).gravity(robot, q, mass, com, out)
+    else:
+        lanes.gravity(robot, q, mass, com, out, frames.rows_last())
     return out
 
 

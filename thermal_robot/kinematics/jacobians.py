@@ -9,6 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics import lanes
+from thermal_robot.kinematics.engines import engine_for
 from thermal_robot.kinematics.frames import ChainFrames, as_rows
 from thermal_robot.kinematics.scratch import result
 
@@ -54,15 +55,12 @@ def frame_jacobians(
     RobotError
         If an array has not the shape that the robot asks for.
     """
-    q, given = _read(robot, q, frames)
-    target = _point(point, len(q))
-    out = result(out, len(q), 6, robot.n)
-
-    def write(places: lanes.Places, part: slice) -> None:
-        with lanes.written(out, part) as block:
-            lanes.jacobian(robot.chain, places, places.target(target, part), block)
-
-    lanes.visit(robot, q, given, write)
+    q = as_rows(robot, q) if frames is None else frames.tool_position
+    at, out = _point(point, len(q)), result(out, len(q), 6, robot.n)
+    if frames is None:
+        engine_for(robot, len(q)).jacobians(robot, q, at, out)
+    else:
+        lanes.jacobians(robot, q, at, out, frames.rows_last())
     return out
 
 
@@ -96,29 +94,19 @@ def placement_sensitivities(
     RobotError
         If an array has not the shape that the robot asks for.
     """
-    q, given = _read(robot, q, frames)
-    target = _point(point, len(q))
-    out = result(out, len(q), 6, len(robot.chain.placed), 6)
-
-    def write(places: lanes.Places, part: slice) -> None:
-        with lanes.written(out, part) as block:
-            lanes.placements(robot.chain, places, places.target(target, part), block)
-
-    lanes.visit(robot, q, given, write)
+    q = as_rows(robot, q) if frames is None else frames.tool_position
+    at, out = _point(point, len(q)), result(out, len(q), 6, len(robot.chain.placed), 6)
+    if frames is None:
+        engine_for(robot, len(q)).placements(robot, q, at, out)
+    else:
+        lanes.placements(robot, q, at, out, frames.rows_last())
     return out
 
 
-def _read(robot: Chained, q: ArrayLike, frames: ChainFrames | None) -> tuple[Array, lanes.Places | None]:
-    """Return configurations, of which only the number counts where frames are given; and the frames, N last."""
-    if frames is None:
-        return as_rows(robot, q), None
-    return frames.tool_position, frames.rows_last()
-
-
-def _point(point: ArrayLike | None, rows: int) -> Array:
-    """Return the point of the tool, (3,) or (N, 3) m."""
+def _point(point: ArrayLike | None, rows: int) -> Array | None:
+    """Return the point of the tool, (3,) or (N, 3) m; ``None`` for its origin."""
     if point is None:
-        return np.zeros(3)
+        return None
     offset = np.asarray(point, dtype=float)
     if offset.shape not in ((3,), (rows, 3)):
         raise RobotError(f"a point of shape {offset.shape} does not fit: expected (3,) or {(rows, 3)}")

@@ -45,6 +45,11 @@ def chunks(rows: int, frames: int) -> Iterator[slice]:
     return (slice(start, min(start + step, rows)) for start in range(0, rows, step))
 
 
+def rows_last(array: Array) -> Array:
+    """Return an array (N, ...) as (..., N), the same memory."""
+    return array.transpose(*range(1, array.ndim), 0)
+
+
 def result(out: Array | None, rows: int, *shape: int) -> Array:
     """Return the array for the results of N configurations: a new one with N last in memory, or the caller's.
 
@@ -63,7 +68,8 @@ def result(out: Array | None, rows: int, *shape: int) -> Array:
         If ``out`` is not such an array of floats, or must not be written to.
     """
     if out is None:
-        return np.moveaxis(np.empty((*shape, rows)), -1, 0)
+        last = len(shape)
+        return np.empty((*shape, rows)).transpose(last, *range(last))
     wanted = (rows, *shape)
     if not isinstance(out, np.ndarray) or out.shape != wanted or out.dtype != np.float64:
         raise RobotError(

@@ -7,3 +7,8 @@ CACHE = 1_000_000
 """Bytes that the frames of a chunk may take; a long chain is worked on in shorter chunks."""
 SHORTEST_CHUNK = 64
 """Configurations; with fewer, NumPy's calls cost more than what they work on."""
+FEW = 80
+"""Configurations up to which Pinocchio itself is called for each: for fewer, NumPy's calls alone take longer (50 for
+poses, 100 for Jacobians and torques)."""
+MOST_PLACEMENTS = 40
+"""Segments of a chain that Pinocchio is called for: its memory grows with their cube, 9 MB at 40."""
