@@ -12,3 +12,15 @@ FEW = 80
 poses, 100 for Jacobians and torques)."""
 MOST_PLACEMENTS = 40
 """Segments of a chain that Pinocchio is called for: its memory grows with their cube, 9 MB at 40."""
+LANES = 64
+"""Configurations side by side in the inner loops of the compiled kernels: whole vectors of any processor, and few
+enough for the frames of an arm to stay in a core's first cache."""
+LARGEST_REDUCED = 1e6
+"""rad; the sine of a larger angle is left to the library, for the reduction to ±π/4 would lose digits."""
+MANY = 20_000
+"""Configurations from which the compiled kernels are used: the first call loads numba, which takes a second, and
+compiles, which takes a minute at most and is kept on disk. NumPy has done fewer in a hundredth of a second."""
+PIECE = 16_384
+"""Configurations that a thread works on before it takes the next ones."""
+THREADS = 0
+"""Threads of the compiled kernels; 0 for one on each processor that this process may use."""
