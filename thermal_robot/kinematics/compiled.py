@@ -104,6 +104,7 @@ def arm(chain: Chain, point: Array | None) -> Arm:
         factor=np.array([0.0 if j is None else matrix[row, j] for row, j in enumerate(lead)]),
         offset=np.array(chain.coupling.offset),
         first=np.array([j not in lead[:row] for row, j in enumerate(lead)]),
+        last=np.array([j not in lead[row + 1 :] for row, j in enumerate(lead)]),
         masses=np.array(chain.masses),
         centres=np.array(chain.mass_centres),
         point=np.array(_ORIGIN if point is None else point),

@@ -2,8 +2,9 @@
 
 Imported only where numba is installed. Every loop over lanes has the same fixed length and no branch, so that the
 compiler makes vector instructions of it and each lane is computed alike, wherever it stands in a block and whichever
-thread works on it. Results are rows with the configurations last. Functions are compiled where they stand, for each
-uses the compiled ones before it.
+thread works on it. What is worked on stands in one array, the room: rows of one number for each lane, given by their
+place in it, since a view of a row would be counted by every function that it is handed to. Functions are compiled where
+they stand, for each uses the compiled ones before it.
 """
 
 from __future__ import annotations
@@ -61,8 +62,8 @@ class Arm(NamedTuple):
         (K, 3) of the joints.
     movable, placed
         (M,) and (S,) elements.
-    lead, factor, offset, first
-        (M,) column of the driving joint (−1: none), how a joint follows it, and whether it is the first to.
+    lead, factor, offset, first, last
+        (M,) column of the driving joint (−1: none), how a joint follows it, and whether it is the first or last to.
     masses, centres
         (M,) kg and (M, 3) m, as a chain has them.
     point
@@ -82,250 +83,270 @@ class Arm(NamedTuple):
     factor: Array
     offset: Array
     first: NDArray[np.bool_]
+    last: NDArray[np.bool_]
     masses: Array
     centres: Array
     point: Array
 
 
-def _sincos(angle: Array, sine: Array, cosine: Array) -> None:
-    """Write sines and cosines of a block of angles below ``LARGEST_REDUCED``."""
+def _sincos(room: Array, x: int) -> None:
+    """Write sines and cosines of the angles of a row, below ``LARGEST_REDUCED``, to the next two rows."""
     (p1, p2, p3), (s1, s2, s3, s4, s5, s6), (c1, c2, c3, c4, c5, c6) = _HALF_PI, _SINE, _COSINE
     for i in range(LANES):
-        x = angle[i]
-        turns = np.rint(x * _QUARTERS)
-        r = ((x - turns * p1) - turns * p2) - turns * p3
+        angle = room[x, i]
+        turns = np.rint(angle * _QUARTERS)
+        r = ((angle - turns * p1) - turns * p2) - turns * p3
         z = r * r
         s = r + r * z * (s1 + z * (s2 + z * (s3 + z * (s4 + z * (s5 + z * s6)))))
         c = 1.0 - z * (0.5 - z * (c1 + z * (c2 + z * (c3 + z * (c4 + z * (c5 + z * c6))))))
         half = np.floor(0.5 * turns)
         odd = turns - 2.0 * half
         sign = 1.0 - 2.0 * (half - 2.0 * np.floor(0.5 * half))
-        sine[i] = sign * (c if odd == 1.0 else s)
-        cosine[i] = sign * (-s if odd == 1.0 else c)
+        room[x + 1, i] = sign * (c if odd == 1.0 else s)
+        room[x + 2, i] = sign * (-s if odd == 1.0 else c)
 
 
 sincos = _compiled(_sincos)
 
 
-def _sincos_any(angle: Array, sine: Array, cosine: Array) -> None:
-    """Do the same for angles of any size, those that are large one by one."""
-    sincos(angle, sine, cosine)
-    for i in range(LANES):
-        if abs(angle[i]) > LARGEST_REDUCED:
-            sine[i], cosine[i] = math.sin(angle[i]), math.cos(angle[i])
+def _turn(room: Array, x: int, large: bool) -> None:
+    """Write sines and cosines of angles of any size: the large ones, if there are any, one by one."""
+    sincos(room, x)
+    if large:
+        for i in range(LANES):
+            if abs(room[x, i]) > LARGEST_REDUCED:
+                room[x + 1, i], room[x + 2, i] = math.sin(room[x, i]), math.cos(room[x, i])
 
 
-sincos_any = _compiled(_sincos_any)
+turn = _compiled(_turn)
 
 
-def _mix(a: float, x: Array, b: float, y: Array, c: float, z: Array, out: Array) -> None:
-    for i in range(LANES):
-        out[i] = a * x[i] + b * y[i] + c * z[i]
-
-
-mix = _compiled(_mix)
-
-
-def _add_mix(a: float, x: Array, b: float, y: Array, c: float, z: Array, out: Array) -> None:
-    for i in range(LANES):
-        out[i] += a * x[i] + b * y[i] + c * z[i]
-
-
-add_mix = _compiled(_add_mix)
-
-
-def _copy(x: Array, out: Array) -> None:
-    for i in range(LANES):
-        out[i] = x[i]
-
-
-copy = _compiled(_copy)
-
-
-def _follow(place: Array, x: Array, out: Array) -> None:
-    """Follow frames, (12, L), by a constant placement, (3, 4)."""
-    for i in range(0, 12, 4):
-        for m in range(3):
-            mix(place[0, m], x[i], place[1, m], x[i + 1], place[2, m], x[i + 2], out[i + m])
-        copy(x[i + 3], out[i + 3])
-        add_mix(place[0, 3], x[i], place[1, 3], x[i + 1], place[2, 3], x[i + 2], out[i + 3])
+def _follow(room: Array, place: Array, x: int, to: int) -> None:
+    """Follow the frame in twelve rows by a constant placement, (3, 4)."""
+    for row in range(0, 12, 4):
+        for m in range(4):
+            a, b, c = place[0, m], place[1, m], place[2, m]
+            if m < 3:
+                for i in range(LANES):
+                    room[to + row + m, i] = a * room[x + row, i] + b * room[x + row + 1, i] + c * room[x + row + 2, i]
+            else:
+                for i in range(LANES):
+                    along = a * room[x + row, i] + b * room[x + row + 1, i] + c * room[x + row + 2, i]
+                    room[to + row + 3, i] = room[x + row + 3, i] + along
 
 
 follow = _compiled(_follow)
 
 
-def _rotate(x: Array, y: Array, sine: Array, cosine: Array, out_x: Array, out_y: Array) -> None:
-    """Turn x towards y."""
+def _mix(room: Array, a: float, x: int, b: float, y: int, c: float, z: int, to: int) -> None:
     for i in range(LANES):
-        out_x[i] = cosine[i] * x[i] + sine[i] * y[i]
-    for i in range(LANES):
-        out_y[i] = cosine[i] * y[i] - sine[i] * x[i]
+        room[to, i] = a * room[x, i] + b * room[y, i] + c * room[z, i]
 
 
-rotate = _compiled(_rotate)
+mix = _compiled(_mix)
 
 
-def _add_product(x: Array, y: Array, out: Array) -> None:
-    for i in range(LANES):
-        out[i] += x[i] * y[i]
-
-
-add_product = _compiled(_add_product)
-
-
-def _move(arm: Arm, k: int, joint: Array, frame: Array, work: Array, out: Array) -> None:
-    """Move frames, (12, L), as the joint behind them does: position, sine and cosine are the rows of ``joint``."""
+def _move(room: Array, arm: Arm, k: int, joint: int, frame: int, work: int, to: int) -> None:
+    """Move the frame as the joint behind it does: position, sine and cosine are the rows from ``joint``."""
+    a, b, source = arm.turns[k, 0], arm.turns[k, 1], frame
     if arm.kinds[k] == SLIDES:
-        for i in range(12):
-            copy(frame[i], out[i])
-        for i in range(0, 12, 4):
-            mix(arm.axes[k, 0], frame[i], arm.axes[k, 1], frame[i + 1], arm.axes[k, 2], frame[i + 2], work[0])
-            add_product(work[0], joint[0], out[i + 3])
+        x, y, z = arm.axes[k]
+        for row in range(0, 12, 4):
+            for i in range(LANES):
+                room[to + row, i] = room[frame + row, i]
+                room[to + row + 1, i] = room[frame + row + 1, i]
+                room[to + row + 2, i] = room[frame + row + 2, i]
+            for i in range(LANES):
+                along = x * room[frame + row, i] + y * room[frame + row + 1, i] + z * room[frame + row + 2, i]
+                room[to + row + 3, i] = room[frame + row + 3, i] + along * room[joint, i]
         return
-    source, a, b = frame, arm.turns[k, 0], arm.turns[k, 1]
     if arm.kinds[k] == TURNS_ALIGNED:
-        follow(arm.aligned[k], frame, work)
+        follow(room, arm.aligned[k], frame, work)
         source = work
-    for i in range(0, 12, 4):
-        rotate(source[i + a], source[i + b], joint[1], joint[2], out[i + a], out[i + b])
-        copy(source[i + 3 - a - b], out[i + 3 - a - b])
-        copy(source[i + 3], out[i + 3])
+    for row in range(0, 12, 4):
+        for i in range(LANES):
+            sine, cosine = room[joint + 1, i], room[joint + 2, i]
+            room[to + row + a, i] = cosine * room[source + row + a, i] + sine * room[source + row + b, i]
+        for i in range(LANES):
+            sine, cosine = room[joint + 1, i], room[joint + 2, i]
+            room[to + row + b, i] = cosine * room[source + row + b, i] - sine * room[source + row + a, i]
+        for i in range(LANES):
+            room[to + row + 3 - a - b, i] = room[source + row + 3 - a - b, i]
+        for i in range(LANES):
+            room[to + row + 3, i] = room[source + row + 3, i]
 
 
 move = _compiled(_move)
 
 
-def _walk(arm: Arm, q: Array, start: int, frames: Array, work: Array) -> None:
-    """Write the frames of a block, (K + 1, 12, L): of every element before its motion, and of the tool.
+def _load(room: Array, arm: Arm, j: int, q: Array, start: int, to: int) -> bool:
+    """Write the positions of a movable joint; return whether one is too large for the short reduction."""
+    lead, factor, offset, large = arm.lead[j], arm.factor[j], arm.offset[j], False
+    for i in range(LANES):
+        position = offset
+        if lead >= 0:
+            position += factor * q[start + i, lead]
+        large |= abs(position) > LARGEST_REDUCED
+        room[to, i] = position
+    return large
 
-    ``work`` has room for three frames.
-    """
-    here, aligned, joint = work[0], work[1], work[2]
-    for k in range(len(arm.kinds)):
+
+load = _compiled(_load)
+
+
+def _walk(room: Array, arm: Arm, q: Array, start: int) -> None:
+    """Write the frames of a block, twelve rows each: of every element before its motion, and of the tool."""
+    elements = len(arm.kinds)
+    here = 12 * (elements + 1)
+    aligned, joint, came = here + 12, here + 24, 0
+    for k in range(elements):
         if k == 0:
-            for i in range(12):
-                frames[0, i, :] = arm.place[0, i // 4, i % 4]
+            for row in range(12):
+                room[row, :] = arm.place[0, row // 4, row % 4]
         else:
-            follow(arm.place[k], frames[k - 1] if arm.kinds[k - 1] == FIXED else here, frames[k])
-        j = arm.joint[k]
-        if j < 0:
-            continue
-        lead, factor, offset = arm.lead[j], arm.factor[j], arm.offset[j]
-        for lane in range(LANES):
-            joint[0, lane] = offset + (factor * q[start + lane, lead] if lead >= 0 else 0.0)
-        if arm.kinds[k] != SLIDES:
-            sincos_any(joint[0], joint[1], joint[2])
-        move(arm, k, joint, frames[k], aligned, here)
-    last = len(arm.kinds) - 1
-    if arm.kinds[last] == TURNS_ALIGNED:
-        follow(arm.back, here, frames[last + 1])
+            follow(room, arm.place[k], came, 12 * k)
+        came = 12 * k
+        if arm.joint[k] >= 0:
+            large = load(room, arm, arm.joint[k], q, start, joint)
+            if arm.kinds[k] != SLIDES:
+                turn(room, joint, large)
+            move(room, arm, k, joint, 12 * k, aligned, here)
+            came = here
+    if arm.kinds[elements - 1] == TURNS_ALIGNED:
+        follow(room, arm.back, here, 12 * elements)
     else:
-        end = frames[last] if arm.kinds[last] == FIXED else here
-        for i in range(12):
-            copy(end[i], frames[last + 1, i])
+        for row in range(12):
+            for i in range(LANES):
+                room[12 * elements + row, i] = room[came + row, i]
 
 
 walk = _compiled(_walk)
 
 
-def _block(start: int, stop: int, number: int) -> int:
+def _room(arm: Arm) -> Array:
+    """Memory for the frames of a block, for the walk, and behind it for twelve more rows."""
+    return np.empty((12 * (len(arm.kinds) + 3) + 3 + 12, LANES))
+
+
+new_room = _compiled(_room)
+
+
+def _begin(start: int, stop: int, number: int) -> int:
     """Where a block begins: the last one ends with the rows, and works on some of them once more."""
     return min(start + number * LANES, stop - LANES)
 
 
-block = _compiled(_block)
+begin = _compiled(_begin)
 
 
-def _rooms(arm: Arm) -> tuple[Array, Array, Array]:
-    """Memory for the frames of a block, for work, and for vectors."""
-    return np.empty((len(arm.kinds) + 1, 12, LANES)), np.empty((3, 12, LANES)), np.empty((12, LANES))
-
-
-rooms = _compiled(_rooms)
-
-
-def _poses(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
-    """Write the poses of the tool, (16, N), of rows from ``start`` to ``stop``, at least ``LANES`` of them."""
-    frames, work, _ = rooms(arm)
-    tool = frames[len(arm.kinds)]
-    for number in range((stop - start + LANES - 1) // LANES):
-        at = block(start, stop, number)
-        walk(arm, q, at, frames, work)
-        for i in range(12):
-            copy(tool[i], out[i, at : at + LANES])
-        for i in range(12, 16):
-            out[i, at : at + LANES] = 1.0 if i == 15 else 0.0
-
-
-poses = _compiled(_poses)
-
-
-def _target(arm: Arm, tool: Array, out: Array) -> None:
-    """Write where the point of the tool is, (3, L)."""
-    for i in range(3):
-        copy(tool[4 * i + 3], out[i])
-        add_mix(arm.point[0], tool[4 * i], arm.point[1], tool[4 * i + 1], arm.point[2], tool[4 * i + 2], out[i])
-
-
-target = _compiled(_target)
-
-
-def _minus(x: Array, y: Array, out: Array) -> None:
+def _give(room: Array, x: int, out: Array, row: int, start: int) -> None:
+    """Hand a row over to the results."""
     for i in range(LANES):
-        out[i] = x[i] - y[i]
+        out[row, start + i] = room[x, i]
 
 
-minus = _compiled(_minus)
+give = _compiled(_give)
 
 
-def _cross(a: Array, b: Array, c: Array, d: Array, out: Array) -> None:
+def _give_cross(room: Array, a: int, b: int, c: int, d: int, out: Array, row: int, start: int) -> None:
+    """Hand one component of a cross product over to the results."""
     for i in range(LANES):
-        out[i] = a[i] * b[i] - c[i] * d[i]
+        out[row, start + i] = room[a, i] * room[b, i] - room[c, i] * room[d, i]
 
 
-cross = _compiled(_cross)
+give_cross = _compiled(_give_cross)
 
 
-def _hand_on(first: bool, factor: float, x: Array, out: Array) -> None:
-    """Write what a movable joint does to the column of the one that drives it, or add to it."""
+def _hand_on(room: Array, x: int, first: bool, factor: float, out: Array, row: int, start: int) -> None:
+    """Hand what a movable joint does over to the one that drives it: the first that follows writes, others add."""
     if first:
         for i in range(LANES):
-            out[i] = factor * x[i]
+            out[row, start + i] = factor * room[x, i]
     else:
         for i in range(LANES):
-            out[i] += factor * x[i]
+            out[row, start + i] += factor * room[x, i]
 
 
 hand_on = _compiled(_hand_on)
 
 
+def _poses(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
+    """Write the poses of the tool, (16, N), of rows from ``start`` to ``stop``, at least ``LANES`` of them."""
+    room = new_room(arm)
+    tool = 12 * len(arm.kinds)
+    for number in range((stop - start + LANES - 1) // LANES):
+        at = begin(start, stop, number)
+        walk(room, arm, q, at)
+        for row in range(12):
+            give(room, tool + row, out, row, at)
+        for row in range(12, 16):
+            for i in range(LANES):
+                out[row, at + i] = 1.0 if row == 15 else 0.0
+
+
+poses = _compiled(_poses)
+
+
+def _target(room: Array, arm: Arm, to: int) -> None:
+    """Write where the point of the tool is."""
+    tool, (x, y, z) = 12 * len(arm.kinds), arm.point
+    for m in range(3):
+        row = tool + 4 * m
+        for i in range(LANES):
+            room[to + m, i] = room[row + 3, i] + x * room[row, i] + y * room[row + 1, i] + z * room[row + 2, i]
+
+
+target = _compiled(_target)
+
+
+def _axis(room: Array, arm: Arm, k: int, to: int) -> None:
+    """Write the axis of a joint in root axes."""
+    x, y, z = arm.axes[k]
+    for m in range(3):
+        row = 12 * k + 4 * m
+        mix(room, x, row, y, row + 1, z, row + 2, to + m)
+
+
+axis_of = _compiled(_axis)
+
+
+def _lever(room: Array, k: int, point: int, mass: float, to: int) -> None:
+    """Write a point, or a moment of some mass, seen from the origin of an element."""
+    for m in range(3):
+        for i in range(LANES):
+            room[to + m, i] = room[point + m, i] - mass * room[12 * k + 4 * m + 3, i]
+
+
+lever_of = _compiled(_lever)
+
+
 def _jacobians(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
     """Write the Jacobians at the point, (6 n, N)."""
-    frames, work, room = rooms(arm)
-    point, lever, axis, column, n = room[0:3], room[3:6], room[6:9], room[9], q.shape[1]
+    room, n = new_room(arm), q.shape[1]
+    point = len(room) - 12
+    lever, axis, column = point + 3, point + 6, point + 9
     for number in range((stop - start + LANES - 1) // LANES):
-        at = block(start, stop, number)
-        walk(arm, q, at, frames, work)
-        target(arm, frames[len(arm.kinds)], point)
+        at = begin(start, stop, number)
+        walk(room, arm, q, at)
+        target(room, arm, point)
         for j, k in enumerate(arm.movable):
-            lead, frame = arm.lead[j], frames[k]
+            lead, first, factor = arm.lead[j], arm.first[j], arm.factor[j]
             if lead < 0:
                 continue
-            for i in range(3):
-                x, y, z = frame[4 * i], frame[4 * i + 1], frame[4 * i + 2]
-                mix(arm.axes[k, 0], x, arm.axes[k, 1], y, arm.axes[k, 2], z, axis[i])
-                minus(point[i], frame[4 * i + 3], lever[i])
-            for i in range(3):
-                a, b = (i + 1) % 3, (i + 2) % 3
-                first, factor = arm.first[j], arm.factor[j]
-                linear, angular = out[i * n + lead, at : at + LANES], out[(3 + i) * n + lead, at : at + LANES]
-                if arm.kinds[k] == SLIDES:
-                    hand_on(first, factor, axis[i], linear)
-                    hand_on(first, 0.0, axis[i], angular)
-                else:
-                    cross(axis[a], lever[b], axis[b], lever[a], column)
-                    hand_on(first, factor, column, linear)
-                    hand_on(first, factor, axis[i], angular)
+            axis_of(room, arm, k, axis)
+            if arm.kinds[k] == SLIDES:
+                for m in range(3):
+                    hand_on(room, axis + m, first, factor, out, m * n + lead, at)
+                    hand_on(room, axis + m, first, 0.0, out, (3 + m) * n + lead, at)
+                continue
+            lever_of(room, k, point, 1.0, lever)
+            for m in range(3):
+                a, b = (m + 1) % 3, (m + 2) % 3
+                for i in range(LANES):
+                    turned = room[axis + a, i] * room[lever + b, i] - room[axis + b, i] * room[lever + a, i]
+                    room[column, i] = turned
+                hand_on(room, column, first, factor, out, m * n + lead, at)
+                hand_on(room, axis + m, first, factor, out, (3 + m) * n + lead, at)
 
 
 jacobians = _compiled(_jacobians)
@@ -333,64 +354,79 @@ jacobians = _compiled(_jacobians)
 
 def _placements(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
     """Write the sensitivities of the point to every placement, (36 S, N)."""
-    frames, work, room = rooms(arm)
-    point, lever, segments = room[0:3], room[3:6], len(arm.placed)
+    room, segments = new_room(arm), len(arm.placed)
+    point = len(room) - 12
+    lever = point + 3
     for number in range((stop - start + LANES - 1) // LANES):
-        at = block(start, stop, number)
-        end = at + LANES
-        walk(arm, q, at, frames, work)
-        target(arm, frames[len(arm.kinds)], point)
+        at = begin(start, stop, number)
+        walk(room, arm, q, at)
+        target(room, arm, point)
         for s, k in enumerate(arm.placed):
-            frame = frames[k]
-            for i in range(3):
-                minus(point[i], frame[4 * i + 3], lever[i])
-            for i in range(3):
-                a, b = (i + 1) % 3, (i + 2) % 3
-                linear, angular = 6 * (i * segments + s), 6 * ((3 + i) * segments + s)
-                for m in range(3):
-                    copy(frame[4 * i + m], out[linear + m, at:end])
-                    cross(frame[4 * a + m], lever[b], frame[4 * b + m], lever[a], out[linear + 3 + m, at:end])
-                    out[angular + m, at:end] = 0.0
-                    copy(frame[4 * i + m], out[angular + 3 + m, at:end])
+            lever_of(room, k, point, 1.0, lever)
+            for m in range(3):
+                a, b = (m + 1) % 3, (m + 2) % 3
+                linear, angular = 6 * (m * segments + s), 6 * ((3 + m) * segments + s)
+                for c in range(3):
+                    row, x, y = 12 * k + 4 * m + c, 12 * k + 4 * a + c, 12 * k + 4 * b + c
+                    give(room, row, out, linear + c, at)
+                    give_cross(room, x, lever + b, y, lever + a, out, linear + 3 + c, at)
+                    for i in range(LANES):
+                        out[angular + c, at + i] = 0.0
+                    give(room, row, out, angular + 3 + c, at)
 
 
 placements = _compiled(_placements)
 
 
+def _weigh(room: Array, arm: Arm, j: int, moment: int) -> None:
+    """Add the first moment of the bodies behind a movable joint."""
+    weight, (x, y, z) = arm.masses[j], arm.centres[j]
+    for m in range(3):
+        row = 12 * (arm.movable[j] + 1) + 4 * m
+        for i in range(LANES):
+            centre = room[row + 3, i] + x * room[row, i] + y * room[row + 1, i] + z * room[row + 2, i]
+            room[moment + m, i] += weight * centre
+
+
+weigh = _compiled(_weigh)
+
+
+def _hold(room: Array, axis: int, lever: int, pull: Array, to: int) -> None:
+    """Write axis · (pull × lever)."""
+    x, y, z = pull
+    for i in range(LANES):
+        a, b, c = room[lever, i], room[lever + 1, i], room[lever + 2, i]
+        torque = room[axis, i] * (y * c - z * b) + room[axis + 1, i] * (z * a - x * c)
+        room[to, i] = torque + room[axis + 2, i] * (x * b - y * a)
+
+
+hold = _compiled(_hold)
+
+
 def _gravity(arm: Arm, pull: Array, payload: float, q: Array, start: int, stop: int, out: Array) -> None:
     """Write the torques, (n, N), that hold the arm and a payload at the point."""
-    frames, work, room = rooms(arm)
-    moment, lever, axis, term, total = room[0:3], room[3:6], room[6:9], room[9:11], room[11]
+    room = new_room(arm)
+    moment = len(room) - 12
+    lever, axis, torque = moment + 3, moment + 6, moment + 9
     for number in range((stop - start + LANES - 1) // LANES):
-        at = block(start, stop, number)
-        walk(arm, q, at, frames, work)
-        target(arm, frames[len(arm.kinds)], lever)
-        for i in range(3):
-            hand_on(True, payload, lever[i], moment[i])
+        at = begin(start, stop, number)
+        walk(room, arm, q, at)
+        target(room, arm, moment)
+        for m in range(3):
+            mix(room, payload, moment + m, 0.0, moment + m, 0.0, moment + m, moment + m)
         mass = payload
         for j in range(len(arm.movable) - 1, -1, -1):
-            k = arm.movable[j]
-            weight, centre, body, frame = arm.masses[j], arm.centres[j], frames[k + 1], frames[k]
-            mass += weight
-            for i in range(3):
-                x, y, z, origin = body[4 * i], body[4 * i + 1], body[4 * i + 2], body[4 * i + 3]
-                mix(centre[0], x, centre[1], y, centre[2], z, term[0])
-                mix(1.0, moment[i], weight, term[0], weight, origin, term[1])
-                copy(term[1], moment[i])
-                x, y, z, origin = frame[4 * i], frame[4 * i + 1], frame[4 * i + 2], frame[4 * i + 3]
-                mix(arm.axes[k, 0], x, arm.axes[k, 1], y, arm.axes[k, 2], z, axis[i])
-                mix(1.0, moment[i], -mass, origin, 0.0, origin, lever[i])
+            k, mass = arm.movable[j], mass + arm.masses[j]
+            weigh(room, arm, j, moment)
             if arm.lead[j] < 0:
                 continue
+            axis_of(room, arm, k, axis)
             if arm.kinds[k] == SLIDES:
-                mix(-mass * pull[0], axis[0], -mass * pull[1], axis[1], -mass * pull[2], axis[2], total)
-            else:  # axis · (pull × lever)
-                total[:] = 0.0
-                for i in range(3):
-                    a, b = (i + 1) % 3, (i + 2) % 3
-                    mix(pull[a], lever[b], -pull[b], lever[a], 0.0, lever[a], term[0])
-                    add_product(axis[i], term[0], total)
-            hand_on(arm.first[j], arm.factor[j], total, out[arm.lead[j], at : at + LANES])
+                mix(room, -mass * pull[0], axis, -mass * pull[1], axis + 1, -mass * pull[2], axis + 2, torque)
+            else:
+                lever_of(room, k, moment, mass, lever)
+                hold(room, axis, lever, pull, torque)
+            hand_on(room, torque, arm.last[j], arm.factor[j], out, arm.lead[j], at)
 
 
 gravity = _compiled(_gravity)
