@@ -194,38 +194,38 @@ def _load(room: Array, arm: Arm, j: int, q: Array, start: int, to: int) -> bool:
 load = _compiled(_load)
 
 
-def _walk(room: Array, arm: Arm, q: Array, start: int) -> None:
-    """Write the frames of a block, twelve rows each: of every element before its motion, and of the tool."""
+def _walk(room: Array, arm: Arm, kept: int, q: Array, start: int) -> None:
+    """Write the frames of a block, twelve rows each: of the last elements before their motion, and of the tool."""
     elements = len(arm.kinds)
-    here = 12 * (elements + 1)
+    here = 12 * (kept + 1)
     aligned, joint, came = here + 12, here + 24, 0
     for k in range(elements):
         if k == 0:
             for row in range(12):
                 room[row, :] = arm.place[0, row // 4, row % 4]
         else:
-            follow(room, arm.place[k], came, 12 * k)
-        came = 12 * k
+            follow(room, arm.place[k], came, 12 * (k % kept))
+        came = 12 * (k % kept)
         if arm.joint[k] >= 0:
             large = load(room, arm, arm.joint[k], q, start, joint)
             if arm.kinds[k] != SLIDES:
                 turn(room, joint, large)
-            move(room, arm, k, joint, 12 * k, aligned, here)
+            move(room, arm, k, joint, came, aligned, here)
             came = here
     if arm.kinds[elements - 1] == TURNS_ALIGNED:
-        follow(room, arm.back, here, 12 * elements)
+        follow(room, arm.back, here, 12 * kept)
     else:
         for row in range(12):
             for i in range(LANES):
-                room[12 * elements + row, i] = room[came + row, i]
+                room[12 * kept + row, i] = room[came + row, i]
 
 
 walk = _compiled(_walk)
 
 
-def _room(arm: Arm) -> Array:
-    """Memory for the frames of a block, for the walk, and behind it for twelve more rows."""
-    return np.empty((12 * (len(arm.kinds) + 3) + 3 + 12, LANES))
+def _room(kept: int) -> Array:
+    """Memory for that many frames of a block, the tool's and the walk's, and behind them for twelve more rows."""
+    return np.empty((12 * (kept + 3) + 3 + 12, LANES))
 
 
 new_room = _compiled(_room)
@@ -272,13 +272,12 @@ hand_on = _compiled(_hand_on)
 
 def _poses(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
     """Write the poses of the tool, (16, N), of rows from ``start`` to ``stop``, at least ``LANES`` of them."""
-    room = new_room(arm)
-    tool = 12 * len(arm.kinds)
+    room = new_room(2)  # no frame is looked at again but the last
     for number in range((stop - start + LANES - 1) // LANES):
         at = begin(start, stop, number)
-        walk(room, arm, q, at)
+        walk(room, arm, 2, q, at)
         for row in range(12):
-            give(room, tool + row, out, row, at)
+            give(room, 24 + row, out, row, at)
         for row in range(12, 16):
             for i in range(LANES):
                 out[row, at + i] = 1.0 if row == 15 else 0.0
@@ -322,12 +321,12 @@ lever_of = _compiled(_lever)
 
 def _jacobians(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
     """Write the Jacobians at the point, (6 n, N)."""
-    room, n = new_room(arm), q.shape[1]
+    room, n = new_room(len(arm.kinds)), q.shape[1]
     point = len(room) - 12
     lever, axis, column = point + 3, point + 6, point + 9
     for number in range((stop - start + LANES - 1) // LANES):
         at = begin(start, stop, number)
-        walk(room, arm, q, at)
+        walk(room, arm, len(arm.kinds), q, at)
         target(room, arm, point)
         for j, k in enumerate(arm.movable):
             lead, first, factor = arm.lead[j], arm.first[j], arm.factor[j]
@@ -354,12 +353,12 @@ jacobians = _compiled(_jacobians)
 
 def _placements(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
     """Write the sensitivities of the point to every placement, (36 S, N)."""
-    room, segments = new_room(arm), len(arm.placed)
+    room, segments = new_room(len(arm.kinds)), len(arm.placed)
     point = len(room) - 12
     lever = point + 3
     for number in range((stop - start + LANES - 1) // LANES):
         at = begin(start, stop, number)
-        walk(room, arm, q, at)
+        walk(room, arm, len(arm.kinds), q, at)
         target(room, arm, point)
         for s, k in enumerate(arm.placed):
             lever_of(room, k, point, 1.0, lever)
@@ -405,12 +404,12 @@ hold = _compiled(_hold)
 
 def _gravity(arm: Arm, pull: Array, payload: float, q: Array, start: int, stop: int, out: Array) -> None:
     """Write the torques, (n, N), that hold the arm and a payload at the point."""
-    room = new_room(arm)
+    room = new_room(len(arm.kinds))
     moment = len(room) - 12
     lever, axis, torque = moment + 3, moment + 6, moment + 9
     for number in range((stop - start + LANES - 1) // LANES):
         at = begin(start, stop, number)
-        walk(room, arm, q, at)
+        walk(room, arm, len(arm.kinds), q, at)
         target(room, arm, moment)
         for m in range(3):
             mix(room, payload, moment + m, 0.0, moment + m, 0.0, moment + m, moment + m)

@@ -12,7 +12,7 @@ FEW = 80
 poses, 100 for Jacobians and torques)."""
 MOST_PLACEMENTS = 40
 """Segments of a chain that Pinocchio is called for: its memory grows with their cube, 9 MB at 40."""
-LANES = 64
+LANES = 256
 """Configurations side by side in the inner loops of the compiled kernels: whole vectors of any processor, and few
 enough for the frames of an arm to stay in a core's first cache."""
 LARGEST_REDUCED = 1e6
