@@ -4,17 +4,19 @@ import numpy as np
 import pytest
 
 from thermal_robot import kinematics as kin
-from thermal_robot.kinematics import engines, lanes, reference, settings, thin
+from thermal_robot.kinematics import compiled, engines, lanes, reference, settings, thin
 
 ROWS = 150
 POINT = np.array([0.05, -0.1, 0.2])
 COM = np.array([0.03, -0.02, 0.1])
 
 
-@pytest.fixture(params=["thin", "lanes"])
+@pytest.fixture(params=["thin", "lanes", "compiled"])
 def engine(request):
     """Each engine in turn."""
-    return {"thin": thin, "lanes": lanes}[request.param]
+    if request.param == "compiled":
+        pytest.importorskip("numba", reason="the compiled engine is in the extra fast: numba is not installed")
+    return {"thin": thin, "lanes": lanes, "compiled": compiled}[request.param]
 
 
 @pytest.fixture
@@ -92,3 +94,11 @@ def test_pinocchio_is_for_few_and_for_chains_that_are_not_long(rv_m2, monkeypatc
     assert engines.engine_for(rv_m2, settings.FEW + 1) is lanes
     monkeypatch.setattr(settings, "MOST_PLACEMENTS", len(rv_m2.segments) - 1)
     assert engines.engine_for(rv_m2, 1) is lanes
+
+
+def test_compiled_lanes_are_for_very_many_and_for_those_who_have_numba(rv_m2, monkeypatch):
+    monkeypatch.setattr(compiled, "installed", lambda: True)
+    assert engines.engine_for(rv_m2, settings.MANY - 1) is lanes
+    assert engines.engine_for(rv_m2, settings.MANY) is compiled
+    monkeypatch.setattr(compiled, "installed", lambda: False)
+    assert engines.engine_for(rv_m2, 10 * settings.MANY) is lanes

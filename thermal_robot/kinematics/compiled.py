@@ -156,7 +156,10 @@ def _pieces(kernel: Callable[..., None], constants: tuple[Any, ...], q: Array, r
 
 
 def _called(kernel: Callable[..., None], *arguments: Any) -> None:
-    try:
-        kernel(*arguments)
-    except OSError:  # compiled, but there is no room on the disk to keep it
-        kernel(*arguments)
+    # A full disk stops numba when it has compiled a function and is to keep it; the next try goes on from there.
+    for _ in range(settings.MOST_UNKEPT):
+        try:
+            return kernel(*arguments)
+        except OSError:
+            continue
+    kernel(*arguments)

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.kinematics import lanes, settings, thin
+from thermal_robot.kinematics import compiled, lanes, settings, thin
 
 if TYPE_CHECKING:
     from thermal_robot.kinematics.chained import Chained, Weighted
@@ -38,4 +38,4 @@ def engine_for(robot: Chained, rows: int) -> Engine:
     """Return the engine that is fastest for that many configurations."""
     if rows <= settings.FEW and thin.covers(robot):
         return thin
-    return lanes
+    return compiled if rows >= settings.MANY and compiled.installed() else lanes

@@ -12,9 +12,9 @@ FEW = 80
 poses, 100 for Jacobians and torques)."""
 MOST_PLACEMENTS = 40
 """Segments of a chain that Pinocchio is called for: its memory grows with their cube, 9 MB at 40."""
-LANES = 256
-"""Configurations side by side in the inner loops of the compiled kernels: whole vectors of any processor, and few
-enough for the frames of an arm to stay in a core's first cache."""
+LANES = 512
+"""Configurations side by side in the inner loops of the compiled kernels: long rows for the memory that results are
+written to, and few enough for the frames of an arm to stay in a core's own cache."""
 LARGEST_REDUCED = 1e6
 """rad; the sine of a larger angle is left to the library, for the reduction to ±π/4 would lose digits."""
 MANY = 20_000
@@ -24,3 +24,5 @@ PIECE = 16_384
 """Configurations that a thread works on before it takes the next ones."""
 THREADS = 0
 """Threads of the compiled kernels; 0 for one on each processor that this process may use."""
+MOST_UNKEPT = 50
+"""Compiled functions that there may be no room on the disk for; a kernel is made of twenty at most."""
