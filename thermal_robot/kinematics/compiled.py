@@ -14,17 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.kinematics import lanes, settings
-from thermal_robot.kinematics.model import PRISMATIC, Chain
+from thermal_robot.kinematics.arm import arm_of
 from thermal_robot.kinematics.scratch import rows_last, scratch
-from thermal_robot.kinematics.walk import steps
 
 if TYPE_CHECKING:
     from thermal_robot.kinematics.chained import Chained, Weighted
-    from thermal_robot.kinematics.kernels import Arm
 
 Array = NDArray[np.float64]
-
-_ORIGIN = np.zeros(3)
 
 
 @cache
@@ -45,7 +41,7 @@ def poses(robot: Chained, q: Array, out: Array) -> None:
     """Write the poses of the tool, (N, 4, 4)."""
     from thermal_robot.kinematics import kernels
 
-    _run(kernels.poses, (arm(robot.chain, _ORIGIN),), q, out)
+    _run(kernels.poses, (arm_of(robot.chain, None),), q, out)
 
 
 def jacobians(robot: Chained, q: Array, point: Array | None, out: Array) -> None:
@@ -55,7 +51,7 @@ def jacobians(robot: Chained, q: Array, point: Array | None, out: Array) -> None
     if point is not None and point.ndim == 2:
         lanes.jacobians(robot, q, point, out)
     else:
-        _run(kernels.jacobians, (arm(robot.chain, point),), q, out)
+        _run(kernels.jacobians, (arm_of(robot.chain, point),), q, out)
 
 
 def placements(robot: Chained, q: Array, point: Array | None, out: Array) -> None:
@@ -65,7 +61,7 @@ def placements(robot: Chained, q: Array, point: Array | None, out: Array) -> Non
     if point is not None and point.ndim == 2:
         lanes.placements(robot, q, point, out)
     else:
-        _run(kernels.placements, (arm(robot.chain, point),), q, out)
+        _run(kernels.placements, (arm_of(robot.chain, point),), q, out)
 
 
 def gravity(robot: Weighted, q: Array, mass: Array, com: Array, out: Array) -> None:
@@ -76,43 +72,7 @@ def gravity(robot: Weighted, q: Array, mass: Array, com: Array, out: Array) -> N
         lanes.gravity(robot, q, mass, com, out)
     else:
         pull = np.array(robot.gravity, dtype=float)
-        _run(kernels.gravity, (arm(robot.chain, com), pull, float(mass)), q, out)
-
-
-def arm(chain: Chain, point: Array | None) -> Arm:
-    """Write a chain, and a point of its tool, as the kernels want it."""
-    from thermal_robot.kinematics import kernels
-
-    taken, matrix = steps(chain), chain.coupling.matrix
-    still = [step.joint is None for step in taken.each]
-    kinds = np.array([kernels.FIXED if f else kernels.TURNS for f in still])
-    kinds[[step.aligned is not None for step in taken.each]] = kernels.TURNS_ALIGNED
-    kinds[chain.kinds == PRISMATIC] = kernels.SLIDES
-    eye = np.eye(4)
-    lead = [chain.coupling.leader(j) for j in range(len(matrix))]
-    return kernels.Arm(
-        kinds=kinds,
-        joint=np.array([-1 if step.joint is None else step.joint for step in taken.each]),
-        turns=np.array([(step.turns[0].start, step.turns[1].start) for step in taken.each]),
-        place=_rigid([step.place for step in taken.each]),
-        aligned=_rigid([eye if step.aligned is None else step.aligned for step in taken.each]),
-        back=_rigid([eye if taken.last is None else taken.last])[0],
-        axes=np.array(chain.axes),
-        movable=np.array(chain.movable),
-        placed=np.array(chain.placed),
-        lead=np.array([-1 if j is None else j for j in lead]),
-        factor=np.array([0.0 if j is None else matrix[row, j] for row, j in enumerate(lead)]),
-        offset=np.array(chain.coupling.offset),
-        first=np.array([j not in lead[:row] for row, j in enumerate(lead)]),
-        last=np.array([j not in lead[row + 1 :] for row, j in enumerate(lead)]),
-        masses=np.array(chain.masses),
-        centres=np.array(chain.mass_centres),
-        point=np.array(_ORIGIN if point is None else point),
-    )
-
-
-def _rigid(transposed: list[Array]) -> Array:
-    return np.ascontiguousarray(np.array(transposed).transpose(0, 2, 1)[:, :3])
+        _run(kernels.gravity, (arm_of(robot.chain, com), pull, float(mass)), q, out)
 
 
 def _run(kernel: Callable[..., None], constants: tuple[Any, ...], q: Array, out: Array) -> None:

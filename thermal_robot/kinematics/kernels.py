@@ -3,26 +3,24 @@
 Imported only where numba is installed. Every loop over lanes has the same fixed length and no branch, so that the
 compiler makes vector instructions of it and each lane is computed alike, wherever it stands in a block and whichever
 thread works on it. What is worked on stands in one array, the room: rows of one number for each lane, given by their
-place in it, since a view of a row would be counted by every function that it is handed to. Functions are compiled where
-they stand, for each uses the compiled ones before it.
+place in it, since a view of a row would be counted by every function that it is handed to. All kernels stand in this
+file, for numba looks at nothing else to see whether what it has kept is old: touch it where ``LANES`` is changed.
 """
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import Any, NamedTuple
+from typing import Any
 
 import numba
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.kinematics.arm import SLIDES, TURNS_ALIGNED, Arm
 from thermal_robot.kinematics.settings import LANES, LARGEST_REDUCED
 
 Array = NDArray[np.float64]
-
-FIXED, TURNS, TURNS_ALIGNED, SLIDES = 0, 1, 2, 3
-"""What happens behind a placement: nothing, a turn about an axis of the frame, or about any other, a slide."""
 
 _QUARTERS = 2.0 / math.pi
 _HALF_PI = (1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624879595063154e-21)
@@ -39,57 +37,15 @@ def _compiled(function: Callable[..., Any]) -> Any:
 
     Products and sums may be contracted to one rounding; nothing else is loosened: what is no number stays none.
     """
-    options = {"nogil": True, "fastmath": {"contract"}}
+    compiler: Any = numba.njit
     try:
-        return numba.njit(cache=True, **options)(function)
+        return compiler(cache=True, nogil=True, fastmath={"contract"})(function)
     except RuntimeError:  # numba finds no folder for its cache
-        return numba.njit(**options)(function)
+        return compiler(nogil=True, fastmath={"contract"})(function)
 
 
-class Arm(NamedTuple):
-    """Constant arrays of a chain of K elements, M movable joints, n driving ones and S segments.
-
-    Parameters
-    ----------
-    kinds, joint
-        (K,) what happens behind each placement, and the number of the movable joint, −1 for a fixed element.
-    turns
-        (K, 2) columns of the rotation: the first turns towards the second.
-    place, aligned, back
-        (K, 3, 4), (K, 3, 4) and (3, 4): placements of the walk, rotations that put the third axis on that of the
-        joint, and the way back behind the last one; as :class:`~thermal_robot.kinematics.walk.Steps` has them.
-    axes
-        (K, 3) of the joints.
-    movable, placed
-        (M,) and (S,) elements.
-    lead, factor, offset, first, last
-        (M,) column of the driving joint (−1: none), how a joint follows it, and whether it is the first or last to.
-    masses, centres
-        (M,) kg and (M, 3) m, as a chain has them.
-    point
-        (3,) m, of the tool.
-    """
-
-    kinds: NDArray[np.int64]
-    joint: NDArray[np.int64]
-    turns: NDArray[np.int64]
-    place: Array
-    aligned: Array
-    back: Array
-    axes: Array
-    movable: NDArray[np.int64]
-    placed: NDArray[np.int64]
-    lead: NDArray[np.int64]
-    factor: Array
-    offset: Array
-    first: NDArray[np.bool_]
-    last: NDArray[np.bool_]
-    masses: Array
-    centres: Array
-    point: Array
-
-
-def _sincos(room: Array, x: int) -> None:
+@_compiled
+def sincos(room: Array, x: int) -> None:
     """Write sines and cosines of the angles of a row, below ``LARGEST_REDUCED``, to the next two rows."""
     (p1, p2, p3), (s1, s2, s3, s4, s5, s6), (c1, c2, c3, c4, c5, c6) = _HALF_PI, _SINE, _COSINE
     for i in range(LANES):
@@ -106,10 +62,8 @@ def _sincos(room: Array, x: int) -> None:
         room[x + 2, i] = sign * (-s if odd == 1.0 else c)
 
 
-sincos = _compiled(_sincos)
-
-
-def _turn(room: Array, x: int, large: bool) -> None:
+@_compiled
+def turn(room: Array, x: int, large: bool) -> None:
     """Write sines and cosines of angles of any size: the large ones, if there are any, one by one."""
     sincos(room, x)
     if large:
@@ -118,10 +72,8 @@ def _turn(room: Array, x: int, large: bool) -> None:
                 room[x + 1, i], room[x + 2, i] = math.sin(room[x, i]), math.cos(room[x, i])
 
 
-turn = _compiled(_turn)
-
-
-def _follow(room: Array, place: Array, x: int, to: int) -> None:
+@_compiled
+def follow(room: Array, place: Array, x: int, to: int) -> None:
     """Follow the frame in twelve rows by a constant placement, (3, 4)."""
     for row in range(0, 12, 4):
         for m in range(4):
@@ -135,18 +87,15 @@ def _follow(room: Array, place: Array, x: int, to: int) -> None:
                     room[to + row + 3, i] = room[x + row + 3, i] + along
 
 
-follow = _compiled(_follow)
-
-
-def _mix(room: Array, a: float, x: int, b: float, y: int, c: float, z: int, to: int) -> None:
+@_compiled
+def mix(room: Array, a: float, x: int, b: float, y: int, c: float, z: int, to: int) -> None:
+    """Write the sum of three rows, each times a number."""
     for i in range(LANES):
         room[to, i] = a * room[x, i] + b * room[y, i] + c * room[z, i]
 
 
-mix = _compiled(_mix)
-
-
-def _move(room: Array, arm: Arm, k: int, joint: int, frame: int, work: int, to: int) -> None:
+@_compiled
+def move(room: Array, arm: Arm, k: int, joint: int, frame: int, work: int, to: int) -> None:
     """Move the frame as the joint behind it does: position, sine and cosine are the rows from ``joint``."""
     a, b, source = arm.turns[k, 0], arm.turns[k, 1], frame
     if arm.kinds[k] == SLIDES:
@@ -176,10 +125,8 @@ def _move(room: Array, arm: Arm, k: int, joint: int, frame: int, work: int, to: 
             room[to + row + 3, i] = room[source + row + 3, i]
 
 
-move = _compiled(_move)
-
-
-def _load(room: Array, arm: Arm, j: int, q: Array, start: int, to: int) -> bool:
+@_compiled
+def load(room: Array, arm: Arm, j: int, q: Array, start: int, to: int) -> bool:
     """Write the positions of a movable joint; return whether one is too large for the short reduction."""
     lead, factor, offset, large = arm.lead[j], arm.factor[j], arm.offset[j], False
     for i in range(LANES):
@@ -191,10 +138,8 @@ def _load(room: Array, arm: Arm, j: int, q: Array, start: int, to: int) -> bool:
     return large
 
 
-load = _compiled(_load)
-
-
-def _walk(room: Array, arm: Arm, kept: int, q: Array, start: int) -> None:
+@_compiled
+def walk(room: Array, arm: Arm, kept: int, q: Array, start: int) -> None:
     """Write the frames of a block, twelve rows each: of the last elements before their motion, and of the tool."""
     elements = len(arm.kinds)
     here = 12 * (kept + 1)
@@ -220,57 +165,55 @@ def _walk(room: Array, arm: Arm, kept: int, q: Array, start: int) -> None:
                 room[12 * kept + row, i] = room[came + row, i]
 
 
-walk = _compiled(_walk)
-
-
-def _room(kept: int) -> Array:
+@_compiled
+def new_room(kept: int) -> Array:
     """Memory for that many frames of a block, the tool's and the walk's, and behind them for twelve more rows."""
     return np.empty((12 * (kept + 3) + 3 + 12, LANES))
 
 
-new_room = _compiled(_room)
-
-
-def _begin(start: int, stop: int, number: int) -> int:
+@_compiled
+def begin(start: int, stop: int, number: int) -> int:
     """Where a block begins: the last one ends with the rows, and works on some of them once more."""
     return min(start + number * LANES, stop - LANES)
 
 
-begin = _compiled(_begin)
-
-
-def _give(room: Array, x: int, out: Array, row: int, start: int) -> None:
+@_compiled
+def give(room: Array, x: int, out: Array, row: int, start: int) -> None:
     """Hand a row over to the results."""
     for i in range(LANES):
         out[row, start + i] = room[x, i]
 
 
-give = _compiled(_give)
+@_compiled
+def give_zeros(out: Array, row: int, start: int) -> None:
+    """Write zeros to the results."""
+    for i in range(LANES):
+        out[row, start + i] = 0.0
 
 
-def _give_cross(room: Array, a: int, b: int, c: int, d: int, out: Array, row: int, start: int) -> None:
+@_compiled
+def give_cross(room: Array, a: int, b: int, c: int, d: int, out: Array, row: int, start: int) -> None:
     """Hand one component of a cross product over to the results."""
     for i in range(LANES):
         out[row, start + i] = room[a, i] * room[b, i] - room[c, i] * room[d, i]
 
 
-give_cross = _compiled(_give_cross)
+@_compiled
+def add(room: Array, x: int, out: Array, row: int, start: int) -> None:
+    """Add a row to the results."""
+    for i in range(LANES):
+        out[row, start + i] += room[x, i]
 
 
-def _hand_on(room: Array, x: int, first: bool, factor: float, out: Array, row: int, start: int) -> None:
-    """Hand what a movable joint does over to the one that drives it: the first that follows writes, others add."""
-    if first:
-        for i in range(LANES):
-            out[row, start + i] = factor * room[x, i]
-    else:
-        for i in range(LANES):
-            out[row, start + i] += factor * room[x, i]
+@_compiled
+def add_cross(room: Array, a: int, b: int, c: int, d: int, out: Array, row: int, start: int) -> None:
+    """Add one component of a cross product to the results."""
+    for i in range(LANES):
+        out[row, start + i] += room[a, i] * room[b, i] - room[c, i] * room[d, i]
 
 
-hand_on = _compiled(_hand_on)
-
-
-def _poses(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
+@_compiled
+def poses(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
     """Write the poses of the tool, (16, N), of rows from ``start`` to ``stop``, at least ``LANES`` of them."""
     room = new_room(2)  # no frame is looked at again but the last
     for number in range((stop - start + LANES - 1) // LANES):
@@ -278,15 +221,14 @@ def _poses(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
         walk(room, arm, 2, q, at)
         for row in range(12):
             give(room, 24 + row, out, row, at)
-        for row in range(12, 16):
-            for i in range(LANES):
-                out[row, at + i] = 1.0 if row == 15 else 0.0
+        for row in range(12, 15):
+            give_zeros(out, row, at)
+        for i in range(LANES):
+            out[15, at + i] = 1.0
 
 
-poses = _compiled(_poses)
-
-
-def _target(room: Array, arm: Arm, to: int) -> None:
+@_compiled
+def target(room: Array, arm: Arm, to: int) -> None:
     """Write where the point of the tool is."""
     tool, (x, y, z) = 12 * len(arm.kinds), arm.point
     for m in range(3):
@@ -295,63 +237,56 @@ def _target(room: Array, arm: Arm, to: int) -> None:
             room[to + m, i] = room[row + 3, i] + x * room[row, i] + y * room[row + 1, i] + z * room[row + 2, i]
 
 
-target = _compiled(_target)
-
-
-def _axis(room: Array, arm: Arm, k: int, to: int) -> None:
-    """Write the axis of a joint in root axes."""
+@_compiled
+def axis_of(room: Array, arm: Arm, k: int, factor: float, to: int) -> None:
+    """Write the axis of a joint in root axes, times a factor."""
     x, y, z = arm.axes[k]
     for m in range(3):
         row = 12 * k + 4 * m
-        mix(room, x, row, y, row + 1, z, row + 2, to + m)
+        mix(room, factor * x, row, factor * y, row + 1, factor * z, row + 2, to + m)
 
 
-axis_of = _compiled(_axis)
-
-
-def _lever(room: Array, k: int, point: int, mass: float, to: int) -> None:
+@_compiled
+def lever_of(room: Array, k: int, point: int, mass: float, to: int) -> None:
     """Write a point, or a moment of some mass, seen from the origin of an element."""
     for m in range(3):
         for i in range(LANES):
             room[to + m, i] = room[point + m, i] - mass * room[12 * k + 4 * m + 3, i]
 
 
-lever_of = _compiled(_lever)
-
-
-def _jacobians(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
-    """Write the Jacobians at the point, (6 n, N)."""
+@_compiled
+def jacobians(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
+    """Write the Jacobians at the point, (6 n, N): the first joint that follows a driving one writes, others add."""
     room, n = new_room(len(arm.kinds)), q.shape[1]
     point = len(room) - 12
-    lever, axis, column = point + 3, point + 6, point + 9
+    lever, axis = point + 3, point + 6
     for number in range((stop - start + LANES - 1) // LANES):
         at = begin(start, stop, number)
         walk(room, arm, len(arm.kinds), q, at)
         target(room, arm, point)
         for j, k in enumerate(arm.movable):
-            lead, first, factor = arm.lead[j], arm.first[j], arm.factor[j]
+            lead, first, slides = arm.lead[j], arm.first[j], arm.kinds[k] == SLIDES
             if lead < 0:
                 continue
-            axis_of(room, arm, k, axis)
-            if arm.kinds[k] == SLIDES:
-                for m in range(3):
-                    hand_on(room, axis + m, first, factor, out, m * n + lead, at)
-                    hand_on(room, axis + m, first, 0.0, out, (3 + m) * n + lead, at)
-                continue
+            axis_of(room, arm, k, arm.factor[j], axis)
             lever_of(room, k, point, 1.0, lever)
             for m in range(3):
-                a, b = (m + 1) % 3, (m + 2) % 3
-                for i in range(LANES):
-                    turned = room[axis + a, i] * room[lever + b, i] - room[axis + b, i] * room[lever + a, i]
-                    room[column, i] = turned
-                hand_on(room, column, first, factor, out, m * n + lead, at)
-                hand_on(room, axis + m, first, factor, out, (3 + m) * n + lead, at)
+                a, b, linear, angular = (m + 1) % 3, (m + 2) % 3, m * n + lead, (3 + m) * n + lead
+                if first and slides:
+                    give(room, axis + m, out, linear, at)
+                    give_zeros(out, angular, at)
+                elif first:
+                    give_cross(room, axis + a, lever + b, axis + b, lever + a, out, linear, at)
+                    give(room, axis + m, out, angular, at)
+                elif slides:
+                    add(room, axis + m, out, linear, at)
+                else:
+                    add_cross(room, axis + a, lever + b, axis + b, lever + a, out, linear, at)
+                    add(room, axis + m, out, angular, at)
 
 
-jacobians = _compiled(_jacobians)
-
-
-def _placements(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
+@_compiled
+def placements(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
     """Write the sensitivities of the point to every placement, (36 S, N)."""
     room, segments = new_room(len(arm.kinds)), len(arm.placed)
     point = len(room) - 12
@@ -369,15 +304,12 @@ def _placements(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
                     row, x, y = 12 * k + 4 * m + c, 12 * k + 4 * a + c, 12 * k + 4 * b + c
                     give(room, row, out, linear + c, at)
                     give_cross(room, x, lever + b, y, lever + a, out, linear + 3 + c, at)
-                    for i in range(LANES):
-                        out[angular + c, at + i] = 0.0
+                    give_zeros(out, angular + c, at)
                     give(room, row, out, angular + 3 + c, at)
 
 
-placements = _compiled(_placements)
-
-
-def _weigh(room: Array, arm: Arm, j: int, moment: int) -> None:
+@_compiled
+def weigh(room: Array, arm: Arm, j: int, moment: int) -> None:
     """Add the first moment of the bodies behind a movable joint."""
     weight, (x, y, z) = arm.masses[j], arm.centres[j]
     for m in range(3):
@@ -387,10 +319,8 @@ def _weigh(room: Array, arm: Arm, j: int, moment: int) -> None:
             room[moment + m, i] += weight * centre
 
 
-weigh = _compiled(_weigh)
-
-
-def _hold(room: Array, axis: int, lever: int, pull: Array, to: int) -> None:
+@_compiled
+def hold(room: Array, axis: int, lever: int, pull: Array, to: int) -> None:
     """Write axis · (pull × lever)."""
     x, y, z = pull
     for i in range(LANES):
@@ -399,10 +329,8 @@ def _hold(room: Array, axis: int, lever: int, pull: Array, to: int) -> None:
         room[to, i] = torque + room[axis + 2, i] * (x * b - y * a)
 
 
-hold = _compiled(_hold)
-
-
-def _gravity(arm: Arm, pull: Array, payload: float, q: Array, start: int, stop: int, out: Array) -> None:
+@_compiled
+def gravity(arm: Arm, pull: Array, payload: float, q: Array, start: int, stop: int, out: Array) -> None:
     """Write the torques, (n, N), that hold the arm and a payload at the point."""
     room = new_room(len(arm.kinds))
     moment = len(room) - 12
@@ -419,13 +347,13 @@ def _gravity(arm: Arm, pull: Array, payload: float, q: Array, start: int, stop: 
             weigh(room, arm, j, moment)
             if arm.lead[j] < 0:
                 continue
-            axis_of(room, arm, k, axis)
+            axis_of(room, arm, k, arm.factor[j], axis)
             if arm.kinds[k] == SLIDES:
                 mix(room, -mass * pull[0], axis, -mass * pull[1], axis + 1, -mass * pull[2], axis + 2, torque)
             else:
                 lever_of(room, k, moment, mass, lever)
                 hold(room, axis, lever, pull, torque)
-            hand_on(room, torque, arm.last[j], arm.factor[j], out, arm.lead[j], at)
-
-
-gravity = _compiled(_gravity)
+            if arm.last[j]:  # from the tool inwards it is the last that writes
+                give(room, torque, out, arm.lead[j], at)
+            else:
+                add(room, torque, out, arm.lead[j], at)
