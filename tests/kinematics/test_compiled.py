@@ -150,3 +150,39 @@ def test_numba_is_not_loaded_before_it_pays():
         "tool_poses(load_robot('builtin:rv_m2', 'tool0'), np.zeros((1000, 5))); assert 'numba' not in sys.modules"
     )
     subprocess.run([sys.executable, "-c", script], check=True)
+
+
+WITHOUT = """
+import sys
+from importlib.machinery import PathFinder
+found = PathFinder.find_spec
+def find_spec(name, *arguments):
+    {block}
+    return found(name, *arguments)
+PathFinder.find_spec = find_spec
+import warnings
+import numpy as np
+from thermal_robot import load_robot
+from thermal_robot.kinematics import settings, tool_poses
+with warnings.catch_warnings(record=True) as told:
+    warnings.simplefilter("always")
+    poses = tool_poses(load_robot("builtin:rv_m2", "tool0"), np.zeros((settings.MANY, 5)))
+assert np.ptp(poses, axis=0).max() == 0.0
+print(*[warning.message for warning in told])
+"""
+
+
+def test_all_works_without_numba():
+    block = "if name.split('.')[0] == 'numba': return None"
+    script = WITHOUT.format(block=block)
+    done = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
+    assert done.stdout.strip() == ""
+
+
+@needs_numba
+def test_a_numba_that_cannot_be_loaded_is_said_and_done_without():
+    block = "if name == 'llvmlite': raise ImportError('no llvm')"
+    script = WITHOUT.format(block=block)
+    done = subprocess.run([sys.executable, "-c", script], check=True, capture_output=True, text=True)
+    assert "cannot be loaded (no llvm)" in done.stdout
+    assert "thermal-robot[fast]" in done.stdout

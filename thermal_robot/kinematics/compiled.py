@@ -4,9 +4,11 @@ from __future__ import annotations
 
 import math
 import os
+import warnings
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from functools import cache
+from importlib import import_module
 from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
@@ -25,8 +27,20 @@ Array = NDArray[np.float64]
 
 @cache
 def installed() -> bool:
-    """Whether numba is there; it is not loaded for that."""
-    return find_spec("numba") is not None
+    """Whether numba is there and can be loaded; the first call loads it."""
+    if find_spec("numba") is None:
+        return False
+    try:
+        import_module("thermal_robot.kinematics.kernels")
+    except ImportError as error:
+        warnings.warn(
+            f"numba is installed but cannot be loaded ({error}); kinematics go on without it, several times slower: "
+            'mend it with pip install --upgrade "thermal-robot[fast]"',
+            RuntimeWarning,
+            stacklevel=2,
+        )
+        return False
+    return True
 
 
 def threads() -> int:
