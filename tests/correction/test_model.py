@@ -70,11 +70,13 @@ def test_a_model_needs_what_its_effects_read_and_nothing_more(rv_m2):
         (["geometric"], set()),
         (["thermal_elongation"], {"temperature"}),
         (["drift"], {"time"}),
-        (["backlash"], {f"approach.{joint}" for joint in rv_m2.joint_names}),
+        (["backlash"], None),
         (["joint_compliance"], {"payload"}),
     ):
-        _, model, fresh, _ = corrected(rv_m2, effects, seed=4, only=effects)
+        campaign, truth, (fresh, _) = simulate(rv_m2, effects, seed=4, fresh=100)
+        model = diagnose(campaign, only=effects).model
         assert [e.name for e, _ in model.effects] == effects
+        needs = {f"approach.{v.split()[-1]}" for v in truth["parts"]["backlash"]["values"]} if needs is None else needs
         assert set(model.needs) == needs
         bare = replace(fresh, covariates={k: v for k, v in fresh.covariates.items() if k in needs})
         np.testing.assert_array_equal(model.predict(bare)[0], model.predict(fresh)[0])
@@ -89,15 +91,17 @@ def test_one_sample_is_predicted_as_among_many(hall):
     np.testing.assert_allclose(back[::-1], together, rtol=0, atol=1e-13)
 
 
-@pytest.mark.parametrize("column", ["temperature", "approach.joint_3"])
-def test_a_missing_column_is_named(hall, column):
+@pytest.mark.parametrize(
+    ("column", "effect"), [("temperature", "thermal_elongation"), ("approach.joint_2", "backlash")]
+)
+def test_a_missing_column_is_named(hall, column, effect):
     _, model, fresh, _ = hall
     assert column in model.needs
     with pytest.raises(CampaignError) as refused:
         model.predict(fresh.drop_covariate(column))
     assert refused.value.column == column
     assert refused.value.row is None
-    assert "thermal_elongation" in str(refused.value)
+    assert f"the model ({effect}) needs this column" in str(refused.value)
 
 
 def test_an_empty_cell_is_named_with_its_row(hall, tmp_path):

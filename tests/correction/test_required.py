@@ -7,6 +7,7 @@ import pytest
 
 from thermal_robot import CampaignError, simulate
 from thermal_robot.correction.required import require_finite, require_needed
+from thermal_robot.effects import Drift, ThermalElongation
 
 
 @pytest.fixture(scope="module")
@@ -15,17 +16,16 @@ def samples(rv_m2):
 
 
 def test_samples_that_have_what_is_needed_pass(samples):
-    require_needed(samples, ("time", "temperature"), ("drift",), False)
+    require_needed(samples, ("time", "temperature"), (Drift(),), False)
     require_finite(samples, samples.position)
     seen = replace(samples, simulated_position=samples.position)
     require_needed(seen, (), (), True)
 
 
 def test_what_is_lacking_is_named(samples):
-    with pytest.raises(
-        CampaignError, match=r"column 'speed': the model \(drift, sag\) needs this column.*no such column"
-    ):
-        require_needed(samples, ("time", "speed"), ("drift", "sag"), False)
+    bare = samples.drop_covariate("time")
+    with pytest.raises(CampaignError, match=r"column 'time': the model \(drift\) needs this column.*no such column"):
+        require_needed(bare, ("temperature", "time"), (Drift(), ThermalElongation()), False)
     with pytest.raises(CampaignError, match=r"column 'sim.x': the model corrects the prediction of your simulator"):
         require_needed(samples, (), (), True)
 

@@ -268,7 +268,7 @@ class CorrectedModel:
         """Return samples with what the model reads, and nothing else that a table may hold."""
         if not isinstance(samples, Campaign):
             samples = self.samples(samples)
-        require_needed(samples, self.needs, [effect.name for effect, _ in self.effects], self.simulated)
+        require_needed(samples, self.needs, [effect for effect, _ in self.effects], self.simulated)
         read = {name: values for name, values in samples.covariates.items() if name in self.needs}
         return self._in_sequence(replace(samples, covariates=read))
 

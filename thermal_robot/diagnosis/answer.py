@@ -24,6 +24,7 @@ from thermal_robot.diagnosis.sensitivity import prior_sensitivity
 from thermal_robot.diagnosis.wanted import wanted
 from thermal_robot.diagnosis.where import locate
 from thermal_robot.effects import Effect, gate, random_effects
+from thermal_robot.effects.dependence import depends_on
 from thermal_robot.effects.quantities import unit
 from thermal_robot.inference.discover import Discovery
 from thermal_robot.inference.fit import Fit
@@ -162,7 +163,7 @@ def _gap(last: Conclusion, shrinkage: Shrinkage) -> Gap:
 
 def _model(last: Conclusion) -> CorrectedModel:
     fit, campaign = last.fit, last.fit.campaign
-    needs = tuple(dict.fromkeys(c for effect, _ in fit.effects for c in gate.reads(effect, fit.nominal)))
+    needs = tuple(dict.fromkeys(c for effect, _ in fit.effects for c in depends_on(effect, fit.nominal)))
     clock = campaign.covariates.get("order")
     return CorrectedModel(
         robot=campaign.robot,
