@@ -2,6 +2,7 @@
 
 import re
 from html import unescape
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -31,6 +32,14 @@ def test_frames_are_those_of_the_model(diagnosis):
     turn += [[[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]]]
     np.testing.assert_allclose(np.array(turn[2]) @ turn[1] @ turn[0], diagnosis.model.frames.base[:3, :3], atol=2e-6)
     assert tool[4:] == ["", "", ""], "positions say nothing of how the target is turned on the tool"
+
+
+@pytest.mark.parametrize("value", [-1e-7, -0.0, 0.0])
+def test_what_rounds_to_zero_has_no_sign(diagnosis, value):
+    frames = diagnosis.frames.copy()
+    frames.loc["base", ["x", "roll"]] = value
+    told = rows(frames_table(SimpleNamespace(frames=frames)))[1]
+    assert (told[1], told[4]) == ("0.000", "0.0000")
 
 
 def test_correlations_are_the_strongest_and_the_others_are_counted(diagnosis):

@@ -91,7 +91,7 @@ def test_the_median_of_few_levels_stands_at_each(case):
         unexplained=replace(base.unexplained, depends_on=(Dependence("payload", 1e-6),)),
     )
     axes = plot_remainder(diagnosis).axes[1]
-    np.testing.assert_allclose(line(axes, "running median"), [[0.0, 2.5, 5.0], [10.0, -20.0, 30.0]])
+    np.testing.assert_allclose(line(axes, "median at each value"), [[0.0, 2.5, 5.0], [10.0, -20.0, 30.0]])
 
 
 def test_joint_positions_are_those_commanded(case):
@@ -146,3 +146,18 @@ def test_a_diagnosis_knows_the_unit_of_a_joint_that_slides(awkward):
         assert plot_remainder(replace(found, unexplained=left)).axes[5].get_xlabel() == f"velocity.{joint} ({length}/s)"
         assert found.rows.units[joint] == length
     assert {*found.rows.covariates, *found.joint_names} == set(found.rows.units)
+
+
+def test_directions_of_approach_are_not_joined_by_a_line(case):
+    diagnosis = case("unexplained")
+    side = np.where(np.arange(120) % 2 == 0, -1.0, 1.0)
+    left = replace(diagnosis.unexplained, depends_on=(Dependence("approach.joint_1", 1e-4),))
+    rows = replace(diagnosis.rows, covariates={"approach.joint_1": side})
+    figure = plot_remainder(replace(diagnosis, unexplained=left, rows=rows))
+    used = ~diagnosis.rows.outliers
+    for k, axes in enumerate(figure.axes[1::2]):
+        (medians,) = [drawn for drawn in axes.lines if drawn.get_label() == "median at each value"]
+        assert medians.get_linestyle() == "None"
+        for level, middle in zip(*medians.get_data(), strict=True):
+            of = 1e6 * rows.remainder[used & (side == level), k]
+            assert (of < middle).sum() <= len(of) / 2 >= (of > middle).sum()

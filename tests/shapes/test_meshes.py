@@ -2,7 +2,9 @@
 
 import pytest
 
+import thermal_robot as tr
 from thermal_robot.shapes.meshes import find_mesh
+from thermal_robot.shapes.visuals import parsed, visuals
 
 
 @pytest.fixture
@@ -48,3 +50,13 @@ def test_a_package_is_found_where_ros_says(package, tmp_path, monkeypatch, varia
 )
 def test_what_is_no_file_here_is_not_found(package, named):
     assert find_mesh(named, package / "urdf") is None
+
+
+def test_meshes_of_a_robot_of_example_robot_data_are_found_from_the_folder_of_a_campaign(tmp_path):
+    pytest.importorskip("example_robot_data", reason="the extra robots is not installed")
+    measured = tr.simulate("example-robot-data:ur5", tool_frame="tool0", rows=5)
+    file = tr.write_campaign(measured, tmp_path / "hall_3")
+    robot = tr.read_campaign(file).robot
+    shapes, missing = visuals(parsed(robot.urdf), robot.folder)
+    assert not missing
+    assert sum(map(len, shapes.values())) >= robot.n

@@ -59,8 +59,12 @@ def test_effects_that_cannot_be_are_refused(rv_m2, effects, message):
         simulate(rv_m2, effects)
 
 
-def test_an_effect_without_anything_to_follow_says_what_does_not_vary(rv_m2):
-    with pytest.raises(EffectError, match="nothing to follow: temperature does not vary; give a value a row"):
-        simulate(rv_m2, {"thermal_elongation": 1e-5}, conditions={"temperature": 25.0})
+def test_an_effect_without_anything_to_follow_says_what_it_needs(rv_m2):
     with pytest.raises(EffectError, match="it needs temperature; give"):
         simulate(rv_m2, {"thermal_elongation": 1e-5}, conditions={"temperature": None})
+
+
+def test_a_robot_that_is_warm_all_the_time_is_larger_by_the_same_share(rv_m2):
+    cold = simulate(rv_m2, conditions={"temperature": 20.0})
+    warm = simulate(rv_m2, {"thermal_elongation": 1e-5}, conditions={"temperature": 32.0})
+    np.testing.assert_allclose(warm.position, (1.0 + 12e-5) * cold.position, rtol=0.0, atol=1e-12)

@@ -31,10 +31,15 @@ def frames_table(diagnosis: Diagnosis) -> str:
     heads = "frame", "x (mm)", "y (mm)", "z (mm)", "roll (°)", "pitch (°)", "yaw (°)"
     rows = []
     for name, pose in diagnosis.frames.iterrows():
-        told = [f"{1e3 * v:.3f}" for v in pose[["x", "y", "z"]]]
-        told += [f"{np.degrees(v):.4f}" if np.isfinite(v) else "" for v in pose[["roll", "pitch", "yaw"]]]
-        rows.append(row((_FRAMES[str(name)], *(value.replace("-", "−") for value in told))))
+        told = [_fixed(1e3 * v, 3) for v in pose[["x", "y", "z"]]]
+        told += [_fixed(np.degrees(v), 4) if np.isfinite(v) else "" for v in pose[["roll", "pitch", "yaw"]]]
+        rows.append(row((_FRAMES[str(name)], *told)))
     return wide(table(heads, rows), "Fitted frames")
+
+
+def _fixed(value: float, digits: int) -> str:
+    """Write a figure with so many decimals; what rounds to zero has no sign."""
+    return f"{round(value, digits) + 0.0:.{digits}f}".replace("-", "−")
 
 
 def correlations_table(diagnosis: Diagnosis) -> str:
@@ -53,7 +58,7 @@ def correlations_table(diagnosis: Diagnosis) -> str:
     rows = []
     for k in strong[:_MOST]:
         pair = (escape(_called(covariance.index[i])) for i in (first[k], second[k]))
-        rows.append(row((*pair, f"{correlation[first[k], second[k]]:.2f}".replace("-", "−")), words=2))
+        rows.append(row((*pair, _fixed(correlation[first[k], second[k]], 2)), words=2))
     heads = "parameter", "known only together with", "correlation"
     hidden = len(strong) - min(len(strong), _MOST)
     more = f" and {hidden} beyond ±{_STRONG}" if hidden else ""

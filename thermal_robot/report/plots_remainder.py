@@ -120,8 +120,7 @@ def _draw(axes: Axes, along: Array, values: Array, aside: NDArray[np.bool_], lim
         rasterized=many,
         label="remainder",
     )
-    where, middle = _middles(along[used], values[used])
-    axes.plot(where, middle, color=AFTER, linewidth=1.8, label="running median")
+    _draw_middles(axes, along[used], values[used])
     axes.plot(
         along[marked],
         np.clip(values[marked], -_EDGE * limit, _EDGE * limit),
@@ -136,11 +135,23 @@ def _draw(axes: Axes, along: Array, values: Array, aside: NDArray[np.bool_], lim
     axes.axhline(0.0, color=MUTED, linewidth=0.7)
 
 
-def _middles(along: Array, values: Array) -> tuple[Array, Array]:
-    """Return medians over equally many rows each, or over each value of a quantity with few."""
+def _draw_middles(axes: Axes, along: Array, values: Array) -> None:
+    """Draw medians: a line over equally many rows each, or a dash at each value of a quantity with few of them."""
     levels = np.unique(along)
-    if len(levels) <= _LEVELS:
-        return levels, np.array([np.median(values[along == level]) for level in levels])
+    if len(levels) <= _LEVELS:  # between two directions of approach there is nothing that a line could tell
+        middle = np.array([np.median(values[along == level]) for level in levels])
+        axes.plot(
+            levels,
+            middle,
+            linestyle="none",
+            marker="_",
+            markersize=22.0,
+            markeredgewidth=2.2,
+            color=AFTER,
+            label="median at each value",
+        )
+        return
     order = np.argsort(along, kind="stable")
     parts = np.array_split(order, int(np.clip(1.4 * np.sqrt(len(order)), 1, _MIDDLES)))
-    return np.array([np.median(along[p]) for p in parts]), np.array([np.median(values[p]) for p in parts])
+    where, middle = (np.array([np.median(of[part]) for part in parts]) for of in (along, values))
+    axes.plot(where, middle, color=AFTER, linewidth=1.8, label="running median")

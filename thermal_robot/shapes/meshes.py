@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import sysconfig
 from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import unquote
@@ -20,7 +21,8 @@ def find_mesh(named: str, folder: Path) -> Path | None:
     named
         As in the URDF: a path, absolute or from the folder of the URDF, ``file://`` and a path, or ``package://``,
         the name of a package and a path in it. A package is looked for in the folders above the URDF, then where
-        ROS says that its packages are.
+        ROS says that its packages are, then where this Python keeps those that were installed as wheels, such as
+        example-robot-data.
     folder
         Of the URDF.
 
@@ -49,5 +51,7 @@ def _places(named: str, folder: Path) -> Iterator[Path]:
                 yield Path(listed) / "share" / package / rest
                 if Path(listed).name == package:
                     yield Path(listed) / rest
+        for prefix in (Path(sysconfig.get_path("purelib")) / "cmeel.prefix", Path(sysconfig.get_path("data"))):
+            yield prefix / "share" / package / rest
     elif "://" not in named:
         yield folder / named

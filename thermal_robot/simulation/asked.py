@@ -94,14 +94,13 @@ def _asked(kind: Any, values: Any, seen: Observations) -> tuple[Effect, Array]:
 
 def _require_conditions(effect: Effect, seen: Observations) -> None:
     """Refuse an effect that has nothing to follow, by what would be needed."""
-    lacks = gate.missing(effect, seen)
+    # a condition may stand still, as on a robot that has warmed through
+    lacks = [column for column in gate.missing(effect, seen) if column not in seen.covariates]
     if not lacks:
         return
-    constant = [column for column in lacks if column in seen.covariates]
     columns = [column for column in lacks if " " not in column and "<" not in column]
-    why = f"{', '.join(constant)} does not vary" if constant else f"it needs {', '.join(lacks)}"
-    how = f"; give a value a row, as conditions={{{columns[0]!r}: [...]}}" if columns else ""
-    raise EffectError(f"effect {effect.name!r} has nothing to follow: {why}{how}")
+    how = f"; give one value, or one a row, as conditions={{{columns[0]!r}: [...]}}" if columns else ""
+    raise EffectError(f"effect {effect.name!r} has nothing to follow: it needs {', '.join(lacks)}{how}")
 
 
 def _scattering(effect: RandomEffect, seen: Observations) -> list[Place]:

@@ -102,7 +102,7 @@ def simulate(
     ------
     EffectError
         A name that no effect, or no parameter of it, has; a value that is no number, or negative where none can be; an
-        effect that needs a condition that is not there or does not vary.
+        effect that needs a condition that is not there.
     CampaignError
         Rows, conditions or frames that no campaign has.
     RobotError

@@ -43,6 +43,8 @@ from thermal_robot.schema import (
 )
 from thermal_robot.urdf_text import BUILTIN, EXAMPLE_ROBOT_DATA
 
+JOINING = ("key", "targets")
+"""What ``[table]`` says of names, and not of how a file is laid out."""
 _SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": SPACE}
 _KNOWN = word(("known", "unknown"), WORD)
 _NAME = text("a name")
@@ -67,6 +69,7 @@ _KINDS: dict[str, Mapping[str, Kind]] = {
         "header": boolean,
         "comment": text("the first letters of a comment"),
         "key": _NAME,
+        "targets": _NAME,
     },
     "columns": {},
     "orientation": {},
@@ -121,7 +124,7 @@ class Plan:
     @property
     def layout(self) -> Layout:
         """Of the table."""
-        stated = {key: value for key, value in self.sections.get("table", {}).items() if key != "key"}
+        stated = {key: value for key, value in self.sections.get("table", {}).items() if key not in JOINING}
         if "separator" in stated:
             stated["separator"] = _SEPARATORS[stated["separator"]]
         return Layout(**stated)

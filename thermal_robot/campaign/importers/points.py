@@ -5,7 +5,8 @@ Points": a line holds the collection, the group and the target, or the last two,
 x y z, separated by blanks or commas; lines that begin with // are comments. What else can be exported (tolerances,
 uncertainties, time stamps) stands behind in an order that the manual does not give: it is left out here.
 
-A generic list has the same lines, or a header.
+A generic list has the same lines, or a header. Several targets of one pose, where the mapping names their column, make
+one row.
 """
 
 from __future__ import annotations
@@ -15,9 +16,10 @@ from dataclasses import replace
 from pathlib import Path
 
 from thermal_robot.campaign.importers.given import files_of
+from thermal_robot.campaign.importers.grouped import grouped
 from thermal_robot.campaign.importers.join import joined
 from thermal_robot.campaign.importers.mapped import Source
-from thermal_robot.campaign.importers.plan import Plan, planned
+from thermal_robot.campaign.importers.plan import JOINING, Plan, planned
 from thermal_robot.campaign.names import listed
 from thermal_robot.campaign.table import Table
 from thermal_robot.campaign.tabular import SPACE, Layout, read_table
@@ -39,14 +41,20 @@ def read(files: Sequence[Path], plan: Plan) -> Source:
         Another number of files, a line that is no point, points and commands that do not belong together.
     """
     files_of(files, FILES, 2, 2)
-    layout = plan.layout if plan.sections.get("table") else _laid_out(files[0])
+    laid_out = set(plan.sections.get("table", {})) - set(JOINING)
+    layout = plan.layout if laid_out else _laid_out(files[0])
     table = _named(read_table(files[0], layout), plan)
     key = plan.get("table", "key") or _NAMES[-1]
+    targets = plan.get("table", "targets")
+    told: list[str] = []
+    if targets:
+        table, note = grouped(table, key, targets)
+        told.append(note)
     both, notes = joined(table, read_table(files[1]), key if key in table.columns else "")
-    sections = {"columns": {axis: axis for axis in _AXES}}
+    sections = {"columns": {} if targets else {axis: axis for axis in _AXES}}
     if key in table.columns:
         sections["columns"]["pose"] = key
-    return Source(both, planned(sections), notes)
+    return Source(both, planned(sections), (*told, *notes))
 
 
 def _laid_out(file: Path) -> Layout:

@@ -14,6 +14,7 @@ from thermal_robot.campaign.importers.join import joined
 from thermal_robot.campaign.importers.mapped import Source
 from thermal_robot.campaign.importers.plan import Plan
 from thermal_robot.campaign.tabular import read_table
+from thermal_robot.errors import CampaignError
 
 DOES = "any table, by a mapping; or two, of what was measured and of what was commanded"
 FILES = "TABLE, or MEASURED COMMANDED"
@@ -25,9 +26,13 @@ def read(files: Sequence[Path], plan: Plan) -> Source:
     Raises
     ------
     CampaignError
-        No file or more than two, a table that cannot be read, tables that cannot be joined.
+        No file or more than two, a table that cannot be read, tables that cannot be joined; targets, which are
+        of a list of points.
     """
     files_of(files, FILES, 1, 2)
+    if plan.get("table", "targets") is not None:
+        expected = 'the format `points`; or the columns of each target, "x.1" = …, in [columns]'
+        raise CampaignError(plan.file, "is for lists of points", column="table.targets", expected=expected)
     table = read_table(files[0], plan.layout)
     if len(files) == 1:
         return Source(table, Plan())
