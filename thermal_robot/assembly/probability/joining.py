@@ -48,7 +48,7 @@ def joining_probability(
     shape
         Clearance of a cylindrical or of a rectangular joint; turn covariance, mean and thermal part for a turned one.
     thermal
-        Thermal part: a `UniformSpread` (independent of the normal part), or a vector ``(2,)`` that shifts the mean.
+        Thermal part: a `UniformSpread` (independent of the normal part), or vectors ``(..., 2)`` that shift the mean.
     randomised
         What becomes of a `UniformSpread`. ``"uniform"``: as it is (flat-normal, Eq 16). ``"normal"``: a normal part
         with the same mean and covariance, added to ``covariance`` (Eqs 20-21), as the paper does for ``r < 1``.
@@ -93,7 +93,7 @@ def _evaluate(
     *,
     outside: bool,
 ) -> Array:
-    """Check, broadcast, and hand every covariance its cases at once."""
+    """Check, broadcast, and integrate all cases at once."""
     matrices = check_covariance(covariance)
     sizes = _sizes(clearance, shape)
     means = np.zeros(2) if np.ndim(mean) == 0 and float(np.asarray(mean)) == 0.0 else np.asarray(mean, dtype=float)
@@ -111,14 +111,17 @@ def _evaluate(
             raise ValueError(f"randomised must be 'uniform' or 'normal', not {randomised!r}")
     elif thermal is not None:
         shift = np.asarray(thermal, dtype=float)
-        if shift.shape != (2,) or not np.all(np.isfinite(shift)):
-            raise ValueError(f"a thermal shift must be a finite vector (2,), not of shape {shift.shape}")
+        if shift.shape[-1:] != (2,) or not np.all(np.isfinite(shift)):
+            raise ValueError(f"a thermal shift must be finite with shape (..., 2), not of shape {shift.shape}")
         means = means + shift
 
     leading = np.broadcast_shapes(matrices.shape[:-2], sizes.shape[:-1], means.shape[:-1])
     all_sizes = np.broadcast_to(sizes, (*leading, sizes.shape[-1])).reshape(-1, sizes.shape[-1])
     all_means = np.broadcast_to(means, (*leading, 2)).reshape(-1, 2)
     all_matrices = np.broadcast_to(matrices, (*leading, 2, 2)).reshape(-1, 2, 2)
+    if spread is None or all(piece.generators.shape[1] < 2 for piece in spread.pieces):
+        return _cases(all_matrices, all_means, all_sizes, shape, spread, outside).reshape(leading)
+    # sums over several generators are as fine as the normal part demands: one after the other
     kinds, kind = np.unique(all_matrices.reshape(-1, 4), axis=0, return_inverse=True)
     result = np.empty(len(all_means))
     for number, flat in enumerate(kinds):
@@ -161,11 +164,11 @@ def _sizes(clearance: npt.ArrayLike, shape: Shape) -> Array:
 def _cases(
     covariance: Array, means: Array, sizes: Array, shape: Shape, spread: UniformSpread | None, outside: bool
 ) -> Array:
-    """All cases of one covariance; zero and infinite clearances are settled here."""
+    """Return all cases, of one covariance ``(2, 2)`` or of one each; zero and infinite clearances are settled here."""
     result = np.full(len(means), 1.0 if outside else 0.0)
     pieces = spread.pieces if spread is not None else (Parallelotope(1.0, np.zeros(2), np.empty((2, 0))),)
     reach = max(float(np.sum(np.abs(p.generators)) + np.sum(np.abs(p.centre))) for p in pieces)
-    far = _FAR * np.sqrt(np.trace(covariance)) + reach + np.linalg.norm(means, axis=1)
+    far = _FAR * np.sqrt(np.trace(covariance, axis1=-2, axis2=-1)) + reach + np.linalg.norm(means, axis=1)
     endless = np.all(np.isinf(sizes), axis=1)
     result[endless] = 0.0 if outside else 1.0
     sizes = np.where(np.isinf(sizes), 2.0 * far[:, None], sizes)
@@ -174,7 +177,12 @@ def _cases(
         total = np.zeros(int(np.sum(proper)))
         for piece in pieces:
             total += piece.weight * _piece_probability(
-                covariance, means[proper] + piece.centre, sizes[proper], shape, piece.generators, outside
+                covariance if covariance.ndim == 2 else covariance[proper],
+                means[proper] + piece.centre,
+                sizes[proper],
+                shape,
+                piece.generators,
+                outside,
             )
         result[proper] = np.minimum(total, 1.0)
     return result

@@ -14,7 +14,9 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
+from thermal_robot.assembly.probability.discs import disc_chances
 from thermal_robot.assembly.probability.kernels import inside_probability, outside_probability
+from thermal_robot.assembly.probability.principal import Principal
 from thermal_robot.assembly.probability.quadrature import integrate_panels
 from thermal_robot.assembly.probability.regions import Disc, Rectangle, Region
 
@@ -24,51 +26,6 @@ _GRADING = 4.0  # neighbouring panels at a critical point differ by this factor;
 _MILD = 0.02  # shortest scale over the region's width from which even panels resolve everything
 _ROWS = 512  # integrals whose breakpoints are found together: they take some megabytes
 _ROOT_2PI = np.sqrt(2.0 * np.pi)
-
-
-def _difference_of_products(a: Array, b: Array, c: Array, d: Array) -> Array:
-    """Return ``a b - c d`` correct to rounding (Dekker's exact products), also where it nearly cancels."""
-
-    def product(p: Array, q: Array) -> tuple[Array, Array]:
-        head = p * q
-        p1, q1 = p * 134217729.0, q * 134217729.0
-        ph, qh = p1 - (p1 - p), q1 - (q1 - q)
-        pl, ql = p - ph, q - qh
-        return head, ((ph * qh - head) + ph * ql + pl * qh) + pl * ql
-
-    one, one_low = product(a, b)
-    two, two_low = product(c, d)
-    return (one - two) + (one_low - two_low)
-
-
-@dataclass(frozen=True)
-class Principal:
-    """2x2 covariances by their principal axes.
-
-    Parameters
-    ----------
-    large, small
-        Variances along the axes, ``large >= small >= 0``, shape ``(...)``.
-    direction
-        Unit vector of the axis with the larger variance, shape ``(..., 2)``.
-    """
-
-    large: Array
-    small: Array
-    direction: Array
-
-    @classmethod
-    def of(cls, covariance: Array) -> Principal:
-        """Decompose; the smaller variance comes from the determinant, which keeps its digits next to a large one."""
-        size = np.max(np.abs(covariance), axis=(-2, -1))
-        nothing = size == 0.0
-        # a power of two: to divide by it rounds nothing
-        scale = np.where(nothing, 1.0, np.ldexp(1.0, np.frexp(size)[1]))
-        a, b, c = (covariance[..., i, j] / scale for i, j in ((0, 0), (0, 1), (1, 1)))
-        large = 0.5 * (a + c + np.hypot(a - c, 2.0 * b))
-        small = np.maximum(_difference_of_products(a, c, b, b), 0.0) / np.where(nothing, 1.0, large)
-        angle = 0.5 * np.arctan2(2.0 * b, a - c)
-        return cls(large * scale, small * scale, np.stack([np.cos(angle), np.sin(angle)], axis=-1))
 
 
 @dataclass(frozen=True)
@@ -97,7 +54,9 @@ class Frame:
     def along(cls, principal: Principal, second: Array, half_width: npt.ArrayLike) -> Frame:
         """Frame whose second axis is the unit vector ``second``, shape ``(..., 2)``."""
         e1, second = np.broadcast_arrays(principal.direction, second)
-        first, e2 = (np.stack([sign * v[..., 1], -sign * v[..., 0]], axis=-1) for v, sign in ((second, 1.0), (e1, -1.0)))
+        first, e2 = (
+            np.stack([sign * v[..., 1], -sign * v[..., 0]], axis=-1) for v, sign in ((second, 1.0), (e1, -1.0))
+        )
         p1, p2, s1, s2 = (np.sum(one * two, axis=-1) for one in (first, second) for two in (e1, e2))
         variance = principal.large * p1**2 + principal.small * p2**2
         varies = variance > 0.0
@@ -143,7 +102,24 @@ def planar_probability(
     """
     count = len(means)
     principal = Principal.of(np.broadcast_to(covariance, (count, 2, 2)))
-    ends = np.zeros((count, 2)) if segment is None else np.broadcast_to(segment, (count, 2))
+    ends = None if segment is None else np.broadcast_to(segment, (count, 2))
+    if shape != "circle":
+        return _graded(principal, means, sizes, shape, ends, outside)
+    chances = disc_chances(principal, means, 0.5 * sizes[:, 0], ends)
+    result = chances.outside if outside else chances.inside
+    left = np.flatnonzero(~chances.known)
+    if len(left):
+        rest = None if ends is None else ends[left]
+        result[left] = _graded(principal.rows(left), means[left], sizes[left], shape, rest, outside)
+    return result
+
+
+def _graded(
+    principal: Principal, means: Array, sizes: Array, shape: str, segment: Array | None, outside: bool
+) -> Array:
+    """Integrate chords on panels that are graded to wherever the integrand may change quickly."""
+    count = len(means)
+    ends = np.zeros((count, 2)) if segment is None else segment
     length = np.hypot(ends[:, 0], ends[:, 1])
     if shape == "rectangle":
         second = np.tile([0.0, 1.0], (count, 1))  # chords along a side: the region has no kinks then
