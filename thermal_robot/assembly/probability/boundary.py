@@ -25,7 +25,7 @@ from scipy.special import ndtr
 
 Array = npt.NDArray[np.float64]
 
-NODES = np.array([32, 48, 64, 96, 128, 192, 256])
+NODES = np.array([32, 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024])
 """Numbers of angles that are used; multiples of four."""
 
 # Angles per standard deviation, the shorter one, from the disc's farther edge to the mean, and besides: measured
@@ -110,7 +110,7 @@ def _mean_decay(half: Array) -> Array:
 
 
 def _poles(axes: Array, centre: Array, count: int) -> Array:
-    """What the poles add to the sum of ``exp(-h)``: one for each root of ``z1 + i z2`` in ``exp(it)``.
+    """Return what the poles add to the sum of ``exp(-h)``: one for each root of ``z1 + i z2`` in ``exp(it)``.
 
     Over the ``n`` roots of -1 the mean of ``z / (z - c)`` is ``1 / (1 + c**n)``.
     """
@@ -133,7 +133,8 @@ def segment_by_edge(axes: Array, centre: Array, segment: Array, count: int) -> t
     Parameters
     ----------
     axes, centre, count
-        As for `disc_by_edge`; ``centre`` is the segment's.
+        As for `disc_by_edge`; ``centre`` is the segment's. Where the segment is longer than one, the angles that a
+        centred disc needs are enough.
     segment
         Half of the segment over the standard deviations, shape ``(N, 2)``; not short beside one.
 

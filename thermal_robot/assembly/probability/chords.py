@@ -45,7 +45,7 @@ def _window(narrow: Array, beside: Array) -> tuple[Array, Array, Array, Array]:
 def chords_resolve(axes: Array, centre: Array) -> npt.NDArray[np.bool_]:
     """Whether 64 nodes follow the chords of each disc; arguments as for `disc_by_chords`."""
     narrow = 1.0 / axes[:, 1]
-    start, low, high, _ = _window(narrow, np.abs(centre[:, 1]) * narrow)
+    start, low, high, _ = _window(narrow, np.abs(centre[:, 1]))
     ends = np.sin(start + low), np.sin(start + high)
     top = (start + low < 0.5 * np.pi) & (start + high > 0.5 * np.pi)
     change = np.where(top, 1.0 - np.minimum(*ends), np.abs(ends[1] - ends[0]))

@@ -107,7 +107,7 @@ def planar_probability(
         return _graded(principal, means, sizes, shape, ends, outside)
     chances = disc_chances(principal, means, 0.5 * sizes[:, 0], ends)
     result = chances.outside if outside else chances.inside
-    left = np.flatnonzero(~chances.known)
+    left = np.flatnonzero(np.isnan(result))
     if len(left):
         rest = None if ends is None else ends[left]
         result[left] = _graded(principal.rows(left), means[left], sizes[left], shape, rest, outside)
@@ -184,7 +184,7 @@ def _integrate(
 
 
 def _ladder_steps(frame: Frame, shape: str, sizes: Array) -> npt.NDArray[np.intp]:
-    """Steps of the graded panels of each row; 0 where the normal part is as wide as the region: even panels do."""
+    """Return steps of the graded panels of each row; 0 where even panels do, as the normal part is wide."""
     scales = np.where(
         frame.remainder > 0.0,
         np.minimum(frame.spread, frame.remainder / np.maximum(np.abs(frame.slope), 1.0)),
@@ -237,7 +237,6 @@ def _likeliest(frame: Frame, region: Region, centres: Array, points: Array) -> A
     units of the standard deviations; its place is where the exponent is least, and three zooms find it to a sixteenth
     cubed of a panel.
     """
-
     spread, slope, remainder, half_width = (
         v[:, None] for v in (frame.spread, frame.slope, frame.remainder, frame.half_width)
     )

@@ -91,7 +91,7 @@ class Rectangle:
     axes: Array
 
     def _corners(self) -> tuple[Array, Array]:
-        one, two = (self.half_sides[:, [k]] * self.axes[..., k] for k in (0, 1))  # each (N, 2)
+        one, two = (np.multiply(self.half_sides[:, k : k + 1], self.axes[..., k]) for k in (0, 1))  # each (N, 2)
         corners = np.stack([one + two, one - two, -one - two, -one + two], axis=1)
         return corners[..., 0], corners[..., 1]
 
@@ -126,7 +126,7 @@ class Rectangle:
         result = []
         for k in (0, 1):
             across, along = self.axes[..., 0, k, None], self.axes[..., 1, k, None]
-            rate = across + along * slope
+            rate = across + along * np.asarray(slope, dtype=float)
             half = self.half_sides[:, [k]]
             with np.errstate(divide="ignore", invalid="ignore"):
                 for side in (-half, half):
