@@ -162,7 +162,7 @@ def assembly_map(
 ) -> AssemblyMap:
     """Probability of joining a round peg, and the clearance it needs, at each pose before and after a rise.
 
-    Only errors across the peg count. A place takes about 60 ms; the uniform law doubles that.
+    Only errors across the peg count.
 
     Parameters
     ----------
@@ -192,7 +192,7 @@ def assembly_map(
         If a shape does not fit, a name is unknown, ``axis`` is zero or ``law`` is unknown.
     """
     # Imported here: this room brings a part of scipy with it.
-    from thermal_robot.assembly.probability import UniformSpread, joining_probability, plane_axes, required_clearance
+    from thermal_robot.assembly.probability import joining_probability, planes, required_clearance
 
     if law not in ("shift", "uniform"):
         raise RobotError(f"law is 'shift' or 'uniform', not {law!r}", name=robot.name)
@@ -203,13 +203,15 @@ def assembly_map(
     grown = elongation(robot, rise, coefficients=coefficients, reference=0.0)
     moved = displacement(robot, q, grown) - carrier_strain * positions
     numbers = np.full((4, len(positions)), np.nan)
-    for m in np.flatnonzero(np.isfinite(positions[:, 0])):
-        plane = plane_axes(directions[m])
-        scatter, off = plane @ covariance[m] @ plane.T, plane @ moved[m]
-        part = off if law == "shift" else UniformSpread.segment(off)
-        for row, thermal in enumerate((None, part)):
-            numbers[row, m] = joining_probability(scatter, clearance, thermal=thermal)
-            numbers[row + 2, m] = required_clearance(scatter, capability=capability, thermal=thermal)
+    known = np.flatnonzero(np.isfinite(positions[:, 0]))
+    if len(known):
+        plane = planes(directions[known])
+        scatter = plane @ covariance[known] @ np.swapaxes(plane, 1, 2)
+        off = np.einsum("nij,nj->ni", plane, moved[known])
+        heated = {"mean": off} if law == "shift" else {"segments": off}
+        for row, thermal in enumerate(({}, heated)):
+            numbers[row, known] = joining_probability(scatter, clearance, **thermal)
+            numbers[row + 2, known] = required_clearance(scatter, capability=capability, **thermal)
     return AssemblyMap(positions, covariance, moved, float(clearance), float(capability), *numbers)
 
 

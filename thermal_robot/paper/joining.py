@@ -73,8 +73,8 @@ def warmed(sigma: tuple[float, float], shift: tuple[float, float], required: flo
     cold = np.diag(np.square(sigma))
     warm = cold + np.diag(np.square(shift)) / 3.0 if model == "covariance" else cold
     thermal = {"covariance": None, "uniform": UniformSpread.box(shift), "mean shift": np.array(shift)}[model]
-    before = required_clearance(cold, capability=required)
-    after = required_clearance(warm, capability=required, thermal=thermal)
+    before = float(required_clearance(cold, capability=required))
+    after = float(required_clearance(warm, capability=required, thermal=thermal))
     left = float(capability(failing=failing_probability(warm, before, thermal=thermal)))
     return Warmed(before, left, 1.0 - left / required, after / before - 1.0)
 

@@ -136,7 +136,7 @@ def thermal_correlation(inputs: PaperInputs) -> Entry:
     change = np.empty(2)
     for row, (sigma, shift) in enumerate(zip(np.array(inputs.experimental_sigma)[:, :2], moved, strict=True)):
         cold = np.diag(sigma**2)
-        clearance = required_clearance(cold, capability=inputs.capability)
+        clearance = float(required_clearance(cold, capability=inputs.capability))
         along, apart = np.outer(shift, shift) / 3.0, np.diag(shift**2) / 3.0
         change[row] = capability_at(cold + along, clearance) - capability_at(cold + apart, clearance)
     return Entry(

@@ -21,7 +21,7 @@ from thermal_robot.assembly.probability.normality import (
     shapiro_wilk_critical,
 )
 from thermal_robot.assembly.probability.spread import UniformSpread
-from thermal_robot.assembly.probability.tolerance import Zonotope, plane_axes, polygon_in_plane, zonotope
+from thermal_robot.assembly.probability.tolerance import Zonotope, plane_axes, planes, polygon_in_plane, zonotope
 
 __all__ = [
     "FlatNormal",
@@ -41,6 +41,7 @@ __all__ = [
     "normality_power",
     "normality_test",
     "plane_axes",
+    "planes",
     "polygon_in_plane",
     "required_clearance",
     "sample_size_to_see",

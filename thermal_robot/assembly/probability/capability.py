@@ -10,7 +10,9 @@ import numpy.typing as npt
 from scipy.optimize import brentq
 from scipy.special import log_ndtr, ndtri, ndtri_exp
 
-from thermal_robot.assembly.probability.joining import Randomised, Shape, Thermal, check_covariance, failing_probability
+from thermal_robot.assembly.probability.clearances import disc_clearances
+from thermal_robot.assembly.probability.joining import Shape, failing_probability
+from thermal_robot.assembly.probability.law import Law, Randomised, Thermal, check_covariance
 from thermal_robot.assembly.probability.spread import UniformSpread
 
 Array = npt.NDArray[np.float64]
@@ -118,17 +120,18 @@ def required_clearance(
     sides: npt.ArrayLike = (1.0, 1.0),
     thermal: Thermal = None,
     randomised: Randomised = "uniform",
+    segments: npt.ArrayLike | None = None,
     convention: Convention = "two_sided",
-) -> float:
+) -> float | Array:
     """Clearance at which a joint reaches a capability or a probability: Eq 22 solved for ``L``.
 
     Parameters
     ----------
     covariance
-        Shape ``(2, 2)``.
+        Shape ``(..., 2, 2)``.
     capability, probability, failing
         What is required; exactly one. ``capability`` in the given ``convention``.
-    mean, shape, thermal, randomised
+    mean, shape, thermal, randomised, segments
         As in `joining_probability`.
     sides
         For a rectangle the proportion of its sides; the result multiplies it.
@@ -137,9 +140,10 @@ def required_clearance(
 
     Returns
     -------
-    float
+    float or Array
         Diameter of the disc, or the factor on ``sides``; relative error below 1e-10. Zero if nothing is required, and
-        ``inf`` for a probability of one unless the law is bounded.
+        ``inf`` for a probability of one unless the law is bounded. One for each of the broadcast leading axes of the
+        covariance, the mean and a thermal shift; ``float`` where there are none.
 
     Raises
     ------
@@ -155,37 +159,56 @@ def required_clearance(
             target = float(np.log1p(-_share(probability)))
         else:
             target = float(np.log(_share(failing)))
-    if target == 0.0:
-        return 0.0
-    if np.isneginf(target):
-        return np.inf
     proportion = np.asarray(sides, dtype=float)
     if proportion.shape != (2,) or not np.all(np.isfinite(proportion) & (proportion > 0.0)):
         raise ValueError("sides must be two positive numbers")
+    law = Law.of(covariance, mean, thermal, randomised, segments)
+    leading = law.leading
+    law = law.flat(leading)
+    found = np.full(len(law.means), 0.0 if target == 0.0 else np.inf)
+    if target < 0.0 and np.isfinite(target):
+        found = _clearances(law, target, shape, proportion)
+    return found.reshape(leading) if leading else float(found[0])
+
+
+def _clearances(law: Law, target: float, shape: Shape, proportion: Array) -> Array:
+    """Return clearances ``(N,)``: all at once where cheap integrals resolve them, one after the other elsewhere."""
+    found = np.full(len(law.means), np.nan)
+    pieces = () if law.spread is None else law.spread.pieces
+    if shape == "circle" and len(pieces) < 2 and all(piece.generators.shape[1] < 2 for piece in pieces):
+        means, segments = law.means, law.segments
+        for piece in pieces:
+            means = means + piece.centre
+            segments = np.broadcast_to(piece.generators[:, 0], means.shape) if piece.generators.shape[1] else segments
+        found = disc_clearances(law.matrices, means, target, segments)
+    for k in np.flatnonzero(np.isnan(found)):
+        found[k] = _one_clearance(law.rows(np.array([k])), target, shape, proportion)
+    return found
+
+
+def _one_clearance(law: Law, target: float, shape: Shape, proportion: Array) -> float:
+    """Return the clearance of a single law, by Brent's method."""
 
     def excess(log_size: float) -> float:
-        size = np.exp(log_size)
-        fails = failing_probability(
-            covariance,
-            size if shape == "circle" else size * proportion,
-            mean,
-            shape=shape,
-            thermal=thermal,
-            randomised=randomised,
+        size = np.exp(log_size) * (1.0 if shape == "circle" else proportion)
+        fails = float(
+            failing_probability(
+                law.matrices[0], size, law.means, shape=shape, thermal=law.spread, segments=law.segments
+            )[0]
         )
         # Bounded below so that a bounded law, which stops failing altogether, still has a change of sign.
         return max(float(np.log(fails)) if fails > 0.0 else -np.inf, -1e4) - target
 
-    return _solve(excess, np.log(_typical_size(covariance, mean, thermal)))
+    return _solve(excess, np.log(_typical_size(law)))
 
 
-def _typical_size(covariance: npt.ArrayLike, mean: npt.ArrayLike, thermal: Thermal) -> float:
+def _typical_size(law: Law) -> float:
     """Start the search at the size of the errors."""
-    square = float(np.trace(check_covariance(covariance))) + float(np.sum(np.square(mean)))
-    if isinstance(thermal, UniformSpread):
-        square += float(np.trace(thermal.covariance) + np.sum(thermal.mean**2))
-    elif thermal is not None:
-        square += float(np.sum(np.square(np.asarray(thermal, dtype=float))))
+    square = float(np.trace(law.matrices[0])) + float(np.sum(np.square(law.means)))
+    if law.spread is not None:
+        square += float(np.trace(law.spread.covariance) + np.sum(law.spread.mean**2))
+    if law.segments is not None:
+        square += float(np.sum(np.square(law.segments)))
     if square == 0.0:
         raise ValueError("without any error every clearance will do")
     return 4.0 * float(np.sqrt(square))

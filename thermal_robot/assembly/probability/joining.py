@@ -7,15 +7,14 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from thermal_robot.assembly.probability.law import Law, Randomised, Thermal
 from thermal_robot.assembly.probability.links import generator_lengths, planar_link_nodes
 from thermal_robot.assembly.probability.planar import planar_probability
 from thermal_robot.assembly.probability.quadrature import integrate_panels
-from thermal_robot.assembly.probability.spread import Parallelotope, UniformSpread
+from thermal_robot.assembly.probability.spread import Parallelotope
 
 Array = npt.NDArray[np.float64]
 Shape = Literal["circle", "rectangle"]
-Randomised = Literal["uniform", "normal"]
-Thermal = UniformSpread | npt.ArrayLike | None
 
 # Beyond this many standard deviations the normal part is zero in double precision; stands for an infinite clearance.
 _FAR = 50.0
@@ -31,6 +30,7 @@ def joining_probability(
     shape: Shape = "circle",
     thermal: Thermal = None,
     randomised: Randomised = "uniform",
+    segments: npt.ArrayLike | None = None,
 ) -> Array:
     """Probability that the deviation lies within the clearance (Eq 22).
 
@@ -48,10 +48,13 @@ def joining_probability(
     shape
         Clearance of a cylindrical or of a rectangular joint; turn covariance, mean and thermal part for a turned one.
     thermal
-        Thermal part: a `UniformSpread` (independent of the normal part), or a vector ``(2,)`` that shifts the mean.
+        Thermal part: a `UniformSpread` (independent of the normal part), or vectors ``(..., 2)`` that shift the mean.
     randomised
         What becomes of a `UniformSpread`. ``"uniform"``: as it is (flat-normal, Eq 16). ``"normal"``: a normal part
         with the same mean and covariance, added to ``covariance`` (Eqs 20-21), as the paper does for ``r < 1``.
+    segments
+        A uniform part of each case's own: ends of segments that run from ``-segment`` to ``segment``, shape
+        ``(..., 2)``.
 
     Returns
     -------
@@ -63,7 +66,7 @@ def joining_probability(
     ValueError
         For wrong shapes, a covariance that is not symmetric positive semidefinite, a negative clearance.
     """
-    return _evaluate(covariance, clearance, mean, shape, thermal, randomised, outside=False)
+    return _evaluate(covariance, clearance, mean, shape, thermal, randomised, segments, outside=False)
 
 
 def failing_probability(
@@ -74,13 +77,14 @@ def failing_probability(
     shape: Shape = "circle",
     thermal: Thermal = None,
     randomised: Randomised = "uniform",
+    segments: npt.ArrayLike | None = None,
 ) -> Array:
     """Probability that the deviation exceeds the clearance, ``1 - P`` of Eq 22, integrated directly over the outside.
 
     It keeps its digits (1e-10 relative) when ``P`` rounds to one. Parameters, shapes and errors as in
     `joining_probability`.
     """
-    return _evaluate(covariance, clearance, mean, shape, thermal, randomised, outside=True)
+    return _evaluate(covariance, clearance, mean, shape, thermal, randomised, segments, outside=True)
 
 
 def _evaluate(
@@ -90,56 +94,25 @@ def _evaluate(
     shape: Shape,
     thermal: Thermal,
     randomised: Randomised,
+    segments: npt.ArrayLike | None,
     *,
     outside: bool,
 ) -> Array:
-    """Check, broadcast, and hand every covariance its cases at once."""
-    matrices = check_covariance(covariance)
+    """Check, broadcast, and integrate all cases at once."""
+    law = Law.of(covariance, mean, thermal, randomised, segments)
     sizes = _sizes(clearance, shape)
-    means = np.zeros(2) if np.ndim(mean) == 0 and float(np.asarray(mean)) == 0.0 else np.asarray(mean, dtype=float)
-    if means.shape[-1:] != (2,) or not np.all(np.isfinite(means)):
-        raise ValueError(f"mean must be 0 or finite with shape (..., 2), not of shape {np.shape(mean)}")
-    spread: UniformSpread | None = None
-    if isinstance(thermal, UniformSpread):
-        if thermal.dimension != 2:
-            raise ValueError(f"the thermal part must be planar, not of dimension {thermal.dimension}")
-        if randomised == "normal":
-            matrices, means = matrices + thermal.covariance, means + thermal.mean
-        elif randomised == "uniform":
-            spread = thermal
-        else:
-            raise ValueError(f"randomised must be 'uniform' or 'normal', not {randomised!r}")
-    elif thermal is not None:
-        shift = np.asarray(thermal, dtype=float)
-        if shift.shape != (2,) or not np.all(np.isfinite(shift)):
-            raise ValueError(f"a thermal shift must be a finite vector (2,), not of shape {shift.shape}")
-        means = means + shift
-
-    leading = np.broadcast_shapes(matrices.shape[:-2], sizes.shape[:-1], means.shape[:-1])
-    all_sizes = np.broadcast_to(sizes, (*leading, sizes.shape[-1])).reshape(-1, sizes.shape[-1])
-    all_means = np.broadcast_to(means, (*leading, 2)).reshape(-1, 2)
-    all_matrices = np.broadcast_to(matrices, (*leading, 2, 2)).reshape(-1, 2, 2)
-    kinds, kind = np.unique(all_matrices.reshape(-1, 4), axis=0, return_inverse=True)
-    result = np.empty(len(all_means))
-    for number, flat in enumerate(kinds):
+    leading = np.broadcast_shapes(law.leading, sizes.shape[:-1])
+    law = law.flat(leading)
+    sizes = np.broadcast_to(sizes, (*leading, sizes.shape[-1])).reshape(-1, sizes.shape[-1])
+    if law.spread is None or all(piece.generators.shape[1] < 2 for piece in law.spread.pieces):
+        return _cases(law, sizes, shape, outside).reshape(leading)
+    # sums over several generators are as fine as the normal part demands: one covariance after the other
+    kinds, kind = np.unique(law.matrices.reshape(-1, 4), axis=0, return_inverse=True)
+    result = np.empty(len(sizes))
+    for number in range(len(kinds)):
         chosen = kind.reshape(-1) == number
-        result[chosen] = _cases(flat.reshape(2, 2), all_means[chosen], all_sizes[chosen], shape, spread, outside)
+        result[chosen] = _cases(law.rows(chosen), sizes[chosen], shape, outside)
     return result.reshape(leading)
-
-
-def check_covariance(covariance: npt.ArrayLike) -> Array:
-    """Return a covariance of shape ``(..., 2, 2)``, or raise ``ValueError`` if it is none."""
-    matrices = np.asarray(covariance, dtype=float)
-    if matrices.shape[-2:] != (2, 2) or not np.all(np.isfinite(matrices)):
-        raise ValueError(f"covariance must be finite with shape (..., 2, 2), not of shape {matrices.shape}")
-    a, b, c, d = (matrices[..., i, j] for i in (0, 1) for j in (0, 1))
-    scale = np.maximum(np.abs(a), np.abs(d))
-    if np.any(np.abs(b - c) > 1e-9 * scale):
-        raise ValueError("covariance must be symmetric")
-    middle = 0.5 * (b + c)
-    if np.any(a < 0.0) or np.any(d < 0.0) or np.any(middle**2 > a * d * (1.0 + 1e-9) + (1e-12 * scale) ** 2):
-        raise ValueError("covariance must be positive semidefinite")
-    return np.stack([np.stack([a, middle], -1), np.stack([middle, d], -1)], -2)
 
 
 def _sizes(clearance: npt.ArrayLike, shape: Shape) -> Array:
@@ -158,24 +131,28 @@ def _sizes(clearance: npt.ArrayLike, shape: Shape) -> Array:
     return sizes
 
 
-def _cases(
-    covariance: Array, means: Array, sizes: Array, shape: Shape, spread: UniformSpread | None, outside: bool
-) -> Array:
-    """All cases of one covariance; zero and infinite clearances are settled here."""
-    result = np.full(len(means), 1.0 if outside else 0.0)
-    pieces = spread.pieces if spread is not None else (Parallelotope(1.0, np.zeros(2), np.empty((2, 0))),)
+def _cases(law: Law, sizes: Array, shape: Shape, outside: bool) -> Array:
+    """Return all cases; zero and infinite clearances are settled here."""
+    result = np.full(len(sizes), 1.0 if outside else 0.0)
+    pieces = law.spread.pieces if law.spread is not None else (Parallelotope(1.0, np.zeros(2), np.empty((2, 0))),)
     reach = max(float(np.sum(np.abs(p.generators)) + np.sum(np.abs(p.centre))) for p in pieces)
-    far = _FAR * np.sqrt(np.trace(covariance)) + reach + np.linalg.norm(means, axis=1)
+    far = _FAR * np.sqrt(np.trace(law.matrices, axis1=1, axis2=2)) + reach + np.linalg.norm(law.means, axis=1)
+    if law.segments is not None:
+        far = far + np.linalg.norm(law.segments, axis=1)
     endless = np.all(np.isinf(sizes), axis=1)
     result[endless] = 0.0 if outside else 1.0
     sizes = np.where(np.isinf(sizes), 2.0 * far[:, None], sizes)
     proper = np.all(sizes > 0.0, axis=1) & ~endless
     if np.any(proper):
-        total = np.zeros(int(np.sum(proper)))
+        law, sizes, total = law.rows(proper), sizes[proper], np.zeros(int(np.sum(proper)))
         for piece in pieces:
-            total += piece.weight * _piece_probability(
-                covariance, means[proper] + piece.centre, sizes[proper], shape, piece.generators, outside
-            )
+            means = law.means + piece.centre
+            if piece.generators.shape[1] < 2:
+                ends = piece.generators[:, 0] if piece.generators.shape[1] else law.segments
+                found = planar_probability(law.matrices, means, sizes, shape=shape, segment=ends, outside=outside)
+            else:
+                found = _piece_probability(law.matrices[0], means, sizes, shape, piece.generators, outside)
+            total += piece.weight * found
         result[proper] = np.minimum(total, 1.0)
     return result
 

@@ -192,42 +192,50 @@ def tail(x: npt.ArrayLike, sigma: npt.ArrayLike, half_width: npt.ArrayLike) -> A
     return np.where(x < 0.0, 1.0 - result, result).reshape(shape)
 
 
-def _either_tail(x: Array, sigma: float, half_width: float) -> Array:
+def _either_tail(x: Array, sigma: Array, half_width: Array) -> Array:
     """P(X > x) by the shortest way: without the uniform part it is one call of ``ndtr``."""
-    if half_width <= 0.0 < sigma:
+    if not np.any(half_width) and np.all(sigma > 0.0):
         return np.asarray(ndtr(-x / sigma))
     return tail(x, sigma, half_width)
 
 
-def outside_probability(low: Array, high: Array, sigma: float, half_width: float) -> Array:
+def outside_probability(low: Array, high: Array, sigma: npt.ArrayLike, half_width: npt.ArrayLike) -> Array:
     """P(X < low or X > high), both measured from the mean; ``low <= high`` of one shape. A sum, so relatively accurate.
 
-    A point mass (``sigma = half_width = 0``) on the edge is inside.
+    A point mass (``sigma = half_width = 0``) on the edge is inside. The widths broadcast.
     """
-    return _either_tail(-low, sigma, half_width) + _either_tail(high, sigma, half_width)
+    width, half = np.asarray(sigma, dtype=float), np.asarray(half_width, dtype=float)
+    return _either_tail(-low, width, half) + _either_tail(high, width, half)
 
 
-def inside_probability(low: Array, high: Array, sigma: float, half_width: float) -> Array:
+def inside_probability(low: Array, high: Array, sigma: npt.ArrayLike, half_width: npt.ArrayLike) -> Array:
     """P(low <= X <= high), both measured from the mean; ``low <= high`` of one shape, relatively accurate.
 
     An interval on one side of the mean is a difference of the tails on that side; an interval much shorter than
-    ``sigma`` is a Gauss-Legendre sum of the density, because there that difference cancels.
+    ``sigma`` is a Gauss-Legendre sum of the density, because there that difference cancels. The widths broadcast.
     """
-    if sigma <= 0.0:
-        if half_width <= 0.0:
-            return np.where((low <= 0.0) & (high >= 0.0), 1.0, 0.0)
-        overlap = np.minimum(high, half_width) - np.maximum(low, -half_width)
-        return np.asarray(np.maximum(overlap, 0.0) / (2.0 * half_width))
+    sigma, half_width = np.asarray(sigma, dtype=float), np.asarray(half_width, dtype=float)
     mirrored = low + high < 0.0
     near, far = np.where(mirrored, -high, low), np.where(mirrored, -low, high)  # near + far >= 0
-    result = np.where(
-        near > 0.0,
-        _either_tail(near, sigma, half_width) - _either_tail(far, sigma, half_width),
-        1.0 - _either_tail(-near, sigma, half_width) - _either_tail(far, sigma, half_width),
-    )
+    beside = near > 0.0
+    # One sided: the nearer tail less the farther one. Else both are taken from one.
+    nearer = _either_tail(np.abs(near), sigma, half_width)
+    farther = _either_tail(far, sigma, half_width)
+    result = np.where(beside, nearer - farther, 1.0 - nearer - farther)
     short = (far - near < 0.5 * sigma) & (far > near)
     if np.any(short):
         half = 0.5 * (far[short] - near[short])
         points = 0.5 * (far[short] + near[short])[:, None] + half[:, None] * NODES
-        result[short] = half * (density(points, sigma, half_width) @ WEIGHTS)
+        widths = (np.broadcast_to(v, short.shape)[short][:, None] for v in (sigma, half_width))
+        result[short] = half * (density(points, *widths) @ WEIGHTS)
+    if np.any(sigma <= 0.0):
+        return np.where(sigma > 0.0, np.maximum(result, 0.0), _inside_uniform(low, high, half_width))
     return np.maximum(result, 0.0)
+
+
+def _inside_uniform(low: Array, high: Array, half_width: Array) -> Array:
+    """Without a normal part: the share of the uniform one, or whether the point mass is inside."""
+    overlap = np.minimum(high, half_width) - np.maximum(low, -half_width)
+    point = np.where((low <= 0.0) & (high >= 0.0), 1.0, 0.0)
+    share = np.maximum(overlap, 0.0) / np.where(half_width > 0.0, 2.0 * half_width, 1.0)
+    return np.where(half_width > 0.0, share, point)

@@ -9,12 +9,14 @@ the other, so both are relatively accurate.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 
 import numpy as np
 import numpy.typing as npt
 
+from thermal_robot.assembly.probability.discs import disc_chances
 from thermal_robot.assembly.probability.kernels import inside_probability, outside_probability
+from thermal_robot.assembly.probability.principal import Principal
 from thermal_robot.assembly.probability.quadrature import integrate_panels
 from thermal_robot.assembly.probability.regions import Disc, Rectangle, Region
 
@@ -22,64 +24,20 @@ Array = npt.NDArray[np.float64]
 
 _GRADING = 4.0  # neighbouring panels at a critical point differ by this factor; adaptation halves what needs it
 _MILD = 0.02  # shortest scale over the region's width from which even panels resolve everything
+_ROWS = 512  # integrals whose breakpoints are found together: they take some megabytes
 _ROOT_2PI = np.sqrt(2.0 * np.pi)
-
-
-def _difference_of_products(a: float, b: float, c: float, d: float) -> float:
-    """Return ``a b - c d`` correct to rounding (Dekker's exact products), also where it nearly cancels."""
-
-    def product(p: float, q: float) -> tuple[float, float]:
-        head = p * q
-        p1, q1 = p * 134217729.0, q * 134217729.0
-        ph, qh = p1 - (p1 - p), q1 - (q1 - q)
-        pl, ql = p - ph, q - qh
-        return head, ((ph * qh - head) + ph * ql + pl * qh) + pl * ql
-
-    one, one_low = product(a, b)
-    two, two_low = product(c, d)
-    return (one - two) + (one_low - two_low)
-
-
-@dataclass(frozen=True)
-class Principal:
-    """A 2x2 covariance by its principal axes.
-
-    Parameters
-    ----------
-    large, small
-        Variances along the axes, ``large >= small >= 0``.
-    direction
-        Unit vector of the axis with the larger variance.
-    """
-
-    large: float
-    small: float
-    direction: Array
-
-    @classmethod
-    def of(cls, covariance: Array) -> Principal:
-        """Decompose; the smaller variance comes from the determinant, which keeps its digits next to a large one."""
-        scale = float(np.max(np.abs(covariance)))
-        if scale == 0.0:
-            return cls(0.0, 0.0, np.array([1.0, 0.0]))
-        scale = float(np.ldexp(1.0, np.frexp(scale)[1]))  # a power of two: to divide by it rounds nothing
-        a, b, c = (float(v) / scale for v in (covariance[0, 0], covariance[0, 1], covariance[1, 1]))
-        large = 0.5 * (a + c + float(np.hypot(a - c, 2.0 * b)))
-        small = max(_difference_of_products(a, c, b, b), 0.0) / large
-        angle = 0.5 * float(np.arctan2(2.0 * b, a - c))
-        return cls(large * scale, small * scale, np.array([np.cos(angle), np.sin(angle)]))
 
 
 @dataclass(frozen=True)
 class Frame:
-    """The normal part in the frame of the chords: ``x`` normal, ``y`` given ``x`` normal about a line.
+    """Normal parts in the frames of their chords: ``x`` normal, ``y`` given ``x`` normal about a line.
 
     Parameters
     ----------
     rotation
-        Rows are the two axes in the plane.
+        Rows are the two axes in the plane, shape ``(..., 2, 2)``.
     spread
-        Standard deviation of ``x``.
+        Standard deviation of ``x``, shape ``(...)``.
     slope, remainder
         ``y = slope x`` on the average, with this standard deviation about it.
     half_width
@@ -87,45 +45,53 @@ class Frame:
     """
 
     rotation: Array
-    spread: float
-    slope: float
-    remainder: float
-    half_width: float
+    spread: Array
+    slope: Array
+    remainder: Array
+    half_width: Array
 
     @classmethod
-    def along(cls, principal: Principal, second: Array, half_width: float) -> Frame:
-        """Frame whose second axis is the unit vector ``second``."""
-        first = np.array([second[1], -second[0]])
-        e1 = principal.direction
-        e2 = np.array([-e1[1], e1[0]])
-        p1, p2, s1, s2 = first @ e1, first @ e2, second @ e1, second @ e2
-        variance = principal.large * p1**2 + principal.small * p2**2
-        if variance > 0.0:
-            slope = (principal.large * p1 * s1 + principal.small * p2 * s2) / variance
-            remainder = principal.large * (principal.small / variance)
-        else:
-            slope, remainder = 0.0, principal.large * s1**2 + principal.small * s2**2
-        return cls(
-            np.stack([first, second]), float(np.sqrt(variance)), float(slope), float(np.sqrt(remainder)), half_width
+    def along(cls, principal: Principal, second: Array, half_width: npt.ArrayLike) -> Frame:
+        """Frame whose second axis is the unit vector ``second``, shape ``(..., 2)``."""
+        e1, second = np.broadcast_arrays(principal.direction, second)
+        first, e2 = (
+            np.stack([sign * v[..., 1], -sign * v[..., 0]], axis=-1) for v, sign in ((second, 1.0), (e1, -1.0))
         )
+        p1, p2, s1, s2 = (np.sum(one * two, axis=-1) for one in (first, second) for two in (e1, e2))
+        variance = principal.large * p1**2 + principal.small * p2**2
+        varies = variance > 0.0
+        divisor = np.where(varies, variance, 1.0)
+        slope = np.where(varies, (principal.large * p1 * s1 + principal.small * p2 * s2) / divisor, 0.0)
+        remainder = np.where(
+            varies,
+            principal.large * (principal.small / divisor),
+            principal.large * s1**2 + principal.small * s2**2,
+        )
+        half = np.broadcast_to(np.asarray(half_width, dtype=float), variance.shape)
+        return cls(np.stack([first, second], axis=-2), np.sqrt(variance), slope, np.sqrt(remainder), half)
+
+    def rows(self, chosen: npt.NDArray[np.intp]) -> Frame:
+        """Return the frames of some rows."""
+        return Frame(*(getattr(self, field.name)[chosen] for field in fields(self)))
 
 
 def planar_probability(
     covariance: Array, means: Array, sizes: Array, *, shape: str, segment: Array | None = None, outside: bool = False
 ) -> Array:
-    """Probability of ``N`` planar deviations with one covariance to lie in, or out of, their regions.
+    """Probability of ``N`` planar deviations to lie in, or out of, their regions.
 
     Parameters
     ----------
     covariance
-        Normal part, shape ``(2, 2)``, positive semidefinite.
+        Normal part, shape ``(2, 2)`` or ``(N, 2, 2)``, positive semidefinite.
     means
         Shape ``(N, 2)``.
     sizes
         Diameters ``(N, 1)`` for ``shape="circle"``, side lengths ``(N, 2)`` for ``shape="rectangle"``; finite and
         positive.
     segment
-        End of the uniform part, which runs from ``-segment`` to ``segment``; ``None`` for none.
+        End of the uniform part, which runs from ``-segment`` to ``segment``, shape ``(2,)`` or ``(N, 2)``; ``None`` for
+        none.
     outside
         The probability of lying outside, computed directly.
 
@@ -134,31 +100,58 @@ def planar_probability(
     Array
         Shape ``(N,)``.
     """
-    principal = Principal.of(covariance)
-    length = 0.0 if segment is None else float(np.hypot(*segment))
-    if segment is not None and length > 0.0:
-        second = segment / length
-    elif shape == "rectangle":
-        second = np.array([0.0, 1.0])  # chords along a side: the region has no kinks then
+    count = len(means)
+    principal = Principal.of(np.broadcast_to(covariance, (count, 2, 2)))
+    ends = None if segment is None else np.broadcast_to(segment, (count, 2))
+    if shape != "circle":
+        return _graded(principal, means, sizes, shape, ends, outside)
+    chances = disc_chances(principal, means, 0.5 * sizes[:, 0], ends)
+    result = chances.outside if outside else chances.inside
+    left = np.flatnonzero(np.isnan(result))
+    if len(left):
+        rest = None if ends is None else ends[left]
+        result[left] = _graded(principal.rows(left), means[left], sizes[left], shape, rest, outside)
+    return result
+
+
+def _graded(
+    principal: Principal, means: Array, sizes: Array, shape: str, segment: Array | None, outside: bool
+) -> Array:
+    """Integrate chords on panels that are graded to wherever the integrand may change quickly."""
+    count = len(means)
+    ends = np.zeros((count, 2)) if segment is None else segment
+    length = np.hypot(ends[:, 0], ends[:, 1])
+    if shape == "rectangle":
+        second = np.tile([0.0, 1.0], (count, 1))  # chords along a side: the region has no kinks then
     else:
-        second = np.array([-principal.direction[1], principal.direction[0]])
+        second = np.stack([-principal.direction[:, 1], principal.direction[:, 0]], axis=1)
+    heated = length > 0.0
+    second[heated] = ends[heated] / length[heated, None]
     frame = Frame.along(principal, second, length)
-    region: Region
-    if shape == "circle":
-        region = Disc(0.5 * sizes[:, 0])
-    else:
-        region = Rectangle(0.5 * sizes, frame.rotation)
-    centres = means @ frame.rotation.T
-    chance = outside_probability if outside else inside_probability
-    return _integrate(frame, region, centres, chance, outside)
+    centres = np.einsum("nij,nj->ni", frame.rotation, means)
+    result = np.empty(count)
+    fixed, kinds = frame.spread == 0.0, _ladder_steps(frame, shape, sizes)
+    for kind in np.unique(np.where(fixed, -1, kinds)):
+        same = np.flatnonzero(np.where(fixed, -1, kinds) == kind)
+        for start in range(0, len(same), _ROWS):
+            chosen = same[start : start + _ROWS]
+            part, half = frame.rows(chosen), 0.5 * sizes[chosen]
+            region: Region = Disc(half[:, 0]) if shape == "circle" else Rectangle(half, part.rotation)
+            chance = outside_probability if outside else inside_probability
+            result[chosen] = _integrate(part, region, centres[chosen], chance, outside, int(kind))
+    return result
 
 
 def _integrate(
-    frame: Frame, region: Region, centres: Array, chance: Callable[[Array, Array, float, float], Array], outside: bool
+    frame: Frame,
+    region: Region,
+    centres: Array,
+    chance: Callable[[Array, Array, Array, Array], Array],
+    outside: bool,
+    steps: int,
 ) -> Array:
     """Integrate the chord's probability over ``x``, and add what lies beyond the region's ends."""
-    count = len(centres)
-    every = np.arange(count)
+    every = np.arange(len(centres))
     ends = region.breaks()[:, [0, -1]]
     low_x, high_x = (region.abscissa(every, ends[:, [k]])[0][:, 0] for k in (0, 1))
 
@@ -166,10 +159,11 @@ def _integrate(
         x, rate = region.abscissa(owner, t)
         low, high = region.chord(owner, t)
         offset = x - centres[owner, 0][:, None]
-        middle = centres[owner, 1][:, None] + frame.slope * offset
-        return offset, rate, chance(low - middle, high - middle, frame.remainder, frame.half_width)
+        middle = centres[owner, 1][:, None] + frame.slope[owner][:, None] * offset
+        widths = (frame.remainder[owner][:, None], frame.half_width[owner][:, None])
+        return offset, rate, chance(low - middle, high - middle, *widths)
 
-    if frame.spread == 0.0:
+    if steps < 0:
         # x does not vary: a single chord, or none.
         at = region.parameter(centres[:, :1])
         result = chord_probability(every, at)[2][:, 0]
@@ -178,31 +172,45 @@ def _integrate(
 
     def integrand(owner: npt.NDArray[np.intp], t: Array) -> Array:
         offset, rate, probability = chord_probability(owner, t)
-        weight = np.exp(-0.5 * (offset / frame.spread) ** 2) / (_ROOT_2PI * frame.spread)
+        spread = frame.spread[owner][:, None]
+        weight = np.exp(-0.5 * (offset / spread) ** 2) / (_ROOT_2PI * spread)
         return np.asarray(weight * rate * probability)
 
-    result = integrate_panels(integrand, _breakpoints(frame, region, centres))
+    result = integrate_panels(integrand, _breakpoints(frame, region, centres, steps))
     if outside:
-        result = result + outside_probability(low_x - centres[:, 0], high_x - centres[:, 0], frame.spread, 0.0)
+        nothing = np.zeros(len(centres))
+        result = result + outside_probability(low_x - centres[:, 0], high_x - centres[:, 0], frame.spread, nothing)
     return result
 
 
-def _breakpoints(frame: Frame, region: Region, centres: Array) -> Array:
+def _ladder_steps(frame: Frame, shape: str, sizes: Array) -> npt.NDArray[np.intp]:
+    """Return steps of the graded panels of each row; 0 where even panels do, as the normal part is wide."""
+    scales = np.where(
+        frame.remainder > 0.0,
+        np.minimum(frame.spread, frame.remainder / np.maximum(np.abs(frame.slope), 1.0)),
+        frame.spread,
+    )
+    if shape == "circle":
+        width = sizes[:, 0]
+    else:
+        width = np.sum(np.abs(frame.rotation[:, 0]) * sizes, axis=1)
+    finest = 0.25 * scales / np.maximum(width, np.finfo(float).tiny)
+    steps = np.clip(np.ceil(np.log(1.0 / np.maximum(finest, 1e-18)) / np.log(_GRADING)), 1, 30).astype(int)
+    return np.where((finest > _MILD) & (frame.remainder > 0.0), 0, steps)
+
+
+def _breakpoints(frame: Frame, region: Region, centres: Array, steps: int) -> Array:
     """Panels graded geometrically towards every point where the integrand may change quickly.
 
     These are the mean, the places where the middle and the edges of the strip of ``y`` cross the boundary, the
-    region's ends and kinks, and the likeliest points of the integrand found on the panels so far. Where the normal
-    part is as wide as the region nothing is quick, and eight even panels do.
+    region's ends and kinks, and the likeliest points of the integrand found on the panels so far. Without steps
+    nothing is quick, and eight even panels do.
     """
-    every = np.arange(len(centres))
     breaks = region.breaks()
     span = (breaks[:, -1] - breaks[:, 0])[:, None]
-    width = np.ptp(region.abscissa(every, breaks[:, [0, -1]])[0], axis=1)
-    finest = float(np.min(_finest_scale(frame) / np.maximum(width, np.finfo(float).tiny)))
-    if finest > _MILD and frame.remainder > 0.0:
+    if steps == 0:
         even = breaks[:, :1] + span * np.linspace(0.0, 1.0, 9)
         return np.sort(np.concatenate([breaks, even], axis=1), axis=1)
-    steps = int(np.clip(np.ceil(np.log(1.0 / max(finest, 1e-18)) / np.log(_GRADING)), 1, 30))
     ladder = _GRADING ** -np.arange(steps + 1.0)
     ladder = np.concatenate([-ladder, [0.0], ladder[::-1]])
 
@@ -210,23 +218,16 @@ def _breakpoints(frame: Frame, region: Region, centres: Array) -> Array:
         spread_out = points[:, :, None] + span[:, :, None] * ladder
         return np.clip(spread_out.reshape(len(points), -1), breaks[:, :1], breaks[:, -1:])
 
-    middle = centres[:, 1] - frame.slope * centres[:, 0]
-    strip = np.array([0.0, -frame.half_width, frame.half_width] if frame.half_width > 0.0 else [0.0])
-    crossings = region.crossings(frame.slope, middle[:, None] + strip)
+    slope = frame.slope[:, None]
+    middle = centres[:, 1:] - slope * centres[:, :1]
+    strip = frame.half_width[:, None] * ([0.0, -1.0, 1.0] if np.any(frame.half_width > 0.0) else [0.0])
+    crossings = region.crossings(slope, middle + strip)
     critical = region.parameter(np.concatenate([centres[:, :1], crossings], axis=1))
     points = np.sort(
         np.concatenate([breaks, critical, graded(np.concatenate([breaks, critical], axis=1))], axis=1), axis=1
     )
     likeliest = _likeliest(frame, region, centres, points)
     return np.sort(np.concatenate([points, graded(likeliest)], axis=1), axis=1)
-
-
-def _finest_scale(frame: Frame) -> float:
-    """Shortest distance in ``x`` over which the integrand changes."""
-    scales = [frame.spread]
-    if frame.remainder > 0.0:
-        scales.append(frame.remainder / max(abs(frame.slope), 1.0))
-    return 0.25 * min(scales)
 
 
 def _likeliest(frame: Frame, region: Region, centres: Array, points: Array) -> Array:
@@ -236,18 +237,21 @@ def _likeliest(frame: Frame, region: Region, centres: Array, points: Array) -> A
     units of the standard deviations; its place is where the exponent is least, and three zooms find it to a sixteenth
     cubed of a panel.
     """
+    spread, slope, remainder, half_width = (
+        v[:, None] for v in (frame.spread, frame.slope, frame.remainder, frame.half_width)
+    )
 
     def exponents(t: Array) -> tuple[Array, Array]:
         every = np.arange(len(t))
         x, _ = region.abscissa(every, t.reshape(len(t), -1))
         low, high = region.chord(every, t.reshape(len(t), -1))
         offset = x - centres[:, :1]
-        y = centres[:, 1:] + frame.slope * offset
-        into = np.maximum(np.maximum(low - y, y - high) - frame.half_width, 0.0)
-        out = np.maximum(np.minimum(high - y, y - low) - frame.half_width, 0.0)
-        along = (offset / frame.spread) ** 2
+        y = centres[:, 1:] + slope * offset
+        into = np.maximum(np.maximum(low - y, y - high) - half_width, 0.0)
+        out = np.maximum(np.minimum(high - y, y - low) - half_width, 0.0)
+        along = (offset / spread) ** 2
         with np.errstate(divide="ignore", invalid="ignore", over="ignore"):
-            pair = tuple(along + np.where(gap > 0.0, (gap / frame.remainder) ** 2, 0.0) for gap in (into, out))
+            pair = tuple(along + np.where(gap > 0.0, (gap / remainder) ** 2, 0.0) for gap in (into, out))
         return pair[0].reshape(t.shape), pair[1].reshape(t.shape)
 
     found = []

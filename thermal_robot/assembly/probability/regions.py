@@ -34,8 +34,11 @@ class Region(Protocol):
         """Lower and upper end of the chord at ``t``."""
         ...
 
-    def crossings(self, slope: float, intercept: Array) -> Array:
-        """Abscissae where lines ``y = slope x + intercept``, shape ``(N, K)``, meet the boundary, shape ``(N, C)``."""
+    def crossings(self, slope: npt.ArrayLike, intercept: Array) -> Array:
+        """Abscissae where lines ``y = slope x + intercept``, shape ``(N, K)``, meet the boundary, shape ``(N, C)``.
+
+        The slope is one number, or of shape ``(N, 1)``.
+        """
         ...
 
 
@@ -63,8 +66,9 @@ class Disc:
         half = self.radius[owner][:, None] * np.cos(t)
         return -half, half
 
-    def crossings(self, slope: float, intercept: Array) -> Array:
+    def crossings(self, slope: npt.ArrayLike, intercept: Array) -> Array:
         """Both intersections of every line; a line that misses gives its nearest approach twice."""
+        slope = np.asarray(slope)
         square = 1.0 + slope * slope
         middle = -slope * intercept / square
         root = np.sqrt(np.maximum(self.radius[:, None] ** 2 * square - intercept**2, 0.0)) / square
@@ -73,21 +77,21 @@ class Disc:
 
 @dataclass(frozen=True)
 class Rectangle:
-    """Rectangles about the origin, turned by one angle.
+    """Rectangles about the origin, each turned by an angle.
 
     Parameters
     ----------
     half_sides
         Half lengths along the rectangle's own axes, shape ``(N, 2)``.
     axes
-        The rectangle's two axes as columns, in the frame of the chords; shape ``(2, 2)``, orthonormal.
+        The rectangles' two axes as columns, in the frame of the chords; shape ``(2, 2)`` or ``(N, 2, 2)``, orthonormal.
     """
 
     half_sides: Array
     axes: Array
 
     def _corners(self) -> tuple[Array, Array]:
-        one, two = (self.half_sides[:, [k]] * self.axes[:, k] for k in (0, 1))  # each (N, 2)
+        one, two = (np.multiply(self.half_sides[:, k : k + 1], self.axes[..., k]) for k in (0, 1))  # each (N, 2)
         corners = np.stack([one + two, one - two, -one - two, -one + two], axis=1)
         return corners[..., 0], corners[..., 1]
 
@@ -107,22 +111,24 @@ class Rectangle:
     def chord(self, owner: npt.NDArray[np.intp], t: Array) -> tuple[Array, Array]:
         """Where the vertical line at ``t`` is within both strips ``|axis . point| <= half side``."""
         low, high = np.full_like(t, -np.inf), np.full_like(t, np.inf)
+        axes = np.broadcast_to(self.axes, (len(self.half_sides), 2, 2))
         for k in (0, 1):
-            across, along = self.axes[0, k], self.axes[1, k]
-            if along == 0.0:
-                continue
+            across, along = axes[owner, 0, k][:, None], axes[owner, 1, k][:, None]
             half = self.half_sides[owner, k][:, None]
-            ends = (-half - across * t) / along, (half - across * t) / along
-            low, high = np.maximum(low, np.minimum(*ends)), np.minimum(high, np.maximum(*ends))
+            crossed = along != 0.0  # a side along the chords does not end them
+            ends = [(side - across * t) / np.where(crossed, along, 1.0) for side in (-half, half)]
+            low = np.where(crossed, np.maximum(low, np.minimum(*ends)), low)
+            high = np.where(crossed, np.minimum(high, np.maximum(*ends)), high)
         return low, np.maximum(low, high)
 
-    def crossings(self, slope: float, intercept: Array) -> Array:
+    def crossings(self, slope: npt.ArrayLike, intercept: Array) -> Array:
         """Where every line meets the four edges' lines."""
         result = []
         for k in (0, 1):
-            rate = self.axes[0, k] + self.axes[1, k] * slope
+            across, along = self.axes[..., 0, k, None], self.axes[..., 1, k, None]
+            rate = across + along * np.asarray(slope, dtype=float)
             half = self.half_sides[:, [k]]
             with np.errstate(divide="ignore", invalid="ignore"):
                 for side in (-half, half):
-                    result.append((side - self.axes[1, k] * intercept) / rate)
+                    result.append((side - along * intercept) / rate)
         return np.asarray(np.nan_to_num(np.concatenate(result, axis=1), nan=0.0, posinf=0.0, neginf=0.0))

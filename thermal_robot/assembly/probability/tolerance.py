@@ -209,12 +209,23 @@ def plane_axes(plane: npt.ArrayLike | str) -> Array:
     length = float(np.linalg.norm(array)) if array.shape == (3,) else 0.0
     if not 0.0 < length < np.inf:
         raise ValueError("a plane is two coordinates, two directions (2, 3) or a normal (3,) that is not zero")
-    normal = array / length
-    first = np.array([-normal[1], normal[0], 0.0])
-    first = first / np.linalg.norm(first) if np.hypot(*normal[:2]) > 1e-9 else np.array([1.0, 0.0, 0.0])
-    first = first - normal * (first @ normal)
-    first /= np.linalg.norm(first)
-    return np.stack([first, np.cross(normal, first)])
+    return np.asarray(planes(array))
+
+
+def planes(normals: npt.ArrayLike) -> Array:
+    """Two orthonormal directions of each plane, shape ``(..., 2, 3)``, as `plane_axes` for each normal ``(..., 3)``.
+
+    Normals are not zero; one that is NaN has NaN.
+    """
+    array = np.asarray(normals, dtype=float)
+    normal = array / np.linalg.norm(array, axis=-1, keepdims=True)
+    across = np.hypot(normal[..., 0], normal[..., 1])[..., None]
+    upright = across < 1e-9
+    first = np.stack([-normal[..., 1], normal[..., 0], np.zeros_like(normal[..., 0])], axis=-1)
+    first = np.where(upright, [1.0, 0.0, 0.0], first / np.where(upright, 1.0, across))
+    first = first - normal * np.sum(first * normal, axis=-1, keepdims=True)
+    first /= np.linalg.norm(first, axis=-1, keepdims=True)
+    return np.stack([first, np.cross(normal, first)], axis=-2)
 
 
 def _groups(edges: Array) -> list[tuple[Array, Array]]:
