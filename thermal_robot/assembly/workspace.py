@@ -33,8 +33,8 @@ class AssemblyMap:
 
     Parameters
     ----------
-    positions
-        (M, 3) m in the root frame: the peg's tip.
+    positions, directions
+        (M, 3) m in the root frame: the peg's tip; and the unit vectors along the peg.
     covariance
         (M, 3, 3) m²: scatter of the tip, in root axes.
     displacement
@@ -48,6 +48,7 @@ class AssemblyMap:
     """
 
     positions: Array
+    directions: Array
     covariance: Array
     displacement: Array
     clearance: float
@@ -212,7 +213,7 @@ def assembly_map(
         for row, thermal in enumerate(({}, heated)):
             numbers[row, known] = joining_probability(scatter, clearance, **thermal)
             numbers[row + 2, known] = required_clearance(scatter, capability=capability, **thermal)
-    return AssemblyMap(positions, covariance, moved, float(clearance), float(capability), *numbers)
+    return AssemblyMap(positions, directions, covariance, moved, float(clearance), float(capability), *numbers)
 
 
 def _solve(

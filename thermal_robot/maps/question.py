@@ -1,0 +1,178 @@
+"""What a map asks of each configuration, and where it asks: positions of the tip, or joint positions."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.errors import RobotError
+from thermal_robot.maps import settings
+from thermal_robot.robot import Robot
+
+Array = NDArray[np.float64]
+Span = tuple[float, float, int]
+"""First and last value of an axis, and how many."""
+
+
+@dataclass(frozen=True)
+class Question:
+    """What is known of the robot, and what its joints are to be good for.
+
+    Parameters
+    ----------
+    sigma_q
+        Standard deviation of each joint, rad or m: one number for all, or by the names of all joints.
+    coefficients, rise
+        1/K and K: of all segments, or by their names.
+    clearance, capability
+        Diameter, m, for the probability; C_p for the clearance that is required.
+    law
+        ``"shift"``: the rise has happened; ``"uniform"``: it is anywhere within ± ``rise``.
+    approach
+        Direction in which the tool enters, in the root frame.
+    axis, point
+        The tool's direction and its tip, m, in the tool frame.
+    """
+
+    sigma_q: float | Mapping[str, float] = 5e-5
+    coefficients: float | Mapping[str, float] = 1.2e-5
+    rise: float | Mapping[str, float] = 3.0
+    clearance: float = 2e-4
+    capability: float = 1.33
+    law: Literal["shift", "uniform"] = "shift"
+    approach: tuple[float, float, float] = (0.0, 0.0, -1.0)
+    axis: tuple[float, float, float] = (0.0, 0.0, 1.0)
+    point: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Positions:
+    """A grid of places of the tip in the root frame, m; one value an axis makes a plane or a line.
+
+    Parameters
+    ----------
+    x, y, z
+        First, last, and how many.
+    home
+        (n,) rad or m: postures are counted from the one nearest to it; the middle of the limits where left out.
+    """
+
+    x: Span
+    y: Span
+    z: Span
+    home: tuple[float, ...] | None = None
+
+    @property
+    def count(self) -> int:
+        """Number of places."""
+        return self.x[2] * self.y[2] * self.z[2]
+
+    def at(self, rows: NDArray[np.int64]) -> Array:
+        """(K, 3) m, places by their number; x runs fastest."""
+        x, y, z = (np.linspace(low, high, many) for low, high, many in (self.x, self.y, self.z))
+        along, rest = rows % len(x), rows // len(x)
+        return np.stack([x[along], y[rest % len(y)], z[rest // len(y)]], axis=1)
+
+
+@dataclass(frozen=True)
+class Joints:
+    """Joint positions that fill the limits evenly: points of Sobol's sequence.
+
+    Parameters
+    ----------
+    count
+        How many.
+    lower, upper
+        (n,) rad or m: the robot's limits where left out, at most a turn about zero.
+    """
+
+    count: int
+    lower: tuple[float, ...] | None = None
+    upper: tuple[float, ...] | None = None
+
+    def at(self, rows: NDArray[np.int64], robot: Robot) -> Array:
+        """(K, n) rad or m, configurations by their number; rows follow each other."""
+        from scipy.stats import qmc
+
+        low, high = within(robot, self.lower, self.upper)
+        engine = qmc.Sobol(robot.n, scramble=False)
+        if rows[0]:
+            engine.fast_forward(int(rows[0]))
+        return np.asarray(low + engine.random(len(rows)) * (high - low))
+
+
+Over = Positions | Joints
+
+
+def within(robot: Robot, lower: tuple[float, ...] | None = None, upper: tuple[float, ...] | None = None) -> tuple[Array, Array]:
+    """Return finite limits (n,) of the joints: those given, else the robot's, at most half a turn either side of zero.
+
+    Raises
+    ------
+    RobotError
+        A prismatic joint without limits, limits of another number of joints.
+    """
+    turns = np.array([kind != "prismatic" for kind in robot.joint_types])
+    low, high = (
+        np.where(turns, np.clip(own, -np.pi, np.pi), own) if given is None else np.asarray(given, dtype=float)
+        for given, own in ((lower, robot.lower), (upper, robot.upper))
+    )
+    if low.shape != (robot.n,) or high.shape != (robot.n,) or not np.all(np.isfinite(low) & np.isfinite(high)):
+        raise RobotError(f"limits of {robot.n} joints are needed, finite ones: a slide has none", name=robot.name)
+    return low, high
+
+
+@dataclass(frozen=True)
+class Spec:
+    """A map: a robot, where, and what is asked.
+
+    Parameters
+    ----------
+    robot, over, question
+        As for :func:`~thermal_robot.maps.workspace_map`.
+    """
+
+    robot: Robot
+    over: Over
+    question: Question = field(default_factory=Question)
+
+    def chunks(self) -> Iterator[NDArray[np.int64]]:
+        """Yield the numbers of places or configurations that are worked on at once."""
+        for start in range(0, self.over.count, settings.CHUNK):
+            yield np.arange(start, min(start + settings.CHUNK, self.over.count))
+
+    @property
+    def parts(self) -> int:
+        """How many chunks there are."""
+        return -(-self.over.count // settings.CHUNK)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return all that decides the map, as JSON would hold it."""
+        return {
+            "schema": "thermal-robot/map/1",
+            "robot": self.robot.name,
+            "urdf_sha256": hashlib.sha256(self.robot.urdf.encode()).hexdigest(),
+            "root_frame": self.robot.root_frame,
+            "tool_frame": self.robot.tool_frame,
+            "joints": list(self.robot.joint_names),
+            "over": type(self.over).__name__.lower(),
+            **{key: _plain(value) for part in (self.over, self.question) for key, value in vars(part).items()},
+            "chunk": settings.CHUNK,
+        }
+
+    @property
+    def fingerprint(self) -> str:
+        """SHA-256 of that."""
+        return hashlib.sha256(json.dumps(self.to_dict(), sort_keys=True).encode()).hexdigest()
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, Mapping):
+        return {str(key): float(number) for key, number in value.items()}
+    return list(value) if isinstance(value, tuple) else value

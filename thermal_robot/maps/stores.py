@@ -1,0 +1,170 @@
+"""Where a map is kept: Zarr or Parquet, in chunks, each whole or not there, so that a second run goes on."""
+
+from __future__ import annotations
+
+import json
+import os
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.errors import CampaignError
+
+Columns = dict[str, NDArray[Any]]
+ZARR, PARQUET = ".zarr", ".parquet"
+NOTES = "map.json"
+"""Beside the parts of a Parquet folder: what decides the map."""
+
+
+class Store(Protocol):
+    """Chunks of a map on disk."""
+
+    @property
+    def notes(self) -> dict[str, Any]:
+        """What decides the map; empty where there is none yet."""
+        ...
+
+    @property
+    def done(self) -> int:
+        """How many chunks are there, from the first on."""
+        ...
+
+    def begin(self, notes: dict[str, Any]) -> None:
+        """Make an empty map."""
+        ...
+
+    def add(self, columns: Columns) -> None:
+        """Add the next chunk, whole."""
+        ...
+
+    def chunks(self, names: list[str] | None = None) -> Iterator[Columns]:
+        """Yield the columns, some of them by name, chunk by chunk."""
+        ...
+
+
+def store(path: str | Path) -> Store:
+    """Return the store of a path, by how its name ends.
+
+    Raises
+    ------
+    CampaignError
+        Another ending; a library that is not installed.
+    """
+    folder = Path(path)
+    if folder.suffix == ZARR:
+        return ZarrStore(folder)
+    if folder.suffix == PARQUET:
+        return ParquetStore(folder)
+    raise CampaignError(str(path), "no kind of map", found=folder.suffix or "no ending", expected=f"{ZARR} or {PARQUET}")
+
+
+class ParquetStore:
+    """A folder of parts, one a chunk, and its notes."""
+
+    def __init__(self, folder: Path) -> None:
+        try:
+            import pyarrow  # noqa: F401
+        except ImportError as error:
+            raise CampaignError(
+                str(folder), "pyarrow is not installed", expected='pip install "thermal-robot[parquet]"'
+            ) from error
+        self.folder = folder
+
+    @property
+    def notes(self) -> dict[str, Any]:
+        """What decides the map; empty where there is none yet."""
+        file = self.folder / NOTES
+        return dict(json.loads(file.read_text(encoding="utf-8"))) if file.is_file() else {}
+
+    def _part(self, k: int) -> Path:
+        return self.folder / f"part-{k:06d}.parquet"
+
+    @property
+    def done(self) -> int:
+        """How many chunks are there, from the first on."""
+        k = 0
+        while self._part(k).is_file():
+            k += 1
+        return k
+
+    def begin(self, notes: dict[str, Any]) -> None:
+        """Make an empty map."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        for part in self.folder.glob("part-*.parquet"):
+            part.unlink()
+        (self.folder / NOTES).write_text(json.dumps(notes, indent=2, ensure_ascii=False), encoding="utf-8")
+
+    def add(self, columns: Columns) -> None:
+        """Add the next chunk, whole: under another name until it is."""
+        import pyarrow
+        import pyarrow.parquet
+
+        part = self._part(self.done)
+        unfinished = part.with_suffix(".unfinished")
+        pyarrow.parquet.write_table(pyarrow.table(columns), unfinished)
+        os.replace(unfinished, part)
+
+    def chunks(self, names: list[str] | None = None) -> Iterator[Columns]:
+        """Yield the columns, some of them by name, chunk by chunk."""
+        import pyarrow.parquet
+
+        for k in range(self.done):
+            table = pyarrow.parquet.read_table(self._part(k), columns=names)
+            yield {name: table[name].to_numpy() for name in table.column_names}
+
+
+class ZarrStore:
+    """A group of one array a column; rows beyond those that are counted are an unfinished chunk."""
+
+    def __init__(self, folder: Path) -> None:
+        try:
+            import zarr  # noqa: F401
+        except ImportError as error:
+            raise CampaignError(
+                str(folder), "zarr is not installed", expected='pip install "thermal-robot[maps]"'
+            ) from error
+        self.folder = folder
+
+    def _group(self, mode: Any = "r+") -> Any:
+        import zarr
+
+        return zarr.open_group(str(self.folder), mode=mode)
+
+    @property
+    def notes(self) -> dict[str, Any]:
+        """What decides the map; empty where there is none yet."""
+        return dict(self._group("r").attrs["notes"]) if (self.folder / "zarr.json").is_file() else {}
+
+    @property
+    def done(self) -> int:
+        """How many chunks are there, from the first on."""
+        return len(self._group("r").attrs["rows"]) if self.notes else 0
+
+    def begin(self, notes: dict[str, Any]) -> None:
+        """Make an empty map."""
+        self._group("w").attrs.update({"notes": notes, "rows": []})
+
+    def add(self, columns: Columns) -> None:
+        """Add the next chunk; it counts once its number of rows is written."""
+        group = self._group()
+        rows = [int(count) for count in group.attrs["rows"]]
+        before = sum(rows)
+        count = len(next(iter(columns.values())))
+        for name, values in columns.items():
+            if name not in group:
+                group.create_array(name, shape=(0,), chunks=(1 << 16,), dtype=values.dtype)
+            array = group[name]
+            array.resize((before + count,))
+            array[before:] = values
+        group.attrs.update({"rows": [*rows, count]})
+
+    def chunks(self, names: list[str] | None = None) -> Iterator[Columns]:
+        """Yield the columns, some of them by name, chunk by chunk."""
+        group, start = self._group("r"), 0
+        for count in group.attrs["rows"]:
+            every = sorted(group.array_keys()) if names is None else names
+            yield {name: np.asarray(group[name][start : start + count]) for name in every}
+            start += count
