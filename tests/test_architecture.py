@@ -24,6 +24,7 @@ ORDER = (
     "robot",
     "shapes",
     "assembly",
+    "maps",
     "paper",
     "campaign",
     "observations",
@@ -51,9 +52,10 @@ ORDER = (
 FREE = {
     "report": {"errors", "files", "report"},
     "assembly": {"errors", "kinematics", "robot", "tables", "assembly"},
+    "maps": {"errors", "kinematics", "robot", "assembly", "maps"},
     "paper": {"errors", "kinematics", "robot", "assembly", "paper"},
 }
-"""Rooms that may import less than what stands before them: one draws what it is given, two need no campaign."""
+"""Rooms that may import less than what stands before them: one draws what it is given, three need no campaign."""
 TYPES = {"report": {f"thermal_robot.diagnosis.{n}" for n in ("result", "parts", "explained")}}
 """What a room may know beyond that by type alone: the report sees values, and nothing that computes them."""
 LONGEST = 400

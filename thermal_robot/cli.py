@@ -22,6 +22,9 @@ from thermal_robot.commands import (
     predict,
     view,
 )
+from thermal_robot.commands import (
+    map as workspace,
+)
 from thermal_robot.console import NORMAL, add_loudness, heard
 from thermal_robot.errors import ThermalRobotError
 from thermal_robot.parser import BAD_INPUT, DONE, FAILED, INTERRUPTED, STATUSES, Parser
@@ -38,6 +41,7 @@ COMMANDS = {
     "correct": correct,
     "iso9283": iso9283,
     "import": import_files,
+    "map": workspace,
     "paper": paper,
     "blind": blind,
 }

@@ -81,7 +81,12 @@ class Map:
         return pd.concat(parts, ignore_index=True)[wanted] if parts else pd.DataFrame(columns=wanted)
 
     def best(
-        self, by: str = "required_warm", *, largest: bool = False, within: Limits | None = None, count: int = settings.LISTED
+        self,
+        by: str = "required_warm",
+        *,
+        largest: bool = False,
+        within: Limits | None = None,
+        count: int = settings.LISTED,
     ) -> pd.DataFrame:
         """Return the best rows, the best posture of each place, best first.
 
@@ -127,7 +132,7 @@ class Map:
             )
 
     def values(self, by: str, *, largest: bool = False) -> tuple[NDArray[Any], NDArray[Any]]:
-        """Return (K, 3) places, m, that are reached, and (K,) the best value of a column there, whatever the posture."""
+        """Return (K, 3) places, m, that are reached, and (K,) the best value of a column among their postures."""
         found = self.frame(["place", "x", "y", "z", by])
         best = found.sort_values(by, ascending=not largest, kind="stable").drop_duplicates("place").sort_values("place")
         return best[["x", "y", "z"]].to_numpy(dtype=float), best[by].to_numpy(dtype=float)

@@ -1,8 +1,8 @@
 """All postures in which an arm holds its tool along a direction at many places.
 
 At a few places they are searched from everywhere; from there each continues to the neighbours, as long as a step is
-short. Where the task leaves a direction free (a turn about the tool, a seventh joint), the configuration that is nearest
-to home is taken among those that hang together:
+short. Where the task leaves a direction free (a turn about the tool, a seventh joint), the configuration that is
+nearest to home is taken among those that hang together:
 
     Δq = J⁺ e + (1 − J⁺J) λ (q_home − q),    J⁺ = Jᵀ (J Jᵀ + μ)⁻¹,  μ as the square of what is missing (e).
 """

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.assembly.thermal.elongation import elongation
-from thermal_robot.assembly.thermal.displacement import elongation_jacobian
 from thermal_robot.assembly.workspace import assembly_map
 from thermal_robot.errors import RobotError
+from thermal_robot.kinematics import elongation_jacobian
 from thermal_robot.maps import settings
 from thermal_robot.maps.postures import Task, all_postures
 from thermal_robot.maps.question import Joints, Spec, within
@@ -116,8 +116,8 @@ def _told(spec: Spec, q: Array) -> Columns:
 def polygon(edges: Array) -> tuple[Array, Array]:
     """Area and width of the polygons in which a tip may be when each segment is anywhere between cold and warm.
 
-    A polygon of edges ``g`` (Eqs 14-15) has the area ``sum |g_i x g_j|`` over all pairs; its width, the largest distance
-    of two corners, is the longest ``sum ± g_i``.
+    A polygon of edges ``g`` (Eqs 14-15) has the area ``sum |g_i x g_j|`` over all pairs; its width, the largest
+    distance of two corners, is the longest ``sum ± g_i``.
 
     Parameters
     ----------

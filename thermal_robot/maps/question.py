@@ -110,7 +110,9 @@ class Joints:
 Over = Positions | Joints
 
 
-def within(robot: Robot, lower: tuple[float, ...] | None = None, upper: tuple[float, ...] | None = None) -> tuple[Array, Array]:
+def within(
+    robot: Robot, lower: tuple[float, ...] | None = None, upper: tuple[float, ...] | None = None
+) -> tuple[Array, Array]:
     """Return finite limits (n,) of the joints: those given, else the robot's, at most half a turn either side of zero.
 
     Raises

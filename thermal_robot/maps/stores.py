@@ -58,7 +58,9 @@ def store(path: str | Path) -> Store:
         return ZarrStore(folder)
     if folder.suffix == PARQUET:
         return ParquetStore(folder)
-    raise CampaignError(str(path), "no kind of map", found=folder.suffix or "no ending", expected=f"{ZARR} or {PARQUET}")
+    raise CampaignError(
+        str(path), "no kind of map", found=folder.suffix or "no ending", expected=f"{ZARR} or {PARQUET}"
+    )
 
 
 class ParquetStore:

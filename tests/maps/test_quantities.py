@@ -1,0 +1,60 @@
+"""The columns of a map: row by row what the functions of the assembly say."""
+
+import numpy as np
+import pytest
+
+from thermal_robot.assembly.probability import capability, failing_probability, plane_axes, required_clearance
+from thermal_robot.assembly.probability import zonotope as zonotope_of
+from thermal_robot.assembly.repeatability import tool_covariance
+from thermal_robot.assembly.thermal import displacement, elongation
+from thermal_robot.errors import RobotError
+from thermal_robot.kinematics import elongation_jacobian, tool_poses
+from thermal_robot.maps import Joints, Question
+from thermal_robot.maps.quantities import UNITS, columns, polygon
+from thermal_robot.maps.question import Spec
+
+
+@pytest.mark.parametrize("law", ["shift", "uniform"])
+def test_each_row_is_what_single_functions_say(rv_m2, law):
+    question = Question(4e-5, 1.5e-5, 5.0, 1.5e-4, 1.2, law, axis=(0.0, 1.0, 0.0), point=(0.0, 0.02, 0.0))
+    found = columns(Spec(rv_m2, Joints(6), question), np.arange(6))
+    q = np.stack([found[name] for name in rv_m2.joint_names], axis=1)
+    grown = elongation(rv_m2, 5.0, coefficients=1.5e-5, reference=0.0)
+    for k in range(6):
+        pose = tool_poses(rv_m2, q[k])[0]
+        tip = pose[:3, 3] + pose[:3, :3] @ question.point
+        np.testing.assert_allclose([found[a][k] for a in "xyz"], tip, atol=1e-15)
+        plane = plane_axes(pose[:3, :3] @ question.axis)
+        covariance = tool_covariance(rv_m2, q[k], 4e-5, point=question.point)[0]
+        moved = displacement(rv_m2, q[k], grown)[0]
+        np.testing.assert_allclose([found[f"std.{a}"][k] for a in "xyz"], np.sqrt(np.diag(covariance)), rtol=1e-12)
+        np.testing.assert_allclose([found[f"shift.{a}"][k] for a in "xyz"], moved, atol=1e-18)
+        scatter, off = plane @ covariance @ plane.T, plane @ moved
+        heated = {"mean": off} if law == "shift" else {"segments": off}
+        fails = failing_probability(scatter, 1.5e-4, **heated)
+        assert found["capability_warm"][k] == pytest.approx(float(capability(failing=fails)), rel=1e-9)
+        assert found["probability_warm"][k] == pytest.approx(1.0 - float(fails), abs=1e-13)
+        assert found["required"][k] == pytest.approx(required_clearance(scatter, capability=1.2), rel=1e-10)
+        warm = required_clearance(scatter, capability=1.2, **heated)
+        assert found["required_warm"][k] == pytest.approx(warm, rel=1e-10)
+        share = np.minimum(q[k] - rv_m2.lower, rv_m2.upper - q[k]) / (rv_m2.upper - rv_m2.lower)
+        assert found["margin"][k] == pytest.approx(share.min(), rel=1e-12)
+    assert set(found) == {*UNITS, *rv_m2.joint_names}
+
+
+def test_a_polygon_is_that_of_its_corners(rv_m2):
+    q = np.random.default_rng(0).uniform(-0.4, 0.4, (5, 5))
+    edges = 1e-5 * elongation_jacobian(rv_m2, q)[:, :2]
+    area, width = polygon(edges)
+    for k in range(5):
+        corners = zonotope_of(edges[k], 0.0, 1.0).vertices
+        x, y = corners.T
+        shoelace = 0.5 * abs(np.dot(x, np.roll(y, -1)) - np.dot(y, np.roll(x, -1)))
+        assert area[k] == pytest.approx(shoelace, rel=1e-10)
+        apart = np.linalg.norm(corners[:, None] - corners[None], axis=2)
+        assert width[k] == pytest.approx(apart.max(), rel=1e-12)
+
+
+def test_a_polygon_of_too_many_segments_is_refused():
+    with pytest.raises(RobotError, match="too many corners"):
+        polygon(np.zeros((1, 2, 13)))

@@ -1,0 +1,11 @@
+"""Maps of the workspace: what a robot is good for, place by place, in every posture.
+
+The room knows robots and the assembly's probabilities, no campaign.
+"""
+
+from thermal_robot.maps.build import workspace_map
+from thermal_robot.maps.figures import plot_map
+from thermal_robot.maps.opened import Map
+from thermal_robot.maps.question import Joints, Positions, Question
+
+__all__ = ["Joints", "Map", "Positions", "Question", "plot_map", "workspace_map"]

@@ -1,0 +1,116 @@
+"""Pictures of a map: contours of a plane, a cloud of places in space."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.maps.opened import Map
+from thermal_robot.maps.quantities import UNITS
+
+if TYPE_CHECKING:
+    from matplotlib.figure import Figure
+
+Array = NDArray[np.float64]
+
+TITLES = {
+    "std.x": "Scatter along x, 1σ",
+    "std.y": "Scatter along y, 1σ",
+    "std.z": "Scatter along z, 1σ",
+    "shift.x": "Thermal displacement along x",
+    "shift.y": "Thermal displacement along y",
+    "shift.z": "Thermal displacement along z",
+    "polygon.area": "Area of the polygon of thermal displacements",
+    "polygon.width": "Width of the polygon of thermal displacements",
+    "probability": "Probability of joining",
+    "probability_warm": "Probability of joining, warm",
+    "capability": "Capability C_p",
+    "capability_warm": "Capability C_p, warm",
+    "required": "Required clearance",
+    "required_warm": "Required clearance, warm",
+    "margin": "Distance to the nearest joint limit, share of the range",
+}
+_SIZES = {"m": (1e6, "µm"), "m²": (1e12, "µm²"), "1": (1.0, ""), "": (1.0, "")}
+_BETTER_LARGE = ("probability", "probability_warm", "capability", "capability_warm", "margin")
+_LEVELS = 12
+
+
+def larger_is_better(by: str) -> bool:
+    """Return whether the largest value of a column is the best one."""
+    return by in _BETTER_LARGE
+
+
+def plot_map(found: Map, by: str = "required_warm") -> Figure:
+    """Draw a column of a map, at each place that of the best posture.
+
+    Contours where the places lie in a plane that is parallel to two axes of the root frame, else points in space.
+    The best place is marked.
+
+    Parameters
+    ----------
+    found
+        The map.
+    by
+        The column.
+
+    Returns
+    -------
+    Figure
+        Of matplotlib.
+
+    Raises
+    ------
+    CampaignError
+        A column that the map has not.
+    """
+    from matplotlib.figure import Figure
+
+    places, values = found.values(by, largest=larger_is_better(by))
+    factor, unit = _SIZES[UNITS.get(by, "")]
+    values = factor * values
+    label = TITLES.get(by, by) + (f" ({unit})" if unit else "")
+    figure = Figure(figsize=(7.2, 5.6), layout="constrained")
+    varies = [k for k in range(3) if len(places) and np.ptp(places[:, k]) > 1e-6]
+    figure.suptitle(f"{found.notes['robot']}: {label}", fontsize=12)
+    if found.notes["over"] == "positions" and len(varies) == 2:
+        _plane(figure, found, places, values, varies, label, largest=larger_is_better(by))
+    else:
+        _space(figure, places, values, label)
+    return figure
+
+
+def _plane(
+    figure: Figure, found: Map, places: Array, values: Array, axes: list[int], label: str, *, largest: bool
+) -> None:
+    """Draw filled contours over a grid; places that are not reached stay empty."""
+    first, second = (np.linspace(*found.notes["xyz"[k]]) for k in axes)
+    grid = np.full((len(second), len(first)), np.nan)
+    column, row = (
+        np.abs(along[:, None] - places[:, k]).argmin(axis=0) for along, k in zip((first, second), axes, strict=True)
+    )
+    grid[row, column] = values
+    own = figure.add_subplot()
+    drawn = own.contourf(first, second, grid, levels=_LEVELS, cmap="viridis_r" if not largest else "viridis")
+    own.contour(first, second, grid, levels=drawn.levels, colors="white", linewidths=0.4)
+    best = values.argmax() if largest else values.argmin()
+    own.plot(*places[best, axes], marker="*", markersize=13, color="#e69f00", markeredgecolor="black", linestyle="none")
+    own.annotate(
+        "best", (places[best, axes[0]], places[best, axes[1]]), xytext=(8, 6), textcoords="offset points", fontsize=10
+    )
+    own.set_aspect("equal")
+    own.set_xlabel(f"{'xyz'[axes[0]]} (m)")
+    own.set_ylabel(f"{'xyz'[axes[1]]} (m)")
+    figure.colorbar(drawn, ax=own, label=label, shrink=0.9)
+
+
+def _space(figure: Figure, places: Array, values: Array, label: str) -> None:
+    """Draw the places as points, at most as many as a picture can show."""
+    step = max(len(places) // 20_000, 1)
+    own = figure.add_subplot(projection="3d")
+    drawn = own.scatter(*places[::step].T, c=values[::step], s=3.0, cmap="viridis", depthshade=False)
+    for name, axis in zip("xyz", (own.xaxis, own.yaxis, own.zaxis), strict=True):
+        axis.set_label_text(f"{name} (m)")
+    own.set_box_aspect(np.maximum(np.ptp(places, axis=0), 1e-3))
+    figure.colorbar(drawn, ax=own, label=label, shrink=0.7, pad=0.12)
