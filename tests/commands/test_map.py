@@ -42,9 +42,9 @@ def test_what_places_must_have_counts(run):
 @pytest.mark.parametrize(
     ("more", "message"),
     [
-        ([], "map: does not say where; expected --x, --y and --z, or --joints"),
+        ([], "map: does not say where, expected --x, --y and --z, or --joints"),
         (["--joints", "5", *LINE], "does not say where"),
-        (["--x", "0", "1", "two", *LINE[7:]], "column '--x': no span; found 0 1 two, expected FROM TO N"),
+        (["--x", "0", "1", "two", *LINE[8:]], "column '--x': no span; found 0 1 two, expected FROM TO N"),
         (["--joints", "5", "--sigma", "much"], "column '--sigma': no number; found much"),
         (["--joints", "5", "--sigma", "joint_1=1e-5"], "joint_2"),
         (["--joints", "5", "--where", "z=1"], "column '--where': no rule; found z=1"),

@@ -17,8 +17,8 @@ def test_a_plane_is_drawn_as_contours_with_its_best_place(rv_m2, plane, question
     assert "µm" in figure.get_suptitle()
     best = found.best("required_warm", count=1)
     (star,) = own.lines
-    at = np.array(star.get_data()).ravel()
-    value = found.frame().query("abs(x - @at[0]) < 1e-9 and abs(y - @at[1]) < 1e-9").required_warm.min()
+    every, (x, y) = found.frame(), np.array(star.get_data()).ravel()
+    value = every.required_warm[np.hypot(every.x - x, every.y - y) < 1e-9].min()
     assert value == pytest.approx(best.required_warm[0])
     figure.savefig(tmp_path / "plane.png")
 

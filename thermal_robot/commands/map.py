@@ -38,9 +38,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     add("--law", choices=("shift", "uniform"), default="shift", help="the rise has happened; or is within ± (shift)")
     add("--clearance", metavar="MM", type=float, default=0.2, help="diameter for the probability, mm (0.2)")
     add("--capability", metavar="CP", type=float, default=1.33, help="for the required clearance (1.33)")
-    add(
-        "--approach", **triple, default=[0.0, 0.0, -1.0], metavar="X", help="where the tool points, root frame (0 0 -1)"
-    )
+    add("--approach", metavar="X", help="where the tool points, root frame (0 0 -1)", **_triple(0.0, 0.0, -1.0))
     add("--axis", metavar="X", help="the tool's direction, tool frame (0 0 1)", **_triple(0.0, 0.0, 1.0))
     add("--point", metavar="MM", help="the tip in the tool frame, mm (0 0 0)", **_triple(0.0, 0.0, 0.0))
     add("--by", metavar="COLUMN", default="required_warm", help="what tells the best places (required_warm)")

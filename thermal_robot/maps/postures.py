@@ -1,8 +1,8 @@
 """All postures in which an arm holds its tool along a direction at many places.
 
-At a few places they are searched from everywhere; from there each continues to the neighbours, as long as a step is
-short. Where the task leaves a direction free (a turn about the tool, a seventh joint), the configuration that is
-nearest to home is taken among those that hang together:
+At a few places they are searched from everywhere; from there each leads to those of the neighbours. Where the task
+leaves a direction free (a turn about the tool, a seventh joint), the configuration that is nearest to home is taken
+among those that hang together:
 
     Δq = J⁺ e + (1 − J⁺J) λ (q_home − q),    J⁺ = Jᵀ (J Jᵀ + μ)⁻¹,  μ as the square of what is missing (e).
 """
@@ -139,10 +139,9 @@ def all_postures(task: Task, targets: Array) -> tuple[Rows, Array]:
     known = _Known(task, len(targets))
     starts, random, idle = _everywhere(task), np.random.default_rng(0), 0
 
-    def searched(places: Rows, start: Array, longest: float = np.inf) -> tuple[Rows, Array]:
+    def searched(places: Rows, start: Array) -> tuple[Rows, Array]:
         """Return the postures that are new."""
         q, found = task.solve(targets[places], start)
-        found &= np.max(np.abs(task.way(start, q)), axis=1) < longest
         new = found.copy()
         new[found] = known.fresh(places[found], q[found])
         return places[new], q[new]
@@ -158,7 +157,7 @@ def all_postures(task: Task, targets: Array) -> tuple[Rows, Array]:
         idle = 0 if len(places) else idle + 1
         while len(places):
             before = np.repeat(q, near.shape[1], axis=0)
-            places, q = searched(near[places].ravel(), before, 2.0 * settings.LONGEST)
+            places, q = searched(near[places].ravel(), before)
         if known.count.min() == settings.MOST:
             break
     places = np.repeat(np.arange(len(targets)), known.count)

@@ -82,7 +82,7 @@ class Positions:
 
 @dataclass(frozen=True)
 class Joints:
-    """Joint positions that fill the limits evenly: points of Sobol's sequence.
+    """Joint positions that fill the limits evenly: points of Halton's sequence.
 
     Parameters
     ----------
@@ -101,9 +101,8 @@ class Joints:
         from scipy.stats import qmc
 
         low, high = within(robot, self.lower, self.upper)
-        engine = qmc.Sobol(robot.n, scramble=False)
-        if rows[0]:
-            engine.fast_forward(int(rows[0]))
+        engine = qmc.Halton(robot.n, scramble=False)
+        engine.fast_forward(int(rows[0]) + 1)  # the first point of all lies in a corner
         return np.asarray(low + engine.random(len(rows)) * (high - low))
 
 
