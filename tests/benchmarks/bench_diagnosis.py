@@ -1,4 +1,4 @@
-"""Time of a whole diagnosis, and of ``import thermal_robot``, beside another state of the program; start it as a script.
+"""Time of a whole diagnosis, and of ``import thermal_robot``, beside another state of the program; start as a script.
 
 usage: python tests/benchmarks/bench_diagnosis.py [--old FOLDER] [--repeats N] [--only CASE ...]
 
@@ -66,11 +66,14 @@ def measured(case):
 
 
 def started(arguments, tree):
-    """Return what a process of this Python prints, with the program of a folder; and the seconds it took."""
-    begun = time.perf_counter()
+    """Return what a process of this Python prints, with the program of a folder; and the processor's seconds."""
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
     environment = {**os.environ, "PYTHONPATH": str(tree)}
-    done = subprocess.run([sys.executable, *arguments], env=environment, capture_output=True, text=True, check=True)
-    return done.stdout.split(), time.perf_counter() - begun
+    done = subprocess.run(
+        [sys.executable, *arguments], env=environment, cwd=tree, capture_output=True, text=True, check=True
+    )
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return done.stdout.split(), after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime
 
 
 def imports(trees, repeats):
