@@ -195,7 +195,17 @@ def _log_det(matrix: Array, rank: int) -> float:
 def whitened(linear: Linear, whitening: Whitening) -> Array:
     """(rows·m, f + P + 1) frames, parameters and gap of the rows with weight, in units of noise."""
     used = np.flatnonzero(whitening.weights > 0)
-    stack = linear.rows(used)
+    return _white(linear.rows(used), used, whitening)
+
+
+def whitened_columns(columns: Array, whitening: Whitening) -> Array:
+    """(rows·m, K) of columns (N, m, K) the rows with weight, in units of noise."""
+    used = np.flatnonzero(whitening.weights > 0)
+    return _white(columns[used], used, whitening)
+
+
+def _white(stack: Array, used: NDArray[np.int64], whitening: Whitening) -> Array:
+    """Whiten columns (n, m, K) of the rows in use, in their place."""
     stack *= (np.sqrt(whitening.weights[used])[:, None] / whitening.sigma(used))[:, :, None]
     flat = stack.reshape(-1, stack.shape[2])
     return flat if whitening.smooth is None else whitening.smooth.whitened(flat)
