@@ -62,10 +62,10 @@ class Products:
 
     def _pair(self, one: Block, other: Block) -> Array:
         """Return the (P, Q) products of the columns of two blocks."""
-        if (known := self._pairs.get(one, {}).get(other)) is not None:
-            return np.asarray(known)
-        if (known := self._pairs.get(other, {}).get(one)) is not None:
-            return np.asarray(known.T)
+        for first, second in ((one, other), (other, one)):
+            known = self._pairs[first].get(second) if first in self._pairs else None
+            if known is not None:
+                return known if first is one else np.asarray(known.T)
         found = self._white[one].T @ self._white[other]
         self._pairs.setdefault(one, WeakKeyDictionary())[other] = found
         return np.asarray(found)
