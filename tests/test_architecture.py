@@ -35,6 +35,7 @@ ORDER = (
     "model_file",
     "correction",
     "simulation",
+    "teller",
     "diagnosis",
     "planning",
     "datasets",
@@ -202,11 +203,24 @@ def test_every_module_says_what_it_is_for(path):
 
 def test_a_light_import_loads_nothing_heavy():
     heavy = ["pandas", "matplotlib", "scipy.stats", "yourdfpy", "rich", "jsonschema", "pyarrow", "tomli_w"]
-    heavy += ["trimesh", "viser"]
+    heavy += ["trimesh", "viser", "numpy", "scipy", "pinocchio"]
     code = f"import sys, thermal_robot; print([m for m in {heavy!r} if m in sys.modules])"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "[]"
     assert done.stderr == ""
+
+
+def test_what_is_loaded_late_is_found_listed_and_typed():
+    code = "import thermal_robot as t; print(t.kinematics.__name__, t.diagnose is t.diagnosis.diagnose, len(dir(t)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert done.stdout.split()[:2] == [f"{PACKAGE}.kinematics", "True"]
+    assert set(thermal_robot.__all__) <= set(dir(thermal_robot))
+    assert [n for n in thermal_robot.__all__ if is_module(f"{PACKAGE}.{n}")] == []  # a module would hide the name
+    typed = {target for target, how in imports(ROOT / "__init__.py") if how == "checked"}
+    assert {room(target) for target in typed} == set(thermal_robot._HOME.values())
+    assert set(thermal_robot._HOME) == set(thermal_robot.__all__)
+    with pytest.raises(AttributeError, match="no attribute 'diagnos'"):
+        _ = thermal_robot.diagnos
 
 
 @pytest.mark.parametrize("name", thermal_robot.__all__)

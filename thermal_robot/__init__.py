@@ -1,19 +1,71 @@
-"""Say where the gap between a robot and its model lies, which effect causes it, and how far it shrinks."""
+"""Say where the gap between a robot and its model lies, which effect causes it, and how far it shrinks.
+
+Nothing is loaded before it is used: neither Pinocchio nor SciPy by ``import thermal_robot`` alone.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from importlib.util import find_spec
+from typing import TYPE_CHECKING, Any
 
 from thermal_robot import report
-from thermal_robot.campaign import Campaign, campaign_from_table, describe, read_campaign, read_samples, write_campaign
-from thermal_robot.correction import CorrectedModel
-from thermal_robot.datasets import demo_campaign
-from thermal_robot.diagnosis import Diagnosis, diagnose
-from thermal_robot.diagnosis.result import told_by
-from thermal_robot.effects import Effect
-from thermal_robot.errors import CampaignError, EffectError, EstimationError, RobotError, ThermalRobotError
-from thermal_robot.observations import Observations, observe
-from thermal_robot.robot import Robot, load_robot
-from thermal_robot.simulation import simulate
+from thermal_robot.teller import told_by
+
+if TYPE_CHECKING:
+    from thermal_robot.campaign import Campaign, campaign_from_table, read_campaign, read_samples, write_campaign
+    from thermal_robot.campaign.describe import describe
+    from thermal_robot.correction import CorrectedModel
+    from thermal_robot.datasets import demo_campaign
+    from thermal_robot.diagnosis import Diagnosis
+    from thermal_robot.diagnosis.diagnose import diagnose
+    from thermal_robot.effects import Effect
+    from thermal_robot.errors import CampaignError, EffectError, EstimationError, RobotError, ThermalRobotError
+    from thermal_robot.observations import Observations, observe
+    from thermal_robot.robot import Robot, load_robot
+    from thermal_robot.simulation.simulate import simulate
 
 told_by(report)
 __version__ = "0.2.0"
+
+_HOME = {
+    "Campaign": "campaign",
+    "CampaignError": "errors",
+    "CorrectedModel": "correction",
+    "Diagnosis": "diagnosis",
+    "Effect": "effects",
+    "EffectError": "errors",
+    "EstimationError": "errors",
+    "Observations": "observations",
+    "Robot": "robot",
+    "RobotError": "errors",
+    "ThermalRobotError": "errors",
+    "campaign_from_table": "campaign",
+    "demo_campaign": "datasets",
+    "describe": "campaign",
+    "diagnose": "diagnosis",
+    "load_robot": "robot",
+    "observe": "observations",
+    "read_campaign": "campaign",
+    "read_samples": "campaign",
+    "simulate": "simulation",
+    "write_campaign": "campaign",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name in _HOME:
+        found = getattr(import_module(f"{__name__}.{_HOME[name]}"), name)
+        globals()[name] = found  # asked for once
+        return found
+    if not name.startswith("_") and find_spec(f"{__name__}.{name}"):
+        return import_module(f"{__name__}.{name}")
+    raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *_HOME})
+
 
 __all__ = [
     "Campaign",

@@ -7,10 +7,11 @@ import jsonschema
 import pytest
 from helpers import numbers
 
-from thermal_robot.diagnosis import result
-from thermal_robot.diagnosis.result import told, told_by
+from thermal_robot import teller
+from thermal_robot.diagnosis.result import told
 from thermal_robot.errors import CampaignError, EffectError
 from thermal_robot.report import schema
+from thermal_robot.teller import told_by
 
 
 class Parrot:
@@ -34,7 +35,7 @@ class Parrot:
 
 @pytest.fixture
 def nobody(monkeypatch):
-    monkeypatch.setattr(result, "_tellers", [])
+    monkeypatch.setattr(teller, "_tellers", [])
 
 
 def test_without_a_teller_it_says_what_to_do(hall, nobody):

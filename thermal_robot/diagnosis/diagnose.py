@@ -94,7 +94,10 @@ def diagnose(
         progress("reading the campaign")
         campaign = read_campaign(campaign)
     candidates = choose(only, without, effects)
-    everything = {*library(), *(effect.name for effect in (*effects, *candidates))}
+    # where nothing was left out the candidates are all; installed packages are looked up once
+    everything = {effect.name for effect in (*effects, *candidates)}
+    if only or without:
+        everything |= {*library()}
     _check_priors(campaign, everything)
 
     def asked(name: str) -> bool:

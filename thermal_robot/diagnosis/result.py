@@ -1,7 +1,7 @@
 """The result of a diagnosis: one frozen value, its JSON, and the port through which it is put into words and drawn.
 
-This module knows nothing of reports. The package registers one with :func:`told_by`; any object with the methods of
-:class:`Teller` will do.
+This module knows nothing of reports. The package registers one with :func:`thermal_robot.teller.told_by`; any object
+with the methods of :class:`Teller` will do.
 """
 
 from __future__ import annotations
@@ -18,6 +18,7 @@ from thermal_robot.diagnosis.parts import Finding, Gap, Misfit, Rows, Sensitivit
 from thermal_robot.diagnosis.plain import gap_as_json, jsonable
 from thermal_robot.effects.catalogue import of_effect
 from thermal_robot.files import write_text
+from thermal_robot.teller import registered
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -50,18 +51,9 @@ class Teller(Protocol):
         """Draw what one effect explains."""
 
 
-_tellers: list[Teller] = []
-
-
-def told_by(teller: Teller) -> None:
-    """Register who puts every diagnosis into words and figures from now on."""
-    _tellers[:] = [teller]
-
-
 def _teller() -> Teller:
-    if not _tellers:
-        raise RuntimeError("nobody can tell a diagnosis: import thermal_robot, or call told_by")
-    return _tellers[0]
+    found: Teller = registered()
+    return found
 
 
 def told(diagnosis: Diagnosis) -> Diagnosis:

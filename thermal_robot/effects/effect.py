@@ -38,7 +38,8 @@ from __future__ import annotations
 import copy
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import asdict, dataclass, field, replace
+from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
@@ -175,6 +176,11 @@ class Parameter:
     def name(self) -> str:
         """Label and place, unique within the effect."""
         return f"{self.label}, {self.place}" if self.place else self.label
+
+    @cached_property
+    def bare(self) -> Parameter:
+        """It without its responses, which may be large."""
+        return replace(self, responses=())
 
 
 @dataclass(frozen=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,6 +11,7 @@ from numpy.typing import NDArray
 Array = NDArray[np.float64]
 
 _MOST = 500  # points of a history that are kept
+_FOLLOWED = 64  # histories and lags of which it is kept how far a body is behind: all settings ask for each
 
 
 @dataclass(frozen=True)
@@ -51,10 +53,7 @@ class History:
         """
         t, u = np.array(self.times), np.array(self.temperatures)
         rate = np.diff(u) / np.diff(t)
-        decay = np.exp(-np.diff(t) / lag)
-        behind = np.zeros(len(t))  # T − u
-        for k in range(len(rate)):
-            behind[k + 1] = (behind[k] + rate[k] * lag) * decay[k] - rate[k] * lag
+        behind = _behind(self, lag)
         i = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 1)
         late = times >= t[-1]
         rate = np.append(rate, 0.0)[i]
@@ -63,3 +62,16 @@ class History:
         inside = u[i] + rate * since + lagging
         after = temperatures + (u[-1] + behind[-1] - temperatures) * np.exp(-since / lag)
         return np.where(times < t[0], temperatures, np.where(late, after, inside))
+
+
+@lru_cache(maxsize=_FOLLOWED)
+def _behind(history: History, lag: float) -> Array:
+    """(K,) by how much a body differs from the record at its points, K."""
+    t, u = np.array(history.times), np.array(history.temperatures)
+    gains = (np.diff(u) / np.diff(t) * lag).tolist()
+    behind = [0.0]
+    for gain, decay in zip(gains, np.exp(-np.diff(t) / lag).tolist(), strict=True):
+        behind.append((behind[-1] + gain) * decay - gain)
+    found = np.array(behind)
+    found.setflags(write=False)
+    return found

@@ -82,7 +82,7 @@ def block(observations: Observations, effect: Effect) -> Block:
     if effect.name in campaign.priors and len(sizes):
         # one size is stated for the whole effect: its parameters keep their default proportions
         sizes = sizes * (campaign.priors[effect.name] / sizes[0])
-    bare = tuple(replace(parameter, responses=()) for parameter in parameters)
+    bare = tuple(parameter.bare for parameter in parameters)
     return Block(effect, bare, observations, sizes, effect.size_spread)
 
 

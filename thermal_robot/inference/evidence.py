@@ -79,10 +79,9 @@ def evidence(
     floor
         Log evidence that is of interest: where it is clear that this is not reached, the iteration ends.
     """
-    spans = [np.arange(gram.slices[b].start, gram.slices[b].stop) for b in blocks]
-    used = np.concatenate([*spans, np.zeros(0, dtype=int)])
-    owner = np.repeat(np.arange(len(blocks)), [len(span) for span in spans])
-    columns = Columns(gram.matrix[np.ix_(used, used)], gram.vector[used], owner, gram.positive[used])
+    used = gram.columns_of(blocks)
+    owner = np.repeat(np.arange(len(blocks)), [gram.slices[b].stop - gram.slices[b].start for b in blocks])
+    columns = Columns(gram.matrix[used[:, None], used], gram.vector[used], owner, gram.positive[used])
     scale = np.array([start.scales.get(b, 1.0) if start else 1.0 for b in blocks])
     variance = start.noise**2 if start else (gram.noise_dof + gram.total) / (gram.noise_dof + gram.equations)
     variance, spread = max(variance, settings.LEAST_VARIANCE), gram.spreads[list(blocks)]

@@ -51,15 +51,18 @@ class Gram:
     noise_dof: float
     offset: float = 0.0
 
+    def columns_of(self, blocks: Sequence[int]) -> NDArray[np.int64]:
+        """(D_γ,) numbers of the reduced columns of some blocks."""
+        return np.array([k for b in blocks for k in range(self.slices[b].start, self.slices[b].stop)], dtype=int)
+
     def some(self, blocks: Sequence[int]) -> Gram:
         """Return the problem of some of the blocks alone."""
         widths = [self.bases[b].shape[1] for b in blocks]
         ends = np.cumsum([0, *widths])
-        used = np.concatenate([*(np.arange(self.slices[b].start, self.slices[b].stop) for b in blocks), np.zeros(0)])
-        own = used.astype(int)
+        own = self.columns_of(blocks)
         return replace(
             self,
-            matrix=self.matrix[np.ix_(own, own)],
+            matrix=self.matrix[own[:, None], own],
             vector=self.vector[own],
             slices=tuple(slice(a, b) for a, b in pairwise(ends.tolist())),
             bases=tuple(self.bases[b] for b in blocks),

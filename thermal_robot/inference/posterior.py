@@ -11,6 +11,7 @@ exact, and the same.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,6 +23,7 @@ from thermal_robot.inference import settings
 
 Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
+_ROOT_2, _ROOT_2_OVER_PI, _LOG_2 = np.sqrt(2.0), np.sqrt(2.0 / np.pi), np.log(2.0)
 UNDETERMINED = "the measurements do not determine anything: too few, or all alike"
 
 
@@ -34,11 +36,16 @@ class Columns:
     owner: NDArray[np.int64]
     positive: Mask
 
-    def some(self, free: Mask) -> Columns:
+    @cached_property
+    def sided(self) -> NDArray[np.int64]:
+        """Numbers of the columns that cannot be negative."""
+        return np.flatnonzero(self.positive)
+
+    def some(self, kept: NDArray[np.int64]) -> Columns:
         """Return those columns alone."""
-        if free.all():
+        if len(kept) == len(self.vector):
             return self
-        return Columns(self.matrix[np.ix_(free, free)], self.vector[free], self.owner[free], self.positive[free])
+        return Columns(self.matrix[kept[:, None], kept], self.vector[kept], self.owner[kept], self.positive[kept])
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,16 +97,19 @@ class Posterior:
             values, covariance, log_det, pull, _ = _solved(columns, scale, variance, free)
             values = np.where(columns.positive, np.maximum(values, 0.0), values)
         tight = scale[columns.owner] ** -2.0
-        spread = np.zeros(size)
-        spread[free] = covariance.diagonal()
-        effective = _by_block(columns, np.where(free, 1.0 - spread * tight, 0.0), count)
+        kept = np.flatnonzero(free)
+        every, spread = len(kept) == size, np.zeros(size)
+        spread[kept] = covariance.diagonal()
+        effective = _by_block(
+            columns, 1.0 - spread * tight if every else np.where(free, 1.0 - spread * tight, 0.0), count
+        )
         first, second, worth = values, values**2 + spread, 0.0
-        if columns.positive.any():
-            first, second, worth = _sides(columns, values, spread, covariance, free, pull, tight, variance)
+        if len(columns.sided):
+            first, second, worth = _sides(columns, values, spread, covariance, kept, pull, tight, variance)
         whole = covariance
-        if not free.all():
+        if not every:
             whole = np.diag(second)
-            whole[np.ix_(free, free)] = covariance
+            whole[kept[:, None], kept] = covariance
         return cls(
             values,
             whole,
@@ -150,18 +160,19 @@ def _solved(columns: Columns, scale: Array, variance: float, free: Mask) -> tupl
     dropped, and which columns should change by more than rounding: those that stay and are negative, those dropped that
     would be positive.
     """
-    mean, covariance, log_det = _both_sides(columns.some(free), scale, variance)
+    kept = np.flatnonzero(free)
+    mean, covariance, log_det = _both_sides(columns.some(kept), scale, variance)
     values, pull, wrong = np.zeros(len(free)), np.zeros(len(free)), np.zeros(len(free), dtype=bool)
-    values[free] = mean
-    out = np.flatnonzero(~free)
-    if len(out):
-        beside, vector = columns.matrix[np.ix_(out, free)], columns.vector[out]
+    values[kept] = mean
+    if len(kept) < len(free):
+        out = np.flatnonzero(~free)
+        beside, vector = columns.matrix[out[:, None], kept], columns.vector[out]
         pull[out] = (vector - beside @ mean) / variance
         rounding = settings.SIDE_ROUNDING * (np.abs(vector) + np.abs(beside) @ np.abs(mean)) / variance
         wrong[out] = pull[out] > rounding
-    if columns.positive.any():
-        negative = values < -settings.SIDE_ROUNDING * np.abs(values).max(initial=0.0)
-        wrong |= columns.positive & negative
+    if len(columns.sided):
+        own = values[columns.sided]
+        wrong[columns.sided] |= own < -settings.SIDE_ROUNDING * np.abs(values).max()
     return values, covariance, log_det, pull, wrong
 
 
@@ -173,34 +184,45 @@ def _both_sides(columns: Columns, scale: Array, variance: float) -> tuple[Array,
     tight = 1.0 / scale[columns.owner] ** 2
     precision = columns.matrix / variance
     precision.ravel()[:: size + 1] += tight
-    factor, failed = dpotrf(precision, lower=1, clean=1)
+    # what stands below the diagonal of its transpose is above its own: it is symmetric, and nothing is copied
+    factor, failed = dpotrf(precision.T, lower=1, clean=1, overwrite_a=1)
     if failed:
         raise EstimationError(UNDETERMINED)
-    lower, _ = dpotri(factor, lower=1)
+    log_det = float(2.0 * np.log(factor.diagonal()).sum() - np.log(tight).sum())
+    lower, _ = dpotri(factor, lower=1, overwrite_c=1)
     covariance = lower + lower.T  # above the diagonal it is zero
     covariance.ravel(order="K")[:: size + 1] *= 0.5
-    log_det = float(2.0 * np.log(factor.ravel(order="K")[:: size + 1]).sum() - np.log(tight).sum())
     return covariance @ columns.vector / variance, covariance, log_det
 
 
 def _sides(
-    columns: Columns, values: Array, spread: Array, covariance: Array, free: Mask, pull: Array, tight: Array, s2: float
+    columns: Columns,
+    values: Array,
+    spread: Array,
+    covariance: Array,
+    kept: NDArray[np.int64],
+    pull: Array,
+    tight: Array,
+    s2: float,
 ) -> tuple[Array, Array, float]:
     """Return mean and mean square of every column on its side, and the logarithm of what the sides are worth."""
-    mean, own, worth, out = values.copy(), spread.copy(), 0.0, ~free
-    if out.any():
-        along = columns.matrix[np.ix_(out, free)] / s2
-        bend = np.diag(columns.matrix)[out] / s2 + tight[out] - ((along @ covariance) * along).sum(axis=1)
+    mean, own, worth = values.copy(), spread.copy(), 0.0
+    if len(kept) < len(values):
+        dropped = np.ones(len(values), dtype=bool)
+        dropped[kept] = False
+        out = np.flatnonzero(dropped)
+        along = columns.matrix[out[:, None], kept] / s2
+        bend = columns.matrix[out, out] / s2 + tight[out] - ((along @ covariance) * along).sum(axis=1)
         bend = np.maximum(bend, tight[out])
         mean[out], own[out] = pull[out] / bend, 1.0 / bend
         worth = float((0.5 * np.log(tight[out] / bend) + 0.5 * pull[out] ** 2 / bend).sum())
-    p = columns.positive
-    root = np.sqrt(own[p])
-    z = mean[p] / root
-    log_mass = log_ndtr(z)
+    p = columns.sided
+    at, beside = mean[p], own[p]
+    root = np.sqrt(beside)
+    z = at / root
     # of a normal on one side of zero: mean m + σ r, mean square σ² + m (m + σ r), with r = φ(z)/Φ(z)
-    ratio = np.sqrt(2.0 / np.pi) / erfcx(-z / np.sqrt(2.0))
-    first, second = mean.copy(), mean**2 + own
-    first[p] = np.maximum(mean[p] + root * ratio, 0.0)
-    second[p] = np.maximum(own[p] + mean[p] * first[p], first[p] ** 2)
-    return first, second, worth + float((log_mass + np.log(2.0)).sum())
+    ratio = _ROOT_2_OVER_PI / erfcx(-z / _ROOT_2)
+    first, second = mean, mean**2 + own
+    first[p] = moved = np.maximum(at + root * ratio, 0.0)
+    second[p] = np.maximum(beside + at * moved, moved**2)
+    return first, second, worth + float((log_ndtr(z) + _LOG_2).sum())

@@ -129,12 +129,11 @@ def normal_equations(
     rest = full[flat:, flat:] * np.outer(sizes, sizes) - along.T @ along
     rest = 0.5 * (rest + rest.T)
     bases, ranks = (like.bases, like.ranks) if like else _reduction(linear, rest, np.diag(full)[flat:] * sizes**2)
-    reduction = _block_diagonal(bases)
     ends = np.cumsum([0, *(basis.shape[1] for basis in bases)]).tolist()
     log_det = _log_det(full[:flat, :flat], known.shape[1])
     return Gram(
-        reduction.T @ rest[:-1, :-1] @ reduction,
-        reduction.T @ rest[:-1, -1],
+        _reduced(_reduced(rest[:-1, :-1], bases).T, bases).T,
+        _reduced(rest[-1:, :-1], bases)[0],
         float(rest[-1, -1]),
         tuple(slice(a, b) for a, b in pairwise(ends)),
         bases,
@@ -175,12 +174,14 @@ def _positive(linear: Linear, bases: Sequence[Array]) -> NDArray[np.bool_]:
     return np.concatenate([*((item.positive @ basis).astype(bool) for item, basis in pairs), np.zeros(0, dtype=bool)])
 
 
-def _block_diagonal(bases: Sequence[Array]) -> Array:
-    result = np.zeros((sum(len(b) for b in bases), sum(b.shape[1] for b in bases)))
-    row, column = 0, 0
+def _reduced(rows: Array, bases: Sequence[Array]) -> Array:
+    """(n, D) rows (n, P) over all parameters, those of each block times its basis."""
+    result = np.empty((len(rows), sum(b.shape[1] for b in bases)))
+    parameter, column = 0, 0
     for basis in bases:
-        result[row : row + len(basis), column : column + basis.shape[1]] = basis
-        row, column = row + len(basis), column + basis.shape[1]
+        size, width = basis.shape
+        np.matmul(rows[:, parameter : parameter + size], basis, out=result[:, column : column + width])
+        parameter, column = parameter + size, column + width
     return result
 
 
@@ -194,7 +195,17 @@ def _log_det(matrix: Array, rank: int) -> float:
 def whitened(linear: Linear, whitening: Whitening) -> Array:
     """(rows·m, f + P + 1) frames, parameters and gap of the rows with weight, in units of noise."""
     used = np.flatnonzero(whitening.weights > 0)
-    stack = linear.rows(used)
+    return _white(linear.rows(used), used, whitening)
+
+
+def whitened_columns(columns: Array, whitening: Whitening) -> Array:
+    """(rows·m, K) of columns (N, m, K) the rows with weight, in units of noise."""
+    used = np.flatnonzero(whitening.weights > 0)
+    return _white(columns[used], used, whitening)
+
+
+def _white(stack: Array, used: NDArray[np.int64], whitening: Whitening) -> Array:
+    """Whiten columns (n, m, K) of the rows in use, in their place."""
     stack *= (np.sqrt(whitening.weights[used])[:, None] / whitening.sigma(used))[:, :, None]
     flat = stack.reshape(-1, stack.shape[2])
     return flat if whitening.smooth is None else whitening.smooth.whitened(flat)

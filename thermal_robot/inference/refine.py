@@ -14,7 +14,8 @@ from thermal_robot.inference.columns import Block, block
 from thermal_robot.inference.evidence import Combination
 from thermal_robot.inference.explain import Explanation, log_odds
 from thermal_robot.inference.gram import Gram
-from thermal_robot.inference.problem import Linear, Whitening, gram, parameter_values
+from thermal_robot.inference.problem import Linear, Whitening, parameter_values
+from thermal_robot.inference.products import Products
 from thermal_robot.inference.robust import tail_weight
 from thermal_robot.inference.search import Search
 from thermal_robot.observations import Observations
@@ -45,41 +46,39 @@ def refined(explanation: Explanation, observations: Observations, factor: float)
     list
         The chosen effects that stay, in their order, their constants moved, with their (P,) values, SI.
     """
-    explanation = replace(explanation, whitening=heard(explanation))
+    kept = Products(explanation.linear, heard(explanation))
     blocks = [explanation.linear.blocks[b].held for b in explanation.best.blocks]
     values = [explanation.values[b][0] for b in explanation.best.blocks]
-    moved = _fewer(explanation, observations, _all_moved(explanation, observations, blocks, factor), factor)
+    moved = _fewer(kept, observations, _all_moved(kept, observations, blocks, factor), factor)
     if moved != blocks:
-        linear, problem, found = _evaluated(explanation, moved)
+        linear, problem, found = _evaluated(kept, moved)
         values = [mean for mean, _ in parameter_values(linear, problem, found).values()]
     return [(item.effect, mean) for item, mean in zip(moved, values, strict=True)]
 
 
-def _all_moved(
-    explanation: Explanation, observations: Observations, blocks: Sequence[Block], factor: float
-) -> list[Block]:
+def _all_moved(kept: Products, observations: Observations, blocks: Sequence[Block], factor: float) -> list[Block]:
     """Return the blocks with the constants of each moved in turn."""
     moved = list(blocks)
     for place, item in enumerate(blocks):
         if _movable(item, factor):
-            moved[place] = _moved(explanation, observations, moved, place, factor)
+            moved[place] = _moved(kept, observations, moved, place, factor)
     return moved
 
 
-def _fewer(explanation: Explanation, observations: Observations, blocks: list[Block], factor: float) -> list[Block]:
+def _fewer(kept: Products, observations: Observations, blocks: list[Block], factor: float) -> list[Block]:
     """Return the blocks less those that only pay for a constant that is a little off.
 
     Beside such an effect the constant stays where the two are best together, and no step leads away. So each is left
     out in turn while the constants move.
     """
-    best = _weighed(explanation, blocks)
+    best = _weighed(kept, blocks)
     while len(blocks) > 1:
         rivals = []
         for k in range(len(blocks)):
             others = [*blocks[:k], *blocks[k + 1 :]]
             if any(_movable(item, factor) for item in others):
-                rivals.append(_all_moved(explanation, observations, others, factor))
-        scores = [_weighed(explanation, rival) for rival in rivals]
+                rivals.append(_all_moved(kept, observations, others, factor))
+        scores = [_weighed(kept, rival) for rival in rivals]
         if not scores or max(scores) <= best:
             break
         blocks, best = rivals[int(np.argmax(scores))], max(scores)
@@ -91,10 +90,10 @@ def _movable(item: Block, factor: float) -> bool:
     return len(gate.nearby(item.effect, factor)) > 1
 
 
-def _weighed(explanation: Explanation, blocks: Sequence[Block]) -> float:
+def _weighed(kept: Products, blocks: Sequence[Block]) -> float:
     """Return the log evidence of these effects with the prior odds of each."""
     priors = log_odds() * sum(1.0 + item.effect.apart for item in blocks)
-    return _evaluated(explanation, blocks)[2].log_evidence + priors
+    return _evaluated(kept, blocks)[2].log_evidence + priors
 
 
 def heard(explanation: Explanation) -> Whitening:
@@ -112,15 +111,13 @@ def heard(explanation: Explanation) -> Whitening:
     return replace(whitening, weights=np.where(aside, tail_weight(distance2, noise.shape[1]), whitening.weights))
 
 
-def _moved(
-    explanation: Explanation, observations: Observations, blocks: Sequence[Block], place: int, factor: float
-) -> Block:
+def _moved(kept: Products, observations: Observations, blocks: Sequence[Block], place: int, factor: float) -> Block:
     """Return the block at one place with the setting of its effect that nothing nearby betters."""
     item, before, after = blocks[place], blocks[:place], blocks[place + 1 :]
 
     def evidence(own: Block) -> float:
         # one that stands apart is as rare as an effect
-        return _evaluated(explanation, [*before, own, *after])[2].log_evidence + log_odds() * own.effect.apart
+        return _evaluated(kept, [*before, own, *after])[2].log_evidence + log_odds() * own.effect.apart
 
     own = evidence(item)
     for _ in range(settings.REFINED_TRIES):
@@ -140,8 +137,7 @@ def _moved(
     return item
 
 
-def _evaluated(explanation: Explanation, blocks: Sequence[Block]) -> tuple[Linear, Gram, Combination]:
+def _evaluated(kept: Products, blocks: Sequence[Block]) -> tuple[Linear, Gram, Combination]:
     """Evaluate these blocks together and no others."""
-    linear = Linear(explanation.linear.gap, explanation.linear.frames, tuple(blocks))
-    problem = gram(linear, explanation.whitening)
+    linear, problem = kept.problem(blocks)
     return linear, problem, Search(problem, [0.0] * len(blocks)).evaluate(range(len(blocks)))

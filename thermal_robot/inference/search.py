@@ -270,8 +270,7 @@ def _gains(gram: Gram, base: Combination, blocks: Sequence[int]) -> list[tuple[i
 
     Q = y'y − b'θ, and s₀ the same without the block.
     """
-    spans = [np.arange(gram.slices[b].start, gram.slices[b].stop) for b in base.blocks]
-    used = np.concatenate([*spans, np.zeros(0, dtype=int)])
+    used = gram.columns_of(base.blocks)
     variance = base.noise**2
     left = gram.vector - gram.matrix[:, used] @ base.values
     log_scale = np.array(settings.SCALE_GRID)
@@ -291,11 +290,14 @@ def _gains(gram: Gram, base: Combination, blocks: Sequence[int]) -> list[tuple[i
     result = []
     for alike, value, along in _padded(parts):
         left_over = np.full((len(alike), len(log_scale)), rest)
+        seen, told = square * value[:, None], along[:, None] * square
+        part = np.empty_like(seen)
         for _ in range(settings.NOISE_ROUNDS):
-            taken = (along[:, None] * square / (left_over[:, :, None] + square * value[:, None])).sum(axis=2) / freedom
+            np.add(left_over[:, :, None], seen, out=part)
+            taken = np.divide(told, part, out=part).sum(axis=2) / freedom
             left_over = np.maximum(rest - taken, settings.LEAST_VARIANCE * rest)
         spread = gram.spreads[alike][:, None]
-        log = -0.5 * np.log1p(square * value[:, None] / left_over[:, :, None]).sum(axis=2)
+        log = -0.5 * np.log1p(np.divide(seen, left_over[:, :, None], out=part), out=part).sum(axis=2)
         log -= 0.5 * (log_scale / spread) ** 2 + np.log(np.sqrt(2.0 * np.pi) * spread / step)
         log -= 0.5 * freedom * np.log(left_over / rest)
         top = log.max(axis=1)
