@@ -8,6 +8,7 @@ from thermal_robot.diagnosis import Diagnosis, diagnose
 from thermal_robot.diagnosis.result import told_by
 from thermal_robot.effects import Effect
 from thermal_robot.errors import CampaignError, EffectError, EstimationError, RobotError, ThermalRobotError
+from thermal_robot.fleet.many import diagnose_many
 from thermal_robot.observations import Observations, observe
 from thermal_robot.robot import Robot, load_robot
 from thermal_robot.simulation import simulate
@@ -31,6 +32,7 @@ __all__ = [
     "demo_campaign",
     "describe",
     "diagnose",
+    "diagnose_many",
     "load_robot",
     "observe",
     "read_campaign",
