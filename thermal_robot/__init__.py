@@ -8,12 +8,13 @@ from thermal_robot.diagnosis import Diagnosis, diagnose
 from thermal_robot.diagnosis.result import told_by
 from thermal_robot.effects import Effect
 from thermal_robot.errors import CampaignError, EffectError, EstimationError, RobotError, ThermalRobotError
-from thermal_robot.fleet.many import diagnose_many
+from thermal_robot.fleet.many import diagnose_many, shown_by
 from thermal_robot.observations import Observations, observe
 from thermal_robot.robot import Robot, load_robot
 from thermal_robot.simulation import simulate
 
 told_by(report)
+shown_by(report)
 __version__ = "0.2.0"
 
 __all__ = [

@@ -72,6 +72,7 @@ def run(folder: Path, out: Path, workers: int) -> None:
 if __name__ == "__main__":
     command, place, *more = sys.argv[1:]
     if command == "make":
-        make(Path(place), *(int(n) for n in (more + ["1000", "100"][len(more) :])))
+        count, rows = (*map(int, more), *(1000, 100)[len(more) :])
+        make(Path(place), count, rows)
     else:
-        run(Path(place), Path(more[0]), int((more + ["2"])[1]))
+        run(Path(place), Path(more[0]), int(more[1]) if len(more) > 1 else 2)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import heapq
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -155,6 +155,6 @@ def _gathered(tallies: dict[str, _Tally], known: Overview) -> tuple[Gathered, ..
                     own = int(found[k]), int(robots[k])
                     rest = int(found.sum()) - own[0], int(robots.sum()) - own[1]
                     looked.append(Gathered(effect, label, groups[k], *own, *rest, p))
-    striking = [Gathered(*(*vars(g).values(),)[:-1], min(g.p_value * tests, 1.0)) for g in looked]
+    striking = [replace(g, p_value=min(g.p_value * tests, 1.0)) for g in looked]
     kept = [g for g in striking if g.p_value < settings.STRIKING]
     return tuple(sorted(kept, key=lambda g: (g.p_value, g.effect, g.label, g.group))[: settings.MOST_LISTED])

@@ -96,7 +96,9 @@ def opened(file: Path) -> Iterator[Done]:
         raise CampaignError(str(file), "cannot be used", found=str(error), expected="no other run with it") from error
     except sqlite3.DatabaseError as error:
         database.close()
-        raise CampaignError(str(file), "is not what a fleet has written", expected="another folder for --out") from error
+        raise CampaignError(
+            str(file), "is not what a fleet has written", expected="another folder for --out"
+        ) from error
     try:
         yield Done(database)
     finally:

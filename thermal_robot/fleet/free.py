@@ -2,13 +2,14 @@
 
 A fleet cannot be judged by the parameters of the robots in which an effect was found: those are the large ones, and an
 effect too small to be found in any robot may be at work in all. So every campaign tells every parameter of every effect
-that it can test, beside the effects that were found, as the data alone say it: with G the products of the columns, the
-frames projected out, s the noise, and Λ the priors of the others,
+that it can test, beside the effects that were found and those that may be at work, as the data alone say it: with G the
+products of the columns, the frames projected out, s the noise, and Λ the priors of the others,
 
     θ = (G/s² + Λ⁻¹)⁻¹ b/s²,
 
 Λ⁻¹ next to nothing for the effect in question, and no parameter held positive. Such estimates scatter about the truth,
-and their mean over a fleet does, too.
+and their mean over a fleet does, too. What is not found but may be at work has its prior of expected size: left out,
+it would be told as something else's, in all robots alike.
 """
 
 from __future__ import annotations
@@ -20,8 +21,10 @@ from numpy.typing import NDArray
 
 from thermal_robot.fleet import settings
 from thermal_robot.inference.fit import Fit
+from thermal_robot.inference.problem import contained
 
 Array = NDArray[np.float64]
+Pairs = frozenset[frozenset[int]]
 
 
 @dataclass(frozen=True)
@@ -34,31 +37,33 @@ class Free:
     unit: str
 
 
-def free(fit: Fit, name: str) -> tuple[Free, ...]:
-    """Return the parameters of an effect as the data alone tell them, beside the other effects that were found.
+def free(fit: Fit) -> dict[str, tuple[Free, ...]]:
+    """Return by effect its parameters as the data alone tell them, beside the other effects that are or may be at work.
 
     Parameters
     ----------
     fit
         The fit of a campaign.
-    name
-        The effect; in the setting that is first looked for, in all its places.
 
     Returns
     -------
-    tuple of Free
-        Those alone of which the data know more than the expected size says; empty for an effect that was not tried.
+    dict
+        Of every effect that was tried, in the setting that is first looked for, in all its places. Of its parameters
+        those alone of which the data know more than the expected size says.
     """
-    blocks = fit.blocks_of(name)
-    if not blocks:
-        return ()
-    e, own = fit.explanation, blocks[0]
-    others = [b for b in e.best.blocks if fit.families[b] != name]
+    inside = contained(fit.explanation.problem)
+    return {name: _alone(fit, name, inside) for name in dict.fromkeys(fit.families)}
+
+
+def _alone(fit: Fit, name: str, inside: Pairs) -> tuple[Free, ...]:
+    e, own = fit.explanation, fit.blocks_of(name)[0]
+    others = _beside(fit, name, own, inside)
     problem = e.problem.some([own, *others])
     tight = np.zeros_like(problem.matrix)
     for k, (number, at) in enumerate(zip([own, *others], problem.slices, strict=True)):
         sizes = e.linear.blocks[number].sizes
-        prior = np.full(len(sizes), settings.UNHELD) if not k else e.held(number) / sizes
+        prior = np.full(len(sizes), 1.0 if k else settings.UNHELD)
+        prior = e.held(number) / sizes if k and number in e.best.blocks else prior
         tight[at, at] = problem.bases[k].T @ (prior[:, None] ** -2.0 * problem.bases[k])
     covariance = np.linalg.inv(problem.matrix / e.best.noise**2 + tight)
     found = covariance @ problem.vector / e.best.noise**2
@@ -66,7 +71,17 @@ def free(fit: Fit, name: str) -> tuple[Free, ...]:
     values = basis @ found[at]
     spread = np.sqrt(np.einsum("pi,ij,pj->p", basis, covariance[at, at], basis))
     seen = np.einsum("pi,pi->p", basis, basis) > settings.SEEN
-    parameters = zip(item.parameters, item.sizes, values, spread, seen, strict=True)
-    return tuple(
-        Free(p.name, float(v * size), float(s * size), p.unit) for p, size, v, s, is_seen in parameters if is_seen and s < 1.0
-    )
+    listed = zip(item.parameters, item.sizes, values, spread, seen & (spread < 1.0), strict=True)
+    return tuple(Free(p.name, float(v * size), float(s * size), p.unit) for p, size, v, s, told in listed if told)
+
+
+def _beside(fit: Fit, name: str, own: int, inside: Pairs) -> list[int]:
+    """Return the blocks of the effects that were found, and of those that may be at work and can be told from this."""
+    e = fit.explanation
+    found = [b for b in e.best.blocks if fit.families[b] != name]
+    settled = {name, *(fit.families[b] for b in found)}
+    for other in dict.fromkeys(fit.families):
+        if other not in settled and fit.probability(other) >= settings.MAY_BE:
+            likely = max(fit.blocks_of(other), key=lambda b: e.probability([b]))
+            found += [] if frozenset((likely, own)) in inside else [likely]
+    return found

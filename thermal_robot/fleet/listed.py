@@ -87,7 +87,9 @@ def _below(root: Path, names: Sequence[str]) -> Listed:
     parts = [Path(name).parts for name in found]
     depth = max(len(levels) for levels in parts)
     if len(names) > depth:
-        raise CampaignError(str(root), "has fewer levels of folders than labels", found=str(depth), expected=str(len(names)))
+        raise CampaignError(
+            str(root), "has fewer levels of folders than labels", found=str(depth), expected=str(len(names))
+        )
     labels = _checked(str(root), [*names, *(f"{LEVEL}{k + 1}" for k in range(len(names), depth))])
     padded = ((*levels, *[""] * (depth - len(levels))) for levels in parts)
     return Listed(root, labels, tuple(zip(found, padded, strict=True)))

@@ -5,27 +5,41 @@ from __future__ import annotations
 import json
 import os
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
 
 from thermal_robot.diagnosis import diagnose
 from thermal_robot.effects.catalogue import choose
 from thermal_robot.errors import CampaignError, ThermalRobotError
-from thermal_robot.files import is_file, written
+from thermal_robot.files import is_file, write_one
 from thermal_robot.fleet import workers as processes
-from thermal_robot.fleet.done import Done, Rows, fingerprint, opened
+from thermal_robot.fleet.done import Done, fingerprint, opened
 from thermal_robot.fleet.extra import needed
 from thermal_robot.fleet.listed import Listed, campaigns
 from thermal_robot.fleet.rows import failed, rows_of, write_rows
 from thermal_robot.fleet.summary import Summary, summarise
-from thermal_robot.fleet.text import text
 
 if TYPE_CHECKING:
     import pandas as pd
 
 TABLE, DONE = "fleet.parquet", "done.sqlite"
+
+
+class Teller(Protocol):
+    """Who puts a fleet into words."""
+
+    def fleet_text(self, summary: Mapping[str, Any]) -> str:
+        """Return a summary as plain text."""
+
+
+_tellers: list[Teller] = []
+
+
+def shown_by(teller: Teller) -> None:
+    """Register who puts every fleet into words from now on."""
+    _tellers[:] = [teller]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -60,7 +74,7 @@ class Fleet:
         return pd.read_parquet(self.table, columns=None if columns is None else list(columns))
 
     def __str__(self) -> str:
-        return text(self.summary)
+        return _tellers[0].fleet_text(self.summary.to_dict()) if _tellers else repr(self)
 
     def __repr__(self) -> str:
         s = self.summary
@@ -137,8 +151,7 @@ def diagnose_many(
     table = folder / TABLE
     with opened(folder / DONE) as done:
         _diagnosed(found, options, done, workers or os.cpu_count() or 1, scheduler, progress)
-        for file, reason in written([(str(table), lambda path: write_rows(path, found.names, _whole(found, done)))]).items():
-            raise CampaignError(file, "cannot be written", found=reason)
+        write_one(str(table), lambda path: write_rows(path, found.names, _whole(found, done)))
     return Fleet(table, summarise(table, found.names, progress))
 
 

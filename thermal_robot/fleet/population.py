@@ -5,9 +5,9 @@ Of robot i the value y_i is known with deviation s_i. The robots' own values sca
     y_i ~ (1 − ε) N(μ_g, s_i² + τ²) + ε N(μ_g, W² (s_i² + τ²)),
 
 with W wide, for robots that are unlike the others. By empirical Bayes all of μ, τ and ε come from the fleet itself
-(Efron, *Large-Scale Inference*, 2010, on two groups; Gelman, *Bayesian Analysis* 1, 2006, on flat priors of τ): for each
-τ of a grid μ_g and ε are found by expectation and maximisation (Dempster, Laird and Rubin, *J. R. Stat. Soc.* B 39,
-1977), μ_g is integrated out by Laplace's method, and everything is averaged over the posterior of τ.
+(Efron, *Large-Scale Inference*, 2010, on two groups; Gelman, *Bayesian Analysis* 1, 2006, on flat priors of τ): for
+each τ of a grid μ_g and ε are found by expectation and maximisation (Dempster, Laird and Rubin, *J. R. Stat. Soc.* B
+39, 1977), μ_g is integrated out by Laplace's method, and everything is averaged over the posterior of τ.
 """
 
 from __future__ import annotations
@@ -127,7 +127,8 @@ def _maximised(y: Array, s: Array, starts: Codes, tau: Array) -> tuple[Array, Ar
 def combined(values: Array, deviations: Array, owners: Codes) -> tuple[Codes, Array, Array]:
     """Combine several values of the same robot, weighted by their precision.
 
-    Where they differ by more than their deviations, that of the mean grows in proportion (Birge, *Phys. Rev.* 40, 1932).
+    Where they differ by more than their deviations, that of the mean grows in proportion (Birge, *Phys. Rev.* 40,
+    1932).
 
     Returns
     -------

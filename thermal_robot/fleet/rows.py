@@ -1,4 +1,4 @@
-"""A campaign's diagnosis as rows of a table, one for each effect, and the Parquet file that holds them. SI throughout."""
+"""A diagnosis as rows of a table, one for each effect, and the Parquet file that holds them; SI throughout."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from thermal_robot.diagnosis.plain import jsonable
 from thermal_robot.files import whole
 from thermal_robot.fleet import settings
 from thermal_robot.fleet.extra import needed
-from thermal_robot.fleet.free import free
+from thermal_robot.fleet.free import Free, free
 
 if TYPE_CHECKING:
     import pyarrow as pa
@@ -79,10 +79,11 @@ def rows_of(found: Diagnosis) -> list[dict[str, Any]]:
     }
     if not found.usable:
         return [dict(jsonable(campaign))]
-    return [dict(jsonable({**campaign, **_of_effect(found, finding)})) for finding in found.effects]
+    alone = {} if found.fit is None else free(found.fit)
+    return [dict(jsonable({**campaign, **_of_effect(f, alone.get(f.name, ()))})) for f in found.effects]
 
 
-def _of_effect(found: Diagnosis, finding: Finding) -> dict[str, Any]:
+def _of_effect(finding: Finding, alone: Sequence[Free]) -> dict[str, Any]:
     low, high = finding.shrinkage_ci95 or (None, None)
     told = [
         {"name": p.name, "value": p.value, "std": p.std, "unit": p.unit} for p in finding.parameters if p.identified
@@ -100,7 +101,7 @@ def _of_effect(found: Diagnosis, finding: Finding) -> dict[str, Any]:
         "confounded_with": finding.confounded_with,
         "places": [asdict(place) for place in finding.locations],
         "parameters": told,
-        "free": [] if found.fit is None else [asdict(p) for p in free(found.fit, finding.name)],
+        "free": [asdict(parameter) for parameter in alone],
     }
 
 

@@ -157,14 +157,18 @@ def _compared(
             usual[kept], unlike[kept] = by.means[own], by.apart
     names = list(known.robots.values) if (unlike >= settings.NAMED).any() else []
     return found, [
-        Apart(names[who[k]], item.effect, item.parameter, item.unit, *(float(v[k]) for v in (values, deviations, usual, unlike)))
+        Apart(
+            names[who[k]],
+            item.effect,
+            item.parameter,
+            item.unit,
+            *(float(v[k]) for v in (values, deviations, usual, unlike)),
+        )
         for k in np.flatnonzero(unlike >= settings.NAMED).tolist()
     ]
 
 
-def _split(
-    values: Array, deviations: Array, codes: Codes
-) -> tuple[Population, NDArray[np.bool_], Codes, Codes] | None:
+def _split(values: Array, deviations: Array, codes: Codes) -> tuple[Population, NDArray[np.bool_], Codes, Codes] | None:
     """Fit a population by groups, those too small left out: with who is in it, which groups, and the number of each."""
     counts = np.bincount(codes)
     kept = counts[codes] >= settings.FEWEST_IN_GROUP

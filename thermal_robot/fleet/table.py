@@ -1,6 +1,6 @@
 """The table of a fleet, read again: campaigns, what was found in them, and one parameter of all robots at a time.
 
-The table is read in pieces, and of an effect only its own columns, so that the memory holds numbers of one effect alone.
+The table is read in pieces, and of an effect only its own columns: the memory holds numbers of one effect alone.
 """
 
 from __future__ import annotations
@@ -97,7 +97,17 @@ def overview(table: Path, names: Sequence[str]) -> Overview:
 
 def findings(table: Path) -> Iterator[dict[str, Any]]:
     """Yield the row of every effect of every campaign that has one: what is needed to count it."""
-    columns = [CAMPAIGN, "rms_before", "rms_after", "effect", "status", "probability", "shrinkage", "quantity", "places"]
+    columns = [
+        CAMPAIGN,
+        "rms_before",
+        "rms_after",
+        "effect",
+        "status",
+        "probability",
+        "shrinkage",
+        "quantity",
+        "places",
+    ]
     return (row for row in _records(table, columns) if row["effect"] is not None)
 
 

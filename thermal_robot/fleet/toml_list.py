@@ -41,7 +41,9 @@ def read_toml(path: Path) -> tuple[dict[str, list[str]], list[int]]:
     items = data.get(SECTION)
     if set(data) != {SECTION} or not isinstance(items, list) or not all(isinstance(item, dict) for item in items):
         found = ", ".join(data) or "nothing"
-        raise CampaignError(str(path), "is no list of campaigns", found=found, expected=f"[[{SECTION}]] and nothing else")
+        raise CampaignError(
+            str(path), "is no list of campaigns", found=found, expected=f"[[{SECTION}]] and nothing else"
+        )
     if not items:
         raise CampaignError(str(path), "lists no campaign", expected=f"a [[{SECTION}]] for each")
     names = dict.fromkeys(name for item in items for name in item)

@@ -1,9 +1,9 @@
 """Who does the work: processes of Dask, on this machine or behind the scheduler of a cluster. No engine of our own.
 
-On one machine a ``LocalCluster`` is started: a process a core, restarted by its nanny when it ends or outgrows its share
-of the memory. It listens on 127.0.0.1 alone, behind TLS with a certificate of its own that lasts as long as it does, so
-that no other user of the machine can hand it work, and serves no page. A cluster's scheduler is named by its address;
-its TLS is that of Dask's own configuration.
+On one machine a ``LocalCluster`` is started: a process a core, started anew by its nanny when it ends or outgrows its
+share of the memory. It listens on 127.0.0.1 alone, behind TLS with a certificate of its own that lasts as long as it
+does, so that no other user of the machine can hand it work, and serves no page. A cluster's scheduler is named by its
+address; its TLS is that of Dask's own configuration.
 
 As much is handed out at a time as there are threads, so that a process that is killed had one campaign. Dask would
 hand that to others again and again, and count whatever else lay on them as suspicious, too: here it waits until the end
@@ -120,7 +120,9 @@ def answers(
     distributed = needed("distributed")
     ended: list[Task] = []
     try:
-        for task, reply, error in _flow(client, work, tasks, distributed, lambda: max(sum(client.nthreads().values()), 1)):
+        for task, reply, error in _flow(
+            client, work, tasks, distributed, lambda: max(sum(client.nthreads().values()), 1)
+        ):
             if isinstance(error, distributed.KilledWorker):
                 ended.append(task)
             else:

@@ -9,9 +9,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
+    from thermal_robot.report.fleet_text import fleet_text
     from thermal_robot.report.json_schema import schema
     from thermal_robot.report.next_step import advice
     from thermal_robot.report.page import fragment, html
+    from thermal_robot.report.page_fleet import fleet_html
     from thermal_robot.report.plain_text import text
     from thermal_robot.report.plots_explain import explain_figure
     from thermal_robot.report.plots_how_far import plot_how_far
@@ -25,6 +27,8 @@ if TYPE_CHECKING:
 _HOME = {
     "advice": "next_step",
     "explain_figure": "plots_explain",
+    "fleet_html": "page_fleet",
+    "fleet_text": "fleet_text",
     "fragment": "page",
     "html": "page",
     "overview": "plots_overview",
@@ -52,6 +56,8 @@ def __dir__() -> list[str]:
 __all__ = [
     "advice",
     "explain_figure",
+    "fleet_html",
+    "fleet_text",
     "fragment",
     "headline",
     "html",
