@@ -14,6 +14,7 @@ it would be told as something else's, in all robots alike.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -51,13 +52,23 @@ def free(fit: Fit) -> dict[str, tuple[Free, ...]]:
         Of every effect that was tried, in the setting that is first looked for, in all its places. Of its parameters
         those alone of which the data know more than the expected size says.
     """
-    inside = contained(fit.explanation.problem)
-    return {name: _alone(fit, name, inside) for name in dict.fromkeys(fit.families)}
+    inside, likely = contained(fit.explanation.problem), _likely(fit)
+    return {name: _alone(fit, name, inside, likely) for name in dict.fromkeys(fit.families)}
 
 
-def _alone(fit: Fit, name: str, inside: Pairs) -> tuple[Free, ...]:
+def _likely(fit: Fit) -> dict[str, int]:
+    """Return by name the effects that were not found but may be at work: the most probable setting of each."""
+    e = fit.explanation
+    found = {fit.families[b] for b in e.best.blocks}
+    others = [name for name in dict.fromkeys(fit.families) if name not in found]
+    may_be = [name for name in others if fit.probability(name) >= settings.MAY_BE]
+    return {name: max(fit.blocks_of(name), key=lambda b: e.probability([b])) for name in may_be}
+
+
+def _alone(fit: Fit, name: str, inside: Pairs, likely: Mapping[str, int]) -> tuple[Free, ...]:
     e, own = fit.explanation, fit.blocks_of(name)[0]
-    others = _beside(fit, name, own, inside)
+    others = [b for b in e.best.blocks if fit.families[b] != name]
+    others += [b for other, b in likely.items() if other != name and frozenset((b, own)) not in inside]
     problem = e.problem.some([own, *others])
     tight = np.zeros_like(problem.matrix)
     for k, (number, at) in enumerate(zip([own, *others], problem.slices, strict=True)):
@@ -71,17 +82,5 @@ def _alone(fit: Fit, name: str, inside: Pairs) -> tuple[Free, ...]:
     values = basis @ found[at]
     spread = np.sqrt(np.einsum("pi,ij,pj->p", basis, covariance[at, at], basis))
     seen = np.einsum("pi,pi->p", basis, basis) > settings.SEEN
-    listed = zip(item.parameters, item.sizes, values, spread, seen & (spread < 1.0), strict=True)
+    listed = zip(item.bare, item.sizes, values, spread, seen & (spread < 1.0), strict=True)
     return tuple(Free(p.name, float(v * size), float(s * size), p.unit) for p, size, v, s, told in listed if told)
-
-
-def _beside(fit: Fit, name: str, own: int, inside: Pairs) -> list[int]:
-    """Return the blocks of the effects that were found, and of those that may be at work and can be told from this."""
-    e = fit.explanation
-    found = [b for b in e.best.blocks if fit.families[b] != name]
-    settled = {name, *(fit.families[b] for b in found)}
-    for other in dict.fromkeys(fit.families):
-        if other not in settled and fit.probability(other) >= settings.MAY_BE:
-            likely = max(fit.blocks_of(other), key=lambda b: e.probability([b]))
-            found += [] if frozenset((likely, own)) in inside else [likely]
-    return found
