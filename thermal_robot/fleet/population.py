@@ -2,9 +2,10 @@
 
 Of robot i the value y_i is known with deviation s_i. The robots' own values scatter about the mean of their group,
 
-    y_i ~ (1 − ε) N(μ_g, s_i² + τ²) + ε N(μ_g, W² (s_i² + τ²)),
+    y_i ~ (1 − ε) N(μ_g, s_i² + τ²) + ε C(μ_g, W √(s_i² + τ²)),
 
-with W wide, for robots that are unlike the others. By empirical Bayes all of μ, τ and ε come from the fleet itself
+with Cauchy's law C, some times as wide and without an end, for robots that are unlike the others; these say nothing of
+μ_g. By empirical Bayes all of μ, τ and ε come from the fleet itself
 (Efron, *Large-Scale Inference*, 2010, on two groups; Gelman, *Bayesian Analysis* 1, 2006, on flat priors of τ): for
 each τ of a grid μ_g and ε are found by expectation and maximisation (Dempster, Laird and Rubin, *J. R. Stat. Soc.* B
 39, 1977), μ_g is integrated out by Laplace's method, and everything is averaged over the posterior of τ.
@@ -106,22 +107,28 @@ def _maximised(y: Array, s: Array, starts: Codes, tau: Array) -> tuple[Array, Ar
     variance = s**2 + tau[:, None] ** 2
     means = np.tile([np.median(part) for part in np.split(y, starts[1:])], (len(tau), 1))
     unlike = np.full((len(tau), 1), settings.UNLIKE)
-    wide = settings.UNLIKE_WIDTH
     for _ in range(settings.ROUNDS):
         square = (y - np.repeat(means, counts, axis=1)) ** 2 / variance
-        odds = np.log(unlike / (1.0 - unlike)) - np.log(wide) + 0.5 * square * (1.0 - wide**-2.0)
+        odds = np.log(unlike / (1.0 - unlike)) + _cauchy(square) + 0.5 * square
         apart = expit(odds)
-        weight = (1.0 - apart * (1.0 - wide**-2.0)) / variance
+        # what is unlike the others says nothing of them, unless nobody is left
+        weight = np.maximum(1.0 - apart, settings.LEAST_HEARD) / variance
         tight = np.add.reduceat(weight, starts, axis=1)
         means = np.add.reduceat(weight * y, starts, axis=1) / tight
         rare = settings.UNLIKE_PRIOR
         unlike = (apart.sum(axis=1, keepdims=True) + rare[0]) / (len(y) + sum(rare))
     square = (y - np.repeat(means, counts, axis=1)) ** 2 / variance
     alike = np.log1p(-unlike) - 0.5 * (square + np.log(variance))
-    other = np.log(unlike / wide) - 0.5 * (square / wide**2 + np.log(variance))
+    other = np.log(unlike) + _cauchy(square) - 0.5 * np.log(variance)
     held = rare[0] * np.log(unlike[:, 0]) + rare[1] * np.log1p(-unlike[:, 0])
     fit = np.logaddexp(alike, other).sum(axis=1) + held - 0.5 * np.log(tight).sum(axis=1)
     return means, tight, apart, fit
+
+
+def _cauchy(square: Array) -> Array:
+    """Return the log density of what is unlike the others at so many squared deviations, over 1/√2π of a deviation."""
+    wide = settings.UNLIKE_WIDTH
+    return np.asarray(np.log(np.sqrt(2.0 / np.pi) / wide) - np.log1p(square / wide**2))
 
 
 def combined(values: Array, deviations: Array, owners: Codes) -> tuple[Codes, Array, Array]:

@@ -26,8 +26,11 @@ ROUNDS = 15
 """Of expectation and maximisation: means then move by less than a hundredth of their deviations."""
 UNLIKE = 0.05
 """Share of robots unlike the others with which the rounds begin."""
-UNLIKE_WIDTH = 10.0
-"""How much wider robots unlike the others scatter: a fault is some times, not thousands of times, what is usual."""
+UNLIKE_WIDTH = 5.0
+"""How much wider robots unlike the others scatter, by the half width of Cauchy's law: a fault is some times what is
+usual, and may be any times."""
+LEAST_HEARD = 1e-6
+"""Weight of a robot that is surely unlike the others: of a group in which all are unlike each other there is a mean."""
 UNLIKE_PRIOR = (0.5, 20.0)
 """What is known of their share beforehand, in robots unlike and like: rare, and learned from a fleet of twenty."""
 MOST_LISTED = 500
