@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 import thermal_robot as tr
+from thermal_robot.fleet.rows import write_rows
 
 ROWS, NOISE = 40, 20e-6
 ONLY = ("backlash", "joint_offset")
@@ -46,3 +47,24 @@ def scattered(rng, robots, mean, spread, deviations):
 
 def deviations(rng, robots):
     return rng.uniform(0.5, 2.0, robots) * np.ones(robots)
+
+
+def told_rows(name, labels, effects, gap=1e-4, outcome="diagnosed", reason=""):
+    """Rows as a campaign's diagnosis would give: effects by name with (found, places, {parameter: (value, std)})."""
+    campaign = {"campaign": name, **labels, "model": "arm", "outcome": outcome, "reason": reason, "rms_before": gap}
+    if not effects:
+        return [campaign]
+    rows = []
+    for effect, (found, place, values) in effects.items():
+        free = [{"name": p, "value": float(v), "std": float(s), "unit": "rad"} for p, (v, s) in values.items()]
+        row = {**campaign, "rms_after": 2e-5, "effect": effect, "status": "found" if found else "not_found"}
+        row |= {"probability": 0.99 if found else 0.01, "shrinkage": 0.9 if found else 0.0, "free": free}
+        row["places"] = [{"kind": "joint", "name": place, "share": 0.9}] if found else []
+        rows.append(row)
+    return rows
+
+
+def write_told(path, campaigns, labels=("hall",)):
+    """Write a table of such rows."""
+    write_rows(path, labels, (row for rows in campaigns for row in rows))
+    return path

@@ -58,7 +58,7 @@ def test_a_list_keeps_its_order_and_its_columns_are_labels(root, name, text):
         ("list.csv", "campaign,hall\na,one\n,two\n", r"row 3, column 'campaign': no campaign is named"),
         ("list.toml", "[[campaigns]]\ncampaign = 3\n", r"campaigns\[0\].campaign"),
         ("list.txt", "campaign\na\n", r"no list of campaigns.*\.csv or \.toml"),
-        ("campaign.toml", "", r"no list of campaigns"),
+        ("campaign.toml", "", "no list of campaigns"),
     ],
 )
 def test_a_list_that_is_none_says_where(tmp_path, name, text, said):
@@ -70,7 +70,7 @@ def test_a_list_that_is_none_says_where(tmp_path, name, text, said):
 def test_what_is_not_there_or_empty_says_so(tmp_path, root):
     with pytest.raises(CampaignError, match="no such folder or list"):
         campaigns(tmp_path / "nowhere")
-    with pytest.raises(CampaignError, match="no campaign.toml lies below"):
+    with pytest.raises(CampaignError, match=r"no campaign\.toml lies below"):
         campaigns(root / "notes")
     with pytest.raises(CampaignError, match="fewer levels"):
         campaigns(root, ["a", "b", "c", "d"])

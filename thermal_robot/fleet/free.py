@@ -14,18 +14,21 @@ it would be told as something else's, in all robots alike.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.effects import choose, gate
 from thermal_robot.fleet import settings
+from thermal_robot.inference.columns import Block, block
+from thermal_robot.inference.explain import Explanation
 from thermal_robot.inference.fit import Fit
-from thermal_robot.inference.problem import contained
+from thermal_robot.inference.gram import Gram
+from thermal_robot.inference.problem import Linear, contained, gram
 
 Array = NDArray[np.float64]
-Pairs = frozenset[frozenset[int]]
 
 
 @dataclass(frozen=True)
@@ -38,13 +41,15 @@ class Free:
     unit: str
 
 
-def free(fit: Fit) -> dict[str, tuple[Free, ...]]:
+def free(fit: Fit, names: Iterable[str] = ()) -> dict[str, tuple[Free, ...]]:
     """Return by effect its parameters as the data alone tell them, beside the other effects that are or may be at work.
 
     Parameters
     ----------
     fit
         The fit of a campaign.
+    names
+        Of effects of the library that were tried, but taken out again: they are told, too.
 
     Returns
     -------
@@ -52,8 +57,28 @@ def free(fit: Fit) -> dict[str, tuple[Free, ...]]:
         Of every effect that was tried, in the setting that is first looked for, in all its places. Of its parameters
         those alone of which the data know more than the expected size says.
     """
-    inside, likely = contained(fit.explanation.problem), _likely(fit)
-    return {name: _alone(fit, name, inside, likely) for name in dict.fromkeys(fit.families)}
+    e, likely = fit.explanation, _likely(fit)
+    own = {name: fit.blocks_of(name)[0] for name in dict.fromkeys(fit.families)}
+    further = _further(fit, [name for name in names if name not in own])
+    linear, problem = e.linear, e.problem
+    if further:
+        own |= {item.effect.name: len(linear.blocks) + k for k, item in enumerate(further)}
+        linear = Linear(linear.gap, linear.frames, (*linear.blocks, *further))
+        problem = gram(linear, e.whitening)
+    inside = contained(problem)
+    told = {}
+    for name, number in own.items():
+        others = [b for b in e.best.blocks if fit.families[b] != name]
+        others += [b for other, b in likely.items() if other != name and frozenset((b, number)) not in inside]
+        told[name] = _alone(e, linear, problem, [number, *others])
+    return told
+
+
+def _further(fit: Fit, names: Iterable[str]) -> list[Block]:
+    """Return the columns of effects that are no longer part of the problem, in the setting that is first looked for."""
+    known = {effect.name: effect for effect in choose()}
+    settings_of = (gate.variants(known[name], fit.nominal) for name in names if name in known)
+    return [block(fit.corrected, variants[0]) for variants in settings_of if variants]
 
 
 def _likely(fit: Fit) -> dict[str, int]:
@@ -65,20 +90,18 @@ def _likely(fit: Fit) -> dict[str, int]:
     return {name: max(fit.blocks_of(name), key=lambda b: e.probability([b])) for name in may_be}
 
 
-def _alone(fit: Fit, name: str, inside: Pairs, likely: Mapping[str, int]) -> tuple[Free, ...]:
-    e, own = fit.explanation, fit.blocks_of(name)[0]
-    others = [b for b in e.best.blocks if fit.families[b] != name]
-    others += [b for other, b in likely.items() if other != name and frozenset((b, own)) not in inside]
-    problem = e.problem.some([own, *others])
+def _alone(e: Explanation, linear: Linear, problem: Gram, blocks: Sequence[int]) -> tuple[Free, ...]:
+    """Return the parameters of the first of some blocks, free of its prior, the others held to theirs."""
+    problem = problem.some(blocks)
     tight = np.zeros_like(problem.matrix)
-    for k, (number, at) in enumerate(zip([own, *others], problem.slices, strict=True)):
-        sizes = e.linear.blocks[number].sizes
+    for k, (number, at) in enumerate(zip(blocks, problem.slices, strict=True)):
+        sizes = linear.blocks[number].sizes
         prior = np.full(len(sizes), 1.0 if k else settings.UNHELD)
         prior = e.held(number) / sizes if k and number in e.best.blocks else prior
         tight[at, at] = problem.bases[k].T @ (prior[:, None] ** -2.0 * problem.bases[k])
     covariance = np.linalg.inv(problem.matrix / e.best.noise**2 + tight)
     found = covariance @ problem.vector / e.best.noise**2
-    at, basis, item = problem.slices[0], problem.bases[0], e.linear.blocks[own]
+    at, basis, item = problem.slices[0], problem.bases[0], linear.blocks[blocks[0]]
     values = basis @ found[at]
     spread = np.sqrt(np.einsum("pi,ij,pj->p", basis, covariance[at, at], basis))
     seen = np.einsum("pi,pi->p", basis, basis) > settings.SEEN

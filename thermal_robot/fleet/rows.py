@@ -79,7 +79,8 @@ def rows_of(found: Diagnosis) -> list[dict[str, Any]]:
     }
     if not found.usable:
         return [dict(jsonable(campaign))]
-    alone = {} if found.fit is None else free(found.fit)
+    refused = [f.name for f in found.effects if f.status == "not_found"]
+    alone = {} if found.fit is None else free(found.fit, refused)
     return [dict(jsonable({**campaign, **_of_effect(f, alone.get(f.name, ()))})) for f in found.effects]
 
 

@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from thermal_robot.report.fleet_text import fleet_text
+    from thermal_robot.report.text_fleet import fleet_text
     from thermal_robot.report.json_schema import schema
     from thermal_robot.report.next_step import advice
     from thermal_robot.report.page import fragment, html
@@ -28,7 +28,7 @@ _HOME = {
     "advice": "next_step",
     "explain_figure": "plots_explain",
     "fleet_html": "page_fleet",
-    "fleet_text": "fleet_text",
+    "fleet_text": "text_fleet",
     "fragment": "page",
     "html": "page",
     "overview": "plots_overview",
