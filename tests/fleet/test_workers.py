@@ -1,7 +1,9 @@
 """Processes of a real cluster: every task answered once, whoever is ended; no port that others can reach."""
 
+import json
 import os
 import signal
+import subprocess
 import sys
 import threading
 import time
@@ -134,3 +136,42 @@ def test_a_scheduler_that_runs_is_used():
         client(1, running.scheduler_address) as found,
     ):
         assert [reply for _, reply, _ in answers(found, square, tasks([5], 0.0))] == [25]
+
+
+@pytest.fixture
+def secured(tmp_path):
+    """A scheduler and a worker as docs/fleet.md starts them, with TLS files; the address, and Dask's configuration."""
+    from distributed import Security
+
+    made = Security.temporary()
+    files = {"ca": made.tls_ca_file, "cert": made.tls_client_cert, "key": made.tls_client_key}
+    for name, text in files.items():
+        (tmp_path / f"{name}.pem").write_text(text)
+    paths = {name: str(tmp_path / f"{name}.pem") for name in files}
+    tls = ["--tls-ca-file", paths["ca"], "--tls-cert", paths["cert"], "--tls-key", paths["key"]]
+    here, contact = ["--host", "127.0.0.1", "--dashboard-address", "127.0.0.1:0"], tmp_path / "scheduler.json"
+    dask = [sys.executable, "-m", "dask"]
+    run = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "start_new_session": True}
+    scheduler = [*dask, "scheduler", *here, "--protocol", "tls", "--port", "0", "--scheduler-file", str(contact), *tls]
+    worker = [*dask, "worker", *here, "--nworkers", "1", "--nthreads", "1", "--scheduler-file", str(contact), *tls]
+    running = [subprocess.Popen(command, **run) for command in (scheduler, worker)]
+    until = time.monotonic() + 60.0
+    while not contact.exists() and time.monotonic() < until:
+        time.sleep(0.1)
+    own = {"ca-file": paths["ca"], "client.cert": paths["cert"], "client.key": paths["key"]}
+    yield json.loads(contact.read_text())["address"], {f"distributed.comm.tls.{k}": path for k, path in own.items()}
+    for process in running:
+        os.killpg(process.pid, signal.SIGTERM)
+        process.wait(30)
+
+
+def test_a_scheduler_behind_tls_takes_who_has_its_files_and_nobody_else(secured, monkeypatch):
+    import dask
+
+    address, tls = secured
+    assert address.startswith("tls://")
+    with dask.config.set(tls), client(1, address) as found:
+        assert sorted(reply for _, reply, _ in answers(found, square, tasks(range(5), 0.0))) == [0, 1, 4, 9, 16]
+    monkeypatch.setattr("thermal_robot.fleet.settings.ANSWERS_WITHIN", 3.0)
+    with pytest.raises(ThermalRobotError, match=r"does not answer.*distributed\.comm\.tls"), client(1, address):
+        pass

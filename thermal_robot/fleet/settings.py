@@ -45,3 +45,5 @@ STRIKING = 0.01
 """P value, all that was looked at counted, below which something is told: one false word in a hundred fleets."""
 NAMED = 0.9
 """Probability of being unlike the others from which a robot is named."""
+ASKED_EVERY = 2.0
+"""Seconds after which a scheduler is asked again how many threads it has: workers come within minutes, and go."""

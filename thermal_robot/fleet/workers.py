@@ -12,6 +12,8 @@ and is done then by itself, once. If that process is killed as well, it was this
 
 from __future__ import annotations
 
+import math
+import time
 import warnings
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
@@ -120,9 +122,7 @@ def answers(
     distributed = needed("distributed")
     ended: list[Task] = []
     try:
-        for task, reply, error in _flow(
-            client, work, tasks, distributed, lambda: max(sum(client.nthreads().values()), 1)
-        ):
+        for task, reply, error in _flow(client, work, tasks, distributed, _threads(client)):
             if isinstance(error, distributed.KilledWorker):
                 ended.append(task)
             else:
@@ -134,6 +134,18 @@ def answers(
         raise ThermalRobotError(f"the scheduler was lost: {error}; the same command continues") from error
 
 
+def _threads(client: Any) -> Callable[[], int]:
+    """Return what tells how many threads there are, asked again now and then: workers come and go."""
+    known = [-math.inf, 1.0]
+
+    def threads() -> int:
+        if time.monotonic() - known[0] > settings.ASKED_EVERY:
+            known[:] = time.monotonic(), max(sum(client.nthreads().values()), 1)
+        return int(known[1])
+
+    return threads
+
+
 def _said(error: BaseException | None) -> str:
     return "" if error is None else f"{type(error).__name__}: {error}"
 
@@ -143,7 +155,7 @@ def _flow(
 ) -> Iterator[tuple[Task, Any, BaseException | None]]:
     """Yield each task with its answer or its error; so many are under way at a time."""
     under_way: dict[Any, Task] = {}
-    finished = distributed.as_completed(raise_errors=False)
+    finished = distributed.as_completed(with_results=True, raise_errors=False)
 
     def begin() -> None:
         while len(under_way) < most() and (task := next(tasks, None)) is not None:
@@ -153,12 +165,11 @@ def _flow(
 
     begin()
     while under_way:
-        future = next(finished)
+        future, reply = next(finished)
         task = under_way.pop(future.key)
         if future.status == "cancelled":
             raise distributed.CancelledError(task[0])
-        error = future.exception()
-        reply = None if error is not None else future.result()
+        error = reply[1] if future.status == "error" else None
         future.release()
         begin()
-        yield task, reply, error
+        yield task, None if error is not None else reply, error
