@@ -10,7 +10,6 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.stats import hypergeom
 
 from thermal_robot.fleet import settings
 from thermal_robot.fleet.listed import CAMPAIGN
@@ -140,6 +139,8 @@ def _counts(tallies: dict[str, _Tally]) -> tuple[Count, ...]:
 
 def _gathered(tallies: dict[str, _Tally], known: Overview) -> tuple[Gathered, ...]:
     """Return what was found more often in a group than chance allows, however many groups were looked at."""
+    from scipy.stats import hypergeom
+
     looked, tests = [], 0
     for label, of in known.labels.items():
         code, groups = known.label_of(label), list(of.values)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gc
 import json
 import os
 import warnings
@@ -178,6 +179,7 @@ def diagnosed(folder: str, only: Sequence[str], without: Sequence[str]) -> tuple
         rows, again = failed(_without_place(str(error), folder)), False
     except Exception as error:
         rows, again = failed(f"the program failed: {type(error).__name__}: {_without_place(str(error), folder)}"), True
+    gc.collect()  # what a diagnosis leaves refers to itself, and would stay for hundreds of campaigns
     return json.dumps(rows), again
 
 

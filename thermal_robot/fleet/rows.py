@@ -23,7 +23,7 @@ _PLACES = "list<struct<kind: string, name: string, share: double>>"
 _VALUES = "list<struct<name: string, value: double, std: double, unit: string>>"
 _OF_CAMPAIGN = {
     "model": "string",
-    "tool_frame": "string",
+    "tool": "string",
     "samples": "int64",
     "measures": "string",
     "outcome": "string",
@@ -65,7 +65,7 @@ def rows_of(found: Diagnosis) -> list[dict[str, Any]]:
     """
     campaign = {
         "model": found.robot,
-        "tool_frame": found.tool_frame,
+        "tool": found.tool_frame,
         "samples": found.samples,
         "measures": found.measures,
         "outcome": DIAGNOSED if found.usable else UNUSABLE,

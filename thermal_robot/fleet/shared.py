@@ -129,43 +129,35 @@ def _compared(
     if len(who) < settings.FEWEST_ROBOTS:
         return None
     whole = population(values, deviations)
-    found = Shared(
-        item.effect,
-        item.parameter,
-        item.unit,
-        len(who),
-        float(whole.means[0]),
-        float(whole.deviations[0]),
-        whole.spread,
-        whole.spread_std,
-        whole.nothing,
-    )
-    usual, unlike = np.full(len(who), whole.means[0]), whole.apart
-    for name, codes in labels.items():
-        split = _split(values, deviations, codes[who])
-        if split is None or split[0].alike >= found.p_label:
-            continue
-        by, kept, groups, own = split
-        named = list(known.labels[name].values)
-        rows = zip(groups.tolist(), by.counts.tolist(), by.means.tolist(), by.deviations.tolist(), strict=True)
-        told_by = [Group(named[g], n, m, d) for g, n, m, d in rows]
-        told_by.sort(key=lambda g: (-abs(g.mean - found.mean) / g.mean_std, g.group))
-        found = replace(found, label=name, p_label=by.alike, groups=tuple(told_by[: settings.MOST_GROUPS]))
-        found = replace(found, spread=by.spread, spread_std=by.spread_std)
+    mean, std = float(whole.means[0]), float(whole.deviations[0])
+    spread = whole.spread, whole.spread_std
+    found = Shared(item.effect, item.parameter, item.unit, len(who), mean, std, *spread, whole.nothing)
+    usual, unlike = np.full(len(who), mean), whole.apart
+    splits = ((name, _split(values, deviations, codes[who])) for name, codes in labels.items())
+    known_splits = [(name, split) for name, split in splits if split is not None]
+    if known_splits:
+        name, (by, kept, groups, own) = min(known_splits, key=lambda item: item[1][0].alike)
+        told_by = _groups(by, groups, list(known.labels[name].values), mean)
+        found = replace(found, label=name, p_label=by.alike, groups=told_by)
         if by.alike < settings.STRIKING:
-            usual, unlike = usual.copy(), np.where(kept, 0.0, unlike)
+            found = replace(found, spread=by.spread, spread_std=by.spread_std)
+            unlike = np.where(kept, 0.0, unlike)
             usual[kept], unlike[kept] = by.means[own], by.apart
-    names = list(known.robots.values) if (unlike >= settings.NAMED).any() else []
+    named = np.flatnonzero(unlike >= settings.NAMED).tolist()
+    names = list(known.robots.values) if named else []
+    what = item.effect, item.parameter, item.unit
     return found, [
-        Apart(
-            names[who[k]],
-            item.effect,
-            item.parameter,
-            item.unit,
-            *(float(v[k]) for v in (values, deviations, usual, unlike)),
-        )
-        for k in np.flatnonzero(unlike >= settings.NAMED).tolist()
+        Apart(names[who[k]], *what, float(values[k]), float(deviations[k]), float(usual[k]), float(unlike[k]))
+        for k in named
     ]
+
+
+def _groups(by: Population, groups: Codes, names: Sequence[str], mean: float) -> tuple[Group, ...]:
+    """Return the groups of a population, the most different from the mean of all first."""
+    rows = zip(groups.tolist(), by.counts.tolist(), by.means.tolist(), by.deviations.tolist(), strict=True)
+    found = [Group(names[g], robots, own, std) for g, robots, own, std in rows]
+    found.sort(key=lambda g: (-abs(g.mean - mean) / g.mean_std, g.group))
+    return tuple(found[: settings.MOST_GROUPS])
 
 
 def _split(values: Array, deviations: Array, codes: Codes) -> tuple[Population, NDArray[np.bool_], Codes, Codes] | None:
