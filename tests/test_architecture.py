@@ -38,6 +38,7 @@ ORDER = (
     "teller",
     "diagnosis",
     "planning",
+    "fleet",
     "datasets",
     "report",
     "console",

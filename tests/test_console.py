@@ -137,3 +137,24 @@ def test_warnings_and_logs_become_notes_or_nothing(capsys, loudness, told):
         assert warnings.showwarning is shown
     assert capsys.readouterr().err.splitlines() == [f"thermal-robot: note: {text}" for text in told]
     assert (warnings.showwarning, logging.getLogger().handlers) == before
+
+
+def test_counted_work_that_takes_long_says_what_time_is_left(capsys, monkeypatch):
+    clock = [0.0]
+    monkeypatch.setattr(console.time, "monotonic", lambda: clock[0])
+    with counted(NORMAL) as progress:
+        for done in range(1, 101):  # half was done before
+            clock[0] += 60.0 if done > 50 else 0.0
+            progress("campaigns", done, 100)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[4] == "campaigns: 50 of 100"
+    told = dict(line.split(", about ") for line in lines[5:-1])
+    assert told["campaigns: 60 of 100"] == "40 min left"
+    assert told["campaigns: 90 of 100"] == "10 min left"
+    assert told["campaigns: 56 of 100"] == "44 min left"  # after five minutes of silence
+    assert lines[-1] == "campaigns: 100 of 100"
+
+
+@pytest.mark.parametrize(("seconds", "said"), [(3.2, "3 s"), (720.0, "12 min"), (12600.0, "3.5 h")])
+def test_a_time_is_written_as_it_is_said(seconds, said):
+    assert console._span(seconds) == said

@@ -21,6 +21,7 @@ if TYPE_CHECKING:
     from thermal_robot.diagnosis.diagnose import diagnose
     from thermal_robot.effects import Effect
     from thermal_robot.errors import CampaignError, EffectError, EstimationError, RobotError, ThermalRobotError
+    from thermal_robot.fleet.many import diagnose_many
     from thermal_robot.observations import Observations, observe
     from thermal_robot.robot import Robot, load_robot
     from thermal_robot.simulation.simulate import simulate
@@ -44,6 +45,7 @@ _HOME = {
     "demo_campaign": "datasets",
     "describe": "campaign",
     "diagnose": "diagnosis",
+    "diagnose_many": "fleet.many",
     "load_robot": "robot",
     "observe": "observations",
     "read_campaign": "campaign",
@@ -83,6 +85,7 @@ __all__ = [
     "demo_campaign",
     "describe",
     "diagnose",
+    "diagnose_many",
     "load_robot",
     "observe",
     "read_campaign",

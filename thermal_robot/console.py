@@ -18,6 +18,9 @@ QUIET, NORMAL, VERBOSE = "quiet", "normal", "verbose"
 _PATIENCE = 2.0
 """s after which a terminal shows the stages: of what is over sooner nobody wants to hear."""
 
+_SILENCE = 300.0
+"""s after which counted work says how far it is, between tenths: a fleet may take days."""
+
 Counted = Callable[[str, int, int], None]
 """Takes a stage, how much of it is done, and how much there is."""
 
@@ -113,6 +116,8 @@ def _spinning() -> Iterator[Callable[[str], None]]:
 def counted(loudness: str) -> Iterator[Counted]:
     """Show how far work is whose parts are counted: bars on a terminal, elsewhere a line for every tenth.
 
+    Both say what time is left.
+
     Yields
     ------
     Callable
@@ -145,12 +150,23 @@ def _bars() -> Iterator[Counted]:
 
 
 def _tenths() -> Counted:
-    told: dict[str, int] = {}
+    told: dict[str, tuple[float, int]] = {}
 
     def show(stage: str, done: int, total: int) -> None:
-        tenth = 10 * done // total
-        if tenth > told.get(stage, 0):
-            told[stage] = tenth
-            print(f"{stage}: {done} of {total}", file=sys.stderr, flush=True)
+        now = time.monotonic()
+        since, before = told.setdefault(stage, (now, 0))
+        if 10 * done // total > 10 * before // total or (done > before and now - since > _SILENCE):
+            # by the parts since the last line: those that were done before the work began took no time
+            left = (now - since) * (total - done) / (done - before)
+            ahead = f", about {_span(left)} left" if done < total and left > _PATIENCE else ""
+            told[stage] = now, done
+            print(f"{stage}: {done} of {total}{ahead}", file=sys.stderr, flush=True)
 
     return show
+
+
+def _span(seconds: float) -> str:
+    """Write a time as it is said: ``40 s``, ``12 min``, ``3.5 h``."""
+    if seconds < 100.0:
+        return f"{seconds:.0f} s"
+    return f"{seconds / 60.0:.0f} min" if seconds < 6000.0 else f"{seconds / 3600.0:.1f} h"

@@ -12,6 +12,7 @@ if TYPE_CHECKING:
     from thermal_robot.report.json_schema import schema
     from thermal_robot.report.next_step import advice
     from thermal_robot.report.page import fragment, html
+    from thermal_robot.report.page_fleet import fleet_html
     from thermal_robot.report.plain_text import text
     from thermal_robot.report.plots_explain import explain_figure
     from thermal_robot.report.plots_how_far import plot_how_far
@@ -21,10 +22,13 @@ if TYPE_CHECKING:
     from thermal_robot.report.plots_where import plot_where
     from thermal_robot.report.plots_which import plot_which
     from thermal_robot.report.sentence import headline
+    from thermal_robot.report.text_fleet import fleet_text
 
 _HOME = {
     "advice": "next_step",
     "explain_figure": "plots_explain",
+    "fleet_html": "page_fleet",
+    "fleet_text": "text_fleet",
     "fragment": "page",
     "html": "page",
     "overview": "plots_overview",
@@ -52,6 +56,8 @@ def __dir__() -> list[str]:
 __all__ = [
     "advice",
     "explain_figure",
+    "fleet_html",
+    "fleet_text",
     "fragment",
     "headline",
     "html",

@@ -1,0 +1,210 @@
+"""Many campaigns: what a loop would say, for any number of workers, after any stop; failures are rows."""
+
+import json
+import os
+import shutil
+import signal
+import subprocess
+import sys
+import time
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+from fleet.robots import ONLY, write_fleet, write_robot
+
+import thermal_robot as tr
+from thermal_robot.fleet import many
+from thermal_robot.fleet.many import DONE, TABLE, diagnosed
+from thermal_robot.fleet.rows import rows_of
+
+pytestmark = pytest.mark.filterwarnings("default")
+BAD = "hall_1/arm_05"
+
+
+def plain(table):
+    """Rows as lists of plain values, nothing rounded."""
+    return json.loads(table.to_json(orient="records", double_precision=15))
+
+
+def test_it_says_what_a_loop_says_exactly(fleet, fleet_folder):
+    table = fleet.to_frame()
+    names = list(dict.fromkeys(table["campaign"]))
+    assert names == sorted(f"hall_{k % 2}/arm_{k:02d}" for k in range(8))
+    for name in names:
+        if name == BAD:
+            continue
+        rows = rows_of(tr.diagnose(fleet_folder / name, only=ONLY))
+        own = table[table["campaign"] == name]
+        assert list(own["effect"]) == [row["effect"] for row in rows]
+        for (_, got), row in zip(own.iterrows(), rows, strict=True):
+            for key in ("rms_before", "rms_after", "held_out", "probability", "shrinkage", "status", "summary"):
+                assert got[key] == row[key], key
+            for key in ("parameters", "free", "places"):
+                assert [dict(value) for value in got[key]] == row[key], key
+
+
+def test_the_labels_are_the_folders(fleet):
+    table = fleet.to_frame(["campaign", "hall", "robot"]).drop_duplicates()
+    assert [f"{hall}/{robot}" for hall, robot in zip(table["hall"], table["robot"], strict=True)] == list(
+        table["campaign"]
+    )
+
+
+def test_a_campaign_that_cannot_be_read_is_a_row_with_its_reason(fleet, fleet_folder):
+    table = fleet.to_frame()
+    (row,) = table[table["campaign"] == BAD].to_dict("records")
+    assert row["outcome"] == "failed"
+    assert pd.isna(row["effect"])
+    with pytest.raises(tr.CampaignError) as complaint:
+        tr.diagnose(fleet_folder / BAD)
+    assert row["reason"] == str(complaint.value).replace(f"{fleet_folder / BAD}{os.sep}", "")
+    assert row["reason"].startswith("measurements.csv, row")
+    assert fleet.summary.outcomes == {"diagnosed": 7, "failed": 1}
+    assert repr(fleet) == "<Fleet: 8 campaigns, 8 robots, 1 failed>"
+    assert str(fleet).startswith("8 campaigns of 8 robots: 7 diagnosed, 1 failed.")
+
+
+def test_one_worker_writes_the_same_bytes(fleet, fleet_folder, tmp_path):
+    alone = tr.diagnose_many(fleet_folder, tmp_path, labels=["hall", "robot"], only=reversed(ONLY), workers=1)
+    assert alone.table.read_bytes() == fleet.table.read_bytes()
+    assert alone.summary == fleet.summary
+
+
+def test_what_is_done_is_not_done_again(fleet, fleet_folder, tmp_path, monkeypatch):
+    shutil.copy(fleet.table.parent / DONE, tmp_path / DONE)
+    more = tmp_path / "campaigns"
+    shutil.copytree(fleet_folder, more)
+    (more / "hall_1" / "arm_03").rename(more / "hall_0" / "arm_03")
+
+    def nobody(*_):
+        raise AssertionError("somebody works")
+
+    monkeypatch.setattr(many.processes, "client", nobody)
+    seen = []
+    again = tr.diagnose_many(
+        fleet_folder, fleet.table.parent, labels=["hall", "robot"], only=ONLY, progress=lambda *s: seen.append(s)
+    )
+    assert again.summary == fleet.summary
+    assert [s for s in seen if s[0] == "campaigns"] == [("campaigns", k + 1, 8) for k in range(8)]
+    with pytest.raises(AssertionError, match="somebody works"):
+        tr.diagnose_many(fleet_folder, tmp_path, only=["backlash"])
+
+
+def test_what_has_changed_is_done_anew(rv_m2, tmp_path):
+    root = write_fleet(rv_m2, tmp_path / "all", 2)
+    first = tr.diagnose_many(root, tmp_path / "out", only=ONLY, workers=1).to_frame()
+    write_robot(rv_m2, tmp_path / "other", {"backlash": {"joint_3": 5e-4}}, seed=9)
+    shutil.copy(tmp_path / "other" / "measurements.csv", root / "hall_1" / "arm_01" / "measurements.csv")
+    second = tr.diagnose_many(root, tmp_path / "out", only=ONLY, workers=1).to_frame()
+    pd.testing.assert_frame_equal(first[first.campaign == "hall_0/arm_00"], second[second.campaign == "hall_0/arm_00"])
+    places = second.loc[(second.campaign == "hall_1/arm_01") & (second.effect == "backlash"), "places"].item()
+    assert places[0]["name"] == "joint_3"
+
+
+RUN = """
+import sys
+import thermal_robot as tr
+if __name__ == "__main__":
+    tr.diagnose_many(sys.argv[1], sys.argv[2], labels=["hall", "robot"], only=sys.argv[3:], workers=2,
+                     progress=lambda *s: print(*s, flush=True))
+"""
+
+
+@pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGKILL], ids=["interrupted", "killed"])
+def test_a_run_that_is_stopped_continues(fleet, fleet_folder, tmp_path, ending):
+    script = tmp_path / "run.py"
+    script.write_text(RUN)
+    command = [sys.executable, str(script), str(fleet_folder), str(tmp_path / "out"), *ONLY]
+    env = {**os.environ, "PYTHONPATH": str(Path(tr.__file__).parents[1])}
+    run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=env)
+    for line in run.stdout:
+        if line.startswith("campaigns 4 "):
+            time.sleep(1.1)  # what is done is on disk within a second, at the latest with the next
+            break
+    run.send_signal(ending)
+    run.stdout.close()
+    assert run.wait(60) != 0
+    assert not (tmp_path / "out" / TABLE).exists()
+    done = []
+    again = tr.diagnose_many(
+        fleet_folder,
+        tmp_path / "out",
+        labels=["hall", "robot"],
+        only=ONLY,
+        workers=2,
+        progress=lambda *s: done.append(s),
+    )
+    assert again.table.read_bytes() == fleet.table.read_bytes()
+
+
+def test_a_program_that_fails_is_a_row_that_is_tried_again(rv_m2, tmp_path, monkeypatch):
+    folder = write_robot(rv_m2, tmp_path / "a")
+
+    def broken(*_, **__):
+        raise ZeroDivisionError(f"in {folder}{os.sep}measurements.csv")
+
+    monkeypatch.setattr(many, "diagnose", broken)
+    rows, again = diagnosed(str(folder), [], [])
+    assert again
+    assert json.loads(rows) == [
+        {"outcome": "failed", "reason": "the program failed: ZeroDivisionError: in measurements.csv"}
+    ]
+
+
+def test_what_a_campaign_says_of_itself_is_not_tried_again(rv_m2, tmp_path):
+    folder = write_robot(rv_m2, tmp_path / "a", rows=3)
+    rows, again = diagnosed(str(folder), [], [])
+    assert not again
+    assert "too few" in json.loads(rows)[0]["reason"]
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"only": ["backlsh"]}, "did you mean 'backlash'"),
+        ({"only": []}, "names no effect"),
+        ({"workers": 0}, "at least 1"),
+        ({"workers": True}, "at least 1"),
+        ({"labels": ["a", "b", "c"]}, "fewer levels"),
+    ],
+)
+def test_what_makes_no_sense_is_said_before_anything_is_done(fleet_folder, tmp_path, options, said):
+    with pytest.raises(tr.ThermalRobotError, match=said):
+        tr.diagnose_many(fleet_folder, tmp_path / "out", **options)
+    assert not (tmp_path / "out" / TABLE).exists()
+
+
+def test_an_empty_folder_and_one_that_cannot_be_made_are_errors(tmp_path, fleet_folder):
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(tr.CampaignError, match=r"no campaign\.toml lies below"):
+        tr.diagnose_many(tmp_path / "empty", tmp_path / "out")
+    (tmp_path / "file").write_text("")
+    with pytest.raises(tr.CampaignError, match="cannot be made"):
+        tr.diagnose_many(fleet_folder, tmp_path / "file" / "out")
+
+
+@pytest.mark.slow
+def test_a_fleet_with_a_fault_of_all_and_one_of_a_hall_is_told_so(rv_m2, tmp_path):
+    """All arms have a gain too small to be found in most of them; those of a hall a zero that is off; one has play."""
+    gain, shift = 8e-5, 2.5e-4
+    rng = np.random.default_rng(17)
+    for k in range(24):
+        effects = {"joint_gain": {"joint_3": rng.normal(gain, 1e-5)}}
+        if k % 3 == 1:
+            effects["joint_offset"] = {"joint_2": rng.normal(shift, 1e-5)}
+        if k == 6:
+            effects["backlash"] = {"joint_4": 6e-4}
+        write_robot(rv_m2, tmp_path / "all" / f"hall_{k % 3}" / f"arm_{k:02d}", effects, seed=k, rows=60)
+    only = ["joint_gain", "joint_offset", "backlash"]
+    found = tr.diagnose_many(tmp_path / "all", tmp_path / "out", labels=["hall", "robot"], only=only, workers=2).summary
+    shared = {(s.effect, s.parameter): s for s in found.shared}
+    assert set(shared) == {("joint_gain", "gain error, joint_3"), ("joint_offset", "zero offset, joint_2")}
+    of_all, of_hall = shared["joint_gain", "gain error, joint_3"], shared["joint_offset", "zero offset, joint_2"]
+    assert of_all.mean == pytest.approx(gain, abs=3.0 * of_all.mean_std)
+    assert of_all.spread == pytest.approx(1e-5, abs=3.0 * of_all.spread_std)
+    assert of_all.label == ""
+    assert (of_hall.label, of_hall.groups[0].group) == ("hall", "hall_1")
+    assert of_hall.groups[0].mean == pytest.approx(shift, abs=3.0 * of_hall.groups[0].mean_std)
+    assert [(a.robot, a.parameter) for a in found.apart] == [("arm_06", "lost motion, joint_4")]

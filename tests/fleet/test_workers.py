@@ -1,0 +1,177 @@
+"""Processes of a real cluster: every task answered once, whoever is ended; no port that others can reach."""
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from pathlib import Path
+
+import psutil
+import pytest
+from fleet.robots import square
+
+from thermal_robot.errors import ThermalRobotError
+from thermal_robot.fleet.workers import answers, client
+
+pytestmark = pytest.mark.filterwarnings("default")
+
+
+@pytest.fixture(scope="module", autouse=True)
+def importable():
+    """Let the processes import this folder, as pytest lets itself."""
+    before = os.environ.get("PYTHONPATH")
+    os.environ["PYTHONPATH"] = os.pathsep.join([str(Path(__file__).parents[1]), *filter(None, [before])])
+    yield
+    os.environ["PYTHONPATH"] = before or ""
+
+
+@pytest.fixture(scope="module")
+def cluster(importable):
+    with client(2) as found:
+        yield found
+
+
+def tasks(numbers, *more):
+    return iter([(str(k), (k, *more)) for k in numbers])
+
+
+def workers():
+    """The processes that work, without nannies and helpers: those in which Python runs a worker."""
+    return [p for p in psutil.Process().children(recursive=True) if "spawn_main" in " ".join(p.cmdline())]
+
+
+def test_every_task_is_answered_once(cluster):
+    found = list(answers(cluster, square, tasks(range(30), 0.0)))
+    assert sorted((int(key), reply, why) for key, reply, why in found) == [(k, k * k, "") for k in range(30)]
+
+
+def test_tasks_are_taken_as_they_are_worked_on(cluster):
+    taken = []
+
+    def counting():
+        for task in tasks(range(20), 0.0):
+            taken.append(task[0])
+            yield task
+
+    ahead = [len(taken) - done for done, _ in enumerate(answers(cluster, square, counting()))]
+    assert max(ahead) <= 4
+
+
+def test_work_that_fails_is_told_and_the_rest_goes_on(cluster):
+    found = {key: (reply, why) for key, reply, why in answers(cluster, square, tasks([1, "two", 3], 0.0))}
+    assert found["1"] == (1, "")
+    assert found["3"] == (9, "")
+    assert found["two"][0] is None
+    assert "TypeError" in found["two"][1]
+
+
+def test_work_that_ends_its_process_is_the_only_one_that_has_no_answer(cluster):
+    found = list(answers(cluster, square, tasks(range(12), 0.05, (3, 4))))
+    assert sorted(int(key) for key, *_ in found) == list(range(12))
+    for key, reply, why in found:
+        if key in "34":
+            assert reply is None
+            assert "was ended twice" in why
+        else:
+            assert (reply, why) == (int(key) ** 2, "")
+
+
+def test_a_process_that_is_killed_in_the_middle_loses_nothing_and_does_nothing_twice(cluster):
+    until = time.monotonic() + 60.0
+    while len(workers()) < 2 and time.monotonic() < until:
+        time.sleep(0.1)  # those that the test before has ended
+    victim = workers()[0]
+    ended = threading.Timer(1.0, lambda: os.kill(victim.pid, signal.SIGKILL))
+    ended.start()
+    found = list(answers(cluster, square, tasks(range(40), 0.1)))
+    ended.join()
+    assert not victim.is_running() or victim.status() == psutil.STATUS_ZOMBIE
+    assert sorted((int(key), reply, why) for key, reply, why in found) == [(k, k * k, "") for k in range(40)]
+
+
+@pytest.mark.skipif(sys.platform == "darwin", reason="connections of other processes are not told there")
+def test_nobody_else_can_reach_it(cluster):
+    assert cluster.scheduler.address.startswith("tls://127.0.0.1:")
+    listening = [
+        connection.laddr.ip
+        for process in (psutil.Process(), *psutil.Process().children(recursive=True))
+        for connection in process.net_connections()
+        if connection.status == psutil.CONN_LISTEN
+    ]
+    assert listening
+    assert set(listening) == {"127.0.0.1"}
+
+
+def threads():
+    import numpy as np
+    from threadpoolctl import threadpool_info
+
+    np.ones((2, 2)) @ np.ones((2, 2))
+    return {pool["num_threads"] for pool in threadpool_info()}
+
+
+def test_each_process_has_one_thread_for_matrices(cluster):
+    assert set().union(*cluster.run(threads).values()) == {1}
+
+
+def test_a_scheduler_that_does_not_answer_is_named(monkeypatch):
+    monkeypatch.setattr("thermal_robot.fleet.settings.ANSWERS_WITHIN", 0.5)
+    with (
+        pytest.raises(ThermalRobotError, match=r"scheduler tcp://127.0.0.1:9 does not answer"),
+        client(1, "tcp://127.0.0.1:9"),
+    ):
+        pass
+
+
+def test_a_scheduler_that_runs_is_used():
+    import distributed
+
+    with (
+        distributed.LocalCluster(
+            n_workers=1, threads_per_worker=1, processes=True, dashboard_address="127.0.0.1:0"
+        ) as running,
+        client(1, running.scheduler_address) as found,
+    ):
+        assert [reply for _, reply, _ in answers(found, square, tasks([5], 0.0))] == [25]
+
+
+@pytest.fixture
+def secured(tmp_path):
+    """A scheduler and a worker as docs/fleet.md starts them, with TLS files; the address, and Dask's configuration."""
+    from distributed import Security
+
+    made = Security.temporary()
+    files = {"ca": made.tls_ca_file, "cert": made.tls_client_cert, "key": made.tls_client_key}
+    for name, text in files.items():
+        (tmp_path / f"{name}.pem").write_text(text)
+    paths = {name: str(tmp_path / f"{name}.pem") for name in files}
+    tls = ["--tls-ca-file", paths["ca"], "--tls-cert", paths["cert"], "--tls-key", paths["key"]]
+    here, contact = ["--host", "127.0.0.1", "--dashboard-address", "127.0.0.1:0"], tmp_path / "scheduler.json"
+    dask = [sys.executable, "-m", "dask"]
+    run = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL, "start_new_session": True}
+    scheduler = [*dask, "scheduler", *here, "--protocol", "tls", "--port", "0", "--scheduler-file", str(contact), *tls]
+    worker = [*dask, "worker", *here, "--nworkers", "1", "--nthreads", "1", "--scheduler-file", str(contact), *tls]
+    running = [subprocess.Popen(command, **run) for command in (scheduler, worker)]
+    until = time.monotonic() + 60.0
+    while not contact.exists() and time.monotonic() < until:
+        time.sleep(0.1)
+    own = {"ca-file": paths["ca"], "client.cert": paths["cert"], "client.key": paths["key"]}
+    yield json.loads(contact.read_text())["address"], {f"distributed.comm.tls.{k}": path for k, path in own.items()}
+    for process in running:
+        os.killpg(process.pid, signal.SIGTERM)
+        process.wait(30)
+
+
+def test_a_scheduler_behind_tls_takes_who_has_its_files_and_nobody_else(secured, monkeypatch):
+    import dask
+
+    address, tls = secured
+    assert address.startswith("tls://")
+    with dask.config.set(tls), client(1, address) as found:
+        assert sorted(reply for _, reply, _ in answers(found, square, tasks(range(5), 0.0))) == [0, 1, 4, 9, 16]
+    monkeypatch.setattr("thermal_robot.fleet.settings.ANSWERS_WITHIN", 3.0)
+    with pytest.raises(ThermalRobotError, match=r"does not answer.*distributed\.comm\.tls"), client(1, address):
+        pass

@@ -1,0 +1,141 @@
+"""Which campaigns a fleet consists of, and what each is labelled with: a folder of them, or a list in a file."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from thermal_robot.campaign import read_table
+from thermal_robot.campaign.declaration import FILE_NAME
+from thermal_robot.campaign.names import did_you_mean, listed
+from thermal_robot.errors import CampaignError, require
+from thermal_robot.files import is_file, is_folder
+from thermal_robot.fleet.toml_list import read_toml
+
+CAMPAIGN, ROBOT = "campaign", "robot"
+"""The column of a list that holds the paths, and the label that says which campaigns are of one robot."""
+LEVEL = "level_"
+_LISTS = (".csv", ".toml")
+
+
+@dataclass(frozen=True)
+class Listed:
+    """The campaigns of a fleet.
+
+    Attributes
+    ----------
+    root
+        Folder that their names start from.
+    names
+        Of the labels.
+    campaigns
+        Per campaign: its name, which is its path from the root, and its labels, empty where it has none.
+    """
+
+    root: Path
+    names: tuple[str, ...]
+    campaigns: tuple[tuple[str, tuple[str, ...]], ...]
+
+    def folder(self, name: str) -> str:
+        """Return the path of a campaign, absolute, so that every process finds it."""
+        return os.path.abspath(self.root / name)
+
+
+def campaigns(source: str | Path, names: Sequence[str] = ()) -> Listed:
+    """Find the campaigns of a fleet.
+
+    Parameters
+    ----------
+    source
+        A folder: every ``campaign.toml`` below it is one, and the folders on the way to it are its labels. Or a list:
+        CSV, or TOML with ``[[campaigns]]``, whose column ``campaign`` names folders or files from that of the list on,
+        and whose other columns are labels.
+    names
+        Of the levels of folders, from the top; ``level_1`` and so on where left out. Campaigns with an equal ``robot``
+        are of the same robot.
+
+    Returns
+    -------
+    Listed
+        In the order of the list, of a folder in that of the names.
+
+    Raises
+    ------
+    CampaignError
+        No such folder or file, one without campaigns, a campaign listed twice, a label that cannot be one.
+    """
+    require("diagnose_many()", source, (str, os.PathLike), "the path of a folder, or of a list of campaigns")
+    path = Path(source)
+    if is_folder(path):
+        return _below(path, names)
+    if not is_file(path):
+        raise CampaignError(str(path), "there is no such folder or list", expected="a folder of campaigns, or a list")
+    if names:
+        problem = "a list names its labels itself: they are its columns"
+        raise CampaignError(str(path), problem, found=listed(names, len(names)), expected="--labels with a folder only")
+    if path.suffix.lower() not in _LISTS or path.name == FILE_NAME:
+        raise CampaignError(str(path), "is no list of campaigns", expected=f"{' or '.join(_LISTS)}, or a folder")
+    return _of_list(path)
+
+
+def _below(root: Path, names: Sequence[str]) -> Listed:
+    found = sorted(_folders(root))
+    if not found:
+        raise CampaignError(str(root), f"no {FILE_NAME} lies below this folder", expected="a folder of campaigns")
+    parts = [Path(name).parts for name in found]
+    depth = max(len(levels) for levels in parts)
+    if len(names) > depth:
+        raise CampaignError(
+            str(root), "has fewer levels of folders than labels", found=str(depth), expected=str(len(names))
+        )
+    labels = _checked(str(root), [*names, *(f"{LEVEL}{k + 1}" for k in range(len(names), depth))])
+    padded = ((*levels, *[""] * (depth - len(levels))) for levels in parts)
+    return Listed(root, labels, tuple(zip(found, padded, strict=True)))
+
+
+def _folders(root: Path) -> Iterator[str]:
+    """Yield the folders with a campaign, from the root on; ``.`` is the root itself."""
+    for folder, inner, files in os.walk(root):
+        inner.sort()
+        if FILE_NAME in files:
+            yield Path(os.path.relpath(folder, root)).as_posix()
+
+
+def _of_list(path: Path) -> Listed:
+    """Read a list: rows of text by column, and where each stands."""
+    columns, rows = read_toml(path) if path.suffix.lower() == ".toml" else _csv(path)
+    if CAMPAIGN not in columns:
+        problem = f"has no column {CAMPAIGN!r}{did_you_mean(CAMPAIGN, columns)}"
+        raise CampaignError(str(path), problem, expected="the paths of the campaigns in it, labels in the others")
+    labels = _checked(str(path), [name for name in columns if name != CAMPAIGN])
+    seen: dict[str, int] = {}
+    for name, row in zip(columns[CAMPAIGN], rows, strict=True):
+        if not name.strip():
+            raise CampaignError(str(path), "no campaign is named", row=row, column=CAMPAIGN, expected="a path")
+        first = seen.setdefault(os.path.normpath(name), row)
+        if first != row:
+            problem = f"this campaign stands in row {first}, too"
+            raise CampaignError(str(path), problem, row=row, column=CAMPAIGN, found=name, expected="each once")
+    of_each = zip(*(columns[name] for name in labels), strict=True) if labels else (() for _ in rows)
+    return Listed(path.parent, labels, tuple(zip(columns[CAMPAIGN], map(tuple, of_each), strict=True)))
+
+
+def _csv(path: Path) -> tuple[dict[str, list[str]], list[int]]:
+    table = read_table(path)
+    return {name: table.text(name) for name in table.columns}, [int(row) for row in table.rows]
+
+
+def _checked(file: str, labels: Iterable[str]) -> tuple[str, ...]:
+    """Refuse a label that the table has a column for, or that stands twice."""
+    from thermal_robot.fleet.rows import OWN
+
+    names = tuple(labels)
+    for name in names:
+        if name in OWN or not name.strip():
+            problem = "the table of a fleet has a column of this name" if name.strip() else "a label has no name"
+            raise CampaignError(file, problem, column=name, expected="another name for the label")
+        if names.count(name) > 1:
+            raise CampaignError(file, "a label stands twice", column=name, expected="each once")
+    return names

@@ -1,0 +1,258 @@
+"""Many campaigns go in; a table, and what they have in common, come out."""
+
+from __future__ import annotations
+
+import gc
+import json
+import os
+import warnings
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from thermal_robot.diagnosis import diagnose
+from thermal_robot.effects.catalogue import choose
+from thermal_robot.errors import CampaignError, ThermalRobotError
+from thermal_robot.files import is_file, write_one
+from thermal_robot.fleet import workers as processes
+from thermal_robot.fleet.done import Done, fingerprint, opened
+from thermal_robot.fleet.extra import needed
+from thermal_robot.fleet.listed import Listed, campaigns
+from thermal_robot.fleet.rows import failed, rows_of, write_rows
+from thermal_robot.fleet.summary import Summary, summarise
+from thermal_robot.teller import registered
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+TABLE, DONE = "fleet.parquet", "done.sqlite"
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Fleet:
+    """The diagnoses of many campaigns, and what they have in common.
+
+    Attributes
+    ----------
+    table
+        Path of the table: Parquet, a row for each campaign and effect.
+    summary
+        What is wrong with which robot, and what several share; it prints as text.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> file = tr.write_campaign(tr.demo_campaign(), "robots/hall_3")
+    >>> fleet = tr.diagnose_many("robots", "out", only=["backlash", "thermal_elongation"], workers=1)
+    >>> fleet
+    <Fleet: 1 campaign, 1 robot, 0 failed>
+    >>> list(fleet.to_frame()["status"])
+    ['found', 'found']
+    """
+
+    table: Path
+    summary: Summary
+
+    def to_frame(self, columns: Sequence[str] | None = None) -> pd.DataFrame:
+        """Return the table, or some of its columns; SI throughout."""
+        import pandas as pd
+
+        return pd.read_parquet(self.table, columns=None if columns is None else list(columns))
+
+    def __str__(self) -> str:
+        return str(registered().fleet_text(self.summary.to_dict()))
+
+    def __repr__(self) -> str:
+        s = self.summary
+        many = [f"{n} {word}{'' if n == 1 else 's'}" for n, word in ((s.campaigns, "campaign"), (s.robots, "robot"))]
+        return f"<Fleet: {', '.join(many)}, {len(s.failures)} failed>"
+
+
+def diagnose_many(
+    source: str | Path,
+    out: str | Path,
+    *,
+    labels: Sequence[str] = (),
+    only: Iterable[str] | None = None,
+    without: Iterable[str] = (),
+    workers: int | None = None,
+    scheduler: str | None = None,
+    progress: Callable[[str, int, int], None] = lambda *_: None,
+) -> Fleet:
+    """Diagnose many campaigns, each as :func:`diagnose` does, and say what their robots have in common.
+
+    A run that was stopped continues: what is done, by the content of its files, the version of the program and the
+    options, is not done again. The table is the same, byte for byte, for any number of workers. A campaign that fails
+    is a row with its reason; one that failed for another reason than its own files is tried again by the next run.
+
+    A script that calls this does so under ``if __name__ == "__main__":``, for its processes import it.
+
+    Parameters
+    ----------
+    source
+        A folder, with a ``campaign.toml`` somewhere below for each; or a list, CSV with a column ``campaign`` or TOML
+        with ``[[campaigns]]``, whose other columns are labels.
+    out
+        Folder of the table and of what is done; made if need be.
+    labels
+        Names of the levels of folders, from the top, ``["hall", "robot", "day"]``; campaigns of an equal ``robot`` are
+        of the same robot.
+    only, without
+        Names of effects, as in :func:`diagnose`.
+    workers
+        Processes on this machine, each on one core; one a core where left out.
+    scheduler
+        Address of a Dask scheduler, whose workers see the same files under the same paths, instead of processes here.
+    progress
+        Called with a stage, how many campaigns are done, and how many there are.
+
+    Returns
+    -------
+    Fleet
+        Prints as text.
+
+    Raises
+    ------
+    CampaignError
+        Nothing to diagnose, a list that cannot be read, a folder that cannot be written or is in use.
+    EffectError
+        If an effect's name is not known.
+    ThermalRobotError
+        If the extra ``fleet`` is not installed, or the scheduler does not answer.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> file = tr.write_campaign(tr.demo_campaign(), "robots/hall_3")
+    >>> fleet = tr.diagnose_many("robots", "out", only=["backlash", "thermal_elongation"], workers=1)
+    >>> [finding.robot for finding in fleet.summary.found]
+    ['hall_3', 'hall_3']
+    """
+    options = _options(only, without)
+    if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
+        raise CampaignError("diagnose_many(), workers", "no such number", found=repr(workers), expected="at least 1")
+    for module in ("pyarrow", "distributed"):
+        needed(module)
+    found, folder = campaigns(source, labels), _made(out)
+    table = folder / TABLE
+    with opened(folder / DONE) as done:
+        _diagnosed(found, options, done, workers or os.cpu_count() or 1, scheduler, progress)
+        write_one(str(table), lambda path: write_rows(path, found.names, _whole(found, done)))
+    return Fleet(table, summarise(table, found.names, progress))
+
+
+def diagnosed(folder: str, only: Sequence[str], without: Sequence[str]) -> tuple[str, bool]:
+    """Diagnose one campaign in a process of its own.
+
+    Parameters
+    ----------
+    folder
+        Absolute path.
+    only, without
+        Names of effects.
+
+    Returns
+    -------
+    tuple
+        Its rows as JSON, and whether another run may give others: the program failed, and not the campaign.
+    """
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # what is worth a word stands in the rows
+            rows, again = rows_of(diagnose(folder, only=only or None, without=without)), False
+    except ThermalRobotError as error:
+        rows, again = failed(_without_place(str(error), folder)), False
+    except Exception as error:
+        rows, again = failed(f"the program failed: {type(error).__name__}: {_without_place(str(error), folder)}"), True
+    gc.collect()  # what a diagnosis leaves refers to itself, and would stay for hundreds of campaigns
+    return json.dumps(rows), again
+
+
+def _options(only: Iterable[str] | None, without: Iterable[str]) -> tuple[list[str], list[str]]:
+    """Return the names of effects, sorted, all of them known."""
+    chosen = [[names] if isinstance(names, str) else list(names) for names in (only or (), without)]
+    if only is not None and not chosen[0]:
+        raise CampaignError("diagnose_many(), only", "names no effect", expected="at least one, or left out for all")
+    choose(tuple(chosen[0]), tuple(chosen[1]), ())
+    return sorted(chosen[0]), sorted(chosen[1])
+
+
+def _made(out: str | Path) -> Path:
+    folder = Path(out)
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except (OSError, ValueError) as error:
+        raise CampaignError(str(out), "cannot be made", found=str(error), expected="a folder to write to") from None
+    return folder
+
+
+def _diagnosed(
+    found: Listed,
+    options: tuple[list[str], list[str]],
+    done: Done,
+    workers: int,
+    scheduler: str | None,
+    progress: Callable[[str, int, int], None],
+) -> None:
+    """Diagnose what is not done yet."""
+    total, finished = len(found.campaigns), 0
+
+    def told(more: int) -> None:
+        nonlocal finished
+        finished += more
+        progress("campaigns", finished, total)
+
+    under_way: set[str] = set()
+    tasks = _tasks(found, options, done, told, under_way)
+    first = next(tasks, None)
+    if first is None:
+        return
+    with processes.client(min(workers, total), scheduler) as client:
+        for key, reply, reason in processes.answers(client, diagnosed, _again(first, tasks)):
+            rows, again = (json.loads(reply[0]), reply[1]) if reply is not None else (failed(reason), True)
+            done.put(key, rows, again)
+            under_way.discard(key)
+            told(1)
+
+
+def _again(first: processes.Task, rest: Iterator[processes.Task]) -> Iterator[processes.Task]:
+    yield first
+    yield from rest
+
+
+def _tasks(
+    found: Listed,
+    options: tuple[list[str], list[str]],
+    done: Done,
+    told: Callable[[int], None],
+    under_way: set[str],
+) -> Iterator[processes.Task]:
+    """Yield what is to be done, in the order of the list; what is alike is done once."""
+    for number, (name, _) in enumerate(found.campaigns):
+        folder = found.folder(name)
+        try:
+            key = fingerprint(folder, options)
+        except (ThermalRobotError, OSError) as error:
+            key = f"unread {number}"
+            done.put(key, failed(_without_place(str(error), folder)), again=True)
+        done.name(number, key)
+        if key in under_way or key in done:
+            told(1)
+        else:
+            under_way.add(key)
+            yield key, (folder, *options)
+
+
+def _whole(found: Listed, done: Done) -> Iterator[dict[str, Any]]:
+    """Yield every row of the table, with names and labels."""
+    for number, rows in done.in_order():
+        name, labels = found.campaigns[number]
+        named = {"campaign": name, **dict(zip(found.names, labels, strict=True))}
+        yield from ({**named, **row} for row in rows)
+
+
+def _without_place(message: str, folder: str) -> str:
+    """Return a message without the folder that its table names anyway, and that differs from machine to machine."""
+    place = folder if not is_file(Path(folder)) else os.path.dirname(folder)
+    return " ".join(message.replace(place + os.sep, "").split())
