@@ -1,0 +1,221 @@
+"""What is said of a robot over time: frozen values, as text and as JSON of the schema ``thermal-robot/wear/1``."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from thermal_robot.files import write_text
+
+SCHEMA = "thermal-robot/wear/1"
+
+
+@dataclass(frozen=True)
+class Visit:
+    """One campaign of a series.
+
+    Attributes
+    ----------
+    name
+        Of the campaign.
+    date
+        ISO 8601; empty where none was given.
+    time
+        Days since the first campaign; its number, from 0, where no dates were given.
+    rows
+        That were used.
+    """
+
+    name: str
+    date: str
+    time: float
+    rows: int
+
+
+@dataclass(frozen=True)
+class Jump:
+    """A change at once, between two campaigns.
+
+    Attributes
+    ----------
+    after
+        Number of the last campaign before it, from 0.
+    probability
+        That it was then, and not between two others, if the parameter jumped at all.
+    probabilities
+        (K − 1,) the same after each campaign.
+    earliest, latest
+        Numbers of the campaigns between which it happened with 95 %: the last before it and the first after it.
+    size, std
+        By how much, and its standard deviation; unit of the parameter.
+    """
+
+    after: int
+    probability: float
+    probabilities: tuple[float, ...]
+    earliest: int
+    latest: int
+    size: float
+    std: float
+
+
+@dataclass(frozen=True)
+class Rate:
+    """How fast a parameter moves, its unit per day."""
+
+    value: float
+    std: float
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """When a parameter's absolute value reaches a limit.
+
+    Attributes
+    ----------
+    limit
+        In the unit of the parameter.
+    state
+        ``passed`` (it is beyond in the last campaign), ``expected`` (a trend leads there), ``never`` (it does not move,
+        or has jumped and stays), ``unknown`` (it wanders, or there are no dates for a rate).
+    day
+        Expected, in days since the first campaign; ``None`` unless ``expected``.
+    low, high
+        95 % interval of it; ``high`` is ``None`` where the trend may be none.
+    dates
+        The three as dates; empty where there is none.
+    """
+
+    limit: float
+    state: str
+    day: float | None = None
+    low: float | None = None
+    high: float | None = None
+    dates: tuple[str, str, str] = ("", "", "")
+
+
+@dataclass(frozen=True)
+class Worn:
+    """One parameter over time; SI.
+
+    Attributes
+    ----------
+    effect, title
+        Its effect's name, and in plain words.
+    parameter, place, unit
+        Its own name, its joint or link, and its unit.
+    comparable
+        Whether campaigns can be compared in it; ``reason`` says why not.
+    alarm
+        Whether it rings: its chance is at most the false-alarm rate.
+    chance
+        Bound on the probability that a series without any change shows one as clear, in whatever parameter, on whatever
+        day.
+    moved
+        Posterior probability that it moves, in whatever way.
+    kind
+        ``constant``, ``jump``, ``trend`` or ``walk``: the most probable, of those in which it moves where it rings.
+    kinds
+        Probability of each.
+    jump, rate
+        Where it is one; a rate needs dates.
+    change, change_std
+        From the first campaign to the last, as its kind has it; 0 where it is constant.
+    values, stds
+        (K,) as each campaign has it, all others as they are over time, and their standard deviations; ``None`` in a
+        campaign that says nothing of it.
+    fitted
+        (K,) as its kind has it.
+    crossing
+        Of a limit that was given for its effect; ``None`` without one.
+    confounded_with
+        Parameters of whose changes the data cannot tell this one's.
+    """
+
+    effect: str
+    title: str
+    parameter: str
+    place: str
+    unit: str
+    comparable: bool
+    reason: str
+    alarm: bool
+    chance: float
+    moved: float
+    kind: str
+    kinds: dict[str, float]
+    jump: Jump | None
+    rate: Rate | None
+    change: float
+    change_std: float
+    values: tuple[float | None, ...]
+    stds: tuple[float | None, ...]
+    fitted: tuple[float, ...]
+    crossing: Crossing | None
+    confounded_with: tuple[str, ...]
+
+
+@dataclass(frozen=True, repr=False)
+class Wear:
+    """One robot over time.
+
+    Attributes
+    ----------
+    robot
+        Its name.
+    campaigns
+        In the order of time.
+    dated
+        Whether dates were given.
+    parameters
+        Those that ring first, then by how probably they moved.
+    false_alarm
+        Stated: at most so many series without any change ring at all.
+    scatter
+        How much more the campaigns scatter about each other than their deviations say; 1 where they do not.
+    nothing
+        Probability that nothing moved.
+    notes
+        What a reader must know beside, one sentence each.
+    """
+
+    robot: str
+    campaigns: tuple[Visit, ...]
+    dated: bool
+    parameters: tuple[Worn, ...]
+    false_alarm: float
+    scatter: float
+    nothing: float
+    notes: tuple[str, ...]
+
+    @property
+    def alarms(self) -> tuple[Worn, ...]:
+        """The parameters that ring."""
+        return tuple(worn for worn in self.parameters if worn.alarm)
+
+    @property
+    def summary(self) -> str:
+        """One sentence."""
+        from thermal_robot.fleet.wear_text import summary
+
+        return summary(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object of the format ``thermal-robot/wear/1``: the attributes, and the schema's name."""
+        plain: dict[str, Any] = json.loads(json.dumps({"schema": SCHEMA, "summary": self.summary, **asdict(self)}))
+        return plain
+
+    def to_json(self, path: str | Path) -> None:
+        """Write :meth:`to_dict` to a file, which appears whole or not at all."""
+        write_text(path, json.dumps(self.to_dict(), indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+
+    def __repr__(self) -> str:
+        moving = ", ".join(f"{w.parameter} ({w.kind})" for w in self.alarms)
+        return f"Wear({self.robot!r}, {len(self.campaigns)} campaigns: {moving or 'no alarm'})"
+
+    def __str__(self) -> str:
+        from thermal_robot.fleet.wear_text import text
+
+        return text(self)
