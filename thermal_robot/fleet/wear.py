@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 from typing import Any, TypeAlias
@@ -100,10 +100,53 @@ def wear(
     choose(chosen, (), ())
     with threadpool_limits(1):
         fits = [_fitted(member, chosen, k, len(members), progress) for k, member in enumerate(members)]
-        require_alike(fits)
         progress("all campaigns together")
-        whole = problem(fits)
-        return _told(members, fits, whole, limit, false_alarm)
+        return of_fits(fits, [member.date for member in members if member.date], limits=limit, false_alarm=false_alarm)
+
+
+def of_fits(
+    fits: Sequence[Fit],
+    moments: Sequence[datetime] = (),
+    *,
+    limits: Mapping[str, float] | None = None,
+    false_alarm: float = settings.FALSE_ALARM,
+) -> Wear:
+    """Say what moved between campaigns that were fitted already.
+
+    Parameters
+    ----------
+    fits
+        K of one robot, in the order of time.
+    moments
+        K dates, not falling; none where they are not known.
+    limits, false_alarm
+        As for :func:`wear`.
+
+    Raises
+    ------
+    CampaignError
+        If they are of different robots.
+    """
+    require_alike(fits)
+    whole = problem(fits)
+    times = days_since(moments) if moments else np.arange(float(len(fits)))
+    series = Series(whole.matrices, whole.vectors, times, np.ones(len(whole.keys), dtype=bool))
+    series = replace(series, followed=comparable(whole, series))
+    found = explanations(series)
+    told = Told(whole, found, moments[0] if moments else None, limits or {}, false_alarm)
+    nothing = sum(float(p) for m, p in zip(found.moves, found.probabilities, strict=True) if not m)
+    dates = [_written(each) for each in moments] or [""] * len(fits)
+    visits = tuple(
+        Visit(fit.campaign.name, date, float(time), int((~fit.explanation.outliers).sum()))
+        for fit, date, time in zip(fits, dates, times, strict=True)
+    )
+    factor = float(np.sqrt(scatter(series, found.grid, found.best)[0]))
+    robot, notes = fits[0].campaign.robot.name, _notes(whole, visits, factor)
+    return Wear(robot, visits, bool(moments), told.parameters(), false_alarm, factor, nothing, notes)
+
+
+def _written(moment: datetime) -> str:
+    return moment.isoformat(timespec="minutes").removesuffix("T00:00")
 
 
 @dataclass(frozen=True, eq=False)
@@ -146,9 +189,7 @@ def _opened(given: Any) -> Campaign | Diagnosis:
     return given  # type: ignore[no-any-return]
 
 
-def _fitted(
-    member: _Member, chosen: tuple[str, ...], number: int, count: int, progress: Callable[[str], None]
-) -> Fit:
+def _fitted(member: _Member, chosen: tuple[str, ...], number: int, count: int, progress: Callable[[str], None]) -> Fit:
     """Return the fit of one campaign by itself."""
     given = member.given
     if isinstance(given, Diagnosis):
@@ -166,26 +207,6 @@ def _fitted(
             expected="a campaign that `thermal-robot diagnose` can use; it says what is wrong",
         )  # fmt: skip
     return found
-
-
-def _told(
-    members: Sequence[_Member], fits: Sequence[Fit], whole: Problem, limits: Mapping[str, float], false_alarm: float
-) -> Wear:
-    """Weigh what moved, and tell it."""
-    moments = [member.date for member in members if member.date is not None]
-    times = days_since(moments) if moments else np.arange(float(len(fits)))
-    series = Series(whole.matrices, whole.vectors, times, np.ones(len(whole.keys), dtype=bool))
-    series = Series(whole.matrices, whole.vectors, times, comparable(whole, series))
-    found = explanations(series)
-    told = Told(whole, found, moments[0] if moments else None, limits, false_alarm)
-    nothing = sum(float(p) for m, p in zip(found.moves, found.probabilities, strict=True) if not m)
-    visits = tuple(
-        Visit(f.campaign.name, m.date.isoformat(timespec="minutes").removesuffix("T00:00") if m.date else "", float(t), r)
-        for f, m, t, r in zip(fits, members, times, (int((~f.explanation.outliers).sum()) for f in fits), strict=True)
-    )
-    factor = float(np.sqrt(scatter(series, found.grid, found.best)[0]))
-    robot = fits[0].campaign.robot.name
-    return Wear(robot, visits, bool(moments), told.parameters(), false_alarm, factor, nothing, _notes(whole, visits, factor))
 
 
 def _notes(whole: Problem, visits: Sequence[Visit], factor: float) -> tuple[str, ...]:
@@ -216,7 +237,9 @@ def _limits(limits: Mapping[str, float]) -> dict[str, float]:
                 f"expected one of {', '.join(sorted(known))}"
             )
         if isinstance(limit, bool) or not isinstance(limit, (int, float)) or not 0.0 < limit < np.inf:
-            raise CampaignError("wear", "is no limit", column=f"limits.{effect}", found=repr(limit), expected="SI, above 0")
+            raise CampaignError(
+                "wear", "is no limit", column=f"limits.{effect}", found=repr(limit), expected="SI, above 0"
+            )
     return {effect: float(limit) for effect, limit in limits.items()}
 
 

@@ -155,7 +155,9 @@ class Grid:
         distance, degrees = series.scattered
         prior = -0.5 * (np.log(factor) / settings.SCATTER_SPREAD) ** 2 + np.log(np.gradient(np.log(factor)))
         base = prior - logsumexp(prior) - 0.5 * distance / factor**2 - degrees * np.log(factor)
-        pairs = np.array([(s**2, f**2, b - np.log(len(scale))) for s in scale for f, b in zip(factor, base, strict=True)])
+        pairs = np.array(
+            [(s**2, f**2, b - np.log(len(scale))) for s in scale for f, b in zip(factor, base, strict=True)]
+        )
         return cls(*np.ascontiguousarray(pairs.T))
 
 

@@ -65,9 +65,7 @@ def explanations(series: Series) -> Explanations:
             break
     ranked = sorted(known.items(), key=lambda item: (-item[1], sorted(item[0])))
     values = np.array([value for _, value in ranked])
-    return Explanations(
-        series, grid, tuple(tuple(sorted(m)) for m, _ in ranked), np.exp(values - logsumexp(values))
-    )
+    return Explanations(series, grid, tuple(tuple(sorted(m)) for m, _ in ranked), np.exp(values - logsumexp(values)))
 
 
 def _one_more(series: Series, grid: Grid, moves: Moves) -> dict[Move, float]:
@@ -79,7 +77,9 @@ def _one_more(series: Series, grid: Grid, moves: Moves) -> dict[Move, float]:
     before = sum(log_prior(move, series) for move in moves)
     own, pull = beside.left(series, grid, columns)
     share = grid.variance[:, None] * own / grid.inflation[:, None]
-    gain = 0.5 * pull**2 * grid.variance[:, None] / (grid.inflation[:, None] ** 2 * (1.0 + share)) - 0.5 * np.log1p(share)
+    gain = 0.5 * pull**2 * grid.variance[:, None] / (grid.inflation[:, None] ** 2 * (1.0 + share)) - 0.5 * np.log1p(
+        share
+    )
     single = logsumexp(beside.log_likelihood[:, None] + gain, axis=0)
     found = {}
     for column, value in zip(columns.tolist(), single.tolist(), strict=True):

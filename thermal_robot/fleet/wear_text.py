@@ -74,9 +74,7 @@ def _others(wear: Wear, named: set[str]) -> Iterator[str]:
     stays = [w for w in wear.parameters if w.comparable and not w.alarm and w.parameter not in named]
     if stays:
         yield f"stays        {'; '.join(f'{w.parameter} (moved: {w.moved:.1%})' for w in stays)}"
-    yield from (
-        f"limit        {w.parameter}: {_reaches(w.crossing, w.unit)}" for w in stays if w.crossing is not None
-    )
+    yield from (f"limit        {w.parameter}: {_reaches(w.crossing, w.unit)}" for w in stays if w.crossing is not None)
     hidden = [w for w in wear.parameters if not w.comparable]
     for reason in dict.fromkeys(w.reason for w in hidden):
         names = ", ".join(w.parameter for w in hidden if w.reason == reason)

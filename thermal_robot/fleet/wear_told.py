@@ -174,5 +174,3 @@ def _kinds(ways: Mapping[Move, float]) -> dict[str, float]:
         found[way.kind] += probability
     found["constant"] = max(1.0 - sum(found.values()), 0.0)
     return found
-
-
