@@ -8,6 +8,7 @@ from thermal_robot.diagnosis import Diagnosis, diagnose
 from thermal_robot.diagnosis.result import told_by
 from thermal_robot.effects import Effect
 from thermal_robot.errors import CampaignError, EffectError, EstimationError, RobotError, ThermalRobotError
+from thermal_robot.fleet.wear import wear
 from thermal_robot.observations import Observations, observe
 from thermal_robot.robot import Robot, load_robot
 from thermal_robot.simulation import simulate
@@ -36,5 +37,6 @@ __all__ = [
     "read_campaign",
     "read_samples",
     "simulate",
+    "wear",
     "write_campaign",
 ]

@@ -21,6 +21,7 @@ from thermal_robot.commands import (
     plan,
     predict,
     view,
+    wear,
 )
 from thermal_robot.console import NORMAL, add_loudness, heard
 from thermal_robot.errors import ThermalRobotError
@@ -36,6 +37,7 @@ COMMANDS = {
     "view": view,
     "predict": predict,
     "correct": correct,
+    "wear": wear,
     "iso9283": iso9283,
     "import": import_files,
     "paper": paper,

@@ -44,9 +44,9 @@ def wear(
 ) -> Wear:
     """Say which parameter of a robot moves over time: at once, steadily, or without a direction.
 
-    Each campaign is fitted by itself, which names effects, outliers and noise. Then all are put into one linear problem:
-    the parameters of all effects that were named in any of them, and the zero of every joint, are constants that all
-    share, the unknown frames of each campaign its own. What moves beside is weighed by marginal likelihood.
+    Each campaign is fitted by itself, which names effects, outliers and noise. Then all are put into one linear
+    problem: the parameters of all effects that were named in any of them, and the zero of every joint, are constants
+    that all share, the unknown frames of each campaign its own. What moves beside is weighed by marginal likelihood.
 
     Parameters
     ----------
@@ -184,7 +184,7 @@ def _members(campaigns: Any, dates: Sequence[Any] | None) -> list[_Member]:
 
 def _opened(given: Any) -> Campaign | Diagnosis:
     if isinstance(given, (str, os.PathLike)):
-        return read_campaign(given)
+        return read_campaign(os.fspath(given))
     require("wear()", given, (Campaign, Diagnosis), _EXPECTED)
     return given  # type: ignore[no-any-return]
 
@@ -214,7 +214,7 @@ def _notes(whole: Problem, visits: Sequence[Visit], factor: float) -> tuple[str,
     notes = []
     for effect in dict.fromkeys(effect for effect, _ in whole.keys):
         own = [k for k, (name, _) in enumerate(whole.keys) if name == effect]
-        lacking = [v.name for v, here in zip(visits, whole.has[:, own].any(axis=1), strict=True) if not here]
+        lacking = [visit.name for k, visit in enumerate(visits) if not whole.has[k, own].any()]
         if lacking:
             notes.append(
                 f"{effect} was named, but {', '.join(lacking)} lack the columns that it needs: what it does there may "

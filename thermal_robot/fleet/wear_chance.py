@@ -52,7 +52,7 @@ def scatter(series: Series, grid: Grid, moves: tuple[Move, ...]) -> tuple[float,
     """Return φ² as the campaigns show it beside some moves, not less than 1, and its degrees of freedom."""
     distance, degrees = series.scattered
     beside = Beside.of(series, _wide(grid, 1.0), moves)
-    if beside.columns:
+    if len(beside.columns):
         distance -= float(beside.mean[0] @ series.pull[beside.columns])
     left = max(degrees - len(beside.columns), 1.0)
     return max(distance / left, 1.0), left

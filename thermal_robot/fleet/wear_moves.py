@@ -7,8 +7,8 @@ products of campaign k, G_k = X'X and b_k = X'y, unknown frames projected out, e
 
     V_ij = Σ s_i s_j G_k[e_i, e_j] − B_i A⁻¹ B_j',   g_i = Σ s_i b_k[e_i] − B_i A⁻¹ Σ b_k,
 
-with A = Σ G_k + prior and B_i = Σ s_i G_k[e_i, :]: the information on moves that is left beside the constants. For moves
-of prior variances τ, and a factor φ by which campaigns scatter more than their deviations say,
+with A = Σ G_k + prior and B_i = Σ s_i G_k[e_i, :]: the information on moves that is left beside the constants. For
+moves of prior variances τ, and a factor φ by which campaigns scatter more than their deviations say,
 
     log BF = −½ log|1 + √τ V √τ/φ²| + ½ g'(V + φ² τ⁻¹)⁻¹ g / φ².
 
@@ -155,10 +155,9 @@ class Grid:
         distance, degrees = series.scattered
         prior = -0.5 * (np.log(factor) / settings.SCATTER_SPREAD) ** 2 + np.log(np.gradient(np.log(factor)))
         base = prior - logsumexp(prior) - 0.5 * distance / factor**2 - degrees * np.log(factor)
-        pairs = np.array(
-            [(s**2, f**2, b - np.log(len(scale))) for s in scale for f, b in zip(factor, base, strict=True)]
-        )
-        return cls(*np.ascontiguousarray(pairs.T))
+        variance, inflation = np.meshgrid(scale**2, factor**2, indexing="ij")
+        alike = np.broadcast_to(base - np.log(len(scale)), variance.shape)
+        return cls(variance.ravel(), inflation.ravel(), alike.ravel())
 
 
 def log_prior(move: Move, series: Series) -> float:
@@ -186,12 +185,12 @@ class Beside:
     log_likelihood: Array
     mean: Array
     covariance: Array
-    columns: list[int]
+    columns: NDArray[np.int64]
 
     @classmethod
     def of(cls, series: Series, grid: Grid, moves: Sequence[Move]) -> Beside:
         """Solve for some moves."""
-        columns = [c for move in moves for c in series.spans(move)]
+        columns = np.array([c for move in moves for c in series.spans(move)], dtype=np.int64)
         share = np.concatenate([*(series.shares(move) for move in moves), np.zeros(0)])
         own, pull = series.information[np.ix_(columns, columns)], series.pull[columns]
         deviation = np.sqrt(grid.variance[:, None] * share)

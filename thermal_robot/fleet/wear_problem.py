@@ -1,11 +1,12 @@
 """Several campaigns of one robot as one linear problem: the same parameters in all, each campaign's frames its own.
 
 Parameters are those of the effects that were named in any campaign, and what somebody could set anew
-(:attr:`Effect.told_inside`): a collision shows in the zeros of joints, whether or not those were off before. All campaigns
-are linearised about one common model, so that what is not linear is the same in all.
+(:attr:`Effect.told_inside`): a collision shows in the zeros of joints, whether or not those were off before. All
+campaigns are linearised about one common model, so that what is not linear is the same in all.
 
-A campaign's own are its unknown frames, and effects that begin anew with it: those of the instrument, of a frame, of its
-clock, and laws that nobody wrote down. They are taken off within it, the frames free, the others held by their sizes.
+A campaign's own are its unknown frames, and effects that begin anew with it: those of the instrument, of a frame, of
+its clock, and laws that nobody wrote down. They are taken off within it, the frames free, the others held by their
+sizes.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Which moves the campaigns speak for: explanations of none, one, two … moving parameters, each with its probability."""
+"""Which moves the campaigns speak for: none, or those of one, two … parameters, each combination with a probability."""
 
 from __future__ import annotations
 
@@ -76,10 +76,9 @@ def _one_more(series: Series, grid: Grid, moves: Moves) -> dict[Move, float]:
         return {}
     before = sum(log_prior(move, series) for move in moves)
     own, pull = beside.left(series, grid, columns)
-    share = grid.variance[:, None] * own / grid.inflation[:, None]
-    gain = 0.5 * pull**2 * grid.variance[:, None] / (grid.inflation[:, None] ** 2 * (1.0 + share)) - 0.5 * np.log1p(
-        share
-    )
+    inflation, variance = grid.inflation[:, None], grid.variance[:, None]
+    share = variance * own / inflation
+    gain = 0.5 * pull**2 * variance / (inflation**2 * (1.0 + share)) - 0.5 * np.log1p(share)
     single = logsumexp(beside.log_likelihood[:, None] + gain, axis=0)
     found = {}
     for column, value in zip(columns.tolist(), single.tolist(), strict=True):

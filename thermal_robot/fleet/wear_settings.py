@@ -12,16 +12,16 @@ ANY_CHANGE = 0.2
 likely is each. Robots are measured anew where somebody suspects a change, and mostly nothing has."""
 
 KINDS = {"jump": 0.4, "trend": 0.4, "walk": 0.2}
-"""Share of each kind among what moves. Jumps (collisions, new zeros) and trends (wear) are what is known to happen; what
-wanders without a direction is rarer (a loose fixture, temperature that nobody recorded)."""
+"""Share of each kind among what moves. Jumps (collisions, new zeros) and trends (wear) are what is known to happen;
+what wanders without a direction is rarer (a loose fixture, temperature that nobody recorded)."""
 
 SCALES = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0)
 """Prior deviation of a change in expected sizes of its parameter, each as likely: what has been corrected moves by less
 than the robot was off at first, and a collision by more."""
 
 SCATTER = (1.0, 1.12, 1.25, 1.4, 1.6, 2.0, 2.5, 3.2, 4.0, 6.0, 10.0)
-"""How much more campaigns scatter about each other than their deviations say: what is named nowhere shifts each campaign
-by another amount, as each measures other poses."""
+"""How much more campaigns scatter about each other than their deviations say: what is named nowhere shifts each
+campaign by another amount, as each measures other poses."""
 
 SCATTER_SPREAD = 0.3
 """Prior deviation of the logarithm of that factor, above 1 alone: deviations are mostly right within a third."""

@@ -145,9 +145,9 @@ class Told:
         if reached is None:
             return Crossing(limit, "never")
         last = float(self.found.series.times[-1])
-        ends = [None if end is None else last + end for end in reached]
-        dates = ["" if end is None else in_words(self.first, end) for end in ends]
-        return Crossing(limit, "expected", *ends, (dates[0], dates[1], dates[2]))
+        day, low, high = last + reached[0], last + reached[1], None if reached[2] is None else last + reached[2]
+        dates = in_words(self.first, day), in_words(self.first, low), "" if high is None else in_words(self.first, high)
+        return Crossing(limit, "expected", day, low, high, dates)
 
     def _alike(self, parameter: int) -> tuple[str, ...]:
         """Return the names of parameters of whose changes the data cannot tell this one's."""

@@ -18,9 +18,11 @@ if TYPE_CHECKING:
     from thermal_robot.report.plots_map import plot_map
     from thermal_robot.report.plots_overview import overview
     from thermal_robot.report.plots_remainder import plot_remainder
+    from thermal_robot.report.plots_wear import plot_wear
     from thermal_robot.report.plots_where import plot_where
     from thermal_robot.report.plots_which import plot_which
     from thermal_robot.report.sentence import headline
+    from thermal_robot.report.wear_page import wear_html
 
 _HOME = {
     "advice": "next_step",
@@ -31,11 +33,13 @@ _HOME = {
     "plot_how_far": "plots_how_far",
     "plot_map": "plots_map",
     "plot_remainder": "plots_remainder",
+    "plot_wear": "plots_wear",
     "plot_where": "plots_where",
     "plot_which": "plots_which",
     "schema": "json_schema",
     "headline": "sentence",
     "text": "plain_text",
+    "wear_html": "wear_page",
 }
 
 
@@ -59,8 +63,10 @@ __all__ = [
     "plot_how_far",
     "plot_map",
     "plot_remainder",
+    "plot_wear",
     "plot_where",
     "plot_which",
     "schema",
     "text",
+    "wear_html",
 ]
