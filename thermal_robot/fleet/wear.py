@@ -140,7 +140,7 @@ def of_fits(
         Visit(fit.campaign.name, date, float(time), int((~fit.explanation.outliers).sum()))
         for fit, date, time in zip(fits, dates, times, strict=True)
     )
-    factor = float(np.sqrt(scatter(series, found.grid, found.best)[0]))
+    factor = float(np.sqrt(scatter(series, found.grid, found.best)))
     robot, notes = fits[0].campaign.robot.name, _notes(whole, visits, factor)
     return Wear(robot, visits, bool(moments), told.parameters(), false_alarm, factor, nothing, notes)
 

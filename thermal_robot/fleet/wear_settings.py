@@ -55,3 +55,7 @@ CROSSING = 1.959963984540054
 
 SCATTER_TOLD = 1.3
 """Factor of scatter from which on a reader is told: by chance it is above in one series of thousands."""
+
+HIDDEN = 1e-6
+"""Share of a move's information that is left beside others, below which nothing can be told of it: its square is then
+three digits above the rounding of the sums."""
