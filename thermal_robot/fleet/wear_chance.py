@@ -2,8 +2,8 @@
 
 The statistic of a single move, a jump on some day or a trend of one parameter, beside what is known to move, is its
 squared significance z² = g²/V over the scatter of the campaigns that it leaves, (Q − z²)/(ν − 1), where that is above
-1. Nothing of a prior is in it. Without a change it follows F(1, ν − 1) or less. The C moves that are looked at share the
-chance unevenly, with weights that add up to 1: alike among parameters, and within one in inverse proportion to the
+1. Nothing of a prior is in it. Without a change it follows F(1, ν − 1) or less. The C moves that are looked at share
+the chance unevenly, with weights that add up to 1: alike among parameters, and within one in inverse proportion to the
 information V, so that an amount is seen on the first day as on one in the middle, where both sides are known well. The
 chance that any comes so far is at most tail/weight (Bonferroni), whatever their correlations, and for small chances not
 much less.
