@@ -78,8 +78,8 @@ def require_alike(fits: Sequence[Fit]) -> None:
         campaign, robot = fit.campaign, first.robot
         for what, found, expected in (
             ("joints", campaign.robot.joint_names, robot.joint_names),
-            ("tool_frame", campaign.robot.tool_frame, robot.tool_frame),
-            ("root_frame", campaign.robot.root_frame, robot.root_frame),
+            ("tool frame", campaign.robot.tool_frame, robot.tool_frame),
+            ("root frame", campaign.robot.root_frame, robot.root_frame),
         ):
             if found != expected:
                 raise CampaignError(
