@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     from thermal_robot.effects import Effect
     from thermal_robot.errors import CampaignError, EffectError, EstimationError, RobotError, ThermalRobotError
     from thermal_robot.fleet.many import diagnose_many
+    from thermal_robot.fleet.wear import wear
     from thermal_robot.observations import Observations, observe
     from thermal_robot.robot import Robot, load_robot
     from thermal_robot.simulation.simulate import simulate
@@ -30,6 +31,7 @@ told_by(report)
 __version__ = "0.2.0"
 
 _HOME = {
+    "wear": "fleet.wear",
     "Campaign": "campaign",
     "CampaignError": "errors",
     "CorrectedModel": "correction",
@@ -91,5 +93,6 @@ __all__ = [
     "read_campaign",
     "read_samples",
     "simulate",
+    "wear",
     "write_campaign",
 ]

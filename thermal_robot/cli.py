@@ -22,6 +22,7 @@ from thermal_robot.commands import (
     plan,
     predict,
     view,
+    wear,
 )
 from thermal_robot.commands import (
     map as workspace,
@@ -40,6 +41,7 @@ COMMANDS = {
     "view": view,
     "predict": predict,
     "correct": correct,
+    "wear": wear,
     "iso9283": iso9283,
     "fleet": fleet,
     "import": import_files,

@@ -19,10 +19,12 @@ if TYPE_CHECKING:
     from thermal_robot.report.plots_map import plot_map
     from thermal_robot.report.plots_overview import overview
     from thermal_robot.report.plots_remainder import plot_remainder
+    from thermal_robot.report.plots_wear import plot_wear
     from thermal_robot.report.plots_where import plot_where
     from thermal_robot.report.plots_which import plot_which
     from thermal_robot.report.sentence import headline
     from thermal_robot.report.text_fleet import fleet_text
+    from thermal_robot.report.wear_page import wear_html
 
 _HOME = {
     "advice": "next_step",
@@ -35,11 +37,13 @@ _HOME = {
     "plot_how_far": "plots_how_far",
     "plot_map": "plots_map",
     "plot_remainder": "plots_remainder",
+    "plot_wear": "plots_wear",
     "plot_where": "plots_where",
     "plot_which": "plots_which",
     "schema": "json_schema",
     "headline": "sentence",
     "text": "plain_text",
+    "wear_html": "wear_page",
 }
 
 
@@ -65,8 +69,10 @@ __all__ = [
     "plot_how_far",
     "plot_map",
     "plot_remainder",
+    "plot_wear",
     "plot_where",
     "plot_which",
     "schema",
     "text",
+    "wear_html",
 ]

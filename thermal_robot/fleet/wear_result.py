@@ -1,0 +1,310 @@
+"""What is said of a robot over time: frozen values, as text and as JSON of the schema ``thermal-robot/wear/1``."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+from thermal_robot.files import write_text
+
+SCHEMA = "thermal-robot/wear/1"
+
+
+@dataclass(frozen=True)
+class Visit:
+    """One campaign of a series.
+
+    Attributes
+    ----------
+    name
+        Of the campaign.
+    date
+        ISO 8601; empty where none was given.
+    time
+        Days since the first campaign; its number, from 0, where no dates were given.
+    rows
+        That were used.
+    """
+
+    name: str
+    date: str
+    time: float
+    rows: int
+
+
+@dataclass(frozen=True)
+class Jump:
+    """A change at once, between two campaigns.
+
+    Attributes
+    ----------
+    after
+        Number of the last campaign before it, from 0.
+    probability
+        That it was then, and not between two others, if the parameter jumped at all.
+    probabilities
+        (K − 1,) the same after each campaign.
+    earliest, latest
+        Numbers of the campaigns between which it happened with 95 %: the last before it and the first after it.
+    size, std
+        By how much, and its standard deviation; unit of the parameter.
+    """
+
+    after: int
+    probability: float
+    probabilities: tuple[float, ...]
+    earliest: int
+    latest: int
+    size: float
+    std: float
+
+
+@dataclass(frozen=True)
+class Rate:
+    """How fast a parameter moves, its unit per day."""
+
+    value: float
+    std: float
+
+
+@dataclass(frozen=True)
+class Crossing:
+    """When a parameter's absolute value reaches a limit.
+
+    Attributes
+    ----------
+    limit
+        In the unit of the parameter.
+    state
+        ``passed`` (it is beyond in the last campaign), ``expected`` (a trend leads there), ``never`` (it does not move,
+        or has jumped and stays), ``unknown`` (it wanders, or there are no dates for a rate).
+    day
+        Expected, in days since the first campaign; ``None`` unless ``expected``.
+    low, high
+        95 % interval of it; ``high`` is ``None`` where the trend may be none.
+    dates
+        The three as dates; empty where there is none.
+    """
+
+    limit: float
+    state: str
+    day: float | None = None
+    low: float | None = None
+    high: float | None = None
+    dates: tuple[str, str, str] = ("", "", "")
+
+
+@dataclass(frozen=True)
+class Worn:
+    """One parameter over time; SI.
+
+    Attributes
+    ----------
+    effect, title
+        Its effect's name, and in plain words.
+    parameter, place, unit
+        Its own name, its joint or link, and its unit.
+    comparable
+        Whether campaigns can be compared in it; ``reason`` says why not.
+    alarm
+        Whether it rings: its chance is at most the false-alarm rate.
+    chance
+        Bound on the probability that a series without any change shows one as clear, in whatever parameter, on whatever
+        day.
+    moved
+        Posterior probability that it moves, in whatever way.
+    kind
+        ``constant``, ``jump``, ``trend`` or ``walk``: the most probable, of those in which it moves where it rings.
+    kinds
+        Probability of each.
+    jump, rate
+        Where it is one; a rate needs dates.
+    change, change_std
+        From the first campaign to the last, as its kind has it; 0 where it is constant.
+    values, stds
+        (K,) as each campaign has it, all others as they are over time, and their standard deviations; ``None`` in a
+        campaign that says nothing of it.
+    fitted
+        (K,) as its kind has it.
+    crossing
+        Of a limit that was given for its effect; ``None`` without one.
+    confounded_with
+        Parameters of whose changes the data cannot tell this one's.
+    """
+
+    effect: str
+    title: str
+    parameter: str
+    place: str
+    unit: str
+    comparable: bool
+    reason: str
+    alarm: bool
+    chance: float
+    moved: float
+    kind: str
+    kinds: dict[str, float]
+    jump: Jump | None
+    rate: Rate | None
+    change: float
+    change_std: float
+    values: tuple[float | None, ...]
+    stds: tuple[float | None, ...]
+    fitted: tuple[float, ...]
+    crossing: Crossing | None
+    confounded_with: tuple[str, ...]
+
+
+@dataclass(frozen=True, repr=False)
+class Wear:
+    """One robot over time.
+
+    Attributes
+    ----------
+    robot
+        Its name.
+    campaigns
+        In the order of time.
+    dated
+        Whether dates were given.
+    parameters
+        Those that ring first, then by how probably they moved.
+    false_alarm
+        Stated: at most so many series without any change ring at all.
+    scatter
+        How much more the campaigns scatter about each other than their deviations say; 1 where they do not.
+    nothing
+        Probability that nothing moved.
+    notes
+        What a reader must know beside, one sentence each.
+    """
+
+    robot: str
+    campaigns: tuple[Visit, ...]
+    dated: bool
+    parameters: tuple[Worn, ...]
+    false_alarm: float
+    scatter: float
+    nothing: float
+    notes: tuple[str, ...]
+
+    @property
+    def alarms(self) -> tuple[Worn, ...]:
+        """The parameters that ring."""
+        return tuple(worn for worn in self.parameters if worn.alarm)
+
+    @property
+    def summary(self) -> str:
+        """One sentence."""
+        return _summary(self)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object of the format ``thermal-robot/wear/1``: the attributes, and the schema's name."""
+        plain: dict[str, Any] = json.loads(json.dumps({"schema": SCHEMA, "summary": self.summary, **asdict(self)}))
+        return plain
+
+    def to_json(self, path: str | Path) -> None:
+        """Write :meth:`to_dict` to a file, which appears whole or not at all."""
+        write_text(path, json.dumps(self.to_dict(), indent=2, ensure_ascii=False, allow_nan=False) + "\n")
+
+    def __repr__(self) -> str:
+        moving = ", ".join(f"{w.parameter} ({w.kind})" for w in self.alarms)
+        return f"Wear({self.robot!r}, {len(self.campaigns)} campaigns: {moving or 'no alarm'})"
+
+    def __str__(self) -> str:
+        return "\n".join(_lines(self))
+
+
+_LIKELY = 0.5
+"""Probability from which on a parameter that does not ring is named beside those that do."""
+
+
+def _summary(wear: Wear) -> str:
+    """Return one sentence: what moved, how and when."""
+    span = f"{len(wear.campaigns)} campaigns of {wear.robot}"
+    if not wear.alarms:
+        return f"Over {span} nothing moves that would not by chance in {_share(wear.false_alarm)} of such series."
+    told = "; ".join(_moves(wear, worn) for worn in wear.alarms)
+    return f"Over {span}: {told}."
+
+
+def _lines(wear: Wear) -> Iterator[str]:
+    yield _summary(wear)
+    yield ""
+    first, last = wear.campaigns[0], wear.campaigns[-1]
+    days = f", {first.date} to {last.date}, {last.time:.0f} days" if wear.dated else ", in order; no dates, so no rates"
+    yield f"campaigns    {len(wear.campaigns)}{days}"
+    yield f"alarms       at most {_share(wear.false_alarm)} of series without a change ring"
+    yield f"scatter      {wear.scatter:.2f} of what the deviations say; nothing moved: {wear.nothing:.1%}"
+    for worn in wear.parameters:
+        if worn.alarm:
+            yield ""
+            yield from _of_one(wear, worn)
+    likely = [w for w in wear.parameters if not w.alarm and w.comparable and w.moved > _LIKELY]
+    if likely:
+        yield ""
+        yield from (f"perhaps      {_moves(wear, w)}: {w.moved:.0%}, but no alarm" for w in likely)
+    yield ""
+    yield from _others(wear, {w.parameter for w in likely})
+    yield from (f"note         {note}" for note in wear.notes)
+
+
+def _of_one(wear: Wear, worn: Worn) -> Iterator[str]:
+    yield f"ALARM        {_moves(wear, worn)}"
+    kinds = ", ".join(f"{kind} {p:.0%}" for kind, p in worn.kinds.items() if p >= 0.005)
+    yield f"             chance of such an alarm without a change: at most {worn.chance:.1g}; {kinds}"
+    if worn.jump:
+        a, b = wear.campaigns[worn.jump.earliest], wear.campaigns[worn.jump.latest]
+        yield f"             95 %: between {_when(wear, a.name, a.date)} and {_when(wear, b.name, b.date)}"
+    if worn.confounded_with:
+        yield f"             cannot be told from a change of {', '.join(worn.confounded_with)}"
+    if worn.crossing:
+        yield f"             {_reaches(worn.crossing, worn.unit)}"
+
+
+def _others(wear: Wear, named: set[str]) -> Iterator[str]:
+    stays = [w for w in wear.parameters if w.comparable and not w.alarm and w.parameter not in named]
+    if stays:
+        yield f"stays        {'; '.join(f'{w.parameter} (moved: {w.moved:.1%})' for w in stays)}"
+    yield from (f"limit        {w.parameter}: {_reaches(w.crossing, w.unit)}" for w in stays if w.crossing is not None)
+    hidden = [w for w in wear.parameters if not w.comparable]
+    for reason in dict.fromkeys(w.reason for w in hidden):
+        names = ", ".join(w.parameter for w in hidden if w.reason == reason)
+        yield f"not compared {names}: {reason}"
+
+
+def _moves(wear: Wear, worn: Worn) -> str:
+    """Say how one parameter moves."""
+    name = f"{worn.title}, {worn.parameter}"
+    if worn.jump is not None:
+        a, b = wear.campaigns[worn.jump.after], wear.campaigns[worn.jump.after + 1]
+        where = f"between {_when(wear, a.name, a.date)} and {_when(wear, b.name, b.date)}"
+        size = f"{worn.jump.size:+.3g} ± {worn.jump.std:.2g} {worn.unit}"
+        return f"{name} jumped by {size} {where} ({worn.jump.probability:.0%})"
+    if worn.rate is not None:
+        return f"{name} moves by {worn.rate.value:+.3g} ± {worn.rate.std:.2g} {worn.unit} a day"
+    how = "moves steadily" if worn.kind == "trend" else "wanders"
+    return f"{name} {how}, by {worn.change:+.3g} ± {worn.change_std:.2g} {worn.unit} from first to last"
+
+
+def _when(wear: Wear, name: str, date: str) -> str:
+    return f"{name} ({date})" if wear.dated else name
+
+
+def _reaches(crossing: Crossing, unit: str) -> str:
+    limit = f"limit {crossing.limit:.3g} {unit}"
+    if crossing.state == "passed":
+        return f"{limit}: passed"
+    if crossing.state == "never":
+        return f"{limit}: never, as it does not go there"
+    if crossing.state == "unknown":
+        return f"{limit}: not foreseen, for lack of a rate"
+    expected, low, high = crossing.dates
+    return f"{limit}: about {expected} (95 %: {low} to {high or 'never'})"
+
+
+def _share(probability: float) -> str:
+    return f"{100.0 * probability:.2g} %"
