@@ -36,6 +36,7 @@ ORDER = (
     "simulation",
     "diagnosis",
     "planning",
+    "fleet",
     "datasets",
     "report",
     "console",

@@ -1,0 +1,1 @@
+"""More than one campaign: many robots at once."""
