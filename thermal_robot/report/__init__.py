@@ -9,9 +9,11 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from thermal_robot.report.json_schema import schema
+    from thermal_robot.report.comparison_text import comparison_headline, comparison_text
+    from thermal_robot.report.json_schema import comparison_schema, schema
     from thermal_robot.report.next_step import advice
     from thermal_robot.report.page import fragment, html
+    from thermal_robot.report.page_comparison import comparison_fragment, comparison_html
     from thermal_robot.report.plain_text import text
     from thermal_robot.report.plots_explain import explain_figure
     from thermal_robot.report.plots_how_far import plot_how_far
@@ -24,6 +26,11 @@ if TYPE_CHECKING:
 
 _HOME = {
     "advice": "next_step",
+    "comparison_fragment": "page_comparison",
+    "comparison_headline": "comparison_text",
+    "comparison_html": "page_comparison",
+    "comparison_schema": "json_schema",
+    "comparison_text": "comparison_text",
     "explain_figure": "plots_explain",
     "fragment": "page",
     "html": "page",
@@ -51,6 +58,11 @@ def __dir__() -> list[str]:
 
 __all__ = [
     "advice",
+    "comparison_fragment",
+    "comparison_headline",
+    "comparison_html",
+    "comparison_schema",
+    "comparison_text",
     "explain_figure",
     "fragment",
     "headline",
