@@ -9,8 +9,8 @@ own. What the search holds for a change must also stand by its chi-square, corre
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import combinations, pairwise
 
 import numpy as np
@@ -27,6 +27,7 @@ from thermal_robot.inference.gram import Gram
 from thermal_robot.inference.search import Search
 
 Array = NDArray[np.float64]
+Places = Mapping[tuple[str, str], Sequence[int]]
 
 
 @dataclass(frozen=True)
@@ -124,27 +125,38 @@ def joint(listed: Sequence[Candidate], owners: Sequence[tuple[int, int]], said: 
 
 def _parts(listed: Sequence[Candidate], owners: Sequence[tuple[int, int]], campaigns: int) -> Iterator[Part]:
     """Yield each effect as shared, in all places and in each, and each place and parameter as one that differs."""
-    subsets = some_of(campaigns)
     for number, item in enumerate(listed):
         own = [k for k, (effect, _) in enumerate(owners) if effect == number]
         told = [item.told[owners[k][1]] for k in own]
         places = {(p.kind, p.place): [k for k, q in zip(own, told, strict=True) if q.place == p.place] for p in told}
-        if not own:
-            continue
-        choices = [(("", ""), tuple(own))]
-        choices += [(place, tuple(inside)) for place, inside in places.items() if len(places) > 1]
-        everywhere = tuple(range(campaigns))
-        for place, inside in choices:
-            share = share_of_places(1 if place[1] else 0, len(places) if len(places) > 1 else 0)
-            yield Part(number, place, inside, everywhere, True, log_odds() + float(np.log(share)))
-        fine = [(place, (k,)) for place, inside in choices for k in inside if len(inside) > 1 and (place[1] or len(places) == 1)]
-        odds = np.log(compare_settings.CHANGED / (1.0 - compare_settings.CHANGED))
-        for place, inside in (*choices, *fine):
-            # in all places, in one, or one parameter there
-            share = 1.0 / (3.0 if len(places) > 1 else 2.0) / (len(places) if place[1] else 1)
-            share /= len(next(i for p, i in choices if p == place)) if (place, inside) in fine else 1
-            for where in subsets:
-                yield Part(number, place, inside, where, False, float(odds + np.log(share / len(subsets))))
+        if own:
+            yield from _shared(number, own, places, campaigns)
+            yield from _differing(number, own, places, campaigns)
+
+
+def _shared(number: int, own: Sequence[int], places: Places, campaigns: int) -> Iterator[Part]:
+    """Yield an effect with one value in all campaigns, in all its places and in each."""
+    everywhere, among = tuple(range(campaigns)), len(places) if len(places) > 1 else 0
+    yield Part(number, ("", ""), tuple(own), everywhere, True, log_odds() + float(np.log(share_of_places(0, among))))
+    for place, inside in places.items() if among else ():
+        alone = log_odds() + float(np.log(share_of_places(1, among)))
+        yield Part(number, place, tuple(inside), everywhere, True, alone)
+
+
+def _differing(number: int, own: Sequence[int], places: Places, campaigns: int) -> Iterator[Part]:
+    """Yield an effect that differs in some campaigns: in all its places, in one, or by one parameter there."""
+    odds, subsets = compare_settings.CHANGED / (1.0 - compare_settings.CHANGED), some_of(campaigns)
+    choices: list[tuple[tuple[str, str], tuple[int, ...], float]] = []
+    if len(places) > 1:
+        choices.append((("", ""), tuple(own), compare_settings.EVERYWHERE))
+    of_places = (1.0 - compare_settings.EVERYWHERE) / len(places)
+    for place, inside in places.items():
+        several = len(inside) > 1
+        choices.append((place, tuple(inside), of_places / (2.0 if several else 1.0)))
+        choices += [(place, (k,), of_places / (2.0 * len(inside))) for k in inside if several]
+    for place, inside, share in choices:
+        for where in subsets:
+            yield Part(number, place, inside, where, False, float(np.log(odds * share / len(subsets))))
 
 
 def some_of(campaigns: int) -> tuple[tuple[int, ...], ...]:
@@ -165,10 +177,8 @@ def _apart(parts: Sequence[Part]) -> frozenset[frozenset[int]]:
     for (i, a), (j, b) in combinations(enumerate(parts), 2):
         if a.effect != b.effect or a.shared != b.shared:
             continue
-        overlap = bool(set(a.parameters) & set(b.parameters))
-        if (a.shared and not (a.place[1] and b.place[1] and a.place != b.place)) or (
-            not a.shared and overlap and (a.where == b.where or set(a.where).isdisjoint(b.where) is False)
-        ):
+        apart = set(a.parameters).isdisjoint(b.parameters)
+        if not apart and (a.shared or not set(a.where).isdisjoint(b.where)):
             pairs.add(frozenset((i, j)))
     return frozenset(pairs)
 
@@ -178,7 +188,7 @@ def _problem(
 ) -> Gram:
     """Return the normal equations of all parts together."""
     positive_of = np.array([listed[e].told[p].positive for e, p in owners])
-    spread_of = np.array([listed[p.effect].effect.size_spread for p in parts])
+    spread_of = np.array([_spread(listed[p.effect], p) for p in parts])
     bases, positive, ranks = [], [], []
     for part in parts:
         own = list(part.parameters)
@@ -210,6 +220,11 @@ def _problem(
         float(sum(np.linalg.matrix_rank(one.matrix, hermitian=True) for one in said)),
         compare_settings.HELD,
     )
+
+
+def _spread(item: Candidate, part: Part) -> float:
+    """Return how well the size of a part is known beforehand: deviation of its logarithm."""
+    return item.effect.size_spread if part.shared else compare_settings.CHANGE_SPREAD
 
 
 def _standing(
@@ -261,7 +276,3 @@ def _values(
         start += basis.shape[1]
     return (across @ best.values).reshape(campaigns, parameters), across @ best.covariance @ across.T
 
-
-def without(found: Joint, effect: int) -> Joint:
-    """Return the joint fit with the changes of one effect left out of the list, as where its name is lost."""
-    return replace(found, changes=tuple(c for c in found.changes if c.part.effect != effect))

@@ -9,7 +9,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from thermal_robot.report.comparison_text import comparison_headline, comparison_text
+    from thermal_robot.report.text_comparison import comparison_headline, comparison_text
     from thermal_robot.report.json_schema import comparison_schema, schema
     from thermal_robot.report.next_step import advice
     from thermal_robot.report.page import fragment, html
@@ -27,10 +27,10 @@ if TYPE_CHECKING:
 _HOME = {
     "advice": "next_step",
     "comparison_fragment": "page_comparison",
-    "comparison_headline": "comparison_text",
+    "comparison_headline": "text_comparison",
     "comparison_html": "page_comparison",
     "comparison_schema": "json_schema",
-    "comparison_text": "comparison_text",
+    "comparison_text": "text_comparison",
     "explain_figure": "plots_explain",
     "fragment": "page",
     "html": "page",
