@@ -18,7 +18,15 @@ TIMES = 4.0
 """Deviations of the difference, as the comparison of two campaigns without a change states it, by which one changes."""
 SIZES = {"joint_offset": 1e-3, "joint_gain": 5e-4, "joint_compliance": 2e-6}
 """Effects at work in every joint of the robots that are compared, and their scale."""
-CAUSES = ("joint_gain", "transmission_error", "joint_compliance", "backlash", "link_compliance", "drift", "base_compliance")
+CAUSES = (
+    "joint_gain",
+    "transmission_error",
+    "joint_compliance",
+    "backlash",
+    "link_compliance",
+    "drift",
+    "base_compliance",
+)
 """Effects that are at work and withheld, in turn: what nobody wrote down."""
 UNLIKE = (0.4, 1.0, 2.5)
 """Sizes of an unlisted cause in three campaigns, in an order that is drawn."""
@@ -77,7 +85,9 @@ def triple(seed):
     false = [
         (effect.name, len(effect.named), effect.name in compared.lost, effect.reason)
         for effect in compared.effects
-        if effect.named and effect.name not in ("joint_offset", "geometric") and not effect.name.startswith("discovered.")
+        if effect.named
+        and effect.name not in ("joint_offset", "geometric")
+        and not effect.name.startswith("discovered.")
     ]
     return cause, false, [diagnosis.verdict for diagnosis in found], compared
 
@@ -137,7 +147,9 @@ def triples(first, count):
         for _, named, gone, _ in false:
             among[named], lost[named] = among[named] + 1, lost[named] + gone
         kept = compared.effect("joint_offset").status
-        print(f"  seed {seed}: {cause} {false} {verdicts} offsets {kept} {time.perf_counter() - begin:.0f} s", flush=True)
+        print(
+            f"  seed {seed}: {cause} {false} {verdicts} offsets {kept} {time.perf_counter() - begin:.0f} s", flush=True
+        )
     for named in among:
         rate(f"false name in {named} of three campaigns, lost", lost[named], among[named])
 

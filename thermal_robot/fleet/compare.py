@@ -83,7 +83,9 @@ def compare(
     for campaign in campaigns:
         require(CALL, campaign, (Campaign, Diagnosis, str, os.PathLike), expected)
     if len(campaigns) < 2:
-        raise CampaignError(CALL, "nothing to compare with", found=f"{len(campaigns)}", expected="two campaigns or more")
+        raise CampaignError(
+            CALL, "nothing to compare with", found=f"{len(campaigns)}", expected="two campaigns or more"
+        )
     found = []
     for number, campaign in enumerate(campaigns):
         if isinstance(campaign, Diagnosis):
@@ -107,7 +109,9 @@ def _called(found: Sequence[Diagnosis], names: Sequence[str]) -> tuple[str, ...]
     """Return a name for each campaign, none twice."""
     require(f"{CALL}, names", names, (list, tuple), "a name for each campaign")
     if names and len(names) != len(found):
-        raise CampaignError(f"{CALL}, names", "one is needed for each campaign", found=f"{len(names)}", expected=f"{len(found)}")
+        raise CampaignError(
+            f"{CALL}, names", "one is needed for each campaign", found=f"{len(names)}", expected=f"{len(found)}"
+        )
     own = [str(name) for name in names] or [diagnosis.campaign for diagnosis in found]
     if len(set(own)) == len(own):
         return tuple(own)
@@ -118,7 +122,9 @@ def _usable(found: Sequence[Diagnosis], names: Sequence[str]) -> list[Fit]:
     fits = []
     for diagnosis, name in zip(found, names, strict=True):
         if not diagnosis.usable:
-            raise CampaignError(name, "cannot be compared", found=diagnosis.reason, expected="a campaign that is usable")
+            raise CampaignError(
+                name, "cannot be compared", found=diagnosis.reason, expected="a campaign that is usable"
+            )
         if diagnosis.fit is None:
             raise CampaignError(name, "this diagnosis was made without its fit", expected="one made by diagnose()")
         fits.append(diagnosis.fit)
@@ -186,9 +192,7 @@ def _effects(
     return result
 
 
-def _changes(
-    listed: Sequence[Candidate], owners: Owners, together: Joint, names: Sequence[str]
-) -> tuple[Change, ...]:
+def _changes(listed: Sequence[Candidate], owners: Owners, together: Joint, names: Sequence[str]) -> tuple[Change, ...]:
     """Return what differs: parts of one effect at one place are one change."""
     result = []
     by_place = sorted(together.changes, key=lambda c: (c.part.effect, c.part.place))
@@ -231,5 +235,3 @@ def _since(groups: Sequence[Sequence[int]], names: Sequence[str]) -> str:
     if len(groups) != 2 or max(groups[0]) > min(groups[1]):
         return ""
     return names[min(groups[1])]
-
-

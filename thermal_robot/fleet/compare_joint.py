@@ -275,4 +275,3 @@ def _values(
             across[rows, start : start + basis.shape[1]] += basis
         start += basis.shape[1]
     return (across @ best.values).reshape(campaigns, parameters), across @ best.covariance @ across.T
-

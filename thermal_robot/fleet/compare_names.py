@@ -50,7 +50,10 @@ def judged(
     if len(tell) < 2:
         if not any(item.named):
             return "absent", ""
-        return "not_compared", f"{names[tell[0]]} alone can tell it" if tell else "no campaign tells it beside the frames"
+        return (
+            "not_compared",
+            f"{names[tell[0]]} alone can tell it" if tell else "no campaign tells it beside the frames",
+        )
     if not any(part.effect == number for part in found.parts):
         if not any(item.named):
             return "absent", ""

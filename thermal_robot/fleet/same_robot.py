@@ -27,7 +27,9 @@ def require_same_robot(robots: Sequence[Robot], names: Sequence[str]) -> None:
         Their joints differ, or the same joints put the tool frame elsewhere.
     """
     first = robots[0]
-    low, high = (np.where(np.isfinite(end), end, sign) for end, sign in zip(joint_range(first), (-1.0, 1.0), strict=True))
+    low, high = (
+        np.where(np.isfinite(end), end, sign) for end, sign in zip(joint_range(first), (-1.0, 1.0), strict=True)
+    )
     q = np.random.default_rng(0).uniform(low, high, (compare_settings.TRIED, first.n))
     for robot, name in zip(robots[1:], names[1:], strict=True):
         if robot.joint_names != first.joint_names:

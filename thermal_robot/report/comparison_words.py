@@ -78,7 +78,9 @@ def chance(p_value: float | None) -> str:
     """Write the probability that chance alone does as much."""
     if p_value is None:
         return units.MISSING
-    return "below 0.001 %" if p_value < 1e-5 else f"{100.0 * p_value:.2g} %"
+    if p_value < 1e-5:
+        return "below 0.001 %"
+    return f"{100.0 * p_value:.0f} %" if p_value > 0.1 else f"{100.0 * p_value:.2g} %"
 
 
 def effects(comparison: Plain) -> Iterator[tuple[str, str, str, str]]:
