@@ -93,6 +93,7 @@ def test_what_cannot_be_compared_is_refused():
         tr.compare(diagnosed(1), diagnosed(2), names=["one"])
     with pytest.raises(tr.CampaignError, match="campaigns, paths of them, or diagnoses"):
         tr.compare(diagnosed(1), 3)
+    arm = tr.load_robot("example-robot-data:ur5", "tool0")
+    other = tr.diagnose(tr.simulate(arm, rows=40, noise=NOISE), only="joint_offset")
     with pytest.raises(tr.CampaignError, match="joints differ"):
-        arm = tr.load_robot("example-robot-data:ur5", "tool0")
-        tr.compare(diagnosed(1), tr.diagnose(tr.simulate(arm, rows=40, noise=NOISE), only="joint_offset"))
+        tr.compare(diagnosed(1), other)

@@ -47,7 +47,7 @@ def test_what_did_not_change_is_shared_and_more_precise_than_in_any_campaign():
 
 def test_one_place_that_changed_is_found_with_when():
     rng, truth = np.random.default_rng(2), np.array([1.0, -0.5, 0.3, 0.8])
-    later = truth + [0.0, 0.0, 0.25, 0.0]
+    later = truth + np.array([0.0, 0.0, 0.25, 0.0])
     found = fitted([truth, truth, later, later], rng)
     (change,) = found.changes
     assert change.part.place == ("joint", "three")
@@ -58,7 +58,7 @@ def test_one_place_that_changed_is_found_with_when():
 
 def test_two_places_may_change_at_two_times():
     rng, truth = np.random.default_rng(3), np.array([1.0, -0.5, 0.3, 0.8])
-    days = [truth, truth + [0.4, 0.0, 0.0, 0.0], truth + [0.4, 0.0, 0.0, -0.4]]
+    days = [truth, truth + np.array([0.4, 0.0, 0.0, 0.0]), truth + np.array([0.4, 0.0, 0.0, -0.4])]
     found = fitted(days, rng)
     assert {change.part.place[1] for change in found.changes} == {"one", "four"}
     np.testing.assert_allclose(found.values, days, atol=0.12)

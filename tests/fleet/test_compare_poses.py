@@ -16,7 +16,7 @@ def one():
 
 
 def test_another_place_of_base_and_target_is_no_difference(one):
-    base, tool = FRAMES["there"]
+    base, _ = FRAMES["there"]
     shifted = np.eye(4)
     shifted[:3, 3] = [1e-3, -2e-3, 5e-4]
     frames = Frames(base @ one.model.frames.base, shifted @ one.model.frames.tool)

@@ -34,5 +34,5 @@ def test_the_fragment_is_one_piece(plain):
 
 def test_the_largest_difference_is_drawn_first(plain):
     axes = plot_differences(plain).axes[0]
-    assert [label.get_text() for label in axes.get_yticklabels()][0].startswith("zero offset, joint_3")
+    assert axes.get_yticklabels()[0].get_text().startswith("zero offset, joint_3")
     assert abs(axes.patches[0].get_width()) > 5.0

@@ -16,8 +16,8 @@ from thermal_robot.diagnosis import Diagnosis, diagnose
 from thermal_robot.effects import Effect
 from thermal_robot.errors import CampaignError, require
 from thermal_robot.fleet.compare_effects import Candidate, candidates
-from thermal_robot.fleet.compare_joint import Joint, joint
 from thermal_robot.fleet.compare_joint import Change as Differs
+from thermal_robot.fleet.compare_joint import Joint, joint
 from thermal_robot.fleet.compare_names import judged
 from thermal_robot.fleet.compare_parameters import equal, parameters
 from thermal_robot.fleet.compare_poses import predicted

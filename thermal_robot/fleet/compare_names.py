@@ -91,7 +91,7 @@ def _strengths(
 
 
 def _length(vector: Array, metric: Array) -> float:
-    return float(np.sqrt(max(vector @ metric @ vector, 0.0)))
+    return float(np.sqrt(max(float(vector @ metric @ vector), 0.0)))
 
 
 def _agreed(sizes: Sequence[tuple[dict[int, float], dict[tuple[int, int], float]]]) -> float:

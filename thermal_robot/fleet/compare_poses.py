@@ -68,7 +68,7 @@ def _pair(a: Diagnosis, b: Diagnosis, names: tuple[str, str]) -> Predicted:
 def _some(q: Array) -> Array:
     """Return rows spread evenly over all."""
     count = min(len(q), compare_settings.POSES)
-    return q[np.linspace(0, len(q) - 1, count).astype(int)]
+    return np.asarray(q[np.linspace(0, len(q) - 1, count).astype(int)])
 
 
 def _common(a: CorrectedModel, b: CorrectedModel) -> dict[str, tuple[float, float]]:

@@ -9,8 +9,8 @@ CHANGED = 0.8
 """Prior probability that an effect of a robot changed somewhere between campaigns: who compares has a reason to,
 and what chance alone does is kept away by :data:`FALSE_CHANGE`."""
 EVERYWHERE = 0.05
-"""Part of the changes of an effect that are in all its places at once, as a new mastering of all joints is: a collision,
-wear or a repair are in one."""
+"""Part of the changes of an effect that are in all its places at once, as a new mastering of all joints is; a
+collision, wear or a repair are in one."""
 CHANGE_SPREAD = 2.0
 """Standard deviation of the logarithm of the size of a change, about that of the effect: a part of it, seldom more, and
 nobody knows which; 95 % within a factor of fifty."""

@@ -274,25 +274,20 @@ class Comparison:
         return {**plain, "summary": _teller().comparison_headline(plain)}
 
     def _plain(self) -> dict[str, Any]:
-        return dict(
-            jsonable(
-                {
-                    "schema": SCHEMA,
-                    "robot": self.robot,
-                    "tool_frame": self.tool_frame,
-                    "campaigns": [
-                        {"name": name, "samples": count, "diagnosis": diagnosis.summary}
-                        for name, count, diagnosis in zip(self.campaigns, self.samples, self.diagnoses, strict=True)
-                    ],
-                    "verdict": {"effects": self.verdict, "lost": self.lost, "changed": bool(self.changes)},
-                    "effects": [asdict(effect) for effect in self.effects],
-                    "changes": [asdict(change) for change in self.changes],
-                    "predicted": [asdict(predicted) for predicted in self.predicted],
-                    "not_told": self.not_told,
-                    "looked_at": self.looked_at,
-                }
-            )
+        told = zip(self.campaigns, self.samples, self.diagnoses, strict=True)
+        plain = dict(
+            schema=SCHEMA,
+            robot=self.robot,
+            tool_frame=self.tool_frame,
+            campaigns=[{"name": name, "samples": count, "diagnosis": d.summary} for name, count, d in told],
+            verdict={"effects": self.verdict, "lost": self.lost, "changed": bool(self.changes)},
+            effects=[asdict(effect) for effect in self.effects],
+            changes=[asdict(change) for change in self.changes],
+            predicted=[asdict(predicted) for predicted in self.predicted],
+            not_told=self.not_told,
+            looked_at=self.looked_at,
         )
+        return dict(jsonable(plain))
 
     def to_json(self, path: str | Path) -> None:
         """Write :meth:`to_dict` to a file, which appears whole or not at all."""

@@ -9,7 +9,6 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from thermal_robot.report.text_comparison import comparison_headline, comparison_text
     from thermal_robot.report.json_schema import comparison_schema, schema
     from thermal_robot.report.next_step import advice
     from thermal_robot.report.page import fragment, html
@@ -23,6 +22,7 @@ if TYPE_CHECKING:
     from thermal_robot.report.plots_where import plot_where
     from thermal_robot.report.plots_which import plot_which
     from thermal_robot.report.sentence import headline
+    from thermal_robot.report.text_comparison import comparison_headline, comparison_text
 
 _HOME = {
     "advice": "next_step",

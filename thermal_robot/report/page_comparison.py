@@ -82,9 +82,9 @@ def _sections(comparison: Mapping[str, Any]) -> Iterator[str]:
         heads = ("effect", "parameter", *names, "difference", "by chance")
         said = "Each by its own campaign, ± one standard deviation; the difference is of the two furthest apart."
         yield _section("Parameters", heads, rows_of_parameters, 2, said, drawn)
-    heads = ("campaigns", "differ, rms", "stated", "beyond twice", "verdict")
+    columns = ("campaigns", "differ, rms", "stated", "beyond twice", "verdict")
     said = "Where both campaigns measured, unknown frames aligned. Beyond twice the stated deviation a model is wrong."
-    yield _section("Predictions", heads, list(predictions(comparison)), 1, said)
+    yield _section("Predictions", columns, list(predictions(comparison)), 1, said)
     if comparison["not_told"]:
         yield f"<section><h2>Not compared</h2>{paragraph('Frames or other parameters take this up:')}"
         yield f"{bullets(comparison['not_told'])}</section>"
