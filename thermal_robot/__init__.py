@@ -21,6 +21,8 @@ if TYPE_CHECKING:
     from thermal_robot.diagnosis.diagnose import diagnose
     from thermal_robot.effects import Effect
     from thermal_robot.errors import CampaignError, EffectError, EstimationError, RobotError, ThermalRobotError
+    from thermal_robot.fleet.compare import compare
+    from thermal_robot.fleet.comparison import Comparison
     from thermal_robot.fleet.many import diagnose_many
     from thermal_robot.fleet.wear import wear
     from thermal_robot.observations import Observations, observe
@@ -31,6 +33,8 @@ told_by(report)
 __version__ = "0.2.0"
 
 _HOME = {
+    "Comparison": "fleet.comparison",
+    "compare": "fleet.compare",
     "wear": "fleet.wear",
     "Campaign": "campaign",
     "CampaignError": "errors",
@@ -74,6 +78,7 @@ def __dir__() -> list[str]:
 __all__ = [
     "Campaign",
     "CampaignError",
+    "Comparison",
     "CorrectedModel",
     "Diagnosis",
     "Effect",
@@ -84,6 +89,7 @@ __all__ = [
     "RobotError",
     "ThermalRobotError",
     "campaign_from_table",
+    "compare",
     "demo_campaign",
     "describe",
     "diagnose",

@@ -11,6 +11,7 @@ from contextlib import suppress
 from thermal_robot.blind import command as blind
 from thermal_robot.commands import (
     check,
+    compare,
     correct,
     demo,
     diagnose,
@@ -38,6 +39,7 @@ COMMANDS = {
     "check": check,
     "effects": effects,
     "diagnose": diagnose,
+    "compare": compare,
     "view": view,
     "predict": predict,
     "correct": correct,

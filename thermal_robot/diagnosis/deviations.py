@@ -34,7 +34,7 @@ from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import orthonormal, without
 from thermal_robot.inference.discrepancy import Spectrum
 from thermal_robot.inference.fit import Fit
-from thermal_robot.inference.problem import whitened
+from thermal_robot.inference.problem import Linear, whitened
 from thermal_robot.inference.rows import blocks, each, neighbourhoods
 
 Array = NDArray[np.float64]
@@ -53,8 +53,7 @@ def as_remainder_says(fit: Fit) -> Fit:
     if not e.best.blocks:
         return fit
     model = Model.of(e, blocks(campaign))
-    groups = (model.block, neighbourhoods(campaign, settings.BLOCKS))
-    said = [*(_jackknife(model, each(labels)) for labels in groups), _beside_discrepancy(fit, model)]
+    said = _said(fit, model)
     wider = dict(e.values)
     for b, span in zip(e.best.blocks, model.spans, strict=True):
         values, covariance = e.values[b]
@@ -62,6 +61,35 @@ def as_remainder_says(fit: Fit) -> Fit:
         unit, own = np.outer(prior, prior), np.ix_(span - model.flat, span - model.flat)
         wider[b] = values, unit * _widened(covariance / unit, [s[own] / unit for s in said])
     return replace(fit, explanation=replace(e, values=wider))
+
+
+def exceeding(fit: Fit, linear: Linear, information: Array, axes: Array) -> Array:
+    """Tell how much more than of independent rows the variance of parameters is.
+
+    Parameters
+    ----------
+    fit
+        The fit of a campaign.
+    linear
+        Its gap, frames and K parameters, held to one unit each.
+    information, axes
+        (K,) and (K, K) what independent rows would say, along its principal axes.
+
+    Returns
+    -------
+    ndarray
+        (K,) by what the information is to be divided along each axis, 1 or more.
+    """
+    e, campaign = fit.explanation, fit.campaign
+    scales = (1.0,) * len(linear.blocks)
+    model = Model(linear, scales, e.whitening, e.best.noise**2, ~e.outliers, blocks(campaign))
+    return _times(1.0 / (1.0 + information), axes, _said(fit, model))
+
+
+def _said(fit: Fit, model: Model) -> list[Array]:
+    """Return the covariances (P, P) of the parameters that are not the posterior's, zero where one cannot be told."""
+    groups = (model.block, neighbourhoods(fit.campaign, settings.BLOCKS))
+    return [*(_jackknife(model, each(labels)) for labels in groups), _beside_discrepancy(fit, model)]
 
 
 def _jackknife(model: Model, groups: Sequence[Rows]) -> Array:
@@ -96,7 +124,12 @@ def _widened(covariance: Array, said: Sequence[Array]) -> Array:
     """(P, P) covariance in units of the prior deviations, along none of its axes smaller than any of those said."""
     variance, axes = np.linalg.eigh(covariance)
     variance = np.maximum(variance, settings.TINY)
-    most = np.max([np.einsum("ki,kl,li->i", axes, own, axes) for own in said], axis=0)
-    times = np.maximum(most / variance, 1.0)
+    times = _times(variance, axes, said)
     wide = np.where(variance < 1.0, 1.0 / (1.0 + (1.0 / variance - 1.0) / times), variance)
     return np.asarray((axes * wide) @ axes.T)
+
+
+def _times(variance: Array, axes: Array, said: Sequence[Array]) -> Array:
+    """(P,) how many times a variance along its axes the largest of those said is, at least once."""
+    most = np.max([np.einsum("ki,kl,li->i", axes, own, axes) for own in said], axis=0)
+    return np.asarray(np.maximum(most / variance, 1.0))

@@ -142,14 +142,17 @@ def identified(spread: Array, prior: Array) -> NDArray[np.bool_]:
     return np.asarray(np.asarray(spread) < settings.DETERMINED * np.asarray(prior))
 
 
-def distinct(across: Array, within: NDArray[np.bool_]) -> list[int]:
-    """Return the numbers of the columns that are independent of those before them, as many as there are rows."""
+def distinct(across: Array, within: NDArray[np.bool_], least: float = settings.DISTINCT) -> list[int]:
+    """Return the numbers of the columns that are independent of those before them, as many as there are rows.
+
+    ``least`` is the length that must be left of one beside those before it.
+    """
     basis = np.zeros((len(across), 0))
     kept: list[int] = []
     for k in np.flatnonzero(within):
         left = across[:, k] - basis @ (basis.T @ across[:, k])
         left = left - basis @ (basis.T @ left)  # rounding
-        if len(kept) < len(across) and np.linalg.norm(left) > settings.DISTINCT:
+        if len(kept) < len(across) and np.linalg.norm(left) > least:
             basis = np.column_stack([basis, left / np.linalg.norm(left)])
             kept.append(int(k))
     return kept

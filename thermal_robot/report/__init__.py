@@ -9,9 +9,10 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from thermal_robot.report.json_schema import schema
+    from thermal_robot.report.json_schema import comparison_schema, schema
     from thermal_robot.report.next_step import advice
     from thermal_robot.report.page import fragment, html
+    from thermal_robot.report.page_comparison import comparison_fragment, comparison_html
     from thermal_robot.report.page_fleet import fleet_html
     from thermal_robot.report.plain_text import text
     from thermal_robot.report.plots_explain import explain_figure
@@ -23,11 +24,17 @@ if TYPE_CHECKING:
     from thermal_robot.report.plots_where import plot_where
     from thermal_robot.report.plots_which import plot_which
     from thermal_robot.report.sentence import headline
+    from thermal_robot.report.text_comparison import comparison_headline, comparison_text
     from thermal_robot.report.text_fleet import fleet_text
     from thermal_robot.report.wear_page import wear_html
 
 _HOME = {
     "advice": "next_step",
+    "comparison_fragment": "page_comparison",
+    "comparison_headline": "text_comparison",
+    "comparison_html": "page_comparison",
+    "comparison_schema": "json_schema",
+    "comparison_text": "text_comparison",
     "explain_figure": "plots_explain",
     "fleet_html": "page_fleet",
     "fleet_text": "text_fleet",
@@ -59,6 +66,11 @@ def __dir__() -> list[str]:
 
 __all__ = [
     "advice",
+    "comparison_fragment",
+    "comparison_headline",
+    "comparison_html",
+    "comparison_schema",
+    "comparison_text",
     "explain_figure",
     "fleet_html",
     "fleet_text",

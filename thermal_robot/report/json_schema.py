@@ -1,4 +1,4 @@
-"""The JSON Schema of a diagnosis, which ships with the package."""
+"""The JSON Schemas of a diagnosis and of a comparison, which ship with the package."""
 
 from __future__ import annotations
 
@@ -9,5 +9,13 @@ from typing import Any
 
 def schema() -> dict[str, Any]:
     """Return the JSON Schema (draft 2020-12) of the format ``thermal-robot/diagnosis/2``."""
-    text = files(__package__).joinpath("diagnosis.schema.json").read_text(encoding="utf-8")
-    return dict(json.loads(text))
+    return _read("diagnosis.schema.json")
+
+
+def comparison_schema() -> dict[str, Any]:
+    """Return the JSON Schema (draft 2020-12) of the format ``thermal-robot/comparison/1``."""
+    return _read("comparison.schema.json")
+
+
+def _read(name: str) -> dict[str, Any]:
+    return dict(json.loads(files(__package__).joinpath(name).read_text(encoding="utf-8")))

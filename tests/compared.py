@@ -1,0 +1,35 @@
+"""Campaigns of one small arm for the tests of comparisons; each is diagnosed once a process."""
+
+from functools import cache
+
+import numpy as np
+
+import thermal_robot as tr
+from thermal_robot.kinematics import exp6
+
+ONLY = ("joint_offset", "joint_gain")
+OFFSETS = (1e-3, 8e-4, -1.2e-3, 5e-4, 3e-4)
+NOISE = 3e-5
+FRAMES = {
+    "here": (np.eye(4), np.eye(4)),
+    "there": (exp6(np.array([0.4, -0.2, 0.1, 0.3, -0.5, 1.1])), exp6(np.array([0.02, 0.01, 0.08, 0.0, 0.0, 0.0]))),
+}
+
+
+def campaign(seed, offsets=OFFSETS, gains=0.0, frame="here", noise=NOISE, rows=50):
+    """A campaign of the small arm; base and target are unknown."""
+    base, tool = FRAMES[frame]
+    effects = {"joint_offset": np.array(offsets), "joint_gain": gains}
+    robot = tr.load_robot("builtin:rv_m2", "tool0")
+    return tr.simulate(robot, effects, rows=rows, noise=noise, base=base, tool=tool, seed=seed)
+
+
+@cache
+def diagnosed(seed, offsets=OFFSETS, gains=0.0, frame="here", noise=NOISE, rows=50, only=ONLY):
+    """Its diagnosis."""
+    return tr.diagnose(campaign(seed, offsets, gains, frame, noise, rows), only=only)
+
+
+def moved(by, joint=2):
+    """The offsets with one changed."""
+    return tuple(value + by * (k == joint) for k, value in enumerate(OFFSETS))

@@ -1,0 +1,296 @@
+"""The result of a comparison: one frozen value, its JSON, and the port through which it is put into words and drawn."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, Protocol
+
+from thermal_robot.diagnosis.plain import jsonable
+from thermal_robot.files import write_text
+from thermal_robot.teller import registered
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+    from thermal_robot.diagnosis.result import Diagnosis
+
+SCHEMA = "thermal-robot/comparison/1"
+Status = Literal["shared", "changed", "contradicts", "not_needed", "not_compared", "absent"]
+
+
+class Teller(Protocol):
+    """Who puts a comparison into words and draws it, from what :meth:`Comparison.to_dict` returns."""
+
+    def comparison_text(self, comparison: dict[str, Any]) -> str:
+        """Return all of it as plain text."""
+
+    def comparison_headline(self, comparison: dict[str, Any]) -> str:
+        """Return what stayed and what changed in one plain sentence."""
+
+    def comparison_fragment(self, comparison: dict[str, Any]) -> str:
+        """Return all of it as HTML without a page around it."""
+
+
+def _teller() -> Teller:
+    found: Teller = registered()
+    return found
+
+
+@dataclass(frozen=True)
+class Parameter:
+    """One parameter in every campaign, each told by its own data beside all effects that are at work, SI.
+
+    Attributes
+    ----------
+    name, kind, place, unit
+        What it is, and where.
+    values, stds
+        Per campaign; ``None`` where its data do not determine it.
+    between
+        The two campaigns that differ most in deviations; empty where fewer than two tell it.
+    difference, std
+        Of the later of these less the earlier, and its standard deviation.
+    chi2, degrees, p_value
+        Of equal values in all campaigns; the probability is that of chance, not corrected for other parameters.
+    """
+
+    name: str
+    kind: str
+    place: str
+    unit: str
+    values: tuple[float | None, ...]
+    stds: tuple[float | None, ...]
+    between: tuple[str, ...] = ()
+    difference: float | None = None
+    std: float | None = None
+    chi2: float | None = None
+    degrees: int = 0
+    p_value: float | None = None
+
+
+@dataclass(frozen=True)
+class Effect:
+    """One effect in every campaign.
+
+    Attributes
+    ----------
+    name, title
+        Of the effect; a law that was found in one campaign has that campaign's name with it.
+    status
+        ``shared``: the same in all campaigns; ``changed``: at work, with places that differ; ``contradicts``: it loses
+        its name; ``not_needed``: some diagnosis names it, and the campaigns together do not need it;
+        ``not_compared``: one campaign alone can tell it; ``absent``: no diagnosis names it, and nothing speaks for it.
+    reason
+        Why it loses its name, or is not compared; empty otherwise.
+    probability
+        That it is at work in any campaign, by the joint fit.
+    named
+        The campaigns whose own diagnosis names it.
+    chi2, degrees, p_value
+        Of equal parameters in all campaigns, all others free in each.
+    parameters
+        One by one.
+    """
+
+    name: str
+    title: str
+    status: Status
+    reason: str
+    probability: float
+    named: tuple[str, ...]
+    chi2: float
+    degrees: int
+    p_value: float
+    parameters: tuple[Parameter, ...]
+
+
+@dataclass(frozen=True)
+class Change:
+    """What differs between campaigns by the joint fit.
+
+    Attributes
+    ----------
+    effect, title
+        Of the effect.
+    kind, place
+        Where; empty for all its places.
+    parameters
+        Names of those that differ.
+    groups
+        Campaigns that agree with each other.
+    since
+        The first campaign that has the new value, where the order of campaigns explains the groups; else empty.
+    values, unit
+        Per campaign, of a single parameter, SI; empty for several.
+    chi2, degrees, p_value
+        Of no difference, beside all else that is shared; the probability is corrected for all that was compared.
+    probability
+        That this place differs.
+    """
+
+    effect: str
+    title: str
+    kind: str
+    place: str
+    parameters: tuple[str, ...]
+    groups: tuple[tuple[str, ...], ...]
+    since: str
+    values: tuple[float, ...]
+    unit: str
+    chi2: float
+    degrees: int
+    p_value: float
+    probability: float
+
+
+@dataclass(frozen=True)
+class Predicted:
+    """What the models of two campaigns predict at the poses and conditions that both measured, frames aligned.
+
+    Attributes
+    ----------
+    campaigns
+        The two.
+    poses
+        How many.
+    rms, stated
+        Root mean square of the difference, and of its stated deviation, m.
+    beyond
+        Share of the poses at which they differ by more than twice that.
+    agrees
+        Whether the root mean square is within twice the stated: otherwise a model is wrong, or the robot changed.
+    note
+        Why nothing was predicted; empty where it was.
+    """
+
+    campaigns: tuple[str, str]
+    poses: int
+    rms: float
+    stated: float
+    beyond: float
+    agrees: bool
+    note: str = ""
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Comparison:
+    """What campaigns of one robot share, and what changed between them.
+
+    Attributes
+    ----------
+    campaigns, samples
+        Names of the campaigns in their order, and how many measurements each has.
+    robot, tool_frame
+        Which robot.
+    effects
+        Every effect that was compared, those at work first.
+    changes
+        What differs, the surest first.
+    predicted
+        For every two campaigns.
+    not_told
+        Parameters that no campaign can tell beside the unknown frames and the others: they are not compared.
+    looked_at
+        How many places were compared: all probabilities of changes are corrected for that.
+    diagnoses
+        Of the campaigns.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> robot = tr.load_robot("builtin:rv_m2", "tool0")
+    >>> days = [tr.simulate(robot, rows=40, noise=2e-5, seed=seed) for seed in (1, 2)]
+    >>> found = tr.compare(*days)
+    >>> found.changes
+    ()
+    """
+
+    campaigns: tuple[str, ...]
+    samples: tuple[int, ...]
+    robot: str
+    tool_frame: str
+    effects: tuple[Effect, ...]
+    changes: tuple[Change, ...]
+    predicted: tuple[Predicted, ...]
+    not_told: tuple[str, ...] = ()
+    looked_at: int = 0
+    diagnoses: tuple[Diagnosis, ...] = field(default=(), compare=False)
+
+    @property
+    def verdict(self) -> tuple[str, ...]:
+        """Names of the effects that keep their name."""
+        return tuple(e.name for e in self.effects if e.status in ("shared", "changed", "not_compared"))
+
+    @property
+    def lost(self) -> tuple[str, ...]:
+        """Names of the effects that some diagnosis names, and that lose their name."""
+        return tuple(e.name for e in self.effects if e.status in ("contradicts", "not_needed"))
+
+    @property
+    def summary(self) -> str:
+        """What stayed and what changed in one plain sentence."""
+        return _teller().comparison_headline(self._plain())
+
+    @property
+    def parameters(self) -> pd.DataFrame:
+        """Parameters by effect and name with a column for each campaign and for its deviation, SI."""
+        import pandas as pd
+
+        rows = {}
+        for effect in self.effects:
+            for p in effect.parameters:
+                told = zip(self.campaigns, p.values, p.stds, strict=True)
+                each = {key: one for c, value, std in told for key, one in ((c, value), (f"std of {c}", std))}
+                tests = {"difference": p.difference, "std": p.std, "chi2": p.chi2, "p_value": p.p_value}
+                rows[effect.name, p.name] = {**each, **tests, "unit": p.unit}
+        return pd.DataFrame.from_dict(rows, orient="index").rename_axis(["effect", "parameter"])
+
+    def effect(self, name: str) -> Effect:
+        """Return what was compared of one effect.
+
+        Raises
+        ------
+        KeyError
+            If it was not compared.
+        """
+        for effect in self.effects:
+            if effect.name == name:
+                return effect
+        raise KeyError(f"{name!r} was not compared; {', '.join(e.name for e in self.effects) or 'nothing'} was")
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return the JSON object of the format ``thermal-robot/comparison/1``; SI throughout."""
+        plain = self._plain()
+        return {**plain, "summary": _teller().comparison_headline(plain)}
+
+    def _plain(self) -> dict[str, Any]:
+        told = zip(self.campaigns, self.samples, self.diagnoses, strict=True)
+        plain = dict(
+            schema=SCHEMA,
+            robot=self.robot,
+            tool_frame=self.tool_frame,
+            campaigns=[{"name": name, "samples": count, "diagnosis": d.summary} for name, count, d in told],
+            verdict={"effects": self.verdict, "lost": self.lost, "changed": bool(self.changes)},
+            effects=[asdict(effect) for effect in self.effects],
+            changes=[asdict(change) for change in self.changes],
+            predicted=[asdict(predicted) for predicted in self.predicted],
+            not_told=self.not_told,
+            looked_at=self.looked_at,
+        )
+        return dict(jsonable(plain))
+
+    def to_json(self, path: str | Path) -> None:
+        """Write :meth:`to_dict` to a file, which appears whole or not at all."""
+        write_text(path, json.dumps(self.to_dict(), indent=2, ensure_ascii=False) + "\n")
+
+    def __repr__(self) -> str:
+        changed = ", ".join(dict.fromkeys(c.effect for c in self.changes)) or "nothing"
+        return f"Comparison({', '.join(self.campaigns)}: {changed} changed)"
+
+    def __str__(self) -> str:
+        return _teller().comparison_text(self.to_dict())
+
+    def _repr_html_(self) -> str:
+        return _teller().comparison_fragment(self.to_dict())
