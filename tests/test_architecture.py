@@ -219,7 +219,7 @@ def test_what_is_loaded_late_is_found_listed_and_typed():
     assert set(thermal_robot.__all__) <= set(dir(thermal_robot))
     assert [n for n in thermal_robot.__all__ if is_module(f"{PACKAGE}.{n}")] == []  # a module would hide the name
     typed = {target for target, how in imports(ROOT / "__init__.py") if how == "checked"}
-    assert {room(target) for target in typed} == set(thermal_robot._HOME.values())
+    assert {room(target) for target in typed} == {room(f"{PACKAGE}.{home}") for home in thermal_robot._HOME.values()}
     assert set(thermal_robot._HOME) == set(thermal_robot.__all__)
     with pytest.raises(AttributeError, match="no attribute 'diagnos'"):
         _ = thermal_robot.diagnos

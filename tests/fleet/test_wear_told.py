@@ -24,7 +24,7 @@ def problem_of(series, has=None):
 
 
 def told(series, first=FIRST, limits=None):
-    found = Told(problem_of(series), explanations(series), first, limits or {}, 0.01).parameters()
+    found = Told(problem_of(series), explanations(series), first, limits or {}, 0.01).worn()
     return {worn.place: worn for worn in found}
 
 

@@ -13,14 +13,14 @@ from thermal_robot.robot import load_robot
 
 def test_places_run_along_x_first():
     grid = Positions((0.0, 1.0, 3), (2.0, 4.0, 2), (7.0, 7.0, 1))
-    at = grid.at(np.arange(grid.count))
+    at = grid.place(np.arange(grid.count))
     np.testing.assert_allclose(at[:4], [[0.0, 2.0, 7.0], [0.5, 2.0, 7.0], [1.0, 2.0, 7.0], [0.0, 4.0, 7.0]])
     assert grid.count == 6
 
 
 def test_joint_positions_fill_the_limits_and_do_not_depend_on_where_one_begins(rv_m2):
-    every = Joints(512).at(np.arange(512), rv_m2)
-    np.testing.assert_array_equal(every[100:], Joints(512).at(np.arange(100, 512), rv_m2))
+    every = Joints(512).drawn(np.arange(512), rv_m2)
+    np.testing.assert_array_equal(every[100:], Joints(512).drawn(np.arange(100, 512), rv_m2))
     low, high = within(rv_m2)
     assert np.all((every >= low) & (every <= high))
     np.testing.assert_allclose((every.mean(axis=0) - low) / (high - low), 0.5, atol=0.01)

@@ -142,7 +142,7 @@ def of_fits(
     )
     factor = float(np.sqrt(scatter(series, found.grid, found.best)))
     robot, notes = fits[0].campaign.robot.name, _notes(whole, visits, factor)
-    return Wear(robot, visits, bool(moments), told.parameters(), false_alarm, factor, nothing, notes)
+    return Wear(robot, visits, bool(moments), told.worn(), false_alarm, factor, nothing, notes)
 
 
 def _written(moment: datetime) -> str:

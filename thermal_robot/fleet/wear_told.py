@@ -45,7 +45,7 @@ class Told:
     limits: Mapping[str, float]
     false_alarm: float
 
-    def parameters(self) -> tuple[Worn, ...]:
+    def worn(self) -> tuple[Worn, ...]:
         """Return all parameters: those that ring first, then by how probably they moved."""
         series = self.found.series
         chance = chances(series, self.found.grid, self.found.best)

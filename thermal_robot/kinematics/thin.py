@@ -74,7 +74,7 @@ class _Own:
         rows[:, self.moves] = q
         return rows
 
-    def at(self, point: Array) -> int:
+    def placed_at(self, point: Array) -> int:
         """Put the frame of the point there, and return its number."""
         self.model.frames[self.point].placement = self.end * pin.SE3(np.eye(3), point)
         number: int = self.point
@@ -126,10 +126,10 @@ def jacobians(robot: Chained, q: Array, point: Array | None, out: Array) -> None
     """Write the Jacobians at a point of the tool, (N, 6, n)."""
     own = _own(robot.chain)
     model, data, plain = own.model, own.data, own.plain
-    frame = own.tool if point is None else own.at(point) if point.ndim == 1 else own.point
+    frame = own.tool if point is None else own.placed_at(point) if point.ndim == 1 else own.point
     for i, row in enumerate(own.joints(q)):
         if point is not None and point.ndim == 2:
-            own.at(point[i])
+            own.placed_at(point[i])
         found = pin.computeFrameJacobian(model, data, row, frame, pin.LOCAL_WORLD_ALIGNED)
         if found.ndim == 1:  # of one joint Pinocchio gives a vector
             found = found[:, None]
@@ -142,11 +142,11 @@ def placements(robot: Chained, q: Array, point: Array | None, out: Array) -> Non
     if own is None:
         own = _kept.placed[robot.chain] = _Own(robot.chain, placed=True)
     model, data = own.model, own.data
-    frame = own.tool if point is None else own.at(point) if point.ndim == 1 else own.point
+    frame = own.tool if point is None else own.placed_at(point) if point.ndim == 1 else own.point
     shape = out.shape[1:]
     for i, row in enumerate(own.joints(q)):
         if point is not None and point.ndim == 2:
-            own.at(point[i])
+            own.placed_at(point[i])
         pin.forwardKinematics(model, data, row)
         found = pin.computeFrameKinematicRegressor(model, data, frame, pin.LOCAL_WORLD_ALIGNED)
         out[i] = found.reshape(shape)

@@ -57,13 +57,13 @@ def columns(spec: Spec, rows: NDArray[np.int64]) -> Columns:
     robot, asked = spec.robot, spec.question
     low, high = within(robot)
     if isinstance(spec.over, Joints):
-        q = spec.over.at(rows, robot)
+        q = spec.over.drawn(rows, robot)
         places, branch = rows, np.zeros(len(rows), dtype=np.int64)
     else:
         home = 0.5 * (low + high) if spec.over.home is None else np.asarray(spec.over.home, dtype=float)
         approach, axis = (np.asarray(v, dtype=float) / np.linalg.norm(v) for v in (asked.approach, asked.axis))
         task = Task(robot, approach, axis, np.asarray(asked.point, dtype=float), home)
-        here, q = all_postures(task, spec.over.at(rows))
+        here, q = all_postures(task, spec.over.place(rows))
         places = rows[here]
         branch = np.arange(len(here)) - np.searchsorted(here, here)
     told = _told(spec, q) if len(q) else dict.fromkeys(list(UNITS)[2:-1], np.zeros(0))

@@ -73,7 +73,7 @@ class Positions:
         """Number of places."""
         return self.x[2] * self.y[2] * self.z[2]
 
-    def at(self, rows: NDArray[np.int64]) -> Array:
+    def place(self, rows: NDArray[np.int64]) -> Array:
         """(K, 3) m, places by their number; x runs fastest."""
         x, y, z = (np.linspace(low, high, many) for low, high, many in (self.x, self.y, self.z))
         along, rest = rows % len(x), rows // len(x)
@@ -96,7 +96,7 @@ class Joints:
     lower: tuple[float, ...] | None = None
     upper: tuple[float, ...] | None = None
 
-    def at(self, rows: NDArray[np.int64], robot: Robot) -> Array:
+    def drawn(self, rows: NDArray[np.int64], robot: Robot) -> Array:
         """(K, n) rad or m, configurations by their number; rows follow each other."""
         from scipy.stats import qmc
 
