@@ -8,7 +8,6 @@ import pytest
 from compared import diagnosed, moved
 
 import thermal_robot as tr
-from thermal_robot.fleet import comparison
 from thermal_robot.report import comparison_schema
 
 
@@ -51,9 +50,3 @@ def test_an_effect_is_asked_for_by_name(found):
 def test_it_shows_itself(found):
     assert str(found).splitlines()[0] == found.summary
     assert found._repr_html_().startswith('<div class="thermal-robot">')
-
-
-def test_somebody_must_tell_it(found, monkeypatch):
-    monkeypatch.setattr(comparison, "_tellers", [])
-    with pytest.raises(RuntimeError, match="nobody can tell a comparison"):
-        str(found)

@@ -29,6 +29,10 @@ _ALONG = {
 }
 
 
+_UPRIGHT = 1e-14
+"""rad; an axis that leans no more turns about gravity: what it carries then is the rounding of what others do."""
+
+
 class _Own:
     """A model of a chain whose world is its root frame, every joint with one coordinate, and memory to work in.
 
@@ -63,6 +67,7 @@ class _Own:
         self.data = self.model.createData()
         self.moves = np.flatnonzero(np.isin(chain.placed, chain.movable)) if placed else np.arange(len(chain.movable))
         self.pull: Array | None = None
+        self.idle: list[int] = []
 
     def joints(self, q: Array) -> Array:
         """Return positions of all joints of the model."""
@@ -158,6 +163,7 @@ def gravity(robot: Weighted, q: Array, mass: Array, com: Array, out: Array) -> N
     model, data = own.model, own.data
     if own.pull is not robot.gravity:
         model.gravity.linear = own.pull = robot.gravity
+        own.idle = _turning_about(own, robot)
     for i, row in enumerate(own.joints(q)):
         found = pin.computeGeneralizedGravity(model, data, row)
         out[i] = found if own.plain else found @ own.coupling.matrix
@@ -165,3 +171,15 @@ def gravity(robot: Weighted, q: Array, mass: Array, com: Array, out: Array) -> N
         lift = np.empty((len(q), 6, robot.n))
         jacobians(robot, q, com, lift)
         out -= mass[..., None] * (robot.gravity @ lift[:, :3])
+    out[:, own.idle] = 0.0
+
+
+def _turning_about(own: _Own, robot: Weighted) -> list[int]:
+    """Return the first joint if it turns about gravity: it carries nothing, which Pinocchio tells to rounding only."""
+    chain = robot.chain
+    first = int(chain.movable[0])
+    if not own.plain or chain.kinds[first] != REVOLUTE:
+        return []
+    axis = own.model.jointPlacements[1].rotation @ chain.axes[first]
+    upright = np.linalg.norm(np.cross(axis, robot.gravity)) <= _UPRIGHT * np.linalg.norm(robot.gravity)
+    return [0] if upright else []
