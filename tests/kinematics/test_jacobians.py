@@ -5,7 +5,8 @@ import pytest
 
 from thermal_robot import kinematics as kin
 from thermal_robot.errors import RobotError
-from thermal_robot.kinematics import reference, settings
+from thermal_robot.kinematics import frames as engine
+from thermal_robot.kinematics import reference
 
 ROWS = 200
 TOLERANCE = 1e-10
@@ -81,7 +82,7 @@ def test_chunks_do_not_show(rv_m2, configurations, monkeypatch):
         )
 
     at_once = everything()
-    monkeypatch.setattr(settings, "CHUNK", 97)
+    monkeypatch.setattr(engine, "CHUNK", 97)
     for whole, pieces in zip(at_once, everything(), strict=True):
         np.testing.assert_allclose(pieces, whole, rtol=0.0, atol=1e-14)
 
