@@ -14,7 +14,7 @@ MODULES = sorted(p for p in ROOT.rglob("*.py") if p.name != "__init__.py")
 LONGEST_BODY = 40
 KNOWING = {"effects", "blind", "paper"}
 """Rooms that may know an effect by name: its own, the trial that withholds it, the paper's."""
-FRAMES = {"maps", "campaign", "model_file.py", "robot.py", "cli.py"}
+FRAMES = {"campaign", "model_file.py", "robot.py", "cli.py"}
 """Rooms for which ``tool_frame`` and ``base_frame`` are frames, not effects."""
 
 every_module = pytest.mark.parametrize("path", MODULES, ids=[str(p.relative_to(ROOT)) for p in MODULES])

@@ -12,6 +12,7 @@ from thermal_robot.kinematics import elongation_jacobian, tool_poses
 from thermal_robot.maps import Joints, Question
 from thermal_robot.maps.quantities import UNITS, columns, polygon
 from thermal_robot.maps.question import Spec
+from thermal_robot.robot import load_robot
 
 
 @pytest.mark.parametrize("law", ["shift", "uniform"])
@@ -58,3 +59,21 @@ def test_a_polygon_is_that_of_its_corners(rv_m2):
 def test_a_polygon_of_too_many_segments_is_refused():
     with pytest.raises(RobotError, match="too many corners"):
         polygon(np.zeros((1, 2, 13)))
+
+
+def test_the_margin_is_a_share_of_the_whole_range(ur10):
+    found = columns(Spec(ur10, Joints(16)), np.arange(16))
+    q = np.stack([found[name] for name in ur10.joint_names], axis=1)
+    share = np.minimum(q - ur10.lower, ur10.upper - q) / (ur10.upper - ur10.lower)
+    np.testing.assert_allclose(found["margin"], share.min(axis=1), rtol=1e-12)
+    assert found["margin"].max() <= 0.5
+
+
+def test_a_slide_without_limits_is_mapped_within_those_that_are_given():
+    text = """<robot name="rail"><link name="a"/><link name="b"/>
+      <joint name="j" type="prismatic"><parent link="a"/><child link="b"/><axis xyz="1 0 0"/></joint></robot>"""
+    rail = load_robot(text, "b")
+    assert not np.isfinite(rail.lower).any()
+    found = columns(Spec(rail, Joints(8, (-0.5,), (0.5,)), Question(coefficients=0.0)), np.arange(8))
+    assert np.all(np.abs(found["j"]) <= 0.5)
+    np.testing.assert_allclose(found["margin"], 0.5)

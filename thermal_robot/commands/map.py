@@ -143,8 +143,9 @@ def _text(found: Map, robot: Robot, best: pd.DataFrame, options: argparse.Namesp
     """Say where the robot is best, in mm and degrees."""
     import numpy as np
 
-    rows = sum(len(chunk["place"]) for chunk in found.chunks(["place"]))
-    reached = len({int(p) for chunk in found.chunks(["place"]) for p in np.unique(chunk["place"])})
+    # the postures of a place stand in one chunk
+    counts = np.array([(len(c["place"]), len(np.unique(c["place"]))) for c in found.chunks(["place"])])
+    rows, reached = counts.sum(axis=0)
     if found.notes["over"] == "positions":
         asked = int(np.prod([found.notes[axis][2] for axis in "xyz"]))
         said = f"{reached} of {asked} places are reached, in {rows} postures; the map is {found.path}."

@@ -55,12 +55,11 @@ def columns(spec: Spec, rows: NDArray[np.int64]) -> Columns:
         Numbers of places or configurations, one after the other.
     """
     robot, asked = spec.robot, spec.question
-    low, high = within(robot)
     if isinstance(spec.over, Joints):
         q = spec.over.drawn(rows, robot)
         places, branch = rows, np.zeros(len(rows), dtype=np.int64)
     else:
-        home = 0.5 * (low + high) if spec.over.home is None else np.asarray(spec.over.home, dtype=float)
+        home = np.mean(within(robot), axis=0) if spec.over.home is None else np.asarray(spec.over.home, dtype=float)
         approach, axis = (np.asarray(v, dtype=float) / np.linalg.norm(v) for v in (asked.approach, asked.axis))
         task = Task(robot, approach, axis, np.asarray(asked.point, dtype=float), home)
         here, q = all_postures(task, spec.over.place(rows))
@@ -70,7 +69,7 @@ def columns(spec: Spec, rows: NDArray[np.int64]) -> Columns:
     joints = {name: q[:, k] for k, name in enumerate(robot.joint_names)}
     inside = np.minimum(q - robot.lower, robot.upper - q)
     with np.errstate(invalid="ignore"):
-        share = np.where(np.isfinite(inside), inside / (high - low), 0.5)
+        share = np.where(np.isfinite(inside), inside / (robot.upper - robot.lower), 0.5)
     told["margin"] = share.min(axis=1) if len(q) else np.zeros(0)
     return {"place": places, "branch": branch, **joints, **told}
 
@@ -139,6 +138,7 @@ def polygon(edges: Array) -> tuple[Array, Array]:
         raise RobotError(f"the polygon of {links} segments has too many corners; {settings.MOST_LINKS} are compared")
     first, second = np.triu_indices(links, 1)
     crossed = edges[:, 0, first] * edges[:, 1, second] - edges[:, 1, first] * edges[:, 0, second]
-    signs = np.array([(1.0, *rest) for rest in product((-1.0, 1.0), repeat=links - 1)])
+    # a corner and the one opposite are as far apart as one with its signs and one with all others: half of them do
+    signs = np.array(list(product((-1.0, 1.0), repeat=links)))[: max(2**links // 2, 1)]
     corners = edges @ signs.T
     return np.abs(crossed).sum(axis=1), np.sqrt((corners**2).sum(axis=1).max(axis=1))

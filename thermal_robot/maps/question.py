@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.errors import RobotError
 from thermal_robot.maps import settings
-from thermal_robot.robot import Robot
+from thermal_robot.robot import ENDS, Robot
 
 Array = NDArray[np.float64]
 Span = tuple[float, float, int]
@@ -159,8 +159,7 @@ class Spec:
             "schema": "thermal-robot/map/1",
             "robot": self.robot.name,
             "urdf_sha256": hashlib.sha256(self.robot.urdf.encode()).hexdigest(),
-            "root_frame": self.robot.root_frame,
-            "tool_frame": self.robot.tool_frame,
+            **{end: getattr(self.robot, end) for end in ENDS},
             "joints": list(self.robot.joint_names),
             "over": type(self.over).__name__.lower(),
             **{key: _plain(value) for part in (self.over, self.question) for key, value in vars(part).items()},
