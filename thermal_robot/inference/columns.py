@@ -45,8 +45,12 @@ class Block:
 
     @property
     def columns(self) -> Array:
-        """(N, m, P) derivative of the gap by each parameter, root frame axes."""
-        return moved_by(self.source, self.parameters) if isinstance(self.source, Observations) else self.source
+        """(N, m, P) derivative of the gap by each parameter, root frame axes; zero where it is but rounding."""
+        if not isinstance(self.source, Observations):
+            return self.source
+        found = moved_by(self.source, self.parameters)
+        found[:, :, np.abs(found).max(axis=(0, 1), initial=0.0) * self.sizes < settings.UNSEEN] = 0.0
+        return found
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:

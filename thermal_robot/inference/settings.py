@@ -54,8 +54,9 @@ RUNG_REACH = 5.4
 
 ROUNDING = 1e-9
 """m and rad: no table and no robot is more accurate."""
-ALIAS = 1e-6
-"""Of a column's length: where less is left of it once others are projected out, it is an exact alias of them."""
+UNSEEN, ALIAS = 1e-12, 1e-6
+"""m and rad: what an expected size moves by less is rounding. Of a column's length: where less is left of it once
+others are projected out, it is an exact alias of them."""
 TINY = 1e-300
 """Keeps a quotient of nothing from being infinite."""
 BETTER = 1e-9
@@ -74,8 +75,7 @@ LARGEST_CLUSTER = 0.1
 FOLDS = 5
 """Regions of joint space that are held out in turn; of temperature and of reach the outermost fifth is."""
 BLOCKS = 20
-"""Blocks of consecutive rows that are held out in turn: a fit then lacks a twentieth of the rows, as good as none, and
-twenty values tell the spread of a figure to a sixth."""
+"""Blocks of consecutive rows that are held out in turn: twenty values tell the spread of a figure to a sixth."""
 GROSS_LEVEL = 0.01
 """Chance that noise alone sets any row of a campaign aside."""
 GROSS_FACTOR = 1.5
