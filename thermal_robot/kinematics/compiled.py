@@ -113,11 +113,16 @@ def _pieces(kernel: Callable[..., None], constants: tuple[Any, ...], q: Array, r
         _pieces(kernel, constants, padded, whole)
         rows[...] = whole[:, : len(q)]
         return
-    count = max(1, len(q) // settings.PIECE)
-    cuts = [len(q) * piece // count for piece in range(count + 1)]
+    in_pieces(kernel, (*constants, q), len(q), (rows,))
+
+
+def in_pieces(kernel: Callable[..., None], constants: tuple[Any, ...], rows: int, out: tuple[Array, ...]) -> None:
+    """Call a kernel for pieces of so many rows, in threads: with constants, first and last row, and where to write."""
+    count = max(1, rows // settings.PIECE)
+    cuts = [rows * piece // count for piece in range(count + 1)]
 
     def work(piece: int) -> None:
-        _called(kernel, *constants, q, cuts[piece], cuts[piece + 1], rows)
+        _called(kernel, *constants, cuts[piece], cuts[piece + 1], *out)
 
     workers = min(threads(), count)
     if workers < 2:

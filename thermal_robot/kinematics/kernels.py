@@ -10,14 +10,12 @@ file, for numba looks at nothing else to see whether what it has kept is old: to
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
-from typing import Any
 
-import numba
 import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.kinematics.arm import SLIDES, TURNS_ALIGNED, Arm
+from thermal_robot.kinematics.compiling import compiled
 from thermal_robot.kinematics.settings import LANES, LARGEST_REDUCED
 
 Array = NDArray[np.float64]
@@ -32,19 +30,7 @@ _COSINE = (4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.4801587289
 """Least-maximum polynomials on ±π/4, below 2⁻⁵⁷ off (fdlibm, k_sin.c and k_cos.c)."""
 
 
-def _compiled(function: Callable[..., Any]) -> Any:
-    """Compile a function when it is first called, and keep it on disk where that can be written.
-
-    Products and sums may be contracted to one rounding; nothing else is loosened: what is no number stays none.
-    """
-    compiler: Any = numba.njit
-    try:
-        return compiler(cache=True, nogil=True, fastmath={"contract"})(function)
-    except RuntimeError:  # numba finds no folder for its cache
-        return compiler(nogil=True, fastmath={"contract"})(function)
-
-
-@_compiled
+@compiled
 def sincos(room: Array, x: int) -> None:
     """Write sines and cosines of the angles of a row, below ``LARGEST_REDUCED``, to the next two rows."""
     (p1, p2, p3), (s1, s2, s3, s4, s5, s6), (c1, c2, c3, c4, c5, c6) = _HALF_PI, _SINE, _COSINE
@@ -62,7 +48,7 @@ def sincos(room: Array, x: int) -> None:
         room[x + 2, i] = sign * (-s if odd == 1.0 else c)
 
 
-@_compiled
+@compiled
 def turn(room: Array, x: int, large: bool) -> None:
     """Write sines and cosines of angles of any size: the large ones, if there are any, one by one."""
     sincos(room, x)
@@ -72,7 +58,7 @@ def turn(room: Array, x: int, large: bool) -> None:
                 room[x + 1, i], room[x + 2, i] = math.sin(room[x, i]), math.cos(room[x, i])
 
 
-@_compiled
+@compiled
 def follow(room: Array, place: Array, x: int, to: int) -> None:
     """Follow the frame in twelve rows by a constant placement, (3, 4)."""
     for row in range(0, 12, 4):
@@ -87,14 +73,14 @@ def follow(room: Array, place: Array, x: int, to: int) -> None:
                     room[to + row + 3, i] = room[x + row + 3, i] + along
 
 
-@_compiled
+@compiled
 def mix(room: Array, a: float, x: int, b: float, y: int, c: float, z: int, to: int) -> None:
     """Write the sum of three rows, each times a number."""
     for i in range(LANES):
         room[to, i] = a * room[x, i] + b * room[y, i] + c * room[z, i]
 
 
-@_compiled
+@compiled
 def move(room: Array, arm: Arm, k: int, joint: int, frame: int, work: int, to: int) -> None:
     """Move the frame as the joint behind it does: position, sine and cosine are the rows from ``joint``."""
     a, b, source = arm.turns[k, 0], arm.turns[k, 1], frame
@@ -125,7 +111,7 @@ def move(room: Array, arm: Arm, k: int, joint: int, frame: int, work: int, to: i
             room[to + row + 3, i] = room[source + row + 3, i]
 
 
-@_compiled
+@compiled
 def load(room: Array, arm: Arm, j: int, q: Array, start: int, to: int) -> bool:
     """Write the positions of a movable joint; return whether one is too large for the short reduction."""
     lead, factor, offset, large = arm.lead[j], arm.factor[j], arm.offset[j], False
@@ -138,7 +124,7 @@ def load(room: Array, arm: Arm, j: int, q: Array, start: int, to: int) -> bool:
     return large
 
 
-@_compiled
+@compiled
 def walk(room: Array, arm: Arm, kept: int, q: Array, start: int) -> None:
     """Write the frames of a block, twelve rows each: of the last elements before their motion, and of the tool."""
     elements = len(arm.kinds)
@@ -165,54 +151,54 @@ def walk(room: Array, arm: Arm, kept: int, q: Array, start: int) -> None:
                 room[12 * kept + row, i] = room[came + row, i]
 
 
-@_compiled
+@compiled
 def new_room(kept: int) -> Array:
     """Memory for that many frames of a block, the tool's and the walk's, and behind them for twelve more rows."""
     return np.empty((12 * (kept + 3) + 3 + 12, LANES))
 
 
-@_compiled
+@compiled
 def begin(start: int, stop: int, number: int) -> int:
     """Where a block begins: the last one ends with the rows, and works on some of them once more."""
     return min(start + number * LANES, stop - LANES)
 
 
-@_compiled
+@compiled
 def give(room: Array, x: int, out: Array, row: int, start: int) -> None:
     """Hand a row over to the results."""
     for i in range(LANES):
         out[row, start + i] = room[x, i]
 
 
-@_compiled
+@compiled
 def give_zeros(out: Array, row: int, start: int) -> None:
     """Write zeros to the results."""
     for i in range(LANES):
         out[row, start + i] = 0.0
 
 
-@_compiled
+@compiled
 def give_cross(room: Array, a: int, b: int, c: int, d: int, out: Array, row: int, start: int) -> None:
     """Hand one component of a cross product over to the results."""
     for i in range(LANES):
         out[row, start + i] = room[a, i] * room[b, i] - room[c, i] * room[d, i]
 
 
-@_compiled
+@compiled
 def add(room: Array, x: int, out: Array, row: int, start: int) -> None:
     """Add a row to the results."""
     for i in range(LANES):
         out[row, start + i] += room[x, i]
 
 
-@_compiled
+@compiled
 def add_cross(room: Array, a: int, b: int, c: int, d: int, out: Array, row: int, start: int) -> None:
     """Add one component of a cross product to the results."""
     for i in range(LANES):
         out[row, start + i] += room[a, i] * room[b, i] - room[c, i] * room[d, i]
 
 
-@_compiled
+@compiled
 def poses(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
     """Write the poses of the tool, (16, N), of rows from ``start`` to ``stop``, at least ``LANES`` of them."""
     room = new_room(2)  # no frame is looked at again but the last
@@ -227,7 +213,7 @@ def poses(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
             out[15, at + i] = 1.0
 
 
-@_compiled
+@compiled
 def target(room: Array, arm: Arm, to: int) -> None:
     """Write where the point of the tool is."""
     tool, (x, y, z) = 12 * len(arm.kinds), arm.point
@@ -237,7 +223,7 @@ def target(room: Array, arm: Arm, to: int) -> None:
             room[to + m, i] = room[row + 3, i] + x * room[row, i] + y * room[row + 1, i] + z * room[row + 2, i]
 
 
-@_compiled
+@compiled
 def axis_of(room: Array, arm: Arm, k: int, factor: float, to: int) -> None:
     """Write the axis of a joint in root axes, times a factor."""
     x, y, z = arm.axes[k]
@@ -246,7 +232,7 @@ def axis_of(room: Array, arm: Arm, k: int, factor: float, to: int) -> None:
         mix(room, factor * x, row, factor * y, row + 1, factor * z, row + 2, to + m)
 
 
-@_compiled
+@compiled
 def lever_of(room: Array, k: int, point: int, mass: float, to: int) -> None:
     """Write a point, or a moment of some mass, seen from the origin of an element."""
     for m in range(3):
@@ -254,7 +240,7 @@ def lever_of(room: Array, k: int, point: int, mass: float, to: int) -> None:
             room[to + m, i] = room[point + m, i] - mass * room[12 * k + 4 * m + 3, i]
 
 
-@_compiled
+@compiled
 def jacobians(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
     """Write the Jacobians at the point, (6 n, N): the first joint that follows a driving one writes, others add."""
     room, n = new_room(len(arm.kinds)), q.shape[1]
@@ -285,7 +271,7 @@ def jacobians(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
                     add(room, axis + m, out, angular, at)
 
 
-@_compiled
+@compiled
 def placements(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
     """Write the sensitivities of the point to every placement, (36 S, N)."""
     room, segments = new_room(len(arm.kinds)), len(arm.placed)
@@ -308,7 +294,7 @@ def placements(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
                     give(room, row, out, angular + 3 + c, at)
 
 
-@_compiled
+@compiled
 def weigh(room: Array, arm: Arm, j: int, moment: int) -> None:
     """Add the first moment of the bodies behind a movable joint."""
     weight, (x, y, z) = arm.masses[j], arm.centres[j]
@@ -319,7 +305,7 @@ def weigh(room: Array, arm: Arm, j: int, moment: int) -> None:
             room[moment + m, i] += weight * centre
 
 
-@_compiled
+@compiled
 def hold(room: Array, axis: int, lever: int, pull: Array, to: int) -> None:
     """Write axis · (pull × lever)."""
     x, y, z = pull
@@ -329,7 +315,7 @@ def hold(room: Array, axis: int, lever: int, pull: Array, to: int) -> None:
         room[to, i] = torque + room[axis + 2, i] * (x * b - y * a)
 
 
-@_compiled
+@compiled
 def gravity(arm: Arm, pull: Array, payload: float, q: Array, start: int, stop: int, out: Array) -> None:
     """Write the torques, (n, N), that hold the arm and a payload at the point."""
     room = new_room(len(arm.kinds))
