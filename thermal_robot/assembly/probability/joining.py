@@ -101,9 +101,10 @@ def _evaluate(
 ) -> Array:
     """Check, broadcast, and integrate all cases at once; compiled loops tell the plain ones of very many."""
     plain = shape == "circle" and thermal is None and segments is None
-    quick = circle_chances(covariance, clearance, mean) if plain else None
-    if quick is not None and not np.any(np.isnan(quick[int(outside)])):
-        return quick[int(outside)]
+    chances = circle_chances(covariance, clearance, mean) if plain else None
+    quick: Array | None = None if chances is None else chances[int(outside)]
+    if quick is not None and not np.any(np.isnan(quick)):
+        return quick
     law = Law.of(covariance, mean, thermal, randomised, segments)
     sizes = _sizes(clearance, shape)
     leading = np.broadcast_shapes(law.leading, sizes.shape[:-1])
@@ -111,10 +112,10 @@ def _evaluate(
     sizes = np.broadcast_to(sizes, (*leading, sizes.shape[-1])).reshape(-1, sizes.shape[-1])
     if quick is None:
         return _integrated(law, sizes, shape, outside).reshape(leading)
-    result = quick[int(outside)].reshape(-1)
+    result: Array = quick.reshape(-1)
     left = np.isnan(result)
     result[left] = _integrated(law.rows(left), sizes[left], shape, outside)
-    return result.reshape(leading)
+    return np.asarray(result.reshape(leading))
 
 
 def _integrated(law: Law, sizes: Array, shape: Shape, outside: bool) -> Array:
