@@ -1,13 +1,13 @@
 """How large a change of one number of a fault is: in deviations of what one campaign, or two, can tell of it.
 
 A campaign of M positions with noise σ tells a number whose unit moves the target by x, (3M,), with the deviation
-σ / |x − P x|, where P projects on the columns of unknown frames, of every joint's zero, and of all other numbers of the
-faults at work. The program that is put to the test takes no part in that.
+σ / |x − P x|, where P projects on the columns of unknown frames, of every joint's zero, and of all other numbers that
+are at work. The program that is put to the test takes no part in that.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -26,6 +26,7 @@ GROWS_ONLY = ("backlash", "joint_compliance")
 """What wear makes larger, and nothing smaller."""
 _ZEROS = "joint_offset"
 _STEP = 1e-4  # rad, rad/(N·m) ...: where a fault has no size yet, of which a derivative could be a share
+_PRESENT = 0.1  # × noise: a number that leaves less is not at work
 _SEEN = 1e-6  # of a column: what less is left of is rounding
 
 
@@ -90,37 +91,38 @@ def deviation(
     Unseen
         If frames or other numbers do the same.
     """
-    own, numbers = _columns(gauge, spot.fault, values)
-    which = numbers.index((spot.number, SIZE))
-    beside = [np.delete(own, which, axis=1), *(_columns(gauge, fault, now)[0] for fault, now in others)]
-    if _ZEROS not in (spot.fault.name, *(fault.name for fault, _ in others)):
-        zeros = FAULTS[_ZEROS]
-        beside.append(_columns(gauge, zeros, np.zeros((gauge.setting.world.n, 1)))[0])
-    aligned = gauge.left(own[:, which])
-    span = _span(gauge, beside)
+    known = {fault.name: values for fault, values in [*others, (spot.fault, values)]}
+    known.setdefault(_ZEROS, np.zeros((gauge.setting.world.n, 1)))
+    beside = []
+    for name, now in known.items():
+        for number, column in _columns(gauge, FAULTS[name], now):
+            if (name, number) == (spot.fault.name, (spot.number, SIZE)):
+                own = column
+            elif name == _ZEROS or gauge.rms(gauge.left(column * now[number])) > _PRESENT * noise:
+                beside.append(column)
+    aligned = gauge.left(own)
+    span = _span(gauge, np.column_stack(beside))
     left = aligned - span @ (span.T @ aligned)
     length = float(np.linalg.norm(left))
-    if length <= _SEEN * float(np.linalg.norm(own[:, which])) or length == 0.0:
+    if length <= _SEEN * float(np.linalg.norm(own)) or length == 0.0:
         raise Unseen(f"{spot.fault.name} is hidden there by what else is at work")
     return noise / length, gauge.rms(aligned)
 
 
-def _columns(gauge: Gauge, fault: Fault, values: Array) -> tuple[Array, list[tuple[int, int]]]:
-    """(3M, K) displacement by a unit of each number of a fault that is a size, and which numbers these are."""
+def _columns(gauge: Gauge, fault: Fault, values: Array) -> Iterator[tuple[tuple[int, int], Array]]:
+    """Yield each number of a fault that is a size, and (3M,) how its unit displaces the target."""
     fixed = {column for column, _ in fault.fixed}
-    numbers = [(p, d) for p in range(values.shape[0]) for d in range(values.shape[1]) if d not in fixed]
-    now, columns = gauge.slope(fault, values), []
-    for p, d in numbers:
-        step = float(np.abs(values[:, d]).max()) or _STEP
-        more = values.copy()
-        more[p, d] += step
-        columns.append((gauge.slope(fault, more) - now) / step)
-    return np.column_stack(columns), numbers
+    now = gauge.slope(fault, values)
+    for p, d in np.ndindex(*values.shape):
+        if d not in fixed:
+            step = float(np.abs(values[:, d]).max()) or _STEP
+            more = values.copy()
+            more[p, d] += step
+            yield (p, d), (gauge.slope(fault, more) - now) / step
 
 
-def _span(gauge: Gauge, parts: Sequence[Array]) -> Array:
+def _span(gauge: Gauge, every: Array) -> Array:
     """(3M, R) orthonormal: all that these columns can do beside the frames."""
-    every = np.column_stack(parts)
     aligned = every - gauge.frames @ (gauge.frames.T @ every)
     length = np.linalg.norm(every, axis=0)
     kept = np.linalg.norm(aligned, axis=0) > _SEEN * length
