@@ -1,4 +1,4 @@
-"""Another day: other poses, another place of instrument and target; the instrument's noise and what is recorded stay."""
+"""Another day: other poses, another place of instrument and target; noise and what is recorded stay."""
 
 import numpy as np
 import pytest
