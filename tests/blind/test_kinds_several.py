@@ -50,9 +50,13 @@ def test_nothing_changes_where_nothing_is_to():
 
 
 def test_two_to_four_robots_of_a_fleet_have_a_fault_of_their_own():
-    counts = Counter(len(case["several"].apart) for case in asked("fleet", 300))
+    cases = asked("fleet", 300)
+    counts = Counter(len(case["several"].apart) for case in cases)
     assert set(counts) == {2, 3, 4}
     assert min(counts.values()) > 60
+    assert set(name for case in cases for name in case["several"].apart) == set(LOCAL)
+    # an arm of four joints has two between the first and the last
+    assert all(max(Counter((*case["effects"], *case["several"].apart)).values()) <= 2 for case in cases)
 
 
 def test_faults_that_may_not_be_asked_are_not():

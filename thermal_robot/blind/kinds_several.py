@@ -25,6 +25,8 @@ PAIR, DAYS, ROBOTS = (2, 2), (12, 12), (10, 14)
 is the least of which the program tells a mean."""
 APART = (2, 4)
 """Fewest and most robots of a fleet with a fault of their own."""
+PLACES = 2
+"""Joints between the first and the last of the arm with the fewest: so many faults of one kind have room in a fleet."""
 _FLEETS: tuple[How, ...] = ("all", "hall", "")
 
 
@@ -83,6 +85,12 @@ def _fleets(local: Sequence[str], rng: np.random.Generator) -> Iterator[Asked]:
     menu: list[Asked] = [{"how": how, "moves": name} for how, name in product(_FLEETS, local)]
     for asked in in_turn(menu, rng):
         how, moves = asked["how"], asked["moves"] if asked["how"] else ""
-        apart = rng.choice(local, int(rng.integers(APART[0], APART[1] + 1)))
-        several = Several(ROBOTS, how, moves, apart=tuple(str(name) for name in apart))
-        yield {"effects": (moves,) if moves else (), "several": several}
+        effects = (moves,) if moves else ()
+        yield {"effects": effects, "several": Several(ROBOTS, how, moves, apart=_apart(effects, local, rng))}
+
+
+def _apart(shared: tuple[str, ...], local: Sequence[str], rng: np.random.Generator) -> tuple[str, ...]:
+    """Draw faults of single robots, no more of one kind than every arm has places for."""
+    places = [name for name in local for _ in range(PLACES - shared.count(name))]
+    count = min(int(rng.integers(APART[0], APART[1] + 1)), len(places))
+    return tuple(places[k] for k in rng.permutation(len(places))[:count])
