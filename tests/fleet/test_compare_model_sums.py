@@ -34,8 +34,10 @@ def seen(one, names, effect):
     return one.matrix[np.ix_(own, own)], one.vector[own]
 
 
-def test_it_is_what_the_rows_said_without_the_prior():
-    rows, model, names = said(diagnosed(1), diagnosed(2, frame="there", noise=2 * NOISE))
+@pytest.mark.parametrize("times", [1.0, 5.0])
+def test_it_is_what_the_rows_said_without_the_prior(times):
+    """Where the noise is large, what was expected beforehand is a part of all that is known."""
+    rows, model, names = said(diagnosed(1, noise=times * NOISE), diagnosed(2, frame="there", noise=2 * NOISE))
     matrix, vector = seen(model, names, "joint_offset")
     true, right = seen(rows, names, "joint_offset")
     np.testing.assert_allclose(matrix, true, atol=1e-4 * np.abs(true).max())
