@@ -59,3 +59,83 @@ def trial():
             "real", said(effect("geometric")), ["geometric"], right=True, asked="arm: untouched", answer="<geometric>"
         ),
     ]
+
+
+def change(name, place, how, after, amount=1e-4):
+    """What truly changes between campaigns."""
+    joint = {"kind": "joint", "name": place}
+    rest = {"how": how, "after": after, "amount": amount, "deviations": 4.0}
+    return {"effect": name, "place": joint, "parameter": f"{name}, {place}", **rest}
+
+
+def alarm(name, place, kind, after=None, size=1e-4, std=1e-5, span=None):
+    """A parameter that rings."""
+    early, late = span or (after, None if after is None else after + 1)
+    jump = {"after": after, "earliest": early, "latest": late} if kind == "jump" else None
+    told = {"effect": name, "place": place, "parameter": f"{name}, {place}", "alarm": True, "kind": kind}
+    return {**told, "jump": jump, "change": size, "change_std": std}
+
+
+def together(kind, diagnosis, true, effects=("joint_offset",), **more):
+    """A record of several campaigns."""
+    truth = {"effects": list(effects), "unlisted": None, "outliers": [], **true}
+    rest = {"id": "s1", "kind": kind, "robot": "ur3", "samples": 200, "measures": "position", "noise": NOISE}
+    rest |= {"without": [], "hidden": [], "fresh": None, "seconds": 9.0, "error": None}
+    return {**rest, "truth": truth, "said": diagnosis, **more}
+
+
+def compared(kind, told, *changes, named=("joint_offset",), **more):
+    """Two campaigns, and what is told to have changed: effects and places."""
+    diagnosis = {"verdict": {"effects": list(named)}, "changes": [{"effect": e, "place": p} for e, p in told]}
+    return together(kind, diagnosis, {"campaigns": 2, "changes": list(changes)}, **more)
+
+
+def series(kind, rings, *changes, **more):
+    """Twelve campaigns, and what rings."""
+    quiet = {**alarm("joint_offset", "j9", "constant"), "alarm": False}
+    return together(kind, {"parameters": [*rings, quiet]}, {"campaigns": 12, "changes": list(changes)}, **more)
+
+
+def told_shared(what, group=None):
+    """A parameter that is called shared: by all, or as differing between two halls."""
+    other = {"hall 1": "hall 2", "hall 2": "hall 1"}
+    groups = [{"group": other[group], "mean": 1e-6}, {"group": group, "mean": -1e-3}] if group else []
+    return {
+        "effect": what["effect"],
+        "parameter": what["parameter"],
+        "label": "hall" if group else "",
+        "groups": groups,
+    }
+
+
+def fleet(true, own, told, gathered=(), apart=(), found=(), **more):
+    """A small fleet."""
+    diagnosis = {"shared": list(told), "gathered": list(gathered), "apart": list(apart), "found": list(found)}
+    return together("fleet", diagnosis, {"campaigns": 10, "shared": list(true), "own": list(own)}, **more)
+
+
+def failed_together(kind, **more):
+    """A case of several campaigns without an answer."""
+    lost = {"error": "the diagnosis failed: late", "seconds": None, **more}
+    if kind == "fleet":
+        place = {"effect": "backlash", "parameter": "lost motion, j1", "place": J1}
+        return {**fleet([{**place, "group": None}], [{**place, "robot": "r1"}], []), "said": None, **lost}
+    if kind in ("same", "steady"):
+        return {**(compared if kind == "same" else series)(kind, []), "said": None, **lost}
+    made = {"changed": (compared, "changes"), "series": (series, "jumps")}[kind]
+    return {**made[0](kind, [], change("joint_offset", "j1", made[1], 0)), "said": None, **lost}
+
+
+def trial_of_several():
+    """Return records of several campaigns: 7 of them, of which 3 are wrong."""
+    jumps, grows = change("backlash", "j1", "jumps", 4), change("backlash", "j1", "grows", None)
+    place = {"effect": "joint_gain", "parameter": "gain error, j2", "place": J2}
+    return [
+        compared("same", [], id="k1"),
+        compared("changed", [("joint_offset", "j1")], change("joint_offset", "j1", "changes", 0), id="k2"),
+        series("steady", [alarm("backlash", "j1", "walk")], id="k3"),
+        series("series", [alarm("backlash", "j1", "jump", 4)], jumps, id="k4"),
+        series("series", [alarm("backlash", "j1", "jump", 4)], grows, id="k5"),
+        fleet([{**place, "group": "hall 2"}], [], [told_shared(place, "hall 2")], id="k6"),
+        failed_together("fleet", id="k7"),
+    ]

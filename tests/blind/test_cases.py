@@ -8,10 +8,10 @@ from typing import get_args
 
 import pytest
 from blind_fakes import RV_M2, case
-from blind_records import trial
+from blind_records import trial, trial_of_several
 
 from thermal_robot.blind import cases
-from thermal_robot.blind.cases import Case, Kind
+from thermal_robot.blind.cases import ASKS, SEVERAL, Case, Kind, Several
 from thermal_robot.blind.judged import HEADLINE
 
 
@@ -34,6 +34,13 @@ def test_a_case_asks_for_nothing_special_unless_told():
     assert 10 < asked.samples[0] < asked.samples[1]
 
 
+def test_several_campaigns_are_asked_by_their_kind_and_travel_too():
+    asked = Case("s1", 1, "series", RV_M2, ("drift",), several=Several((12, 12), "grows", "drift", (8.0, 16.0)))
+    assert pickle.loads(pickle.dumps(asked)) == asked
+    assert json.loads(json.dumps(asdict(asked)))["several"]["how"] == "grows"
+    assert set(SEVERAL) == set(ASKS) < set(get_args(Kind))
+
+
 def test_every_kind_can_be_judged():
     assert set(HEADLINE) == set(get_args(Kind))
 
@@ -41,7 +48,7 @@ def test_every_kind_can_be_judged():
 def test_records_have_the_fields_that_are_listed():
     listed = set(re.findall(r'"(\w+)":', cases.__doc__))
     real = {"right", "asked", "answer"}  # which a real case adds when it judges
-    for record in trial():
+    for record in (*trial(), *trial_of_several()):
         assert set(record) - real <= listed
         assert set(record["truth"]) <= listed
         assert record["kind"] in get_args(Kind)

@@ -3,6 +3,7 @@
 import json
 import subprocess
 import sys
+from dataclasses import replace
 from types import SimpleNamespace
 
 import pytest
@@ -165,6 +166,19 @@ def test_without_mujoco_one_line_says_what_to_install(run, monkeypatch):
     status, out, err = run()
     assert (status, out) == (2, "")
     assert err == 'thermal-robot: the blind trial needs MuJoCo: pip install "thermal-robot[blind]"\n'
+
+
+def test_fleets_without_pyarrow_are_refused_before_anything_is_made(run, asked, monkeypatch):
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None if name == "pyarrow" else name)
+    assert run("--seed", 1)[0] == 0
+    asked.pop("cases")
+    fleets = SimpleNamespace(plan=lambda *_: (replace(case("s1"), kind="fleet"),), robots=tuple, ROBOTS=ROBOTS)
+    monkeypatch.setitem(
+        sys.modules, "thermal_robot.blind.plan", SimpleNamespace(**vars(fleets), SHORT=SHORT, FULL=FULL)
+    )
+    status, _, err = run("--seed", 1)
+    assert (status, "cases" in asked) == (2, False)
+    assert err == 'thermal-robot: fleets in the trial need pyarrow: pip install "thermal-robot[blind]"\n'
 
 
 def test_other_commands_load_nothing_of_the_trial():

@@ -9,8 +9,9 @@ pytest.importorskip("mujoco", reason='the blind trial needs "thermal-robot[blind
 
 from scipy.stats import binom
 
+from thermal_robot.blind.cases import SEVERAL
 from thermal_robot.blind.kinds import CONDITION, RANDOM
-from thermal_robot.blind.plan import plan, robots
+from thermal_robot.blind.plan import FULL, SHORT, plan, robots
 from thermal_robot.blind.reality import FAULTS, UNLISTED
 from thermal_robot.errors import EffectError, RobotError
 
@@ -70,6 +71,19 @@ def test_each_robot_is_as_probable_as_any_other(arms):
     cases = plan(7, {"null": 400}, two)
     low, high = binom.ppf([1e-5, 1 - 1e-5], 400, 0.5)
     assert low <= sum(case.robot.name == "other" for case in cases) <= high
+
+
+@pytest.mark.parametrize("size", [SHORT, FULL], ids=["short", "full"])
+def test_whoever_asks_for_several_campaigns_has_the_same_single_ones(arms, size):
+    alone = {kind: count for kind, count in size.items() if kind not in SEVERAL}
+    cases = plan(9, size, arms)
+    assert [case for case in cases if case.several is None] == list(plan(9, alone, arms))
+    together = [case for case in cases if case.several is not None]
+    assert Counter(case.kind for case in together) == {kind: size[kind] for kind in SEVERAL}
+    assert {case.id[0] for case in together} == {"s"}
+    # a stream of their own: single ones change nothing of them either
+    assert together == list(plan(9, {kind: size[kind] for kind in SEVERAL}, arms))
+    assert together != list(plan(10, {kind: size[kind] for kind in SEVERAL}, arms))
 
 
 @pytest.mark.parametrize(

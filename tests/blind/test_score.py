@@ -3,7 +3,7 @@
 import json
 
 import pytest
-from blind_records import crash, record, said, trial
+from blind_records import crash, record, said, trial, trial_of_several
 
 from thermal_robot.blind.report.markdown import markdown
 from thermal_robot.blind.report.page import html
@@ -50,7 +50,31 @@ def test_misses_can_be_looked_up():
     assert misses["a3"].unexplained == "none"
 
 
-@pytest.mark.parametrize("records", [[], trial(), [crash("single", "drift")], [record("null", said())]])
+def test_several_campaigns_are_scored_beside_and_change_no_figure_of_single_ones():
+    alone, whole = score(trial()).to_dict(), score([*trial(), *trial_of_several()]).to_dict()
+    assert [k["kind"] for k in whole["kinds"]][-5:] == ["same", "changed", "steady", "series", "fleet"]
+    assert whole["kinds"][: len(alone["kinds"])] == alone["kinds"]
+    counted = {"kinds", "cases", "failed", "misses", "changes"}
+    assert {name for name in alone if alone[name] != whole[name]} == counted
+    assert (whole["cases"], whole["failed"]) == (alone["cases"] + 7, alone["failed"] + 1)
+    misses = {m["id"]: m for m in whole["misses"]}
+    assert {name for name in misses if name.startswith("k")} == {"k3", "k5", "k7"}
+    assert (misses["k5"]["truth"], misses["k5"]["wrong"]) == (
+        ["backlash grows, j1"],
+        [
+            "exact",
+            "way",
+        ],
+    )
+    assert misses["k5"]["said"] == ["backlash, j1: jump after campaign 5"]
+    assert misses["k7"]["error"] == "the diagnosis failed: late"
+    by_change = {name: rates["exact"]["successes"] for name, rates in whole["changes"].items()}
+    assert by_change == {"backlash grows": 0, "backlash jumps": 1, "joint_offset changes": 1}
+
+
+@pytest.mark.parametrize(
+    "records", [[], trial(), trial_of_several(), [crash("single", "drift")], [record("null", said())]]
+)
 def test_whatever_was_asked_can_be_written(records):
     plain = score(records).to_dict()
     assert json.loads(json.dumps(plain, allow_nan=False)) == plain

@@ -12,6 +12,7 @@ import pytest
 from blind_fakes import AtOnce, Real, alive, case, light, put_examinee, rms, simulated
 
 from thermal_robot.blind import supervise, trial
+from thermal_robot.blind.cases import Several
 from thermal_robot.blind.sealed import canonical
 from thermal_robot.blind.trial import run_trial
 from thermal_robot.errors import SealError, ThermalRobotError
@@ -170,6 +171,18 @@ def test_the_distance_is_that_of_a_hand_calculation(fake):
     real = records[2]
     assert (real["kind"], real["robot"], real["asked"]) == ("real", "arm", "untouched")
     assert (real["right"], real["fresh"], real["answer"], records[3]["answer"]) == (True, None, None, "r1")
+
+
+def test_of_several_campaigns_the_request_says_what_is_asked_and_no_more(fake):
+    asks = {"same": "comparison", "changed": "comparison", "steady": "wear", "series": "wear", "fleet": "fleet"}
+    cases = [
+        replace(case(f"s{k}", "backlash", own=""), kind=kind, several=Several((2, 2), "grows", "backlash"))
+        for k, kind in enumerate(asks)
+    ]
+    records = run_trial(cases, fake, light)
+    for record, asked in zip(records, cases, strict=True):
+        folder = str(fake.resolve() / "campaigns" / asked.id)
+        assert record["said"]["was"] == {"folder": folder, "without": [], "only": [], "asks": asks[asked.kind]}
 
 
 def test_a_crash_and_a_late_answer_are_errors_of_one_case_only(fake):

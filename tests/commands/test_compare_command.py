@@ -57,3 +57,18 @@ def test_one_campaign_and_another_robot_are_bad_input(run, days, tmp_path):
     assert told.count("\n") == 1
     assert not (tmp_path / "c.json").exists()
     assert run("compare", days / "before", days / "none")[0] == 2
+
+
+def test_a_model_file_stands_for_its_campaign(run, days, tmp_path):
+    model = tmp_path / "before.model.json"
+    assert run("diagnose", days / "before", "--only", *ONLY, "--model", model)[0] == 0
+    page = tmp_path / "c.html"
+    status, out, _ = run("compare", model, days / "after", "--only", *ONLY, "--report", page)
+    assert status == 0
+    assert "joint_3 changed since after" in " ".join(out.split())
+    assert "before.model.json: A model file" in out
+    assert "before.model.json" in page.read_text(encoding="utf-8")  # with its checksum
+    model.write_text(model.read_text().replace("joint_offset", "joint_offsat"))
+    status, _, told = run("compare", model, days / "after")
+    assert (status, told.count("\n")) == (2, 1)
+    assert "joint_offsat" in told

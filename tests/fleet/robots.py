@@ -8,6 +8,7 @@ import time
 from pathlib import Path
 
 import numpy as np
+from threadpoolctl import threadpool_info
 
 import thermal_robot as tr
 from thermal_robot.fleet.rows import write_rows
@@ -37,6 +38,12 @@ def square(number, slow, deadly=()):
     if number in deadly:
         os.kill(os.getpid(), signal.SIGKILL)
     return number * number
+
+
+def threads():
+    """How many threads this process multiplies matrices with, as a set of what its libraries say."""
+    np.ones((2, 2)) @ np.ones((2, 2))
+    return {pool["num_threads"] for pool in threadpool_info()}
 
 
 def scattered(rng, robots, mean, spread, deviations):

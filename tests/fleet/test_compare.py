@@ -91,7 +91,7 @@ def test_what_cannot_be_compared_is_refused():
         tr.compare(diagnosed(1))
     with pytest.raises(tr.CampaignError, match="one is needed for each campaign"):
         tr.compare(diagnosed(1), diagnosed(2), names=["one"])
-    with pytest.raises(tr.CampaignError, match="campaigns, paths of them, or diagnoses"):
+    with pytest.raises(tr.CampaignError, match="campaigns, their diagnoses, models, or paths"):
         tr.compare(diagnosed(1), 3)
     arm = tr.load_robot("example-robot-data:ur5", "tool0")
     other = tr.diagnose(tr.simulate(arm, rows=40, noise=NOISE), only="joint_offset")

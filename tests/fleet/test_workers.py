@@ -11,7 +11,7 @@ from pathlib import Path
 
 import psutil
 import pytest
-from fleet.robots import square
+from fleet.robots import square, threads
 
 from thermal_robot.errors import ThermalRobotError
 from thermal_robot.fleet.workers import answers, client
@@ -103,14 +103,6 @@ def test_nobody_else_can_reach_it(cluster):
     ]
     assert listening
     assert set(listening) == {"127.0.0.1"}
-
-
-def threads():
-    import numpy as np
-    from threadpoolctl import threadpool_info
-
-    np.ones((2, 2)) @ np.ones((2, 2))
-    return {pool["num_threads"] for pool in threadpool_info()}
 
 
 def test_each_process_has_one_thread_for_matrices(cluster):

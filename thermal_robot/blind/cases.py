@@ -19,8 +19,15 @@ A **record** is what is known of one case after its seal was opened, as plain JS
                                        quantity "none": it follows nothing that is recorded
         "near": [{"kind": "joint", "name": ...}],    these places and those beside them
         "needs": ["temperature"],      columns that the diagnosis should ask for (hidden condition)
-        "outliers": [17, 80]},
-     "said": {diagnosis JSON of formats.md} | null,
+        "outliers": [17, 80],
+        "campaigns": 12,               of several campaigns: how many;
+        "changes": [{"effect": "backlash", "place": {"kind": "joint", "name": ...}, "parameter": "lost motion, ...",
+                     "how": "grows", "after": 4 | null, "amount": 2e-4, "deviations": 9.1}],
+                                       what changes between them, SI; "after": number of the last one before, from 0;
+        "shared": [{"effect": ..., "place": {...}, "parameter": ..., "group": "hall 1" | null}],
+                                       what robots have in common, all of them or those of one hall;
+        "own": [{"robot": "r03", "effect": ..., "place": {...}, "parameter": ...}]},   and what one robot has alone
+     "said": {diagnosis JSON of formats.md; of several: of a comparison, of wear, of a fleet} | null,
      "fresh": {"rms_before": 1.2e-4, "rms_after": 2.0e-6,   rms distance on noise-free fresh samples, m: frames alone,
                                        and the corrected model
                "shares": {"drift": 0.9}} | null,            of each effect in the model, on the same samples
@@ -47,7 +54,20 @@ Kind = Literal[
     "unlisted",
     "both",
     "real",
+    "same",
+    "changed",
+    "steady",
+    "series",
+    "fleet",
 ]
+How = Literal["", "changes", "begins", "jumps", "grows", "all", "hall"]
+"""What changes between campaigns of one robot, and how; which robots of a fleet share a fault."""
+
+ASKS = {"same": "comparison", "changed": "comparison", "steady": "wear", "series": "wear", "fleet": "fleet"}
+"""Kinds of several campaigns, and what is asked of them: the request says no more."""
+SEVERAL = tuple(ASKS)
+LISTED = "campaigns.csv"
+"""The list of several campaigns in a case's folder: ``campaign``, and ``date`` or ``robot`` and ``hall``."""
 
 
 @dataclass(frozen=True)
@@ -67,6 +87,32 @@ class RobotChoice:
     name: str
     urdf: str
     tool_frame: str
+
+
+@dataclass(frozen=True)
+class Several:
+    """What a case of several campaigns asks beside.
+
+    Attributes
+    ----------
+    campaigns
+        How many: drawn between the two.
+    how
+        What is true of them; empty where nothing changes, and where nothing is shared.
+    moves
+        The effect of which one parameter changes, or that is shared.
+    change
+        How large a change is: deviations of the difference between two campaigns for ``changes``, of one campaign
+        else; drawn between the two, evenly in its logarithm.
+    apart
+        Effects of a fleet that one robot has, each another one.
+    """
+
+    campaigns: tuple[int, int]
+    how: How = ""
+    moves: str = ""
+    change: tuple[float, float] = (4.0, 4.0)
+    apart: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -104,6 +150,8 @@ class Case:
         Whether the noise has Student's law, with 3 to 8 degrees of freedom.
     own
         ``file.py:NAME`` of a fault of the user's own; its name is the unlisted cause, or the only effect.
+    several
+        For the kinds of :data:`SEVERAL`.
     """
 
     id: str
@@ -120,3 +168,4 @@ class Case:
     wants: tuple[str, ...] = ()
     heavy: bool = False
     own: str = ""
+    several: Several | None = None

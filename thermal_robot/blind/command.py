@@ -88,6 +88,7 @@ def run(options: argparse.Namespace) -> None:
             print(text, file=notes, flush=True)
 
     cases = _cases(options, seed, tell)
+    _require_tables(cases)
     tell(f"Seed {seed}: {len(cases)} cases in {directory}")
     records = _records(cases, directory, seed, options, tell)
     _tell(records, options)
@@ -211,6 +212,14 @@ def _robots(urdfs: Sequence[str], tools: Sequence[str]) -> tuple[RobotChoice, ..
         raise ThermalRobotError(f"each --robot needs its --tool: found {len(urdfs)} and {len(tools)}")
     own = [(Path(urdf.rpartition(":")[2]).stem, urdf, tool) for urdf, tool in zip(urdfs, tools, strict=True)]
     return robots(own or ROBOTS)
+
+
+def _require_tables(cases: Sequence[Case | RealCase]) -> None:
+    """Refuse before the first campaign is made what would fail after the last."""
+    from importlib.util import find_spec
+
+    if any(getattr(case, "kind", "") == "fleet" for case in cases) and find_spec("pyarrow") is None:
+        raise ThermalRobotError('fleets in the trial need pyarrow: pip install "thermal-robot[blind]"')
 
 
 def _require_mujoco() -> None:

@@ -6,6 +6,9 @@
     {"said": {diagnosis} | null, "predicted": [[x, y, z], ...] | null, "refitted": {"drift+backlash": [[x, y, z], ...]},
      "seconds": 0.4, "error": null | "..."}
 
+A request for several campaigns has ``"asks"``, too (:data:`thermal_robot.blind.cases.ASKS`); what is said is then a
+comparison, a robot over time or a fleet, and nothing is predicted.
+
 Before the first it writes ``{"ready": true}``. ``DIRECTORY`` is that of the trial.
 """
 
@@ -22,6 +25,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.blind.examinee_several import ANSWERS
 from thermal_robot.blind.refitted import refitted
 from thermal_robot.campaign import read_campaign
 from thermal_robot.correction import CorrectedModel
@@ -64,13 +68,17 @@ class Fence:
 
 def answer(request: dict[str, Any]) -> dict[str, Any]:
     """Diagnose a campaign and predict its fresh samples; whatever goes wrong becomes the reply's error."""
-    folder = Path(request["folder"])
+    folder, asks = Path(request["folder"]), request.get("asks", "diagnosis")
     reply: dict[str, Any] = {"said": None, "predicted": None, "refitted": {}, "seconds": None, "error": None}
-    at = "diagnosis"
+    at = asks
     try:
         # what the library does not have need not be taken out of it
         without = [name for name in request["without"] if name in library()]
         start = time.perf_counter()
+        if asks in ANSWERS:
+            reply["said"] = ANSWERS[asks](folder, request["only"])
+            reply["seconds"] = time.perf_counter() - start
+            return reply
         found = diagnose(folder / CAMPAIGN, only=request["only"] or None, without=without)
         reply["seconds"] = time.perf_counter() - start
         reply["said"] = found.to_dict()

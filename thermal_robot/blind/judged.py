@@ -22,13 +22,16 @@ right         removed, unlisted: flagged and nothing blamed; both: that, and lis
 ============= =====================================================================================================
 
 An effect that is not among the truth's but leaves 0.1 noise or more is no false alarm: it is at work. Below 0.5 it is
-not asked for either.
+not asked for either. Of several campaigns: :mod:`thermal_robot.blind.judged_several`.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from typing import Any
+
+from thermal_robot.blind import judged_several
+from thermal_robot.blind.cases import SEVERAL
 
 Plain = Mapping[str, Any]
 Record = Plain
@@ -42,7 +45,7 @@ BAD = frozenset({"false_alarm"})
 KNOWN = ("single", "large", "visits", "lags", "pair", "many", "null", "hard")
 """Kinds of which all causes are in the library."""
 HEADLINE = {
-    **dict.fromkeys(KNOWN, "exact"),
+    **dict.fromkeys((*KNOWN, *SEVERAL), "exact"),
     "mixed": "sound",
     **dict.fromkeys(("removed", "hidden", "unlisted", "both", "real"), "right"),
 }
@@ -52,6 +55,7 @@ _SILENT: dict[str, Any] = {
     "effects": [],
     "unexplained": {"locations": [], "depends_on": []},
     "next": {"advice": ""},
+    **{what: [] for what in ("changes", "parameters", "shared", "gathered", "apart", "found")},
 }
 
 
@@ -241,6 +245,10 @@ def _stem(column: str) -> str:
     return column.partition(".")[0]
 
 
+def _several(judge: Callable[[Plain, Plain], Marks]) -> Callable[[Record], Marks]:
+    return lambda record: judge(record["truth"], said(record))
+
+
 def _real(record: Record) -> Marks:
     return {"right": (bool(record.get("right", False)),)}
 
@@ -252,4 +260,7 @@ _ASKED: dict[str, Callable[[Record], Marks]] = {
     "both": _both,
     "hidden": _hidden,
     "real": _real,
+    **dict.fromkeys(("same", "changed"), _several(judged_several.compared)),
+    **dict.fromkeys(("steady", "series"), _several(judged_several.followed)),
+    "fleet": _several(judged_several.shared),
 }

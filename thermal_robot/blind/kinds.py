@@ -75,7 +75,7 @@ def turns(kind: str, effects: Sequence[str], causes: Sequence[str], rng: np.rand
     menu = _menu(kind, effects, apart, causes)
     if not menu or (kind == "both" and not apart):
         raise EffectError(f"no case of kind {kind!r} can be made of {', '.join(effects)}")
-    return _beside(menu, apart, rng) if kind == "both" else _in_turn(menu, rng)
+    return _beside(menu, apart, rng) if kind == "both" else in_turn(menu, rng)
 
 
 def _menu(kind: str, effects: Sequence[str], apart: Sequence[str], causes: Sequence[str]) -> list[Asked]:
@@ -88,7 +88,7 @@ def _menu(kind: str, effects: Sequence[str], apart: Sequence[str], causes: Seque
         "visits": [{"effects": (n,), "wants": ("repeats",)} for n in effects if n == "encoder_resolution"],
         "lags": [{**asked, "ratio": LAGGING} for asked in LAGS if asked["effects"][0] in effects],
         "hard": [{"effects": (name,), **HARD} for name in apart],
-        "pair": [{"effects": chosen} for chosen in combinations(apart, 2) if not _alike(chosen)],
+        "pair": [{"effects": chosen} for chosen in combinations(apart, 2) if not alike(chosen)],
         # one that the library does not have yet needs not be taken out
         "removed": [{"effects": (n,), "without": (n,) if n in library() else ()} for n in apart if n not in contained],
         "hidden": [{"effects": (name,), "hidden": CONDITION[name]} for name in apart if name in CONDITION],
@@ -98,7 +98,7 @@ def _menu(kind: str, effects: Sequence[str], apart: Sequence[str], causes: Seque
     return menus[kind]
 
 
-def _in_turn(menu: Sequence[Asked], rng: np.random.Generator) -> Iterator[Asked]:
+def in_turn(menu: Sequence[Asked], rng: np.random.Generator) -> Iterator[Asked]:
     """Yield every item as often as any other."""
     while True:
         for k in rng.permutation(len(menu)):
@@ -107,7 +107,7 @@ def _in_turn(menu: Sequence[Asked], rng: np.random.Generator) -> Iterator[Asked]
 
 def _beside(menu: Sequence[Asked], apart: Sequence[str], rng: np.random.Generator) -> Iterator[Asked]:
     """Yield causes in turn, each with one or two effects by chance."""
-    for asked in _in_turn(menu, rng):
+    for asked in in_turn(menu, rng):
         yield {**asked, "effects": _several(apart, int(rng.integers(1, 3)), rng)}
 
 
@@ -122,7 +122,7 @@ def _together(apart: Sequence[str], rng: np.random.Generator) -> Iterator[Asked]
 def _several(apart: Sequence[str], number: int, rng: np.random.Generator) -> tuple[str, ...]:
     while True:
         chosen = tuple(apart[k] for k in sorted(rng.permutation(len(apart))[:number]))
-        if not _alike(chosen):
+        if not alike(chosen):
             return chosen
 
 
@@ -145,5 +145,6 @@ def _containing(chosen: Sequence[str]) -> bool:
     return any(inner in CONTAINS.get(outer, ()) for outer in chosen for inner in chosen)
 
 
-def _alike(chosen: Sequence[str]) -> bool:
+def alike(chosen: Sequence[str]) -> bool:
+    """Whether one of them contains another, or can do nearly the same."""
     return _containing(chosen) or any(inner in IMITATES.get(outer, ()) for outer in chosen for inner in chosen)

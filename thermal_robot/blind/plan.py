@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, get_args
+from typing import get_args
 
 import numpy as np
 
-from thermal_robot.blind.cases import Case, Kind, RobotChoice
-from thermal_robot.blind.kinds import turns
+from thermal_robot.blind.cases import SEVERAL, Case, Kind, RobotChoice
+from thermal_robot.blind.kinds import Asked, turns
+from thermal_robot.blind.kinds_several import turns_of_several
 from thermal_robot.errors import EffectError, RobotError
 from thermal_robot.robot import load_robot
 
@@ -43,6 +44,11 @@ SHORT = {
     "hidden": 2,
     "unlisted": 8,
     "both": 2,
+    "same": 1,
+    "changed": 2,
+    "steady": 1,
+    "series": 2,
+    "fleet": 1,
 }
 FULL = {
     "single": 200,
@@ -58,6 +64,11 @@ FULL = {
     "hidden": 24,
     "unlisted": 216,
     "both": 48,
+    "same": 60,
+    "changed": 100,
+    "steady": 60,
+    "series": 96,
+    "fleet": 30,
 }
 
 
@@ -108,7 +119,7 @@ def plan(
     Returns
     -------
     tuple of Case
-        In a drawn order, so that a case's number tells nothing.
+        In a drawn order, so that a case's number tells nothing; those of several campaigns after the others.
 
     Raises
     ------
@@ -125,20 +136,42 @@ def plan(
     for name in (*only_effects, *unlisted):
         if name not in FAULTS and name not in UNLISTED:
             raise EffectError(f"the trial cannot make {name!r}; it can make {', '.join((*FAULTS, *UNLISTED))}")
-    rng = np.random.default_rng([seed, 4])
     effects = [name for name in (only_effects or FAULTS) if name in FAULTS]
     causes = list(unlisted or UNLISTED)
-    drawn: list[dict[str, Any]] = []
+    alone = {kind: count for kind, count in counts.items() if kind not in SEVERAL}
+    together = {kind: count for kind, count in counts.items() if kind in SEVERAL}
+    rng = np.random.default_rng([seed, 4])
+    drawn = _drawn(alone, lambda kind: turns(kind, effects, causes, rng))
+    cases = _cases("c", drawn, alone, robots, rng)
+    # a stream of their own: whoever asks for several campaigns, too, has the same single ones
+    own = np.random.default_rng([seed, 6])
+    drawn = _drawn(together, lambda kind: turns_of_several(kind, effects, own))
+    return (*cases, *_cases("s", drawn, together, robots, own))
+
+
+def _drawn(counts: Mapping[str, int], turn_of: Callable[[str], Iterator[Asked]]) -> list[Asked]:
+    """Draw what is asked, kind by kind."""
+    drawn: list[Asked] = []
     for kind, count in counts.items():
-        turn = turns(kind, effects, causes, rng)
+        turn = turn_of(kind)
         drawn += [{"kind": kind, **next(turn)} for _ in range(count)]
+    return drawn
+
+
+def _cases(
+    letter: str,
+    drawn: Sequence[Asked],
+    counts: Mapping[str, int],
+    robots: Sequence[RobotChoice],
+    rng: np.random.Generator,
+) -> Iterator[Case]:
+    """Yield cases in a drawn order, each with a seed and a robot."""
     order = rng.permutation(len(drawn))
     seeds = rng.integers(2**62, size=len(drawn))
     places = {kind: 0 for kind in counts}
-    cases: list[Case] = []
     for number, k in enumerate(order):
         asked = drawn[k]
         turn_of_robot = places[str(asked["kind"])] + int(rng.integers(len(robots)))
         places[str(asked["kind"])] += 1
-        cases.append(Case(f"c{number:04d}", int(seeds[number]), robot=robots[turn_of_robot % len(robots)], **asked))
-    return tuple(cases)
+        robot = robots[turn_of_robot % len(robots)]
+        yield Case(f"{letter}{number:04d}", int(seeds[number]), robot=robot, **asked)

@@ -11,7 +11,7 @@ from typing import Any, get_args
 import numpy as np
 
 from thermal_robot.blind.calibration import Calibration, calibration
-from thermal_robot.blind.cases import Kind
+from thermal_robot.blind.cases import SEVERAL, Kind
 from thermal_robot.blind.confusion import Confusion, confusion
 from thermal_robot.blind.coverage import Coverage, coverage
 from thermal_robot.blind.detection import Detection, detection
@@ -28,6 +28,7 @@ from thermal_robot.blind.judged import (
     marks,
     said,
 )
+from thermal_robot.blind.judged_several import said_words, true_words
 from thermal_robot.blind.laws import sure_laws
 from thermal_robot.blind.rate import Rate, rate
 from thermal_robot.blind.shrinkage import Shrinkage, Spread, fresh_ratio, shrinkage, spread, worse
@@ -131,6 +132,9 @@ class Score:
         Of the same cases and those with nothing at work.
     removed, unlisted
         Rates by effect that was taken out of the library, and by cause that no library knows, alone or beside effects.
+    changes
+        Of several campaigns of one robot: rates by what changes, and how. The figures below are of cases of a single
+        campaign.
     laws
         Laws printed at 0.9 or more: how many are right.
     worse
@@ -156,6 +160,7 @@ class Score:
     by_robot: Mapping[str, Mapping[str, Rate]]
     removed: Mapping[str, Mapping[str, Rate]]
     unlisted: Mapping[str, Mapping[str, Rate]]
+    changes: Mapping[str, Mapping[str, Rate]]
     laws: Rate
     worse: Rate
     coverage: Coverage
@@ -187,6 +192,7 @@ def score(records: Sequence[Record]) -> Score:
     """
     of_kind = {kind: [r for r in records if r["kind"] == kind] for kind in get_args(Kind)}
     known = [r for kind in KNOWN for r in of_kind[kind] if at_work(r)]
+    alone = [r for r in records if r["kind"] not in SEVERAL]
     tables = {name: confusion(records, kinds) for name, kinds in CONFUSIONS.items()}
     return Score(
         cases=len(records),
@@ -196,14 +202,15 @@ def score(records: Sequence[Record]) -> Score:
         by_robot=_grouped((r["robot"], r) for r in (*known, *of_kind["null"])),
         removed=_grouped((name, r) for r in of_kind["removed"] for name in at_work(r)),
         unlisted=_grouped((str(r["truth"]["unlisted"]), r) for r in (*of_kind["unlisted"], *of_kind["both"])),
-        laws=sure_laws(records),
-        worse=worse(records),
-        coverage=coverage(records),
-        shrinkage=shrinkage(records),
-        calibration=calibration(records),
+        changes=_grouped((f"{c['effect']} {c['how']}", r) for r in records for c in r["truth"].get("changes", ())),
+        laws=sure_laws(alone),
+        worse=worse(alone),
+        coverage=coverage(alone),
+        shrinkage=shrinkage(alone),
+        calibration=calibration(alone),
         confusion={name: table for name, table in tables.items() if table.rows},
-        detection=detection(records),
-        seconds=_seconds([float(r["seconds"]) for r in records if r.get("seconds") is not None]),
+        detection=detection(alone),
+        seconds=_seconds([float(r["seconds"]) for r in alone if r.get("seconds") is not None]),
         real=tuple(
             RealAnswer(r["id"], r["robot"], r.get("asked", ""), r.get("answer", ""), all(marks(r)["right"]))
             for r in of_kind["real"]
@@ -253,20 +260,33 @@ def _seconds(values: Sequence[float]) -> Seconds:
 
 
 def _miss(record: Record) -> Miss:
-    truth, verdict = record["truth"], said(record)["verdict"]
-    place, quantity = answer(record)
-    where = f"{place[1] or place[0]}, {quantity}" if place else str(quantity or "somewhere")
+    true, told = _told_of_several(record) if record["kind"] in SEVERAL else _told(record)
     return Miss(
         id=record["id"],
         kind=record["kind"],
         robot=record["robot"],
-        truth=(*at_work(record), *([truth["unlisted"]] if truth.get("unlisted") else [])),
-        said=tuple(verdict["effects"]),
-        unexplained=where if verdict["unexplained"] else None,
-        probability=None if failed(record) else verdict["probability"],
+        truth=true,
+        **told,
         wrong=tuple(q for q, given in marks(record).items() if any(a == (q in BAD) for a in given)),
         error=(record.get("error") or "no diagnosis") if failed(record) else None,
     )
+
+
+def _told(record: Record) -> tuple[tuple[str, ...], dict[str, Any]]:
+    truth, verdict = record["truth"], said(record)["verdict"]
+    place, quantity = answer(record)
+    where = f"{place[1] or place[0]}, {quantity}" if place else str(quantity or "somewhere")
+    true = (*at_work(record), *([truth["unlisted"]] if truth.get("unlisted") else []))
+    return true, {
+        "said": tuple(verdict["effects"]),
+        "unexplained": where if verdict["unexplained"] else None,
+        "probability": None if failed(record) else verdict["probability"],
+    }
+
+
+def _told_of_several(record: Record) -> tuple[tuple[str, ...], dict[str, Any]]:
+    told = said_words(record["kind"], said(record))
+    return true_words(record["truth"]), {"said": told, "unexplained": None, "probability": None}
 
 
 def _plain(value: Any) -> Any:

@@ -17,7 +17,7 @@ from multiprocessing import get_context
 from pathlib import Path
 from typing import Any, Protocol
 
-from thermal_robot.blind.cases import Case
+from thermal_robot.blind.cases import ASKS, Case
 from thermal_robot.blind.sealed import open_seal, seal
 from thermal_robot.blind.shares import shares
 from thermal_robot.blind.supervise import examine
@@ -157,7 +157,10 @@ def _judged(cases: Sequence[Case | RealCase], records: list[Plain]) -> list[Plai
 
 
 def _request(case: Case | RealCase, folder: Path) -> Plain:
-    return {"folder": str(folder / CAMPAIGNS / case.id), "without": list(getattr(case, "without", ())), "only": []}
+    folder = folder / CAMPAIGNS / case.id
+    request = {"folder": str(folder), "without": list(getattr(case, "without", ())), "only": []}
+    several = isinstance(case, Case) and case.several is not None
+    return {**request, "asks": ASKS[case.kind]} if several else request  # type: ignore[union-attr]
 
 
 def _identity(cases: Sequence[Case | RealCase]) -> Plain:

@@ -13,14 +13,17 @@ from thermal_robot.console import stages
 from thermal_robot.errors import CampaignError
 from thermal_robot.files import checksum, require_free, write_text
 
-DOES = "say what campaigns of one robot share, and what changed between them"
+DOES = "say what campaigns or models of one robot share, and what changed between them"
 EXAMPLE = " january june december --report compared.html"
 
 
 def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Define the options of ``thermal-robot compare``."""
     parser.add_argument(
-        "campaigns", nargs="*", metavar="campaign", help="two or more in order of time: campaign.toml, or its folder"
+        "campaigns",
+        nargs="*",
+        metavar="campaign",
+        help="two or more in order of time: campaign.toml, its folder, or a model",
     )
     parser.add_argument("--json", metavar="F", help="write the comparison as JSON ('-' prints it instead of the text)")
     parser.add_argument("--report", metavar="F.html", help="write a page with figures ('-' prints it)")
@@ -34,10 +37,14 @@ def run(options: argparse.Namespace) -> None:
     """Compare campaigns, print the result and write what is asked for."""
     from thermal_robot.campaign.declaration import read_declaration
     from thermal_robot.fleet.compare import compare
+    from thermal_robot.fleet.compare_model import is_model
     from thermal_robot.report import comparison_html
 
     files: list[Path] = []
     for campaign in options.campaigns:
+        if is_model(campaign):
+            files.append(Path(campaign))
+            continue
         declaration = read_declaration(Path(campaign))
         robot = [declaration.robot] if isinstance(declaration.robot, Path) else []
         files += [declaration.file, declaration.table, *robot]

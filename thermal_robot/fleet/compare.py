@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable, Iterable, Sequence
+from dataclasses import replace
 from itertools import groupby
 from pathlib import Path
 from typing import Any
@@ -12,12 +13,15 @@ import numpy as np
 from threadpoolctl import threadpool_limits
 
 from thermal_robot.campaign import Campaign
+from thermal_robot.correction import CorrectedModel
 from thermal_robot.diagnosis import Diagnosis, diagnose
 from thermal_robot.effects import Effect
 from thermal_robot.errors import CampaignError, require
 from thermal_robot.fleet.compare_effects import Candidate, candidates
 from thermal_robot.fleet.compare_joint import Change as Differs
 from thermal_robot.fleet.compare_joint import Joint, joint
+from thermal_robot.fleet.compare_model import Known, is_model, known
+from thermal_robot.fleet.compare_model_sums import sums_of_model
 from thermal_robot.fleet.compare_names import judged
 from thermal_robot.fleet.compare_parameters import equal, parameters
 from thermal_robot.fleet.compare_poses import predicted
@@ -33,7 +37,7 @@ Owners = Sequence[tuple[int, int]]
 
 
 def compare(
-    *campaigns: Campaign | Diagnosis | str | Path,
+    *campaigns: Campaign | Diagnosis | CorrectedModel | str | Path,
     names: Sequence[str] = (),
     only: Iterable[str] | None = None,
     without: Iterable[str] = (),
@@ -49,7 +53,8 @@ def compare(
     Parameters
     ----------
     *campaigns
-        Two or more, in the order in which they were measured: campaigns, paths of them, or their diagnoses.
+        Two or more, in the order in which they were measured: campaigns, their diagnoses, corrected models, or paths of
+        campaigns and of model files (``.json``). A model says nothing of effects that it does not hold.
     names
         What they are called; by default their own names.
     only, without, effects
@@ -65,7 +70,8 @@ def compare(
     Raises
     ------
     CampaignError
-        Fewer than two campaigns; campaigns of different robots; one that is not usable.
+        Fewer than two campaigns; campaigns of different robots; one that is not usable; a model that does not say how
+        sure it is.
     EffectError, EstimationError
         As :func:`~thermal_robot.diagnose`.
 
@@ -79,33 +85,40 @@ def compare(
     >>> [(change.effect, change.place, change.since) for change in found.changes]
     [('joint_offset', 'joint_3', 'friday')]
     """
-    expected = "campaigns, paths of them, or diagnoses"
+    expected = "campaigns, their diagnoses, models, or paths of campaigns and models"
     for campaign in campaigns:
-        require(CALL, campaign, (Campaign, Diagnosis, str, os.PathLike), expected)
+        require(CALL, campaign, (Campaign, Diagnosis, CorrectedModel, str, os.PathLike), expected)
     if len(campaigns) < 2:
         raise CampaignError(
             CALL, "nothing to compare with", found=f"{len(campaigns)}", expected="two campaigns or more"
         )
-    found = []
+    found: list[Diagnosis | Known] = []
     for number, campaign in enumerate(campaigns):
-        if isinstance(campaign, Diagnosis):
-            found.append(campaign)
-            continue
-        stage = f"campaign {number + 1} of {len(campaigns)}: "
-        told_on = _after(stage, progress)
-        found.append(diagnose(campaign, only=only, without=without, effects=effects, progress=told_on))
+        told_on = _after(f"campaign {number + 1} of {len(campaigns)}: ", progress)
+        opened = _opened(campaign, effects)
+        if not isinstance(opened, (Diagnosis, Known)):
+            opened = diagnose(opened, only=only, without=without, effects=effects, progress=told_on)
+        found.append(opened)
     called = _called(found, names)
+    found = [replace(d, campaign=name) if isinstance(d, Known) else d for d, name in zip(found, called, strict=True)]
     fits = _usable(found, called)
-    require_same_robot([fit.campaign.robot for fit in fits], called)
+    require_same_robot([one.model.robot for one in found], called)
     with threadpool_limits(1):
         return _compared(found, fits, called, progress)
+
+
+def _opened(given: Any, effects: Sequence[Effect]) -> Any:
+    """Return a model as something to compare, and anything else as it is."""
+    if is_model(given):
+        return known(CorrectedModel.load(given, effects), Path(given).name)
+    return known(given, given.robot.name) if isinstance(given, CorrectedModel) else given
 
 
 def _after(stage: str, progress: Callable[[str], None]) -> Callable[[str], None]:
     return lambda words: progress(stage + words)
 
 
-def _called(found: Sequence[Diagnosis], names: Sequence[str]) -> tuple[str, ...]:
+def _called(found: Sequence[Diagnosis | Known], names: Sequence[str]) -> tuple[str, ...]:
     """Return a name for each campaign, none twice."""
     require(f"{CALL}, names", names, (list, tuple), "a name for each campaign")
     if names and len(names) != len(found):
@@ -118,9 +131,12 @@ def _called(found: Sequence[Diagnosis], names: Sequence[str]) -> tuple[str, ...]
     return tuple(f"{name} ({k + 1})" if own.count(name) > 1 else name for k, name in enumerate(own))
 
 
-def _usable(found: Sequence[Diagnosis], names: Sequence[str]) -> list[Fit]:
-    fits = []
+def _usable(found: Sequence[Diagnosis | Known], names: Sequence[str]) -> list[Fit | Known]:
+    fits: list[Fit | Known] = []
     for diagnosis, name in zip(found, names, strict=True):
+        if isinstance(diagnosis, Known):
+            fits.append(diagnosis)
+            continue
         if not diagnosis.usable:
             raise CampaignError(
                 name, "cannot be compared", found=diagnosis.reason, expected="a campaign that is usable"
@@ -132,12 +148,15 @@ def _usable(found: Sequence[Diagnosis], names: Sequence[str]) -> list[Fit]:
 
 
 def _compared(
-    found: Sequence[Diagnosis], fits: Sequence[Fit], names: tuple[str, ...], progress: Callable[[str], None]
+    found: Sequence[Diagnosis | Known],
+    fits: Sequence[Fit | Known],
+    names: tuple[str, ...],
+    progress: Callable[[str], None],
 ) -> Comparison:
     progress("what each campaign says")
     listed = candidates(found, fits, names)
     every = [(effect, k) for effect, item in enumerate(listed) for k in range(len(item.told))]
-    said = [sums(d, fit, listed, c) for c, (d, fit) in enumerate(zip(found, fits, strict=True))]
+    said = [_said(d, fit, listed, c) for c, (d, fit) in enumerate(zip(found, fits, strict=True))]
     kept = told(said)
     owners, said = [every[k] for k in kept], [one.some(kept) for one in said]
     progress("what is shared, what differs")
@@ -160,6 +179,13 @@ def _compared(
         looked_at=together.looked_at,
         diagnoses=tuple(found),
     )
+
+
+def _said(found: Diagnosis | Known, fit: Fit | Known, listed: Sequence[Candidate], number: int) -> Sums:
+    if isinstance(found, Diagnosis) and isinstance(fit, Fit):
+        return sums(found, fit, listed, number)
+    assert isinstance(found, Known)
+    return sums_of_model(found, listed, number)
 
 
 def _effects(

@@ -14,6 +14,7 @@ from thermal_robot.effects.law import Discovered
 from thermal_robot.effects.law_words import called
 from thermal_robot.errors import EffectError
 from thermal_robot.fleet import compare_settings
+from thermal_robot.fleet.compare_model import Known
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.fit import Fit
 
@@ -54,7 +55,9 @@ class Candidate:
         return isinstance(self.effect, Discovered)
 
 
-def candidates(found: Sequence[Diagnosis], fits: Sequence[Fit], names: Sequence[str]) -> tuple[Candidate, ...]:
+def candidates(
+    found: Sequence[Diagnosis | Known], fits: Sequence[Fit | Known], names: Sequence[str]
+) -> tuple[Candidate, ...]:
     """List the effects that are compared, those that can be set anew first.
 
     Every effect of a diagnosis is; every one that is probable enough in any of them; and those that somebody could set
@@ -63,7 +66,7 @@ def candidates(found: Sequence[Diagnosis], fits: Sequence[Fit], names: Sequence[
     Parameters
     ----------
     found, fits
-        The diagnoses, and the fits behind them.
+        The diagnoses, and the fits behind them; a model file is both.
     names
         What the campaigns are called.
     """
@@ -84,14 +87,14 @@ def candidates(found: Sequence[Diagnosis], fits: Sequence[Fit], names: Sequence[
     return tuple(sorted(listed, key=lambda c: (c.law, not c.effect.told_inside, c.name)))
 
 
-def _names(effect: Effect, diagnosis: Diagnosis, fit: Fit) -> bool:
+def _names(effect: Effect, diagnosis: Diagnosis | Known, fit: Fit | Known) -> bool:
     """Whether a diagnosis names an effect; a law it names only as it is."""
     if isinstance(effect, Discovered):
         return any(own == effect for own, _ in fit.effects)
     return effect.name in diagnosis.verdict
 
 
-def _settings(fits: Sequence[Fit], names: Sequence[str]) -> Iterator[tuple[str, Effect]]:
+def _settings(fits: Sequence[Fit | Known], names: Sequence[str]) -> Iterator[tuple[str, Effect]]:
     """Yield each effect once, by its name, in all its places and in the setting that the surest fit has."""
     known: dict[str, tuple[float, Effect]] = {}
     for fit in fits:
@@ -111,7 +114,7 @@ def _settings(fits: Sequence[Fit], names: Sequence[str]) -> Iterator[tuple[str, 
         yield from ((f"{e.name} of {campaign}", e) for e, _ in fit.effects if isinstance(e, Discovered))
 
 
-def _parameters(effect: Effect, fit: Fit) -> tuple[Parameter, ...]:
+def _parameters(effect: Effect, fit: Fit | Known) -> tuple[Parameter, ...]:
     """Return an effect's parameters in a campaign, as they are told; empty where the campaign lacks what it needs."""
     observations = fit.corrected
     try:
@@ -124,7 +127,7 @@ def _parameters(effect: Effect, fit: Fit) -> tuple[Parameter, ...]:
         return ()  # a law of what only another campaign recorded
 
 
-def _sizes(effect: Effect, fit: Fit, told: Sequence[Parameter]) -> Array:
+def _sizes(effect: Effect, fit: Fit | Known, told: Sequence[Parameter]) -> Array:
     own = block(fit.corrected, effect)
     alike = [p.name for p in own.bare] == [p.name for p in told]
     return own.sizes if alike else np.array([p.size for p in told])

@@ -109,7 +109,7 @@ def joint(listed: Sequence[Candidate], owners: Sequence[tuple[int, int]], said: 
     said
         What each campaign says of these parameters.
     """
-    parts = tuple(_parts(listed, owners, len(said)))
+    parts = tuple(part for part in _parts(listed, owners, len(said)) if part.shared or _can_differ(part, said))
     problem = _problem(listed, owners, parts, said)
     seen = [k for k, rank in enumerate(problem.ranks) if rank]
     parts, problem = tuple(parts[k] for k in seen), problem.some(seen)
@@ -157,6 +157,12 @@ def _differing(number: int, own: Sequence[int], places: Places, campaigns: int) 
     for place, inside, share in choices:
         for where in subsets:
             yield Part(number, place, inside, where, False, float(np.log(odds * share / len(subsets))))
+
+
+def _can_differ(part: Part, said: Sequence[Sums]) -> bool:
+    """Whether campaigns on both sides tell any of its parameters: otherwise nobody knows that it changed."""
+    tell = [bool(np.diag(one.matrix)[list(part.parameters)].max() > settings.INFORMATION_FLOOR) for one in said]
+    return any(tell[c] for c in part.where) and any(yes for c, yes in enumerate(tell) if c not in part.where)
 
 
 def some_of(campaigns: int) -> tuple[tuple[int, ...], ...]:

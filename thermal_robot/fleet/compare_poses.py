@@ -8,33 +8,33 @@ fitted away, in the difference and in the deviations.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.campaign.names import LABELS
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.diagnosis.result import Diagnosis
 from thermal_robot.effects.apply import displacement
 from thermal_robot.fleet import compare_settings
+from thermal_robot.fleet.compare_model import Known, observed, poses
 from thermal_robot.fleet.comparison import Predicted
 from thermal_robot.inference.algebra import orthonormal
-from thermal_robot.observations import Observations, observe
+from thermal_robot.observations import Observations
 from thermal_robot.prediction import sensitivity
 
 Array = NDArray[np.float64]
 
 
-def predicted(found: Sequence[Diagnosis], names: Sequence[str]) -> tuple[Predicted, ...]:
+def predicted(found: Sequence[Diagnosis | Known], names: Sequence[str]) -> tuple[Predicted, ...]:
     """Compare the models of every two campaigns.
 
     Parameters
     ----------
     found
-        Their diagnoses.
+        Their diagnoses, or models.
     names
         What the campaigns are called.
     """
@@ -42,20 +42,20 @@ def predicted(found: Sequence[Diagnosis], names: Sequence[str]) -> tuple[Predict
     return tuple(_pair(found[a], found[b], (names[a], names[b])) for a, b in pairs)
 
 
-def _pair(a: Diagnosis, b: Diagnosis, names: tuple[str, str]) -> Predicted:
+def _pair(a: Diagnosis | Known, b: Diagnosis | Known, names: tuple[str, str]) -> Predicted:
     nothing = Predicted(names, 0, 0.0, 0.0, 0.0, True)
     if a.model.simulated or b.model.simulated:
         return replace(nothing, note="predictions of a simulator stand in the place of the model's own")
     if a.model.spread is None or b.model.spread is None:
         return replace(nothing, note="a model does not state how far its predictions may be off")
-    q = np.concatenate([_some(a.rows.q), _some(b.rows.q)])
+    q = _measured(a, b)
     common = _common(a.model, b.model)
     joints = a.model.robot.joint_names
     low, high = (np.array([common[name][end] for name in joints]) for end in (0, 1))
     q = q[((q >= low) & (q <= high)).all(axis=1)]
     if len(q) < compare_settings.TRIED:
         return replace(nothing, note="the two did not measure a common part of the workspace")
-    at = [_observed(found.model, q, common) for found in (a, b)]
+    at = [observed(found.model, q, common) for found in (a, b)]
     gauge = _gauge(a.model, b.model, at[0])
     gap = _left(_points(a.model, at[0]) - _points(b.model, at[1]), gauge)
     variance = sum(_variance(found.model, one, gauge) for found, one in zip((a, b), at, strict=True))
@@ -63,6 +63,16 @@ def _pair(a: Diagnosis, b: Diagnosis, names: tuple[str, str]) -> Predicted:
     rms, deviation = float(np.sqrt((distance**2).mean())), float(np.sqrt((stated**2).mean()))
     far = float((distance > compare_settings.TWICE * stated).mean())
     return Predicted(names, len(q), rms, deviation, far, rms <= compare_settings.TWICE * deviation)
+
+
+def _measured(a: Diagnosis | Known, b: Diagnosis | Known) -> Array:
+    """(N, n) poses: those that were measured; where neither has its rows, poses in the ranges that both measured."""
+    rows = [_some(found.rows.q) for found in (a, b) if not isinstance(found, Known)]
+    if rows:
+        return np.concatenate(rows)
+    common = _common(a.model, b.model)
+    low, high = (np.array([common[name][end] for name in a.model.robot.joint_names]) for end in (0, 1))
+    return poses(a.model.robot, common) if (low <= high).all() else np.zeros((0, len(low)))
 
 
 def _some(q: Array) -> Array:
@@ -79,22 +89,6 @@ def _common(a: CorrectedModel, b: CorrectedModel) -> dict[str, tuple[float, floa
         ends = [ranges[name] for ranges in (first, second) if name in ranges]
         found[name] = max(low for low, _ in ends), min(high for _, high in ends)
     return found
-
-
-def _observed(model: CorrectedModel, q: Array, common: Mapping[str, tuple[float, float]]) -> Observations:
-    """Return the corrected model at the poses, every condition going once through its common range."""
-    covariates = {}
-    for k, name in enumerate(model.needs):
-        low, high = common.get(name, (0.0, 0.0))
-        if high < low:  # none in common: halfway between the two
-            low = high = 0.5 * (low + high)
-        # a golden step for each, so that conditions do not run together
-        turn = np.modf(np.arange(len(q)) * 0.6180339887498949 * (k + 1))[0]
-        covariates[name] = np.where(turn < 0.5, low, high) if name.startswith("approach") else low + turn * (high - low)
-    samples = model.samples_at(q, covariates)
-    samples = replace(samples, labels={label: np.full(len(q), "one to come") for label in LABELS})
-    moved, _ = displacement(observe(samples, model.frames), model.effects)
-    return observe(samples, model.frames, displacement=moved)
 
 
 def _points(model: CorrectedModel, at: Observations) -> Array:

@@ -41,3 +41,9 @@ SAME_PLACE = 1e-6
 """m and rad: two descriptions of one robot put its tool to the same place but for what a file rounds."""
 TRIED = 8
 """Configurations at which two descriptions are compared: two robots that differ anywhere differ there."""
+SAYS = 0.01
+"""What a model's rows must say of a direction of its parameters, against what was expected beforehand, to count: frames
+are held so loosely that of a zero which they take up a thousandth is left, and a hundredth tells nothing."""
+ROUNDING = 1e-9
+"""Part of the longest column below which one is rounding: a joint that turns the target about itself moves it by
+1e-16 m, and a parameter that does anything at all by a millionth of another's."""

@@ -15,6 +15,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from thermal_robot.diagnosis.result import Diagnosis
+    from thermal_robot.fleet.compare_model import Known
 
 SCHEMA = "thermal-robot/comparison/1"
 Status = Literal["shared", "changed", "contradicts", "not_needed", "not_compared", "absent"]
@@ -181,7 +182,7 @@ class Comparison:
     Attributes
     ----------
     campaigns, samples
-        Names of the campaigns in their order, and how many measurements each has.
+        Names of the campaigns in their order, and how many measurements each has; none of a model file.
     robot, tool_frame
         Which robot.
     effects
@@ -195,7 +196,7 @@ class Comparison:
     looked_at
         How many places were compared: all probabilities of changes are corrected for that.
     diagnoses
-        Of the campaigns.
+        Of the campaigns; in the place of a model file what the comparison knows of it.
 
     Examples
     --------
@@ -216,7 +217,7 @@ class Comparison:
     predicted: tuple[Predicted, ...]
     not_told: tuple[str, ...] = ()
     looked_at: int = 0
-    diagnoses: tuple[Diagnosis, ...] = field(default=(), compare=False)
+    diagnoses: tuple[Diagnosis | Known, ...] = field(default=(), compare=False)
 
     @property
     def verdict(self) -> tuple[str, ...]:

@@ -50,6 +50,12 @@ def _more(count: int) -> str:
     return f" and {count} more" if count > 0 else ""
 
 
+def campaign_in_words(campaign: Plain) -> str:
+    """Tell what was compared: a campaign with what its diagnosis says, or a model file."""
+    samples = f"{campaign['samples']} samples. " if campaign["samples"] else ""
+    return f"{campaign['name']}: {samples}{campaign['diagnosis']}"
+
+
 def change_in_short(change: Plain) -> str:
     """Name a change and when it came."""
     place = change["place"] or change["kind"]

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from thermal_robot.report.comparison_words import (
+    campaign_in_words,
     change_in_words,
     effects,
     headline,
@@ -65,7 +66,7 @@ def comparison_fragment(comparison: Mapping[str, Any]) -> str:
 def _header(comparison: Mapping[str, Any]) -> Iterator[str]:
     yield '<header><div class="tr-kicker">What the same robot shares between campaigns, and what changed</div>'
     yield f"<h1>{escape(headline(comparison))}</h1></header>"
-    yield bullets(f"{c['name']}: {c['samples']} samples. {c['diagnosis']}" for c in comparison["campaigns"])
+    yield bullets(campaign_in_words(c) for c in comparison["campaigns"])
 
 
 def _sections(comparison: Mapping[str, Any]) -> Iterator[str]:

@@ -6,7 +6,14 @@ from collections.abc import Iterator, Mapping, Sequence
 from textwrap import fill
 from typing import Any
 
-from thermal_robot.report.comparison_words import change_in_words, effects, headline, parameters, predictions
+from thermal_robot.report.comparison_words import (
+    campaign_in_words,
+    change_in_words,
+    effects,
+    headline,
+    parameters,
+    predictions,
+)
 
 _WIDTH = 96
 _MOST = 40
@@ -39,7 +46,7 @@ def _lines(comparison: Mapping[str, Any]) -> Iterator[str]:
     yield fill(headline(comparison), _WIDTH)
     yield ""
     for c in comparison["campaigns"]:
-        yield fill(f"{c['name']}: {c['samples']} samples. {c['diagnosis']}", _WIDTH, subsequent_indent="  ")
+        yield fill(campaign_in_words(c), _WIDTH, subsequent_indent="  ")
     yield from ("", "CHANGED")
     told = [change_in_words(change, names) for change in comparison["changes"]]
     yield from (fill(line, _WIDTH, initial_indent="  ", subsequent_indent="    ") for line in told or ["nothing"])

@@ -4,7 +4,7 @@ import re
 from html.parser import HTMLParser
 
 import pytest
-from blind_records import trial
+from blind_records import trial, trial_of_several
 
 from thermal_robot.blind.report.page import html
 from thermal_robot.blind.score import score
@@ -85,3 +85,11 @@ def test_sections_without_cases_are_left_out():
 def test_equal_scores_give_equal_pages_and_only_the_footer_tells_when(plain, page):
     assert html(plain, "") == page.replace(", today</footer>", "</footer>")
     assert page.count("today") == 1
+
+
+def test_several_campaigns_have_a_table_by_what_changes(page):
+    whole = html(score([*trial(), *trial_of_several()]).to_dict(), "today")
+    assert headings(whole) == headings(page)
+    assert "Campaigns of one robot, by what changes" in whole
+    assert "backlash grows, j1" in whole
+    assert "by what changes" not in page

@@ -3,7 +3,7 @@
 import re
 
 import pytest
-from blind_records import record, said, trial
+from blind_records import record, said, trial, trial_of_several
 
 from thermal_robot.blind.report.markdown import markdown
 from thermal_robot.blind.report.text import text
@@ -54,3 +54,14 @@ def test_a_long_answer_hangs_under_its_head(plain):
     assert first.startswith("  WRONG  r1  word word")
     assert all(line.startswith(" " * 11) and len(line) <= 100 for line in rest)
     assert sum(line.count("word") for line in (first, *rest)) == 40
+
+
+def test_several_campaigns_are_told_by_what_changes(plain):
+    told = text(score([*trial(), *trial_of_several()]).to_dict())
+    assert re.search(
+        r"two campaigns, one parameter changed, 1 cases\n  > what changed is told, and nothing else +1 of 1", told
+    )
+    assert re.search(r"backlash jumps +1/1 +100\.0 % +1/1 +100\.0 % +1/1 +100\.0 % +1/1 +100\.0 %", told)
+    assert re.search(r"joint_offset changes +1/1 +100\.0 % +1/1 +100\.0 % +– +–", told)
+    assert re.search(r"k5 +series +ur3 +backlash grows, j1 → backlash, j1: jump after campaign 5", told)
+    assert "CAMPAIGNS OF ONE ROBOT" not in text(plain)

@@ -13,6 +13,7 @@ from thermal_robot.blind.cases import Case
 from thermal_robot.blind.reality.fault import Fault
 from thermal_robot.blind.reality.faults import FAULTS
 from thermal_robot.blind.reality.instrument import Instrument, measure, registered
+from thermal_robot.blind.reality.lots import make_several
 from thermal_robot.blind.reality.own import known
 from thermal_robot.blind.reality.rigid import anywhere
 from thermal_robot.blind.reality.setting import Setting, draw_setting, humidity
@@ -33,7 +34,7 @@ _TAILS = (3.0, 8.0)  # degrees of freedom: from the fewest with a third moment t
 
 
 def make(case: Case, folder: Path) -> dict[str, Any]:
-    """Write a case's campaign into a folder and return its answers.
+    """Write a case's campaign, or its several campaigns, into a folder and return the answers.
 
     Parameters
     ----------
@@ -47,13 +48,15 @@ def make(case: Case, folder: Path) -> dict[str, Any]:
     dict
         ``withdrawn`` with the reason where what is asked cannot be seen in any draw; else ``truth`` as in
         :mod:`thermal_robot.blind.cases`, ``noise`` (m), ``samples``, ``measures``, ``fresh_position`` (M, 3)
-        where the target really is, ``fresh_before`` (M, 3) where frames alone put it.
+        where the target really is, ``fresh_before`` (M, 3) where frames alone put it. Of several campaigns nothing is
+        predicted: see :mod:`thermal_robot.blind.reality.lots`.
     """
     rng = np.random.default_rng(case.seed)
     world = World(case.robot.urdf, case.robot.tool_frame)
+    attempt = _attempt if case.several is None else make_several
     for _ in range(_TRIES):
         try:
-            return _attempt(case, world, rng, folder)
+            return attempt(case, world, rng, folder)
         except Unseen as unseen:  # this draw hides its own fault: draw again
             reason = unseen
     return {"withdrawn": str(reason)}

@@ -24,7 +24,7 @@ def write_folder(
     instrument: Instrument,
     gears: dict[str, float] | None = None,
 ) -> None:
-    """Write campaign.toml, robot.urdf, measurements.csv and fresh.csv.
+    """Write campaign.toml, robot.urdf, measurements.csv and, where something is to be predicted, fresh.csv.
 
     Parameters
     ----------
@@ -51,7 +51,8 @@ def write_folder(
             table[name] = values.round(10)
     hidden = [c for c in map(str, columns) if any(c == h or c.startswith(h + ".") for h in case.hidden)]
     for name, rows_given in (("measurements.csv", table), ("fresh.csv", columns.iloc[others])):
-        write_text(folder / name, rows_given.drop(columns=hidden).to_csv(index=False))
+        if len(rows_given):
+            write_text(folder / name, rows_given.drop(columns=hidden).to_csv(index=False))
 
 
 def conditions(setting: Setting) -> pd.DataFrame:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
 from typing import Any
 
@@ -16,6 +16,7 @@ from thermal_robot.report.html_parts import bullets, document, figure, paragraph
 Plain = Mapping[str, Any]
 
 _CARDS = ("single", "null", "removed", "unlisted")
+_CHANGES = ("exact", "found", "way", "day", "false_alarm")
 _ASKED = ("exact", "right", "first_named", "found", "false_alarm", "place", "near_place", "quantity")
 
 
@@ -81,6 +82,8 @@ def _one_by_one(score: Plain) -> Iterator[str]:
         ("Cause that no library knows, by cause", score["unlisted"]),
     )
     tables = [_groups(heading, rates) for heading, rates in groups if rates]
+    if score["changes"]:
+        tables.append(_groups("Campaigns of one robot, by what changes", score["changes"], _CHANGES))
     if tables:
         yield section("One by one", *tables)
 
@@ -118,9 +121,8 @@ def _kinds(kinds: Iterable[Plain]) -> str:
     return table(("", "cases", "share", "95 % interval"), rows)
 
 
-def _groups(heading: str, groups: Mapping[str, Plain]) -> str:
-    first = next(iter(groups.values()))
-    asked = [q for q in _ASKED if q in first]
+def _groups(heading: str, groups: Mapping[str, Plain], questions: Sequence[str] = _ASKED) -> str:
+    asked = [q for q in questions if any(q in rates for rates in groups.values())]
     rows = (row((escape(name), *(_share(rates.get(q)) for q in asked))) for name, rates in groups.items())
     return f'<p class="tr-kicker">{escape(heading)}</p>{table(("", *map(question, asked)), rows)}'
 

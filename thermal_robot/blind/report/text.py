@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from textwrap import wrap
 from typing import Any
 
@@ -13,12 +13,15 @@ WIDTH = 100
 _ANSWERS = ("nothing", "unexplained", "failed")
 _SHORT = {"nothing": "n", "unexplained": "u", "failed": "f"}
 _ASKED = ("exact", "right", "first_named", "found", "false_alarm", "place", "near_place", "quantity")
+_CHANGES = ("exact", "found", "way", "day")
 _HEADS = {
     "exact": "exact",
     "first_named": "named first",
     "right": "right",
     "near_place": "or beside",
     "quantity": "what it follows",
+    "way": "jump or trend",
+    "day": "day",
 }
 _TABLES = {
     "single": "one effect, nothing, or a cause that no library knows",
@@ -49,6 +52,7 @@ def text(score: Plain) -> str:
         ["BY ROBOT, the same cases and those with nothing at work", *_groups(score["by_robot"])],
         ["EFFECT TAKEN OUT OF THE LIBRARY, by effect", *_groups(score["removed"])],
         ["CAUSE THAT NO LIBRARY KNOWS, by cause", *_groups(score["unlisted"])],
+        ["CAMPAIGNS OF ONE ROBOT, by what changes", *_groups(score["changes"], _CHANGES)],
         *(
             [f"NAMED FIRST: {_TABLES.get(name, name)}", *_confusion(table)]
             for name, table in score["confusion"].items()
@@ -81,11 +85,10 @@ def _kinds(kinds: list[Plain]) -> Iterator[str]:
             yield f"    left on fresh samples, over the noise: {spread}"
 
 
-def _groups(groups: Mapping[str, Plain]) -> Iterator[str]:
+def _groups(groups: Mapping[str, Plain], questions: Sequence[str] = _ASKED) -> Iterator[str]:
     if not groups:
         return
-    first = next(iter(groups.values()))
-    asked = [q for q in _ASKED if q in first]
+    asked = [q for q in questions if any(q in rates for rates in groups.values())]
     wide = max(len(name) for name in groups)
     column = 17
     yield f"  {'':{wide}}" + "".join(f"{_HEADS.get(q, question(q)):>{column}}" for q in asked)

@@ -22,6 +22,11 @@ KINDS = {
     "unlisted": "cause that no library knows",
     "both": "such a cause beside one or two effects",
     "real": "real campaigns",
+    "same": "two campaigns, nothing changed",
+    "changed": "two campaigns, one parameter changed",
+    "steady": "twelve days, nothing changed",
+    "series": "twelve days, something begins, jumps or grows",
+    "fleet": "a small fleet, shared faults and single ones",
 }
 QUESTIONS = {
     "exact": "exactly what is at work, nothing else",
@@ -40,6 +45,13 @@ QUESTIONS = {
     "asks": "advised to record it",
     "right": "right",
     "found": "found",
+    "way": "told as a jump or as a trend, rightly",
+    "day": "the day right",
+    "day_within": "the day within its 95 % interval",
+    "amount": "its size within its 95 % interval",
+    "shared_found": "shared fault called shared",
+    "own_kept": "fault of one robot not called shared",
+    "own_named": "fault of one robot told of that robot",
 }
 _OF_KIND = {
     ("null", "exact"): "nothing found, nothing unexplained",
@@ -48,6 +60,16 @@ _OF_KIND = {
     ("both", "right"): "listed ones found, the rest unexplained",
     ("hidden", "right"): "unexplained, nobody blamed, told to record it",
     ("real", "right"): "right, by the rule of each question",
+    **dict.fromkeys((("same", "exact"), ("steady", "exact")), "nothing told to have changed"),
+    ("same", "listed"): "all effects at work keep their name",
+    ("changed", "listed"): "all effects at work keep their name",
+    ("changed", "exact"): "what changed is told, and nothing else",
+    ("series", "exact"): "what, where, how and when, and nothing else",
+    ("series", "place"): "the joint rings, whatever is blamed",
+    ("fleet", "exact"): "all that is shared, and nothing else",
+    **dict.fromkeys((("changed", "found"), ("series", "found")), "effect and place of the change told"),
+    **dict.fromkeys((("changed", "false_alarm"), ("series", "false_alarm")), "another change told"),
+    ("fleet", "false_alarm"): "something else called shared",
 }
 _EFFECTS = {
     "geometric": "link geometry",
