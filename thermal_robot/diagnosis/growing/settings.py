@@ -1,0 +1,21 @@
+"""Every number that was chosen for data that grow."""
+
+KEPT = 500
+"""Rows that are kept one by one, more where more are in the tail; up to twice as many before sums are formed anew. A
+fit of a thousand rows takes some tens of milliseconds, and a thousand rows hold the median well inside those kept."""
+SETTLED, STEPS = 1e-9, 60
+"""Deviations by which parameters, and share by which noise and scales, still move when they are found; rounds at most.
+A thousandth of what is promised; each round is about ten times nearer."""
+CURVED = 2e-7
+"""Deviations by which the curvature of the rows in the sums may move a parameter before they are linearised anew: a
+fifth of the 1e-6 that is promised."""
+SAMPLED = 500
+"""Rows that stand for all where it is asked how firmly they hold the parameters, and how far they are from linear."""
+LEVEL = 1e-3
+"""Chance that new rows of the same robot and the same noise make the choice fall in one update, all tests together."""
+RIVALS, LEAST_RIVAL = 8, 1e-3
+"""Combinations that are weighed again with the new rows, and their least probability against the chosen one: one of a
+thousandth needs rows that say as much as a deviation of 3.7 before it is the better one."""
+FEWEST_OUTSIDE, OUTSIDE = 3, 0.05
+"""Rows, and share of the new rows, beyond what was measured from which on the choice is to be made anew: a model of
+effects that were told apart inside says little of those that show outside alone."""
