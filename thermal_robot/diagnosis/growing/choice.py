@@ -27,6 +27,25 @@ class Point:
 
 
 @dataclass(frozen=True, eq=False)
+class Judge:
+    """The model of a diagnosis, by which new rows are weighed where old ones keep their weights.
+
+    Attributes
+    ----------
+    point
+        Its frames and parameters.
+    sigma
+        (m,) one sigma of what it leaves, m and rad.
+    rows
+        How many rows it had: a gross error is one that so many do not show by chance.
+    """
+
+    point: Point
+    sigma: Array
+    rows: int
+
+
+@dataclass(frozen=True, eq=False)
 class Choice:
     """Effects with their prior sizes; what would be asked of a fresh fit that chooses nothing.
 
@@ -40,9 +59,9 @@ class Choice:
         m: 3 for positions, 6 for poses.
     position, orientation
         Noise that the campaign states, m and rad; ``None`` where none is.
-    judged
-        Whether every row is weighed by its distance from the model of the moment, as in a diagnosis. Otherwise rows
-        keep the weight that they had, and new ones get theirs by their distance from the model of the diagnosis.
+    judge
+        ``None`` where every row is weighed by its distance from the model of the moment, as in a diagnosis of noise
+        alone. Otherwise rows keep the weight that they had, and new ones get theirs by the model of the diagnosis.
     """
 
     blocks: tuple[Block, ...]
@@ -50,12 +69,17 @@ class Choice:
     measures: int
     position: float | None
     orientation: float | None
-    judged: bool
+    judge: Judge | None
 
     @cached_property
     def ends(self) -> list[int]:
         """Where the parameters of each chosen effect end among all P."""
         return np.cumsum([len(item.sizes) for item in self.blocks]).tolist()
+
+    @property
+    def judged(self) -> bool:
+        """Whether rows are weighed anew in every fit."""
+        return self.judge is None
 
     @property
     def count(self) -> int:

@@ -145,7 +145,7 @@ def _round(choice: Choice, sums: Sums, single: Single, begin: Begin) -> tuple[Fi
     """Go round once: weigh the rows, find scales and noise, step; return also how far the step went, in noise."""
     seen = Seen.at(single.campaign, begin.point, choice)
     alike, flat = seen.alike, len(seen.names)
-    weighing = _weighed(choice, sums, single, alike[:, :, -1], begin)
+    weighing = weighed(choice, sums, single, alike[:, :, -1], begin)
     single, sigma = weighing.single, weighing.sigma
     k = flat + choice.count
     whole = carried(_chosen(sums.weighed, k), begin.step) + products(alike, single.weights)
@@ -179,7 +179,7 @@ def _round(choice: Choice, sums: Sums, single: Single, begin: Begin) -> tuple[Fi
 
 
 @dataclass(frozen=True, eq=False)
-class _Weighing:
+class Weighing:
     """Rows with their weights, the noise, and the limits that rows must not cross unseen: see :class:`Fitted`."""
 
     single: Single
@@ -190,19 +190,22 @@ class _Weighing:
     inside: bool
 
 
-def _weighed(choice: Choice, sums: Sums, single: Single, gap: Array, begin: Begin) -> _Weighing:
+def weighed(choice: Choice, sums: Sums, single: Single, gap: Array, begin: Begin) -> Weighing:
     """Weigh the rows that are kept one by one, (n, m) what is left of them, as a diagnosis does."""
     groups, measures = len(sums.below), choice.measures
     if not choice.judged:
-        return _Weighing(single, begin.sigma, begin.held, np.zeros(groups), np.inf, True)
+        return Weighing(single, begin.sigma, begin.held, np.zeros(groups), np.inf, True)
     parts = (gap.reshape(len(gap), groups, 3) ** 2).sum(axis=2)
-    middle, inside = _medians(parts, sums)
+    if sums.guard is not None and sums.guard.quiet:
+        middle, inside = (sums.guard.medians * sums.guard.sigma[::3]) ** 2, True
+    else:
+        middle, inside = _medians(parts, sums)
     measured = np.maximum(np.sqrt(middle / float(chdtri(3, 0.5)) / (1.0 - begin.leverage)), chosen.ROUNDING)
     sigma, held, distance2 = judged(gap, measured, choice.noise(single.campaign), begin.leverage, measures)
     aside = distance2 > distance_limit(measures, sums.rows + len(gap))
     weights = np.where(aside, 0.0, tail_weight(distance2, measures))
     edge = bend(measures, begin.leverage, sigma, far_scale(measured, sigma))
-    return _Weighing(
+    return Weighing(
         replace(single, weights=weights, aside=aside), sigma, held, np.sqrt(middle) / sigma[::3], edge, inside
     )
 
@@ -219,7 +222,7 @@ def _medians(parts: Array, sums: Sums) -> tuple[Array, bool]:
 
 
 def _explained(
-    choice: Choice, white: Array, flat: int, used: int, weighing: _Weighing, begin: Begin
+    choice: Choice, white: Array, flat: int, used: int, weighing: Weighing, begin: Begin
 ) -> tuple[Gram, Combination, dict[int, tuple[Array, Array]]]:
     """Find the most probable prior scales and noise, and the parameters, from whitened products at a point."""
     measures, weights = choice.measures, weighing.single.weights

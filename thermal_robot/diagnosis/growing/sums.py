@@ -1,10 +1,13 @@
 """Rows that need not be looked at again: their sums of products, and how far the model may move before they must be.
 
-In the fit of a diagnosis a row counts in full unless it stands in the tail, and the noise, where none is stated, is the
-median of what rows leave. So a row bears on the fit by its products alone as long as it crosses neither the median nor
-the edge of the tail. With J_i the row's columns in units of the noise, and any positive A, a step δ of the parameters
-moves the row by at most √tr(J_i A⁻¹ J_iᵀ) √(δᵀAδ) (Cauchy and Schwarz). Rows that such a step might carry across are
-kept one by one; the others are in the sums.
+In the fit of a diagnosis a row counts in full unless it stands in the tail, and the noise, where none is stated, is
+told by the median of what rows leave. So a row bears on the fit by its products alone as long as it crosses neither the
+edge of the tail nor the median. With J_i the row's columns in units of the noise, and any positive A, a step δ of the
+parameters moves it by at most √tr(J_i A⁻¹ J_iᵀ) √(δᵀAδ) (Cauchy and Schwarz), and where A is that of all N rows, by
+√(δᵀAδ/N) in the root mean square. Rows that might reach the tail at most, or the median by a few root mean squares, are
+kept one by one; the others are in the sums. One that crosses the median all the same moves the noise by 1/N of itself,
+and with it nothing but the weights in the tail. Where noise is stated, and no more than it remains, the median bears on
+nothing.
 """
 
 from __future__ import annotations
@@ -15,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
+from thermal_robot.diagnosis.growing import settings
 from thermal_robot.diagnosis.growing.linearised import products
 from thermal_robot.inference import settings as chosen
 
@@ -32,39 +36,62 @@ class Guard:
         A (k, k) of the columns of frames and chosen effects; positive.
     reach
         √(δᵀAδ) up to which steps are safe.
-    spare
-        By how much each limit may move meanwhile, in units of the noise ``sigma``.
+    share, typical
+        How far a step of 1 moves a row, at most and in the root mean square, in units of the noise: of the median row,
+        and over all rows. Limits may move by as much beside.
     sigma
         (m,) noise in whose units distances are told.
     medians
         (G,) median distance of positions and of orientations.
     bend
         Distance from which on a row is in the tail.
+    quiet
+        Whether the medians bear on nothing: noise is stated, and clearly less than its slack remains.
     """
 
     metric: Array
     reach: float
-    spare: float
+    share: float
+    typical: float
     sigma: Array
     medians: Array
     bend: float
+    quiet: bool
 
     def scores(self, rows: Array, weights: Array) -> Array:
         """(N,) the reach up to which each of the rows at the point of the sums, (N, m, K + 1), is safe; −1 for none."""
-        k, groups = len(self.metric), len(self.medians)
-        white = rows / self.sigma[:, None]
-        parts = np.sqrt(((white[:, :, -1] ** 2).reshape(len(rows), groups, 3)).sum(axis=2))
-        slack = np.minimum(np.abs(parts - self.medians).min(axis=1), self.bend - np.sqrt((parts**2).sum(axis=1)))
-        within = white[:, :, :k] @ np.linalg.inv(np.linalg.cholesky(self.metric)).T
-        moves = np.sqrt((within**2).sum(axis=(1, 2)))
-        return np.where((slack > 0.0) & (weights >= 1.0), slack / (moves + self.spare / self.reach), -1.0)
+        groups = len(self.medians)
+        parts = np.sqrt(((rows[:, :, -1] / self.sigma) ** 2).reshape(len(rows), groups, 3).sum(axis=2))
+        tail = (self.bend - np.sqrt((parts**2).sum(axis=1))) / (self.moves(rows) + self.share)
+        if not self.quiet:
+            wide = 2.0 * settings.WIDE * self.typical  # the row and the median
+            tail = np.minimum(tail, np.abs(parts - self.medians).min(axis=1) / wide)
+        return np.where((tail > 0.0) & (weights >= 1.0), tail, -1.0)
 
-    def holds(self, step: Array, sigma: Array, medians: Array, bend: float) -> bool:
-        """Tell whether a step of the parameters, and limits in units of another noise, are within reach."""
-        far = float(np.sqrt(step @ self.metric @ step))
-        ratio = sigma[::3] / self.sigma[::3]
-        moved = max(np.abs(medians * ratio - self.medians).max(), np.abs(bend * ratio - self.bend).max())
-        return bool(far <= self.reach and moved <= self.spare)
+    def moves(self, rows: Array) -> Array:
+        """(N,) how far a unit of reach moves each of the rows (N, m, K + 1) at most, in units of the noise."""
+        white = rows[:, :, : len(self.metric)] / self.sigma[:, None]
+        within = white @ np.linalg.inv(np.linalg.cholesky(self.metric)).T
+        return np.asarray(np.sqrt((within**2).sum(axis=(1, 2))))
+
+    def holds(self, step: Array, sigma: Array, medians: Array, bend: float, rms: Array) -> bool:
+        """Tell whether a fit is within reach.
+
+        Parameters
+        ----------
+        step
+            (k,) of its parameters.
+        sigma, medians, bend
+            Its noise and limits, these in units of it.
+        rms
+            (G,) that remains per axis, m and rad.
+        """
+        far, ratio = float(np.sqrt(step @ self.metric @ step)), sigma[::3] / self.sigma[::3]
+        within = far <= self.reach and bool(np.abs(bend * ratio - self.bend).max() <= self.share * self.reach)
+        if self.quiet:
+            return within and bool((rms <= chosen.NOISE_SLACK * sigma[::3]).all())
+        apart = np.abs(medians * ratio - self.medians).max()
+        return within and bool(apart <= settings.WIDE * self.typical * self.reach)
 
 
 @dataclass(frozen=True, eq=False)
