@@ -36,6 +36,11 @@ def chosen(fit: Fit) -> Choice:
     )
 
 
+def can_grow(fit: Fit) -> bool:
+    """Tell whether rows count by themselves: whether nothing of what remains is drawn anew in every pose or visit."""
+    return fit.explanation.whitening.smooth is None
+
+
 def rivals(fit: Fit) -> list[tuple[int, ...]]:
     """Return the combinations of blocks that came nearest to the chosen one, most probable first."""
     e = fit.explanation

@@ -9,9 +9,10 @@ from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis.growing.choice import Choice, Point
-from thermal_robot.inference.columns import frame_columns, moved_by
 from thermal_robot.effects.gate import checked
+from thermal_robot.inference.columns import Block, frame_columns, moved_by
 from thermal_robot.inference.gauss_newton import corrected_observations
+from thermal_robot.observations import Observations
 
 Array = NDArray[np.float64]
 
@@ -42,7 +43,7 @@ class Seen:
         there = corrected_observations(campaign, point.frames, choice.split(point.values))
         flat, names = frame_columns(there)
         asked = (*choice.blocks, *(choice.rivals if rivals else ()))
-        columns = [moved_by(there, checked(item.effect, there)) for item in asked]
+        columns = [_columns(there, item) for item in asked]
         return cls(campaign, np.concatenate([flat, *columns, there.gap[:, :, None]], axis=2), names)
 
     @classmethod
@@ -62,6 +63,15 @@ class Seen:
         """(N, m, K + 1) columns and gap, in units of each row's own noise over that of all."""
         relative = self.campaign.relative_noise
         return self.stack if relative is None else self.stack / relative[:, :, None]
+
+
+def _columns(there: Observations, item: Block) -> Array:
+    """(N, m, P) columns of an effect's parameters; zero for those of which these rows tell nothing."""
+    known = {parameter.name: parameter for parameter in checked(item.effect, there)}
+    told = [k for k, parameter in enumerate(item.bare) if parameter.name in known]
+    found = np.zeros((there.campaign.samples, 6 if there.campaign.measures == "pose" else 3, len(item.bare)))
+    found[:, :, told] = moved_by(there, [known[item.bare[k].name] for k in told])
+    return found
 
 
 def frame_names(campaign: Campaign) -> tuple[str, ...]:

@@ -28,3 +28,5 @@ WIDE = 2.0
 move further, as many cross it one way as the other."""
 QUIET = 0.9
 """Of the slack of a stated noise: where less remains, the median of what rows leave bears on nothing."""
+SAME_PLACE = 1e-9
+"""m: by which the tool frame differs between readings of one URDF at most."""
