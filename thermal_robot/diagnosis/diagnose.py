@@ -125,7 +125,7 @@ def diagnose(
 
 
 def _ready(found: Diagnosis) -> Diagnosis:
-    """Return a diagnosis of many rows ready for new ones: the one pass over its rows belongs to it, not to the update."""
+    """Return a diagnosis of many rows ready for new ones: the pass over its rows is a part of it, not of an update."""
     if found.usable and found.fit is not None and found.samples > 2 * KEPT and can_grow(found.fit):
         _ = found.growing
     return found

@@ -44,7 +44,9 @@ def can_grow(fit: Fit) -> bool:
 def rivals(fit: Fit) -> list[tuple[int, ...]]:
     """Return the combinations of blocks that came nearest to the chosen one, most probable first."""
     e = fit.explanation
-    own = max((p for c, p in zip(e.combinations, e.probabilities, strict=True) if c.blocks == e.best.blocks), default=1.0)
+    own = max(
+        (p for c, p in zip(e.combinations, e.probabilities, strict=True) if c.blocks == e.best.blocks), default=1.0
+    )
     found = [
         c.blocks
         for c, p in zip(e.combinations, e.probabilities, strict=True)

@@ -74,7 +74,7 @@ class Choice:
     @cached_property
     def ends(self) -> list[int]:
         """Where the parameters of each chosen effect end among all P."""
-        return np.cumsum([len(item.sizes) for item in self.blocks]).tolist()
+        return [int(end) for end in np.cumsum([len(item.sizes) for item in self.blocks])]
 
     @property
     def judged(self) -> bool:

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis.growing import settings
 from thermal_robot.diagnosis.growing.choice import Choice, Point
 from thermal_robot.diagnosis.growing.linearised import Seen, products

@@ -75,7 +75,7 @@ def _columns(there: Observations, item: Block) -> Array:
 
 
 def frame_names(campaign: Campaign) -> tuple[str, ...]:
-    """Return what the columns of the unknown frames are, as of :func:`~thermal_robot.inference.columns.frame_columns`."""
+    """Return what the columns of the unknown frames are (:func:`~thermal_robot.inference.columns.frame_columns`)."""
     measures = 6 if campaign.measures == "pose" else 3
     tool = not campaign.tool_known and campaign.simulated_position is None
     return (*("base",) * (0 if campaign.base_known else 6), *("tool",) * (measures if tool else 0))

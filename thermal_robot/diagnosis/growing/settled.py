@@ -1,7 +1,7 @@
 """The fit of a choice: parameters, prior scales, noise and weights at which none of them would change another.
 
-A diagnosis goes round the same circle while it chooses, and leaves it where the choice no longer changes. Here nothing is
-chosen, and the circle is gone round until it stands still, so that old rows and new ones in whatever order, and one
+A diagnosis goes round the same circle while it chooses, and leaves it where the choice no longer changes. Here nothing
+is chosen, and the circle is gone round until it stands still, so that old rows and new ones in whatever order, and one
 batch or many, end at the same place.
 """
 
@@ -133,8 +133,8 @@ def settled(choice: Choice, sums: Sums, single: Single, begin: Begin) -> Fitted:
     state = begin
     for _ in range(settings.STEPS):
         found, size = _round(choice, sums, single, state)
-        still = abs(found.leverage - state.leverage) < settings.SETTLED and state.best is not None
-        still = still and abs(np.log(found.best.noise / state.best.noise)) < settings.SETTLED
+        before = np.inf if state.best is None else state.best.noise
+        still = max(abs(found.leverage - state.leverage), abs(np.log(found.best.noise / before))) < settings.SETTLED
         state, single = Begin.at(found), found.single
         if size < settings.SETTLED and still:
             return found

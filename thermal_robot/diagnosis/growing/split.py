@@ -12,7 +12,7 @@ from scipy.special import chdtri
 from thermal_robot.campaign.appended import appended
 from thermal_robot.diagnosis.growing import settings
 from thermal_robot.diagnosis.growing.choice import Choice, Point, together
-from thermal_robot.diagnosis.growing.linearised import Seen, products
+from thermal_robot.diagnosis.growing.linearised import Seen, frame_names, products
 from thermal_robot.diagnosis.growing.settled import Begin, Single, weighed
 from thermal_robot.diagnosis.growing.sums import Guard, Sums
 from thermal_robot.inference import settings as chosen
@@ -56,19 +56,23 @@ def split(choice: Choice, rows: Single, begin: Begin) -> tuple[Sums, Rows]:
         (n,) numbers of the others.
     """
     rows, guard = _weighed(choice, rows, begin)
-    total, scores = None, []
+    total = Sums.empty(_width(choice, rows), choice.measures // 3)
+    total, scores = replace(total, guard=guard), []
     for part in _parts(rows.campaign.samples):
         own = some(rows, part)
         seen = Seen.at(own.campaign, begin.point, choice, rivals=True)
-        if total is None:
-            total = replace(Sums.empty(seen.stack.shape[2], choice.measures // 3), guard=guard)
         total = total.plus(seen.stack, seen.alike, own.weights, own.aside)
         scores.append(np.zeros(len(part)) if guard is None else guard.scores(seen.alike, own.weights))
     kept, reach = _kept(np.concatenate(scores), guard)
     own = some(rows, kept)
     seen = Seen.at(own.campaign, begin.point, choice, rivals=True)
-    left = _less(total, Sums.empty(seen.stack.shape[2], choice.measures // 3), seen, own, guard)
+    left = _less(total, Sums.empty(_width(choice, rows), choice.measures // 3), seen, own, guard)
     return replace(left, guard=None if guard is None else replace(guard, reach=reach)), kept
+
+
+def _width(choice: Choice, rows: Single) -> int:
+    """Return K + 1, the columns of frames, chosen effects, rivals and gap."""
+    return len(frame_names(rows.campaign)) + choice.count + sum(len(item.sizes) for item in choice.rivals) + 1
 
 
 def _less(total: Sums, nothing: Sums, seen: Seen, own: Single, guard: Guard | None) -> Sums:

@@ -1,4 +1,4 @@
-"""A diagnosis and the rows that came after it: what is held, the fit to all rows, and whether the choice still stands."""
+"""A diagnosis and the rows that came after it: what is held, the fit to all, and whether the choice still stands."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ class Stream:
     agreement
         Of the last rows.
     fallen
-        Why the choice is to be made anew, one sentence a reason, in the order in which they came; empty while it stands.
+        Why the choice is to be made anew, one sentence a reason, in the order in which they came; none while it stands.
     """
 
     fit: Fit
@@ -64,8 +64,8 @@ class Stream:
         """
         if not can_grow(fit):
             raise EstimationError(
-                f"{fit.campaign.name}: what remains is drawn anew in every pose or visit, and how rows count depends on "
-                "all of them; diagnose old and new rows together"
+                f"{fit.campaign.name}: what remains is drawn anew in every pose or visit, and how rows count depends "
+                "on all of them; diagnose old and new rows together"
             )
         grown = begun(fit)
         return cls(fit, grown, _watch(fit), _behind(grown, runners(fit)), Agreement())
@@ -97,7 +97,10 @@ class Stream:
             )
         if a.p_change < level:
             effect, parameter = a.changed
-            yield f"Something begins with the new rows that {effect} would explain, most in {parameter} (p = {a.p_change:.1g})."
+            yield (
+                f"Something begins with the new rows that {effect} would explain, most of it in {parameter} "
+                f"(p = {a.p_change:.1g})."
+            )
         if a.p_aside < level:
             yield f"{a.aside} of {a.rows} rows since the diagnosis are gross errors (p = {a.p_aside:.1g})."
 
@@ -119,8 +122,11 @@ class Stream:
         gain = ahead(self.grown, self.runners)
         best = int(np.argmax(gain))
         if gain[best] > 0.0:
-            names = " and ".join(self.runners[best].names) or "no effect"
-            yield f"{names}, in other settings or places or with other effects, explains all rows better than what was chosen."
+            own = dict.fromkeys(effect.name for effect in self.grown.choice.effects)
+            names = self.runners[best].names
+            told, before = (" and ".join(some) or "no effect" for some in (names, own))
+            rest = "in other settings or places than chosen" if set(names) == set(own) else f"and not {before}"
+            yield f"All rows together speak for {told}, {rest}."
 
 
 def _behind(grown: Grown, listed: tuple[Runner, ...]) -> tuple[Runner, ...]:

@@ -9,8 +9,8 @@ with C that of the parameters. Three questions are asked of it, each at its shar
   uᵀI⁻¹u with u = XᵀV⁻¹r and I = XᵀV⁻¹X, of all effects that can be tested, by Bonferroni.
 * Gross errors among them are as frequent as before.
 
-Where what remains is more alike in neighbouring rows than noise is, its mean square scatters more between blocks of rows
-than chi-square says; all tests allow as much.
+Where what remains is more alike in neighbouring rows than noise is, its mean square scatters more between blocks of
+rows than chi-square says; all tests allow as much.
 """
 
 from __future__ import annotations
@@ -22,7 +22,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import betainc, fdtrc
 
-from thermal_robot.diagnosis.growing import settings
 from thermal_robot.diagnosis.growing.choice import together
 from thermal_robot.diagnosis.growing.grown import Grown
 from thermal_robot.diagnosis.growing.linearised import Seen
@@ -47,8 +46,8 @@ class Agreement:
     aside, rows
         Gross errors since the diagnosis, and of how many rows.
     p_batch, p_whole, p_change, p_aside
-        Chance of so large a figure where nothing changed: of the misfit of these rows and of all since the diagnosis, of
-        the largest change, and of so many gross errors.
+        Chance of so large a figure where nothing changed: of the misfit of these rows and of all since the diagnosis,
+        of the largest change, and of so many gross errors.
     changed
         Effect and parameter that a change would be of.
     """
@@ -172,5 +171,6 @@ def scatter_of(left: Array, blocks: Sequence[NDArray[np.bool_]]) -> float:
         return 1.0
     squares = (left**2).sum(axis=1)
     squares = squares * left.size / max(float(squares.sum()), 1e-300)
-    apart = [(float(squares[own].sum()) - own.sum() * left.shape[1]) ** 2 / (2.0 * own.sum() * left.shape[1]) for own in blocks]
-    return max(float(np.sum(apart)) / (len(blocks) - 1), 1.0)
+    figures = np.array([own.sum() * left.shape[1] for own in blocks])
+    apart = np.array([squares[own].sum() for own in blocks]) - figures
+    return max(float((apart**2 / (2.0 * figures)).sum()) / (len(blocks) - 1), 1.0)
