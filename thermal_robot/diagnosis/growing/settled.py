@@ -133,7 +133,7 @@ def settled(choice: Choice, sums: Sums, single: Single, begin: Begin) -> Fitted:
     state = begin
     for _ in range(settings.STEPS):
         found, size = _round(choice, sums, single, state)
-        before = np.inf if state.best is None else state.best.noise
+        before = np.e * found.best.noise if state.best is None else state.best.noise
         still = max(abs(found.leverage - state.leverage), abs(np.log(found.best.noise / before))) < settings.SETTLED
         state, single = Begin.at(found), found.single
         if size < settings.SETTLED and still:
