@@ -80,13 +80,15 @@ def alike(found, fresh):
     there = fresh.fit.corrected
     own, other = ([moved_by(there, checked(e, there)) for e, _ in d.model.effects] for d in (found, fresh))
     names = [[e.name for e, _ in d.model.effects] for d in (found, fresh)]
-    return names[0] == names[1] and all(a.shape == b.shape and np.allclose(a, b, 1e-9) for a, b in zip(own, other))
+    return names[0] == names[1] and all(
+        a.shape == b.shape and np.allclose(a, b, 1e-9) for a, b in zip(own, other, strict=True)
+    )
 
 
 def equal(seeds, old=400, more=200):
     """Compare an update with the diagnosis of all rows, where both chose the same."""
     print(
-        "case | seed | same choice | values, of deviation | values, of size | deviations | noise | rms | prediction, nm"
+        "case | seed | same choice | values, of deviation, of size | deviations | noise | rms | prediction, nm | rest"
     )
     for case in CASES:
         for seed in range(seeds):
@@ -105,10 +107,14 @@ def equal(seeds, old=400, more=200):
                 far = np.abs(updated.model.predict(whole)[0] - fresh.model.predict(whole)[0]).max()
                 told = np.abs(values) > 3.0 * deviations
                 apart = np.abs(own["value"].to_numpy() - values)
+                wide = np.abs(own["std"].to_numpy() / deviations - 1.0).max()
+                size = (apart[told] / np.abs(values[told])).max(initial=0.0)
+                rest = fresh.update(whole.take([]))
+                still = np.abs((own["value"] - rest.parameters["value"]).to_numpy() / deviations).max()
                 line += (
-                    f" | {(apart / deviations).max():.1e} | {(apart[told] / np.abs(values[told])).max(initial=0.0):.1e} | "
-                    f"{np.abs(own['std'].to_numpy() / deviations - 1.0).max():.1e} | {updated.noise / noise - 1.0:.1e} | "
-                    f"{updated.rms_after / rms - 1.0:.1e} | {far * 1e9:.1e}"
+                    f" | {(apart / deviations).max():.1e} {size:.1e} | {wide:.1e} | "
+                    f"{updated.noise / noise - 1.0:.1e} | {updated.rms_after / rms - 1.0:.1e} | {far * 1e9:.1e} | "
+                    f"{still:.1e}"
                 )
             print(line, flush=True)
 

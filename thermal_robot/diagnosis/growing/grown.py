@@ -17,6 +17,7 @@ from thermal_robot.inference import settings as chosen
 from thermal_robot.inference.algebra import whitener
 
 Array = NDArray[np.float64]
+Mask = NDArray[np.bool_]
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,8 +36,10 @@ class Grown:
         The fit to all rows.
     batches
         Every batch of rows: read only when the sums must be formed anew.
+    aside
+        Which of the last batch are set aside.
     anew
-        Whether the last rows made that necessary.
+        Whether the last rows made it necessary to look at all of them.
     """
 
     choice: Choice
@@ -45,6 +48,7 @@ class Grown:
     single: Single
     fitted: Fitted
     batches: tuple[Single, ...]
+    aside: Mask
     anew: bool = False
 
     @classmethod
@@ -54,23 +58,27 @@ class Grown:
         begin = replace(begin, step=np.zeros_like(begin.step))
         groups = choice.measures // 3
         sums = Sums.empty(len(begin.step) + sum(len(b.sizes) for b in choice.rivals) + 1, groups)
-        if whole.campaign.samples > 2 * settings.KEPT:
+        aside, kept = whole.aside.copy(), np.arange(whole.campaign.samples)
+        if len(kept) > 2 * settings.KEPT:
             sums, kept = split(choice, whole, begin)
             whole = some(whole, kept)
         fitted = settled(choice, sums, whole, begin)
-        return cls(choice, begin.point, sums, fitted.single, fitted, batches)
+        aside[kept] = fitted.single.aside  # rows in the sums are not set aside, or keep what they had
+        last = len(batches[-1].aside)
+        return cls(choice, begin.point, sums, fitted.single, fitted, batches, aside[len(aside) - last :])
 
     def plus(self, new: Single) -> Grown:
         """Return all rows and some more; old rows in the sums are looked at again only where ``anew`` says so."""
         both, batches = end_to_end((self.single, new)), (*self.batches, new)
         fitted = settled(self.choice, self.sums, both, Begin.at(self.fitted))
         many = both.campaign.samples > 2 * settings.KEPT
+        aside = fitted.single.aside[len(both.aside) - len(new.aside) :]
         if not self.sums.rows:
-            whole = replace(self, single=fitted.single, fitted=fitted, batches=batches)
+            whole = replace(self, single=fitted.single, fitted=fitted, batches=batches, aside=aside)
             return Grown.of(self.choice, batches, Begin.at(fitted)) if many else whole
         if not (fitted.steady and self._holds(fitted)):
             return replace(Grown.of(self.choice, batches, Begin.at(fitted)), anew=True)
-        grown = replace(self, fitted=fitted, batches=batches, anew=False)._taking_in(new.campaign.samples)
+        grown = replace(self, fitted=fitted, batches=batches, aside=aside, anew=False)._taking_in(new.campaign.samples)
         if grown.single.campaign.samples > 2 * settings.KEPT:
             return replace(Grown.of(self.choice, batches, Begin.at(fitted)), anew=True)
         return grown
@@ -114,7 +122,7 @@ class Grown:
         unit = np.sqrt((root**2).sum(axis=1)).clip(chosen.TINY) * fitted.best.noise
         shift = np.zeros(k)
         for rows, factor in ((curved, times), (turned, np.sqrt(times))):
-            apart = products(rows, np.ones(len(rows)))[:, :k, -1]
+            apart = products(rows, old.weights)[:, :k, -1]
             along = np.einsum("g,gi->i", fitted.sigma[::3] ** -2.0, apart) * factor
             shift += np.abs(root @ (root.T @ along)) / unit
         return float(shift.max(initial=0.0))

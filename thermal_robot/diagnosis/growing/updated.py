@@ -167,7 +167,6 @@ def _told(found: Diagnosis, stream: Stream, wider: Array, model: CorrectedModel,
     fitted, choice = stream.grown.fitted, stream.grown.choice
     rms = np.sqrt(fitted.squares / max(fitted.count, 1))
     turned = choice.measures == 6
-    aside = fitted.single.aside[len(fitted.single.aside) - new.samples :]
     fresh = replace(
         model,
         frames=fitted.point.frames,
@@ -183,7 +182,7 @@ def _told(found: Diagnosis, stream: Stream, wider: Array, model: CorrectedModel,
         noise_orientation=float(fitted.noise[3]) if turned else None,
         rms_after=float(rms[0]),
         rms_after_orientation=float(rms[1]) if turned else None,
-        outliers=tuple(new.rows[aside].tolist()),
+        outliers=tuple(new.rows[stream.grown.aside].tolist()),
         model=fresh,
         agreement=stream.agreement,
         anew=stream.grown.anew,
