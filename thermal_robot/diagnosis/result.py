@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import json
 from dataclasses import asdict, dataclass, field, replace
-from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
@@ -27,7 +26,6 @@ if TYPE_CHECKING:
 
     from thermal_robot.campaign import Campaign
     from thermal_robot.diagnosis.explained import Arm
-    from thermal_robot.diagnosis.growing.stream import Stream
     from thermal_robot.diagnosis.growing.updated import Updated
     from thermal_robot.diagnosis.next_samples import NextSamples
     from thermal_robot.inference.fit import Fit
@@ -217,13 +215,6 @@ class Diagnosis:
         from thermal_robot.diagnosis.growing.updated import update
 
         return update(self, rows)
-
-    @cached_property
-    def growing(self) -> Stream:
-        """What :meth:`update` begins with; formed once."""
-        from thermal_robot.diagnosis.growing.stream import Stream
-
-        return Stream.of(self._fitted())
 
     def _fitted(self) -> Fit:
         if self.fit is None:

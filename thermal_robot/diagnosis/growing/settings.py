@@ -30,3 +30,5 @@ QUIET = 0.9
 """Of the slack of a stated noise: where less remains, the median of what rows leave bears on nothing."""
 SAME_PLACE = 1e-9
 """m: by which the tool frame differs between readings of one URDF at most."""
+LEAD = 0.0
+"""Log odds of another combination against the chosen one from which on the choice is to be made anew."""

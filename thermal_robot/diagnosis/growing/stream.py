@@ -42,6 +42,9 @@ class Stream:
         What new rows are compared with, and combinations that may come first.
     agreement
         Of the last rows.
+    rival, lead
+        The best of these combinations by all rows so far, and its log odds against the chosen one; −∞ where there is
+        none.
     fallen
         Why the choice is to be made anew, one sentence a reason, in the order in which they came; none while it stands.
     """
@@ -51,6 +54,8 @@ class Stream:
     watch: Watch
     runners: tuple[Runner, ...]
     agreement: Agreement
+    rival: tuple[str, ...] = ()
+    lead: float = -np.inf
     fallen: tuple[str, ...] = ()
 
     @classmethod
@@ -77,7 +82,8 @@ class Stream:
         after = replace(self, grown=self.grown.plus(new), agreement=agreement)
         if not rows.samples:
             return after
-        found = [*after._misfits(), *_beyond(spread, rows), *after._testable(rows), *after._overtaken()]
+        after = after._weighed()
+        found = [*after._misfits(), *_beyond(spread, rows), *after._testable(), *after._overtaken()]
         if not after.grown.fitted.steady:
             found.append("The fit of the chosen effects to all rows does not come to rest.")
         return replace(after, fallen=tuple(dict.fromkeys((*self.fallen, *found))))
@@ -104,7 +110,7 @@ class Stream:
         if a.p_aside < level:
             yield f"{a.aside} of {a.rows} rows since the diagnosis are gross errors (p = {a.p_aside:.1g})."
 
-    def _testable(self, rows: Campaign) -> Iterator[str]:
+    def _testable(self) -> Iterator[str]:
         """Yield the effects that could not be tested, and can be with what the new rows recorded."""
         known = library()
         asked = [(name, needs) for name, needs in self.fit.needs.items() if name in known]
@@ -115,18 +121,22 @@ class Stream:
             if not gate.missing(known[name], both):
                 yield f"{name} could not be tested without {', '.join(needs)}, and now can be."
 
-    def _overtaken(self) -> Iterator[str]:
-        """Yield the combinations that explain all rows better now."""
+    def _weighed(self) -> Stream:
+        """Return the same with the best of the combinations that may come first."""
         if not self.runners:
-            return
+            return self
         gain = ahead(self.grown, self.runners)
         best = int(np.argmax(gain))
-        if gain[best] > 0.0:
+        return replace(self, rival=self.runners[best].names, lead=float(gain[best]))
+
+    def _overtaken(self) -> Iterator[str]:
+        """Yield the combination that explains all rows better now."""
+        if self.lead > settings.LEAD:
             own = dict.fromkeys(effect.name for effect in self.grown.choice.effects)
-            names = self.runners[best].names
-            told, before = (" and ".join(some) or "no effect" for some in (names, own))
-            rest = "in other settings or places than chosen" if set(names) == set(own) else f"and not {before}"
-            yield f"All rows together speak for {told}, {rest}."
+            told, before = (" and ".join(some) or "no effect" for some in (self.rival, own))
+            same = set(self.rival) == set(own)
+            rest = "in other settings or places than chosen" if same else f"rather than {before}"
+            yield f"All rows together speak for {told}, {rest} (odds {np.exp(min(self.lead, 20.0)):.2g} : 1)."
 
 
 def _behind(grown: Grown, listed: tuple[Runner, ...]) -> tuple[Runner, ...]:

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Protocol
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,17 +17,46 @@ from thermal_robot.diagnosis.growing.linearised import frame_names
 from thermal_robot.diagnosis.growing.received import received
 from thermal_robot.diagnosis.growing.stream import Stream, expected_sizes
 from thermal_robot.diagnosis.growing.watched import Agreement
+from thermal_robot.diagnosis.parts import Unexplained
 from thermal_robot.diagnosis.settings import LOOSE
 from thermal_robot.errors import EstimationError
+from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.inside import identified
 from thermal_robot.prediction import Spread, moves
 
 if TYPE_CHECKING:
     import pandas as pd
 
-    from thermal_robot.diagnosis.result import Diagnosis
-
 Array = NDArray[np.float64]
+
+
+class Diagnosed(Protocol):
+    """What of a :class:`~thermal_robot.Diagnosis` rows are added to."""
+
+    @property
+    def campaign(self) -> str: ...  # noqa: D102
+    @property
+    def usable(self) -> bool: ...  # noqa: D102
+    @property
+    def reason(self) -> str: ...  # noqa: D102
+    @property
+    def model(self) -> CorrectedModel: ...  # noqa: D102
+    @property
+    def fit(self) -> Fit | None: ...  # noqa: D102
+    @property
+    def unexplained(self) -> Unexplained: ...  # noqa: D102
+    @property
+    def remaining(self) -> Unexplained | None: ...  # noqa: D102
+
+
+_BEGUN: WeakKeyDictionary[Diagnosed, Stream] = WeakKeyDictionary()
+
+
+def ready(found: Diagnosed, fit: Fit) -> Stream:
+    """Return what the updates of a diagnosis begin with; its rows are passed over once."""
+    if found not in _BEGUN:
+        _BEGUN[found] = Stream.of(fit)
+    return _BEGUN[found]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -70,7 +100,7 @@ class Updated:
     True
     """
 
-    diagnosis: Diagnosis
+    diagnosis: Diagnosed
     samples: int
     choice_stands: bool
     reason: str
@@ -144,7 +174,7 @@ class Updated:
         return "\n\n".join([repr(self), *([self.reason] if self.reason else []), str(self.parameters)])
 
 
-def update(found: Diagnosis, rows: Campaign | pd.DataFrame) -> Updated:
+def update(found: Diagnosed, rows: Campaign | pd.DataFrame) -> Updated:
     """Add rows to a diagnosis; see :meth:`Diagnosis.update <thermal_robot.Diagnosis.update>`.
 
     Raises
@@ -158,12 +188,12 @@ def update(found: Diagnosis, rows: Campaign | pd.DataFrame) -> Updated:
         raise EstimationError(f"{found.campaign}: this diagnosis was made without its fit; diagnose the rows")
     new = received(found.fit.campaign, rows, found.model.needs)
     with threadpool_limits(1):  # as in a diagnosis: matrices are small
-        begun = found.growing
+        begun = ready(found, found.fit)
         stream = begun.plus(new, found.model.spread)
     return _told(found, stream, _widened(found, begun), _reaching(found.model, new), new)
 
 
-def _told(found: Diagnosis, stream: Stream, wider: Array, model: CorrectedModel, new: Campaign) -> Updated:
+def _told(found: Diagnosed, stream: Stream, wider: Array, model: CorrectedModel, new: Campaign) -> Updated:
     fitted, choice = stream.grown.fitted, stream.grown.choice
     rms = np.sqrt(fitted.squares / max(fitted.count, 1))
     turned = choice.measures == 6
@@ -201,7 +231,7 @@ def _deviations(stream: Stream) -> Array:
     return together([np.sqrt(np.maximum(np.diag(values[k][1]), 0.0)) for k in sorted(values)])
 
 
-def _widened(found: Diagnosis, begun: Stream) -> Array:
+def _widened(found: Diagnosed, begun: Stream) -> Array:
     """(P,) by how much the diagnosis widened each deviation for what it could not explain."""
     own, left = _deviations(begun), found.unexplained if found.remaining is None else found.remaining
     if not left.flagged or found.fit is None:
