@@ -7,7 +7,7 @@ import pytest
 from growing_cases import EFFECTS, measured
 
 import thermal_robot as tr
-from thermal_robot.diagnosis.growing.stream import Stream, expected_sizes
+from thermal_robot.diagnosis.growing.stream import Stream, _beyond, expected_sizes
 from thermal_robot.errors import EstimationError
 
 ASKED = ["joint_offset", "backlash"]
@@ -78,3 +78,15 @@ def test_expected_sizes_are_those_of_the_priors(stream, known):
     e = known.fit.explanation
     told = np.concatenate([e.linear.blocks[b].sizes * e.best.scales[b] for b in e.best.blocks])
     assert np.allclose(expected_sizes(stream), told, rtol=0.02)
+
+
+def test_rows_are_outside_by_chance_as_often_as_is_stated(stream, known):
+    """Outermost rows are new ones now and then; many of them hardly ever."""
+    rng, said, spread = np.random.default_rng(0), 0, known.model.spread
+    rows = measured(400, seed=70)
+    for _ in range(200):
+        order = rng.permutation(400)
+        old, new = rows.q[order[:60]], rows.take(order[60:90])
+        ends = zip(rows.robot.joint_names, old.min(axis=0), old.max(axis=0), strict=True)
+        said += bool(list(_beyond(replace(spread, ranges={n: (a, b) for n, a, b in ends}), new, 60)))
+    assert said <= 2

@@ -11,8 +11,9 @@ CURVED = 5e-6
 diagnosis itself ends its rounds about 1e-5 deviations from where they would come to rest."""
 SAMPLED = 500
 """Rows that stand for all where it is asked how firmly they hold the parameters, and how far they are from linear."""
-LEVEL = 1e-3
-"""Chance that new rows of the same robot and the same noise make the choice fall in one update, all tests together."""
+LEVEL, TESTS = 1e-3, 5
+"""Chance that new rows of the same robot and the same noise make the choice fall in one update, and among how many
+tests it is shared: of these rows, of all since the diagnosis, of a change, of gross errors, of rows outside."""
 RIVALS, LEAST_RIVAL = 8, 1e-3
 """Combinations that are weighed again with the new rows, and their least probability against the chosen one: one of a
 thousandth needs rows that say as much as a deviation of 3.7 before it is the better one."""
@@ -31,4 +32,5 @@ QUIET = 0.9
 SAME_PLACE = 1e-9
 """m: by which the tool frame differs between readings of one URDF at most."""
 LEAD = 0.0
-"""Log odds of another combination against the chosen one from which on the choice is to be made anew."""
+"""Log odds of another combination against the chosen one from which on the choice is to be made anew: a fresh diagnosis
+takes the more probable one, however little it is ahead."""

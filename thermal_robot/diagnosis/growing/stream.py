@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import gammaln
 
 from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.names import CLOCK
@@ -77,20 +78,20 @@ class Stream:
 
     def plus(self, rows: Campaign, spread: Spread | None) -> Stream:
         """Return the same with further rows; ``spread`` says where the model was measured."""
-        new = weighed(self.grown.choice, rows)
+        new, before = weighed(self.grown.choice, rows), sum(one.campaign.samples for one in self.grown.batches)
         agreement = self.watch.look(self.grown, new, self.agreement) if rows.samples else self.agreement
         after = replace(self, grown=self.grown.plus(new), agreement=agreement)
         if not rows.samples:
             return after
         after = after._weighed()
-        found = [*after._misfits(), *_beyond(spread, rows), *after._testable(), *after._overtaken()]
+        found = [*after._misfits(), *_beyond(spread, rows, before), *after._testable(), *after._overtaken()]
         if not after.grown.fitted.steady:
             found.append("The fit of the chosen effects to all rows does not come to rest.")
         return replace(after, fallen=tuple(dict.fromkeys((*self.fallen, *found))))
 
     def _misfits(self) -> Iterator[str]:
         """Yield what is unlikely where the robot and its noise are as they were."""
-        a, level = self.agreement, settings.LEVEL / 4.0  # of four tests
+        a, level = self.agreement, settings.LEVEL / settings.TESTS
         if a.p_batch < level:
             yield (
                 f"The new rows leave {a.chi2 / a.figures:.3g} times the mean square that noise and the parameters' "
@@ -164,14 +165,23 @@ def _watch(fit: Fit) -> Watch:
     )
 
 
-def _beyond(spread: Spread | None, rows: Campaign) -> Iterator[str]:
-    """Yield that many of the new rows leave what was measured."""
+def _beyond(spread: Spread | None, rows: Campaign, before: int) -> Iterator[str]:
+    """Yield that many of the new rows leave what was measured by ``before`` rows, and not by chance.
+
+    Of rows in no particular order, the k of n new ones that are the outermost of all N + n, at either end, have the
+    chance (k + 1) · n!/(n − k)! · (N + n − k)!/(N + n)!.
+    """
     known = () if spread is None else spread.outside(rows)
     outside = [[name for name in names if name not in CLOCK] for names in known]  # time goes on
-    count = sum(bool(names) for names in outside)
-    if count >= max(settings.FEWEST_OUTSIDE, settings.OUTSIDE * rows.samples):
-        names = ", ".join(dict.fromkeys(name for own in outside for name in own))
-        yield f"{count} of {rows.samples} new rows lie outside of what was measured, in {names}."
+    count, n = sum(bool(names) for names in outside), rows.samples
+    if spread is None or count < max(settings.FEWEST_OUTSIDE, settings.OUTSIDE * n):
+        return
+    for name in dict.fromkeys(name for own in outside for name in own):
+        k = sum(name in own for own in outside)
+        chance = np.log(k + 1.0) + gammaln([n + 1.0, before + n - k + 1.0]).sum()
+        chance -= gammaln([n - k + 1.0, before + n + 1.0]).sum()
+        if chance + np.log(len(spread.ranges)) < np.log(settings.LEVEL / settings.TESTS):
+            yield f"{k} of {n} new rows lie outside of what was measured, in {name}."
 
 
 def expected_sizes(stream: Stream) -> Array:
