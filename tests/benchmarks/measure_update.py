@@ -141,7 +141,7 @@ def times(batches=5):
 def false(seeds, old=300, batches=20, more=50):
     """Count how often the choice falls while nothing changes."""
     fallen = {"each": 0, "stream": 0}
-    reasons, updates, table = [], 0, []
+    reasons, updates = [], 0
     for seed in range(seeds):
         case = list(CASES)[seed % len(CASES)]
         whole = measured(case, old + batches * more, 1000 + seed)
@@ -156,9 +156,6 @@ def false(seeds, old=300, batches=20, more=50):
             if not each.choice_stands:
                 reasons.append((case, seed, "each", each.reason))
         fallen["stream"] += not stream.choice_stands
-        fresh = tr.diagnose(whole)
-        table.append((stream.choice_stands, alike(found, fresh), found.verdict == fresh.verdict, stream.stream.lead))
-        print(table[-1], stream.stream.rival)
         if not stream.choice_stands:
             reasons.append((case, seed, "stream", stream.reason))
         print(case, seed, found.verdict, found.fit.explanation.discrepancy.form, fallen, updates, flush=True)

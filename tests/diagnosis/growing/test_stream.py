@@ -90,3 +90,9 @@ def test_rows_are_outside_by_chance_as_often_as_is_stated(stream, known):
         ends = zip(rows.robot.joint_names, old.min(axis=0), old.max(axis=0), strict=True)
         said += bool(list(_beyond(replace(spread, ranges={n: (a, b) for n, a, b in ends}), new, 60)))
     assert said <= 2
+
+
+def test_a_combination_that_is_ahead_makes_it_fall_as_long_as_it_is(stream):
+    ahead = replace(stream, rival=("joint_gain",), lead=1.5)
+    assert any("speak for joint_gain, rather than joint_offset and backlash (odds 4.5 : 1)" in r for r in ahead.reasons)
+    assert replace(ahead, lead=-0.1).reasons == ()

@@ -47,7 +47,7 @@ class Stream:
         The best of these combinations by all rows so far, and its log odds against the chosen one; −∞ where there is
         none.
     fallen
-        Why the choice is to be made anew, one sentence a reason, in the order in which they came; none while it stands.
+        What new rows said against the choice, one sentence a reason, in the order in which they came; it stays.
     """
 
     fit: Fit
@@ -84,7 +84,7 @@ class Stream:
         if not rows.samples:
             return after
         after = after._weighed()
-        found = [*after._misfits(), *_beyond(spread, rows, before), *after._testable(), *after._overtaken()]
+        found = [*after._misfits(), *_beyond(spread, rows, before), *after._testable()]
         if not after.grown.fitted.steady:
             found.append("The fit of the chosen effects to all rows does not come to rest.")
         return replace(after, fallen=tuple(dict.fromkeys((*self.fallen, *found))))
@@ -129,6 +129,11 @@ class Stream:
         gain = ahead(self.grown, self.runners)
         best = int(np.argmax(gain))
         return replace(self, rival=self.runners[best].names, lead=float(gain[best]))
+
+    @property
+    def reasons(self) -> tuple[str, ...]:
+        """Why the choice is to be made anew, one sentence each; empty while it stands."""
+        return (*self.fallen, *self._overtaken())
 
     def _overtaken(self) -> Iterator[str]:
         """Yield the combination that explains all rows better now."""

@@ -70,8 +70,8 @@ class Updated:
     samples
         Rows so far, those of the diagnosis included.
     choice_stands
-        Whether nothing speaks against the effects, settings and places that the diagnosis chose. Once it has fallen it
-        stays so.
+        Whether nothing speaks against the effects, settings and places that the diagnosis chose. What new rows said
+        against it stays; that other effects explain all rows better may change with more rows.
     reason
         Why the choice is to be made anew, in plain words; empty while it stands.
     noise, noise_orientation
@@ -206,8 +206,8 @@ def _told(found: Diagnosed, stream: Stream, wider: Array, model: CorrectedModel,
     return Updated(
         diagnosis=found,
         samples=sum(one.campaign.samples for one in stream.grown.batches),
-        choice_stands=not stream.fallen,
-        reason=" ".join(stream.fallen),
+        choice_stands=not stream.reasons,
+        reason=" ".join(stream.reasons),
         noise=float(fitted.noise[0]),
         noise_orientation=float(fitted.noise[3]) if turned else None,
         rms_after=float(rms[0]),
