@@ -20,6 +20,7 @@ from thermal_robot.diagnosis.growing.watched import Agreement
 from thermal_robot.diagnosis.parts import Unexplained
 from thermal_robot.diagnosis.settings import LOOSE
 from thermal_robot.errors import EstimationError
+from thermal_robot.inference import settings as chosen
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.inside import identified
 from thermal_robot.prediction import Spread, moves
@@ -238,7 +239,7 @@ def _widened(found: Diagnosed, begun: Stream) -> Array:
         return np.ones_like(own)
     e = found.fit.explanation
     told = together([np.sqrt(np.maximum(np.diag(e.values[b][1]), 0.0)) for b in e.best.blocks])
-    return np.maximum(told / np.maximum(own, 1e-300), 1.0)
+    return np.maximum(told / np.maximum(own, chosen.TINY), 1.0)
 
 
 def _reaching(model: CorrectedModel, new: Campaign) -> CorrectedModel:
@@ -258,7 +259,7 @@ def _spread(stream: Stream, known: Spread) -> Spread:
     fitted, choice = stream.grown.fitted, stream.grown.choice
     names = frame_names(stream.fit.campaign)
     expected = expected_sizes(stream)
-    tight = np.concatenate([np.full(len(names), LOOSE**-2.0), np.maximum(expected, 1e-300) ** -2.0])
+    tight = np.concatenate([np.full(len(names), LOOSE**-2.0), np.maximum(expected, chosen.TINY) ** -2.0])
     precision = fitted.products[:-1, :-1] / fitted.best.noise**2
     unit = (precision.diagonal() + tight) ** -0.5
     inner = np.linalg.inv(precision * np.outer(unit, unit) + np.diag(tight * unit**2))

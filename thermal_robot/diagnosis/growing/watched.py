@@ -26,6 +26,7 @@ from thermal_robot.diagnosis.growing.choice import together
 from thermal_robot.diagnosis.growing.grown import Grown
 from thermal_robot.diagnosis.growing.linearised import Seen
 from thermal_robot.diagnosis.growing.settled import Single
+from thermal_robot.inference import settings as chosen
 from thermal_robot.inference.algebra import whitener
 from thermal_robot.inference.columns import Block
 from thermal_robot.inference.robust import distance_limit
@@ -151,7 +152,7 @@ class Watch:
                 continue
             chance = float(fdtrc(len(score), freedom, float(score @ score) / len(score) / self.scatter))
             if chance < best:
-                length = np.sqrt(np.maximum(np.diag(inside)[own], 1e-300))
+                length = np.sqrt(np.maximum(np.diag(inside)[own], chosen.TINY))
                 largest = item.bare[int(np.argmax(np.abs(inside[own, -1]) / length))]
                 best, where = chance, (item.effect.name, largest.name)
         return min(best * len(self.tested), 1.0), where
@@ -170,7 +171,7 @@ def scatter_of(left: Array, blocks: Sequence[NDArray[np.bool_]]) -> float:
     if len(blocks) < 2:
         return 1.0
     squares = (left**2).sum(axis=1)
-    squares = squares * left.size / max(float(squares.sum()), 1e-300)
+    squares = squares * left.size / max(float(squares.sum()), chosen.TINY)
     figures = np.array([own.sum() * left.shape[1] for own in blocks])
     apart = np.array([squares[own].sum() for own in blocks]) - figures
     return max(float((apart**2 / (2.0 * figures)).sum()) / (len(blocks) - 1), 1.0)
