@@ -22,6 +22,9 @@ from thermal_robot.diagnosis.data_faults import data_fault
 from thermal_robot.diagnosis.data_faults.misfit import another_motion, delivered, frames_alone
 from thermal_robot.diagnosis.deviations import as_remainder_says
 from thermal_robot.diagnosis.examine import examine
+from thermal_robot.diagnosis.growing.begun import can_grow
+from thermal_robot.diagnosis.growing.settings import KEPT
+from thermal_robot.diagnosis.growing.updated import ready
 from thermal_robot.diagnosis.held_out import held_out
 from thermal_robot.diagnosis.in_full import in_full
 from thermal_robot.diagnosis.parts import Misfit
@@ -119,7 +122,14 @@ def diagnose(
             left_out=sorted(name for name in {*everything, *RANDOM} if not asked(name)),
             notes=notes,
         )
-    return told(found)
+        return _ready(told(found))
+
+
+def _ready(found: Diagnosis) -> Diagnosis:
+    """Return a diagnosis of many rows ready for new ones: the pass over its rows is a part of it, not of an update."""
+    if found.usable and found.fit is not None and found.samples > 2 * KEPT and can_grow(found.fit):
+        ready(found, found.fit)
+    return found
 
 
 @contextmanager

@@ -24,7 +24,9 @@ if TYPE_CHECKING:
     import pandas as pd
     from numpy.typing import ArrayLike
 
+    from thermal_robot.campaign import Campaign
     from thermal_robot.diagnosis.explained import Arm
+    from thermal_robot.diagnosis.growing.updated import Updated
     from thermal_robot.diagnosis.next_samples import NextSamples
     from thermal_robot.inference.fit import Fit
     from thermal_robot.iso9283 import Performance
@@ -196,6 +198,23 @@ class Diagnosis:
         from thermal_robot.diagnosis.next_samples import next_samples
 
         return next_samples(self._fitted(), count)
+
+    def update(self, rows: Campaign | pd.DataFrame) -> Updated:
+        """Add new rows of the same robot, in time that does not grow with the number of old ones (docs/update.md).
+
+        Effects, settings and places stay; all else is that of a fresh fit of them to all rows. Rows may be a campaign
+        of the same robot and kind, or a table of its columns. :class:`CampaignError` says what does not fit.
+
+        Examples
+        --------
+        >>> import numpy as np
+        >>> campaign, new = tr.demo_campaign(), np.arange(120) % 6 == 0
+        >>> tr.diagnose(campaign.take(~new)).update(campaign.take(new))
+        Updated('demo': backlash, thermal_elongation; 120 rows; the choice stands)
+        """
+        from thermal_robot.diagnosis.growing.updated import update
+
+        return update(self, rows)
 
     def _fitted(self) -> Fit:
         if self.fit is None:

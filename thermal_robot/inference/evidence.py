@@ -62,7 +62,12 @@ class Combination:
 
 
 def evidence(
-    gram: Gram, blocks: tuple[int, ...], prior: float, start: Combination | None, floor: float = -np.inf
+    gram: Gram,
+    blocks: tuple[int, ...],
+    prior: float,
+    start: Combination | None,
+    floor: float = -np.inf,
+    settled: float = settings.EVIDENCE_SETTLED,
 ) -> Combination:
     """Return one combination with noise and scales at their most probable values.
 
@@ -78,6 +83,8 @@ def evidence(
         A combination like it, from whose noise and scales the iteration starts.
     floor
         Log evidence that is of interest: where it is clear that this is not reached, the iteration ends.
+    settled
+        By how much the logarithms of noise and scales still move when they are found.
     """
     used = gram.columns_of(blocks)
     owner = np.repeat(np.arange(len(blocks)), [gram.slices[b].stop - gram.slices[b].start for b in blocks])
@@ -86,7 +93,7 @@ def evidence(
     variance = start.noise**2 if start else (gram.noise_dof + gram.total) / (gram.noise_dof + gram.equations)
     variance, spread = max(variance, settings.LEAST_VARIANCE), gram.spreads[list(blocks)]
     known = prior + gram.offset
-    peak = _most_probable(gram, columns, scale, spread, variance, floor - known)
+    peak = _most_probable(gram, columns, scale, spread, variance, floor - known, settled)
     found, scale, variance = peak.posterior, peak.scale, peak.variance
     log_evidence = known + _log_joint(gram, columns, found, scale, spread, variance) + _log_volume(peak.bend, spread)
     if not np.isfinite(log_evidence):
@@ -109,7 +116,9 @@ class _Peak:
     exact: bool
 
 
-def _most_probable(gram: Gram, columns: Columns, scale: Array, spread: Array, variance: float, floor: float) -> _Peak:
+def _most_probable(
+    gram: Gram, columns: Columns, scale: Array, spread: Array, variance: float, floor: float, settled: float
+) -> _Peak:
     """Return the most probable scales and variance of the noise, left early where the log evidence stays below."""
     held = gram.noise_dof
     before, reach, free = np.zeros(len(scale)), 1.0, np.ones(len(columns.vector), dtype=bool)
@@ -123,7 +132,7 @@ def _most_probable(gram: Gram, columns: Columns, scale: Array, spread: Array, va
         residual = float(gram.total - (2 * columns.vector - columns.matrix @ found.values) @ found.values)
         left = max(held + gram.equations - float(found.effective.sum()), 1.0)
         target = max((held + max(residual, 0.0)) / left, settings.LEAST_VARIANCE)
-        if last or max(abs(np.log(target / variance)), np.abs(step).max(initial=0.0)) < settings.EVIDENCE_SETTLED:
+        if last or max(abs(np.log(target / variance)), np.abs(step).max(initial=0.0)) < settled:
             break
         if np.isfinite(floor):
             gain += 0.5 * (gram.equations + held) * (target / variance - 1.0 - np.log(target / variance))

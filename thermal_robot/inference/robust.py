@@ -100,17 +100,30 @@ def reweigh(
         (N,) rows set aside.
     """
     remainder = remainder if noise.relative is None else remainder / noise.relative
-    measured = robust_noise(remainder[use], leverage)
-    sigma, held = settled_noise(measured, noise, measures)
-    # where more is left than noise, a row is far only if it is far from the others
-    scale = np.where(np.repeat(measured, 3) > settings.NOISE_SLACK * sigma, np.repeat(measured, 3), sigma)
-    distance2 = ((remainder / scale) ** 2).sum(axis=1) / (1.0 - leverage)
+    sigma, held, distance2 = judged(remainder, robust_noise(remainder[use], leverage), noise, leverage, measures)
     aside = use & (distance2 > distance_limit(measures, int(use.sum())))
     if aside.sum() > settings.MOST_OUTLIERS * use.sum():
         worst = np.argsort(np.where(use, -distance2, np.inf))[: int(settings.MOST_OUTLIERS * use.sum())]
         aside = np.isin(np.arange(len(use)), worst) & aside
     weights = np.where(use & ~aside, tail_weight(distance2, measures), 0.0)
     return Whitening(weights, sigma, held, relative=noise.relative), aside
+
+
+def judged(
+    remainder: Array, measured: Array, noise: Noise, leverage: float, measures: int
+) -> tuple[Array, float, Array]:
+    """Return noise and degrees of freedom as :func:`settled_noise`, and (N,) squared distances of rows in its units.
+
+    ``remainder`` (N, m) is that of rows alike; what a median says of its noise is ``measured``, one sigma a part.
+    """
+    sigma, held = settled_noise(measured, noise, measures)
+    distance2 = ((remainder / far_scale(measured, sigma)) ** 2).sum(axis=1) / (1.0 - leverage)
+    return sigma, held, distance2
+
+
+def far_scale(measured: Array, sigma: Array) -> Array:
+    """(m,) one sigma by which distances count: where more is left than noise, a row is far only if far from others."""
+    return np.where(np.repeat(measured, 3) > settings.NOISE_SLACK * sigma, np.repeat(measured, 3), sigma)
 
 
 def tail_weight(distance2: Array, measures: int) -> Array:

@@ -1,0 +1,33 @@
+"""A robot whose zeros and play are known, measured for a long time, and the diagnosis of its first rows."""
+
+import numpy as np
+import pytest
+from growing_cases import ALL, OLD, measured
+
+import thermal_robot as tr
+from thermal_robot.diagnosis.growing.begun import begun
+
+ASKED = ["joint_offset", "backlash", "joint_gain"]
+
+
+@pytest.fixture(scope="session")
+def whole():
+    """1100 rows, three in a hundred of them gross errors."""
+    return measured(ALL, seed=3, gross=0.03)
+
+
+@pytest.fixture(scope="session")
+def found(whole):
+    """The diagnosis of the first 900."""
+    return tr.diagnose(whole.take(np.arange(OLD)), only=ASKED)
+
+
+@pytest.fixture(scope="session")
+def fresh(whole):
+    """The diagnosis of all."""
+    return tr.diagnose(whole, only=ASKED)
+
+
+@pytest.fixture(scope="session")
+def grown(found):
+    return begun(found.fit)
