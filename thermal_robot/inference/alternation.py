@@ -1,4 +1,4 @@
-"""Frames from nothing: the rigid alignment of the base and the place of the target by turns, from several starts at once.
+"""Frames from nothing: the rigid alignment of the base and the place of the target by turns, from several starts.
 
 Each of the two is linear while the other is held, and a third of the rows may be grossly wrong. Starts go side by side,
 each until its own median distance settles: what one start finds does not depend on the others.
@@ -50,9 +50,7 @@ def soft(distance: Array) -> Array:
 
 
 def _soft(distance: Array, scale: Array) -> Array:
-    return np.asarray(
-        1.0 / (1.0 + (distance / (settings.CAUCHY_SCALE * scale[..., None] + settings.NO_DISTANCE)) ** 2)
-    )
+    return np.asarray(1.0 / (1.0 + (distance / (settings.CAUCHY_SCALE * scale[..., None] + settings.NO_DISTANCE)) ** 2))
 
 
 def middle(values: Array) -> Array:
@@ -112,7 +110,7 @@ def alternate(
 
 
 class _Alternating:
-    """S alternations side by side: bases (S, 4, 4), places (S, 3), weights (S, N), medians (S,), and who still moves."""
+    """S alternations side by side: bases (S, 4, 4), places (S, 3), weights (S, N), medians (S,), and who moves."""
 
     def __init__(
         self,

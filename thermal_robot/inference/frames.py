@@ -42,11 +42,15 @@ def register(campaign: Campaign, keep: NDArray[np.bool_] | None = None) -> Frame
     EstimationError
         If fewer than three rows have weight.
     """
-    frames = Frames.declared(campaign)
-    if campaign.base_known and (campaign.tool_known or campaign.simulated_position is not None):
-        return frames
+    if frames_known(campaign):
+        return Frames.declared(campaign)
     used = campaign if keep is None or keep.all() else campaign.take(np.flatnonzero(keep))
     return refined_frames(used, found_frames(used), robust=keep is None)
+
+
+def frames_known(campaign: Campaign) -> bool:
+    """Tell whether no frame has to be fitted: both are declared, or a simulator holds the tool."""
+    return campaign.base_known and (campaign.tool_known or campaign.simulated_position is not None)
 
 
 def found_frames(campaign: Campaign) -> Frames:
