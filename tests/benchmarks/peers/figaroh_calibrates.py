@@ -1,9 +1,9 @@
 """FIGAROH calibrates: run by the Python of its own environment; prints seconds and the rms that is left as JSON.
 
-usage: python figaroh_calibrates.py INPUT.json METHOD REPEATS
+usage: python figaroh_calibrates.py INPUT.json METHOD TRIES SECONDS
 
-Time is that of loading measurements, choosing parameters and solving; reading robot and configuration is not in it.
-The cost is the distance of positions in metres, as its documentation of the class shows it.
+Time is that of ``initialize`` (it reads the table and chooses parameters) and of ``solve``; that of ``solve`` alone is
+told, too. Reading robot and configuration is not in it. The cost is the distance of positions in metres.
 """
 
 from __future__ import annotations
@@ -72,24 +72,40 @@ def calibrated(robot, path):
     return found, (chosen - begun, time.perf_counter() - chosen)
 
 
-def main(source, method, repeats):
-    """Calibrate several times."""
+def repeated(once, tries, seconds):
+    """Run something several times while there is time; return the runs, the first left out where there are others."""
+    begun, runs = time.perf_counter(), []
+    while len(runs) <= tries and (not runs or time.perf_counter() - begun < seconds / 2):
+        runs.append(once())
+    return runs[1:] or runs
+
+
+def rms(predicted, measured):
+    """Return the rms distance, m, of vectors in which x, y and z stand one after another."""
+    return float(np.sqrt(((predicted - measured).reshape(3, -1) ** 2).sum(axis=0).mean()))
+
+
+def main(source, method, tries, seconds):
+    """Calibrate several times; predict fresh poses."""
     logging.disable(logging.CRITICAL)
     given = json.loads(Path(source).read_text())
     model = pin.buildModelFromUrdf(given["urdf"])
     robot = SimpleNamespace(model=model, data=model.createData(), q0=pin.neutral(model))
     with tempfile.TemporaryDirectory() as folder:
         path = configuration(given, method, Path(folder))
-        runs = [calibrated(robot, path) for _ in range(int(repeats) + 1)]
-    found = runs[-1][0]
-    left = (found.PEE_measured - found.get_pose_from_measure(found.LM_result.x)).reshape(3, -1)
-    rms = float(np.sqrt((left**2).sum(axis=0).mean()))
+        runs = repeated(lambda: calibrated(robot, path), int(tries), float(seconds))
+    found, values = runs[-1][0], runs[-1][0].LM_result.x
+    left = rms(found.get_pose_from_measure(values), found.PEE_measured)
+    fresh = np.array(given["fresh_q"])
+    config = found.calib_config | {"NbSample": len(fresh)}
+    ahead = calc_updated_fkm(model, robot.data, values, fresh, config)
     answer = {
-        "seconds": [sum(parts) for _, parts in runs[1:]],
-        "solving": [parts[1] for _, parts in runs[1:]],
-        "rms": rms,
-        "parameters": len(found.LM_result.x),
-        "versions": {name: version(name) for name in ("figaroh", "pin", "numpy", "scipy")},
+        "seconds": [sum(parts) for _, parts in runs],
+        "solving": [parts[1] for _, parts in runs],
+        "rms": left,
+        "fresh": rms(ahead, np.array(given["fresh_position"]).T.ravel()),
+        "parameters": len(values),
+        "version": f"figaroh {version('figaroh')}, pin {version('pin')}, numpy {version('numpy')}",
     }
     print(json.dumps(answer))
 
