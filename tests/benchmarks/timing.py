@@ -31,6 +31,8 @@ class Effort:
 
 FEWEST = 3
 """Turns, where so many are allowed: a median of fewer is none."""
+SHORT = 0.5
+"""Seconds of a first call after which a second one tells how often to call; longer ones are called once anyway."""
 FULL = Effort(0.02, 7, 3.0, 10**7)
 """A measurement of 20 ms is long beside the clock; medians of seven are good to some per cent on a shared machine."""
 TINY = Effort(0.0, 1, 0.0, 200)
@@ -41,8 +43,10 @@ def by_turns(effort, *calls):
     """Return (T, C) seconds of C calls in T turns; one call before the first turn is not counted, as it compiles."""
     counts = []
     for call in calls if effort.long_enough else ():
-        call()
-        counts.append(max(1, int(effort.long_enough / max(seconds(call), 1e-9))))
+        once = seconds(call)
+        # what loads or compiles is timed again to see how long it takes itself
+        once = seconds(call) if once < SHORT else once
+        counts.append(max(1, int(effort.long_enough / max(once, 1e-9))))
     counts = counts or [1] * len(calls)
     measured, begun = [], time.perf_counter()
     while len(measured) < effort.turns and (len(measured) < FEWEST or time.perf_counter() - begun < effort.budget):

@@ -61,8 +61,8 @@ def calibrate(
     >>> worn = {"backlash": {"joint_3": 3e-4}}
     >>> campaign = tr.simulate("builtin:rv_m2", worn, tool_frame="tool0", noise=20e-6, seed=1)
     >>> found = tr.calibrate(campaign, "backlash")
-    >>> round(1e3 * found.parameters.value["backlash", "lost motion, joint_3"], 2)  # mrad
-    0.3
+    >>> print(f"{1e3 * found.parameters.value['backlash', 'lost motion, joint_3']:.1f} mrad")
+    0.3 mrad
     """
     expected = "a campaign, or the path of one; campaign_from_table makes one of a DataFrame"
     require("calibrate()", campaign, (Campaign, str, os.PathLike), expected)

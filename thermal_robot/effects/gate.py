@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import copy
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import fields
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, get_args
@@ -24,11 +24,6 @@ if TYPE_CHECKING:
     from thermal_robot.observations import Observations
     from thermal_robot.robot import Robot
 
-_SHAPES: dict[str, Callable[[int], tuple[tuple[int, ...], ...]]] = {
-    "joint": lambda rows: ((), (rows,)),
-    "instrument": lambda rows: ((rows, 3),),
-    **dict.fromkeys(("segment", "base", "tool"), lambda rows: ((6,), (rows, 6))),
-}
 KINDS = ("joint", "link", "base", "tool", "instrument")
 """Kinds of place that a parameter may sit in."""
 _CHANNELS = get_args(Channel)
@@ -395,7 +390,7 @@ def _wrong_response(response: Any, observations: Observations) -> str:
     if not isinstance(index, Integral) or not 0 <= int(index) < places:
         return f"{channel} index is {index!r}, expected 0 to {places - 1}"
     rows = observations.campaign.samples
-    shapes = _SHAPES[channel](rows)
+    shapes = ((), (rows,)) if channel == "joint" else ((rows, 3),) if channel == "instrument" else ((6,), (rows, 6))
     if not isinstance(values, np.ndarray) or values.dtype.kind != "f" or values.shape not in shapes:
         found = f"{values.dtype} {values.shape}" if isinstance(values, np.ndarray) else repr(values)
         return f"values of channel {channel} are {found}, expected float {' or '.join(map(str, shapes))}"
