@@ -35,6 +35,8 @@ SHORT = 0.5
 """Seconds of a first call after which a second one tells how often to call; longer ones are called once anyway."""
 FULL = Effort(0.02, 7, 3.0, 10**7)
 """A measurement of 20 ms is long beside the clock; medians of seven are good to some per cent on a shared machine."""
+QUICK = Effort(0.01, 3, 0.5, 10**5)
+"""A look: three turns, sizes up to a hundred thousand."""
 TINY = Effort(0.0, 1, 0.0, 200)
 """For the test of the benchmark's own code."""
 

@@ -1,6 +1,6 @@
 """The calibration alone: named effects come back as they were, with deviations that are true."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import pytest
@@ -102,3 +102,16 @@ def test_the_kinematic_effects_are_the_default(found):
     tr.calibrate(measured(1), progress=stages.append)
     assert stages[0] == "unknown frames"
     assert "exact fit" in stages[-1]
+
+
+@pytest.mark.parametrize("times", [10.0, 40.0])
+def test_an_arm_far_off_with_gross_errors_is_calibrated_as_well(times):
+    base, tool = np.eye(4), np.eye(4)
+    base[:3, 3], tool[:3, 3] = [1.0, 2.0, 0.3], [0.05, 0.02, 0.1]
+    far = tr.simulate(ROBOT, {"geometric": times * off(5)}, rows=60, noise=NOISE, base=base, tool=tool, seed=5)
+    position, struck = far.position.copy(), [3, 30, 50]
+    position[struck] += 0.02
+    found = tr.calibrate(replace(far, position=position))
+    assert found.outliers == tuple(far.rows[struck])
+    assert found.rms_before > 10.0 * times * found.rms_after
+    assert found.rms_after < np.sqrt(3.0) * NOISE * 1.2

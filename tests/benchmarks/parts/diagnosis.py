@@ -22,7 +22,8 @@ from thermal_robot.inference.fit import fit
 
 SCRIPT = Path(__file__).resolve().parents[1] / "bench_diagnosis.py"
 TREE = SCRIPT.parents[2]
-RUNS = 3
+RUNS, MOST = 3, 10**6
+"""Runs of a case, and the largest size from which on the real robots are diagnosed, a minute or two."""
 AT_WORK = ["backlash", "joint_offset"]
 """In the campaign of which the parts are timed; a tiny run looks at the last one alone."""
 IMPORTS = {
@@ -40,12 +41,12 @@ TEXT = (
 
 def _whole(effort):
     rows = [("diagnosis", "s", "peak of memory, GB")]
-    full = effort.budget > 0.0
-    for case in CASES if full else CASES[:1]:
+    cases = CASES if effort.largest >= MOST else [case for case in CASES if case not in REAL]
+    for case in cases if effort.budget > 0.0 else cases[:1]:
         if case in REAL and "THERMAL_ROBOT_DATA" not in os.environ:
             rows.append((case, "the data are not here", ""))
             continue
-        runs = 1 if case in REAL or not full else RUNS
+        runs = 1 if case in REAL else min(RUNS, effort.turns)
         told = [[float(v) for v in started([str(SCRIPT), "--measure", case], TREE)[0]] for _ in range(runs)]
         seconds, peak = np.median(told, axis=0)
         rows.append((case, f"{seconds:.3f}", f"{peak:.2f}"))

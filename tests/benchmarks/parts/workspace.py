@@ -36,8 +36,7 @@ def _mapped(robot, over):
 def measured(effort, peers):
     """Time maps of places and of joint positions."""
     robot = tr.load_robot(*ARM)
-    sides = [n for n in SIDES if n <= effort.largest // 4] if effort.largest < 1000 else SIDES
-    sides = sides[:1] if effort.largest < 1000 else sides
+    sides = [n for n in SIDES if 10 * n * n <= effort.largest] or SIDES[:1]
     configurations = [n for n in CONFIGURATIONS if n <= effort.largest] or [effort.largest]
     _mapped(robot, Joints(10))
     rows, points = [("map", "N", "postures", "s", "ms each")], {"places": [], "joints": []}
