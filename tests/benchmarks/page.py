@@ -31,15 +31,19 @@ def plain(part, state, spent):
     return {**asdict(part), "state": state, "spent": spent}
 
 
-def write(folder, parts):
-    """Write page, figures and plots."""
+def write(folder, parts, anew=()):
+    """Write page and figures, and the plots of the parts that are named or have none."""
     folder.mkdir(parents=True, exist_ok=True)
     (folder / FIGURES).write_text(json.dumps(parts, indent=1, ensure_ascii=False) + "\n", encoding="utf-8")
     blocks = [HEAD]
-    for part in parts.values():
+    for name, part in parts.items():
         blocks.append(f"## {part['title']}\n\n{part['text']}\n")
         blocks += [_table(rows) for rows in part["tables"]]
-        blocks += [_picture(folder, plot) for plot in part["plots"]]
+        for plot in part["plots"]:
+            picture = folder / f"performance_{plot['name']}.svg"
+            if name in anew or not picture.exists():
+                _draw(picture, plot)
+            blocks.append(f"![{plot['title']}]({picture.name})\n")
         blocks.append(f"Took {part['spent']}.\n")
     state = list(parts.values())[-1]["state"]
     blocks.append("## The machine\n\n" + _table([("", ""), *state.items()]))
@@ -51,8 +55,9 @@ def _table(rows):
     return "\n".join([lines[0], "|---" * len(rows[0]) + "|", *lines[1:]]) + "\n"
 
 
-def _picture(folder, plot):
-    """Draw curves and return the link to them."""
+def _draw(path, plot):
+    """Draw curves into a file."""
+    from matplotlib import rc_context
     from matplotlib.figure import Figure
 
     figure = Figure(figsize=(6.4, 3.8), layout="constrained")
@@ -64,7 +69,6 @@ def _picture(folder, plot):
     axes.set(title=plot["title"], xlabel=plot["size"], ylabel="s")
     axes.grid(alpha=0.3)
     axes.legend(fontsize=8)
-    name = f"performance_{plot['name']}.svg"
     # neither the day nor chance in the file: the same figures give the same picture
-    figure.savefig(folder / name, metadata={"Date": None})
-    return f"![{plot['title']}]({name})\n"
+    with rc_context({"svg.hashsalt": plot["name"]}):
+        figure.savefig(path, metadata={"Date": None})

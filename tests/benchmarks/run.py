@@ -45,7 +45,7 @@ def main(arguments=None):
         )
         print(f"{name}: {spent}", flush=True)
         kept[name] = page.plain(found, state, spent)
-        page.write(options.out, {part: kept[part] for part in PARTS if part in kept})
+        page.write(options.out, {part: kept[part] for part in PARTS if part in kept}, [name])
     return 0
 
 

@@ -30,8 +30,9 @@ TEXT = (
     "is left. FIGAROH's time is that of `initialize`, which chooses parameters, and `solve`; *solving* is that of "
     "`solve` alone. robotkinecal does not fit where the tracker stands, and is handed positions in the root frame. "
     "*left* is the rms distance on the rows that were fitted, *fresh* that of 500 poses that nobody fitted to the "
-    "true places without noise. Ratios are of medians; ours is measured before and after each peer. Each program "
-    "runs alone, on one thread."
+    "true places without noise. *parameters* are counted with those of the frames; ours are held to their expected "
+    "sizes, so that there may be more than the data determine. Ratios are of medians; ours is measured before and "
+    "after each peer. Each program runs on one thread."
 )
 
 
@@ -108,24 +109,26 @@ def _table(effort, peers, rows, folder):
             name = f"{peer.name} `{method}`" if len(peer.methods) > 1 else peer.name
             lines.append(_line(name, answer, np.mean(ours[-2:], axis=0)[0]))
     alone, told = np.median(ours, axis=0)
+    count = str(sum(len(values) for _, values in found.fit.effects) + found.fit.before.frames.shape[2])
     left = f"{1e3 * found.rms_after:.4f}", f"{1e3 * np.sqrt((away**2).sum(axis=1).mean()):.4f}"
     return (
-        (f"{rows} poses", "ms", "of it solving", "times ours", "left, mm", "fresh, mm", "version"),
-        ("`tr.calibrate`", f"{alone:.1f}", "", "1", *left, tr.__version__),
-        ("… told", f"{told:.1f}", "", f"{told / alone:.1f}", *left, tr.__version__),
+        (f"{rows} poses", "ms", "of it solving", "times ours", "parameters", "left, mm", "fresh, mm", "version"),
+        ("`tr.calibrate`", f"{alone:.1f}", "", "1", count, *left, tr.__version__),
+        ("… told", f"{told:.1f}", "", f"{told / alone:.1f}", count, *left, tr.__version__),
         *lines,
     )
 
 
 def _line(name, answer, ours):
     if isinstance(answer, str):
-        return (name, answer, "", "", "", "", "")
+        return (name, answer, *("",) * 6)
     time, solving = (1e3 * float(np.median(answer[key])) for key in ("seconds", "solving"))
     return (
         name,
         f"{time:.0f}",
         f"{solving:.0f}",
         f"{time / ours:.1f}",
+        str(answer["parameters"]),
         f"{1e3 * answer['rms']:.4f}",
         f"{1e3 * answer['fresh']:.4f}",
         answer["version"],

@@ -9,6 +9,7 @@ peer is to change what we run with. What cannot be installed is told in the tabl
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import venv
@@ -77,8 +78,10 @@ def calibrated(peer, method, folder, source, seconds=SECONDS):
     if folder is None or not (python(peer, folder).parents[1] / "installed").exists():
         return "not installed"
     call = [python(peer, folder), HERE / peer.script, source, method, str(TRIES), str(seconds)]
+    own = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"}
+    own |= dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
     try:
-        answer = subprocess.run(call, capture_output=True, text=True, check=False, timeout=4 * seconds)
+        answer = subprocess.run(call, capture_output=True, text=True, check=False, timeout=4 * seconds, env=own)
     except subprocess.TimeoutExpired:
         return f"no answer within {4 * seconds} s"
     if answer.returncode:
