@@ -23,7 +23,7 @@ from thermal_robot.inference.fit import fit
 SCRIPT = Path(__file__).resolve().parents[1] / "bench_diagnosis.py"
 TREE = SCRIPT.parents[2]
 RUNS, MOST = 3, 10**6
-"""Runs of a case, and the largest size from which on the real robots are diagnosed, a minute or two."""
+"""Runs of a case, and the largest size from which on there are so many, and real robots too, a minute or two each."""
 AT_WORK = ["backlash", "joint_offset"]
 """In the campaign of which the parts are timed; a tiny run looks at the last one alone."""
 IMPORTS = {
@@ -46,7 +46,7 @@ def _whole(effort):
         if case in REAL and "THERMAL_ROBOT_DATA" not in os.environ:
             rows.append((case, "the data are not here", ""))
             continue
-        runs = 1 if case in REAL else min(RUNS, effort.turns)
+        runs = RUNS if case not in REAL and effort.largest >= MOST else 1
         told = [[float(v) for v in started([str(SCRIPT), "--measure", case], TREE)[0]] for _ in range(runs)]
         seconds, peak = np.median(told, axis=0)
         rows.append((case, f"{seconds:.3f}", f"{peak:.2f}"))
