@@ -58,7 +58,7 @@ FREE = {
     "paper": {"errors", "kinematics", "robot", "assembly", "paper"},
 }
 """Rooms that may import less than what stands before them: one draws what it is given, three need no campaign."""
-TYPES = {"report": {f"thermal_robot.diagnosis.{n}" for n in ("result", "parts", "explained")}}
+TYPES = {"report": {f"thermal_robot.diagnosis.{n}" for n in ("result", "parts", "explained", "calibration")}}
 TYPES["report"] |= {"thermal_robot.fleet.wear_result"}
 """What a room may know beyond that by type alone: the report sees values, and nothing that computes them."""
 LONGEST = 400

@@ -145,8 +145,8 @@ REVISIONS = 3
 MANY_ROWS = 500
 """Above, a choice is revised once and one law looked for: each takes tens of seconds, and so many rows hardly change
 it."""
-SETTLED = 1e-4
-"""Last step of a fit, in standard deviations."""
+SETTLED, SETTLED_NAMED = 1e-4, 1e-2
+"""Last step of a fit, in standard deviations; of one of named effects, where the next step is a thousandth of it."""
 SETTLED_BETWEEN = 2.0
 """The same for a fit of many rows that is chosen anew: the step after it would be a hundredth of it."""
 REFINEMENT = 1.6

@@ -62,18 +62,15 @@ class Displaced:
         segment = _channel(robot, "segment", displacement.segment, (len(robot.segments), 6), rows)
         base = _channel(robot, "base", displacement.base, (6,), rows)
         tool = _channel(robot, "tool", displacement.tool, (6,), rows)
-        motions: dict[int, Array] = {}
-        for s, k in enumerate(robot.chain.placed if segment is not None else ()):
-            if segment is not None and np.any(segment[:, s]):
-                motions[int(k)] = _motions(segment[:, s])
-        return Displaced(
-            joint,
-            motions,
-            None if base is None else _motions(base),
-            None if tool is None else _motions(tool),
-        )
+        twists = {} if segment is None else {int(k): segment[:, s] for s, k in enumerate(robot.chain.placed)}
+        twists = {k: own for k, own in twists.items() if np.any(own)}
+        ends = {k: own for k, own in ((_BASE, base), (_TOOL, tool)) if own is not None}
+        motions = _motions({**twists, **ends})
+        return Displaced(joint, {k: motions[k] for k in twists}, motions.get(_BASE), motions.get(_TOOL))
 
 
+_BASE, _TOOL = -2, -1
+"""Numbers of the ends of the chain beside those of its elements."""
 NOWHERE = Displaced(None, {}, None, None)
 """Nothing displaced."""
 
@@ -92,5 +89,11 @@ def _channel(robot: Chained, name: str, value: ArrayLike | None, shape: tuple[in
     )
 
 
-def _motions(twists: Array) -> Array:
-    return np.ascontiguousarray(np.moveaxis(exp6(twists), 0, -1))
+def _motions(twists: dict[int, Array]) -> dict[int, Array]:
+    """(4, 4, N) of each of (N, 6) twists, (4, 4, 1) where all rows are the same, as most errors of an arm are."""
+    same = [k for k, own in twists.items() if (own == own[:1]).all()]
+    alike = exp6(np.array([twists[k][0] for k in same]).reshape(-1, 6))
+    motions = {k: motion[:, :, None] for k, motion in zip(same, alike, strict=True)}
+    for k in twists.keys() - motions.keys():
+        motions[k] = np.ascontiguousarray(np.moveaxis(exp6(twists[k]), 0, -1))
+    return motions
