@@ -7,6 +7,7 @@ import sys
 import numpy as np
 import pytest
 
+from thermal_robot import compiling
 from thermal_robot import kinematics as kin
 from thermal_robot.kinematics import compiled, lanes, settings
 
@@ -34,8 +35,8 @@ def written(call, robot, q, arguments, shape):
 def test_the_number_of_threads_does_not_show(awkward, configurations, monkeypatch, call, arguments, shape):
     q, found = configurations(awkward, ROWS), []
     for threads, piece in ((1, 16_384), (2, 700), (5, 1300), (16, 513)):
-        monkeypatch.setattr(settings, "THREADS", threads)
-        monkeypatch.setattr(settings, "PIECE", piece)
+        monkeypatch.setattr(compiling, "THREADS", threads)
+        monkeypatch.setattr(compiling, "PIECE", piece)
         found.append(written(call, awkward, q, arguments, shape))
     for other in found[1:]:
         np.testing.assert_array_equal(other, found[0])
@@ -54,7 +55,7 @@ def test_nor_does_the_place_of_a_row(awkward, configurations, call, arguments, s
 @each_call
 @pytest.mark.parametrize("rows", [1, settings.LANES - 1, settings.LANES, 3 * settings.LANES + 5])
 def test_results_go_to_arrays_of_any_layout(awkward, configurations, monkeypatch, call, arguments, shape, rows):
-    monkeypatch.setattr(settings, "PIECE", 600)
+    monkeypatch.setattr(compiling, "PIECE", 600)
     q = configurations(awkward, rows)
     expected = written(call, awkward, q, arguments, shape)
     for out in (
@@ -96,13 +97,6 @@ def test_many_rows_are_compiled_and_the_same(ur5_or_rv_m2, configurations):
 def ur5_or_rv_m2(rv_m2):
     pytest.importorskip("numba", reason="the compiled engine is in the extra fast: numba is not installed")
     return rv_m2
-
-
-def test_the_threads_are_those_that_are_set_or_one_a_processor(monkeypatch):
-    monkeypatch.setattr(settings, "THREADS", 0)
-    assert 1 <= compiled.threads() <= os.cpu_count()
-    monkeypatch.setattr(settings, "THREADS", 3)
-    assert compiled.threads() == 3
 
 
 SCRIPT = """

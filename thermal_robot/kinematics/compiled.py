@@ -3,18 +3,13 @@
 from __future__ import annotations
 
 import math
-import os
-import warnings
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from functools import cache
-from importlib import import_module
-from importlib.util import find_spec
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.compiling import in_pieces, loads, rows_at_once
 from thermal_robot.kinematics import lanes, settings
 from thermal_robot.kinematics.arm import arm_of
 from thermal_robot.kinematics.scratch import rows_last, scratch
@@ -25,30 +20,9 @@ if TYPE_CHECKING:
 Array = NDArray[np.float64]
 
 
-@cache
 def installed() -> bool:
     """Whether numba is there and can be loaded; the first call loads it."""
-    if find_spec("numba") is None:
-        return False
-    try:
-        import_module("thermal_robot.kinematics.kernels")
-    except ImportError as error:
-        warnings.warn(
-            f"numba is installed but cannot be loaded ({error}); kinematics go on without it, several times slower: "
-            'mend it with pip install --upgrade "thermal-robot[fast]"',
-            RuntimeWarning,
-            stacklevel=2,
-        )
-        return False
-    return True
-
-
-def threads() -> int:
-    """How many threads work on a batch."""
-    if settings.THREADS:
-        return settings.THREADS
-    allowed = getattr(os, "sched_getaffinity", None)
-    return len(allowed(0)) if allowed else os.cpu_count() or 1
+    return loads("thermal_robot.kinematics.kernels")
 
 
 def poses(robot: Chained, q: Array, out: Array) -> None:
@@ -98,7 +72,7 @@ def _run(kernel: Callable[..., None], constants: tuple[Any, ...], q: Array, out:
         _pieces(kernel, constants, q, rows.reshape(-1, len(q)))
         return
     size = math.prod(out.shape[1:])
-    step = settings.PIECE * threads()
+    step = rows_at_once()
     for start in range(0, len(q), step):
         part = slice(max(0, min(start, len(q) - settings.LANES)), min(start + step, len(q)))
         block = scratch("compiled", size, part.stop - part.start)
@@ -114,31 +88,3 @@ def _pieces(kernel: Callable[..., None], constants: tuple[Any, ...], q: Array, r
         rows[...] = whole[:, : len(q)]
         return
     in_pieces(kernel, (*constants, q), len(q), (rows,))
-
-
-def in_pieces(kernel: Callable[..., None], constants: tuple[Any, ...], rows: int, out: tuple[Array, ...]) -> None:
-    """Call a kernel for pieces of so many rows, in threads: with constants, first and last row, and where to write."""
-    count = max(1, rows // settings.PIECE)
-    cuts = [rows * piece // count for piece in range(count + 1)]
-
-    def work(piece: int) -> None:
-        _called(kernel, *constants, cuts[piece], cuts[piece + 1], *out)
-
-    workers = min(threads(), count)
-    if workers < 2:
-        for piece in range(count):
-            work(piece)
-        return
-    work(0)  # compiles, where nothing is on disk
-    with ThreadPoolExecutor(workers) as pool:
-        list(pool.map(work, range(1, count)))
-
-
-def _called(kernel: Callable[..., None], *arguments: Any) -> None:
-    # A full disk stops numba when it has compiled a function and is to keep it; the next try goes on from there.
-    for _ in range(settings.MOST_UNKEPT):
-        try:
-            return kernel(*arguments)
-        except OSError:
-            continue
-    kernel(*arguments)

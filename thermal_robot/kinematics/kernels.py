@@ -14,8 +14,8 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.compiling import compiled
 from thermal_robot.kinematics.arm import SLIDES, TURNS_ALIGNED, Arm
-from thermal_robot.kinematics.compiling import compiled
 from thermal_robot.kinematics.settings import LANES, LARGEST_REDUCED
 
 Array = NDArray[np.float64]

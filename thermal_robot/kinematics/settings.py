@@ -20,9 +20,3 @@ LARGEST_REDUCED = 1e6
 MANY = 20_000
 """Configurations from which the compiled kernels are used: the first call loads numba, which takes a second, and
 compiles, which takes a minute at most and is kept on disk. NumPy has done fewer in a hundredth of a second."""
-PIECE = 16_384
-"""Configurations that a thread works on before it takes the next ones."""
-THREADS = 0
-"""Threads of the compiled kernels; 0 for one on each processor that this process may use."""
-MOST_UNKEPT = 50
-"""Compiled functions that there may be no room on the disk for; a kernel is made of twenty at most."""

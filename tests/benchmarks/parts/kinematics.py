@@ -9,7 +9,7 @@ import pinocchio as pin
 from benchmarks.parts import Curve, Part, Plot
 from benchmarks.timing import by_turns, medians
 
-from thermal_robot import load_robot
+from thermal_robot import compiling, load_robot
 from thermal_robot.kinematics import (
     compiled,
     frame_jacobians,
@@ -101,19 +101,19 @@ def bare(robot):
 
 
 @contextmanager
-def compiling(threads):
+def running(threads):
     """Let so many threads run compiled kernels, 0 for all processors; ``None`` lets NumPy alone work."""
-    kept = settings.MANY, settings.THREADS
-    settings.MANY, settings.THREADS = (2**62, 0) if threads is None else (kept[0], threads)
+    kept = settings.MANY, compiling.THREADS
+    settings.MANY, compiling.THREADS = (2**62, 0) if threads is None else (kept[0], threads)
     try:
         yield
     finally:
-        settings.MANY, settings.THREADS = kept
+        settings.MANY, compiling.THREADS = kept
 
 
 def in_pieces(batch, robot, q, rows, out, threads):
     """Do so many configurations in pieces, all into the same array."""
-    with compiling(threads):
+    with running(threads):
         for _ in range(0, rows, len(q)):
             batch(robot, q, out=out)
 
@@ -177,9 +177,9 @@ def _plot(name, columns):
 def _threads(effort, robot):
     """Return the table of compiled kernels by threads; none where they are not installed."""
     sizes = [n for n in SIDED if n <= effort.largest]
-    if not compiled.installed() or not sizes or compiled.threads() < 2:
+    if not compiled.installed() or not sizes or compiling.threads() < 2:
         return ()
-    rows = [("compiled kernels", "N", "one thread, µs each", f"{compiled.threads()} threads", "gain")]
+    rows = [("compiled kernels", "N", "one thread, µs each", f"{compiling.threads()} threads", "gain")]
     for name, batch in BATCHES.items():
         for n in sizes:
             q = np.random.default_rng(0).uniform(-2.0, 2.0, (min(n, PIECE), robot.n))

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from thermal_robot.assembly.probability.boundary import NODES
-from thermal_robot.kinematics.compiled import in_pieces, installed
+from thermal_robot.compiling import in_pieces, loads
 
 Array = npt.NDArray[np.float64]
 
@@ -40,7 +40,7 @@ def circle_chances(covariance: npt.ArrayLike, diameter: npt.ArrayLike, mean: npt
         leading = np.broadcast_shapes(matrices.shape[:-2], sizes.shape, means.shape[:-1])
     except ValueError:
         return None
-    if math.prod(leading) < MANY or not installed():
+    if math.prod(leading) < MANY or not loads("thermal_robot.assembly.probability.loops"):
         return None
     from thermal_robot.assembly.probability import loops
 

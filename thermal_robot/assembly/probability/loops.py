@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from thermal_robot.kinematics.compiling import compiled
+from thermal_robot.compiling import compiled
 
 Array = npt.NDArray[np.float64]
 
