@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from thermal_robot.correction import CorrectedModel
     from thermal_robot.datasets import demo_campaign
     from thermal_robot.diagnosis import Diagnosis
+    from thermal_robot.diagnosis.calibrate import calibrate
+    from thermal_robot.diagnosis.calibration import Calibration
     from thermal_robot.diagnosis.diagnose import diagnose
     from thermal_robot.effects import Effect
     from thermal_robot.errors import CampaignError, EffectError, EstimationError, RobotError, ThermalRobotError
@@ -36,6 +38,7 @@ _HOME = {
     "Comparison": "fleet.comparison",
     "compare": "fleet.compare",
     "wear": "fleet.wear",
+    "Calibration": "diagnosis.calibration",
     "Campaign": "campaign",
     "CampaignError": "errors",
     "CorrectedModel": "correction",
@@ -47,6 +50,7 @@ _HOME = {
     "Robot": "robot",
     "RobotError": "errors",
     "ThermalRobotError": "errors",
+    "calibrate": "diagnosis.calibrate",
     "campaign_from_table": "campaign",
     "demo_campaign": "datasets",
     "describe": "campaign",
@@ -76,6 +80,7 @@ def __dir__() -> list[str]:
 
 
 __all__ = [
+    "Calibration",
     "Campaign",
     "CampaignError",
     "Comparison",
@@ -88,6 +93,7 @@ __all__ = [
     "Robot",
     "RobotError",
     "ThermalRobotError",
+    "calibrate",
     "campaign_from_table",
     "compare",
     "demo_campaign",

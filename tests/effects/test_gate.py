@@ -486,3 +486,33 @@ def test_parameters_are_declared_whatever_their_responses(observations):
     for answer, found in ((None, "answers NoneType"), ((GOOD, 1), "answers tuple"), (GOOD, "answers Parameter")):
         with pytest.raises(EffectError, match=f"'sagging' {found}, expected a tuple of Parameter"):
             gate.declared(Answers(answer), observations)
+
+
+@dataclass(frozen=True)
+class Fixed(Effect):
+    """Counts how often it is asked."""
+
+    name: ClassVar[str] = "fixed"
+    constant: ClassVar[bool] = True
+    asked: ClassVar[list[int]] = []
+    by_row: bool = False
+
+    def parameters(self, observations):
+        self.asked.append(1)
+        values = np.ones(observations.campaign.samples) if self.by_row else 1.0
+        return (replace(GOOD, responses=(at_joint(1, values),)),)
+
+
+@dataclass(frozen=True)
+class Derived(Fixed):
+    """What derives from a constant effect is asked again."""
+
+
+def test_a_constant_effect_is_asked_once_a_robot_and_what_derives_from_it_each_time(rv_m2):
+    for kind, times in ((Fixed, 1), (Derived, 2)):
+        Fixed.asked.clear()
+        found = [checked(kind(), observe(commanded(rv_m2))) for _ in range(2)]
+        assert len(Fixed.asked) == times
+        assert [p.name for p in found[0]] == [p.name for p in found[1]]
+    with pytest.raises(EffectError, match="constant is True, and a response has a value for each row"):
+        checked(Fixed(by_row=True), observe(commanded(rv_m2)))

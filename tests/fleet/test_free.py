@@ -67,3 +67,14 @@ def test_what_the_data_do_not_see_has_no_value(rv_m2):
     found = free(diagnosed(rv_m2, {}, 0).fit)["joint_offset"]
     assert found
     assert "zero offset, joint_1" not in [parameter.name for parameter in found]
+
+
+def test_an_effect_that_was_found_in_one_joint_is_told_in_all(rv_m2):
+    """Else no robot could stand out by a fault of its own of the kind that all have."""
+    found = diagnosed(rv_m2, {"backlash": {"joint_2": 6e-4}}, 4)
+    assert {place.name for place in found.finding("backlash").locations if place.share > 0.0} == {"joint_2"}
+    told = {p.name: p for p in free(found.fit)["backlash"]}
+    others = [p for name, p in told.items() if "joint_2" not in name]
+    assert len(others) >= 3
+    assert abs(told["lost motion, joint_2"].value - 6e-4) < 4.0 * told["lost motion, joint_2"].std
+    assert all(abs(p.value) < 4.0 * p.std for p in others)

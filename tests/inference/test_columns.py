@@ -75,3 +75,16 @@ def test_a_block_holds_neither_columns_nor_responses(rv_m2):
     np.testing.assert_array_equal(item.columns, moved_by(seen, effect.parameters(seen)))
     given = replace(item, source=item.columns[:3])
     assert given.columns is given.source
+
+
+def test_what_is_rounding_is_no_column(rv_m2):
+    """A torque about an axis through the centre of mass is what the last bits leave: its column would be noise."""
+    rng, data = np.random.default_rng(5), simulate(rv_m2, samples=30, seed=1)[0]
+    sizes = dict(zip(rv_m2.joint_names, [20.0, 10.0, 5.0, 1.0, 4e-16], strict=False))
+    torques = {f"torque.{joint}": size * rng.normal(size=30) for joint, size in sizes.items()}
+    seen = observe(replace(data, covariates={**data.covariates, **torques}))
+    item = block(seen, library()["joint_compliance"])
+    largest = dict(zip([p.place for p in item.bare], np.abs(item.columns).max(axis=(0, 1)), strict=True))
+    hidden = [joint for joint, size in sizes.items() if size < 1e-12]
+    assert [largest[joint] for joint in hidden] == [0.0]
+    assert all(largest[joint] > 0.0 for joint in sizes if joint not in hidden)

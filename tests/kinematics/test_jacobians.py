@@ -5,8 +5,7 @@ import pytest
 
 from thermal_robot import kinematics as kin
 from thermal_robot.errors import RobotError
-from thermal_robot.kinematics import frames as engine
-from thermal_robot.kinematics import reference
+from thermal_robot.kinematics import reference, settings
 
 ROWS = 200
 TOLERANCE = 1e-10
@@ -82,7 +81,7 @@ def test_chunks_do_not_show(rv_m2, configurations, monkeypatch):
         )
 
     at_once = everything()
-    monkeypatch.setattr(engine, "CHUNK", 97)
+    monkeypatch.setattr(settings, "CHUNK", 97)
     for whole, pieces in zip(at_once, everything(), strict=True):
         np.testing.assert_allclose(pieces, whole, rtol=0.0, atol=1e-14)
 

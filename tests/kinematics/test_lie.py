@@ -99,3 +99,14 @@ def test_roll_pitch_and_yaw_together_give_the_rotation_at_a_quarter_turn(away):
             rotation = pinocchio.rpy.rpyToMatrix(roll, side * (np.pi / 2 - away), yaw)
             again = pinocchio.rpy.rpyToMatrix(kin.rotation_to_rpy(rotation))
             np.testing.assert_allclose(again, rotation, atol=1e-15)
+
+
+def test_points_are_aligned_in_batches_as_one_by_one():
+    rng = np.random.default_rng(3)
+    points, weights = rng.normal(size=(5, 30, 3)), rng.uniform(0.1, 1.0, (5, 30))
+    motions = kin.exp6(rng.normal(size=(5, 6)))
+    moved = points @ motions[:, :3, :3].transpose(0, 2, 1) + motions[:, None, :3, 3]
+    np.testing.assert_allclose(kin.align(points, moved, weights), motions, rtol=0.0, atol=1e-13)
+    for k in range(5):
+        one = kin.align(points[k], moved[0], weights[k])
+        np.testing.assert_array_equal(kin.align(points, moved[0], weights)[k], one)

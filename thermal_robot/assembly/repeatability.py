@@ -11,6 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from thermal_robot.errors import EstimationError, RobotError
 from thermal_robot.kinematics import frame_jacobians
+from thermal_robot.kinematics.scratch import chunks, result, rows_last
 from thermal_robot.robot import Robot
 
 Array = NDArray[np.float64]
@@ -121,8 +122,15 @@ def tool_covariance(
     if measures not in ("position", "pose"):
         raise RobotError(f"measures is 'position' or 'pose', not {measures!r}", name=robot.name)
     jacobian = frame_jacobians(robot, q, point=point)[:, : 3 if measures == "position" else 6]
-    scaled = jacobian * _deviations(robot, sigma_q)
-    covariance: Array = scaled @ np.swapaxes(scaled, 1, 2)
+    rows, variances = rows_last(jacobian), _deviations(robot, sigma_q) ** 2
+    size, joints, count = rows.shape
+    covariance = result(None, count, size, size)
+    written = rows_last(covariance)
+    for part in chunks(count, joints):
+        moved = rows[..., part] * variances[:, None]
+        for a in range(size):
+            for b in range(a + 1):
+                written[a, b, part] = written[b, a, part] = np.einsum("jn,jn->n", moved[a], rows[b][:, part])
     return covariance
 
 

@@ -119,7 +119,7 @@ def answer(
         verdict=(*(f.name for f in found if f.name in held), *(f.name for f in chance if f.status == "found")),
         probability=probability,
         separates=groups,
-        model=_model(last),
+        model=model_of(fit, None if last.misfit else last.left.floor),
         rows=_rows(fit, shrinkage),
         warnings=(*campaign.warnings, *notes, *last.notes, *cautions(fit, last.refused, sensitivity)),
         sensitivity=sensitivity,
@@ -161,8 +161,18 @@ def _gap(last: Conclusion, shrinkage: Shrinkage) -> Gap:
     )
 
 
-def _model(last: Conclusion) -> CorrectedModel:
-    fit, campaign = last.fit, last.fit.campaign
+def model_of(fit: Fit, floor: float | None) -> CorrectedModel:
+    """Return the model that predicts as a fit does.
+
+    Parameters
+    ----------
+    fit
+        The fit.
+    floor
+        One sigma per axis of the noise where the campaign states none, m; ``None`` where nobody is to be told how far
+        predictions may be off.
+    """
+    campaign = fit.campaign
     needs = tuple(dict.fromkeys(c for effect, _ in fit.effects for c in depends_on(effect, fit.nominal)))
     clock = campaign.covariates.get("order")
     return CorrectedModel(
@@ -174,7 +184,7 @@ def _model(last: Conclusion) -> CorrectedModel:
         needs=needs,
         simulated=campaign.simulated_position is not None,
         last_order=None if clock is None else (float(clock.min()), float(clock.max())),
-        spread=None if last.misfit else uncertainty(fit, needs, last.left.floor),
+        spread=None if floor is None else uncertainty(fit, needs, floor),
     )
 
 

@@ -101,7 +101,7 @@ def diagnose(
     everything = {effect.name for effect in (*effects, *candidates)}
     if only or without:
         everything |= {*library()}
-    _check_priors(campaign, everything)
+    check_priors(campaign, everything)
 
     def asked(name: str) -> bool:
         return name not in without and (not only or name in only)
@@ -110,7 +110,7 @@ def diagnose(
         raise CampaignError(campaign.name, "nothing was measured", expected="a campaign with measured positions")
     campaign, notes = usable(campaign)
     # matrices are small: threads that wait for each other cost several times what they bring, and the last bits
-    with threadpool_limits(1), _solvable(campaign):
+    with threadpool_limits(1), solvable(campaign):
         last = _concluded(campaign, candidates, progress)
         shrinkage = held_out(last.fit, progress)
         progress("places")
@@ -133,7 +133,7 @@ def _ready(found: Diagnosis) -> Diagnosis:
 
 
 @contextmanager
-def _solvable(campaign: Campaign) -> Iterator[None]:
+def solvable(campaign: Campaign) -> Iterator[None]:
     """Say in a sentence that equations have no solution in floating point: figures of very different sizes."""
     try:
         yield
@@ -200,7 +200,14 @@ def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
     return Conclusion(fit, laws, unexplained, left, chance, refused)
 
 
-def _check_priors(campaign: Campaign, known: set[str]) -> None:
+def check_priors(campaign: Campaign, known: set[str]) -> None:
+    """Refuse a campaign that states the size of an effect that nobody knows.
+
+    Raises
+    ------
+    CampaignError
+        Naming it, and what was probably meant.
+    """
     for name in campaign.priors:
         if name not in known:
             expected = "one of " + ", ".join(sorted(known))

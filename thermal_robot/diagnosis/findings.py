@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
-import numpy as np
-from numpy.typing import NDArray
-
-from thermal_robot.diagnosis.parts import Estimate, Finding, Location, Refused, is_frame
+from thermal_robot.diagnosis.estimates import estimates, fitted_values, told_inside
+from thermal_robot.diagnosis.parts import Finding, Location, Refused, is_frame
 from thermal_robot.diagnosis.rivals import rivals, unknown_frames, within_frames
 from thermal_robot.effects import Effect
 from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.effects.law_size import Size, in_joints, sizes
 from thermal_robot.effects.law_words import called, usually
 from thermal_robot.inference.fit import Fit
-from thermal_robot.inference.inside import divided, identified
 
-Array = NDArray[np.float64]
 Shares = dict[str, tuple[float, tuple[float, float]]]
 
 
@@ -46,7 +42,7 @@ def findings(
     """
     explained = {effect.name: b for b, (effect, _) in zip(fit.explanation.best.blocks, fit.effects, strict=True)}
     known = {effect.name: effect for effect, _ in fit.effects}
-    apart, inside = rivals(fit, explained), _told_inside(fit)
+    apart, inside = rivals(fit, explained), told_inside(fit)
     result = []
     for name in dict.fromkeys(fit.families):
         if name.startswith(PREFIX) and name not in explained:
@@ -60,7 +56,7 @@ def findings(
             shrinkage=share,
             shrinkage_ci95=interval,
             locations=locations.get(name, ()),
-            parameters=part.parameters if part else _estimates(fit, explained[name]) if name in explained else (),
+            parameters=part.parameters if part else estimates(fit, explained[name]) if name in explained else (),
             unseen=part.unseen if part else (),
         )
         if isinstance(law, Discovered):
@@ -84,7 +80,7 @@ def findings(
 
 def _of_law(fit: Fit, law: Discovered, block: int) -> dict[str, Any]:
     """Return the fields of a finding that only a law has: what it follows, in which shape, how far, and in words."""
-    e, values = fit.explanation, _values(fit, block)
+    e, values = fit.explanation, fitted_values(fit, block)
     return {
         "quantity": law.follows,
         "shape": law.shape,
@@ -98,12 +94,7 @@ def _of_law(fit: Fit, law: Discovered, block: int) -> dict[str, Any]:
 
 def _in_joints(fit: Fit, effect: Effect, block: int) -> tuple[Size, ...]:
     e = fit.explanation
-    return in_joints(effect.sized_as, e.linear.blocks[block].parameters, _values(fit, block), e.values[block][1])
-
-
-def _values(fit: Fit, block: int) -> Array:
-    """Return the values of one block of the best combination, as they were refined."""
-    return fit.effects[fit.explanation.best.blocks.index(block)][1]
+    return in_joints(effect.sized_as, e.linear.blocks[block].parameters, fitted_values(fit, block), e.values[block][1])
 
 
 def titled(found: Sequence[Finding], effects: Iterable[Effect]) -> tuple[Finding, ...]:
@@ -124,51 +115,10 @@ def by_share(found: Sequence[Finding]) -> tuple[Finding, ...]:
     )
 
 
-def _estimates(fit: Fit, block: int) -> tuple[Estimate, ...]:
-    e = fit.explanation
-    item = e.linear.blocks[block]
-    values = _values(fit, block)
-    spread = np.sqrt(np.maximum(np.diag(e.values[block][1]), 0.0))
-    prior = item.sizes * e.best.scales[block]
-    result = []
-    for parameter, value, std, known in zip(
-        item.parameters, values, spread, identified(spread, prior).tolist(), strict=True
-    ):
-        result.append(
-            Estimate(
-                parameter.name, float(value) if known else None, float(std) if known else None, parameter.unit, known
-            )
-        )
-    return tuple(result)
-
-
 def _hidden(fit: Fit, name: str, explained: Mapping[str, int]) -> tuple[str, ...]:
     """Return the unknown frames that hold all that an effect outside the fit could do; empty where they do not."""
     inside = name not in explained and all(within_frames(fit, b) for b in fit.blocks_of(name))
     return unknown_frames(fit) if inside else ()
-
-
-@dataclass(frozen=True)
-class _Inside:
-    """An effect's part of one that was found, or the rest of that: its estimates, and what is not seen of it."""
-
-    container: str
-    parameters: tuple[Estimate, ...]
-    unseen: tuple[str, ...]
-
-
-def _told_inside(fit: Fit) -> dict[str, _Inside]:
-    """Return by name the effects of the fit that are told in parts, and the parts."""
-    found = {}
-    for effect, _ in fit.effects:
-        for part in divided(fit, effect.name):
-            known = identified(part.spread, part.prior)
-            estimates = tuple(
-                Estimate(p.name, float(v) if k else None, float(s) if k else None, p.unit, bool(k))
-                for p, v, s, k in zip(part.parameters, part.values, part.spread, known, strict=True)
-            )
-            found[part.effect] = _Inside(effect.name, estimates, tuple(p.name for p in part.unseen))
-    return found
 
 
 def separates(found: Sequence[Finding]) -> tuple[tuple[str, ...], ...]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from thermal_robot.correction import CorrectedModel
-    from thermal_robot.diagnosis.parts import Finding, Rows
+    from thermal_robot.diagnosis.parts import Estimate, Finding, Rows
     from thermal_robot.inference.fit import Fit
 
 LEVELS = ("effect", "parameter")
@@ -32,20 +33,24 @@ def parameters(findings: tuple[Finding, ...]) -> pd.DataFrame:
         Index (effect, parameter); columns ``status``, ``value``, ``std`` (one sigma), ``unit`` and ``identified``.
         Values are NaN where the data do not identify the parameter.
     """
+    found = estimates((finding.name, estimate) for finding in findings for estimate in finding.parameters)
+    found.insert(0, "status", [finding.status for finding in findings for _ in finding.parameters])
+    return found
+
+
+def estimates(of_effects: Iterable[tuple[str, Estimate]]) -> pd.DataFrame:
+    """Return the same of estimates, each with the name of its effect, without ``status``."""
     import pandas as pd
 
-    told = [(finding, estimate) for finding in findings for estimate in finding.parameters]
-    index = pd.MultiIndex.from_tuples([(f.name, e.name) for f, e in told], names=LEVELS)
-    nothing = float("nan")
+    told, nothing = list(of_effects), float("nan")
     return pd.DataFrame(
         {
-            "status": [f.status for f, _ in told],
             "value": np.array([nothing if e.value is None else e.value for _, e in told], dtype=float),
             "std": np.array([nothing if e.std is None else e.std for _, e in told], dtype=float),
             "unit": [e.unit for _, e in told],
             "identified": np.array([e.identified for _, e in told], dtype=bool),
         },
-        index=index,
+        index=pd.MultiIndex.from_tuples([(name, e.name) for name, e in told], names=LEVELS),
     )
 
 

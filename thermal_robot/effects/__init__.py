@@ -3,7 +3,7 @@
 from thermal_robot.effects.backlash import Backlash
 from thermal_robot.effects.base_compliance import BaseCompliance
 from thermal_robot.effects.base_frame import BaseFrame
-from thermal_robot.effects.catalogue import RANDOM, choose, library, named, random_effects
+from thermal_robot.effects.catalogue import KINEMATIC, RANDOM, choose, library, named, random_effects
 from thermal_robot.effects.drift import Drift
 from thermal_robot.effects.effect import (
     Effect,
@@ -32,6 +32,7 @@ from thermal_robot.effects.tracking_lag import TrackingLag
 from thermal_robot.effects.transmission_error import TransmissionError
 
 __all__ = [
+    "KINEMATIC",
     "RANDOM",
     "Backlash",
     "BaseCompliance",

@@ -54,6 +54,8 @@ _SYSTEMATIC: tuple[type[Effect], ...] = (
 )
 _RANDOM: tuple[type[RandomEffect], ...] = (EncoderResolution, ExcessRepeatability)
 
+KINEMATIC = (JointOffset.name, Geometric.name)
+"""Names of the effects that a calibration of the kinematics fits: what a controller's zeros can take, and the rest."""
 RANDOM = tuple(kind.name for kind in _RANDOM)
 """Names of the effects that scatter."""
 
@@ -149,6 +151,9 @@ def named(name: str) -> Effect:
     Traceback (most recent call last):
     thermal_robot.errors.EffectError: no effect is named 'drft'; did you mean 'drift'?
     """
+    own = {kind.name: kind for kind in _SYSTEMATIC}
+    if name in own:  # no package can give one of these names, and looking all of them up takes a while
+        return own[name]()
     known = {**library(), **{effect.name: effect for effect in random_effects()}}
     if name not in known:
         raise _unknown(name, known)

@@ -42,6 +42,8 @@ def column(observations: Observations, response: Response, measures: int) -> Arr
         return np.asarray(moves[:, :, 0] * (values[:, None] if values.ndim else values))
     if values.ndim == 1:
         used = np.flatnonzero(values)  # most twists move along or about one axis
+        if len(used) == 1:
+            return np.asarray(moves[:, :, used[0]] * values[used[0]])
         return np.asarray(moves[:, :, used] @ values[used])
     return np.asarray(np.einsum("nrk,nk->nr", moves, values))
 

@@ -38,7 +38,7 @@ from __future__ import annotations
 import copy
 from abc import ABC, abstractmethod
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field
 from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
@@ -180,7 +180,7 @@ class Parameter:
     @cached_property
     def bare(self) -> Parameter:
         """It without its responses, which may be large."""
-        return replace(self, responses=())
+        return Parameter(self.label, self.unit, self.size, self.kind, self.place, (), self.positive)
 
 
 @dataclass(frozen=True)
@@ -234,6 +234,9 @@ class Effect(ABC):
     contained_in: ClassVar[tuple[str, ...]] = ()
     """Names of larger effects that can do exactly what it does, but for the unknown frames; where that holds for some
     arms only, the class says so."""
+    constant: ClassVar[bool] = False
+    """Whether its parameters and responses follow from the robot alone, the same in all rows: they are then asked for
+    once a robot. Each class says so for itself; what derives from it is asked again."""
     told_inside: ClassVar[bool] = False
     """Whether its own part is told where a larger effect that contains it was found: what somebody could set anew."""
 

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 from dataclasses import fields
 from numbers import Integral, Real
 from typing import TYPE_CHECKING, Any, get_args
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -25,6 +26,8 @@ if TYPE_CHECKING:
 
 KINDS = ("joint", "link", "base", "tool", "instrument")
 """Kinds of place that a parameter may sit in."""
+_CHANNELS = get_args(Channel)
+_CONSTANT: WeakKeyDictionary[Robot, dict[Effect, tuple[Parameter, ...]]] = WeakKeyDictionary()
 
 
 def checked(effect: Effect, observations: Observations) -> tuple[Parameter, ...]:
@@ -57,7 +60,7 @@ def checked(effect: Effect, observations: Observations) -> tuple[Parameter, ...]
     object.__setattr__(whole, "places", ())
     object.__setattr__(whole, "excluded", ())
     known = observations.parameters.pop(whole, None)
-    known = observations.parameters[whole] = _parameters(whole, observations) if known is None else known
+    known = observations.parameters[whole] = _first_asked(whole, observations) if known is None else known
     while len(observations.parameters) > KEPT:
         del observations.parameters[next(iter(observations.parameters))]
     return _kept(effect, known, observations.robot)
@@ -85,6 +88,19 @@ def _is_what_it_holds(effect: Any) -> bool:
     except TypeError:
         return False
     return isinstance(effect, Effect) and vars(effect).keys() == {own.name for own in fields(effect) if own.compare}
+
+
+def _first_asked(effect: Effect, observations: Observations) -> tuple[Parameter, ...]:
+    """Return all parameters of an effect, of one that is constant as they are known of the robot."""
+    if vars(type(effect)).get("constant") is not True:
+        return _parameters(effect, observations)
+    of_robot = _CONSTANT.setdefault(observations.robot, {})
+    if effect not in of_robot:
+        found = _parameters(effect, observations)
+        if any(r.values.shape not in ((), (6,)) for p in found for r in p.responses):
+            raise EffectError(f"effect {effect.name!r}: constant is True, and a response has a value for each row")
+        of_robot[effect] = found
+    return of_robot[effect]
 
 
 def _parameters(effect: Effect, observations: Observations) -> tuple[Parameter, ...]:
@@ -367,13 +383,14 @@ def _wrong_response(response: Any, observations: Observations) -> str:
     channel: Any = response.channel
     index: Any = response.index
     values: Any = response.values
-    if channel not in get_args(Channel):
-        return f"channel is {channel!r}, expected one of {', '.join(get_args(Channel))}"
-    places = {"joint": observations.robot.n, "segment": len(observations.robot.segments)}.get(channel, 1)
+    if channel not in _CHANNELS:
+        return f"channel is {channel!r}, expected one of {', '.join(_CHANNELS)}"
+    robot = observations.robot
+    places = robot.n if channel == "joint" else len(robot.segments) if channel == "segment" else 1
     if not isinstance(index, Integral) or not 0 <= int(index) < places:
         return f"{channel} index is {index!r}, expected 0 to {places - 1}"
     rows = observations.campaign.samples
-    shapes = {"joint": ((), (rows,)), "instrument": ((rows, 3),)}.get(channel, ((6,), (rows, 6)))
+    shapes = ((), (rows,)) if channel == "joint" else ((rows, 3),) if channel == "instrument" else ((6,), (rows, 6))
     if not isinstance(values, np.ndarray) or values.dtype.kind != "f" or values.shape not in shapes:
         found = f"{values.dtype} {values.shape}" if isinstance(values, np.ndarray) else repr(values)
         return f"values of channel {channel} are {found}, expected float {' or '.join(map(str, shapes))}"

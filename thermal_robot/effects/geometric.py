@@ -37,6 +37,7 @@ class Geometric(Effect):
     name: ClassVar[str] = "geometric"
     title: ClassVar[str] = "geometric errors of the links"
     size_spread: ClassVar[float] = 1.0
+    constant: ClassVar[bool] = True
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """Three translations (m) and three rotations (rad) a segment, in the placement's own frame."""

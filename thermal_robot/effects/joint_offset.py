@@ -29,6 +29,7 @@ class JointOffset(Effect):
     title: ClassVar[str] = "joint zero offsets"
     singular: ClassVar[str] = "a zero offset"
     size_spread: ClassVar[float] = UNSOURCED
+    constant: ClassVar[bool] = True
     contained_in: ClassVar[tuple[str, ...]] = ("geometric",)
     told_inside: ClassVar[bool] = True
 

@@ -58,7 +58,7 @@ def free(fit: Fit, names: Iterable[str] = ()) -> dict[str, tuple[Free, ...]]:
         those alone of which the data know more than the expected size says.
     """
     e, likely = fit.explanation, _likely(fit)
-    own = {name: fit.blocks_of(name)[0] for name in dict.fromkeys(fit.families)}
+    own = {name: _everywhere(fit, name) for name in dict.fromkeys(fit.families)}
     further = _further(fit, [name for name in names if name not in own])
     linear, problem = e.linear, e.problem
     if further:
@@ -72,6 +72,12 @@ def free(fit: Fit, names: Iterable[str] = ()) -> dict[str, tuple[Free, ...]]:
         others += [b for other, b in likely.items() if other != name and frozenset((b, number)) not in inside]
         told[name] = _alone(e, linear, problem, [number, *others])
     return told
+
+
+def _everywhere(fit: Fit, name: str) -> int:
+    """Return the block of an effect in all its places; where none is among those that were compared, the first."""
+    blocks = fit.blocks_of(name)
+    return next((b for b in blocks if not fit.explanation.linear.blocks[b].effect.places), blocks[0])
 
 
 def _further(fit: Fit, names: Iterable[str]) -> list[Block]:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.campaign import Campaign
 from thermal_robot.effects import Effect, Parameter
 from thermal_robot.effects.channel import column
 from thermal_robot.effects.effect import UNSOURCED
@@ -45,8 +46,12 @@ class Block:
 
     @property
     def columns(self) -> Array:
-        """(N, m, P) derivative of the gap by each parameter, root frame axes."""
-        return moved_by(self.source, self.parameters) if isinstance(self.source, Observations) else self.source
+        """(N, m, P) derivative of the gap by each parameter, root frame axes; zero where it is but rounding."""
+        if not isinstance(self.source, Observations):
+            return self.source
+        found = moved_by(self.source, self.parameters)
+        found[:, :, np.abs(found).max(axis=(0, 1), initial=0.0) * self.sizes < settings.UNSEEN] = 0.0
+        return found
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -103,15 +108,20 @@ def frame_columns(observations: Observations) -> tuple[Array, tuple[str, ...]]:
     Base: twist in the root frame. Tool: translation of the target in the tool frame, and its turn where orientation is
     measured. Where the campaign brings a simulator's prediction, that holds the tool, and it is not fitted.
     """
-    campaign = observations.campaign
+    campaign, names = observations.campaign, unknown_frames(observations.campaign)
     measures = 6 if campaign.measures == "pose" else 3
-    parts, names = [], []
-    if not campaign.base_known:
+    parts = []
+    if "base" in names:
         parts.append(observations.base_sensitivity[:, :measures, :])
-        names += ["base"] * 6
-    if not campaign.tool_known and campaign.simulated_position is None:
+    if "tool" in names:
         parts.append(observations.tool_sensitivity[:, :measures, :measures])
-        names += ["tool"] * measures
     if not parts:
         return np.zeros((campaign.samples, measures, 0)), ()
-    return np.concatenate(parts, axis=2), tuple(names)
+    return np.concatenate(parts, axis=2), names
+
+
+def unknown_frames(campaign: Campaign) -> tuple[str, ...]:
+    """Return to which frame, ``base`` or ``tool``, each of the columns of the unknown frames belongs."""
+    base = 0 if campaign.base_known else 6
+    fixed = campaign.tool_known or campaign.simulated_position is not None
+    return ("base",) * base + ("tool",) * (0 if fixed else 6 if campaign.measures == "pose" else 3)

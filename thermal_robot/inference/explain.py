@@ -208,7 +208,7 @@ class _Round:
         ladder.run(seeds)
         rung, best = ladder.consensus(asked.families)
         white = ladder.whitened_at(rung)
-        remainder = _left(asked.linear, white, parameter_values(asked.linear, ladder.beside(rung).gram, best))
+        remainder = left_of(asked.linear, white, parameter_values(asked.linear, ladder.beside(rung).gram, best))
         return cls(asked, ladder, rung, best, remainder, discrepancy_mean(white, remainder))
 
     @property
@@ -260,7 +260,7 @@ class _Round:
             [replace(c, values=NOTHING, covariance=NOTHING) for c in compared],
             probabilities,
             values,
-            _left(linear, white, values),
+            left_of(linear, white, values),
             self.smooth,
             aside,
             Discrepancy(self.form, self.rung[1], 1.0 - odds.get("", 0.0), odds, self.best.noise),
@@ -316,7 +316,7 @@ def _weight(effect: Effect) -> float:
     return effect.weight * float(np.exp(log_odds() * effect.apart))
 
 
-def _left(linear: Linear, whitening: Whitening, values: dict[int, tuple[Array, Array]]) -> Array:
+def left_of(linear: Linear, whitening: Whitening, values: dict[int, tuple[Array, Array]]) -> Array:
     """(N, m) gap less effects and frames."""
     moved = (linear.contribution(b, mean) for b, (mean, _) in values.items())
     left = linear.gap - sum(moved, np.zeros_like(linear.gap))

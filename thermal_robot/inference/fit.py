@@ -12,7 +12,7 @@ from thermal_robot.campaign import Campaign
 from thermal_robot.effects import Effect, gate
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
-from thermal_robot.inference.columns import frame_columns
+from thermal_robot.inference.columns import frame_columns, unknown_frames
 from thermal_robot.inference.evidence import Combination
 from thermal_robot.inference.explain import Explanation
 from thermal_robot.inference.frames import register
@@ -105,7 +105,7 @@ def fit(campaign: Campaign, effects: Sequence[Effect], progress: Callable[[str],
         If there are too few different poses for the unknown frames.
     """
     progress("unknown frames")
-    _require_enough(campaign)
+    require_enough(campaign)
     nominal = observe(campaign, register(campaign))
     needs = {e.name: missing for e in effects if (missing := gate.missing(e, nominal))}
     variants = {e.name: _settings(e, nominal) for e in effects if e.name not in needs}
@@ -180,13 +180,10 @@ def _fitted(
     return Fit(campaign, nominal, before, corrected, explanation, settled.held, settled.families, needs, variants)
 
 
-def _require_enough(campaign: Campaign) -> None:
+def require_enough(campaign: Campaign) -> None:
     """Refuse a campaign that leaves nothing to tell effects by once the frames are fitted and a fold is held out."""
     poses = len(np.unique(np.round(campaign.q, 6), axis=0))
-    unknown, measures = (
-        frame_columns(observe(campaign.take(np.arange(1))))[0].shape[2],
-        campaign.orientation is not None,
-    )
+    unknown, measures = len(unknown_frames(campaign)), campaign.orientation is not None
     fewest = -(-(unknown + settings.SPARE_EQUATIONS) // (6 if measures else 3)) + 2
     if poses < fewest:
         raise EstimationError(

@@ -49,14 +49,14 @@ def refined(explanation: Explanation, observations: Observations, factor: float)
     kept = Products(explanation.linear, heard(explanation))
     blocks = [explanation.linear.blocks[b].held for b in explanation.best.blocks]
     values = [explanation.values[b][0] for b in explanation.best.blocks]
-    moved = _fewer(kept, observations, _all_moved(kept, observations, blocks, factor), factor)
+    moved = _fewer(kept, observations, constants_moved(kept, observations, blocks, factor), factor)
     if moved != blocks:
         linear, problem, found = _evaluated(kept, moved)
         values = [mean for mean, _ in parameter_values(linear, problem, found).values()]
     return [(item.effect, mean) for item, mean in zip(moved, values, strict=True)]
 
 
-def _all_moved(kept: Products, observations: Observations, blocks: Sequence[Block], factor: float) -> list[Block]:
+def constants_moved(kept: Products, observations: Observations, blocks: Sequence[Block], factor: float) -> list[Block]:
     """Return the blocks with the constants of each moved in turn."""
     moved = list(blocks)
     for place, item in enumerate(blocks):
@@ -71,14 +71,14 @@ def _fewer(kept: Products, observations: Observations, blocks: list[Block], fact
     Beside such an effect the constant stays where the two are best together, and no step leads away. So each is left
     out in turn while the constants move.
     """
-    best = _weighed(kept, blocks)
+    best = weighed(kept, blocks)
     while len(blocks) > 1:
         rivals = []
         for k in range(len(blocks)):
             others = [*blocks[:k], *blocks[k + 1 :]]
             if any(_movable(item, factor) for item in others):
-                rivals.append(_all_moved(kept, observations, others, factor))
-        scores = [_weighed(kept, rival) for rival in rivals]
+                rivals.append(constants_moved(kept, observations, others, factor))
+        scores = [weighed(kept, rival) for rival in rivals]
         if not scores or max(scores) <= best:
             break
         blocks, best = rivals[int(np.argmax(scores))], max(scores)
@@ -90,7 +90,7 @@ def _movable(item: Block, factor: float) -> bool:
     return len(gate.nearby(item.effect, factor)) > 1
 
 
-def _weighed(kept: Products, blocks: Sequence[Block]) -> float:
+def weighed(kept: Products, blocks: Sequence[Block]) -> float:
     """Return the log evidence of these effects with the prior odds of each."""
     priors = log_odds() * sum(1.0 + item.effect.apart for item in blocks)
     return _evaluated(kept, blocks)[2].log_evidence + priors

@@ -54,8 +54,9 @@ RUNG_REACH = 5.4
 
 ROUNDING = 1e-9
 """m and rad: no table and no robot is more accurate."""
-ALIAS = 1e-6
-"""Of a column's length: where less is left of it once others are projected out, it is an exact alias of them."""
+UNSEEN, ALIAS = 1e-12, 1e-6
+"""m and rad: what an expected size moves by less is rounding. Of a column's length: where less is left of it once
+others are projected out, it is an exact alias of them."""
 TINY = 1e-300
 """Keeps a quotient of nothing from being infinite."""
 BETTER = 1e-9
@@ -74,8 +75,7 @@ LARGEST_CLUSTER = 0.1
 FOLDS = 5
 """Regions of joint space that are held out in turn; of temperature and of reach the outermost fifth is."""
 BLOCKS = 20
-"""Blocks of consecutive rows that are held out in turn: a fit then lacks a twentieth of the rows, as good as none, and
-twenty values tell the spread of a figure to a sixth."""
+"""Blocks of consecutive rows that are held out in turn: twenty values tell the spread of a figure to a sixth."""
 GROSS_LEVEL = 0.01
 """Chance that noise alone sets any row of a campaign aside."""
 GROSS_FACTOR = 1.5
@@ -145,8 +145,8 @@ REVISIONS = 3
 MANY_ROWS = 500
 """Above, a choice is revised once and one law looked for: each takes tens of seconds, and so many rows hardly change
 it."""
-SETTLED = 1e-4
-"""Last step of a fit, in standard deviations."""
+SETTLED, SETTLED_NAMED = 1e-4, 1e-2
+"""Last step of a fit, in standard deviations; of one of named effects, where the next step is a thousandth of it."""
 SETTLED_BETWEEN = 2.0
 """The same for a fit of many rows that is chosen anew: the step after it would be a hundredth of it."""
 REFINEMENT = 1.6

@@ -112,7 +112,7 @@ def settle(
         candidates, families = [b.effect for b in blocks], tuple(b.effect.name for b in blocks)
         chosen = [candidates.index(effect) for effect, _ in held]
         start_at = chosen if revision or not begin else [candidates.index(effect) for effect in begin]
-        linear = _at(observations, blocks, chosen, held)
+        linear = at_exact_model(observations, blocks, chosen, held)
         explanation = _explanation(linear, noise, families, tuple(start_at), forms(observations), before, outliers)
         factor, since = settings.REFINEMENT ** (1 / 2**revision), held
         held = [(candidates[b], explanation.values[b][0]) for b in explanation.best.blocks]
@@ -155,7 +155,7 @@ def _explanation(
     )
 
 
-def _at(
+def at_exact_model(
     observations: Observations, blocks: Sequence[Block], chosen: Sequence[int], held: Sequence[tuple[Effect, Array]]
 ) -> Linear:
     """Return the linear problem at the exact model: its gap, and what the effects that it holds have moved."""

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, Protocol
 
+import numpy as np
+from numpy.typing import NDArray
+
 from thermal_robot.kinematics.model import Chain
 
 
@@ -26,3 +29,11 @@ class Chained(Protocol):
     @property
     def chain(self) -> Chain:
         """Constant arrays of its elements."""
+
+
+class Weighted(Chained, Protocol):
+    """A chain on which gravity pulls; a :class:`~thermal_robot.Robot` is one."""
+
+    @property
+    def gravity(self) -> NDArray[np.float64]:
+        """(3,) m/s² in the root frame."""

@@ -8,8 +8,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from thermal_robot.errors import RobotError
-from thermal_robot.kinematics.frames import ChainFrames, chain_frames
+from thermal_robot.kinematics import lanes
+from thermal_robot.kinematics.engines import engine_for
+from thermal_robot.kinematics.frames import ChainFrames, as_rows, chain_frames
 from thermal_robot.kinematics.model import REVOLUTE
+from thermal_robot.kinematics.scratch import result
 
 if TYPE_CHECKING:
     from thermal_robot.robot import Robot
@@ -24,6 +27,7 @@ def gravity_torques(
     payload: ArrayLike | None = None,
     payload_com: ArrayLike = (0.0, 0.0, 0.0),
     frames: ChainFrames | None = None,
+    out: Array | None = None,
 ) -> Array:
     """Torque or force of each joint that holds the arm and its payload still.
 
@@ -42,6 +46,8 @@ def gravity_torques(
         (3,) m: centre of the payload in the tool frame.
     frames
         From :func:`~thermal_robot.kinematics.chain_frames`, to save computing them again.
+    out
+        Array for the result, of its shape; fastest with N last in memory, as the results of earlier calls are.
 
     Returns
     -------
@@ -53,27 +59,14 @@ def gravity_torques(
     RobotError
         If an array has not the shape that the robot asks for.
     """
-    frames = chain_frames(robot, q) if frames is None else frames
-    chain, rows = robot.chain, len(frames.tool_position)
-    rotations, positions, tool_rotation, tool_position = _rows_last(frames)
-    # From the tool inwards: what a joint carries is what the next one carries plus its own bodies.
-    mass, moment = _at_the_tool(frames, payload, payload_com)
-
-    torques = np.empty((rows, len(chain.movable)))
-    for j in range(len(chain.movable) - 1, -1, -1):
-        k = chain.movable[j]
-        last = k + 1 == len(chain.names)
-        body_rotation, body_position = (tool_rotation, tool_position) if last else (rotations[k + 1], positions[k + 1])
-        moment = moment + chain.masses[j] * (body_position + chain.mass_centres[j] @ body_rotation)
-        mass = mass + chain.masses[j]
-        axis = chain.axes[k] @ rotations[k]
-        if chain.kinds[k] == REVOLUTE:
-            # −m g · (axis × lever), the triple product turned so that the constant vector is crossed once
-            lever = moment - mass * positions[k]
-            torques[:, j] = -np.einsum("in,in->n", axis, np.cross(lever, robot.gravity[:, None], axis=0))
-        else:
-            torques[:, j] = -mass * (robot.gravity @ axis)
-    return torques @ chain.coupling.matrix
+    q = as_rows(robot, q) if frames is None else frames.tool_position
+    mass, com = _payload(payload, payload_com, len(q))
+    out = result(out, len(q), robot.n)
+    if frames is None:
+        engine_for(robot, len(q)).gravity(robot, q, mass, com, out)
+    else:
+        lanes.gravity(robot, q, mass, com, out, frames.rows_last())
+    return out
 
 
 def segment_loads(

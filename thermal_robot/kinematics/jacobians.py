@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from thermal_robot.errors import RobotError
-from thermal_robot.kinematics.frames import ChainFrames, chain_frames, chunks
-from thermal_robot.kinematics.model import REVOLUTE
+from thermal_robot.kinematics import lanes
+from thermal_robot.kinematics.engines import engine_for
+from thermal_robot.kinematics.frames import ChainFrames, as_rows
+from thermal_robot.kinematics.scratch import result
 
 if TYPE_CHECKING:
     from thermal_robot.kinematics.chained import Chained
@@ -18,7 +20,12 @@ Array = NDArray[np.float64]
 
 
 def frame_jacobians(
-    robot: Chained, q: ArrayLike, *, frames: ChainFrames | None = None, point: ArrayLike | None = None
+    robot: Chained,
+    q: ArrayLike,
+    *,
+    frames: ChainFrames | None = None,
+    point: ArrayLike | None = None,
+    out: Array | None = None,
 ) -> Array:
     """Geometric Jacobian: twist of the tool frame, in root axes at the point, for a unit speed of each joint.
 
@@ -34,6 +41,8 @@ def frame_jacobians(
     point
         (3,) or (N, 3) m: the point whose velocity is meant, fixed to the tool frame and expressed in it; the
         tool's origin by default.
+    out
+        Array for the result, of its shape; fastest with N last in memory, as the results of earlier calls are.
 
     Returns
     -------
@@ -46,26 +55,22 @@ def frame_jacobians(
     RobotError
         If an array has not the shape that the robot asks for.
     """
-    frames = chain_frames(robot, q) if frames is None else frames
-    chain = robot.chain
-    rotations, positions, target = _structure_of_arrays(frames, point)
-    rows = positions.shape[-1]
-    jacobians = np.empty((rows, 6, robot.n))
-    for part in chunks(rows):
-        block = np.zeros((6, len(chain.movable), part.stop - part.start))
-        for j, k in enumerate(chain.movable):
-            axis = chain.axes[k] @ rotations[k, ..., part]
-            if chain.kinds[k] == REVOLUTE:
-                _cross(axis, target[:, part] - positions[k, :, part], out=block[:3, j])
-                block[3:, j] = axis
-            else:
-                block[:3, j] = axis
-        jacobians[part] = np.moveaxis(chain.coupling.matrix.T @ block, -1, 0)
-    return jacobians
+    q = as_rows(robot, q) if frames is None else frames.tool_position
+    at, out = _point(point, len(q)), result(out, len(q), 6, robot.n)
+    if frames is None:
+        engine_for(robot, len(q)).jacobians(robot, q, at, out)
+    else:
+        lanes.jacobians(robot, q, at, out, frames.rows_last())
+    return out
 
 
 def placement_sensitivities(
-    robot: Chained, q: ArrayLike, *, frames: ChainFrames | None = None, point: ArrayLike | None = None
+    robot: Chained,
+    q: ArrayLike,
+    *,
+    frames: ChainFrames | None = None,
+    point: ArrayLike | None = None,
+    out: Array | None = None,
 ) -> Array:
     """Twist of the tool frame, in root axes at the point, for a unit twist of each segment's placement.
 
@@ -76,7 +81,7 @@ def placement_sensitivities(
 
     Parameters
     ----------
-    robot, q, frames, point
+    robot, q, frames, point, out
         As for :func:`frame_jacobians`.
 
     Returns
@@ -89,40 +94,20 @@ def placement_sensitivities(
     RobotError
         If an array has not the shape that the robot asks for.
     """
-    frames = chain_frames(robot, q) if frames is None else frames
-    rotations, positions, target = _structure_of_arrays(frames, point)
-    rows, elements = positions.shape[-1], robot.chain.placed
-    sensitivities = np.empty((rows, 6, len(elements), 6))
-    for part in chunks(rows):
-        block = np.zeros((6, len(elements), 6, part.stop - part.start))
-        for s, k in enumerate(elements):
-            rotation = rotations[k, ..., part]
-            lever = target[:, part] - positions[k, :, part]
-            block[:3, s, :3] = rotation
-            block[3:, s, 3:] = rotation
-            for axis in range(3):
-                _cross(rotation[:, axis], lever, out=block[:3, s, 3 + axis])
-        sensitivities[part] = np.moveaxis(block, -1, 0)
-    return sensitivities
+    q = as_rows(robot, q) if frames is None else frames.tool_position
+    at, out = _point(point, len(q)), result(out, len(q), 6, len(robot.chain.placed), 6)
+    if frames is None:
+        engine_for(robot, len(q)).placements(robot, q, at, out)
+    else:
+        lanes.placements(robot, q, at, out, frames.rows_last())
+    return out
 
 
-def _structure_of_arrays(frames: ChainFrames, point: ArrayLike | None) -> tuple[Array, Array, Array]:
-    """Rotations (K, 3, 3, N), positions (K, 3, N) and the target point (3, N), all in root axes."""
-    target = frames.tool_position.T
-    if point is not None:
-        offset = np.asarray(point, dtype=float)
-        if offset.shape not in ((3,), frames.tool_position.shape):
-            raise RobotError(
-                f"a point of shape {offset.shape} does not fit: expected (3,) or {frames.tool_position.shape}"
-            )
-        target = target + np.einsum(
-            "nij,nj->in", frames.tool_rotation, np.broadcast_to(offset, frames.tool_position.shape)
-        )
-    return np.moveaxis(frames.rotations, 0, -1), np.moveaxis(frames.positions, 0, -1), target
-
-
-def _cross(a: Array, b: Array, out: Array) -> None:
-    """Cross product of vectors with their components first; here several times faster than ``np.cross``."""
-    for i, (j, k) in enumerate(((1, 2), (2, 0), (0, 1))):
-        np.multiply(a[j], b[k], out=out[i])
-        out[i] -= a[k] * b[j]
+def _point(point: ArrayLike | None, rows: int) -> Array | None:
+    """Return the point of the tool, (3,) or (N, 3) m; ``None`` for its origin."""
+    if point is None:
+        return None
+    offset = np.asarray(point, dtype=float)
+    if offset.shape not in ((3,), (rows, 3)):
+        raise RobotError(f"a point of shape {offset.shape} does not fit: expected (3,) or {(rows, 3)}")
+    return offset

@@ -195,14 +195,17 @@ def _rodrigues_coefficients(vectors: Array) -> tuple[Array, Array, Array]:
 
 
 def align(source: Array, target: Array, weights: Array) -> Array:
-    """Return the (4, 4) rigid motion that brings points (N, 3) onto others, least squares.
+    """Return the (..., 4, 4) rigid motion that brings points (..., N, 3) onto others, least squares, weights (..., N).
 
     Umeyama, *IEEE PAMI* 13 (1991), without scale; reflections excluded.
     """
-    share = weights / weights.sum()
-    from_mean, to_mean = share @ source, share @ target
-    u, _, vt = np.linalg.svd((target - to_mean).T @ ((source - from_mean) * share[:, None]))
-    turn = u @ np.diag([1.0, 1.0, np.linalg.det(u) * np.linalg.det(vt)]) @ vt
-    motion = np.eye(4)
-    motion[:3, :3], motion[:3, 3] = turn, to_mean - turn @ from_mean
+    share = weights / weights.sum(axis=-1, keepdims=True)
+    from_mean, to_mean = share[..., None, :] @ source, share[..., None, :] @ target
+    u, _, vt = np.linalg.svd((target - to_mean).swapaxes(-1, -2) @ ((source - from_mean) * share[..., None]))
+    upright = np.ones(u.shape[:-1])
+    upright[..., 2] = np.linalg.det(u) * np.linalg.det(vt)
+    motion = np.zeros((*u.shape[:-2], 4, 4))
+    motion[..., :3, :3] = turn = (u * upright[..., None, :]) @ vt
+    motion[..., :3, 3] = (to_mean.swapaxes(-1, -2) - turn @ from_mean.swapaxes(-1, -2))[..., 0]
+    motion[..., 3, 3] = 1.0
     return motion

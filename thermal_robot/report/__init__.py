@@ -24,12 +24,14 @@ if TYPE_CHECKING:
     from thermal_robot.report.plots_where import plot_where
     from thermal_robot.report.plots_which import plot_which
     from thermal_robot.report.sentence import headline
+    from thermal_robot.report.text_calibration import calibration_text
     from thermal_robot.report.text_comparison import comparison_headline, comparison_text
     from thermal_robot.report.text_fleet import fleet_text
     from thermal_robot.report.wear_page import wear_html
 
 _HOME = {
     "advice": "next_step",
+    "calibration_text": "text_calibration",
     "comparison_fragment": "page_comparison",
     "comparison_headline": "text_comparison",
     "comparison_html": "page_comparison",
@@ -66,6 +68,7 @@ def __dir__() -> list[str]:
 
 __all__ = [
     "advice",
+    "calibration_text",
     "comparison_fragment",
     "comparison_headline",
     "comparison_html",

@@ -85,7 +85,7 @@ def with_held_weights(found):
     e, start = found.fit.explanation, begun(found.fit)
     judge = Judge(start.fitted.point, e.whitening.noise * e.best.noise, found.samples)
     rows = Single(found.fit.campaign, e.whitening.weights, e.outliers)
-    return Grown.of(replace(start.choice, judge=judge), (rows,), Begin.at(start.fitted))
+    return Grown.of(replace(start.choice, judge=judge), (rows,), Begin.about(start.fitted))
 
 
 @pytest.mark.parametrize("batches", [1, 5])

@@ -16,7 +16,7 @@ from thermal_robot.inference.frames import moved
 
 def test_it_ends_at_the_same_place_wherever_it_begins(whole, grown):
     known = grown.fitted
-    begin = replace(Begin.at(known), best=None, leverage=0.0, sigma=known.sigma)
+    begin = replace(Begin.about(known), best=None, leverage=0.0, sigma=known.sigma)
     astray = replace(begin, point=Point(begin.point.frames, 1.3 * known.point.values))
     one, other = (settled(grown.choice, grown.sums, in_full(whole), b) for b in (begin, astray))
     assert one.steady
@@ -26,7 +26,7 @@ def test_it_ends_at_the_same_place_wherever_it_begins(whole, grown):
 
 def test_the_order_of_rows_does_not_matter(whole, grown):
     mixed = whole.take(np.random.default_rng(2).permutation(whole.samples))
-    one, other = (settled(grown.choice, grown.sums, in_full(c), Begin.at(grown.fitted)) for c in (whole, mixed))
+    one, other = (settled(grown.choice, grown.sums, in_full(c), Begin.about(grown.fitted)) for c in (whole, mixed))
     assert far(one, other) < 1e-7
     assert one.noise == pytest.approx(other.noise, rel=1e-10)
     assert set(whole.rows[one.single.aside]) == set(mixed.rows[other.single.aside])

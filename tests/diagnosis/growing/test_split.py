@@ -13,7 +13,7 @@ from thermal_robot.diagnosis.growing.split import end_to_end, some, split
 @pytest.fixture
 def parted(whole, grown, monkeypatch):
     monkeypatch.setattr(settings, "KEPT", 150)
-    return split(grown.choice, in_full(whole), Begin.at(grown.fitted))
+    return split(grown.choice, in_full(whole), Begin.about(grown.fitted))
 
 
 def test_no_row_is_lost_and_none_counts_twice(whole, grown, parted):

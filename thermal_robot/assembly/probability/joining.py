@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from thermal_robot.assembly.probability.compiled import circle_chances
 from thermal_robot.assembly.probability.law import Law, Randomised, Thermal
 from thermal_robot.assembly.probability.links import generator_lengths, planar_link_nodes
 from thermal_robot.assembly.probability.planar import planar_probability
@@ -98,21 +99,36 @@ def _evaluate(
     *,
     outside: bool,
 ) -> Array:
-    """Check, broadcast, and integrate all cases at once."""
+    """Check, broadcast, and integrate all cases at once; compiled loops tell the plain ones of very many."""
+    plain = shape == "circle" and thermal is None and segments is None
+    chances = circle_chances(covariance, clearance, mean) if plain else None
+    quick: Array | None = None if chances is None else chances[int(outside)]
+    if quick is not None and not np.any(np.isnan(quick)):
+        return quick
     law = Law.of(covariance, mean, thermal, randomised, segments)
     sizes = _sizes(clearance, shape)
     leading = np.broadcast_shapes(law.leading, sizes.shape[:-1])
     law = law.flat(leading)
     sizes = np.broadcast_to(sizes, (*leading, sizes.shape[-1])).reshape(-1, sizes.shape[-1])
+    if quick is None:
+        return _integrated(law, sizes, shape, outside).reshape(leading)
+    result: Array = quick.reshape(-1)
+    left = np.isnan(result)
+    result[left] = _integrated(law.rows(left), sizes[left], shape, outside)
+    return np.asarray(result.reshape(leading))
+
+
+def _integrated(law: Law, sizes: Array, shape: Shape, outside: bool) -> Array:
+    """Integrate cases that were checked, one after the other."""
     if law.spread is None or all(piece.generators.shape[1] < 2 for piece in law.spread.pieces):
-        return _cases(law, sizes, shape, outside).reshape(leading)
+        return _cases(law, sizes, shape, outside)
     # sums over several generators are as fine as the normal part demands: one covariance after the other
     kinds, kind = np.unique(law.matrices.reshape(-1, 4), axis=0, return_inverse=True)
     result = np.empty(len(sizes))
     for number in range(len(kinds)):
         chosen = kind.reshape(-1) == number
         result[chosen] = _cases(law.rows(chosen), sizes[chosen], shape, outside)
-    return result.reshape(leading)
+    return result
 
 
 def _sizes(clearance: npt.ArrayLike, shape: Shape) -> Array:

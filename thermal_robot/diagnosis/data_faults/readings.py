@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis.data_faults.settings import COARSE_ROUNDS
 from thermal_robot.inference import settings
-from thermal_robot.inference.frames import alternate, starts
+from thermal_robot.inference.alternation import alternate, starts
 from thermal_robot.kinematics import log3, quaternion_to_rotation, tool_poses
 from thermal_robot.observations import Frames
 from thermal_robot.robot import Robot
@@ -99,8 +99,7 @@ class Readings:
         target = self.declared.tool[:3, 3]
         begun = starts(self)[:1] if coarse else starts(self)
         rounds = COARSE_ROUNDS if coarse else settings.START_ROUNDS
-        fits = [alternate(self, self.declared, target + shift, rounds) for shift in begun]
-        return min(fits, key=lambda fit: fit[0])[1]
+        return alternate(self, self.declared, target + begun, rounds)[1]
 
     def distance(self, frames: Frames) -> Array:
         """(N,) distance between measured and predicted pose, m; a turn counts by what it moves at a lever's length."""

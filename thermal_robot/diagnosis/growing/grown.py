@@ -70,17 +70,17 @@ class Grown:
     def plus(self, new: Single) -> Grown:
         """Return all rows and some more; old rows in the sums are looked at again only where ``anew`` says so."""
         both, batches = end_to_end((self.single, new)), (*self.batches, new)
-        fitted = settled(self.choice, self.sums, both, Begin.at(self.fitted))
+        fitted = settled(self.choice, self.sums, both, Begin.about(self.fitted))
         many = both.campaign.samples > 2 * settings.KEPT
         aside = fitted.single.aside[len(both.aside) - len(new.aside) :]
         if not self.sums.rows:
             whole = replace(self, single=fitted.single, fitted=fitted, batches=batches, aside=aside)
-            return Grown.of(self.choice, batches, Begin.at(fitted)) if many else whole
+            return Grown.of(self.choice, batches, Begin.about(fitted)) if many else whole
         if not (fitted.steady and self._holds(fitted)):
-            return replace(Grown.of(self.choice, batches, Begin.at(fitted)), anew=True)
+            return replace(Grown.of(self.choice, batches, Begin.about(fitted)), anew=True)
         grown = replace(self, fitted=fitted, batches=batches, aside=aside, anew=False)._taking_in(new.campaign.samples)
         if grown.single.campaign.samples > 2 * settings.KEPT:
-            return replace(Grown.of(self.choice, batches, Begin.at(fitted)), anew=True)
+            return replace(Grown.of(self.choice, batches, Begin.about(fitted)), anew=True)
         return grown
 
     def _taking_in(self, count: int) -> Grown:

@@ -111,7 +111,7 @@ class Begin:
     best: Combination | None = None
 
     @classmethod
-    def at(cls, known: Fitted) -> Begin:
+    def about(cls, known: Fitted) -> Begin:
         """Begin where another fit ended."""
         return cls(known.point, known.step, known.sigma, known.held, known.leverage, known.best)
 
@@ -135,7 +135,7 @@ def settled(choice: Choice, sums: Sums, single: Single, begin: Begin) -> Fitted:
         found, size = _round(choice, sums, single, state)
         before = np.e * found.best.noise if state.best is None else state.best.noise
         still = max(abs(found.leverage - state.leverage), abs(np.log(found.best.noise / before))) < settings.SETTLED
-        state, single = Begin.at(found), found.single
+        state, single = Begin.about(found), found.single
         if size < settings.SETTLED and still:
             return found
     return replace(found, steady=False)

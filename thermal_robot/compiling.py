@@ -1,0 +1,94 @@
+"""Loops compiled by numba, the extra ``fast``: how they are compiled, whether they can be, and who runs them."""
+
+from __future__ import annotations
+
+import os
+import warnings
+from collections.abc import Callable, Set
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from importlib import import_module
+from importlib.util import find_spec
+from typing import Any
+
+THREADS = 0
+"""Threads that run compiled loops; 0 for one on each processor that this process may use."""
+PIECE = 16_384
+"""Rows that a thread works on before it takes the next ones."""
+MOST_UNKEPT = 50
+"""Compiled functions that there may be no room on the disk for; a kernel is made of twenty at most."""
+
+
+def compiled(function: Callable[..., Any], loosened: Set[str] | bool = frozenset({"contract"})) -> Any:
+    """Compile a function when it is first called, and keep it on disk where that can be written.
+
+    Products and sums may be contracted to one rounding, unless more or less is ``loosened``; in any case what is no
+    number stays none.
+    """
+    import numba
+
+    compiler: Any = numba.njit
+    fastmath = loosened if isinstance(loosened, bool) else set(loosened)
+    try:
+        return compiler(cache=True, nogil=True, fastmath=fastmath)(function)
+    except RuntimeError:  # numba finds no folder for its cache
+        return compiler(nogil=True, fastmath=fastmath)(function)
+
+
+@cache
+def loads(kernels: str) -> bool:
+    """Whether numba is there and a module of compiled functions can be loaded; the first call loads it."""
+    if find_spec("numba") is None:
+        return False
+    try:
+        import_module(kernels)
+    except ImportError as error:
+        warnings.warn(
+            f"numba is installed but cannot be loaded ({error}); batches go on without it, several times slower: "
+            'mend it with pip install --upgrade "thermal-robot[fast]"',
+            RuntimeWarning,
+            stacklevel=2,
+        )
+        return False
+    return True
+
+
+def threads() -> int:
+    """How many threads work on a batch."""
+    if THREADS:
+        return THREADS
+    allowed = getattr(os, "sched_getaffinity", None)
+    return len(allowed(0)) if allowed else os.cpu_count() or 1
+
+
+def rows_at_once() -> int:
+    """How many rows all threads work on at a time."""
+    return PIECE * threads()
+
+
+def in_pieces(kernel: Callable[..., None], constants: tuple[Any, ...], rows: int, out: tuple[Any, ...]) -> None:
+    """Call a kernel for pieces of so many rows, in threads: with constants, first and last row, and where to write."""
+    count = max(1, rows // PIECE)
+    cuts = [rows * piece // count for piece in range(count + 1)]
+
+    def work(piece: int) -> None:
+        _called(kernel, *constants, cuts[piece], cuts[piece + 1], *out)
+
+    workers = min(threads(), count)
+    if workers < 2:
+        for piece in range(count):
+            work(piece)
+        return
+    work(0)  # compiles, where nothing is on disk
+    with ThreadPoolExecutor(workers) as pool:
+        list(pool.map(work, range(1, count)))
+
+
+def _called(kernel: Callable[..., None], *arguments: Any) -> None:
+    # A full disk stops numba when it has compiled a function and is to keep it; the next try goes on from there.
+    for _ in range(MOST_UNKEPT):
+        try:
+            return kernel(*arguments)
+        except OSError:
+            continue
+    kernel(*arguments)

@@ -1,0 +1,157 @@
+"""Frames from nothing: the rigid alignment of the base and the place of the target by turns, from several starts.
+
+Each of the two is linear while the other is held, and a third of the rows may be grossly wrong. Starts go side by side,
+each until its own median distance settles: what one start finds does not depend on the others.
+"""
+
+from __future__ import annotations
+
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.inference import settings
+from thermal_robot.kinematics import align, quaternion_to_rotation, tool_poses
+from thermal_robot.observations import Frames
+from thermal_robot.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+class Paired(Protocol):
+    """Commands paired with measurements, as a campaign holds them; see :class:`~thermal_robot.campaign.Campaign`."""
+
+    @property
+    def robot(self) -> Robot: ...  # noqa: D102
+    @property
+    def q(self) -> Array: ...  # noqa: D102
+    @property
+    def position(self) -> Array | None: ...  # noqa: D102
+    @property
+    def orientation(self) -> Array | None: ...  # noqa: D102
+    @property
+    def simulated_position(self) -> Array | None: ...  # noqa: D102
+    @property
+    def base_known(self) -> bool: ...  # noqa: D102
+    @property
+    def tool_known(self) -> bool: ...  # noqa: D102
+
+
+def starts(campaign: Paired) -> Array:
+    """(S, 3) shifts of the target, m, from which :func:`alternate` begins; the first is none."""
+    fixed = campaign.tool_known or campaign.simulated_position is not None
+    return settings.TARGET_STARTS[:1] if fixed else settings.TARGET_STARTS
+
+
+def soft(distance: Array) -> Array:
+    """Cauchy weights of distances (..., N) at the scale of their median: a third of the rows may be grossly wrong."""
+    return _soft(distance, middle(distance))
+
+
+def _soft(distance: Array, scale: Array) -> Array:
+    return np.asarray(1.0 / (1.0 + (distance / (settings.CAUCHY_SCALE * scale[..., None] + settings.NO_DISTANCE)) ** 2))
+
+
+def middle(values: Array) -> Array:
+    """(...) median along the last axis of finite values (..., N), as NumPy's, which spends most of its time on NaN."""
+    half, odd = divmod(values.shape[-1], 2)
+    parted = np.partition(values, half if odd else (half - 1, half), axis=-1)
+    return np.asarray(parted[..., half] if odd else 0.5 * (parted[..., half - 1] + parted[..., half]))
+
+
+def alternate(
+    campaign: Paired,
+    declared: Frames,
+    targets: Array,
+    rounds: int = settings.START_ROUNDS,
+    some: NDArray[np.int64] | slice = slice(None),
+) -> tuple[float, Frames]:
+    """Alternate the rigid alignment of the base with the linear fit of the target's place, robustly.
+
+    Parameters
+    ----------
+    campaign
+        With measurements.
+    declared
+        Frames as declared; known ones stay.
+    targets
+        (S, 3) where the target may sit on the tool frame, m: from each of them.
+    rounds
+        Alternations at most.
+    some
+        Rows that are looked at.
+
+    Returns
+    -------
+    tuple
+        Of the start that ends nearest: median distance that is left, m, and the frames.
+    """
+    measured = np.asarray(campaign.position)[some]
+    if campaign.simulated_position is not None:
+        origin, turns = np.asarray(campaign.simulated_position)[some], None
+    else:
+        poses = tool_poses(campaign.robot, campaign.q[some])
+        origin, turns = poses[:, :3, 3], poses[:, :3, :3]
+    place = np.repeat(declared.tool[None, :3, 3], len(targets), axis=0) if campaign.tool_known else np.array(targets)
+    state = _Alternating(measured, origin, turns, campaign.base_known, campaign.tool_known, declared.base, place)
+    for _ in range(rounds):
+        if state.step():
+            break
+    best = int(np.argmin(state.cost))
+    base, weights = state.base[best], state.weights[best]
+    tool = declared.tool.copy()
+    tool[:3, 3] = state.place[best]
+    if campaign.orientation is not None and turns is not None and not campaign.tool_known:
+        seen = turns.transpose(0, 2, 1) @ base[:3, :3].T @ quaternion_to_rotation(campaign.orientation[some])
+        u, _, vt = np.linalg.svd(np.einsum("n,nij->ij", weights, seen))
+        tool[:3, :3] = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+    return float(state.cost[best]), Frames(base, tool)
+
+
+class _Alternating:
+    """S alternations side by side: bases (S, 4, 4), places (S, 3), weights (S, N), medians (S,), and who moves."""
+
+    def __init__(
+        self,
+        measured: Array,
+        origin: Array,
+        turns: Array | None,
+        base_known: bool,
+        tool_known: bool,
+        base: Array,
+        place: Array,
+    ) -> None:
+        self._measured, self._origin, self._turns = measured, origin, turns
+        self._base_known, self._tool_known = base_known, tool_known
+        self.base = np.repeat(base[None], len(place), axis=0)
+        self.place, self.cost = place, np.full(len(place), np.inf)
+        self.weights = np.ones((len(place), len(measured)))
+        self._moving = np.arange(len(place))
+
+    def step(self) -> bool:
+        """Take one alternation of those that still move; tell whether none is left."""
+        moving = self._moving
+        base, place, weights = self.base[moving], self.place[moving], self.weights[moving]
+        predicted = self._predicted(place)
+        if not self._base_known:
+            base = align(predicted, self._measured, weights)
+        turned, shift = base[:, :3, :3], base[:, None, :3, 3]
+        if self._turns is not None and not self._tool_known:
+            # (measured in the root frame − origin) = R t: the mean over rows of Rᵀ(…), since each R is orthogonal
+            local = np.einsum("nji,snj->sni", self._turns, (self._measured - shift) @ turned - self._origin)
+            place = (weights[:, None] @ local)[:, 0] / weights.sum(axis=1)[:, None]
+            predicted = self._predicted(place)
+        away = self._measured - predicted @ turned.transpose(0, 2, 1) - shift
+        distance = np.sqrt((away * away).sum(axis=2))
+        before, cost = self.cost[moving], middle(distance)
+        self.base[moving], self.place[moving], self.cost[moving] = base, place, cost
+        self.weights[moving] = _soft(distance, cost)
+        self._moving = moving[~(np.abs(before - cost) < settings.START_SETTLED * cost)]
+        return not len(self._moving)
+
+    def _predicted(self, place: Array) -> Array:
+        """(S, N, 3) origin and place in the root frame, or what the simulator says."""
+        if self._turns is None:
+            return np.repeat(self._origin[None], len(place), axis=0)
+        return np.asarray(self._origin + (self._turns @ place[:, None, :, None])[..., 0])

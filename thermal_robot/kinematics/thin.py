@@ -1,0 +1,185 @@
+"""The engine for few configurations: Pinocchio itself, one call for each, on a model that is made once."""
+
+from __future__ import annotations
+
+import threading
+from typing import TYPE_CHECKING
+from weakref import WeakKeyDictionary
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import NDArray
+
+from thermal_robot.kinematics import settings
+from thermal_robot.kinematics.model import FIXED, REVOLUTE, Chain
+from thermal_robot.kinematics.walk import steps
+
+if TYPE_CHECKING:
+    from thermal_robot.kinematics.chained import Chained, Weighted
+
+Array = NDArray[np.float64]
+
+_ALONG = {
+    (True, 0): pin.JointModelRX,
+    (True, 1): pin.JointModelRY,
+    (True, 2): pin.JointModelRZ,
+    (False, 0): pin.JointModelPX,
+    (False, 1): pin.JointModelPY,
+    (False, 2): pin.JointModelPZ,
+}
+
+
+_UPRIGHT = 1e-14
+"""rad; an axis that leans no more turns about gravity: what it carries then is the rounding of what others do."""
+
+
+class _Own:
+    """A model of a chain whose world is its root frame, every joint with one coordinate, and memory to work in.
+
+    Parameters
+    ----------
+    chain
+        Its elements.
+    placed
+        Whether every segment is to be a joint: fixed ones too, which stay at zero. Pinocchio's kinematic regressor
+        knows the placements of joints only.
+    """
+
+    def __init__(self, chain: Chain, placed: bool) -> None:
+        self.model, self.plain, self.coupling = pin.Model(), steps(chain).plain, chain.coupling
+        joint, here = 0, pin.SE3.Identity()
+        joint_of = {int(k): j for j, k in enumerate(chain.movable)}
+        segments = set(chain.placed.tolist())
+        places = [pin.SE3(r, t) for r, t in zip(chain.rotations, chain.translations, strict=True)]
+        for k, place in enumerate(places):
+            here = here * place
+            if k in joint_of or (placed and k in segments):
+                joint = self.model.addJoint(joint, _joint(chain, k), here, str(k))
+                here = pin.SE3.Identity()
+            if k in joint_of:
+                body = pin.Inertia(float(chain.masses[joint_of[k]]), chain.mass_centres[joint_of[k]], np.zeros((3, 3)))
+                after = places[k + 1] if k + 1 < len(places) else pin.SE3.Identity()
+                self.model.appendBodyToJoint(joint, body, after)
+        self.end = here
+        self.tool, self.point = (
+            self.model.addFrame(pin.Frame(name, joint, 0, here, pin.FrameType.OP_FRAME)) for name in ("tool", "point")
+        )
+        self.data = self.model.createData()
+        self.moves = np.flatnonzero(np.isin(chain.placed, chain.movable)) if placed else np.arange(len(chain.movable))
+        self.pull: Array | None = None
+        self.idle: list[int] = []
+
+    def joints(self, q: Array) -> Array:
+        """Return positions of all joints of the model."""
+        if not self.plain:
+            q = self.coupling.positions(q)
+        if self.model.nq == q.shape[1]:
+            return q
+        rows = np.zeros((len(q), self.model.nq))
+        rows[:, self.moves] = q
+        return rows
+
+    def placed_at(self, point: Array) -> int:
+        """Put the frame of the point there, and return its number."""
+        self.model.frames[self.point].placement = self.end * pin.SE3(np.eye(3), point)
+        number: int = self.point
+        return number
+
+
+class _Kept(threading.local):
+    """Models of each thread: what Pinocchio works in must not be shared."""
+
+    def __init__(self) -> None:
+        self.plain: WeakKeyDictionary[Chain, _Own] = WeakKeyDictionary()
+        self.placed: WeakKeyDictionary[Chain, _Own] = WeakKeyDictionary()
+
+
+_kept = _Kept()
+
+
+def _own(chain: Chain) -> _Own:
+    found = _kept.plain.get(chain)
+    if found is None:
+        found = _kept.plain[chain] = _Own(chain, placed=False)
+    return found
+
+
+def _joint(chain: Chain, k: int) -> pin.JointModel:
+    axis = chain.axes[k] if chain.kinds[k] != FIXED else np.array([1.0, 0.0, 0.0])
+    turns = chain.kinds[k] == REVOLUTE
+    w = int(np.argmax(axis))
+    if axis[w] == 1.0 and np.count_nonzero(axis) == 1:
+        return _ALONG[turns, w]()
+    return pin.JointModelRevoluteUnaligned(axis) if turns else pin.JointModelPrismaticUnaligned(axis)
+
+
+def covers(robot: Chained) -> bool:
+    """Whether Pinocchio's memory for a chain of that length is small."""
+    return len(robot.chain.placed) <= settings.MOST_PLACEMENTS
+
+
+def poses(robot: Chained, q: Array, out: Array) -> None:
+    """Write the poses of the tool, (N, 4, 4)."""
+    own = _own(robot.chain)
+    model, data, tool = own.model, own.data, own.tool
+    for i, row in enumerate(own.joints(q)):
+        pin.forwardKinematics(model, data, row)
+        out[i] = pin.updateFramePlacement(model, data, tool).homogeneous
+
+
+def jacobians(robot: Chained, q: Array, point: Array | None, out: Array) -> None:
+    """Write the Jacobians at a point of the tool, (N, 6, n)."""
+    own = _own(robot.chain)
+    model, data, plain = own.model, own.data, own.plain
+    frame = own.tool if point is None else own.placed_at(point) if point.ndim == 1 else own.point
+    for i, row in enumerate(own.joints(q)):
+        if point is not None and point.ndim == 2:
+            own.placed_at(point[i])
+        found = pin.computeFrameJacobian(model, data, row, frame, pin.LOCAL_WORLD_ALIGNED)
+        if found.ndim == 1:  # of one joint Pinocchio gives a vector
+            found = found[:, None]
+        out[i] = found if plain else found @ own.coupling.matrix
+
+
+def placements(robot: Chained, q: Array, point: Array | None, out: Array) -> None:
+    """Write the sensitivities of a point of the tool to every placement, (N, 6, S, 6)."""
+    own = _kept.placed.get(robot.chain)
+    if own is None:
+        own = _kept.placed[robot.chain] = _Own(robot.chain, placed=True)
+    model, data = own.model, own.data
+    frame = own.tool if point is None else own.placed_at(point) if point.ndim == 1 else own.point
+    shape = out.shape[1:]
+    for i, row in enumerate(own.joints(q)):
+        if point is not None and point.ndim == 2:
+            own.placed_at(point[i])
+        pin.forwardKinematics(model, data, row)
+        found = pin.computeFrameKinematicRegressor(model, data, frame, pin.LOCAL_WORLD_ALIGNED)
+        out[i] = found.reshape(shape)
+
+
+def gravity(robot: Weighted, q: Array, mass: Array, com: Array, out: Array) -> None:
+    """Write the torques, (N, n), that hold the arm and a payload: its mass, () or (N,), at ``com`` in the tool."""
+    own = _own(robot.chain)
+    model, data = own.model, own.data
+    if own.pull is not robot.gravity:
+        model.gravity.linear = own.pull = robot.gravity
+        own.idle = _turning_about(own, robot)
+    for i, row in enumerate(own.joints(q)):
+        found = pin.computeGeneralizedGravity(model, data, row)
+        out[i] = found if own.plain else found @ own.coupling.matrix
+    if mass.ndim or mass:
+        lift = np.empty((len(q), 6, robot.n))
+        jacobians(robot, q, com, lift)
+        out -= mass[..., None] * (robot.gravity @ lift[:, :3])
+    out[:, own.idle] = 0.0
+
+
+def _turning_about(own: _Own, robot: Weighted) -> list[int]:
+    """Return the first joint if it turns about gravity: it carries nothing, which Pinocchio tells to rounding only."""
+    chain = robot.chain
+    first = int(chain.movable[0])
+    if not own.plain or chain.kinds[first] != REVOLUTE:
+        return []
+    axis = own.model.jointPlacements[1].rotation @ chain.axes[first]
+    upright = np.linalg.norm(np.cross(axis, robot.gravity)) <= _UPRIGHT * np.linalg.norm(robot.gravity)
+    return [0] if upright else []
