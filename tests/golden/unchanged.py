@@ -18,3 +18,12 @@ def unchanged(name, tolerance=TOLERANCE):
         f"{name}: {len(lines)} figures changed, the first: {lines[:3]}. If that is meant, write them anew with "
         f"`{rewrite}`, and let the commit message tell what changed, where and why."
     )
+
+
+def shrinks(found):
+    """Held-out rows, not those of the fit, say so; and the interval holds the figure."""
+    held_out = found.gap.held_out
+    low, high = held_out.shrinkage_ci95
+    assert 0.0 < low <= held_out.shrinkage <= high < 1.0
+    assert held_out.rms_after < held_out.rms_before
+    return held_out.shrinkage

@@ -1,0 +1,51 @@
+"""The same of poses of a real robot: a file of its own, as it takes minutes and files are shared out to processes."""
+
+import os
+
+import pytest
+from golden.record import diagnosed
+from golden.unchanged import shrinks, unchanged
+
+from thermal_robot.report.sentence import MOST_WORDS
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(
+        not os.environ.get("THERMAL_ROBOT_DATA"), reason="THERMAL_ROBOT_DATA names no folder of measured campaigns"
+    ),
+]
+
+
+def test_the_same_is_said_as_before():
+    unchanged("ipa_ur10_d")
+
+
+def test_its_headline_is_short():
+    assert len(diagnosed("ipa_ur10_d").summary.split()) <= MOST_WORDS
+
+
+def test_ipa_ur10_d_is_calibrated_to_a_fifth_of_a_millimetre():
+    found = diagnosed("ipa_ur10_d")
+    assert found.finding("geometric").status == "found"
+    assert found.measures == "pose"
+    assert shrinks(found) > 0.9
+    assert found.gap.held_out.rms_after < 0.22e-3
+    assert found.gap.orientation_after < found.gap.orientation_before
+
+
+@pytest.mark.xfail(
+    strict=True,
+    reason="the base link's bending, alike about both axes, is named in place of the joints' springs since columns "
+    "that are rounding take no part: the last digits decide which of thirty waves join, and these decide this",
+)
+def test_ipa_ur10_d_names_joints_that_yield():
+    """By hand, over its four series: 9 to 13 and 11 to 17 µrad/(N·m); a fit of this series alone 10 and 15."""
+    found = diagnosed("ipa_ur10_d")
+    springs = found.finding("joint_compliance")
+    assert springs.status == "found"
+    assert springs.probability > 0.7
+    lift, elbow = (
+        next(p for p in springs.parameters if joint in p.name) for joint in ("shoulder_lift_joint", "elbow_joint")
+    )
+    assert 9e-6 < lift.value < 13e-6
+    assert elbow.value - 2.0 * elbow.std < 11e-6 < 17e-6 < elbow.value + 2.0 * elbow.std
