@@ -2,30 +2,13 @@
 
 import numpy as np
 import pytest
-from assembly.drawn import drawn
+from assembly.drawn import both, drawn, needs_loops
 
 from thermal_robot import compiling
-from thermal_robot.assembly.probability import compiled, failing_probability, joining_probability
+from thermal_robot.assembly.probability import joining_probability
 
-pytestmark = pytest.mark.skipif(
-    not compiling.loads("thermal_robot.assembly.probability.loops"),
-    reason="the loops are in the extra fast: numba is not installed",
-)
+pytestmark = needs_loops
 CASES = 3000
-
-
-@pytest.fixture
-def always(monkeypatch):
-    monkeypatch.setattr(compiled, "MANY", 1)
-
-
-def both(monkeypatch, *case):
-    """Return the chances inside and outside, by the loops and without them."""
-    found = []
-    for many in (1, 10**9):
-        monkeypatch.setattr(compiled, "MANY", many)
-        found.append((joining_probability(*case), failing_probability(*case)))
-    return found
 
 
 def test_the_number_of_threads_does_not_show(always, monkeypatch):

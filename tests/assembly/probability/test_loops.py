@@ -4,31 +4,13 @@ from fractions import Fraction
 
 import numpy as np
 import pytest
-from assembly.drawn import drawn
+from assembly.drawn import both, drawn, needs_loops
 from scipy.stats import ncx2
 
-from thermal_robot import compiling
-from thermal_robot.assembly.probability import compiled, failing_probability, joining_probability
+from thermal_robot.assembly.probability import joining_probability
 
-pytestmark = pytest.mark.skipif(
-    not compiling.loads("thermal_robot.assembly.probability.loops"),
-    reason="the loops are in the extra fast: numba is not installed",
-)
+pytestmark = needs_loops
 CASES = 3000
-
-
-@pytest.fixture
-def always(monkeypatch):
-    monkeypatch.setattr(compiled, "MANY", 1)
-
-
-def both(monkeypatch, *case):
-    """Return the chances inside and outside, by the loops and without them."""
-    found = []
-    for many in (1, 10**9):
-        monkeypatch.setattr(compiled, "MANY", many)
-        found.append((joining_probability(*case), failing_probability(*case)))
-    return found
 
 
 @pytest.mark.parametrize("ratio", [1.0, 3.0, 100.0, 1e4])

@@ -30,10 +30,10 @@ NODES = np.array([32, 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024])
 
 # Angles per standard deviation, the shorter one, from the disc's farther edge to the mean, and besides: measured
 # against the chords' integral, the absolute error is then below 2e-15 and that of a small 1 - P below 1e-11 of it.
-_PER_DEVIATION, _BESIDES = 8.0, 16.0
-_NEAR = 0.01  # squared distances (halved) of a node from the mean below which (1 - exp(-h)) / h is taken by its series
-_SERIES = (-1.0 / 720.0, 1.0 / 120.0, -1.0 / 24.0, 1.0 / 6.0, -0.5, 1.0)
-_FRACTION = 0.05  # a failing probability above this is one minus the other
+PER_DEVIATION, BESIDES = 8.0, 16.0
+NEAR = 0.01  # squared distances (halved) of a node from the mean below which (1 - exp(-h)) / h is taken by its series
+SERIES = (-1.0 / 720.0, 1.0 / 120.0, -1.0 / 24.0, 1.0 / 6.0, -0.5, 1.0)
+FRACTION = 0.05  # a failing probability above this is one minus the other
 _ROOT_2PI = np.sqrt(2.0 * np.pi)
 
 
@@ -44,7 +44,7 @@ def angles_needed(axes: Array, centre: Array) -> Array:
     """
     ratio = axes[:, 1] / axes[:, 0]
     distance = np.hypot(centre[:, 0] * ratio, centre[:, 1])  # in the smaller deviation
-    return np.asarray(_PER_DEVIATION * (axes[:, 1] + distance) + _BESIDES)
+    return np.asarray(PER_DEVIATION * (axes[:, 1] + distance) + BESIDES)
 
 
 def disc_by_edge(axes: Array, centre: Array, count: int, *, central: bool = False) -> tuple[Array, Array, Array]:
@@ -87,7 +87,7 @@ def disc_by_edge(axes: Array, centre: Array, count: int, *, central: bool = Fals
     decay = np.negative(half, out=second)
     np.exp(decay, out=decay)
     rate = area * np.mean(decay, axis=1)
-    close = np.min(half, axis=1) < _NEAR
+    close = np.min(half, axis=1) < NEAR
     with np.errstate(divide="ignore", invalid="ignore"):
         share = np.divide(weight, half, out=None if np.any(close) else half)
     outer = 0.5 * np.einsum("nk,nk->n", share, decay) / len(angle)
@@ -97,16 +97,16 @@ def disc_by_edge(axes: Array, centre: Array, count: int, *, central: bool = Fals
         near = np.broadcast_to(weight, half.shape)[close] * _mean_decay(half[close])
         inside[close] = 0.5 * np.mean(near, axis=1)
     outside = 1.0 - inside
-    small = np.flatnonzero(outside < _FRACTION)
+    small = np.flatnonzero(outside < FRACTION)
     outside[small] = outer[small] + _poles(axes[small], centre[small], count)
     return inside, outside, rate
 
 
 def _mean_decay(half: Array) -> Array:
     """``(1 - exp(-h)) / h``, also at zero."""
-    near = half < _NEAR
+    near = half < NEAR
     with np.errstate(divide="ignore", invalid="ignore"):
-        return np.where(near, np.polyval(_SERIES, half), (1.0 - np.exp(-half)) / half)
+        return np.where(near, np.polyval(SERIES, half), (1.0 - np.exp(-half)) / half)
 
 
 def _poles(axes: Array, centre: Array, count: int) -> Array:

@@ -24,7 +24,7 @@ _CELLS = 1 << 17  # numbers of an array that stays in cache, eight bytes each
 TOLD = 1e-5
 """Chance outside that is told everywhere: as one minus that inside, fewer than ten digits are left below it."""
 _TOLD_BY_CHORDS = 1e-7  # the same by chords, which add tails
-_MOST = 256  # angles beside which chords are worth their while
+MOST = 256  # angles beside which chords are worth their while
 _SHORT = 1.0  # half segments in standard deviations up to which a mean over it is a sum of so many nodes
 _UNITS, _SHARES = np.polynomial.legendre.leggauss(16)
 
@@ -124,7 +124,7 @@ class _Discs:
             far = heated & (np.hypot(ends[:, 0], ends[:, 1]) > _SHORT)
             needed = angles_needed(axes, np.where(far[:, None], 0.0, at))
         # without a segment chords are cheaper than so many angles
-        needed[~np.isfinite(needed) | (~far & (needed > _MOST)) | (principal.large == 0.0)] = np.inf
+        needed[~np.isfinite(needed) | (~far & (needed > MOST)) | (principal.large == 0.0)] = np.inf
         short = heated & ~far
         which = np.where(short, len(NODES) + 1, np.searchsorted(NODES, needed))
         over_radius = np.stack([at[:, 0], centre[:, 1] / radii], axis=1)

@@ -1,7 +1,8 @@
 """Compiled loops of the probability of a disc: one deviation after the other, its angles side by side.
 
 Imported only where numba is installed. The same integral along the edge as in `boundary`, from the same numbers of
-angles, and the same principal axes as in `principal`; what it leaves out is told by NaN.
+angles, and the same principal axes as in `principal`; what it leaves out is told by NaN. Where constants of `boundary`
+or `discs` are changed, touch this file: numba looks at nothing else to see whether what it has kept is old.
 """
 
 from __future__ import annotations
@@ -12,6 +13,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from thermal_robot.assembly.probability.boundary import BESIDES, FRACTION, NEAR, PER_DEVIATION, SERIES
+from thermal_robot.assembly.probability.discs import MOST
 from thermal_robot.compiling import compiled
 
 Array = npt.NDArray[np.float64]
@@ -23,8 +26,6 @@ _ROUND = 6755399441055744.0
 _EXP = tuple(1.0 / math.factorial(k) for k in range(13, 1, -1))
 """Taylor series of eˣ without its first two terms: below 2⁻⁵⁶ off for |x| ≤ ½ ln 2."""
 _LEAST = -700.0
-_SERIES = (-1.0 / 720.0, 1.0 / 120.0, -1.0 / 24.0, 1.0 / 6.0, -0.5, 1.0)
-_NEAR, _FRACTION, _MOST, _PER_DEVIATION, _BESIDES = 0.01, 0.05, 256.0, 8.0, 16.0
 _SURE = 9.0
 """Wide deviations from the mean to the edge beyond which the chance outside, below 3e-18, is nothing beside one."""
 _SPLIT = 134217729.0
@@ -94,14 +95,14 @@ def _edge(
         share = (area + by_cosine * circle[0, k] + by_sine * circle[1, k]) / max(room[0, k], 1e-300)
         outside += share * decay
         inside += share * (1.0 - decay)
-    if least < _NEAR:
+    if least < NEAR:
         inside = 0.0
         for k in range(count):
             h, weight = room[0, k], area + by_cosine * circle[0, k] + by_sine * circle[1, k]
             series = 0.0
-            for term in _SERIES:
+            for term in SERIES:
                 series = series * h + term
-            inside += weight * (series if h < _NEAR else (1.0 - room[1, k]) / h)
+            inside += weight * (series if h < NEAR else (1.0 - room[1, k]) / h)
     return 0.5 * inside / count, 0.5 * outside / count
 
 
@@ -182,8 +183,8 @@ def circles(
             cosine, sine = math.cos(angle), math.sin(angle)
             u, v = m1 * cosine + m2 * sine, m2 * cosine - m1 * sine
         axes, at = (radius / wide, radius / narrow), (u / wide, v / narrow)
-        needed = _PER_DEVIATION * (axes[1] + math.hypot(u / narrow, at[1])) + _BESIDES
-        if not needed <= _MOST:
+        needed = PER_DEVIATION * (axes[1] + math.hypot(u / narrow, at[1])) + BESIDES
+        if not needed <= MOST:
             if radius - math.hypot(u, v) > _SURE * wide:
                 found[0, n] = 1.0
             continue
@@ -191,7 +192,7 @@ def circles(
         count = nodes[k]
         circle = quarters[k, :, : count // 4] if central else table[k, :, :count]
         inside, outside = _edge(axes, at, circle, room, bits)
-        if 1.0 - inside < _FRACTION:
+        if 1.0 - inside < FRACTION:
             outside += _poles(axes, at, count)
         else:
             outside = 1.0 - inside

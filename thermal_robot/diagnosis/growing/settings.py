@@ -34,3 +34,5 @@ SAME_PLACE = 1e-9
 LEAD = 0.0
 """Log odds of another combination against the chosen one from which on the choice is to be made anew: a fresh diagnosis
 takes the more probable one, however little it is ahead."""
+MOST_LEAD = 20.0
+"""Log odds that are told at most: beyond 5e8 : 1 nobody asks how many."""

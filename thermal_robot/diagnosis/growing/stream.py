@@ -142,7 +142,8 @@ class Stream:
             told, before = (" and ".join(some) or "no effect" for some in (self.rival, own))
             same = set(self.rival) == set(own)
             rest = "in other settings or places than chosen" if same else f"rather than {before}"
-            yield f"All rows together speak for {told}, {rest} (odds {np.exp(min(self.lead, 20.0)):.2g} : 1)."
+            odds = np.exp(min(self.lead, settings.MOST_LEAD))
+            yield f"All rows together speak for {told}, {rest} (odds {odds:.2g} : 1)."
 
 
 def _behind(grown: Grown, listed: tuple[Runner, ...]) -> tuple[Runner, ...]:
