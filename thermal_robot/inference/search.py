@@ -47,7 +47,7 @@ class Search:
         """List what each block excludes."""
         self._apart: dict[int, set[int]] = {}
         self._expanded: set[tuple[int, ...]] = set()
-        self._far: set[tuple[int, ...]] = set()
+        self._left_at: dict[tuple[int, ...], float] = {}
         self._most = max((c.log_evidence for c in self.seen.values() if c.exact), default=-np.inf)
         for a, b in self.exclusive:
             self._apart.setdefault(a, set()).add(b)
@@ -58,20 +58,36 @@ class Search:
         whole = set(blocks)
         return not any(self._apart.get(b, whole - whole) & whole for b in blocks)
 
-    def evaluate(self, blocks: Sequence[int], start: Combination | None = None) -> Combination:
-        """Return the combination's evidence, computed once."""
+    def evaluate(
+        self, blocks: Sequence[int], start: Combination | None = None, wanted: float = -np.inf
+    ) -> Combination:
+        """Return the combination's evidence, computed once.
+
+        Parameters
+        ----------
+        blocks
+            That are in it.
+        start
+            A combination like it.
+        wanted
+            Log evidence of which what clearly stays below is not computed to its end; what is far below the best is
+            not in any case.
+        """
         key = tuple(sorted(blocks))
-        known = self.seen.get(key)
-        if known is None or not (known.exact or key in self._far):
-            self.seen[key] = self._computed(key, known or start)
+        known, floor = self.seen.get(key), max(wanted, self._most - settings.DETOUR_FROM)
+        if known is None or not (known.exact or self._left_at.get(key, np.inf) <= floor):
+            self.seen[key] = self._computed(key, known or start, floor)
             self._most = max(self._most, self.seen[key].log_evidence)
             if not self.seen[key].exact:
-                self._far.add(key)
+                self._left_at[key] = floor
         return self.seen[key]
 
-    def _computed(self, key: tuple[int, ...], start: Combination | None) -> Combination:
+    def _at_least(self, blocks: Sequence[int], start: Combination) -> Combination:
+        """Return the evidence of what is of interest only where it comes near that of another combination."""
+        return self.evaluate(blocks, start, start.log_evidence - settings.NEARLY)
+
+    def _computed(self, key: tuple[int, ...], start: Combination | None, floor: float) -> Combination:
         try:
-            floor = self._most - settings.DETOUR_FROM
             return evidence(self.gram, key, sum(self.log_prior[b] for b in key), start, floor)
         except EstimationError:
             if not key:
@@ -141,7 +157,7 @@ class Search:
     def weigh(self, blocks: Sequence[int]) -> Combination:
         """Weigh every neighbour of a combination; return the best of them and it."""
         own = self.evaluate(blocks)
-        near = [self.evaluate(c.blocks, own) for c in self._promising(own)]
+        near = [self._at_least(c.blocks, own) for c in self._promising(own)]
         return max((own, *near), key=lambda c: c.log_evidence)
 
     def _simpler(self, best: Combination) -> Combination | None:
@@ -176,7 +192,7 @@ class Search:
     def _missed(self, best: Combination) -> Combination | None:
         """Compute exactly what was weighed on the way and comes near the best; return one that is better, if any is."""
         near = [c.blocks for c in self.seen.values() if not c.exact and self._near(c, best)]
-        found = max((self.evaluate(blocks) for blocks in near), key=lambda c: c.log_evidence, default=best)
+        found = max((self._at_least(blocks, best) for blocks in near), key=lambda c: c.log_evidence, default=best)
         return found if found.log_evidence > best.log_evidence + settings.BETTER else None
 
     @staticmethod
@@ -192,7 +208,7 @@ class Search:
             close = [c.blocks for c in self._promising(best, barred)]
             better = best
             for k in range(0, len(close), settings.AT_ONCE):
-                some = (self.evaluate(blocks, best) for blocks in close[k : k + settings.AT_ONCE])
+                some = (self._at_least(blocks, best) for blocks in close[k : k + settings.AT_ONCE])
                 better = max((better, *some), key=lambda c: c.log_evidence)
                 if better.log_evidence > best.log_evidence + settings.BETTER:
                     break
@@ -271,21 +287,27 @@ def _gains(gram: Gram, base: Combination, blocks: Sequence[int]) -> list[tuple[i
     Q = y'y − b'θ, and s₀ the same without the block.
     """
     used = gram.columns_of(base.blocks)
+    # a column that is held at zero takes nothing up
+    kept = (base.values != 0.0) | ~gram.positive[used]
+    used, values, covariance = used[kept], base.values[kept], base.covariance[kept[:, None] & kept]
+    covariance = covariance.reshape(len(used), len(used))
     variance = base.noise**2
-    left = gram.vector - gram.matrix[:, used] @ base.values
+    left = gram.vector - gram.matrix[:, used] @ values
     log_scale = np.array(settings.SCALE_GRID)
     square = np.exp(2.0 * log_scale)[:, None]
     step = float(log_scale[1] - log_scale[0])
     freedom = gram.equations + gram.noise_dof
-    rest = (gram.noise_dof + gram.total - float(gram.vector[used] @ base.values)) / freedom
+    rest = (gram.noise_dof + gram.total - float(gram.vector[used] @ values)) / freedom
     rest = max(rest, settings.LEAST_VARIANCE * variance)
     parts = []
     for alike in _by_width(gram, blocks):
         own = np.array([np.arange(gram.slices[b].start, gram.slices[b].stop) for b in alike])
-        cross = gram.matrix[own[:, :, None], used]
-        inside = gram.matrix[own[:, :, None], own[:, None, :]]
-        value, vector = np.linalg.eigh(inside - cross @ (base.covariance / variance) @ cross.transpose(0, 2, 1))
-        along = (vector.transpose(0, 2, 1) @ left[own][:, :, None])[:, :, 0] ** 2
+        # one that cannot be negative and would be stays at zero
+        free = ~gram.positive[own] | (left[own] > 0.0)
+        cross = gram.matrix[own[:, :, None], used] * free[:, :, None]
+        inside = gram.matrix[own[:, :, None], own[:, None, :]] * (free[:, :, None] & free[:, None, :])
+        value, vector = np.linalg.eigh(inside - cross @ (covariance / variance) @ cross.transpose(0, 2, 1))
+        along = (vector.transpose(0, 2, 1) @ (left[own] * free)[:, :, None])[:, :, 0] ** 2
         parts.append((alike, np.maximum(value, 0.0), along))
     result = []
     for alike, value, along in _padded(parts):
