@@ -70,6 +70,7 @@ class Ladder:
         ends = np.cumsum([self.linear.frames.shape[2], *(len(block.sizes) for block in self.linear.blocks)])
         self._spans = [np.arange(a, b) for a, b in pairwise(ends)]
         self._quick: dict[tuple[Rung, tuple[int, ...]], float] = {}
+        self._settled: dict[tuple[int, tuple[int, ...]], Combination] = {}
         self._priors = {PLAIN: float(np.log1p(-share))}
         self._joined = False
         self._sizes: dict[int, float] = {}
@@ -203,6 +204,7 @@ class Ladder:
         number = len(self.forms) - 1
         del self.forms[number], self._spectra[number], self._along[number]
         self._quick = {key: log for key, log in self._quick.items() if key[0][0] != number}
+        self._settled = {key: found for key, found in self._settled.items() if key[0] != number}
 
     def _size(self, form: int, blocks: tuple[int, ...], start: float = 1.0) -> tuple[Rung, float]:
         """Return the most probable size of a form beside one combination, with the log evidence; it has one peak."""
@@ -233,10 +235,18 @@ class Ladder:
             )
             prior = self._priors[rung] + sum(self.log_prior[b] for b in key[1])
             try:
-                self._quick[key] = evidence(problem, tuple(range(len(blocks))), prior, None).log_evidence
+                found = evidence(problem, tuple(range(len(blocks))), prior, self._like(rung[0], key[1]))
+                self._settled[rung[0], key[1]], self._quick[key] = found, found.log_evidence
             except EstimationError:  # what so large a discrepancy leaves is rounding
                 self._quick[key] = -np.inf
         return self._quick[key]
+
+    def _like(self, form: int, blocks: tuple[int, ...]) -> Combination | None:
+        """Return the same combination beside the size tried last, or beside none: from there it is not far."""
+        if (form, blocks) in self._settled:
+            return self._settled[form, blocks]
+        known = self.searches[PLAIN].seen.get(blocks)
+        return known and replace(known, scales={k: known.scales[b] for k, b in enumerate(blocks)})
 
     def _left(self, rung: Rung, picked: NDArray[np.int64]) -> Array:
         """Return the products of some columns, whitened by the discrepancy of a rung."""
