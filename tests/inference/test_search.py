@@ -8,7 +8,7 @@ import pytest
 from inference.problems import columns_of, small_problem
 
 from thermal_robot.inference.problem import Linear, Whitening, contained, gram
-from thermal_robot.inference.search import Search, _gains
+from thermal_robot.inference.search import Search
 
 
 def best_of_all(search, most=3):
@@ -37,44 +37,6 @@ def test_the_search_finds_the_best_of_all_combinations():
         search = Search(gram(linear, whitening), (-2.2,) * 3)
         best = search.run()
         assert best.log_evidence == pytest.approx(best_of_all(search), abs=1e-3)
-
-
-def gains_of(linear, whitening, beside):
-    """What each further block gains beside some: to first order, and computed exactly."""
-    search = Search(gram(linear, whitening), (0.0,) * len(linear.blocks))
-    base = search.evaluate(beside)
-    others = [b for b in range(len(linear.blocks)) if b not in beside]
-    first = {b: gain for b, gain, _ in _gains(search.gram, base, others)}
-    return [(first[b], search.evaluate((*beside, b)).log_evidence - base.log_evidence) for b in others]
-
-
-@pytest.mark.parametrize("beside", [(), (1,)], ids=["alone", "beside another"])
-def test_a_gain_to_first_order_is_the_exact_one_where_a_block_explains_little(beside):
-    """Blocks that do nothing: the integral over their size is within what the exact one's parabola misses."""
-    errors = []
-    for seed in range(20):
-        linear, whitening = small_problem(seed, rows=40, present=beside)
-        errors += np.subtract(*np.transpose(gains_of(linear, whitening, beside))).tolist()
-    assert np.abs(errors).max() < 0.3
-    assert abs(np.mean(errors)) < 0.15
-
-
-def test_a_gain_to_first_order_is_near_the_exact_one_where_a_block_explains_all():
-    """So large ones come first: they are within a tenth, or two nats, of what they gain."""
-    for seed in range(10):
-        linear, whitening = small_problem(seed, rows=40, present=(2,), noise=0.3)
-        (_, _), (_, _), (first, exact) = gains_of(linear, whitening, ())
-        assert exact > 20.0
-        assert abs(first - exact) < max(0.1 * exact, 2.0)
-
-
-def test_the_scale_of_a_gain_is_that_of_the_grid_nearest_the_best():
-    for seed in range(6):
-        linear, whitening = small_problem(seed, rows=40, present=(2,), noise=0.3)
-        search = Search(gram(linear, whitening), (0.0,) * 3)
-        ((_, _, scale),) = _gains(search.gram, search.evaluate(()), [2])
-        # half a unit of ln λ between places of the grid
-        assert abs(np.log(scale / search.evaluate((2,)).scales[2])) < 0.5
 
 
 def test_neighbours_that_come_near_the_best_are_computed_exactly():

@@ -96,24 +96,25 @@ def evidence(
     peak = _most_probable(gram, columns, scale, spread, variance, floor - known, settled)
     found, scale, variance = peak.posterior, peak.scale, peak.variance
     log_evidence = known + _log_joint(gram, columns, found, scale, spread, variance) + _log_volume(peak.bend, spread)
+    log_evidence += peak.promised or 0.0
     if not np.isfinite(log_evidence):
         raise EstimationError(UNDETERMINED)
     scales = dict(zip(blocks, scale.tolist(), strict=True))
     effective = float(found.effective.sum())
-    return Combination(
-        blocks, log_evidence, float(np.sqrt(variance)), scales, found.values, found.covariance, effective, peak.exact
-    )
+    exact = peak.promised is None
+    noise = float(np.sqrt(variance))
+    return Combination(blocks, log_evidence, noise, scales, found.values, found.covariance, effective, exact)
 
 
 @dataclass(frozen=True, eq=False)
 class _Peak:
-    """Where the density of scales and noise is largest, or where it was left: see :class:`Combination`, ``exact``."""
+    """Where the density of scales and noise is largest, or where it was left, and what it promised there to gain."""
 
     posterior: Posterior
     bend: Array
     scale: Array
     variance: float
-    exact: bool
+    promised: float | None = None
 
 
 def _most_probable(
@@ -138,9 +139,9 @@ def _most_probable(
             gain += 0.5 * (gram.equations + held) * (target / variance - 1.0 - np.log(target / variance))
             reached = _log_joint(gram, columns, found, scale, spread, variance)
             if reached + settings.CLEARLY * gain < floor:
-                return _Peak(found, bend, scale, variance, False)
+                return _Peak(found, bend, scale, variance, gain)
         variance, scale = target, scale * np.exp(step)
-    return _Peak(found, bend, scale, variance, True)
+    return _Peak(found, bend, scale, variance)
 
 
 def _log_joint(gram: Gram, columns: Columns, found: Posterior, scale: Array, spread: Array, variance: float) -> float:

@@ -7,7 +7,7 @@ and another setting of one block in place of two blocks.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
 from thermal_robot.inference.evidence import Combination, evidence
+from thermal_robot.inference.gains import gains
 from thermal_robot.inference.gram import Gram
 
 Array = NDArray[np.float64]
@@ -58,9 +59,7 @@ class Search:
         whole = set(blocks)
         return not any(self._apart.get(b, whole - whole) & whole for b in blocks)
 
-    def evaluate(
-        self, blocks: Sequence[int], start: Combination | None = None, wanted: float = -np.inf
-    ) -> Combination:
+    def evaluate(self, blocks: Sequence[int], start: Combination | None = None, wanted: float = -np.inf) -> Combination:
         """Return the combination's evidence, computed once.
 
         Parameters
@@ -241,7 +240,7 @@ class Search:
         keys = {b: tuple(sorted((*base.blocks, b))) for b in others}
         barred = set().union(*(self._apart.get(b, ()) for b in base.blocks))
         new = [b for b in others if b not in barred and keys[b] not in self.seen]
-        for b, gain, scale in _gains(self.gram, base, new):
+        for b, gain, scale in gains(self.gram, base, new):
             self.seen[keys[b]] = Combination(
                 keys[b],
                 base.log_evidence + gain + self.log_prior[b],
@@ -273,77 +272,3 @@ class Search:
         log = np.array([c.log_evidence for c in order])
         weight = np.exp(log - log[0])
         return order, weight / weight.sum()
-
-
-def _gains(gram: Gram, base: Combination, blocks: Sequence[int]) -> list[tuple[int, float, float]]:
-    """Return for each block what adding it gains in log evidence, its scale integrated out, and its best scale.
-
-    Scales of the others stay. In the eigenvectors of the block's own information beside the others, w, with the vector
-    c there, and with the noise s'² that it leaves,
-
-        (n + ν) s'² = ν + Q − Σ c² λ²/(s'² + λ² w) ,
-        gain(λ) = −½ Σ log(1 + λ² w/s'²) − ½ (n + ν) log(s'²/s₀²) ,
-
-    Q = y'y − b'θ, and s₀ the same without the block.
-    """
-    used = gram.columns_of(base.blocks)
-    # a column that is held at zero takes nothing up
-    kept = (base.values != 0.0) | ~gram.positive[used]
-    used, values, covariance = used[kept], base.values[kept], base.covariance[kept[:, None] & kept]
-    covariance = covariance.reshape(len(used), len(used))
-    variance = base.noise**2
-    left = gram.vector - gram.matrix[:, used] @ values
-    log_scale = np.array(settings.SCALE_GRID)
-    square = np.exp(2.0 * log_scale)[:, None]
-    step = float(log_scale[1] - log_scale[0])
-    freedom = gram.equations + gram.noise_dof
-    rest = (gram.noise_dof + gram.total - float(gram.vector[used] @ values)) / freedom
-    rest = max(rest, settings.LEAST_VARIANCE * variance)
-    parts = []
-    for alike in _by_width(gram, blocks):
-        own = np.array([np.arange(gram.slices[b].start, gram.slices[b].stop) for b in alike])
-        # one that cannot be negative and would be stays at zero
-        free = ~gram.positive[own] | (left[own] > 0.0)
-        cross = gram.matrix[own[:, :, None], used] * free[:, :, None]
-        inside = gram.matrix[own[:, :, None], own[:, None, :]] * (free[:, :, None] & free[:, None, :])
-        value, vector = np.linalg.eigh(inside - cross @ (covariance / variance) @ cross.transpose(0, 2, 1))
-        along = (vector.transpose(0, 2, 1) @ (left[own] * free)[:, :, None])[:, :, 0] ** 2
-        parts.append((alike, np.maximum(value, 0.0), along))
-    result = []
-    for alike, value, along in _padded(parts):
-        left_over = np.full((len(alike), len(log_scale)), rest)
-        seen, told = square * value[:, None], along[:, None] * square
-        part = np.empty_like(seen)
-        for _ in range(settings.NOISE_ROUNDS):
-            np.add(left_over[:, :, None], seen, out=part)
-            taken = np.divide(told, part, out=part).sum(axis=2) / freedom
-            left_over = np.maximum(rest - taken, settings.LEAST_VARIANCE * rest)
-        spread = gram.spreads[alike][:, None]
-        log = -0.5 * np.log1p(np.divide(seen, left_over[:, :, None], out=part), out=part).sum(axis=2)
-        log -= 0.5 * (log_scale / spread) ** 2 + np.log(np.sqrt(2.0 * np.pi) * spread / step)
-        log -= 0.5 * freedom * np.log(left_over / rest)
-        top = log.max(axis=1)
-        gain = top + np.log(np.exp(log - top[:, None]).sum(axis=1))
-        result += list(zip(alike, gain.tolist(), np.exp(log_scale[log.argmax(axis=1)]).tolist(), strict=True))
-    return result
-
-
-def _padded(parts: Sequence[tuple[list[int], Array, Array]]) -> Iterator[tuple[list[int], Array, Array]]:
-    """Yield narrow blocks together, with zeros that bring nothing, and wide ones as they are: it is done at once."""
-    narrow = [part for part in parts if part[1].shape[1] <= settings.NARROW]
-    yield from (part for part in parts if part[1].shape[1] > settings.NARROW)
-    if narrow:
-        wide = max(value.shape[1] for _, value, _ in narrow)
-        blocks = [b for part in narrow for b in part[0]]
-        value, along, first = np.zeros((len(blocks), wide)), np.zeros((len(blocks), wide)), 0
-        for alike, own, seen in narrow:
-            rows, columns = slice(first, first + len(alike)), slice(own.shape[1])
-            value[rows, columns], along[rows, columns], first = own, seen, first + len(alike)
-        yield blocks, value, along
-
-
-def _by_width(gram: Gram, blocks: Sequence[int]) -> list[list[int]]:
-    widths: dict[int, list[int]] = {}
-    for b in blocks:
-        widths.setdefault(gram.slices[b].stop - gram.slices[b].start, []).append(b)
-    return list(widths.values())

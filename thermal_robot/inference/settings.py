@@ -129,7 +129,7 @@ and may have brought. And that to first order, which tells less than the exact o
 NARROW = 6
 """Columns up to which blocks of different width are weighed in one array: wider ones would fill it with zeros."""
 NOISE_ROUNDS = 6
-"""Rounds in which the noise that a further block leaves settles."""
+"""Rounds in which the noise that a further block leaves settles, and which of its columns stay at zero."""
 FLATTEST_PEAK = 0.5
 """Curvature of a peak over ln λ, that of the prior being 1: of a flatter one a parabola is up to 0.9 nat off."""
 FIRST_ROUNDS = 5
