@@ -108,10 +108,11 @@ def _sided(inside: Array, pull: Array, sided: NDArray[np.bool_], noise2: float) 
     A free one with its mean and variance beside all the others that are free, one that is held at zero with the pull
     and the information that these leave it.
     """
-    free, unit = ~sided | (pull > 0.0), np.eye(pull.shape[1], dtype=bool)
+    free = ~sided | (pull > 0.0)
     for last in [*(False,) * settings.NOISE_ROUNDS, True]:
         both = free[:, :, None] & free[:, None, :]
-        inverse = np.linalg.inv(np.where(both, inside, 0.0) + np.where(both & unit, noise2, 0.0) + (unit & ~both))
+        value, vector = np.linalg.eigh(np.where(both, inside, 0.0))
+        inverse = (vector / (np.maximum(value, 0.0) + noise2)[:, None, :]) @ vector.transpose(0, 2, 1)
         inverse = np.where(both, inverse, 0.0)
         mean = (inverse @ pull[:, :, None])[:, :, 0]
         rest = pull - (inside @ mean[:, :, None])[:, :, 0]
@@ -121,9 +122,9 @@ def _sided(inside: Array, pull: Array, sided: NDArray[np.bool_], noise2: float) 
         free = free ^ wrong
     taken = (inside @ inverse * inside).sum(axis=2)
     tight = 1.0 / np.where(free, inverse.diagonal(axis1=1, axis2=2), 1.0)
-    value = np.where(free, tight - noise2, inside.diagonal(axis1=1, axis2=2) - taken)
+    own = np.where(free, tight - noise2, inside.diagonal(axis1=1, axis2=2) - taken)
     where = np.nonzero(sided)
-    return free, (where[0], np.maximum(value, 0.0)[where], np.where(free, mean * tight, rest)[where])
+    return free, (where[0], np.maximum(own, 0.0)[where], np.where(free, mean * tight, rest)[where])
 
 
 def _on_their_sides(alike: _Alike, square: Array, noise: Array) -> Array:

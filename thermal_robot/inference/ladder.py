@@ -246,7 +246,7 @@ class Ladder:
         if (form, blocks) in self._settled:
             return self._settled[form, blocks]
         known = self.searches[PLAIN].seen.get(blocks)
-        return known and replace(known, scales={k: known.scales[b] for k, b in enumerate(blocks)})
+        return known and replace(known, scales={k: known.scales.get(b, 1.0) for k, b in enumerate(blocks)})
 
     def _left(self, rung: Rung, picked: NDArray[np.int64]) -> Array:
         """Return the products of some columns, whitened by the discrepancy of a rung."""

@@ -316,7 +316,7 @@ def _chance_of_size(
     left = max(gap.size - freedom, 1)
     ratio2 = float(distance2.sum()) / left
     m = gap.shape[1]
-    spread = max(float((distance2**2).mean() / distance2.mean() ** 2 - 1.0), 2.0 / m)
+    spread = max(float((distance2**2).mean() / max(float(distance2.mean()) ** 2, settings.TINY) - 1.0), 2.0 / m)
     effective = left * (2.0 / m) / spread
     p = float(chdtrc(effective, ratio2 * effective))
     # a noise that is not stated fits whatever is left: scatter explains only where there is some

@@ -198,7 +198,7 @@ class Likelihood:
             scale = np.ones(len(candidates))
             for _ in range(1 if np.isinf(self.tails) else 4):
                 pull = self._pull(distance2 / scale, m)
-                scale = (w[:, None] * pull * distance2).sum(axis=0) / (m * w.sum())
+                scale = np.maximum((w[:, None] * pull * distance2).sum(axis=0) / (m * w.sum()), settings.TINY)
             volume = logdet[:, None] + np.log1p(variance * length2) + m * np.log(scale)
             each = self._density(distance2 / scale, volume, m)
             prior = sum(

@@ -104,7 +104,7 @@ class Target:
         if not k or freedom - k < settings.FEWEST_LEFT:
             return NOTHING
         projected = own.T @ (flat.T @ self.white)
-        total, gained = float(self.white @ self.white), float(projected @ projected)
+        total, gained = max(float(self.white @ self.white), settings.TINY), float(projected @ projected)
         rest = max(total - gained, settings.TINY)
         return Worth(
             float(fdtrc(k, freedom - k, (gained / k) / (rest / (freedom - k)))),
@@ -120,7 +120,7 @@ class Target:
             np.einsum("nmd,nme->nde", own, own),
             np.einsum("nmr,nmd->rdn", basis, own),
             np.einsum("nm,nmd->nd", self.white.reshape(self.root.shape), own),
-            float(self.white @ self.white),
+            max(float(self.white @ self.white), settings.TINY),
             self.freedom,
         )
 
