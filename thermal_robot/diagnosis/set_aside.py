@@ -34,7 +34,7 @@ def too_many(fit: Fit, left: Remainder) -> tuple[float, str]:
 def _heavy(left: Remainder) -> bool:
     """Tell whether the rows that are left have tails heavier than normal, by their kurtosis."""
     squares = left.white**2
-    excess = float((squares**2).mean() / squares.mean() ** 2) - 3.0
+    excess = float((squares**2).mean() / max(float(squares.mean()) ** 2, settings.TINY)) - 3.0
     # variance of the kurtosis of a normal sample: 24/n
     return excess > settings.HEAVY_SIGMAS * float(np.sqrt(24 / squares.size))
 

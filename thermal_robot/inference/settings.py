@@ -106,9 +106,9 @@ TARGET_STARTS = np.vstack([np.zeros(3), 0.2 * np.eye(3), -0.2 * np.eye(3)])
 """m: where the target may sit on the tool frame; from each the fit reaches 0.3 m."""
 SPARE_EQUATIONS = 6
 """Equations that must be left once the frames are fitted: as many as one pose has."""
-EVIDENCE_STEPS, EVIDENCE_SETTLED, LEAST_VARIANCE, CLEARLY = 40, 1e-3, 1e-12, 4.0
-"""Newton steps of scales and noise at most, the change of a logarithm at which they end, the smallest variance, in
-squares of the noise: what fits better is rounding; times that a step's promise must not suffice to end without it."""
+EVIDENCE_STEPS, EVIDENCE_SETTLED, LEAST_VARIANCE, CLEARLY = 40, 1e-3, 1e-6, 4.0
+"""Newton steps of scales and noise at most; the change of a logarithm at which they end; the smallest variance, in
+squares of the noise: what fits better is rounding, or seen anew; times that a step's promise must not suffice."""
 PIVOTS, SIDE_ROUNDING, TAKEN_BACK = 60, 1e-10, 0.9
 """Changes at most of the columns held at zero; of the sums that tell it, what is rounding; less is no step back."""
 SCALE_GRID = tuple(np.linspace(-6.0, 6.0, 25))

@@ -18,6 +18,7 @@ _WEIGHTY = 0.01  # of the gap on held-out rows: an effect with less is counted a
 _CARRIES = 1.5  # times what is left of the fitted rows: more on held-out rows is not called noise
 _UNKNOWN = ", which may or may not be noise: the campaign states none"
 _SURE = 0.995  # a probability above it would be rounded to 100 %, which is never claimed
+_NOTHING = 0.9995e-9  # m: what is less rounds to no nanometre
 # m: from which length on it is read times so much in which unit; what rounds to 1 mm is never written as 1e+03 µm
 _LENGTHS = ((0.9995, 1.0, "m"), (0.9995e-3, 1e3, "mm"), (0.0, 1e6, "µm"))
 
@@ -184,7 +185,9 @@ def _unexplained(diagnosis: Diagnosis, remaining: Unexplained, of: float, with_a
 
 
 def length(metres: float) -> str:
-    """Return a length in the unit that a metrologist would use."""
+    """Return a length in the unit that a metrologist would use; what no instrument sees is not told in figures."""
+    if metres < _NOTHING:
+        return "less than 1 nm"
     factor, unit = next((f, u) for least, f, u in _LENGTHS if metres >= least)
     return f"{metres * factor:.3g} {unit}"
 
