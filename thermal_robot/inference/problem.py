@@ -17,6 +17,7 @@ from thermal_robot.inference.columns import Block
 from thermal_robot.inference.discrepancy import Smooth
 from thermal_robot.inference.evidence import Combination
 from thermal_robot.inference.gram import Gram
+from thermal_robot.inference.stack import Stack
 
 Array = NDArray[np.float64]
 
@@ -101,8 +102,17 @@ class Whitening:
 
 def gram(linear: Linear, whitening: Whitening) -> Gram:
     """Form the normal equations, project the frames out, and reduce each block to what the data determine of it."""
-    stack = whitened(linear, whitening)
-    return normal_equations(linear, whitening, stack.T @ stack, len(stack))
+    if whitening.smooth is None:  # rows are then apart, and never all held at once
+        stack = weighed(Stack.of(linear.columns), whitening)
+        return normal_equations(linear, whitening, stack.products(), stack.equations)
+    white = whitened(linear, whitening)
+    return normal_equations(linear, whitening, white.T @ white, len(white))
+
+
+def weighed(stack: Stack, whitening: Whitening) -> Stack:
+    """Return the columns over the rows with weight, in units of noise, a discrepancy left aside."""
+    used = np.flatnonzero(whitening.weights > 0)
+    return stack.weighed(used, np.sqrt(whitening.weights[used])[:, None] / whitening.sigma(used))
 
 
 def normal_equations(
