@@ -261,7 +261,9 @@ def test_a_fault_of_the_table_is_said_with_what_it_explains_and_its_remedy(case)
         (0.9999, "1 m"),
         (1.2, "1.2 m"),
         (2.6e-7, "0.26 µm"),
-        (0.0, "0 µm"),
+        (1.2e-9, "0.0012 µm"),
+        (4e-10, "less than 1 nm"),
+        (0.0, "less than 1 nm"),
     ],
 )
 def test_a_length_is_read_at_sight(metres, written):

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.linalg import qr
 
 from thermal_robot.inference import settings
 
@@ -35,7 +36,9 @@ def solve(matrix: Array, vector: Array) -> Array:
 def orthonormal(columns: Array) -> Array:
     """Return an orthonormal basis (E, r) of the span of columns (E, D)."""
     scaled = columns / (np.linalg.norm(columns, axis=0) + settings.TINY)
-    return np.linalg.qr(scaled @ whitener(scaled.T @ scaled))[0]
+    turned = (whitener(scaled.T @ scaled).T @ scaled.T).T  # column after column in memory, so that nothing is copied
+    del scaled
+    return np.asarray(qr(turned, mode="economic", overwrite_a=True, check_finite=False)[0])
 
 
 def without(columns: Array, basis: Array) -> Array:
