@@ -12,6 +12,7 @@ from threadpoolctl import threadpool_info
 
 import thermal_robot as tr
 from thermal_robot.fleet.rows import write_rows
+from thermal_robot.fleet.workers import limited
 
 ROWS, NOISE = 40, 20e-6
 ONLY = ("backlash", "joint_offset")
@@ -38,6 +39,12 @@ def square(number, slow, deadly=()):
     if number in deadly:
         os.kill(os.getpid(), signal.SIGKILL)
     return number * number
+
+
+def square_in_time(number, slow, limit):
+    """The same, in a process that ends where it takes longer than the limit."""
+    with limited(limit):
+        return square(number, slow if number == 3 else 0.0)
 
 
 def threads():

@@ -153,6 +153,16 @@ def test_a_program_that_fails_is_a_row_that_is_tried_again(rv_m2, tmp_path, monk
     ]
 
 
+def test_a_campaign_that_takes_too_long_is_a_row_that_is_tried_again(rv_m2, tmp_path):
+    write_robot(rv_m2, tmp_path / "in" / "arm", seed=1)
+    late = tr.diagnose_many(tmp_path / "in", tmp_path / "out", only=ONLY, workers=1, time_limit=0.01)
+    ((name, *_, why),) = late.summary.failures
+    assert name == "arm"
+    assert "time limit" in why
+    fleet = tr.diagnose_many(tmp_path / "in", tmp_path / "out", only=ONLY, workers=1)
+    assert not fleet.summary.failures
+
+
 def test_what_a_campaign_says_of_itself_is_not_tried_again(rv_m2, tmp_path):
     folder = write_robot(rv_m2, tmp_path / "a", rows=3)
     rows, again = diagnosed(str(folder), [], [])
@@ -167,6 +177,7 @@ def test_what_a_campaign_says_of_itself_is_not_tried_again(rv_m2, tmp_path):
         ({"only": []}, "names no effect"),
         ({"workers": 0}, "at least 1"),
         ({"workers": True}, "at least 1"),
+        ({"time_limit": 0.0}, "seconds above 0"),
         ({"labels": ["a", "b", "c"]}, "fewer levels"),
     ],
 )

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import psutil
 import pytest
-from fleet.robots import square, threads
+from fleet.robots import square, square_in_time, threads
 
 from thermal_robot.errors import ThermalRobotError
 from thermal_robot.fleet.workers import answers, client
@@ -66,6 +66,16 @@ def test_work_that_fails_is_told_and_the_rest_goes_on(cluster):
     assert found["3"] == (9, "")
     assert found["two"][0] is None
     assert "TypeError" in found["two"][1]
+
+
+def test_work_that_takes_too_long_is_ended_and_the_rest_goes_on(cluster):
+    began = time.monotonic()
+    found = {
+        int(key): (reply, why) for key, reply, why in answers(cluster, square_in_time, tasks(range(6), 600.0, 1.0))
+    }
+    assert time.monotonic() - began < 60.0
+    assert found.pop(3)[0] is None
+    assert found == {k: (k * k, "") for k in (0, 1, 2, 4, 5)}
 
 
 def test_work_that_ends_its_process_is_the_only_one_that_has_no_answer(cluster):

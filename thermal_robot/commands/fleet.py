@@ -11,6 +11,7 @@ from typing import Any
 from thermal_robot.commands.shared import deliver
 from thermal_robot.console import counted
 from thermal_robot.files import write_text
+from thermal_robot.fleet import settings
 
 DOES = "diagnose many campaigns: what is wrong with which robot, and what several share"
 EXAMPLE = " campaigns --out fleet --labels hall robot"
@@ -27,6 +28,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
         "--labels", metavar="NAME", nargs="+", default=[], help="what the levels of folders are, from the top"
     )
     parser.add_argument("--workers", metavar="N", type=int, help="processes on this machine (default: one a core)")
+    limit = settings.TIME_LIMIT / 60.0
+    parser.add_argument(
+        "--time-limit", metavar="MINUTES", type=float, default=limit, help=f"for each campaign (default: {limit:.0f})"
+    )
     parser.add_argument("--scheduler", metavar="ADDRESS", help="of Dask on a cluster, instead of processes here")
     choice: dict[str, Any] = {"metavar": "EFFECT", "nargs": "+", "action": "extend"}
     parser.add_argument("--without", **choice, default=[], help="leave effects out")
@@ -48,6 +53,7 @@ def run(options: argparse.Namespace) -> None:
             without=options.without,
             workers=options.workers,
             scheduler=options.scheduler,
+            time_limit=60.0 * options.time_limit,
             progress=progress,
         )
     found, folder = fleet.summary.to_dict(), Path(options.out)

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import gc
 import json
+import math
 import os
 import warnings
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -15,6 +17,7 @@ from thermal_robot.diagnosis import diagnose
 from thermal_robot.effects.catalogue import choose
 from thermal_robot.errors import CampaignError, ThermalRobotError
 from thermal_robot.files import is_file, write_one
+from thermal_robot.fleet import settings
 from thermal_robot.fleet import workers as processes
 from thermal_robot.fleet.done import Done, fingerprint, opened
 from thermal_robot.fleet.extra import needed
@@ -78,6 +81,7 @@ def diagnose_many(
     without: Iterable[str] = (),
     workers: int | None = None,
     scheduler: str | None = None,
+    time_limit: float = settings.TIME_LIMIT,
     progress: Callable[[str, int, int], None] = lambda *_: None,
 ) -> Fleet:
     """Diagnose many campaigns, each as :func:`diagnose` does, and say what their robots have in common.
@@ -104,6 +108,8 @@ def diagnose_many(
         Processes on this machine, each on one core; one a core where left out.
     scheduler
         Address of a Dask scheduler, whose workers see the same files under the same paths, instead of processes here.
+    time_limit
+        Seconds that one campaign may take, tried twice; then it is a row that says so, and the rest goes on.
     progress
         Called with a stage, how many campaigns are done, and how many there are.
 
@@ -132,12 +138,15 @@ def diagnose_many(
     options = _options(only, without)
     if workers is not None and (isinstance(workers, bool) or not isinstance(workers, int) or workers < 1):
         raise CampaignError("diagnose_many(), workers", "no such number", found=repr(workers), expected="at least 1")
+    if isinstance(time_limit, bool) or not isinstance(time_limit, (int, float)) or not 0.0 < time_limit < math.inf:
+        where = "diagnose_many(), time_limit"
+        raise CampaignError(where, "no such time", found=repr(time_limit), expected="seconds above 0")
     for module in ("pyarrow", "distributed"):
         needed(module)
     found, folder = campaigns(source, labels), _made(out)
     table = folder / TABLE
     with opened(folder / DONE) as done:
-        _diagnosed(found, options, done, workers or os.cpu_count() or 1, scheduler, progress)
+        _diagnosed(found, options, done, workers or os.cpu_count() or 1, scheduler, time_limit, progress)
         write_one(str(table), lambda path: write_rows(path, found.names, _whole(found, done)))
     return Fleet(table, summarise(table, found.names, progress))
 
@@ -193,6 +202,7 @@ def _diagnosed(
     done: Done,
     workers: int,
     scheduler: str | None,
+    time_limit: float,
     progress: Callable[[str, int, int], None],
 ) -> None:
     """Diagnose what is not done yet."""
@@ -209,16 +219,22 @@ def _diagnosed(
     if first is None:
         return
     with processes.client(min(workers, total), scheduler) as client:
-        for key, reply, reason in processes.answers(client, diagnosed, _again(first, tasks)):
+        for key, reply, reason in processes.answers(client, _in_time, _again(time_limit, first, tasks)):
             rows, again = (json.loads(reply[0]), reply[1]) if reply is not None else (failed(reason), True)
             done.put(key, rows, again)
             under_way.discard(key)
             told(1)
 
 
-def _again(first: processes.Task, rest: Iterator[processes.Task]) -> Iterator[processes.Task]:
-    yield first
-    yield from rest
+def _again(time_limit: float, first: processes.Task, rest: Iterator[processes.Task]) -> Iterator[processes.Task]:
+    for key, arguments in chain([first], rest):
+        yield key, (time_limit, *arguments)
+
+
+def _in_time(time_limit: float, *campaign: Any) -> tuple[str, bool]:
+    """Diagnose a campaign, or end the process."""
+    with processes.limited(time_limit):
+        return diagnosed(*campaign)
 
 
 def _tasks(

@@ -15,6 +15,8 @@ WRITTEN_EVERY = 1.0
 """Seconds within which what is done is on disk: a power cut costs no more, and a disk has one write to do."""
 WAIT_FOR_OTHERS = 1.0
 """Seconds that a second run waits for the folder of a first one before it is refused."""
+TIME_LIMIT = 3600.0
+"""Seconds that one campaign may take: one of 12 000 poses takes four minutes; what takes longer hangs."""
 ANSWERS_WITHIN = 30.0
 """Seconds within which a scheduler must answer: it may be busy, but it is there."""
 SPREADS = (0.02, 5.0)

@@ -12,7 +12,9 @@ and is done then by itself, once. If that process is killed as well, it was this
 
 from __future__ import annotations
 
+import faulthandler
 import math
+import os
 import time
 import warnings
 from collections.abc import Callable, Generator, Iterator
@@ -25,7 +27,7 @@ from thermal_robot.fleet.extra import needed
 
 LOCAL = "127.0.0.1"
 KILLED = "the process that diagnosed it was ended twice, the second time with nothing else to do: by the system, for \
-memory, or by a crash"
+memory, by a crash, or because it took longer than the time limit"
 
 Task = tuple[str, tuple[Any, ...]]
 """Key, and the arguments of the work."""
@@ -132,6 +134,17 @@ def answers(
             yield task[0], reply, KILLED if killed else _said(error)
     except (distributed.comm.core.CommClosedError, distributed.CancelledError, OSError) as error:
         raise ThermalRobotError(f"the scheduler was lost: {error}; the same command continues") from error
+
+
+@contextmanager
+def limited(seconds: float) -> Iterator[None]:
+    """End this whole process where what is done within takes longer, even where it hangs outside Python."""
+    with open(os.devnull, "w", encoding="utf-8") as nowhere:
+        faulthandler.dump_traceback_later(seconds, exit=True, file=nowhere)
+        try:
+            yield
+        finally:
+            faulthandler.cancel_dump_traceback_later()
 
 
 def _threads(client: Any) -> Callable[[], int]:
