@@ -174,7 +174,6 @@ def diagnosed(folder: str, only: Sequence[str], without: Sequence[str]) -> tuple
         rows, again = failed(_without_place(str(error), folder)), False
     except Exception as error:
         rows, again = failed(f"the program failed: {type(error).__name__}: {_without_place(str(error), folder)}"), True
-    gc.collect()  # what a diagnosis leaves refers to itself, and would stay for hundreds of campaigns
     return json.dumps(rows), again
 
 
@@ -232,9 +231,17 @@ def _again(time_limit: float, first: processes.Task, rest: Iterator[processes.Ta
 
 
 def _in_time(time_limit: float, *campaign: Any) -> tuple[str, bool]:
-    """Diagnose a campaign, or end the process."""
+    """Diagnose a campaign, or end the process.
+
+    What a diagnosis leaves refers to itself, and would stay for hundreds of campaigns; what was there after the first,
+    modules above all, is not looked through again.
+    """
     with processes.limited(time_limit):
-        return diagnosed(*campaign)
+        found = diagnosed(*campaign)
+    gc.collect()
+    if not gc.get_freeze_count():
+        gc.freeze()
+    return found
 
 
 def _tasks(
