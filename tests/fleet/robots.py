@@ -47,6 +47,15 @@ def square_in_time(number, slow, limit):
         return square(number, slow if number == 3 else 0.0)
 
 
+def samples_kept():
+    """How many samples Dask has kept of where this process was: what makes it grow, task after task."""
+    from distributed import get_worker
+
+    time.sleep(0.5)
+    worker = get_worker()
+    return len(worker.profile_history) + len(worker.profile_recent["children"])
+
+
 def threads():
     """How many threads this process multiplies matrices with, as a set of what its libraries say."""
     np.ones((2, 2)) @ np.ones((2, 2))

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import psutil
 import pytest
-from fleet.robots import square, square_in_time, threads
+from fleet.robots import samples_kept, square, square_in_time, threads
 
 from thermal_robot.errors import ThermalRobotError
 from thermal_robot.fleet.workers import answers, client
@@ -66,6 +66,11 @@ def test_work_that_fails_is_told_and_the_rest_goes_on(cluster):
     assert found["3"] == (9, "")
     assert found["two"][0] is None
     assert "TypeError" in found["two"][1]
+
+
+def test_processes_keep_nothing_of_where_they_were(cluster):
+    ((_, kept, _),) = list(answers(cluster, samples_kept, iter([("kept", ())])))
+    assert kept == 0
 
 
 def test_work_that_takes_too_long_is_ended_and_the_rest_goes_on(cluster):

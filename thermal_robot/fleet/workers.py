@@ -72,10 +72,12 @@ def client(workers: int, scheduler: str | None = None) -> Iterator[Any]:
 _UNSERVED = {
     "distributed.scheduler.http.routes": [],
     "distributed.worker.http.routes": [],
+    "distributed.worker.profile.enabled": False,
     "distributed.scheduler.allowed-failures": 0,
     "distributed.admin.large-graph-warning-threshold": "1GB",
 }
-"""Nothing is served beside the work itself, and a campaign whose process was killed comes back at once."""
+"""Nothing is served beside the work itself, nor kept of how it goes on, which grows by a megabyte a campaign; and a
+campaign whose process was killed comes back at once."""
 
 
 @contextmanager
