@@ -38,7 +38,7 @@ def test_the_period_of_a_sawtooth_is_found(rows, noise):
 
 
 def test_normal_errors_have_no_steps_and_are_refuted():
-    for seed in range(40):
+    for seed in range(100):
         rng, command = np.random.default_rng(seed), commands(seed, 200, reach=0.3)
         found = period(STEP / np.sqrt(12.0) * rng.normal(size=200), variances(0.0, 200), command, STEP)
         assert found.step == pytest.approx(STEP)
@@ -63,7 +63,7 @@ def test_a_bayes_factor_is_as_often_right_as_it_says():
 
 def test_where_steps_would_not_be_seen_nothing_is_said():
     """Errors of which most are the instrument's."""
-    for seed in range(60):
+    for seed in range(200):
         rng, command = np.random.default_rng(seed), commands(seed, 40, reach=0.3)
         for errors in (np.zeros(40), sawtooth(command)):
             found = period(errors + STEP * rng.normal(size=40), variances(STEP, 40), command, STEP)

@@ -58,7 +58,7 @@ def surely(fit: Fit) -> Iterator[tuple[Effect, Array, Block, Array]]:
     """Yield each effect, its values, its columns, and how many expected sizes each value is at least, at 95 %."""
     e = fit.explanation
     for b, (effect, values) in zip(e.best.blocks, fit.effects, strict=True):
-        item, deviation = e.linear.blocks[b], np.sqrt(np.maximum(np.diag(e.values[b][1]), 0.0))
+        item, deviation = e.linear.blocks[b], np.sqrt(np.diag(e.values[b][1]))
         yield effect, values, item, np.maximum(np.abs(values) - settings.SIGMAS_95 * deviation, 0.0) / item.sizes
 
 

@@ -218,15 +218,16 @@ def _diagnosed(
     if first is None:
         return
     with processes.client(min(workers, total), scheduler) as client:
-        for key, reply, reason in processes.answers(client, _in_time, _again(time_limit, first, tasks)):
+        for key, reply, reason in processes.answers(client, _in_time, _limited(time_limit, chain([first], tasks))):
             rows, again = (json.loads(reply[0]), reply[1]) if reply is not None else (failed(reason), True)
             done.put(key, rows, again)
             under_way.discard(key)
             told(1)
 
 
-def _again(time_limit: float, first: processes.Task, rest: Iterator[processes.Task]) -> Iterator[processes.Task]:
-    for key, arguments in chain([first], rest):
+def _limited(time_limit: float, tasks: Iterator[processes.Task]) -> Iterator[processes.Task]:
+    """Yield tasks as :func:`_in_time` takes them."""
+    for key, arguments in tasks:
         yield key, (time_limit, *arguments)
 
 

@@ -15,7 +15,7 @@ from thermal_robot.inference.discrepancy import Form, Smooth, Spectrum, decompos
 from thermal_robot.inference.evidence import Combination, evidence
 from thermal_robot.inference.gram import Gram
 from thermal_robot.inference.grouped import Grouped
-from thermal_robot.inference.problem import Linear, Whitening, contained, normal_equations, weighed
+from thermal_robot.inference.problem import Linear, Whitening, contained, normal_equations, white_stack
 from thermal_robot.inference.search import Search
 from thermal_robot.inference.stack import Stack
 
@@ -57,7 +57,7 @@ class Ladder:
     def __post_init__(self) -> None:
         """Decompose the forms once for all sizes."""
         w = self.whitening
-        self._stack = weighed(self.stack or Stack.of(self.linear.columns), w)
+        self._stack = white_stack(self.stack or Stack.of(self.linear.columns), w)
         self._products, self._equations = self._stack.products(), self._stack.equations
         self._first = np.unique(self._stack.number, return_index=True)[1]
         plain = normal_equations(self.linear, w, self._products, self._equations)

@@ -103,13 +103,13 @@ class Whitening:
 def gram(linear: Linear, whitening: Whitening) -> Gram:
     """Form the normal equations, project the frames out, and reduce each block to what the data determine of it."""
     if whitening.smooth is None:  # rows are then apart, and never all held at once
-        stack = weighed(Stack.of(linear.columns), whitening)
+        stack = white_stack(Stack.of(linear.columns), whitening)
         return normal_equations(linear, whitening, stack.products(), stack.equations)
     white = whitened(linear, whitening)
     return normal_equations(linear, whitening, white.T @ white, len(white))
 
 
-def weighed(stack: Stack, whitening: Whitening) -> Stack:
+def white_stack(stack: Stack, whitening: Whitening) -> Stack:
     """Return the columns over the rows with weight, in units of noise, a discrepancy left aside."""
     used = np.flatnonzero(whitening.weights > 0)
     return stack.weighed(used, np.sqrt(whitening.weights[used])[:, None] / whitening.sigma(used))

@@ -8,7 +8,7 @@ from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import expit, log_ndtr
+from scipy.special import expit, log_ndtr, logsumexp
 
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import without
@@ -90,8 +90,8 @@ def period(errors: Array, variance: Array, command: Array, step: float) -> Steps
     tried = [_tried(errors, variance, command, slack) for slack in settings.STEP_SLACKS]
     if not all(len(frequency) for frequency, _ in tried):
         return Steps(step, 0.0)
-    means = [float(_summed(each) - np.log(len(each))) for _, each in tried]
-    factor = float(_summed(np.array(means)) - np.log(len(means))) - without
+    means = [float(logsumexp(each) - np.log(len(each))) for _, each in tried]
+    factor = float(logsumexp(means) - np.log(len(means))) - without
     frequency, each = tried[int(np.argmax(means))]
     return Steps(step / float(frequency[np.argmax(each)]) if factor > settings.STEP_SURE else step, factor)
 
@@ -112,15 +112,9 @@ def _tried(errors: Array, variance: Array, command: Array, slack: float) -> tupl
         series = _series(errors * here, known * here**2, slack)
         waves = [_sums(c, k * command, low, width, len(frequency)) for k, c in enumerate(series.T)]
         of_phase = np.fft.irfft(np.stack(waves), settings.STEP_PHASES, axis=0) + len(errors) * np.log(here)
-        likelihoods.append(_summed(of_phase) - np.log(settings.STEP_PHASES))
+        likelihoods.append(logsumexp(of_phase, axis=0) - np.log(settings.STEP_PHASES))
         frequencies.append(frequency)
     return np.concatenate(frequencies), np.concatenate(likelihoods)
-
-
-def _summed(logarithms: Array) -> Array:
-    """Return the logarithm of the sum along the first axis, of finite values: SciPy's asks each whether it is."""
-    top = logarithms.max(axis=0)
-    return np.asarray(top + np.log(np.exp(logarithms - top).sum(axis=0)))
 
 
 def _normal(x: Array, mean: Array | float, variance: Array) -> Array:
@@ -135,9 +129,9 @@ def _series(errors: Array, variance: Array, slack: float) -> NDArray[np.complex1
     u = np.arange(settings.STEP_PHASES) / settings.STEP_PHASES
     near = np.stack([u - 1.0, u, u + 1.0]) - 0.5
     taken = log_ndtr((0.5 - np.abs(near)) / slack)
-    taken = taken - _summed(taken)
+    taken = taken - logsumexp(taken, axis=0)
     each = taken + _normal(errors[:, None, None], near, variance[:, None, None])
-    return np.asarray(np.fft.rfft(_summed(each.swapaxes(0, 1)), axis=1)[:, : settings.STEP_HARMONICS + 1])
+    return np.asarray(np.fft.rfft(logsumexp(each, axis=1), axis=1)[:, : settings.STEP_HARMONICS + 1])
 
 
 def _sums(weight: NDArray[np.complex128], place: Array, lowest: float, width: float, count: int) -> Array:
