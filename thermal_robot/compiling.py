@@ -69,19 +69,27 @@ def rows_at_once() -> int:
 def in_pieces(kernel: Callable[..., None], constants: tuple[Any, ...], rows: int, out: tuple[Any, ...]) -> None:
     """Call a kernel for pieces of so many rows, in threads: with constants, first and last row, and where to write."""
     count = max(1, rows // PIECE)
+    workers = min(threads(), count)
+    count = -(-count // workers) * workers  # as many for each, so that none waits for another
     cuts = [rows * piece // count for piece in range(count + 1)]
 
     def work(piece: int) -> None:
         _called(kernel, *constants, cuts[piece], cuts[piece + 1], *out)
 
-    workers = min(threads(), count)
     if workers < 2:
         for piece in range(count):
             work(piece)
-        return
-    work(0)  # compiles, where nothing is on disk
-    with ThreadPoolExecutor(workers) as pool:
-        list(pool.map(work, range(1, count)))
+    else:
+        list(_pool(workers).map(work, range(count)))
+
+
+@cache
+def _pool(workers: int) -> ThreadPoolExecutor:
+    return ThreadPoolExecutor(workers, "compiled loops")
+
+
+if hasattr(os, "register_at_fork"):
+    os.register_at_fork(after_in_child=_pool.cache_clear)  # threads are not forked
 
 
 def _called(kernel: Callable[..., None], *arguments: Any) -> None:

@@ -140,7 +140,7 @@ def _cases(options: argparse.Namespace, seed: int, tell: Callable[[str], None]) 
     from thermal_robot.blind.plan import plan
 
     counts = _counts(options)
-    most_real = counts.pop("real", None)
+    most_real = counts.pop("real", 0 if options.count else None)
     chosen = _robots(options.robot, options.tool)
     drawn = plan(seed, counts, chosen, tuple(options.effect))
     drawn = _with_faults(drawn, options.fault, seed, chosen)

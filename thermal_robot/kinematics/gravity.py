@@ -18,6 +18,8 @@ if TYPE_CHECKING:
     from thermal_robot.robot import Robot
 
 Array = NDArray[np.float64]
+_AT_TOOL = (0.0, 0.0, 0.0)
+_NONE = np.asarray(0.0), np.zeros(3)
 
 
 def gravity_torques(
@@ -25,7 +27,7 @@ def gravity_torques(
     q: ArrayLike,
     *,
     payload: ArrayLike | None = None,
-    payload_com: ArrayLike = (0.0, 0.0, 0.0),
+    payload_com: ArrayLike = _AT_TOOL,
     frames: ChainFrames | None = None,
     out: Array | None = None,
 ) -> Array:
@@ -74,7 +76,7 @@ def segment_loads(
     q: ArrayLike,
     *,
     payload: ArrayLike | None = None,
-    payload_com: ArrayLike = (0.0, 0.0, 0.0),
+    payload_com: ArrayLike = _AT_TOOL,
     frames: ChainFrames | None = None,
 ) -> Array:
     """Wrench that gravity puts on the far end of each segment: the weight of everything beyond it.
@@ -179,6 +181,8 @@ def _at_the_tool(frames: ChainFrames, payload: ArrayLike | None, payload_com: Ar
 
 
 def _payload(payload: ArrayLike | None, com: ArrayLike, rows: int) -> tuple[Array, Array]:
+    if payload is None and com is _AT_TOOL:
+        return _NONE
     mass = np.asarray(0.0 if payload is None else payload, dtype=float)
     centre = np.asarray(com, dtype=float)
     if mass.shape not in ((), (rows,)):

@@ -2,9 +2,10 @@
 
 Imported only where numba is installed. Every loop over lanes has the same fixed length and no branch, so that the
 compiler makes vector instructions of it and each lane is computed alike, wherever it stands in a block and whichever
-thread works on it. What is worked on stands in one array, the room: rows of one number for each lane, given by their
-place in it, since a view of a row would be counted by every function that it is handed to. All kernels stand in this
-file, for numba looks at nothing else to see whether what it has kept is old: touch it where ``LANES`` is changed.
+thread works on it. What is worked on stands in one flat array, the room: rows of ``LANES`` numbers, given by their
+place in it. So the compiler knows how far the rows of a frame are apart, and writes four of them in one loop; of rows
+that may overlap it would make no vectors. All kernels stand in this file, for numba looks at nothing else to see
+whether what it has kept is old: touch it where ``LANES`` is changed.
 """
 
 from __future__ import annotations
@@ -15,11 +16,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.compiling import compiled
-from thermal_robot.kinematics.arm import SLIDES, TURNS_ALIGNED, Arm
+from thermal_robot.kinematics.arm import SLIDES, TURNS, TURNS_ALIGNED, Arm
 from thermal_robot.kinematics.settings import LANES, LARGEST_REDUCED
 
 Array = NDArray[np.float64]
 
+WIDE = np.uint64(LANES)
 _QUARTERS = 2.0 / math.pi
 _HALF_PI = (1.57079632673412561417e00, 6.07710050630396597660e-11, 2.02226624879595063154e-21)
 """π/2 in three parts (fdlibm, e_rem_pio2.c): the product of the first two with a number below 2²⁰ is exact."""
@@ -31,11 +33,18 @@ _COSINE = (4.16666666666666019037e-02, -1.38888888888741095749e-03, 2.4801587289
 
 
 @compiled
+def at(row: int) -> np.uint64:
+    """Where a row begins: a number without a sign, as one that may be negative counts from the end."""
+    return np.uint64(row * LANES)
+
+
+@compiled
 def sincos(room: Array, x: int) -> None:
     """Write sines and cosines of the angles of a row, below ``LARGEST_REDUCED``, to the next two rows."""
     (p1, p2, p3), (s1, s2, s3, s4, s5, s6), (c1, c2, c3, c4, c5, c6) = _HALF_PI, _SINE, _COSINE
-    for i in range(LANES):
-        angle = room[x, i]
+    angles, sines, cosines = at(x), at(x + 1), at(x + 2)
+    for i in range(WIDE):
+        angle = room[angles + i]
         turns = np.rint(angle * _QUARTERS)
         r = ((angle - turns * p1) - turns * p2) - turns * p3
         z = r * r
@@ -44,8 +53,8 @@ def sincos(room: Array, x: int) -> None:
         half = np.floor(0.5 * turns)
         odd = turns - 2.0 * half
         sign = 1.0 - 2.0 * (half - 2.0 * np.floor(0.5 * half))
-        room[x + 1, i] = sign * (c if odd == 1.0 else s)
-        room[x + 2, i] = sign * (-s if odd == 1.0 else c)
+        room[sines + i] = sign * (c if odd == 1.0 else s)
+        room[cosines + i] = sign * (-s if odd == 1.0 else c)
 
 
 @compiled
@@ -53,245 +62,287 @@ def turn(room: Array, x: int, large: bool) -> None:
     """Write sines and cosines of angles of any size: the large ones, if there are any, one by one."""
     sincos(room, x)
     if large:
-        for i in range(LANES):
-            if abs(room[x, i]) > LARGEST_REDUCED:
-                room[x + 1, i], room[x + 2, i] = math.sin(room[x, i]), math.cos(room[x, i])
+        angles, sines, cosines = at(x), at(x + 1), at(x + 2)
+        for i in range(WIDE):
+            angle = room[angles + i]
+            if abs(angle) > LARGEST_REDUCED:
+                room[sines + i], room[cosines + i] = math.sin(angle), math.cos(angle)
 
 
 @compiled
 def follow(room: Array, place: Array, x: int, to: int) -> None:
     """Follow the frame in twelve rows by a constant placement, (3, 4)."""
+    a0, a1, a2, a3 = place[0]
+    b0, b1, b2, b3 = place[1]
+    c0, c1, c2, c3 = place[2]
     for row in range(0, 12, 4):
-        for m in range(4):
-            a, b, c = place[0, m], place[1, m], place[2, m]
-            if m < 3:
-                for i in range(LANES):
-                    room[to + row + m, i] = a * room[x + row, i] + b * room[x + row + 1, i] + c * room[x + row + 2, i]
-            else:
-                for i in range(LANES):
-                    along = a * room[x + row, i] + b * room[x + row + 1, i] + c * room[x + row + 2, i]
-                    room[to + row + 3, i] = room[x + row + 3, i] + along
+        u, v, w, p = at(x + row), at(x + row + 1), at(x + row + 2), at(x + row + 3)
+        to_u, to_v, to_w, to_p = at(to + row), at(to + row + 1), at(to + row + 2), at(to + row + 3)
+        for i in range(WIDE):
+            a, b, c, d = room[u + i], room[v + i], room[w + i], room[p + i]
+            room[to_u + i] = a0 * a + b0 * b + c0 * c
+            room[to_v + i] = a1 * a + b1 * b + c1 * c
+            room[to_w + i] = a2 * a + b2 * b + c2 * c
+            room[to_p + i] = d + (a3 * a + b3 * b + c3 * c)
 
 
 @compiled
-def mix(room: Array, a: float, x: int, b: float, y: int, c: float, z: int, to: int) -> None:
-    """Write the sum of three rows, each times a number."""
-    for i in range(LANES):
-        room[to, i] = a * room[x, i] + b * room[y, i] + c * room[z, i]
+def turn_and_follow(room: Array, a: int, b: int, joint: int, place: Array, x: int, to: int) -> None:
+    """Turn column a of the frame in twelve rows towards column b, and follow it by a constant placement, (3, 4).
 
-
-@compiled
-def move(room: Array, arm: Arm, k: int, joint: int, frame: int, work: int, to: int) -> None:
-    """Move the frame as the joint behind it does: position, sine and cosine are the rows from ``joint``."""
-    a, b, source = arm.turns[k, 0], arm.turns[k, 1], frame
-    if arm.kinds[k] == SLIDES:
-        x, y, z = arm.axes[k]
-        for row in range(0, 12, 4):
-            for i in range(LANES):
-                room[to + row, i] = room[frame + row, i]
-                room[to + row + 1, i] = room[frame + row + 1, i]
-                room[to + row + 2, i] = room[frame + row + 2, i]
-            for i in range(LANES):
-                along = x * room[frame + row, i] + y * room[frame + row + 1, i] + z * room[frame + row + 2, i]
-                room[to + row + 3, i] = room[frame + row + 3, i] + along * room[joint, i]
-        return
-    if arm.kinds[k] == TURNS_ALIGNED:
-        follow(room, arm.aligned[k], frame, work)
-        source = work
+    Sine and cosine are the second and third row from ``joint``.
+    """
+    c = 3 - a - b
+    a0, a1, a2, a3 = place[a]
+    b0, b1, b2, b3 = place[b]
+    c0, c1, c2, c3 = place[c]
+    sines, cosines = at(joint + 1), at(joint + 2)
     for row in range(0, 12, 4):
-        for i in range(LANES):
-            sine, cosine = room[joint + 1, i], room[joint + 2, i]
-            room[to + row + a, i] = cosine * room[source + row + a, i] + sine * room[source + row + b, i]
-        for i in range(LANES):
-            sine, cosine = room[joint + 1, i], room[joint + 2, i]
-            room[to + row + b, i] = cosine * room[source + row + b, i] - sine * room[source + row + a, i]
-        for i in range(LANES):
-            room[to + row + 3 - a - b, i] = room[source + row + 3 - a - b, i]
-        for i in range(LANES):
-            room[to + row + 3, i] = room[source + row + 3, i]
+        u, v, w, p = at(x + row + a), at(x + row + b), at(x + row + c), at(x + row + 3)
+        to_u, to_v, to_w, to_p = at(to + row), at(to + row + 1), at(to + row + 2), at(to + row + 3)
+        for i in range(WIDE):
+            sine, cosine = room[sines + i], room[cosines + i]
+            first = cosine * room[u + i] + sine * room[v + i]
+            second = cosine * room[v + i] - sine * room[u + i]
+            third, along = room[w + i], room[p + i]
+            room[to_u + i] = a0 * first + b0 * second + c0 * third
+            room[to_v + i] = a1 * first + b1 * second + c1 * third
+            room[to_w + i] = a2 * first + b2 * second + c2 * third
+            room[to_p + i] = along + (a3 * first + b3 * second + c3 * third)
 
 
 @compiled
-def load(room: Array, arm: Arm, j: int, q: Array, start: int, to: int) -> bool:
+def slide(room: Array, axis: Array, joint: int, x: int, to: int) -> None:
+    """Move the frame in twelve rows along an axis of its own by the position in a row."""
+    (ax, ay, az), moved = axis, at(joint)
+    for row in range(0, 12, 4):
+        u, v, w, p = at(x + row), at(x + row + 1), at(x + row + 2), at(x + row + 3)
+        to_u, to_v, to_w, to_p = at(to + row), at(to + row + 1), at(to + row + 2), at(to + row + 3)
+        for i in range(WIDE):
+            a, b, c, d = room[u + i], room[v + i], room[w + i], room[p + i]
+            room[to_u + i], room[to_v + i], room[to_w + i] = a, b, c
+            room[to_p + i] = d + (ax * a + ay * b + az * c) * room[moved + i]
+
+
+@compiled
+def load(room: Array, arm: Arm, j: int, q: Array, start: np.uint64, to: int) -> bool:
     """Write the positions of a movable joint; return whether one is too large for the short reduction."""
-    lead, factor, offset, large = arm.lead[j], arm.factor[j], arm.offset[j], False
-    for i in range(LANES):
+    lead, factor, offset, large, here = arm.lead[j], arm.factor[j], arm.offset[j], False, at(to)
+    for i in range(WIDE):
         position = offset
         if lead >= 0:
             position += factor * q[start + i, lead]
         large |= abs(position) > LARGEST_REDUCED
-        room[to, i] = position
+        room[here + i] = position
     return large
 
 
 @compiled
-def walk(room: Array, arm: Arm, kept: int, q: Array, start: int) -> None:
-    """Write the frames of a block, twelve rows each: of the last elements before their motion, and of the tool."""
-    elements = len(arm.kinds)
-    here = 12 * (kept + 1)
-    aligned, joint, came = here + 12, here + 24, 0
-    for k in range(elements):
-        if k == 0:
-            for row in range(12):
-                room[row, :] = arm.place[0, row // 4, row % 4]
-        else:
-            follow(room, arm.place[k], came, 12 * (k % kept))
-        came = 12 * (k % kept)
-        if arm.joint[k] >= 0:
-            large = load(room, arm, arm.joint[k], q, start, joint)
-            if arm.kinds[k] != SLIDES:
-                turn(room, joint, large)
-            move(room, arm, k, joint, came, aligned, here)
-            came = here
-    if arm.kinds[elements - 1] == TURNS_ALIGNED:
-        follow(room, arm.back, here, 12 * kept)
-    else:
-        for row in range(12):
-            for i in range(LANES):
-                room[12 * kept + row, i] = room[came + row, i]
+def frame_of(k: int, kept: int) -> int:
+    """Where the frame of an element is, before its motion; where few are kept it takes the place of an older one."""
+    return 12 * (k if k < kept else kept - 2 + (k - kept) % 2)
 
 
 @compiled
-def new_room(kept: int) -> Array:
-    """Memory for that many frames of a block, the tool's and the walk's, and behind them for twelve more rows."""
-    return np.empty((12 * (kept + 3) + 3 + 12, LANES))
+def still(arm: Arm) -> int:
+    """Return how many elements come before the first joint that moves."""
+    k = 0
+    while k < len(arm.kinds) - 1 and arm.joint[k] < 0:
+        k += 1
+    return k
 
 
 @compiled
-def begin(start: int, stop: int, number: int) -> int:
+def new_room(arm: Arm, kept: int, more: int) -> Array:
+    """Return memory for the frames of a block, for the walk, and behind them for some more rows.
+
+    The frames of the first elements, which do not move, are in it.
+    """
+    room = np.empty((12 * kept + 27 + more) * LANES)
+    for row in range(12):
+        room[at(row) : at(row + 1)] = arm.place[0, row // 4, row % 4]
+    for k in range(still(arm)):
+        follow(room, arm.place[k + 1], frame_of(k, kept), frame_of(k + 1, kept))
+    return room
+
+
+@compiled
+def walk(room: Array, arm: Arm, kept: int, q: Array, start: np.uint64) -> int:
+    """Write the frames of a block, twelve rows each, before their elements move; return where the tool's is."""
+    elements, joint = len(arm.kinds), 12 * kept
+    aligned, slid = joint + 3, joint + 15
+    for k in range(still(arm), elements):
+        here, to = frame_of(k, kept), frame_of(k + 1, kept)
+        last = k == elements - 1
+        place = arm.back if last else arm.place[k + 1]
+        if arm.joint[k] < 0 and last:
+            return int(here)
+        if arm.joint[k] < 0:
+            follow(room, place, here, to)
+            continue
+        large = load(room, arm, arm.joint[k], q, start, joint)
+        if arm.kinds[k] == SLIDES:
+            slide(room, arm.axes[k], joint, here, slid)
+            follow(room, place, slid, to)
+            continue
+        turn(room, joint, large)
+        if arm.kinds[k] == TURNS_ALIGNED:
+            follow(room, arm.aligned[k], here, aligned)
+            here = aligned
+        turn_and_follow(room, arm.turns[k, 0], arm.turns[k, 1], joint, place, here, to)
+    return int(frame_of(elements, kept))
+
+
+@compiled
+def begin(start: int, stop: int, number: int) -> np.uint64:
     """Where a block begins: the last one ends with the rows, and works on some of them once more."""
-    return min(start + number * LANES, stop - LANES)
+    return np.uint64(max(min(start + number * LANES, stop - LANES), 0))
 
 
 @compiled
-def give(room: Array, x: int, out: Array, row: int, start: int) -> None:
+def give(room: Array, x: int, out: Array, row: int, start: np.uint64) -> None:
     """Hand a row over to the results."""
-    for i in range(LANES):
-        out[row, start + i] = room[x, i]
+    given = at(x)
+    for i in range(WIDE):
+        out[row, start + i] = room[given + i]
 
 
 @compiled
-def give_zeros(out: Array, row: int, start: int) -> None:
+def give_zeros(out: Array, row: int, start: np.uint64) -> None:
     """Write zeros to the results."""
-    for i in range(LANES):
+    for i in range(WIDE):
         out[row, start + i] = 0.0
 
 
 @compiled
-def give_cross(room: Array, a: int, b: int, c: int, d: int, out: Array, row: int, start: int) -> None:
+def give_cross(room: Array, a: int, b: int, c: int, d: int, out: Array, row: int, start: np.uint64) -> None:
     """Hand one component of a cross product over to the results."""
-    for i in range(LANES):
-        out[row, start + i] = room[a, i] * room[b, i] - room[c, i] * room[d, i]
+    u, v, w, p = at(a), at(b), at(c), at(d)
+    for i in range(WIDE):
+        out[row, start + i] = room[u + i] * room[v + i] - room[w + i] * room[p + i]
 
 
 @compiled
-def add(room: Array, x: int, out: Array, row: int, start: int) -> None:
-    """Add a row to the results."""
-    for i in range(LANES):
-        out[row, start + i] += room[x, i]
-
-
-@compiled
-def add_cross(room: Array, a: int, b: int, c: int, d: int, out: Array, row: int, start: int) -> None:
-    """Add one component of a cross product to the results."""
-    for i in range(LANES):
-        out[row, start + i] += room[a, i] * room[b, i] - room[c, i] * room[d, i]
+def add(room: Array, x: int, factor: float, out: Array, row: int, start: np.uint64) -> None:
+    """Add a row times a factor to the results."""
+    given = at(x)
+    for i in range(WIDE):
+        out[row, start + i] += factor * room[given + i]
 
 
 @compiled
 def poses(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
     """Write the poses of the tool, (16, N), of rows from ``start`` to ``stop``, at least ``LANES`` of them."""
-    room = new_room(2)  # no frame is looked at again but the last
+    kept = still(arm) + 3  # no frame is looked at again but those that stay, and the last
+    room = new_room(arm, kept, 0)
     for number in range((stop - start + LANES - 1) // LANES):
-        at = begin(start, stop, number)
-        walk(room, arm, 2, q, at)
+        here = begin(start, stop, number)
+        tool = walk(room, arm, kept, q, here)
         for row in range(12):
-            give(room, 24 + row, out, row, at)
+            give(room, tool + row, out, row, here)
         for row in range(12, 15):
-            give_zeros(out, row, at)
-        for i in range(LANES):
-            out[15, at + i] = 1.0
+            give_zeros(out, row, here)
+        for i in range(WIDE):
+            out[15, here + i] = 1.0
 
 
 @compiled
-def target(room: Array, arm: Arm, to: int) -> None:
+def target(room: Array, arm: Arm, tool: int, to: int) -> None:
     """Write where the point of the tool is."""
-    tool, (x, y, z) = 12 * len(arm.kinds), arm.point
+    x, y, z = arm.point
     for m in range(3):
-        row = tool + 4 * m
-        for i in range(LANES):
-            room[to + m, i] = room[row + 3, i] + x * room[row, i] + y * room[row + 1, i] + z * room[row + 2, i]
+        row, here = tool + 4 * m, at(to + m)
+        u, v, w, p = at(row), at(row + 1), at(row + 2), at(row + 3)
+        for i in range(WIDE):
+            room[here + i] = room[p + i] + (x * room[u + i] + y * room[v + i] + z * room[w + i])
 
 
 @compiled
-def axis_of(room: Array, arm: Arm, k: int, factor: float, to: int) -> None:
-    """Write the axis of a joint in root axes, times a factor."""
+def axis_of(room: Array, arm: Arm, k: int, to: int) -> tuple[int, int, float]:
+    """Return where the axis of a joint is in root axes, how far its components are apart, and what each is times.
+
+    Where a joint turns about an axis of its frame it is a column of that; else it is written.
+    """
+    if arm.kinds[k] == TURNS:
+        a, b = arm.turns[k]
+        return 12 * k + 3 - a - b, 4, 1.0 if (b - a) % 3 == 1 else -1.0
     x, y, z = arm.axes[k]
     for m in range(3):
-        row = 12 * k + 4 * m
-        mix(room, factor * x, row, factor * y, row + 1, factor * z, row + 2, to + m)
+        row, here = 12 * k + 4 * m, at(to + m)
+        u, v, w = at(row), at(row + 1), at(row + 2)
+        for i in range(WIDE):
+            room[here + i] = x * room[u + i] + y * room[v + i] + z * room[w + i]
+    return to, 1, 1.0
 
 
 @compiled
-def lever_of(room: Array, k: int, point: int, mass: float, to: int) -> None:
-    """Write a point, or a moment of some mass, seen from the origin of an element."""
-    for m in range(3):
-        for i in range(LANES):
-            room[to + m, i] = room[point + m, i] - mass * room[12 * k + 4 * m + 3, i]
+def add_twist(
+    room: Array, m: int, axis: int, step: int, factor: float, k: int, point: int, out: Array, row: int, start: np.uint64
+) -> None:
+    """Add to the results how a turn about the axis at the origin of an element moves a point, one component of it."""
+    a, b = (m + 1) % 3, (m + 2) % 3
+    u, v, x, y = at(axis + step * a), at(axis + step * b), at(point + a), at(point + b)
+    p, q = at(12 * k + 4 * a + 3), at(12 * k + 4 * b + 3)
+    for i in range(WIDE):
+        moved = room[u + i] * (room[y + i] - room[q + i]) - room[v + i] * (room[x + i] - room[p + i])
+        out[row, start + i] += factor * moved
 
 
 @compiled
 def jacobians(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
-    """Write the Jacobians at the point, (6 n, N): the first joint that follows a driving one writes, others add."""
-    room, n = new_room(len(arm.kinds)), q.shape[1]
-    point = len(room) - 12
-    lever, axis = point + 3, point + 6
+    """Write the Jacobians at the point, (6 n, N): the first joint that follows a driving one clears what was there."""
+    n, kept = q.shape[1], len(arm.kinds) + 1
+    room = new_room(arm, kept, 6)
+    point = 12 * kept + 27
     for number in range((stop - start + LANES - 1) // LANES):
-        at = begin(start, stop, number)
-        walk(room, arm, len(arm.kinds), q, at)
-        target(room, arm, point)
+        here = begin(start, stop, number)
+        target(room, arm, walk(room, arm, kept, q, here), point)
         for j, k in enumerate(arm.movable):
-            lead, first, slides = arm.lead[j], arm.first[j], arm.kinds[k] == SLIDES
-            if lead < 0:
+            if arm.lead[j] < 0:
                 continue
-            axis_of(room, arm, k, arm.factor[j], axis)
-            lever_of(room, k, point, 1.0, lever)
+            axis, step, sign = axis_of(room, arm, k, point + 3)
+            factor = sign * arm.factor[j]
             for m in range(3):
-                a, b, linear, angular = (m + 1) % 3, (m + 2) % 3, m * n + lead, (3 + m) * n + lead
-                if first and slides:
-                    give(room, axis + m, out, linear, at)
-                    give_zeros(out, angular, at)
-                elif first:
-                    give_cross(room, axis + a, lever + b, axis + b, lever + a, out, linear, at)
-                    give(room, axis + m, out, angular, at)
-                elif slides:
-                    add(room, axis + m, out, linear, at)
+                linear, angular = m * n + arm.lead[j], (3 + m) * n + arm.lead[j]
+                if arm.first[j]:
+                    give_zeros(out, linear, here)
+                    give_zeros(out, angular, here)
+                if arm.kinds[k] == SLIDES:
+                    add(room, axis + m * step, factor, out, linear, here)
                 else:
-                    add_cross(room, axis + a, lever + b, axis + b, lever + a, out, linear, at)
-                    add(room, axis + m, out, angular, at)
+                    add_twist(room, m, axis, step, factor, k, point, out, linear, here)
+                    add(room, axis + m * step, factor, out, angular, here)
+
+
+@compiled
+def lever_of(room: Array, k: int, point: int, to: int) -> None:
+    """Write a point seen from the origin of an element."""
+    for m in range(3):
+        origin, end, here = at(12 * k + 4 * m + 3), at(point + m), at(to + m)
+        for i in range(WIDE):
+            room[here + i] = room[end + i] - room[origin + i]
 
 
 @compiled
 def placements(arm: Arm, q: Array, start: int, stop: int, out: Array) -> None:
     """Write the sensitivities of the point to every placement, (36 S, N)."""
-    room, segments = new_room(len(arm.kinds)), len(arm.placed)
-    point = len(room) - 12
-    lever = point + 3
+    segments, kept = len(arm.placed), len(arm.kinds) + 1
+    room = new_room(arm, kept, 6)
+    point, lever = 12 * kept + 27, 12 * kept + 30
     for number in range((stop - start + LANES - 1) // LANES):
-        at = begin(start, stop, number)
-        walk(room, arm, len(arm.kinds), q, at)
-        target(room, arm, point)
+        here = begin(start, stop, number)
+        target(room, arm, walk(room, arm, kept, q, here), point)
         for s, k in enumerate(arm.placed):
-            lever_of(room, k, point, 1.0, lever)
+            lever_of(room, k, point, lever)
             for m in range(3):
                 a, b = (m + 1) % 3, (m + 2) % 3
                 linear, angular = 6 * (m * segments + s), 6 * ((3 + m) * segments + s)
                 for c in range(3):
                     row, x, y = 12 * k + 4 * m + c, 12 * k + 4 * a + c, 12 * k + 4 * b + c
-                    give(room, row, out, linear + c, at)
-                    give_cross(room, x, lever + b, y, lever + a, out, linear + 3 + c, at)
-                    give_zeros(out, angular + c, at)
-                    give(room, row, out, angular + 3 + c, at)
+                    give(room, row, out, linear + c, here)
+                    give_cross(room, x, lever + b, y, lever + a, out, linear + 3 + c, here)
+                    give_zeros(out, angular + c, here)
+                    give(room, row, out, angular + 3 + c, here)
 
 
 @compiled
@@ -299,47 +350,51 @@ def weigh(room: Array, arm: Arm, j: int, moment: int) -> None:
     """Add the first moment of the bodies behind a movable joint."""
     weight, (x, y, z) = arm.masses[j], arm.centres[j]
     for m in range(3):
-        row = 12 * (arm.movable[j] + 1) + 4 * m
-        for i in range(LANES):
-            centre = room[row + 3, i] + x * room[row, i] + y * room[row + 1, i] + z * room[row + 2, i]
-            room[moment + m, i] += weight * centre
+        row, here = 12 * (arm.movable[j] + 1) + 4 * m, at(moment + m)
+        u, v, w, p = at(row), at(row + 1), at(row + 2), at(row + 3)
+        for i in range(WIDE):
+            room[here + i] += weight * (room[p + i] + (x * room[u + i] + y * room[v + i] + z * room[w + i]))
 
 
 @compiled
-def hold(room: Array, axis: int, lever: int, pull: Array, to: int) -> None:
-    """Write axis · (pull × lever)."""
-    x, y, z = pull
-    for i in range(LANES):
-        a, b, c = room[lever, i], room[lever + 1, i], room[lever + 2, i]
-        torque = room[axis, i] * (y * c - z * b) + room[axis + 1, i] * (z * a - x * c)
-        room[to, i] = torque + room[axis + 2, i] * (x * b - y * a)
+def add_torque(
+    room: Array, axis: int, step: int, factor: float, pull: Array, moment: int, mass: float, k: int,
+    out: Array, row: int, start: np.uint64,
+) -> None:  # fmt: skip
+    """Add to the results a factor times axis · (pull × lever), with the lever from the origin of an element."""
+    x, y, z = pull[0] * factor, pull[1] * factor, pull[2] * factor
+    u, v, w = at(axis), at(axis + step), at(axis + 2 * step)
+    along, across, up = at(moment), at(moment + 1), at(moment + 2)
+    o, p, q = at(12 * k + 3), at(12 * k + 7), at(12 * k + 11)
+    for i in range(WIDE):
+        a = room[along + i] - mass * room[o + i]
+        b, c = room[across + i] - mass * room[p + i], room[up + i] - mass * room[q + i]
+        torque = room[u + i] * (y * c - z * b) + room[v + i] * (z * a - x * c)
+        out[row, start + i] += torque + room[w + i] * (x * b - y * a)
 
 
 @compiled
 def gravity(arm: Arm, pull: Array, payload: float, q: Array, start: int, stop: int, out: Array) -> None:
     """Write the torques, (n, N), that hold the arm and a payload at the point."""
-    room = new_room(len(arm.kinds))
-    moment = len(room) - 12
-    lever, axis, torque = moment + 3, moment + 6, moment + 9
+    kept = len(arm.kinds) + 1
+    room = new_room(arm, kept, 6)
+    moment = 12 * kept + 27
     for number in range((stop - start + LANES - 1) // LANES):
-        at = begin(start, stop, number)
-        walk(room, arm, len(arm.kinds), q, at)
-        target(room, arm, moment)
-        for m in range(3):
-            mix(room, payload, moment + m, 0.0, moment + m, 0.0, moment + m, moment + m)
+        here = begin(start, stop, number)
+        target(room, arm, walk(room, arm, kept, q, here), moment)
+        room[moment * LANES : (moment + 3) * LANES] *= payload
         mass = payload
         for j in range(len(arm.movable) - 1, -1, -1):
-            k, mass = arm.movable[j], mass + arm.masses[j]
+            k, row, mass = arm.movable[j], arm.lead[j], mass + arm.masses[j]
             weigh(room, arm, j, moment)
-            if arm.lead[j] < 0:
+            if row < 0:
                 continue
-            axis_of(room, arm, k, arm.factor[j], axis)
+            if arm.last[j]:  # from the tool inwards it is the last that comes first
+                give_zeros(out, row, here)
+            axis, step, sign = axis_of(room, arm, k, moment + 3)
+            factor = sign * arm.factor[j]
             if arm.kinds[k] == SLIDES:
-                mix(room, -mass * pull[0], axis, -mass * pull[1], axis + 1, -mass * pull[2], axis + 2, torque)
+                for m in range(3):
+                    add(room, axis + m * step, -mass * factor * pull[m], out, row, here)
             else:
-                lever_of(room, k, moment, mass, lever)
-                hold(room, axis, lever, pull, torque)
-            if arm.last[j]:  # from the tool inwards it is the last that writes
-                give(room, torque, out, arm.lead[j], at)
-            else:
-                add(room, torque, out, arm.lead[j], at)
+                add_torque(room, axis, step, factor, pull, moment, mass, k, out, row, here)

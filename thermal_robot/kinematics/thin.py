@@ -67,7 +67,7 @@ class _Own:
         self.data = self.model.createData()
         self.moves = np.flatnonzero(np.isin(chain.placed, chain.movable)) if placed else np.arange(len(chain.movable))
         self.pull: Array | None = None
-        self.idle: list[int] = []
+        self.idle = False
 
     def joints(self, q: Array) -> Array:
         """Return positions of all joints of the model."""
@@ -171,15 +171,15 @@ def gravity(robot: Weighted, q: Array, mass: Array, com: Array, out: Array) -> N
         lift = np.empty((len(q), 6, robot.n))
         jacobians(robot, q, com, lift)
         out -= mass[..., None] * (robot.gravity @ lift[:, :3])
-    out[:, own.idle] = 0.0
+    if own.idle:
+        out[:, 0] = 0.0
 
 
-def _turning_about(own: _Own, robot: Weighted) -> list[int]:
-    """Return the first joint if it turns about gravity: it carries nothing, which Pinocchio tells to rounding only."""
+def _turning_about(own: _Own, robot: Weighted) -> bool:
+    """Whether the first joint turns about gravity: it carries nothing, which Pinocchio tells to rounding only."""
     chain = robot.chain
     first = int(chain.movable[0])
     if not own.plain or chain.kinds[first] != REVOLUTE:
-        return []
+        return False
     axis = own.model.jointPlacements[1].rotation @ chain.axes[first]
-    upright = np.linalg.norm(np.cross(axis, robot.gravity)) <= _UPRIGHT * np.linalg.norm(robot.gravity)
-    return [0] if upright else []
+    return bool(np.linalg.norm(np.cross(axis, robot.gravity)) <= _UPRIGHT * np.linalg.norm(robot.gravity))
