@@ -51,3 +51,17 @@ def test_it_is_drawn_against_the_clock(rv_m2, clock, unit):
     found = Drift().driver(observations, Drift().parameters(observations), np.zeros(SAMPLES))
     assert found[:2] == (clock, unit)
     np.testing.assert_array_equal(found[2], values)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.3])
+def test_in_another_campaign_drift_begins_with_that_one_at_the_same_rate(rv_m2, share):
+    first = commanded(rv_m2, {"time": np.linspace(0.0, 1000.0, SAMPLES)})
+    later = commanded(rv_m2, {"time": np.linspace(90_000.0, 90_500.0, SAMPLES)})
+    effect = replace(Drift().variants(observe(first))[0], time_constant=share)
+    there = effect.elsewhere(observe(later))
+    values = [2e-4, -1e-4, 3e-4, 0, 0, 0]
+    gone = tool_with(later, there, values) - tool_with(later, there, np.zeros(6))
+    np.testing.assert_allclose(gone[0], 0.0, atol=1e-14)
+    half = commanded(rv_m2, {"time": np.linspace(0.0, 500.0, SAMPLES)})
+    same = tool_with(half, effect, values) - tool_with(half, effect, np.zeros(6))
+    np.testing.assert_allclose(gone, same, atol=1e-13)

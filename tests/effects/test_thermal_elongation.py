@@ -156,3 +156,15 @@ def test_between_one_for_all_and_one_each_are_small_deviations(rv_m2):
     )
     # from any setting the same ones are compared
     assert setting.variants(seen) == ThermalElongation().variants(seen)
+
+
+def test_in_another_campaign_links_follow_that_ones_record(rv_m2):
+    time = np.linspace(0.0, 5400.0, SAMPLES)
+    first = commanded(rv_m2, {"time": time, "temperature": 20.0 + 9.0 * np.sin(time / 900.0)})
+    second = commanded(rv_m2, {"time": 2.0 * time, "temperature": 15.0 + time / 600.0})
+    assert one_lag(first).elsewhere(observe(second)) == one_lag(second)
+    assert one_lag(first).elsewhere(observe(first)) == one_lag(first)
+    untimed = observe(commanded(rv_m2, {"temperature": second.covariates["temperature"]}))
+    at_once = one_lag(first).elsewhere(untimed)
+    assert at_once == ThermalElongation(common=True)
+    assert at_once.reads(untimed) == ("temperature",)

@@ -56,6 +56,11 @@ class Drift(Effect):
         fitted = replace(self, origin=float(clock.min()), span=float(np.ptp(clock)) or 1.0)
         return tuple(replace(fitted, time_constant=share) for share in (0.0, 0.1, 0.25, 0.6))
 
+    def elsewhere(self, observations: Observations) -> Drift:
+        """Return it as it begins with that campaign, at the same rate."""
+        clock = observations.clock
+        return self if clock is None else replace(self, origin=float(clock.min()))
+
     def nearby(self, factor: float) -> tuple[Effect, ...]:
         """Time constants longer and shorter by a factor; beside the linear law, long ones."""
         shares = (0.0, 1.0, 2.0) if self.time_constant == 0.0 else (1.0, factor, 1.0 / factor)

@@ -338,6 +338,10 @@ class Effect(ABC):
         """Return the effect as a model holds it that predicts other rows; it does the same in these."""
         return self
 
+    def elsewhere(self, observations: Observations) -> Effect:
+        """Return the effect as it is in another campaign of the robot, with that one's record in place of its own."""
+        return self
+
     def fading(self, observations: Observations) -> Array | None:
         """Return (N,) what part of the effect its responses hold; ``None`` where they hold all of it.
 

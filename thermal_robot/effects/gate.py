@@ -200,6 +200,17 @@ def delivered(effect: Effect, observations: Observations) -> Effect:
     return _settings(effect, "delivered", (_asked(effect, "delivered", observations),))[0]
 
 
+def elsewhere(effect: Effect, observations: Observations) -> Effect:
+    """Return an effect as it is in another campaign (:meth:`Effect.elsewhere`).
+
+    Raises
+    ------
+    EffectError
+        If it is no effect of this one's name.
+    """
+    return _settings(effect, "elsewhere", (_asked(effect, "elsewhere", observations),))[0]
+
+
 def fading(effect: Effect, observations: Observations) -> Array | None:
     """Return (N,) what part of an effect its responses hold, ``None`` for all (:meth:`Effect.fading`).
 

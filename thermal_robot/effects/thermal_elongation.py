@@ -85,13 +85,23 @@ class ThermalElongation(Effect):
         """
         one = replace(self, common=True, spread=0.0, balanced=True)
         plain = (replace(one, common=False), one, replace(one, spread=_SPREAD))
-        # a sensor on each link knows its temperature; where but some have one, nothing says what the rest follow
-        if not observations.varies("time") or _columns(observations) != ("temperature",):
+        if not _follows(observations):
             return plain
+        told = [own._recorded(observations) for own in plain]
+        return (*plain, *(replace(own, lag=lag) for own in told for lag in _LAGS))
+
+    def elsewhere(self, observations: Observations) -> ThermalElongation:
+        """Return it with the temperatures of that campaign; without the lag where nobody recorded when they were."""
+        if not self.lag:
+            return self
+        if not _follows(observations):
+            return replace(self, lag=0.0, times=(), temperatures=(), starts=(), balanced=True)
+        return self._recorded(observations)
+
+    def _recorded(self, observations: Observations) -> ThermalElongation:
         record = History.of(observations.covariates["time"], observations.covariates["temperature"])
         starts = tuple(sorted(began(observations, observations.covariates["time"]).values()))
-        told = [replace(own, times=record.times, temperatures=record.temperatures, starts=starts) for own in plain]
-        return (*plain, *(replace(own, lag=lag) for own in told for lag in _LAGS))
+        return replace(self, times=record.times, temperatures=record.temperatures, starts=starts)
 
     def nearby(self, factor: float) -> tuple[Effect, ...]:
         """Return lags longer and shorter by a factor, of 5 min to 3 h; other ways to share; links out of balance."""
@@ -163,6 +173,11 @@ def _grown(observations: Observations, s: int, strain: Array) -> Response:
     """Return the twist of a segment that is longer by a strain (N,), along its virtual prismatic joint."""
     segment = observations.robot.segments[s]
     return at_segment(s, strain[:, None] * np.concatenate([segment.direction, np.zeros(3)]) * segment.length)
+
+
+def _follows(observations: Observations) -> bool:
+    """Whether links may follow the record: a sensor on each knows its temperature, of some alone nothing follows."""
+    return observations.varies("time") and _columns(observations) == ("temperature",)
 
 
 def _columns(observations: Observations) -> tuple[str, ...]:

@@ -95,20 +95,23 @@ def _names(effect: Effect, diagnosis: Diagnosis | Known, fit: Fit | Known) -> bo
 
 
 def _settings(fits: Sequence[Fit | Known], names: Sequence[str]) -> Iterator[tuple[str, Effect]]:
-    """Yield each effect once, by its name, in all its places and in the setting that the surest fit has."""
-    known: dict[str, tuple[float, Effect]] = {}
+    """Yield each effect once, by its name, in all its places and in the setting that the surest fit has.
+
+    A setting that reads more, such as a clock, goes before one that a campaign without it had to do with.
+    """
+    known: dict[str, tuple[tuple[int, float], Effect]] = {}
     for fit in fits:
         for effect, _ in fit.effects:
-            odds = fit.odds(effect.name)
-            if not isinstance(effect, Discovered) and odds > known.get(effect.name, (-1.0, effect))[0]:
-                known[effect.name] = odds, effect
+            sure = len(gate.reads(effect, fit.corrected)), fit.odds(effect.name)
+            if not isinstance(effect, Discovered) and sure > known.get(effect.name, ((-1, 0.0), effect))[0]:
+                known[effect.name] = sure, effect
     for fit in fits:
         for name, variants in fit.variants.items():
             first = variants[0] if variants else None
             if first is None or name in known or isinstance(first, Discovered):
                 continue
             if first.told_inside or fit.probability(name) >= compare_settings.MAY_BE:
-                known[name] = 0.0, first
+                known[name] = (0, 0.0), first
     yield from ((name, replace(effect, places=(), excluded=())) for name, (_, effect) in known.items())
     for fit, campaign in zip(fits, names, strict=True):
         yield from ((f"{e.name} of {campaign}", e) for e, _ in fit.effects if isinstance(e, Discovered))
@@ -118,6 +121,7 @@ def _parameters(effect: Effect, fit: Fit | Known) -> tuple[Parameter, ...]:
     """Return an effect's parameters in a campaign, as they are told; empty where the campaign lacks what it needs."""
     observations = fit.corrected
     try:
+        effect = _there(effect, fit)
         if gate.missing(effect, observations):
             return ()
         return gate.independent(effect, observations) or gate.checked(effect, observations)
@@ -127,7 +131,12 @@ def _parameters(effect: Effect, fit: Fit | Known) -> tuple[Parameter, ...]:
         return ()  # a law of what only another campaign recorded
 
 
+def _there(effect: Effect, fit: Fit | Known) -> Effect:
+    """Return an effect as it is in a campaign; a model has no record to take anything from."""
+    return gate.elsewhere(effect, fit.corrected) if isinstance(fit, Fit) else effect
+
+
 def _sizes(effect: Effect, fit: Fit | Known, told: Sequence[Parameter]) -> Array:
-    own = block(fit.corrected, effect)
+    own = block(fit.corrected, _there(effect, fit))
     alike = [p.name for p in own.bare] == [p.name for p in told]
     return own.sizes if alike else np.array([p.size for p in told])
