@@ -22,7 +22,7 @@ sys.path.insert(0, str(TESTS))
 from benchmarks import machine, page  # noqa: E402
 from benchmarks.timing import FULL, QUICK, TINY, busy  # noqa: E402
 
-PARTS = ("kinematics", "calibration", "mixed", "probability", "workspace", "diagnosis")
+PARTS = ("kinematics", "calibration", "mixed", "probability", "workspace", "diagnosis", "installed")
 
 
 def main(arguments=None):
