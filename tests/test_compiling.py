@@ -1,8 +1,10 @@
 """Who runs compiled loops: every row once, in as many threads as are set; a module that cannot be loaded is told."""
 
 import os
+import subprocess
 import sys
 import threading
+import time
 
 import numpy as np
 import pytest
@@ -43,6 +45,46 @@ def test_what_goes_wrong_in_a_thread_is_raised(monkeypatch):
 
     with pytest.raises(ArithmeticError):
         compiling.in_pieces(kernel, (), 100, ())
+
+
+def test_nothing_is_written_any_more_once_an_error_is_raised(monkeypatch):
+    monkeypatch.setattr(compiling, "THREADS", 3)
+    monkeypatch.setattr(compiling, "PIECE", 10)
+    busy = threading.Event()
+
+    def kernel(start, stop, out):
+        if start == 0:
+            busy.wait(10.0)
+            raise ArithmeticError
+        busy.set()
+        time.sleep(0.05)
+        out[start:stop] = 1.0
+
+    out = np.zeros(90)
+    with pytest.raises(ArithmeticError):
+        compiling.in_pieces(kernel, (), 90, (out,))
+    left = out.copy()
+    time.sleep(0.2)
+    np.testing.assert_array_equal(out, left)
+
+
+@pytest.mark.skipif(not hasattr(os, "fork"), reason="processes are not forked here")
+def test_a_forked_process_has_threads_of_its_own():
+    code = """
+import os, numpy as np
+from thermal_robot import compiling
+compiling.THREADS, compiling.PIECE = 2, 10
+def kernel(start, stop, out): out[start:stop] = 1.0
+def done():
+    out = np.zeros(100)
+    compiling.in_pieces(kernel, (), 100, (out,))
+    return int(out.sum())
+first, child = done(), os.fork()
+if not child: os._exit(done())
+print(first, os.waitstatus_to_exitcode(os.waitpid(child, 0)[1]))
+"""
+    found = subprocess.run([sys.executable, "-W", "ignore", "-c", code], capture_output=True, text=True, timeout=120)
+    assert found.stdout == "100 100\n", found.stderr
 
 
 def test_a_full_disk_is_no_reason_to_stop(monkeypatch):

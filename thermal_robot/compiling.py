@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import warnings
 from collections.abc import Callable, Set
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ThreadPoolExecutor, wait
 from functools import cache
 from importlib import import_module
 from importlib.util import find_spec
@@ -79,8 +79,15 @@ def in_pieces(kernel: Callable[..., None], constants: tuple[Any, ...], rows: int
     if workers < 2:
         for piece in range(count):
             work(piece)
-    else:
-        list(_pool(workers).map(work, range(count)))
+        return
+    promised = [_pool(workers).submit(work, piece) for piece in range(count)]
+    try:
+        for one in promised:
+            one.result()
+    finally:  # what was interrupted writes no more when the caller goes on
+        for one in promised:
+            one.cancel()
+        wait(promised)
 
 
 @cache

@@ -210,6 +210,8 @@ ASK = {
     "nearby": lambda effect, seen: gate.nearby(effect, 1.6),
     "at": lambda effect, seen: gate.at(effect, "joint_2", seen),
     "in_full": lambda effect, seen: gate.in_full(effect),
+    "delivered": lambda effect, seen: gate.delivered(effect, seen),
+    "elsewhere": lambda effect, seen: gate.elsewhere(effect, seen),
     "driver": lambda effect, seen: driver(effect, seen, (GOOD,), np.zeros(SAMPLES)),
     "arguments": lambda effect, seen: gate.arguments(effect),
 }
@@ -252,6 +254,8 @@ def test_whatever_an_effect_raises_names_it_and_what_was_asked(observations, mem
         ("at", (), r"at answers \(\)"),
         ("in_full", (), r"in_full answers \(\)"),
         ("in_full", JointOffset(), "in_full answers JointOffset.*, expected None or an effect named 'mine'"),
+        ("delivered", None, r"delivered answers \(None,\), expected a tuple of effects named 'mine'"),
+        ("elsewhere", JointOffset(), "elsewhere answers .*JointOffset"),
         ("arguments", None, "arguments answers None, expected numbers, texts and tuples of them by name"),
         ("arguments", {"share": np.ones(2)}, "arguments answers {'share': array"),
         ("arguments", {1: 2.0}, "arguments answers {1: 2.0}"),
