@@ -2,31 +2,11 @@
 
 import numpy as np
 import pytest
+from compared import JOINTS, listed, said
 
-from thermal_robot.effects import library
-from thermal_robot.effects.effect import Parameter
-from thermal_robot.fleet.compare_effects import Candidate
-from thermal_robot.fleet.compare_joint import joint, some_of
-from thermal_robot.fleet.compare_sums import Sums
+from thermal_robot.fleet.compare_joint import joint
+from thermal_robot.fleet.compare_problem import some_of
 from thermal_robot.inference.algebra import solve
-
-JOINTS = ("one", "two", "three", "four")
-
-
-def listed(campaigns):
-    """One effect with a parameter in each of four joints, of unit size."""
-    told = tuple(Parameter("size", "rad", 1.0, "joint", name, ()) for name in JOINTS)
-    effect = library()["joint_offset"]
-    return [Candidate("own", "own", effect, told, np.ones(4), (told,) * campaigns, (True,) * campaigns)]
-
-
-def said(truths, rng, rows=60):
-    """What campaigns with these parameters say, noise one."""
-    result = []
-    for truth in truths:
-        columns = rng.normal(size=(rows, 4)) * 4.0
-        result.append(Sums(columns.T @ columns, columns.T @ (columns @ truth + rng.normal(size=rows))))
-    return result
 
 
 def fitted(truths, rng):

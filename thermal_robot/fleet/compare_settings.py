@@ -19,6 +19,9 @@ FALSE_CHANGE = 0.02
 FEW = 5
 """Campaigns up to which every set of them may differ from the others (30 sets of five); of more, each alone, and those
 before or after any moment."""
+AT_ONCE = 500
+"""Parts that are weighed together, each beside all others, and to first order at a time: a search over so many takes
+seconds and a hundred megabytes; four campaigns of a real robot have 2800."""
 AGREE = 0.5
 """Part of the larger of two sizes by which they may differ and still be one effect that changed, not two names for
 something else: wear and re-adjustment move a size by a part of it, a wrong name takes any size."""

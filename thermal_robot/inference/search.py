@@ -142,9 +142,7 @@ class Search:
 
         Two effects that stand in for two others are told only so: with one of them exchanged there is little to choose.
         """
-        near = [c for c in self.seen.values() if c.exact and self._near(c, best) and c.blocks != best.blocks]
-        near = [c for c in near if len(c.blocks) == len(best.blocks)]
-        for tie in sorted(near, key=lambda c: -c.log_evidence)[: settings.TIES]:
+        for tie in self.ties(best)[1:]:
             if tie.blocks in self._expanded:
                 continue
             self._expanded.add(tie.blocks)
@@ -152,6 +150,12 @@ class Search:
             if found.log_evidence > best.log_evidence + settings.BETTER:
                 return found
         return None
+
+    def ties(self, best: Combination) -> list[Combination]:
+        """Return the best combination, and those of as many blocks that are nearly as probable, the nearest first."""
+        near = [c for c in self.seen.values() if c.exact and self._near(c, best) and c.blocks != best.blocks]
+        near = [c for c in near if len(c.blocks) == len(best.blocks)]
+        return [best, *sorted(near, key=lambda c: -c.log_evidence)[: settings.TIES]]
 
     def weigh(self, blocks: Sequence[int]) -> Combination:
         """Weigh every neighbour of a combination; return the best of them and it."""
