@@ -75,7 +75,7 @@ def triple(seed):
     arm, rng = ARMS[seed % len(ARMS)], np.random.default_rng([18, seed])
     robot, cause = tr.load_robot(*arm), CAUSES[seed % len(CAUSES)]
     offsets = rng.normal(0.0, SIZES["joint_offset"], robot.n)
-    poor = tr.simulate(robot, {cause: 0.0}, rows=ROWS, conditions={"payload": 3.0})
+    poor = tr.simulate(robot, rows=ROWS, conditions={"payload": 3.0})
     sizes = _sizes(robot, cause, poor, rng)
     found = []
     for k, factor in enumerate(rng.permutation(UNLIKE)):
