@@ -33,26 +33,18 @@ _CONSTANT: WeakKeyDictionary[Robot, dict[Effect, tuple[Parameter, ...]]] = WeakK
 def checked(effect: Effect, observations: Observations) -> tuple[Parameter, ...]:
     """Return the parameters of an effect, once they are seen to keep the contract.
 
-    Parameters
-    ----------
-    effect
-        The effect, its arguments set.
-    observations
-        N rows that its responses are read from.
-
     Returns
     -------
     tuple of Parameter
-        Each with a name of its own, a known kind of place, a place of that kind that the robot has (or none), a
-        positive size, and responses of finite values in a channel and at an index that the robot has, of that
-        channel's shape (see :class:`Response`). Where the effect names ``places``, only those there; none in places
-        that are ``excluded``.
+        Read from the N rows of the observations, each with a name of its own, a known kind of place, a place of that
+        kind that the robot has (or none), a positive size, and responses of finite values in a channel and at an index
+        that the robot has, of that channel's shape (see :class:`Response`). Where the effect names ``places``, only
+        those there; none in places that are ``excluded``.
 
     Raises
     ------
     EffectError
-        Otherwise, or if the effect raises anything; names the effect, the parameter, what was found and what was
-        expected.
+        Otherwise, or if the effect raises anything: the effect, the parameter, what was found and what was expected.
     """
     if not _is_what_it_holds(effect):
         return _kept(effect, _parameters(effect, observations), observations.robot)
@@ -201,13 +193,7 @@ def delivered(effect: Effect, observations: Observations) -> Effect:
 
 
 def elsewhere(effect: Effect, observations: Observations) -> Effect:
-    """Return an effect as it is in another campaign (:meth:`Effect.elsewhere`).
-
-    Raises
-    ------
-    EffectError
-        If it is no effect of this one's name.
-    """
+    """Return an effect as it is in another campaign (:meth:`Effect.elsewhere`); raises as :func:`delivered`."""
     return _settings(effect, "elsewhere", (_asked(effect, "elsewhere", observations),))[0]
 
 
