@@ -5,11 +5,12 @@ from functools import cache
 import numpy as np
 
 import thermal_robot as tr
-from thermal_robot.effects import library
+from thermal_robot.effects import ThermalElongation, library
 from thermal_robot.effects.effect import Parameter
 from thermal_robot.fleet.compare_effects import Candidate
 from thermal_robot.fleet.compare_sums import Sums
 from thermal_robot.kinematics import exp6
+from thermal_robot.observations import observe
 
 ONLY = ("joint_offset", "joint_gain")
 OFFSETS = (1e-3, 8e-4, -1.2e-3, 5e-4, 3e-4)
@@ -56,3 +57,17 @@ def said(truths, rng, rows=60):
         columns = rng.normal(size=(rows, 4)) * 4.0
         result.append(Sums(columns.T @ columns, columns.T @ (columns @ truth + rng.normal(size=rows))))
     return result
+
+
+def lagging_days(strain=2e-5):
+    """Three campaigns of links that follow the air with 1500 s: it jumps, it falls, and nobody read the clock."""
+    robot, minutes = tr.load_robot("builtin:rv_m2", "tool0"), 60.0 * np.arange(60)
+    jump, fall = np.where(minutes > 900.0, 34.0, 20.0), np.where(minutes > 1500.0, 18.0, 30.0)
+    days = [(minutes, jump), (minutes, fall), (None, np.linspace(20.0, 32.0, 60))]
+    made = []
+    for seed, (time, temperature) in enumerate(days, 1):
+        plan = tr.simulate(robot, rows=60, conditions={"time": time, "temperature": temperature}, seed=seed)
+        settings = ThermalElongation().variants(observe(plan))
+        at_work = next(s for s in settings if s.lag == (0.0 if time is None else 1500.0) and s.common and not s.spread)
+        made.append(tr.simulate(robot, [(at_work, [strain])], commands=plan, noise=1e-5, seed=seed))
+    return made

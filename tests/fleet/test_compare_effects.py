@@ -1,7 +1,7 @@
 """Which effects are compared, and as what."""
 
 import numpy as np
-from compared import diagnosed
+from compared import diagnosed, lagging_days
 
 from thermal_robot.fleet.compare_effects import candidates
 
@@ -39,27 +39,8 @@ def test_what_one_campaign_cannot_tell_has_no_parameters_there():
 def test_links_that_lag_are_compared_with_the_record_of_each_campaign():
     """The setting of one campaign would read a clock that another does not have, or follow the wrong day's air."""
     import thermal_robot as tr
-    from thermal_robot.effects import ThermalElongation
-    from thermal_robot.observations import observe
 
-    robot, minutes = tr.load_robot("builtin:rv_m2", "tool0"), 60.0 * np.arange(60)
-
-    def day(conditions, seed):
-        plan = tr.simulate(robot, rows=60, conditions=conditions, seed=seed)
-        at_work = ThermalElongation().elsewhere(observe(plan))
-        if "time" in plan.covariates:
-            settings = at_work.variants(observe(plan))
-            at_work = next(s for s in settings if s.lag == 1500.0 and s.common and not s.spread)
-        values = np.full(len(at_work.parameters(observe(plan))), 2e-5)
-        measured = tr.simulate(robot, [(at_work, values)], commands=plan, noise=1e-5, seed=seed)
-        return tr.diagnose(measured, only="thermal_elongation")
-
-    jump, fall = np.where(minutes > 900.0, 34.0, 20.0), np.where(minutes > 1500.0, 18.0, 30.0)
-    days = [
-        day({"time": minutes, "temperature": jump}, 1),
-        day({"time": minutes, "temperature": fall}, 2),
-        day({"time": None, "temperature": np.linspace(20.0, 32.0, 60)}, 3),
-    ]
+    days = [tr.diagnose(day, only="thermal_elongation") for day in lagging_days()]
     assert [bool(d.fit.effects[0][0].lag) for d in days] == [True, True, False]
     found = tr.compare(*days, names=["jump", "fall", "no clock"])
     assert found.effect("thermal_elongation").status == "shared"

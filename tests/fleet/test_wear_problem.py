@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from compared import lagging_days
 
 from thermal_robot import CampaignError, load_robot, simulate
 from thermal_robot.effects import choose
@@ -81,3 +82,14 @@ def test_another_robot_is_refused(rv_m2):
     other = load_robot(rv_m2.urdf.replace("<robot", "<!-- calibrated --><robot", 1), rv_m2.tool_frame)
     with pytest.raises(CampaignError, match="another URDF"):
         require_alike(fitted(campaign(rv_m2, 1), campaign(other, 2)))
+
+
+def test_links_that_lag_follow_the_record_of_each_campaign():
+    """Each campaign by itself says what was at work, whichever one has the setting that all are followed by."""
+    for days in (lagging_days(), lagging_days()[:2][::-1]):
+        found = problem([fit(day, choose(("thermal_elongation",), (), ())) for day in days])
+        own = [k for k, (effect, _) in enumerate(found.keys) if effect == "thermal_elongation"]
+        assert found.has[:, own].all()
+        for matrix, vector in zip(found.matrices, found.vectors, strict=True):
+            values = np.linalg.solve(matrix + 1e-6 * np.eye(len(matrix)), vector) * found.sizes
+            np.testing.assert_allclose(values[own], 2e-5, rtol=0.15)

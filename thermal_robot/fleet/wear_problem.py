@@ -196,7 +196,7 @@ class _Visit:
     @classmethod
     def of(cls, fit: Fit, shared: Sequence[Effect], own: Sequence[Effect]) -> _Visit:
         """Read the parameters' responses in the rows of a campaign; an effect whose columns it lacks has none."""
-        listed = dict(_told(shared, fit.nominal))
+        listed = dict(_told([gate.elsewhere(effect, fit.nominal) for effect in shared], fit.nominal))
         mine = tuple(p for effect in own for p in _named(effect, gate.checked(effect, fit.nominal)))
         best, white = fit.explanation.best, fit.explanation.whitening
         return cls(fit, listed, mine, fit.nominal.frames, replace(white, noise=white.noise * best.noise))
@@ -234,7 +234,7 @@ def _told(effects: Sequence[Effect], observations: Observations) -> Iterator[tup
     """Yield the parameters of effects that these rows tell, those of a larger effect without the smaller ones in it."""
     names = {effect.name for effect in effects if effect.told_inside}
     for effect in effects:
-        if any(need not in observations.covariates for need in effect.needs):
+        if gate.missing(effect, observations):
             continue
         parameters = gate.checked(effect, observations)
         if any(effect.name in other.contained_in for other in effects if other.name in names):
