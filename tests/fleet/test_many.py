@@ -6,7 +6,6 @@ import shutil
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 
 import numpy as np
@@ -106,9 +105,15 @@ def test_what_has_changed_is_done_anew(rv_m2, tmp_path):
 RUN = """
 import sys
 import thermal_robot as tr
+
+def progress(stage, done, among):
+    print(stage, done, among, flush=True)
+    if stage == "campaigns" and done >= 4:
+        time.sleep(1.1)  # what is done is on disk with the next, once a second has passed; and all is not done at once
+
 if __name__ == "__main__":
     tr.diagnose_many(sys.argv[1], sys.argv[2], labels=["hall", "robot"], only=sys.argv[3:], workers=2,
-                     progress=lambda *s: print(*s, flush=True))
+                     progress=progress)
 """
 
 
@@ -120,8 +125,7 @@ def test_a_run_that_is_stopped_continues(fleet, fleet_folder, tmp_path, ending):
     env = {**os.environ, "PYTHONPATH": str(Path(tr.__file__).parents[1])}
     run = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True, env=env)
     for line in run.stdout:
-        if line.startswith("campaigns 4 "):
-            time.sleep(1.1)  # what is done is on disk within a second, at the latest with the next
+        if line.startswith("campaigns 5 "):
             break
     run.send_signal(ending)
     run.stdout.close()
