@@ -85,6 +85,7 @@ def joint(listed: Sequence[Candidate], owners: Sequence[tuple[int, int]], said: 
     best, changes = _standing(search, parts, best, looked_at)
     values, covariance = _values(parts, search.gram, best, len(said), len(owners))
     seen, weight = search.probabilities()
+    changes = tuple(replace(c, probability=_held(seen, weight, _alike(parts, c.part))) for c in changes)
     probability = tuple(
         _held(seen, weight, {k for k, p in enumerate(parts) if p.effect == e}) for e in range(len(listed))
     )
@@ -136,8 +137,6 @@ def _standing(
         changes = [_change(search, parts, best, b) for b in best.blocks if not parts[b].shared]
         weakest = max(changes, key=lambda c: c.p_value, default=None)
         if weakest is None or weakest.p_value * looked_at < compare_settings.FALSE_CHANGE:
-            seen, weight = search.probabilities()
-            changes = [replace(c, probability=_held(seen, weight, _alike(parts, c.part))) for c in changes]
             return best, tuple(sorted(changes, key=lambda c: -c.chi2))
         left = tuple(b for b in best.blocks if parts[b] is not weakest.part)
         shared = [k for k, p in enumerate(parts) if p.shared and p.effect == weakest.part.effect]

@@ -71,6 +71,8 @@ class Problem:
         Per part, (D,): which columns cannot be negative.
     spreads
         (B,) deviation of the logarithm of each part's size.
+    total, equations
+        y'y along what the campaigns see, and how many directions that are: of all of them together.
     """
 
     parts: tuple[Part, ...]
@@ -78,6 +80,8 @@ class Problem:
     bases: tuple[Array, ...]
     positive: tuple[NDArray[np.bool_], ...]
     spreads: Array
+    total: float
+    equations: float
 
     @classmethod
     def of(cls, listed: Sequence[Candidate], owners: Sequence[tuple[int, int]], said: Sequence[Sums]) -> Problem:
@@ -96,7 +100,9 @@ class Problem:
                 bases.append(basis)
                 positive.append((held @ basis).astype(bool))
         spreads = np.array([_spread(listed[p.effect], p) for p in kept])
-        return cls(tuple(kept), said, tuple(bases), tuple(positive), spreads)
+        total = sum(float(one.vector @ one.inverse[0] @ one.vector) for one in said)
+        equations = float(sum(np.linalg.matrix_rank(one.matrix, hermitian=True) for one in said))
+        return cls(tuple(kept), said, tuple(bases), tuple(positive), spreads, total, equations)
 
     def gram(self, which: Sequence[int]) -> Gram:
         """Return the normal equations of some parts together."""
@@ -111,17 +117,16 @@ class Problem:
                     across[list(self.parts[k].parameters), a:b] = basis
             matrix += across.T @ one.matrix @ across
             vector += across.T @ one.vector
-        inverse = [one.inverse[0] for one in self.said]
         return Gram(
             matrix,
             vector,
-            float(sum(one.vector @ inside @ one.vector for one, inside in zip(self.said, inverse, strict=True))),
+            self.total,
             tuple(slice(a, b) for a, b in pairwise(ends)),
             tuple(bases),
             np.concatenate([*(self.positive[k] for k in which), np.zeros(0, dtype=bool)]).astype(bool),
             tuple(ranks),
             self.spreads[list(which)],
-            float(sum(np.linalg.matrix_rank(one.matrix, hermitian=True) for one in self.said)),
+            self.equations,
             compare_settings.HELD,
         )
 
