@@ -19,7 +19,9 @@ if TYPE_CHECKING:
 
 Array = NDArray[np.float64]
 _AT_TOOL = (0.0, 0.0, 0.0)
-_NONE = np.asarray(0.0), np.zeros(3)
+_NO_PAYLOAD = np.asarray(0.0), np.zeros(3)
+for _constant in _NO_PAYLOAD:
+    _constant.setflags(write=False)  # every call shares them
 
 
 def gravity_torques(
@@ -182,7 +184,7 @@ def _at_the_tool(frames: ChainFrames, payload: ArrayLike | None, payload_com: Ar
 
 def _payload(payload: ArrayLike | None, com: ArrayLike, rows: int) -> tuple[Array, Array]:
     if payload is None and com is _AT_TOOL:
-        return _NONE
+        return _NO_PAYLOAD
     mass = np.asarray(0.0 if payload is None else payload, dtype=float)
     centre = np.asarray(com, dtype=float)
     if mass.shape not in ((), (rows,)):
