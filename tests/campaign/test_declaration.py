@@ -28,7 +28,7 @@ REFUSED = [
     ('file = "measurements.csv"\n', "", 5, "measurements.file", None, ["is missing", "path of the table"]),
     ('angle_unit = "rad"\n', "", 5, "measurements.angle_unit", None, ["is missing", '"rad" or "deg"']),
     ('length_unit = "mm"\n', "", 5, "measurements.length_unit", None, ["is missing", '"m" or "mm" or "um"']),
-    ('"mm"', '"inch"', 8, "measurements.length_unit", "'inch'", ["unknown unit", '"m" or "mm" or "um"']),
+    ('"mm"', '"yard"', 8, "measurements.length_unit", "'yard'", ["unknown unit", '"m" or "mm" or "um"']),
     ('"rad"', '"radian"', 7, "measurements.angle_unit", "'radian'", ["unknown unit", '"rad" or "deg"']),
     ('"rad"', "1", 7, "measurements.angle_unit", "1", ["unknown unit", '"rad" or "deg"']),
     (
@@ -107,7 +107,7 @@ def test_a_known_robot_is_no_path_and_a_path_is_beside_the_file(tmp_path: Path, 
     assert found.table == tmp_path / "t.csv"
 
 
-@pytest.mark.parametrize(("unit", "metres"), [("m", 1.0), ("mm", 1e-3), ("um", 1e-6)])
+@pytest.mark.parametrize(("unit", "metres"), [("m", 1.0), ("mm", 1e-3), ("um", 1e-6), ("inch", 0.0254)])
 def test_every_length_is_in_the_declared_unit(tmp_path: Path, unit: str, metres: float) -> None:
     more = "[frames]\ntarget = [1, 2, 3]\n[noise]\nposition = 4\norientation = 5\n[payload]\ncom = [6, 7, 8]\n"
     settings = declared(tmp_path, BARE.format(urdf="r.urdf", unit=unit) + more).settings

@@ -57,7 +57,7 @@ def test_rows_are_those_of_the_index(robot: Robot, tmp_path: Path) -> None:
     ("arguments", "column", "words"),
     [
         ({"angle_unit": "grad"}, "angle_unit", '"rad" or "deg"'),
-        ({"length_unit": "inch"}, "length_unit", '"m" or "mm" or "um"'),
+        ({"length_unit": "yard"}, "length_unit", '"m" or "mm" or "um"'),
         ({"base": "floor"}, "base", '"known" or "unknown"'),
         ({"noise_position": -1}, "noise_position", "negative"),
         ({"noise_orientation": math.inf}, "noise_orientation", "finite"),
@@ -93,7 +93,7 @@ def test_cells_are_checked(robot: Robot) -> None:
     assert (caught.value.row, caught.value.column, caught.value.found) == (1, "turn", "an empty cell")
 
 
-@pytest.mark.parametrize(("unit", "per_metre"), [("m", 1.0), ("mm", 1e3), ("um", 1e6)])
+@pytest.mark.parametrize(("unit", "per_metre"), [("m", 1.0), ("mm", 1e3), ("um", 1e6), ("inch", 1 / 0.0254), ("ft", 1 / 0.3048)])
 def test_one_campaign_in_any_unit(robot: Robot, unit: str, per_metre: float) -> None:
     rng = np.random.default_rng(1)
     q = pd.DataFrame(rng.uniform(0.1, 0.4, (5, 4)), columns=list(robot.joint_names))

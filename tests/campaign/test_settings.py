@@ -32,7 +32,7 @@ def test_settings_refuse_other_keys(tmp_path: Path, change: dict[str, object]) -
         ({"noise_position": -1e-5}, "noise_position: a standard deviation cannot be negative"),
         ({"reference_temperature": -300}, "reference_temperature: no temperature is lower"),
         ({"gravity": [0, 0, -9810]}, r"gravity\[2\]: is -9810, expected a number of m/s"),
-        ({"units": {"angle": "deg", "length": "inch"}}, r'units\.length: unknown unit, expected "m" or "mm" or "um"'),
+        ({"units": {"angle": "deg", "length": "yard"}}, r'units\.length: unknown unit, expected "m" or "mm" or "um"'),
         ({"units": {"angle": "deg"}}, r"units\.length: is missing"),
         ({"base_known": 1}, "base_known: is 1, expected true or false"),
         ({"gears": {"lift": 0}}, r"gears\.lift: a transmission ratio must be positive"),

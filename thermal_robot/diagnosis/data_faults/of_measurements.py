@@ -9,6 +9,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.campaign.units import LENGTH_UNITS
 from thermal_robot.diagnosis.data_faults.kind import Kind, Repair
 from thermal_robot.diagnosis.data_faults.readings import Readings, Rows
 
@@ -39,9 +40,9 @@ def _turned(change: Callable[[Array], Array]) -> Repair:
 
 def _units(units: dict[str, float]) -> Callable[[Readings], Iterator[tuple[str, Repair]]]:
     def proposals(readings: Readings) -> Iterator[tuple[str, Repair]]:
-        read = METRIC[readings.length_unit]
+        read = LENGTH_UNITS[readings.length_unit]
         for unit, size in units.items():
-            if unit != readings.length_unit:
+            if size != read:
                 yield f"{unit}, not in {readings.length_unit}", _at_places(lambda p, by=size / read: p * by)  # type: ignore[misc]
 
     return proposals
