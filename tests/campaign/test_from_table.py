@@ -93,7 +93,9 @@ def test_cells_are_checked(robot: Robot) -> None:
     assert (caught.value.row, caught.value.column, caught.value.found) == (1, "turn", "an empty cell")
 
 
-@pytest.mark.parametrize(("unit", "per_metre"), [("m", 1.0), ("mm", 1e3), ("um", 1e6), ("inch", 1 / 0.0254), ("ft", 1 / 0.3048)])
+@pytest.mark.parametrize(
+    ("unit", "per_metre"), [("m", 1.0), ("mm", 1e3), ("um", 1e6), ("inch", 1 / 0.0254), ("ft", 1 / 0.3048)]
+)
 def test_one_campaign_in_any_unit(robot: Robot, unit: str, per_metre: float) -> None:
     rng = np.random.default_rng(1)
     q = pd.DataFrame(rng.uniform(0.1, 0.4, (5, 4)), columns=list(robot.joint_names))

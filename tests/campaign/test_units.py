@@ -66,7 +66,9 @@ def test_every_column_has_its_unit(robot: Robot, column: str, si: str, file: str
 FACTORS = {"deg": math.pi / 180, "mm": 1e-3, "um": 1e-6, "cm": 1e-2, "inch": 0.0254, "in": 0.0254, "ft": 0.3048}
 
 
-@pytest.mark.parametrize("units", [Units("deg", "mm"), Units("rad", "um"), Units("deg", "inch"), Units("rad", "ft"), Units()])
+@pytest.mark.parametrize(
+    "units", [Units("deg", "mm"), Units("rad", "um"), Units("deg", "inch"), Units("rad", "ft"), Units()]
+)
 def test_the_scale_is_the_ratio_of_the_two_units(robot: Robot, tmp_path: Path, units: Units) -> None:
     for column in full(tmp_path / "c").covariates:
         word = unit_of(column, robot, units).partition("/")[0]

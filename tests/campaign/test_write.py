@@ -22,7 +22,9 @@ from thermal_robot.campaign import (
 from thermal_robot.errors import CampaignError
 
 
-@pytest.mark.parametrize(("angle", "length"), [("deg", "mm"), ("rad", "m"), ("deg", "um"), ("deg", "inch"), ("rad", "in"), ("rad", "ft")])
+@pytest.mark.parametrize(
+    ("angle", "length"), [("deg", "mm"), ("rad", "m"), ("deg", "um"), ("deg", "inch"), ("rad", "in"), ("rad", "ft")]
+)
 def test_reading_again_gives_the_same(tmp_path: Path, angle: str, length: str) -> None:
 
     campaign = dataclasses.replace(full(tmp_path / "c"), units=Units(angle, length), name="copy")

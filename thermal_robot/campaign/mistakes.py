@@ -92,7 +92,7 @@ def _slides(campaign: Campaign) -> Iterator[str]:
             )
 
 
-def _step(values: FloatArray) -> float:
+def step_of(values: FloatArray) -> float:
     """Return the largest power of ten, 1000 at most, of which all figures are multiples; 0 where there is none."""
     for power in range(3, -7, -1):
         parts = values * 10.0**-power
@@ -104,7 +104,7 @@ def _step(values: FloatArray) -> float:
 def _rounded(campaign: Campaign) -> Iterator[str]:
     if campaign.position is None or campaign.samples < FEWEST_ROWS or not np.ptp(campaign.position) > 0.0:
         return
-    step = _step(campaign.position / campaign.units.length_scale) * campaign.units.length_scale
+    step = step_of(campaign.position / campaign.units.length_scale) * campaign.units.length_scale
     noise = campaign.noise_position
     if step and (step / math.sqrt(12.0) > noise if noise else step > ROUNDED_TO):
         stated = f", and the noise is stated as {1e3 * noise:.3g} mm" if noise else ""
@@ -123,7 +123,7 @@ def _grid(campaign: Campaign, reach: float) -> Iterator[str]:
     # who types commands takes few of them again and again
     if min(len(np.unique(column)) for column in values.T) <= campaign.samples / 2:
         return
-    step = _step(values)
+    step = step_of(values)
     moved = step * units.angle_scale / math.sqrt(12.0) * reach
     if moved > max(GRID, campaign.noise_position or 0.0):
         yield (

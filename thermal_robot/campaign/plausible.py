@@ -8,14 +8,12 @@ from collections.abc import Iterator
 import numpy as np
 
 from thermal_robot.campaign.campaign import Campaign
+from thermal_robot.campaign.marks import SAME_COMMAND, doubled, marks
 from thermal_robot.campaign.mistakes import mistakes
 from thermal_robot.campaign.names import listed
 
 LIMIT_TOLERANCE = 1e-6
 """rad or m by which a command may pass a limit: the last digit of a file is not a violation."""
-SAME_COMMAND = 1e-3
-"""rad or m within which commands of one pose label count as the same: a controller that reports where it stopped
-repeats a pose to better than that, and a pose of its own is farther away."""
 MOST_TURNS = 2
 """Turns that no command in rad exceeds: wrists and cables allow at most two to either side, and 13 degrees, read as
 rad, are more."""
@@ -41,14 +39,18 @@ MOVING_JOINTS = 3
 
 def doubts(campaign: Campaign) -> list[str]:
     """Return the sentences, none for an ordinary campaign."""
+    marked, lost = marks(campaign)
+    seen = campaign.take(~marked) if marked.any() else campaign
     return [
+        *lost,
+        *doubled(campaign),
         *_angle_unit(campaign),
-        *_length_unit(campaign),
+        *_length_unit(seen),
         *_limits(campaign),
         *_time(campaign),
         *_speed(campaign),
         *_pose_labels(campaign),
-        *mistakes(campaign, _reach(campaign)),
+        *mistakes(seen, _reach(campaign)),
     ]
 
 

@@ -51,9 +51,7 @@ class Table:
 
     def told(self, chosen: NDArray[np.bool_]) -> str:
         """Say which rows were chosen (N,), a few of them by number: ``3 rows (4, 7, 9)``."""
-        numbers = self.rows[chosen]
-        more = "" if len(numbers) <= _FEW else " …"
-        return f"{len(numbers)} row{'s' if len(numbers) > 1 else ''} ({', '.join(map(str, numbers[:_FEW]))}{more})"
+        return told_rows(self.rows[chosen])
 
     def numbers(self, column: str, *, gaps: bool = False) -> NDArray[np.float64]:
         """Return a column as (N,) numbers in the file's unit.
@@ -179,3 +177,9 @@ class Table:
         if isinstance(cell, str):
             return repr(cell) if cell else "an empty cell"
         return "an empty cell" if np.isnan(cell) else repr(float(cell))
+
+
+def told_rows(numbers: NDArray[np.int64]) -> str:
+    """Say how many rows, and a few of them by number: ``3 rows (4, 7, 9)``."""
+    more = "" if len(numbers) <= _FEW else " …"
+    return f"{len(numbers)} row{'s' if len(numbers) > 1 else ''} ({', '.join(map(str, numbers[:_FEW]))}{more})"

@@ -11,7 +11,15 @@ from thermal_robot.robot import Robot
 
 ANGLE_UNITS: dict[str, float] = {"rad": 1.0, "deg": math.pi / 180.0}
 """Radians in one of the unit."""
-LENGTH_UNITS: dict[str, float] = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "cm": 1e-2, "inch": 0.0254, "in": 0.0254, "ft": 0.3048}
+LENGTH_UNITS: dict[str, float] = {
+    "m": 1.0,
+    "mm": 1e-3,
+    "um": 1e-6,
+    "cm": 1e-2,
+    "inch": 0.0254,
+    "in": 0.0254,
+    "ft": 0.3048,
+}
 """Metres in one of the unit; inch and foot are the international ones of 1959, exact."""
 
 _OF_ITS_OWN = {"time": "s", "temperature": "°C", "payload": "kg"}

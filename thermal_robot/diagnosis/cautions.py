@@ -9,6 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from thermal_robot.campaign import Campaign
+from thermal_robot.campaign.marks import copies, marks
 from thermal_robot.diagnosis.cancelling import cancelling, cancelling_within
 from thermal_robot.diagnosis.credible import outsized
 from thermal_robot.diagnosis.parts import Refused, Sensitivity
@@ -20,7 +21,7 @@ from thermal_robot.kinematics.gravity import gravity_torques
 
 
 def usable(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
-    """Leave out copied rows, and an orientation that the simulator does not predict; return the reasons."""
+    """Leave out rows that measured nothing, and an orientation that the simulator does not predict; say so."""
     notes = []
     if (
         campaign.orientation is not None
@@ -31,14 +32,13 @@ def usable(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
         notes.append("orientation was measured, but sim.* predicts positions only: orientation is left out")
         campaign = replace(campaign, orientation=None, noise_orientation=None)
     notes += contradicted(campaign)
-    # a real repetition may well measure the same digits, but not in the same second and conditions
-    recorded = [values[:, None] for values in campaign.covariates.values()]
-    table = np.hstack([campaign.q, np.asarray(campaign.position), *recorded])
-    first = np.sort(np.unique(table, axis=0, return_index=True)[1])
-    copies = campaign.samples - len(first)
-    if copies:
-        notes.append(f"{copies} rows repeat another one to the last digit: these copies are left out")
-        campaign = campaign.take(first)
+    again, (lost, _) = copies(campaign), marks(campaign)
+    if again.any():
+        notes.append(f"{again.sum()} rows repeat another one to the last digit: these copies are left out")
+    if lost.any():
+        notes.append(f"{lost.sum()} rows hold a mark of a missing value in place of a position: they are left out")
+    if (again | lost).any():
+        campaign = campaign.take(~(again | lost))
     return campaign, tuple(notes)
 
 

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign
-from thermal_robot.campaign.plausible import SAME_COMMAND
+from thermal_robot.campaign.marks import SAME_COMMAND
 from thermal_robot.errors import CampaignError, require
 from thermal_robot.inference.frames import register
 from thermal_robot.iso9283.accuracy import Accuracy, accuracy
