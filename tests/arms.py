@@ -61,6 +61,10 @@ def urdfs(draw):
         placed = {"origin": draw(_three(-50, 50)), "rpy": draw(_three(-314, 314)), "axis": draw(AXES)}
         parts += [draw(_link(child)), joint(f"q_{k}", kind, parent, child, limits=LIMITS[kind], mimic=mimic, **placed)]
         drivers += [] if mimic else [f"q_{k}"]
+        if not draw(st.integers(0, 5)):  # a joint beside the chain, which what comes behind may mimic
+            aside = draw(st.sampled_from(KINDS))
+            parts += [link(f"aside_{k}"), joint(f"beside_{k}", aside, parent, f"aside_{k}", limits=LIMITS[aside])]
+            drivers.append(f"beside_{k}")
         parent = child
     end = joint("tip_joint", "fixed", parent, "tip", draw(_three(-20, 20)), draw(_three(-314, 314)))
     return urdf(*parts, link("tip"), end)

@@ -82,16 +82,16 @@ COUPLED = urdf(
           'joint="turret" multiplier="0.5" offset="1.3"'),
     joint("rack", "prismatic", "rack", "held", "0.1 0 0.1", "-1 0 0", "0 -1 0", (-1, 1),
           'joint="turret" multiplier="0.05"'),
-    # follows a finger, which is no part of the chain and stands at its lower limit
+    # follows a finger, which stands beside the chain
     joint("jaw", "revolute", "held", "wrist", "0 0 0.1", "0.2 0 0", "1 0 0", (-1, 1),
           'joint="finger" multiplier="3" offset="0.1"'),
     joint("finger", "prismatic", "held", "finger", "0 0.1 0", "0 0 0.3", "0 1 0", (0.2, 0.5)),
     THUMB,
     joint("tip_joint", "fixed", "wrist", "tip", "0.02 0.03 0.12", "0.1 0.2 0.3"),
 )  # fmt: skip
-"""Every kind of joint follows every other; chains of mimics, a joint that follows one further out, and one outside."""
+"""Every kind of joint follows every other; chains of mimics, a joint that follows one further out, and one beside."""
 
-DRIVEN = {"parallelogram": ("turn", "lift", "reach", "spin"), "coupled": ("turret", "swing", "stage_1")}
+DRIVEN = {"parallelogram": ("turn", "lift", "reach", "spin"), "coupled": ("turret", "swing", "stage_1", "finger")}
 """Joints that a table has columns for."""
 
 
@@ -100,9 +100,9 @@ def by_hand(name, q):
     if name == "parallelogram":
         turn, lift, reach, spin = q.T
         return np.stack([turn, lift, reach, 0.3 - reach, spin], axis=1)
-    turret, swing, stage = q.T
+    turret, swing, stage, finger = q.T
     second = 1.1 * stage + 0.02
-    jaw = np.full_like(stage, 3 * 0.2 + 0.1)
+    jaw = 3 * finger + 0.1
     moves = [0.4 * swing - 0.2, turret, swing, stage, second, 0.05 - 2 * second, 0.5 * turret + 1.3, 0.05 * turret, jaw]
     return np.stack(moves, axis=1)
 

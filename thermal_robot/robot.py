@@ -51,7 +51,7 @@ class Segment:
         Whether the placement is a movable joint's.
     joint
         Name of the joint whose position moves what is behind it: its own, or the one that it mimics; ``None`` for a
-        fixed frame, and for a joint that mimics one outside the chain.
+        fixed frame, and for a joint that mimics a fixed one.
     """
 
     name: str
@@ -79,7 +79,8 @@ class Robot:
         (3,) m/s² in the root frame.
     joint_names, joint_types
         n names and types (``revolute``, ``continuous`` or ``prismatic``) of the movable joints, from the root
-        on. A joint that mimics another is none of them: it follows.
+        on. A joint that mimics another is none of them: it follows. One beside the chain that a joint of the chain
+        mimics is among them, where the first that follows it is.
     lower, upper
         (n,) limits, rad or m, narrowed to those of the joints that mimic it; infinite where the URDF gives none.
     has_masses
@@ -238,8 +239,9 @@ def load_robot(
     """Load the chain of a robot from its URDF; meshes are not read.
 
     Joints outside the chain, and those between the root of the URDF and ``root_frame``, are held at 0, or at
-    their limit nearest to 0. A joint with a ``<mimic>`` tag follows the joint that it names, and stands still where
-    that one is held; outside the chain it is held in any case, where the held position of that one takes it.
+    their limit nearest to 0. A joint of the chain with a ``<mimic>`` tag follows the joint that it names, wherever that
+    one is: one beside the chain is a joint of the robot, too. Outside the chain a joint with such a tag is held, where
+    the held position of the other one takes it.
 
     Parameters
     ----------

@@ -184,15 +184,51 @@ def test_a_telescope_grows_by_all_its_stages():
     np.testing.assert_allclose([arm.lower, arm.upper], [[0.0], [0.38]], atol=1e-15)
 
 
-def test_a_joint_that_mimics_one_outside_the_chain_stands_still():
+def test_a_joint_that_mimics_one_beside_the_chain_is_driven_by_it():
     arm = coupled("coupled")
     jaw = next(s for s in arm.segments if s.name == "jaw")
     assert jaw.movable
-    assert jaw.joint is None
-    assert "jaw" not in arm.joint_names
-    # whatever drives the joints behind this link is before it
-    with pytest.raises(RobotError, match="no movable joint"):
-        load_robot(arm.urdf, "tip", root_frame="geared")
+    assert jaw.joint == "finger"
+    assert arm.joint_types[arm.joint_names.index("finger")] == "prismatic"
+    # what drives the first joints behind this link stands before it
+    end = load_robot(arm.urdf, "tip", root_frame="geared")
+    assert end.joint_names == ("turret", "finger")
+    q = np.array([[0.4, 0.2, 0.1, 0.25]])
+    whole, base = kin.tool_poses(arm, q)[0], kin.link_poses(arm, q)[0, arm.urdf_links.index("geared")]
+    np.testing.assert_allclose(base @ kin.tool_poses(end, q[:, [0, 3]])[0], whole, atol=1e-12)
+
+
+@pytest.mark.parametrize("times", [(0.5, 0.5), (1.0, -0.25), (2.0, 0.0)])
+def test_a_lift_of_two_stages_that_a_joint_beside_it_tells(times):
+    """As a vehicle's column: a pseudo joint of its whole stroke, which both stages mimic."""
+    stages = [
+        joint(
+            "middle",
+            "prismatic",
+            "floor",
+            "one",
+            limits=(-9, 9),
+            mimic=f'joint="stroke" multiplier="{times[0]}" offset="-0.706"',
+        ),
+        joint(
+            "top",
+            "prismatic",
+            "one",
+            "two",
+            limits=(-9, 9),
+            mimic=f'joint="stroke" multiplier="{times[1]}" offset="-0.736"',
+        ),
+        joint("stroke", "prismatic", "floor", "pseudo", limits=(1.48, 3.972)),
+        joint("turn", "revolute", "two", "arm", "0.1 0 0.3", axis="0 1 0", limits=(-2, 2)),
+    ]
+    arm = load_robot(urdf(*(link(name, 1.0) for name in ("floor", "one", "two", "pseudo", "arm")), *stages), "arm")
+    assert arm.joint_names == ("stroke", "turn")
+    np.testing.assert_allclose([arm.lower[0], arm.upper[0]], [1.48, 3.972])
+    q = np.array([[1.5, 0.3], [3.0, -1.0], [3.9, 0.0]])
+    np.testing.assert_allclose(kin.tool_poses(arm, q)[:, 2, 3], sum(times) * q[:, 0] - 1.442 + 0.3, atol=1e-12)
+    np.testing.assert_allclose(kin.frame_jacobians(arm, q)[:, 2, 0], sum(times), atol=1e-12)
+    # the joint beside lifts each stage as far as it goes
+    np.testing.assert_allclose(kin.gravity_torques(arm, q)[:, 0], 9.81 * (times[0] + 2 * sum(times)), atol=1e-9)
 
 
 @pytest.mark.parametrize(
@@ -260,23 +296,32 @@ def test_circles_and_missing_joints_are_named(found, words, name):
 
 def test_the_coupling_of_a_chain():
     ends = {"b": Mimic("d", 2.0, 0.1), "c": Mimic("outside", 5.0, 7.0), "e": Mimic("a", 0.0, -1.0)}
-    coupling = couple("abcde", ends, {"b": 90.0, "c": 0.7, "e": 91.0})
-    assert coupling.driving.tolist() == [0, 3]
+    coupling = couple("abcde", ends)
+    assert (coupling.names, coupling.driving.tolist()) == (("a", "d"), [0, 3])
     assert [coupling.leader(j) for j in range(5)] == [0, 1, None, 1, None]
-    np.testing.assert_allclose(coupling.positions(np.array([[1.0, 10.0]])), [[1.0, 20.1, 0.7, 10.0, -1.0]])
+    np.testing.assert_allclose(coupling.positions(np.array([[1.0, 10.0]])), [[1.0, 20.1, 7.0, 10.0, -1.0]])
+    # a joint beside the chain drives it, and stands where the first is that follows it
+    coupling = couple("abcde", {**ends, "e": Mimic("outside", -1.0)}, ["outside", "other"])
+    assert (coupling.names, coupling.driving.tolist()) == (("a", "outside", "d"), [0, 2, 3])
+    assert [coupling.leader(j) for j in range(5)] == [0, 2, 1, 2, 1]
+    np.testing.assert_allclose(coupling.positions(np.array([[1.0, 2.0, 10.0]])), [[1.0, 20.1, 17.0, 10.0, -2.0]])
 
 
 def test_limits_are_those_of_all_who_move_together():
     ends = {"b": Mimic("a", -2.0, 0.5), "c": Mimic("a", 0.1), "d": Mimic("a", 0.0, 9.0)}
-    coupling = couple("abcd", ends, {})
+    coupling = couple("abcd", ends)
     infinite = np.inf
     lower, upper = common_limits(
-        coupling, "abcd", np.array([-1.0, -0.5, -infinite, -1.0]), np.array([infinite, 1.5, 0.2, 1.0])
+        coupling,
+        "abcd",
+        np.array([-1.0, -0.5, -infinite, -1.0]),
+        np.array([infinite, 1.5, 0.2, 1.0]),
+        (np.array([-1.0]), np.array([infinite])),
     )
     # −0.5 ≤ 0.5 − 2 a ≤ 1.5 and 0.1 a ≤ 0.2; d stands still, wherever
     np.testing.assert_allclose([lower, upper], [[-0.5], [0.5]], atol=1e-15)
     with pytest.raises(RobotError, match="'b' mimics 'a', but the two are never both within their limits"):
-        common_limits(coupling, "abcd", np.array([0.6, -0.5, 0.0, 0.0]), np.array([1.0, 1.5, 1.0, 1.0]))
+        common_limits(coupling, "abcd", np.array([0.6, -0.5, 0, 0]), np.array([1, 1.5, 1, 1]), ([0.6], [1.0]))
 
 
 def test_the_arms_have_the_limits_of_their_mimics():

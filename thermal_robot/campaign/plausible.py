@@ -42,6 +42,7 @@ def doubts(campaign: Campaign) -> list[str]:
     marked, lost = marks(campaign)
     seen = campaign.take(~marked) if marked.any() else campaign
     return [
+        *_beside(campaign),
         *lost,
         *doubled(campaign),
         *_angle_unit(campaign),
@@ -52,6 +53,15 @@ def doubts(campaign: Campaign) -> list[str]:
         *_pose_labels(campaign),
         *mistakes(seen, _reach(campaign)),
     ]
+
+
+def _beside(campaign: Campaign) -> Iterator[str]:
+    """Say which joints of the chain are moved by one that is no part of it."""
+    robot = campaign.robot
+    for joint in (name for name in robot.joint_names if name not in robot.chain.names):
+        led = [segment.name for segment in robot.segments if segment.joint == joint]
+        follow = f"joint {led[0]!r} of the chain mimics" if len(led) == 1 else f"joints {listed(led)} of the chain mimic"
+        yield f"{follow} {joint!r}, which is outside the chain: its column is read"
 
 
 def _angle_unit(campaign: Campaign) -> Iterator[str]:

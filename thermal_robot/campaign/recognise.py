@@ -211,7 +211,9 @@ def _refuse_two_meanings(table: Table, robot: Robot) -> None:
 
 def _require_joints(table: Table, robot: Robot) -> None:
     chain = f"{robot.root_frame!r} to {robot.tool_frame!r}"
-    _require(table, robot.joint_names, f"every movable joint of the chain from {chain} needs a column")
+    beside = [name for name in robot.joint_names if name not in robot.chain.names]
+    more = f", and so does {listed(beside)}, which moves it by joints that mimic" if beside else ""
+    _require(table, robot.joint_names, f"every movable joint of the chain from {chain} needs a column{more}")
 
 
 def _require(table: Table, wanted: Sequence[str], why: str) -> None:

@@ -22,12 +22,14 @@ def arm(robot: Robot, q: ArrayLike, where: Where) -> Arm:
     """Return the arm in (R, n) joint positions, rad or m, with the shares of its places."""
     chain = robot.chain
     links = (*chain.parent_links, robot.tool_frame)
-    joints = tuple(chain.names[k] for k in chain.movable)
+    joints = [chain.names[k] for k in chain.movable]
+    for j, name in zip(chain.coupling.driving.tolist(), robot.joint_names, strict=True):
+        joints[j] = name  # one beside the chain is seen at the first that follows it
     return Arm(
         links=links,
         link_shares=np.array([where.links.get(name, 0.0) for name in links]),
         poses=link_poses(robot, q)[:, [robot.urdf_links.index(name) for name in links]],
-        joints=joints,
+        joints=tuple(joints),
         joint_shares=np.array([where.joints.get(name, 0.0) for name in joints]),
         moves=np.asarray(chain.movable) + 1,
         hulls=hulls(robot),

@@ -36,7 +36,8 @@ class AugmentedModel:
         ``pinocchio.Model`` with M + S joints of one coordinate each; a continuous joint is a revolute one without
         limits. The links of the chain are frames of type ``BODY`` with their own names.
     joints
-        (n,) columns of the driving joints in a configuration, rad or m.
+        (n,) columns of the driving joints in a configuration, rad or m; of one beside the chain, that of its first
+        follower.
     elongations
         (S,) columns of the virtual joints, m; their joints are called ``"elongation of <segment>"``.
     segments
@@ -196,7 +197,8 @@ def augmented_model(robot: Robot) -> AugmentedModel:
                 offset, here = pin.SE3.Identity(), pin.SE3.Identity()
         model.addFrame(pin.Frame(link, parent, 0, offset, pin.FrameType.BODY))
     names = tuple(robot.segments[s].name for s in growing(robot))
-    joints = _columns(model, robot.joint_names)
+    chain = robot.chain
+    joints = _columns(model, [chain.names[k] for k in chain.movable[chain.coupling.driving]])
     return AugmentedModel(
         model,
         joints,
@@ -228,9 +230,12 @@ def _add_movable(model: pin.Model, parent: int, robot: Robot, name: str, placeme
     one = joint if joint.nq == 1 else pin.JointModelRevoluteUnaligned(unit_motion(robot.model, joint)[3:])
     free = np.full(1, np.inf)
     low, high = -free, free
-    if name in robot.joint_names:
-        j = robot.joint_names.index(name)
-        low, high = robot.lower[j : j + 1], robot.upper[j : j + 1]
+    coupling = robot.chain.coupling
+    row = [robot.chain.names[k] for k in robot.chain.movable].index(name)
+    if row in coupling.driving:
+        j = coupling.driving.tolist().index(row)
+        ends = coupling.matrix[row, j] * np.array([robot.lower[j], robot.upper[j]]) + coupling.offset[row]
+        low, high = ends.min(keepdims=True), ends.max(keepdims=True)
     added: int = model.addJoint(parent, one, placement, name, free, free, low, high)
     return added
 

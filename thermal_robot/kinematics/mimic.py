@@ -49,14 +49,18 @@ class Coupling:
 
     Parameters
     ----------
+    names
+        (n,) of the driving joints. One that stands beside the chain drives it by those of the chain that mimic it.
     driving
-        (n,) numbers of the driving joints among the movable ones, in their order.
+        (n,) numbers, among the movable joints, of those that stand for them: the driving joint itself, or the first
+        that mimics it.
     matrix
         (M, n); a driving joint's row is a unit vector, that of a joint which stands still is zero.
     offset
         (M,) rad or m.
     """
 
+    names: tuple[str, ...]
     driving: NDArray[np.int64]
     matrix: Array
     offset: Array
@@ -140,7 +144,7 @@ def _end(name: str, found: Mapping[str, Mimic], joints: Collection[str]) -> Mimi
         end = end.after(found[end.joint])
 
 
-def couple(names: Sequence[str], ends: Mapping[str, Mimic], held: Mapping[str, float]) -> Coupling:
+def couple(names: Sequence[str], ends: Mapping[str, Mimic], beside: Collection[str] = ()) -> Coupling:
     """Couple the movable joints of a chain.
 
     Parameters
@@ -149,27 +153,31 @@ def couple(names: Sequence[str], ends: Mapping[str, Mimic], held: Mapping[str, f
         M names of the movable joints, from the root on.
     ends
         From :func:`followed`.
-    held
-        Where the mimicking joints of the chain stand while what they follow is held, rad or m; read for those
-        that follow a joint outside the chain.
+    beside
+        Names of movable joints outside the chain: what mimics another one of those is at the offset, as one that
+        mimics a fixed joint is.
     """
-    driving = [j for j, name in enumerate(names) if name not in ends]
-    column = {names[j]: i for i, j in enumerate(driving)}
+    driving: dict[str, int] = {}
+    for j, name in enumerate(names):
+        end = ends.get(name, Mimic(name))
+        if end.joint == name or (end.joint in beside and end.joint not in names and end.multiplier):
+            driving.setdefault(end.joint, j)
+    column = {driver: i for i, driver in enumerate(driving)}
     matrix, offset = np.zeros((len(names), len(driving))), np.zeros(len(names))
     for j, name in enumerate(names):
-        if name in column:
-            matrix[j, column[name]] = 1.0
-        elif ends[name].joint in column:
-            matrix[j, column[ends[name].joint]], offset[j] = ends[name].multiplier, ends[name].offset
-        else:
-            offset[j] = held[name]
-    numbers = np.array(driving, dtype=np.int64)
+        end = ends.get(name, Mimic(name))
+        offset[j] = end.offset
+        if end.joint in column:
+            matrix[j, column[end.joint]] = end.multiplier
+    numbers = np.array(list(driving.values()), dtype=np.int64)
     for array in (numbers, matrix, offset):
         array.setflags(write=False)
-    return Coupling(numbers, matrix, offset)
+    return Coupling(tuple(driving), numbers, matrix, offset)
 
 
-def common_limits(coupling: Coupling, names: Sequence[str], lower: Array, upper: Array) -> tuple[Array, Array]:
+def common_limits(
+    coupling: Coupling, names: Sequence[str], lower: Array, upper: Array, own: tuple[Array, Array]
+) -> tuple[Array, Array]:
     """Limits of the driving joints within which every joint that follows them is within its own.
 
     Parameters
@@ -180,6 +188,8 @@ def common_limits(coupling: Coupling, names: Sequence[str], lower: Array, upper:
         M names of the movable joints.
     lower, upper
         (M,) limits of each, rad or m; infinite where there is none.
+    own
+        (n,) and (n,) those of the driving joints.
 
     Returns
     -------
@@ -191,7 +201,7 @@ def common_limits(coupling: Coupling, names: Sequence[str], lower: Array, upper:
     RobotError
         If a joint and one that follows it are never both within their limits.
     """
-    low, high = lower[coupling.driving], upper[coupling.driving]
+    low, high = (np.array(limits) for limits in own)
     for j, name in enumerate(names):
         i = coupling.leader(j)
         if i is None:
@@ -200,9 +210,9 @@ def common_limits(coupling: Coupling, names: Sequence[str], lower: Array, upper:
             ends = (np.array([lower[j], upper[j]]) - coupling.offset[j]) / coupling.matrix[j, i]
         low[i], high[i] = max(low[i], ends.min()), min(high[i], ends.max())
         if low[i] > high[i]:
-            driver = names[coupling.driving[i]]
             raise RobotError(
-                f"joint {name!r} mimics {driver!r}, but the two are never both within their limits", name=name
+                f"joint {name!r} mimics {coupling.names[i]!r}, but the two are never both within their limits",
+                name=name,
             )
     return low, high
 

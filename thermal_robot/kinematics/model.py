@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics.hanging import hanging_masses
-from thermal_robot.kinematics.held import held_configuration, held_position
+from thermal_robot.kinematics.held import held_configuration
 from thermal_robot.kinematics.mimic import Coupling, common_limits, couple, followed, mimics
 from thermal_robot.kinematics.urdf import nearest, parse_urdf
 
@@ -120,8 +121,8 @@ def build_chain_model(
 ) -> ChainModel:
     """Read a URDF and keep the chain from the root frame to the tool frame; every other joint is held.
 
-    A joint is held at 0, or at the limit nearest to 0; one that mimics another, where that one takes it. A joint of
-    the chain that mimics one outside is held with it.
+    A joint is held at 0, or at the limit nearest to 0; one that mimics another, where that one takes it. One outside
+    that a joint of the chain mimics is no part of the chain and yet drives it: it is one of its joints.
 
     Parameters
     ----------
@@ -146,16 +147,16 @@ def build_chain_model(
     root = _find_link(full, links, root_frame, "root frame") if root_frame is not None else _root_link(links)
     tool = _find_link(full, links, tool_frame, "tool frame")
     elements = _elements_between(full, root, tool)
-    joint_types = _joint_types(full, elements)
-
     # a fixed joint stays where it is, whatever it is said to mimic
     found = {name: mimic for name, mimic in mimics(urdf).items() if full.existJointName(name)}
     ends = followed(found, _joint_names(full), [full.frames[e].name for e in elements])
     held = held_configuration(full, ends)
     in_chain = {full.frames[e].parentJoint for e in elements if full.frames[e].type == pin.FrameType.JOINT}
+    for joint in sorted(in_chain):
+        _joint_type(full, full.names[joint])
     model = _reduced(full, [j for j in range(1, full.njoints) if j not in in_chain], held)
     names = tuple(model.names)[1:]
-    coupling = couple(names, ends, {name: held_position(full, held, name) for name in names if name in ends})
+    coupling = couple(names, ends, tuple(full.names)[1:])
     if not len(coupling.driving):
         raise RobotError("the chain has no movable joint between its root frame and its tool frame")
 
@@ -166,15 +167,16 @@ def build_chain_model(
         gravity = root_rotation.T @ np.array([0.0, 0.0, -STANDARD_GRAVITY])
     model.gravity.linear = root_rotation @ gravity
 
-    lower, upper = common_limits(coupling, names, *_limits(model, joint_types))
+    joint_types = tuple(_joint_type(full, name) for name in coupling.names)
+    lower, upper = common_limits(coupling, names, *_limits(model, names), _limits(full, coupling.names))
     chain = _chain_arrays(full, model, elements, held, coupling)
     _freeze(gravity, lower, upper)
     return ChainModel(
         model,
         full.frames[root].name,
         gravity,
-        tuple(names[j] for j in coupling.driving),
-        tuple(joint_types[j] for j in coupling.driving),
+        coupling.names,
+        joint_types,
         lower,
         upper,
         chain,
@@ -292,31 +294,19 @@ def _elements_between(model: pin.Model, root: int, tool: int) -> list[int]:
     return elements[::-1]
 
 
-def _joint_types(model: pin.Model, elements: list[int]) -> tuple[str, ...]:
-    types = []
-    for element in elements:
-        frame = model.frames[element]
-        if frame.type != pin.FrameType.JOINT:
-            continue
-        kind = model.joints[frame.parentJoint].shortname()
-        if kind.startswith("JointModelRUB") or kind == "JointModelRevoluteUnboundedUnaligned":
-            types.append("continuous")
-        elif kind.startswith("JointModelR"):
-            types.append("revolute")
-        elif kind.startswith("JointModelPrismatic") or kind in (
-            "JointModelPX",
-            "JointModelPY",
-            "JointModelPZ",
-        ):
-            types.append("prismatic")
-        else:
-            named = {"JointModelFreeFlyer": "floating", "JointModelPlanar": "planar"}.get(kind, kind)
-            raise RobotError(
-                f"joint {frame.name!r} of the chain is {named}; "
-                "only revolute, continuous, prismatic and fixed joints are supported",
-                name=frame.name,
-            )
-    return tuple(types)
+def _joint_type(model: pin.Model, name: str) -> str:
+    kind = model.joints[model.getJointId(name)].shortname()
+    if kind.startswith("JointModelRUB") or kind == "JointModelRevoluteUnboundedUnaligned":
+        return "continuous"
+    if kind.startswith("JointModelR"):
+        return "revolute"
+    if kind.startswith("JointModelPrismatic") or kind in ("JointModelPX", "JointModelPY", "JointModelPZ"):
+        return "prismatic"
+    named = {"JointModelFreeFlyer": "floating", "JointModelPlanar": "planar"}.get(kind, kind)
+    raise RobotError(
+        f"joint {name!r} of the chain is {named}; only revolute, continuous, prismatic and fixed joints are supported",
+        name=name,
+    )
 
 
 def _joint_names(model: pin.Model) -> tuple[str, ...]:
@@ -325,13 +315,14 @@ def _joint_names(model: pin.Model) -> tuple[str, ...]:
     return tuple(frame.name for i, frame in enumerate(model.frames) if i > 0 and frame.type in kinds)
 
 
-def _limits(model: pin.Model, joint_types: tuple[str, ...]) -> tuple[Array, Array]:
-    lower, upper = np.full(len(joint_types), -np.inf), np.full(len(joint_types), np.inf)
-    for i, kind in enumerate(joint_types):
-        q = model.joints[i + 1].idx_q
-        low, high = model.lowerPositionLimit[q], model.upperPositionLimit[q]
+def _limits(model: pin.Model, names: Sequence[str]) -> tuple[Array, Array]:
+    """Limits of some joints, which a continuous one has none of."""
+    lower, upper = np.full(len(names), -np.inf), np.full(len(names), np.inf)
+    for i, name in enumerate(names):
+        joint = model.joints[model.getJointId(name)]
+        low, high = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
         # A URDF <limit> without its bounds reads as 0 and 0: an absent limit, not a joint that cannot move.
-        if kind != "continuous" and low < high:
+        if joint.nq == 1 and low < high:
             lower[i], upper[i] = low, high
     return lower, upper
 

@@ -94,9 +94,9 @@ class Scene:
         return np.asarray(link_poses(self.robot, self.q[row])[0])
 
     def joints(self, row: int) -> tuple[Array, Array]:
-        """Return (n, 3) origins and (n, 3) unit axes of the driven joints in one row."""
+        """Return (n, 3) origins and (n, 3) unit axes of the driven joints in one row, or of what first follows them."""
         chain, frames = self.robot.chain, chain_frames(self.robot, self.q[row])
-        elements = [chain.names.index(name) for name in self.robot.joint_names]
+        elements = chain.movable[chain.coupling.driving]
         axes = np.einsum("kij,kj->ki", frames.rotations[0, elements], chain.axes[elements])
         return frames.positions[0, elements], axes
 
