@@ -236,7 +236,8 @@ def test_a_segment_knows_the_joint_that_moves_it():
     moved = {segment.name: segment.joint for segment in coupled("coupled").segments}
     assert moved == {
         "mount": None, "early": "swing", "turret": "turret", "swing": "swing", "stage_1": "stage_1",
-        "stage_2": "stage_1", "stage_3": "stage_1", "half": "turret", "rack": "turret", "jaw": "finger", "tip_joint": None,
+        "stage_2": "stage_1", "stage_3": "stage_1", "half": "turret", "rack": "turret", "jaw": "finger",
+        "tip_joint": None,
     }  # fmt: skip
 
 

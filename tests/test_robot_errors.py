@@ -149,11 +149,13 @@ def test_fingers_that_mimic_nothing_beyond_the_tool_do_not_matter():
     assert refusal(text, "thumb").name == "bend"
 
 
-def test_a_mimic_finger_stands_where_the_other_one_is_held():
+def test_a_mimic_finger_is_driven_by_the_other_one_beside_the_chain():
     pytest.importorskip("example_robot_data", reason="the arm is in the package example-robot-data-loaders")
     assert load_robot("example-robot-data:panda", "panda_hand").n == 7
     finger = load_robot("example-robot-data:panda", "panda_rightfinger")
-    assert finger.joint_names == load_robot("example-robot-data:panda", "panda_hand").joint_names
+    assert finger.joint_names == (*(f"panda_joint{k}" for k in range(1, 8)), "panda_finger_joint1")
+    one, other = finger.forward([0.1] * 7 + [0.0]), finger.forward([0.1] * 7 + [0.03])
+    np.testing.assert_allclose(np.linalg.norm(other[:3, 3] - one[:3, 3]), 0.03, atol=1e-12)
 
 
 def test_an_axis_without_direction_is_named():

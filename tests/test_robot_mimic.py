@@ -62,12 +62,14 @@ def test_a_hand_whose_own_zero_is_off_is_no_zero_of_a_drive():
     assert "geometric" in found.verdict
 
 
-BESIDE = coupled("parallelogram").urdf.replace(
-    'joint="reach" multiplier="-1"', 'joint="lever" multiplier="-0.5"'
-).replace(
-    "</robot>",
-    '<link name="side"/><joint name="lever" type="revolute"><parent link="column"/><child link="side"/>'
-    '<axis xyz="0 1 0"/><limit lower="-2" upper="2" effort="1" velocity="1"/></joint></robot>',
+BESIDE = (
+    coupled("parallelogram")
+    .urdf.replace('joint="reach" multiplier="-1"', 'joint="lever" multiplier="-0.5"')
+    .replace(
+        "</robot>",
+        '<link name="side"/><joint name="lever" type="revolute"><parent link="column"/><child link="side"/>'
+        '<axis xyz="0 1 0"/><limit lower="-2" upper="2" effort="1" velocity="1"/></joint></robot>',
+    )
 )
 """The hand follows a lever beside the chain."""
 

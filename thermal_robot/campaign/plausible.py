@@ -60,7 +60,9 @@ def _beside(campaign: Campaign) -> Iterator[str]:
     robot = campaign.robot
     for joint in (name for name in robot.joint_names if name not in robot.chain.names):
         led = [segment.name for segment in robot.segments if segment.joint == joint]
-        follow = f"joint {led[0]!r} of the chain mimics" if len(led) == 1 else f"joints {listed(led)} of the chain mimic"
+        follow = (
+            f"joint {led[0]!r} of the chain mimics" if len(led) == 1 else f"joints {listed(led)} of the chain mimic"
+        )
         yield f"{follow} {joint!r}, which is outside the chain: its column is read"
 
 

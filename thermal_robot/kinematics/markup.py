@@ -1,22 +1,37 @@
-"""XML that is changed in a few places and stays as it stands everywhere else, to the last blank and comment.
+"""XML that is read once, and changed in a few places; it stays as it stands everywhere else, to the last blank.
 
 A parser that writes a tree anew loses comments, the order of attributes or the digits of numbers. Here it only tells
-where the tags stand; the text between the changes is copied.
+where the tags stand; the text between the changes is copied. Of a URDF that nobody has read it refuses what urdfdom
+takes without a word, or needs hours or all memory for: a text that is no XML, deep or wide.
 """
 
 from __future__ import annotations
 
 import re
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TypeAlias
 from xml.parsers import expat
+
+from thermal_robot.errors import RobotError
 
 Edit: TypeAlias = "tuple[int, int, str]"
 """First byte, byte behind the last one, and the text in its place; an insertion where the two are the same."""
 
 _HIDDEN = re.compile(rb"<!--.*?(?:-->|\Z)|<!\[CDATA\[.*?(?:\]\]>|\Z)|<\?.*?\?>", re.DOTALL)
 _START = re.compile(rb"<[^\s/>]+(?:\s+[^\s=>]+\s*=\s*(?:\"[^\"]*\"|'[^']*'))*\s*/?>")
+_DEEPEST = 100
+"""Elements within each other: no robot has more than ten, and urdfdom refuses 500."""
+_MOST_ATTRIBUTES = 100
+"""Of one element: a dozen at most are in use, and urdfdom's time grows with their square."""
+MOST_JOINTS = 1000
+"""Joints, fixed ones too: the largest humanoids have 220, and Pinocchio's stack ends between 3000 and 4000."""
+IS_XACRO = "is a xacro file; expand it to URDF first (xacro robot.xacro > robot.urdf)"
+_FOREIGN = {
+    "sdf": "is an SDF file",
+    "mujoco": "is an MJCF file (MuJoCo)",
+    "COLLADA": "is a mesh (COLLADA)",
+}
 _ENCODING = re.compile(rb"(\A\s*<\?xml[^>]*?\sencoding\s*=\s*)(\"[^\"]*\"|'[^']*')")
 
 
@@ -56,37 +71,92 @@ def encoded(text: str) -> bytes:
     return _ENCODING.sub(rb'\1"utf-8"', text.encode(errors="replace"), count=1)
 
 
-def tags(content: bytes) -> tuple[Tag, ...]:
+def bare(content: bytes) -> bytes:
+    """Blank comments, raw text and declarations, all else in its place: urdfdom takes ``--`` in a comment, XML not."""
+    return _HIDDEN.sub(lambda span: re.sub(rb"[^\n]", b" ", span[0]), content)
+
+
+def tags(content: bytes, source: str = "") -> tuple[Tag, ...]:
     """Return the elements in the order in which they begin; comments are not read, so they may hold anything.
+
+    Parameters
+    ----------
+    content
+        From :func:`encoded`.
+    source
+        What to call it in an error, where it is a URDF that nobody has read; whether prefixes were declared is not
+        asked.
 
     Raises
     ------
     expat.ExpatError
-        If it is no XML.
+        If it is no XML, and there is no ``source``.
+    RobotError
+        If it is empty, no XML, another kind of file, or deeper or wider than any robot, and there is one.
     """
-    seen = _HIDDEN.sub(lambda span: re.sub(rb"[^\n]", b" ", span[0]), content)
-    found: list[Tag] = []
-    ends: dict[int, int] = {}
-    open_: list[int] = []
-    parser = expat.ParserCreate("utf-8")
+    reader = _Reader(bare(content), source)
+    if source and not content.strip():
+        raise reader.refused("is empty")
+    try:
+        reader.parser.Parse(reader.seen, True)
+    except expat.ExpatError as problem:
+        if not source:
+            raise
+        raise reader.refused(f"is not XML: {problem}") from problem
+    return tuple(reader.found)
 
-    def begin(name: str, attributes: dict[str, str]) -> None:
-        start = parser.CurrentByteIndex
-        tag = _START.match(seen, start)
-        parent = open_[-1] if open_ else -1
-        path = (*(found[parent].path if open_ else ()), name)
-        open_.append(len(found))
-        found.append(Tag(path, attributes, start, tag.end() if tag else start, start, parent))
 
-    def finish(_: str) -> None:
-        ends[open_.pop()] = parser.CurrentByteIndex
+class _Reader:
+    """What expat calls."""
 
-    parser.StartElementHandler, parser.EndElementHandler = begin, finish
-    parser.Parse(seen, True)
-    return tuple(
-        Tag(t.path, t.attributes, t.start, t.stop, t.start if seen[t.stop - 2 : t.stop] == b"/>" else ends[k], t.parent)
-        for k, t in enumerate(found)
-    )
+    def __init__(self, seen: bytes, source: str) -> None:
+        self.seen, self.source = seen, source
+        self.found: list[Tag] = []
+        self.open: list[int] = []
+        self.joints = 0
+        # a text in Python has left its encoding behind, whatever it declares
+        self.parser = expat.ParserCreate("utf-8")
+        self.parser.StartElementHandler, self.parser.EndElementHandler = self.begin, self.finish
+        if source:
+            self.parser.EntityDeclHandler = self.entity
+
+    def refused(self, problem: str) -> RobotError:
+        return RobotError(f"{self.source} {problem}", name=self.source)
+
+    def entity(self, name: str, *_: object) -> None:
+        raise self.refused(
+            f"declares the XML entity {name!r}, which no URDF reader expands; write its text in its place"
+        )
+
+    def begin(self, name: str, attributes: dict[str, str]) -> None:
+        if self.source:
+            self.guard(name, attributes)
+        start = self.parser.CurrentByteIndex
+        tag = _START.match(self.seen, start)
+        parent = self.open[-1] if self.open else -1
+        path = (*(self.found[parent].path if self.open else ()), name)
+        self.open.append(len(self.found))
+        self.found.append(Tag(path, attributes, start, tag.end() if tag else start, start, parent))
+
+    def guard(self, name: str, attributes: dict[str, str]) -> None:
+        # a tag of xacro whose prefix is not declared is left over from an expanded file
+        if name.startswith("xacro:") and self.open and "xmlns:xacro" in self.found[0].attributes:
+            raise self.refused(IS_XACRO)
+        if not self.open and name != "robot":
+            kind = _FOREIGN.get(name, "is XML")
+            raise self.refused(f"{kind} but not a URDF: its root element is <{name}>, expected <robot>")
+        if len(self.open) == _DEEPEST or len(attributes) > _MOST_ATTRIBUTES:
+            what = "elements within each other" if len(self.open) == _DEEPEST else "attributes of one element"
+            raise self.refused(f"has more than 100 {what}, which no URDF has")
+        self.joints += len(self.open) == 1 and name == "joint"
+        if self.joints > MOST_JOINTS:
+            raise self.refused(f"has more than {MOST_JOINTS} joints: cut it to the arm")
+
+    def finish(self, _: str) -> None:
+        number = self.open.pop()
+        tag = self.found[number]
+        if self.seen[tag.stop - 2 : tag.stop] != b"/>":
+            self.found[number] = replace(tag, close=self.parser.CurrentByteIndex)
 
 
 def with_values(content: bytes, tag: Tag, values: Mapping[str, str | None]) -> Edit:

@@ -6,7 +6,6 @@ but no regressors, wants the driving joint to be nearer to the root, and cannot 
 
 from __future__ import annotations
 
-import math
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
@@ -14,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.errors import RobotError
-from thermal_robot.kinematics.elements import read_elements, without_comments
+from thermal_robot.kinematics.markup import encoded, tags
 from thermal_robot.kinematics.urdf import nearest
 
 Array = NDArray[np.float64]
@@ -76,21 +75,13 @@ class Coupling:
 
 
 def mimics(urdf: str) -> dict[str, Mimic]:
-    """Read what every joint with a ``<mimic>`` tag follows, which Pinocchio's default parsing drops.
-
-    Raises
-    ------
-    RobotError
-        If a multiplier or an offset is not a finite number.
-    """
-    found = {}
-    for element in read_elements(without_comments(urdf), "the robot description"):
-        if element.path == ("joint", "mimic") and (name := element.owner.get("name")):
-            said = element.attributes
-            numbers = (
-                _number(said.get(key), key, default, name) for key, default in (("multiplier", 1.0), ("offset", 0.0))
-            )
-            found[name] = Mimic(said.get("joint", ""), *numbers)
+    """Read what every joint with a ``<mimic>`` tag follows, which Pinocchio's default parsing drops."""
+    found, every = {}, tags(encoded(urdf), "the robot description")
+    for tag in every:
+        if tag.path == ("robot", "joint", "mimic") and (name := every[tag.parent].attributes.get("name")):
+            said = tag.attributes
+            times, offset = float(said.get("multiplier", 1.0)), float(said.get("offset", 0.0))
+            found[name] = Mimic(said.get("joint", ""), times, offset)
     return found
 
 
@@ -215,13 +206,3 @@ def common_limits(
                 name=name,
             )
     return low, high
-
-
-def _number(text: str | None, name: str, default: float, joint: str) -> float:
-    try:
-        value = default if text is None else float(text)
-    except ValueError:
-        value = math.nan
-    if not math.isfinite(value):
-        raise RobotError(f"the {name} with which joint {joint!r} mimics another is {text!r}, no number", name=joint)
-    return value

@@ -9,12 +9,12 @@ import re
 import sys
 import tempfile
 import threading
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterable, Iterator, Sequence
 
 import pinocchio as pin
 
 from thermal_robot.errors import RobotError
-from thermal_robot.kinematics.elements import IS_XACRO, Element, read_elements, without_comments
+from thermal_robot.kinematics.markup import IS_XACRO, Edit, Tag, bare, changed, encoded, tags
 
 # Redirecting the process's output streams is global: one thread at a time.
 _STREAMS = threading.Lock()
@@ -36,40 +36,36 @@ def parse_urdf(urdf: str, source: str) -> pin.Model:
         If the text is not a URDF, with the reason.
     """
     said: list[str] = []
-    text = without_comments(urdf)
-    whole = with_limits(text, read_elements(text, source))
+    content = bare(encoded(urdf))
+    whole = with_limits(content, tags(content, source))
     try:
         with _quiet(said):
             return pin.buildModelFromXML(whole)
     except (ValueError, RuntimeError) as error:
         reasons = re.findall(r"Error:\s+(.*)", "".join(said))
-        why = IS_XACRO if "<xacro:" in text else f"is not a valid URDF: {reasons[0] if reasons else error}"
+        why = IS_XACRO if b"<xacro:" in content else f"is not a valid URDF: {reasons[0] if reasons else error}"
         raise RobotError(f"{source} {why}", name=source) from error
 
 
-def with_limits(text: str, elements: Iterable[Element]) -> str:
+def with_limits(content: bytes, found: Sequence[Tag]) -> str:
     """Give each joint the limits that urdfdom asks for and nobody here uses; bounds of 0 and 0 stand for none.
 
     Parameters
     ----------
-    text
+    content
         XML without comments.
-    elements
-        Of it.
+    found
+        Its elements.
     """
-    limited = {element.number for element in elements if element.path == ("joint", "limit")}
-    added: list[tuple[int, str]] = []
-    for element in elements:
-        if element.path == ("joint", "limit"):
-            more = "".join(f' {name}="0"' for name in ("effort", "velocity") if name not in element.attributes)
-            added.append((element.start + len("<limit"), more))
-        elif element.path == ("joint",) and element.number not in limited:
-            added.append((element.end, '<limit effort="0" velocity="0"/>'))
-    content, parts, last = text.encode(errors="replace"), [], 0
-    for place, more in sorted(added):
-        parts += [content[last:place], more.encode()]
-        last = place
-    return b"".join([*parts, content[last:]]).decode()
+    limits = {t.parent: t for t in found if t.path == ("robot", "joint", "limit")}
+    edits: list[Edit] = []
+    for number, tag in enumerate(found):
+        if tag.path == ("robot", "joint") and number not in limits:
+            edits.append((tag.close, tag.close, '<limit effort="0" velocity="0"/>'))
+    for tag in limits.values():
+        more = "".join(f' {name}="0"' for name in ("effort", "velocity") if name not in tag.attributes)
+        edits.append((tag.start + len("<limit"), tag.start + len("<limit"), more))
+    return changed(content, edits).lstrip()
 
 
 def nearest(name: str, known: Iterable[str]) -> tuple[str, ...]:
