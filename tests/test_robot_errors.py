@@ -4,6 +4,7 @@ import os
 import re
 import sys
 
+import numpy as np
 import pytest
 from coupled import PARALLELOGRAM, joint, link
 

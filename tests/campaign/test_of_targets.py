@@ -91,6 +91,16 @@ def test_targets_that_do_not_keep_their_places_are_told(tmp_path: Path) -> None:
     assert not read(tmp_path, table=text(table(4, rows=12)), toml=UNKNOWN).warnings
 
 
+def test_a_tool_that_is_declared_known_counts_as_unknown(tmp_path: Path) -> None:
+    known, plain = (read(tmp_path, table=text(table(4, rows=12)), toml=toml) for toml in (TOML, UNKNOWN))
+    assert known.warnings == (
+        'where several targets sit on the tool is fitted: tool = "known" counts as "unknown"',
+        *plain.warnings,
+    )
+    assert (known.tool_known, known.settings.tool_known) == (False, False)
+    np.testing.assert_array_equal(known.position, plain.position)
+
+
 def changed(**columns: Any) -> pd.DataFrame:
     return table().assign(**columns)
 
@@ -98,7 +108,6 @@ def changed(**columns: Any) -> pd.DataFrame:
 @pytest.mark.parametrize(
     ("frame", "toml", "column", "words"),
     [
-        (table(), TOML, "x.1", ["is not stated, but fitted", 'tool = "unknown" under [frames]']),
         (table(2), UNKNOWN, "x.1", ["too few targets", "at least 3 as x.1 y.1 z.1, x.2 …; or one, as x y z"]),
         (table().drop(columns="y.2"), UNKNOWN, "y.2", ["stand together or not at all", "only 'x.2', 'z.2'"]),
         (changed(x=1.0, y=2.0, z=3.0), UNKNOWN, "x", ["a target without a number stands beside those with one"]),

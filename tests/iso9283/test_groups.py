@@ -1,9 +1,12 @@
 """Which rows are repeats, directions and times."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from clouds import cell
 
+from thermal_robot.campaign.validate import arrived
 from thermal_robot.iso9283.groups import directions, repeats, times
 
 
@@ -51,6 +54,18 @@ def test_directions_are_the_same_sign_in_every_joint(rv_m2):
     assert directions(cell(rv_m2, [0] * 6, covariates=nothing), rows) is None
     never = {"approach.joint_1": np.array([1.0, 0] * 3), "approach.joint_2": np.array([0, 1.0] * 3)}
     assert directions(cell(rv_m2, [0] * 6, covariates=never), rows) is None
+
+
+def test_nobody_knows_from_where_a_pose_is_repeated_in_a_row(rv_m2):
+    clock = {"covariates": {"time": np.arange(12.0)}}
+    in_a_row = arrived(cell(rv_m2, np.repeat([0, 1], 6), **clock))
+    assert in_a_row.derived
+    assert directions(in_a_row, np.arange(6)) is directions(in_a_row, np.arange(6, 12)) is None
+    # in turns, the order of the rows tells it; what was recorded is believed
+    in_turns = arrived(cell(rv_m2, [0, 1] * 6, **clock))
+    assert [len(part) for part in directions(in_turns, np.arange(1, 12, 2))] == [6]
+    recorded = replace(in_a_row, derived=())
+    assert [len(part) for part in directions(recorded, np.arange(6, 12))] == [6]
 
 
 @pytest.mark.parametrize(("cycles", "parts"), [(19, []), (20, [10, 10]), (30, [10, 10, 10]), (400, [50] * 8)])

@@ -7,6 +7,8 @@ import pytest
 from clouds import ELEVEN, TURNS, cell
 from simulate import random_motion
 
+from thermal_robot import campaign_from_table
+from thermal_robot.campaign import Units, read_campaign, write_campaign
 from thermal_robot.errors import CampaignError
 from thermal_robot.iso9283 import performance
 from thermal_robot.observations import Frames, observe
@@ -132,3 +134,34 @@ def test_scatter_of_a_known_size_is_found(rv_m2):
     assert np.mean([r.position for r in found]) == pytest.approx(0.97 * 72.3e-6, rel=0.02)
     held = [r.ci95[0] < 72.3e-6 < r.ci95[1] for r in found]
     assert sum(held) >= 53
+
+
+@pytest.mark.parametrize("poses", [1, 2])
+@pytest.mark.parametrize("unit", ["m", "mm", "inch"])
+def test_few_poses_tell_repeatability_without_frames(rv_m2, tmp_path, poses, unit):
+    """A robot's acceptance test: 30 cycles in a row, the tracker anywhere, the target's place unknown."""
+    frames = Frames(random_motion(np.random.default_rng(1), 3.0), random_motion(np.random.default_rng(2), 0.1))
+    scatter = np.random.default_rng(3).normal(0.0, 3e-5, (30 * poses, 3))
+    clock = {"time": 10.0 * np.arange(30 * poses)}
+    known = cell(rv_m2, np.repeat(np.arange(poses), 30), scatter, frames=frames, covariates=clock)
+    unknown = replace(known, base_known=False, tool_known=False, units=Units("deg", unit))
+    found = performance(read_campaign(write_campaign(unknown, tmp_path)))
+    for pose, expected in zip(found.poses, performance(known, frames=frames).poses, strict=True):
+        assert (pose.cycles, pose.accuracy, pose.directions) == (30, None, None)
+        assert pose.repeatability.position == pytest.approx(expected.repeatability.position, rel=1e-6)
+    assert any("AP and AT cannot be told" in note for note in found.notes)
+    assert all(row[2] == "–" for row in found.tables[0].rows)
+
+
+def test_several_targets_tell_repeatability_of_two_poses(rv_m2, tmp_path):
+    scatter = np.random.default_rng(3).normal(0.0, 3e-5, (60, 3))
+    one = cell(rv_m2, np.repeat([0, 1], 30), scatter)
+    frame, pose = one.to_frame().drop(columns=["x", "y", "z"]), rv_m2.forward(one.q)
+    for k, place in enumerate(np.vstack([np.eye(3), -np.eye(3)]) * 0.1, start=1):
+        frame[[f"x.{k}", f"y.{k}", f"z.{k}"]] = one.position + pose[:, :3, :3] @ place
+    several = campaign_from_table(rv_m2, frame, tool="known")
+    assert any('tool = "known" counts as "unknown"' in warning for warning in several.warnings)
+    found, expected = performance(several), performance(one)
+    for pose, same in zip(found.poses, expected.poses, strict=True):
+        assert pose.repeatability.position == pytest.approx(same.repeatability.position, rel=1e-6)
+        assert max(pose.repeatability.angles) < 1e-9

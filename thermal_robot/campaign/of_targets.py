@@ -23,10 +23,10 @@ def of_targets(table: Table, columns: Columns, settings: Settings) -> tuple[Tabl
     Raises
     ------
     CampaignError
-        Targets that are declared known, or beside a simulator's; a place of which one or two figures lack; targets on
+        Targets beside a simulator's; a place of which one or two figures lack; targets on
         a line in all rows, or one that is never seen beside the others.
     """
-    _refuse_known(table, columns, settings)
+    _refuse_simulated(table, columns)
     points = np.stack([_points(table, number) for number in columns.targets], axis=1) * settings.units.length_scale
     kept = telling(points)
     if not kept.any():
@@ -46,6 +46,8 @@ def of_targets(table: Table, columns: Columns, settings: Settings) -> tuple[Tabl
             expected="rows that show it beside them",
         )
     warnings = []
+    if settings.tool_known:
+        warnings.append('where several targets sit on the tool is fitted: tool = "known" counts as "unknown"')
     if not kept.all():
         several = f"fewer than {FEWEST} targets, or targets on a line"
         warnings.append(f"{table.told(~kept)} left out: {several} tell no pose")
@@ -53,21 +55,12 @@ def of_targets(table: Table, columns: Columns, settings: Settings) -> tuple[Tabl
     return taken, told, [*warnings, *_doubts(taken, told, settings)]
 
 
-def _refuse_known(table: Table, columns: Columns, settings: Settings) -> None:
-    first = names.axes_of(columns.targets[0])[0]
-    if settings.tool_known:
-        raise CampaignError(
-            table.file,
-            "where several targets sit on the tool is not stated, but fitted",
-            column=first,
-            found='tool = "known"',
-            expected='tool = "unknown" under [frames]; or one target, as x y z',
-        )
+def _refuse_simulated(table: Table, columns: Columns) -> None:
     if columns.has_simulated_position:
         raise CampaignError(
             table.file,
             "sim.x, sim.y, sim.z predict one target",
-            column=first,
+            column=names.axes_of(columns.targets[0])[0],
             found=f"{len(columns.targets)} targets",
             expected="one target, as x y z; or no columns sim.*",
         )

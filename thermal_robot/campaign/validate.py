@@ -60,6 +60,7 @@ def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str,
     left_out: list[str] = []
     if columns.targets:
         table, told, left_out = of_targets(table, columns, settings)
+        settings = replace(settings, tool_known=False)
     covariates, missing, gaps = _covariates(table, columns, robot, units)
     campaign = Campaign(
         name=name,
@@ -84,7 +85,7 @@ def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str,
         urdf=settings.urdf,
     )
     if measured:
-        _require_enough(table.file, campaign)
+        left_out += _too_few(table.file, campaign)
     warnings = (*table.warnings, *columns.warnings, *left_out, *gaps, *doubts(campaign))
     return replace(arrived(campaign), warnings=warnings)
 
@@ -214,8 +215,8 @@ def _quaternions(table: Table, group: Sequence[str]) -> FloatArray:
     return unit
 
 
-def _require_enough(file: str, campaign: Campaign) -> None:
-    """Refuse a campaign whose rows cannot determine the frames that it declares unknown."""
+def _too_few(file: str, campaign: Campaign) -> list[str]:
+    """Say that the rows cannot determine the frames that are declared unknown; refuse them where none is repeated."""
     pose = campaign.measures == "pose"
     equations = 6 if pose else 3
     base = 0 if campaign.base_known else 6
@@ -224,11 +225,12 @@ def _require_enough(file: str, campaign: Campaign) -> None:
     if base:
         needed = max(needed, MINIMUM_POSES)
     distinct = len(np.unique(np.round(campaign.q, SAME_CONFIGURATION), axis=0))
-    if distinct < needed:
-        unknown = " and ".join(word for word, count in (("base", base), ("tool", tool)) if count)
-        raise CampaignError(
-            file,
-            f"too few measurements to find the unknown {unknown} frame{'s' if base and tool else ''}",
-            found=f"{campaign.samples} rows with {distinct} different joint configurations",
-            expected=f"at least {needed} different configurations",
-        )
+    if distinct >= needed:
+        return []
+    unknown = " and ".join(word for word, count in (("base", base), ("tool", tool)) if count)
+    problem = f"too few measurements to find the unknown {unknown} frame{'s' if base and tool else ''}"
+    found = f"{campaign.samples} rows with {distinct} different joint configurations"
+    expected = f"at least {needed} different configurations"
+    if distinct == campaign.samples:
+        raise CampaignError(file, problem, found=found, expected=expected)
+    return [f"{problem}: found {found}, expected {expected}; they tell repeatability alone"]

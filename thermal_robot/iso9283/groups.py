@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign
+from thermal_robot.campaign.marks import SAME_COMMAND
 from thermal_robot.campaign.names import split_name
 from thermal_robot.inference.rows import in_order, repeated_poses
 
@@ -75,18 +76,29 @@ def repeats(campaign: Campaign) -> tuple[list[Repeats], int]:
 def directions(campaign: Campaign, rows: Rows) -> list[Rows] | None:
     """Group repeats of one pose by the direction of approach, the same sign in every joint.
 
-    Rows in which a joint's direction is unknown belong to none. ``None`` where no direction is known.
+    Rows in which a joint's direction is unknown belong to none. ``None`` where half of them do: nobody recorded it, and the
+    pose was repeated in a row.
     """
-    signs = [values[rows] for name, values in campaign.covariates.items() if split_name(name)[0] == "approach"]
+    columns = [name for name in campaign.covariates if split_name(name)[0] == "approach"]
+    signs = [campaign.covariates[name][rows] for name in columns]
     told = [sign for sign in signs if np.any(sign)]  # a joint that never moves has none, and tells nothing
     if not told:
         return None
     from_where = np.column_stack(told)
     known = (from_where != 0.0).all(axis=1)
-    if not known.any():
+    if set(columns) <= set(campaign.derived):
+        known &= _came(campaign)[rows]
+    if 2 * known.sum() <= len(rows):
         return None
     number = np.unique(from_where[known], axis=0, return_inverse=True)[1].ravel()
     return [rows[known][number == k] for k in range(int(number.max()) + 1)]
+
+
+def _came(campaign: Campaign) -> NDArray[np.bool_]:
+    """(N,) whether the row before was of other commands, so that the order tells from where the robot came."""
+    order, came = in_order(campaign), np.ones(campaign.samples, dtype=bool)
+    came[order[1:]] = np.abs(np.diff(campaign.q[order], axis=0)).max(axis=1) > SAME_COMMAND
+    return came
 
 
 def times(campaign: Campaign, rows: Rows) -> list[Rows]:
