@@ -7,13 +7,13 @@ import numpy as np
 import pytest
 from bodies import bodies, displaced, mine
 from helpers import NOISE, SAMPLES, commanded, tool_with, without_masses
+from reference import tool_poses
 from simulate import simulate
 
 from thermal_robot.campaign import Campaign
 from thermal_robot.effects import JointCompliance, LinkCompliance, choose
 from thermal_robot.effects.beam import beams, cross_axes, shafts
 from thermal_robot.inference.fit import fit
-from thermal_robot.kinematics.reference import tool_poses
 from thermal_robot.observations import observe
 from thermal_robot.robot import load_robot
 

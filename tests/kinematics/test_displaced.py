@@ -2,9 +2,9 @@
 
 import numpy as np
 import pytest
+import reference
 
 from thermal_robot.errors import RobotError
-from thermal_robot.kinematics import reference
 from thermal_robot.kinematics.displaced import Displaced, Displacement
 from thermal_robot.kinematics.frames import tool_poses
 

@@ -2,9 +2,10 @@
 
 import numpy as np
 import pytest
+import reference
 
 from thermal_robot import kinematics as kin
-from thermal_robot.kinematics import compiled, engines, lanes, reference, settings, thin
+from thermal_robot.kinematics import compiled, engines, lanes, settings, thin
 
 ROWS = 150
 POINT = np.array([0.05, -0.1, 0.2])

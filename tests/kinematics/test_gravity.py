@@ -5,9 +5,9 @@ import xml.etree.ElementTree as ElementTree
 import numpy as np
 import pinocchio
 import pytest
+import reference
 
 from thermal_robot import kinematics as kin
-from thermal_robot.kinematics import reference
 from thermal_robot.kinematics.model import PRISMATIC
 from thermal_robot.robot import load_robot
 

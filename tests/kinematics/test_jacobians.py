@@ -2,10 +2,11 @@
 
 import numpy as np
 import pytest
+import reference
 
 from thermal_robot import kinematics as kin
 from thermal_robot.errors import RobotError
-from thermal_robot.kinematics import reference, settings
+from thermal_robot.kinematics import settings
 
 ROWS = 200
 TOLERANCE = 1e-10

@@ -3,9 +3,9 @@
 import numpy as np
 import pinocchio
 import pytest
+import reference
 
 from thermal_robot import kinematics as kin
-from thermal_robot.kinematics import reference
 
 STEP = 1e-5
 TOLERANCE = 2e-9  # STEP² times lengths of a metre or two, and rounding over STEP

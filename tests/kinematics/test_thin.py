@@ -5,9 +5,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import reference
 
 from thermal_robot import kinematics as kin
-from thermal_robot.kinematics import reference, thin
+from thermal_robot.kinematics import thin
 
 ROWS = 20
 

@@ -2,8 +2,8 @@
 
 import numpy as np
 import pytest
+import reference
 
-from thermal_robot.kinematics import reference
 from thermal_robot.kinematics.displaced import NOWHERE
 from thermal_robot.kinematics.walk import steps, walk
 

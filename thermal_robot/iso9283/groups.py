@@ -76,8 +76,8 @@ def repeats(campaign: Campaign) -> tuple[list[Repeats], int]:
 def directions(campaign: Campaign, rows: Rows) -> list[Rows] | None:
     """Group repeats of one pose by the direction of approach, the same sign in every joint.
 
-    Rows in which a joint's direction is unknown belong to none. ``None`` where half of them do: nobody recorded it, and the
-    pose was repeated in a row.
+    Rows in which a joint's direction is unknown belong to none. ``None`` where half of them do: nobody recorded
+    it, and the pose was repeated in a row.
     """
     columns = [name for name in campaign.covariates if split_name(name)[0] == "approach"]
     signs = [campaign.covariates[name][rows] for name in columns]

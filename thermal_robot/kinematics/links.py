@@ -8,8 +8,6 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
-from thermal_robot.kinematics.reference import to_pinocchio
-
 if TYPE_CHECKING:
     from thermal_robot.robot import Robot
 
@@ -40,3 +38,25 @@ def link_poses(robot: Robot, q: ArrayLike) -> Array:
         pin.framesForwardKinematics(model, data, configuration)
         poses[i] = [data.oMf[root].actInv(data.oMf[frame]).homogeneous for frame in frames]
     return poses
+
+
+def to_pinocchio(robot: Robot, q: ArrayLike) -> Array:
+    """Write configurations as Pinocchio does: mimicking joints too, a continuous joint as its cosine and sine.
+
+    Parameters
+    ----------
+    robot
+        The robot.
+    q
+        (N, n) rad or m.
+
+    Returns
+    -------
+    ndarray
+        (N, nq).
+    """
+    rows = robot.chain.coupling.positions(np.atleast_2d(np.asarray(q, dtype=float)))
+    columns = []
+    for joint, position in zip(list(robot.model.joints)[1:], rows.T, strict=True):
+        columns += [np.cos(position), np.sin(position)] if joint.nq == 2 else [position]
+    return np.column_stack(columns)

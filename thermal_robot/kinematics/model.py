@@ -151,9 +151,8 @@ def build_chain_model(
     found = {name: mimic for name, mimic in mimics(urdf).items() if full.existJointName(name)}
     ends = followed(found, _joint_names(full), [full.frames[e].name for e in elements])
     held = held_configuration(full, ends)
-    in_chain = {full.frames[e].parentJoint for e in elements if full.frames[e].type == pin.FrameType.JOINT}
-    for joint in sorted(in_chain):
-        _joint_type(full, full.names[joint])
+    moving = [full.frames[e] for e in elements if full.frames[e].type == pin.FrameType.JOINT]
+    in_chain = {frame.parentJoint: _joint_type(full, frame.name) for frame in moving}
     model = _reduced(full, [j for j in range(1, full.njoints) if j not in in_chain], held)
     names = tuple(model.names)[1:]
     coupling = couple(names, ends, tuple(full.names)[1:])

@@ -15,33 +15,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from thermal_robot.kinematics.augmented import augmented_model
 from thermal_robot.kinematics.frames import ChainFrames, Displacement
+from thermal_robot.kinematics.links import to_pinocchio
 
 if TYPE_CHECKING:
     from thermal_robot.robot import Robot
 
 Array = NDArray[np.float64]
-
-
-def to_pinocchio(robot: Robot, q: ArrayLike) -> Array:
-    """Write configurations as Pinocchio does: mimicking joints too, a continuous joint as its cosine and sine.
-
-    Parameters
-    ----------
-    robot
-        The robot.
-    q
-        (N, n) rad or m.
-
-    Returns
-    -------
-    ndarray
-        (N, nq).
-    """
-    rows = robot.chain.coupling.positions(np.atleast_2d(np.asarray(q, dtype=float)))
-    columns = []
-    for joint, position in zip(list(robot.model.joints)[1:], rows.T, strict=True):
-        columns += [np.cos(position), np.sin(position)] if joint.nq == 2 else [position]
-    return np.column_stack(columns)
 
 
 def chain_frames(robot: Robot, q: ArrayLike, displacement: Displacement | None = None) -> ChainFrames:
