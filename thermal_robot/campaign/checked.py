@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from typing import Any
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.campaign.figures import LARGEST_COMMAND, SMALLEST, first_beyond, impossible, no_orientation, settled
-from thermal_robot.campaign.names import did_you_mean, listed
+from thermal_robot.campaign.figures import LARGEST_COMMAND, SMALLEST, first_beyond, no_orientation, settled
+from thermal_robot.campaign.names import did_you_mean, listed, split_name
+from thermal_robot.campaign.settings import ABSOLUTE_ZERO
 from thermal_robot.errors import CampaignError
 from thermal_robot.schema import LARGEST
+
+Rows: TypeAlias = "NDArray[np.int64]"
 
 _NUMBERS = "a finite number in every place"
 
@@ -62,33 +65,48 @@ def checked_array(file: str, key: str, value: Any, shape: tuple[int, ...], kind:
     return array
 
 
-def check_quaternions(file: str, key: str, quaternions: NDArray[np.float64]) -> None:
+def check_quaternions(file: str, key: str, quaternions: NDArray[np.float64], rows: Rows | None = None) -> None:
     """Refuse (N, 4) quaternions of which one is no orientation.
 
     Raises
     ------
     CampaignError
-        Naming the first.
+        Naming the first: by its number of (N,) ``rows``, else by its index.
     """
-    row = no_orientation(quaternions)
-    if row is not None:
-        found, expected = f"{quaternions[row]} at index {row}", "qw, qx, qy, qz of length 1"
-        raise CampaignError(file, "no orientation", column=key, found=found, expected=expected)
+    index = no_orientation(quaternions)
+    if index is not None:
+        four = ", ".join(f"{part:g}" for part in quaternions[index])
+        found, expected = f"({four}) of length {np.linalg.norm(quaternions[index]):.3g}", "qw, qx, qy, qz of length 1"
+        problem = "no orientation: the quaternion's length is not 1"
+        raise CampaignError(file, problem, column=key, expected=expected, **_at(found, index, rows))
 
 
-def check_covariate(file: str, name: str, values: NDArray[np.float64]) -> None:
-    """Refuse (N,) numbers that cannot be what their name says.
+def check_covariate(file: str, name: str, values: NDArray[np.float64], rows: Rows | None = None) -> None:
+    """Refuse (N,) numbers that cannot be what their name says; NaN passes.
 
     Raises
     ------
     CampaignError
-        Naming the first.
+        Naming the first: by its number of (N,) ``rows``, else by its index.
     """
-    wrong = impossible(name, values)
-    if wrong:
-        row, expected = wrong
-        found = f"{values[row]:.15g} at index {row}"
-        raise CampaignError(file, "impossible value", column=name, found=found, expected=expected)
+    quantity, place = split_name(name)
+    if quantity == "approach" and place:
+        refused, expected = ~np.isin(values, (-1.0, 0.0, 1.0)) & ~np.isnan(values), "-1, 0 or 1"
+    elif name == "payload":
+        refused, expected = values < 0, "a mass in kg that is not negative"
+    elif quantity == "temperature":
+        refused, expected = values < ABSOLUTE_ZERO, "°C"
+    else:
+        return
+    if refused.any():
+        row = int(np.argmax(refused))
+        told = _at(f"{values[row]:.15g}", row, rows)
+        raise CampaignError(file, "impossible value", column=name, expected=expected, **told)
+
+
+def _at(found: str, index: int, rows: Rows | None) -> dict[str, Any]:
+    """Return what was found, and in which row: by its number, where there are any."""
+    return {"found": f"{found} at index {index}"} if rows is None else {"found": found, "row": int(rows[index])}
 
 
 def check_joints(file: str, key: str, named: Iterable[str], joints: tuple[str, ...]) -> None:

@@ -5,17 +5,15 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.campaign.names import split_name
-from thermal_robot.campaign.settings import ABSOLUTE_ZERO
 from thermal_robot.schema import LARGEST
 
 SMALLEST = 1e-30
 """In any unit: what is nearer to 0 is 0; a picometre in metres is 1e-12."""
-LARGEST_COMMAND = 1e6
-"""rad or m: 160 000 turns, which leave ten digits for the angle."""
 QUATERNION_TOLERANCE = 0.1
 """A quaternion whose length differs from 1 by more is a mistake, not a rounding: four parts that are written with one
 decimal change the length by at most 0.05 · √4."""
+LARGEST_COMMAND = 1e6
+"""rad or m: 160 000 turns, which leave ten digits for the angle."""
 
 
 def first_beyond(values: NDArray[np.float64], most: float = LARGEST) -> int | None:
@@ -29,20 +27,6 @@ def settled(values: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return the figures with those that are next to nothing as 0; the array itself where there are none."""
     vanishing = (np.abs(values) < SMALLEST) & (values != 0.0)
     return np.where(vanishing, 0.0, values) if vanishing.any() else values
-
-
-def impossible(column: str, values: NDArray[np.float64]) -> tuple[int, str] | None:
-    """Return the row of the first number that cannot be what the column says, and what can; NaN passes."""
-    quantity, place = split_name(column)
-    if quantity == "approach" and place:
-        refused, expected = ~np.isin(values, (-1.0, 0.0, 1.0)) & ~np.isnan(values), "-1, 0 or 1"
-    elif column == "payload":
-        refused, expected = values < 0, "a mass in kg that is not negative"
-    elif quantity == "temperature":
-        refused, expected = values < ABSOLUTE_ZERO, "°C"
-    else:
-        return None
-    return (int(np.argmax(refused)), expected) if refused.any() else None
 
 
 def no_orientation(quaternions: NDArray[np.float64]) -> int | None:

@@ -68,7 +68,8 @@ def _places(campaign: Campaign) -> Iterator[tuple[tuple[str, ...], FloatArray]]:
 
 
 def _of_points(campaign: Campaign, names: tuple[str, ...], points: FloatArray) -> Iterator[tuple[Mask, str]]:
-    q, seen, scale = campaign.q, np.isfinite(points).all(axis=1), campaign.units.length_scale
+    q, scale = campaign.q, campaign.units.length_scale
+    seen = np.asarray(np.isfinite(points).all(axis=1))
     places, figures = _equal(q, points, seen), [_equal(q, points[:, k], seen) for k in range(3)]
     # places that most rows share were meant: a ball in its socket
     if not any((places, *figures)) or 2 * sum(int(rows.sum()) for rows in places) > seen.sum():
@@ -135,7 +136,7 @@ def copies(campaign: Campaign) -> Mask:
     A repeat may well measure the same digits, but not at the same time. Where none is recorded, equal rows are repeats
     if the figures are so coarse that some would agree by chance.
     """
-    return _originals(campaign) != np.arange(campaign.samples)
+    return np.asarray(_originals(campaign) != np.arange(campaign.samples))
 
 
 def doubled(campaign: Campaign) -> Iterator[str]:

@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 
 from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign, FloatArray
-from thermal_robot.campaign.figures import LARGEST_COMMAND, SMALLEST, first_beyond, impossible, no_orientation
+from thermal_robot.campaign.checked import check_covariate, check_quaternions
+from thermal_robot.campaign.figures import LARGEST_COMMAND, SMALLEST, first_beyond
 from thermal_robot.campaign.fill import fill
 from thermal_robot.campaign.names import CLOCK, split_name
 from thermal_robot.campaign.noise import told_by
@@ -128,7 +129,7 @@ def _covariates(
     clock = _clock(table, columns)
     for column in (*columns.covariates, *columns.extra):
         values = table.numbers(column, gaps=True)
-        _check_covariate(table, column, values)
+        check_covariate(table.file, column, values, table.rows)
         gaps = np.isnan(values)
         if gaps.any():
             values, how = fill(column, values, None if column in CLOCK else clock)
@@ -145,21 +146,6 @@ def _clock(table: Table, columns: Columns) -> FloatArray | None:
         if name in columns.covariates and not np.isnan(values := table.numbers(name, gaps=True)).any():
             return values
     return None
-
-
-def _check_covariate(table: Table, column: str, values: NDArray[np.float64]) -> None:
-    """Refuse numbers that cannot be what the column says; NaN passes."""
-    wrong = impossible(column, values)
-    if wrong:
-        index, expected = wrong
-        raise CampaignError(
-            table.file,
-            "impossible value",
-            row=int(table.rows[index]),
-            column=column,
-            found=f"{values[index]:.15g}",
-            expected=expected,
-        )
 
 
 def _vectors(table: Table, group: Sequence[str], units: Units) -> FloatArray:
@@ -200,18 +186,8 @@ def _noise_of_rows(table: Table, settings: Settings) -> FloatArray:
 def _quaternions(table: Table, group: Sequence[str]) -> FloatArray:
     """(N, 4) unit quaternions wxyz."""
     quaternions: FloatArray = np.column_stack([table.numbers(column) for column in group])
-    lengths = np.linalg.norm(quaternions, axis=1)
-    index = no_orientation(quaternions)
-    if index is not None:
-        raise CampaignError(
-            table.file,
-            "no orientation: the quaternion's length is not 1",
-            row=int(table.rows[index]),
-            column=group[0],
-            found=f"({', '.join(f'{part:g}' for part in quaternions[index])}) of length {lengths[index]:.3g}",
-            expected="qw, qx, qy, qz of length 1",
-        )
-    unit: FloatArray = quaternions / lengths[:, None]
+    check_quaternions(table.file, group[0], quaternions, table.rows)
+    unit: FloatArray = quaternions / np.linalg.norm(quaternions, axis=1, keepdims=True)
     return unit
 
 
