@@ -240,8 +240,8 @@ def load_robot(
 
     Joints outside the chain, and those between the root of the URDF and ``root_frame``, are held at 0, or at
     their limit nearest to 0. A joint of the chain with a ``<mimic>`` tag follows the joint that it names, wherever that
-    one is: one beside the chain is a joint of the robot, too, its own link being held. Outside the chain a joint with such a tag is held, where
-    the held position of the other one takes it.
+    one is: one beside the chain is a joint of the robot, too, its own link being held. Outside the chain a joint with
+    such a tag is held, where the held position of the other one takes it.
 
     Parameters
     ----------

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from thermal_robot.iso9283 import Attained
-from thermal_robot.iso9283.attained import angles, mean_rotation, three
+from thermal_robot.iso9283.criteria import angles, mean_rotation, three
 from thermal_robot.kinematics import exp3
 
 

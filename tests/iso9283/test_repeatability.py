@@ -6,7 +6,7 @@ from clouds import cloud
 from scipy.spatial.transform import Rotation
 
 from thermal_robot.iso9283 import Attained, repeatability
-from thermal_robot.iso9283.repeatability import of_noise
+from thermal_robot.iso9283.criteria import of_noise
 
 # RP_l of endlessly many cycles with σ = 1 in all directions (Maxwell), in a plane (Rayleigh), on a line (half-normal):
 # mean and standard deviation from tables.

@@ -114,9 +114,8 @@ def test_what_a_segment_carries_is_what_pinocchio_says(arm, configurations):
 
 
 def whole_configurations(full, arm, q):
-    """The chain's joints as given, every other one where it is held, as Pinocchio writes them."""
+    """The chain's joints as given, every other one where it is held, even if it drives the chain, for Pinocchio."""
     rows, tree = [], ElementTree.fromstring(arm.urdf)
-    beside = set(arm.joint_names) - set(arm.chain.names)  # they drive joints of the chain, and their links are held
     for values in q:
         row, at, held = pinocchio.neutral(full), {}, {}
         for j, name in enumerate(full.names[1:], start=1):
@@ -126,7 +125,7 @@ def whole_configurations(full, arm, q):
             held[name] = value
             at[name] = values[arm.joint_names.index(name)] if name in arm.joint_names else value
         for j, name in enumerate(full.names[1:], start=1):
-            joint, value = full.joints[j], held[name] if name in beside else position(tree, name, at)
+            joint, value = full.joints[j], position(tree, name, at if name in arm.chain.names else held)
             if joint.nq == 2:
                 row[joint.idx_q : joint.idx_q + 2] = np.cos(value), np.sin(value)
             elif joint.nq == 1:

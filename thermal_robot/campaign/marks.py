@@ -14,7 +14,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.campaign.campaign import Campaign, FloatArray
-from thermal_robot.campaign.mistakes import FEWEST_ROWS, step_of
 from thermal_robot.campaign.names import CLOCK, axes_of
 from thermal_robot.campaign.names import POSITION as XYZ
 from thermal_robot.campaign.table import told_rows
@@ -22,6 +21,8 @@ from thermal_robot.kinematics import tool_poses
 
 Mask = NDArray[np.bool_]
 
+FEWEST_ROWS = 10
+"""Rows from which figures that all end alike were rounded, and are no accident."""
 ASTRAY_PLACE, ASTRAY_FIGURE = 3.0, 10.0
 """Times the others' median distance from the regression beyond which rows with one place, or one figure of a place,
 hold a mark: three figures that are equal by chance are rare, one of a rounded table is not."""
@@ -177,6 +178,15 @@ def _by_chance(campaign: Campaign) -> float:
     # the difference of two repeats is normal with √2 σ; its density at 0 times the step
     alike = np.prod(np.minimum(1.0, step / (2.0 * math.sqrt(math.pi) * sigma)))
     return float(alike * (counts * (counts - 1) / 2).sum())
+
+
+def step_of(values: FloatArray) -> float:
+    """Return the largest power of ten, 1000 at most, of which all figures are multiples; 0 where there is none."""
+    for power in range(3, -7, -1):
+        parts = values * 10.0**-power
+        if np.abs(parts - np.round(parts)).max() < 1e-6 * max(1.0, float(np.abs(parts).max()) * 1e-6):
+            return 10.0**power
+    return 0.0
 
 
 def _figure(value: float) -> str:

@@ -9,14 +9,11 @@ from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign
 from thermal_robot.errors import CampaignError, require
-from thermal_robot.iso9283.directions import variation
-from thermal_robot.iso9283.drift import drift_of
+from thermal_robot.iso9283.criteria import along_path, drift_of, of_noise, repeatability, variation
 from thermal_robot.iso9283.groups import CYCLES, FEWEST, Repeats, directions, repeats, times
 from thermal_robot.iso9283.notes import notes_of
 from thermal_robot.iso9283.parts import PathCriteria, PoseCriteria
-from thermal_robot.iso9283.path import along_path
 from thermal_robot.iso9283.performance import Performance
-from thermal_robot.iso9283.repeatability import of_noise, repeatability
 from thermal_robot.iso9283.seen import Seen
 from thermal_robot.observations import Frames
 

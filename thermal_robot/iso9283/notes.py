@@ -8,9 +8,9 @@ import numpy as np
 
 from thermal_robot.campaign.marks import SAME_COMMAND
 from thermal_robot.campaign.names import listed
+from thermal_robot.iso9283.criteria import of_noise
 from thermal_robot.iso9283.groups import CYCLES, PATH_CYCLES, Repeats
 from thermal_robot.iso9283.parts import PathCriteria, PoseCriteria
-from thermal_robot.iso9283.repeatability import of_noise
 from thermal_robot.iso9283.seen import Seen
 
 _NAMED = 5

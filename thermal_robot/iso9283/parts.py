@@ -4,11 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from thermal_robot.iso9283.accuracy import Accuracy
-from thermal_robot.iso9283.directions import Variation
-from thermal_robot.iso9283.drift import Drift
-from thermal_robot.iso9283.path import AlongPath
-from thermal_robot.iso9283.repeatability import Repeatability
+from thermal_robot.iso9283.criteria import Accuracy, AlongPath, Drift, Repeatability, Variation
 
 
 @dataclass(frozen=True)

@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-from thermal_robot.iso9283.attained import Three
+from thermal_robot.iso9283.criteria import Three
 from thermal_robot.iso9283.parts import PathCriteria, PoseCriteria
 from thermal_robot.iso9283.table import (
     Table,

@@ -11,8 +11,7 @@ from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.marks import SAME_COMMAND
 from thermal_robot.errors import CampaignError, require
 from thermal_robot.inference.frames import register
-from thermal_robot.iso9283.accuracy import Accuracy, accuracy
-from thermal_robot.iso9283.attained import Attained
+from thermal_robot.iso9283.criteria import Accuracy, Attained, accuracy
 from thermal_robot.kinematics import quaternion_to_rotation
 from thermal_robot.observations import Frames, observe
 

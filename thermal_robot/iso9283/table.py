@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from math import floor, isfinite, log10
 from textwrap import fill
 
-from thermal_robot.iso9283.attained import Three
+from thermal_robot.iso9283.criteria import Three
 from thermal_robot.iso9283.groups import CYCLES, PATH_CYCLES
 from thermal_robot.iso9283.parts import PathCriteria, PoseCriteria
 

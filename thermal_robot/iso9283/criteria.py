@@ -1,0 +1,285 @@
+"""Criteria of ISO 9283:1998 from attained poses: where a robot really was, cycle after cycle.
+
+Clauses: AP 7.2.1, RP 7.2.2, vAP 7.2.3, drift 7.6, AT and RT 8.2 and 8.3. The standard cuts the attained paths with
+planes across the commanded one. Here a point of the path is a command, and what was measured for it in each cycle
+belongs to it: how far the robot lags behind counts in AT.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from thermal_robot.kinematics import log3
+
+Array = NDArray[np.float64]
+Three = tuple[float, float, float]
+SPREADS = 3.0
+"""Standard deviations that the standard adds to the mean distance."""
+FEWEST_FOR_INTERVAL = 3
+"""Cycles from which an interval is told. Two lie equally far from their barycentre: nothing is known of the spread."""
+DRAWS = 1000
+"""Times that the test is repeated in simulation: the ends of the interval are then good to 1 % at 30 cycles."""
+_LEVEL = (0.025, 0.975)
+
+
+@dataclass(frozen=True, eq=False)
+class Attained:
+    """Poses of one target in n cycles, all in the same frame: that of the base where the standard is to be met.
+
+    Attributes
+    ----------
+    position
+        (n, 3) m.
+    rotation
+        (n, 3, 3), which turn vectors of the target's frame into that frame; ``None`` where only positions are known.
+    """
+
+    position: Array
+    rotation: Array | None = None
+
+    @property
+    def cycles(self) -> int:
+        """Number of cycles n."""
+        return len(self.position)
+
+    @property
+    def barycentre(self) -> Array:
+        """(3,) mean position, m."""
+        return np.asarray(self.position.mean(axis=0))
+
+    @property
+    def mean_rotation(self) -> Array | None:
+        """(3, 3) the rotation nearest to all; ``None`` where only positions are known."""
+        return None if self.rotation is None else mean_rotation(self.rotation)
+
+    def take(self, rows: NDArray[np.int64] | NDArray[np.bool_]) -> Attained:
+        """Return some of the cycles."""
+        return Attained(self.position[rows], None if self.rotation is None else self.rotation[rows])
+
+
+def mean_rotation(rotations: Array) -> Array:
+    """Return the (3, 3) rotation from which the sum of squared chordal distances to (n, 3, 3) rotations is least.
+
+    Moakher, *SIAM J. Matrix Anal. Appl.* 24 (2002): the projection of the mean matrix onto the rotations.
+    """
+    u, _, vt = np.linalg.svd(rotations.mean(axis=0))
+    return np.asarray(u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt)
+
+
+def angles(rotations: Array, reference: Array) -> Array:
+    """(..., 3) angles a, b, c from a reference to rotations, about the axes of their common frame, rad.
+
+    They are the rotation vector of R R_refᵀ. The angles of the standard, turns about one axis after the other, are the
+    same but for products of them: 1 µrad at 1 mrad.
+    """
+    return log3(rotations @ np.swapaxes(reference, -1, -2))
+
+
+def three(values: ArrayLike) -> Three:
+    """Return three numbers as plain values."""
+    a, b, c = (float(v) for v in np.asarray(values))
+    return a, b, c
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """From the commanded pose to the barycentre of the attained ones.
+
+    Attributes
+    ----------
+    position
+        AP_p, the distance, m.
+    axes
+        AP_x, AP_y, AP_z, m.
+    angles
+        AP_a, AP_b, AP_c, about the same axes, rad; ``None`` where only positions are known.
+    """
+
+    position: float
+    axes: Three
+    angles: Three | None = None
+
+
+def accuracy(attained: Attained, commanded: Attained) -> Accuracy:
+    """Compute the accuracy of one pose.
+
+    Parameters
+    ----------
+    attained
+        Of n cycles.
+    commanded
+        Of one row; or of n, where a model predicts every cycle by itself, as one does that knows of temperature.
+    """
+    away = attained.barycentre - commanded.barycentre
+    is_, should = attained.mean_rotation, commanded.mean_rotation
+    turned = None if is_ is None or should is None else three(angles(is_, should))
+    return Accuracy(float(np.linalg.norm(away)), three(away), turned)
+
+
+@dataclass(frozen=True)
+class Repeatability:
+    """Of the attained poses about their barycentre.
+
+    Attributes
+    ----------
+    position
+        RP_l: mean distance and three of its standard deviations, m.
+    ci95
+        Interval in which RP_l lies that endlessly many cycles would give, with a probability of 95 %, m; ``None`` with
+        two cycles, or without scatter. RP_l of few cycles is too small in the mean, by a sixth with five: the
+        interval counts that, and lies higher.
+    angles
+        RP_a, RP_b, RP_c: three standard deviations, to be read as ±, rad; ``None`` where only positions are known.
+    """
+
+    position: float
+    ci95: tuple[float, float] | None = None
+    angles: Three | None = None
+
+
+def repeatability(attained: Attained) -> Repeatability:
+    """Compute the repeatability of one pose from n ≥ 2 cycles."""
+    deviations = attained.position - attained.barycentre
+    value = float(_of(np.linalg.norm(deviations, axis=1)))
+    mean, turned = attained.mean_rotation, None
+    if attained.rotation is not None and mean is not None:
+        turned = three(SPREADS * angles(attained.rotation, mean).std(axis=0, ddof=1))
+    return Repeatability(value, _interval(deviations, value), turned)
+
+
+def _of(distances: Array) -> Array:
+    """RP_l of distances from the barycentre, the last axis being cycles."""
+    return np.asarray(distances.mean(axis=-1) + SPREADS * distances.std(axis=-1, ddof=1))
+
+
+def _interval(deviations: Array, value: float) -> tuple[float, float] | None:
+    """95 % interval of RP_l for normal scatter of any shape, by repeating the test in simulation.
+
+    What n cycles show, over what endlessly many would, depends on the shape of the scatter alone, not on its size. The
+    shape is that of the sample: how far it spreads along its principal axes. The draws are the same in each call, so
+    that the same table gives the same figures.
+    """
+    cycles = len(deviations)
+    if cycles < FEWEST_FOR_INTERVAL or value == 0.0:
+        return None
+    spread = np.linalg.svd(deviations / value, compute_uv=False)[:3] / np.sqrt(cycles - 1.0)
+    drawn = np.random.default_rng(0).standard_normal((DRAWS, cycles, len(spread))) * spread
+    endless = _of(np.linalg.norm(drawn, axis=2).ravel())
+    shown = _of(np.linalg.norm(drawn - drawn.mean(axis=1, keepdims=True), axis=2)) / endless
+    low, high = np.quantile(shown, _LEVEL)
+    return float(value / high), float(value / low)
+
+
+def of_noise(sigma: float) -> float:
+    """Return RP_l that an instrument with a standard deviation of ``sigma`` per axis (m) shows where nothing moves.
+
+    The distances have Maxwell's law: mean 2 √(2/π) σ, standard deviation √(3 − 8/π) σ.
+    """
+    return float(sigma * (2.0 * np.sqrt(2.0 / np.pi) + SPREADS * np.sqrt(3.0 - 8.0 / np.pi)))
+
+
+@dataclass(frozen=True)
+class Variation:
+    """Largest differences between barycentres of one pose that is reached from several directions.
+
+    Attributes
+    ----------
+    position
+        vAP_p, the largest distance, m.
+    angles
+        vAP_a, vAP_b, vAP_c, the largest angle about each axis, rad; ``None`` where only positions are known.
+    """
+
+    position: float
+    angles: Three | None = None
+
+
+def variation(attained: Sequence[Attained]) -> Variation:
+    """Compute the variation from the attained poses of two directions or more."""
+    pairs = list(combinations(attained, 2))
+    away = max(float(np.linalg.norm(one.barycentre - other.barycentre)) for one, other in pairs)
+    means = [(one.mean_rotation, other.mean_rotation) for one, other in pairs]
+    turns = [np.abs(angles(one, other)) for one, other in means if one is not None and other is not None]
+    return Variation(away, three(np.max(turns, axis=0)) if turns else None)
+
+
+@dataclass(frozen=True)
+class Drift:
+    """Largest changes against the first measuring time.
+
+    Attributes
+    ----------
+    accuracy, accuracy_angles
+        dAP_p, m, and dAP_a, dAP_b, dAP_c, rad: change of AP; ``None`` where AP cannot be told.
+    repeatability, repeatability_angles
+        dRP_l, m, and dRP_a, dRP_b, dRP_c, rad: change of RP.
+    shift
+        How far the barycentre went, m. It is no criterion of the standard, whose dAP_p does not see a pose that goes
+        from one side of the commanded pose to the other.
+    """
+
+    accuracy: float | None
+    repeatability: float
+    shift: float
+    accuracy_angles: Three | None = None
+    repeatability_angles: Three | None = None
+
+
+def drift_of(attained: Sequence[Attained], commanded: Sequence[Attained] | None = None) -> Drift:
+    """Compute the drift of one pose.
+
+    Parameters
+    ----------
+    attained
+        Of each measuring time, first to last: two times or more, each of two cycles or more.
+    commanded
+        Of each measuring time, as for :func:`~thermal_robot.iso9283.accuracy`; ``None`` where AP cannot be
+        told.
+    """
+    spread = [repeatability(each) for each in attained]
+    away = None if commanded is None else [accuracy(a, c) for a, c in zip(attained, commanded, strict=True)]
+    gone = [float(np.linalg.norm(each.barycentre - attained[0].barycentre)) for each in attained]
+    return Drift(
+        None if away is None else _largest([a.position for a in away]),
+        _largest([r.position for r in spread]),
+        max(gone),
+        None if away is None else _largest_of_three([a.angles for a in away]),
+        _largest_of_three([r.angles for r in spread]),
+    )
+
+
+def _largest(values: Sequence[float]) -> float:
+    return max(abs(value - values[0]) for value in values)
+
+
+def _largest_of_three(values: Sequence[Three | None]) -> Three | None:
+    known = np.array([value for value in values if value is not None])
+    return three(np.abs(known - known[0]).max(axis=0)) if len(known) == len(values) else None
+
+
+@dataclass(frozen=True)
+class AlongPath:
+    """The worst of a path's points.
+
+    Attributes
+    ----------
+    position
+        AT_p or RT_p, m.
+    angles
+        AT_a, AT_b, AT_c, or RT_a, RT_b, RT_c (±), each the largest of all points, rad; ``None`` where only positions
+        are known.
+    """
+
+    position: float
+    angles: Three | None = None
+
+
+def along_path(points: Sequence[Accuracy] | Sequence[Repeatability]) -> AlongPath:
+    """Return the path accuracy of the accuracies of its points; the path repeatability of their repeatabilities."""
+    turns = [np.abs(point.angles) for point in points if point.angles is not None]
+    return AlongPath(max(point.position for point in points), three(np.max(turns, axis=0)) if turns else None)
