@@ -64,8 +64,11 @@ def test_nobody_knows_from_where_a_pose_is_repeated_in_a_row(rv_m2):
     # in turns, the order of the rows tells it; what was recorded is believed
     in_turns = arrived(cell(rv_m2, [0, 1] * 6, **clock))
     assert [len(part) for part in directions(in_turns, np.arange(1, 12, 2))] == [6]
-    recorded = replace(in_a_row, derived=())
-    assert [len(part) for part in directions(recorded, np.arange(6, 12))] == [6]
+    written = replace(in_a_row, derived=())
+    assert directions(written, np.arange(6, 12)) is None
+    recorded = {name: values for name, values in in_a_row.covariates.items()}
+    recorded |= {name: np.where(values == 0.0, 1.0, values) for name, values in recorded.items() if name != "time"}
+    assert [len(part) for part in directions(replace(written, covariates=recorded), np.arange(6, 12))] == [6]
 
 
 @pytest.mark.parametrize(("cycles", "parts"), [(19, []), (20, [10, 10]), (30, [10, 10, 10]), (400, [50] * 8)])

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.marks import SAME_COMMAND
 from thermal_robot.campaign.names import split_name
+from thermal_robot.campaign.turning import arrivals
 from thermal_robot.inference.rows import in_order, repeated_poses
 
 Rows = NDArray[np.int64]
@@ -86,12 +87,20 @@ def directions(campaign: Campaign, rows: Rows) -> list[Rows] | None:
         return None
     from_where = np.column_stack(told)
     known = (from_where != 0.0).all(axis=1)
-    if set(columns) <= set(campaign.derived):
+    if _follow(campaign, columns):
         known &= _came(campaign)[rows]
     if 2 * known.sum() <= len(rows):
         return None
     number = np.unique(from_where[known], axis=0, return_inverse=True)[1].ravel()
     return [rows[known][number == k] for k in range(int(number.max()) + 1)]
+
+
+def _follow(campaign: Campaign, columns: list[str]) -> bool:
+    """Tell whether directions follow from the order of the rows: so told, or written and read again."""
+    names, sessions = campaign.robot.joint_names, campaign.labels.get("session")
+    ordered = arrivals(campaign.q, names, campaign.covariates, sessions)
+    same = (name in ordered and np.array_equal(campaign.covariates[name], ordered[name]) for name in columns)
+    return set(columns) <= set(campaign.derived) or all(same)
 
 
 def _came(campaign: Campaign) -> NDArray[np.bool_]:
