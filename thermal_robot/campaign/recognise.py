@@ -223,7 +223,7 @@ def _require(table: Table, wanted: Sequence[str], why: str) -> None:
             found = f"the nearest names {listed(close)}" if close else f"the columns {listed(table.columns)}"
             raise CampaignError(
                 table.file,
-                f"there is no such column; {why}",
+                f"there is no such column; {why}{table.headless}",
                 row=table.header,
                 column=name,
                 found=found,

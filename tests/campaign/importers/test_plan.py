@@ -22,7 +22,7 @@ def test_the_one_that_is_over_counts_key_by_key():
     assert both.get("measurements", "angle_unit") == "rad"
     assert both.get("measurements", "length_unit") == "m"
     assert [both.get("columns", axis).sources for axis in "xy"] == [("c",), ("b",)]
-    assert both.layout.skip == 3
+    assert both.layout().skip == 3
     assert both.get("noise", "position") == 0.1
 
 
@@ -57,5 +57,5 @@ def test_what_is_not_stated_is_asked_for():
 
 
 def test_a_separator_is_a_word():
-    layout = planned({"table": {"separator": "tab", "comment": "#", "header": False, "key": "n"}}).layout
+    layout = planned({"table": {"separator": "tab", "comment": "#", "header": False, "key": "n"}}).layout()
     assert (layout.separator, layout.skip, layout.header, layout.comment) == ("\t", 0, False, "#")

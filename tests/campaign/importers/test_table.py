@@ -82,6 +82,34 @@ def test_commands_and_measurements_in_two_tables(tmp_path, capsys):
     assert "1 points left out, not commanded: 'P9'" in out
 
 
+def test_two_lists_without_headers_are_described_once(tmp_path, capsys):
+    mapping = "[table]\nheader = false\n[columns]\njoints = [4, 5, 6, 7]\nx = 1\ny = 2\nz = 3\n"
+    rows = "\n".join(COMMANDS.split()[1:]).replace(",", " ")
+    folder = put(tmp_path, p__txt="1 2 3\n4 5 6\n7 8 9.5\n", j__txt=rows, m__toml=mapping, n__toml=mapping[23:])
+    units = ("--angle-unit", "rad", "--length-unit", "m")
+    campaign, out = imported(capsys, folder, "table", "p.txt", "j.txt", "--mapping", str(folder / "m.toml"), *units)
+    np.testing.assert_allclose(campaign.position[2], [7, 8, 9.5])
+    np.testing.assert_allclose(campaign.q[2], [0.5, -0.4, 0.09, -0.4])
+    assert "3 rows read, 3 taken" in out
+    (folder / "made").rename(folder / "first")
+    said = complaint(capsys, folder, "table", "p.txt", "j.txt", "--mapping", str(folder / "n.toml"), *units)
+    assert "the first line of p.txt is numbers alone and was taken for a header" in said
+    assert "`header = false`" in said
+    assert "found 2 and 3 rows, without that line" in said
+
+
+def test_headers_tell_names_and_units(tmp_path, capsys):
+    table = "J1 [deg];J2 [deg];J3 [mm];J4 (rad);X [m];Y (mm);z\n10;20;30;0,4;1,5;20;500\n11;21;60;0,5;1,6;21;510\n"
+    folder = put(tmp_path, log__csv=table + "12;-22;90;0,6;1,7;22;520\n", m__toml='[columns]\nx = "X"\nj = "J1"\n')
+    campaign, _ = imported(capsys, folder, "table", "log.csv")
+    np.testing.assert_allclose(campaign.q[0], [np.deg2rad(10), np.deg2rad(20), 0.03, 0.4])
+    np.testing.assert_allclose(campaign.position[0], [1.5, 0.02, 0.5 if campaign.units.length == "mm" else 500])
+    (folder / "made").rename(folder / "first")
+    units = ("--angle-unit", "rad", "--length-unit", "um", "--mapping", str(folder / "m.toml"))
+    campaign, _ = imported(capsys, folder, "table", "log.csv", *units)
+    np.testing.assert_allclose(campaign.position[0], [1.5, 0.02, 500e-6])
+
+
 @pytest.mark.parametrize(
     ("was", "becomes", "words"),
     [

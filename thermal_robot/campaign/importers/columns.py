@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.campaign.headings import bare
 from thermal_robot.campaign.names import did_you_mean, listed
 from thermal_robot.campaign.table import Table
 from thermal_robot.errors import CampaignError
@@ -113,14 +114,17 @@ def found(table: Table, source: str | int) -> str:
         There is none.
     """
     names = list(table.columns)
+    if source in names or (table.header is None and str(source) in names):  # without a header numbers are names
+        return str(source)
     if isinstance(source, int) and source <= len(names):
         return names[source - 1]
-    if source in table.columns:
-        return str(source)
+    known = [name for name in names if bare(name).column == source]
+    if len(known) == 1:
+        return known[0]
     meant = did_you_mean(str(source), names) if isinstance(source, str) else ""
     raise CampaignError(
         table.file,
-        f"there is no such column{meant}",
+        f"there is no such column{meant}{table.headless}",
         row=table.header,
         column=str(source),
         found=f"the columns {listed(names)}" if table.header else f"{len(names)} columns without names",

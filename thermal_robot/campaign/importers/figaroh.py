@@ -41,7 +41,7 @@ def read(files: Sequence[Path], plan: Plan) -> Source:
     tables = [file for file in files if not is_yaml(file)]
     configurations = [file for file in files if is_yaml(file)]
     files_of(tables, FILES, 1, 1)
-    table = read_table(tables[0], plan.layout)
+    table = read_table(tables[0], plan.layout())
     sections = _configured(configurations[0]) if configurations else {}
     sections["measurements"] = {"angle_unit": "rad", "length_unit": "m"}
     sections["columns"] = {axis: f"{axis}1" for axis in "xyz"}

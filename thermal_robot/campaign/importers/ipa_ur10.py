@@ -36,7 +36,7 @@ def read(files: Sequence[Path], plan: Plan) -> Source:
         Another number of files, a table that cannot be read.
     """
     files_of(files, FILES, 1, 1)
-    table = read_table(files[0], plan.layout)
+    table = read_table(files[0], plan.layout())
     whole = all(re.fullmatch(r"\d{14}", stamp) for stamp in table.text(_STAMP)) if _STAMP in table.columns else False
     clock: dict[str, Any] = (
         {"time": {"column": _STAMP, "time": "%Y%m%d%H%M%S"}} if whole else {"order": {"count": True}}

@@ -29,7 +29,7 @@ def read(files: Sequence[Path], plan: Plan) -> Source:
         Another number of files, a table that cannot be read.
     """
     files_of(files, FILES, 1, 1)
-    table = read_table(files[0], plan.layout)
+    table = read_table(files[0], plan.layout())
     joints = sorted((name for name in table.columns if re.fullmatch(r"joint_\d", name)), key=lambda name: name[-1])
     measured = {axis: {"sum": [f"{axis}_t", f"{axis}_dif"]} for axis in "xyz"}
     return Source(

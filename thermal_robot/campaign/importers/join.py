@@ -4,15 +4,50 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
+from thermal_robot.campaign.importers.plan import Plan
 from thermal_robot.campaign.names import listed
 from thermal_robot.campaign.table import Cells, Table
+from thermal_robot.campaign.tabular import PLAIN, read_table
 from thermal_robot.errors import CampaignError
 
 _FEW = 3
 """Names of either table that a sentence shows: enough to see how the two spell them."""
+
+
+def commands(file: Path, plan: Plan) -> Table:
+    """Read the second of two tables, as ``[commands]`` says; without it as ``[table]`` does of the first, if it fits.
+
+    A layout fits where the header, if it has any, is no row of numbers, and where no row is a header. What does not fit
+    is tried with a header or without, and as any table is read.
+
+    Raises
+    ------
+    CampaignError
+        A table that cannot be read.
+    """
+    if plan.sections.get("commands"):
+        return read_table(file, plan.layout("commands"))
+    first = plan.layout()
+    for layout in (first, replace(first, header=not first.header), PLAIN):
+        try:
+            table = read_table(file, layout)
+        except CampaignError:
+            continue
+        if len(table.columns) > 1 and _fits(table):
+            return table
+    return read_table(file, first)
+
+
+def _fits(table: Table) -> bool:
+    if table.header is not None:
+        return not table.headless
+    rest = table.take(table.rows != table.rows[0])
+    return not any(table.first_text(name) == 0 and rest.first_text(name) is None for name in table.columns)
 
 
 def joined(measured: Table, commanded: Table, key: str = "") -> tuple[Table, tuple[str, ...]]:
@@ -36,10 +71,11 @@ def joined(measured: Table, commanded: Table, key: str = "") -> tuple[Table, tup
     taken = ""
     if not key:
         if len(measured.rows) != len(commanded.rows):
+            headless = measured.headless or commanded.headless
             raise CampaignError(
                 measured.file,
-                f"has not as many rows as {commanded.file}, and no names that tell which belong together",
-                found=f"{len(measured.rows)} and {len(commanded.rows)} rows",
+                f"has not as many rows as {commanded.file}, and no names that tell which belong together{headless}",
+                found=f"{len(measured.rows)} and {len(commanded.rows)} rows{', without that line' if headless else ''}",
                 expected="as many, in the same order, or a column of names in both",
             )
         order: Sequence[int] = range(len(commanded.rows))
@@ -48,6 +84,11 @@ def joined(measured: Table, commanded: Table, key: str = "") -> tuple[Table, tup
         taken = _names_of(commanded, measured.text(key)) or _no_name(measured, commanded, key)
         measured, order, notes = _by_name(measured, commanded, key, taken)
     columns = _settled(measured, range(len(measured.rows)))
+    header = None if commanded.unnamed else measured.header
+    if commanded.unnamed:  # known by their numbers, which go on from those of the first table
+        called = {name: str(len(columns) + k) for k, name in enumerate(commanded.columns, start=1)}
+        commanded = replace(commanded, columns={called[name]: cells for name, cells in commanded.columns.items()})
+        taken = called.get(taken, "")
     for name, cells in _settled(commanded, order).items():
         if name == taken:
             continue
@@ -60,7 +101,7 @@ def joined(measured: Table, commanded: Table, key: str = "") -> tuple[Table, tup
                 expected="every column in one of the two tables",
             )
         columns[name] = cells
-    return Table(f"{measured.file} with {commanded.file}", columns, measured.rows, measured.header), notes
+    return Table(f"{measured.file} with {commanded.file}", columns, measured.rows, header), notes
 
 
 def _names_of(commanded: Table, points: Sequence[str]) -> str:

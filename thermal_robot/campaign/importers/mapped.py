@@ -9,15 +9,15 @@ import numpy as np
 
 from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign
+from thermal_robot.campaign.headings import bare, headings, size, wanted
 from thermal_robot.campaign.importers.columns import JOINTS, Column, found
-from thermal_robot.campaign.importers.plan import Plan
+from thermal_robot.campaign.importers.plan import Plan, planned
 from thermal_robot.campaign.names import listed
 from thermal_robot.campaign.table import Cells, Table
+from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS
 from thermal_robot.campaign.validate import build_campaign
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot
-
-"""Rows that a sentence names; who left out more looks for a cause, not for rows."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +63,9 @@ def campaign_of(source: Source, plan: Plan, robot: Robot, name: str) -> tuple[Ca
     """
     table = source.table
     columns = _columns(table, plan, robot)
+    plan = plan.over(planned({"measurements": _units(table, columns, robot)}))
+    settings = plan.settings(robot)
+    columns = {name: _in_units(column, table, wanted(name, robot, settings.units)) for name, column in columns.items()}
     measured = np.zeros(len(table.rows), dtype=bool)
     places = [name for name in columns if name in names.POSITION or names.target_of(name)]
     for axis in places:
@@ -82,7 +85,7 @@ def campaign_of(source: Source, plan: Plan, robot: Robot, name: str) -> tuple[Ca
     if spare:
         notes.append(f"columns left out: {listed(spare)}")
     ready = Table(table.file, cells, table.rows, table.header, warnings=table.warnings)
-    campaign = build_campaign(ready, plan.settings(robot), robot, name=name)
+    campaign = build_campaign(ready, settings, robot, name=name)
     # what follows from the order of the rows is not recorded: it will follow again
     kept = {name: values for name, values in campaign.covariates.items() if name not in campaign.derived}
     return replace(campaign, covariates=kept, derived=()), (*source.notes, *notes)
@@ -103,9 +106,32 @@ def _columns(table: Table, plan: Plan, robot: Robot) -> dict[str, Column]:
     orientation = plan.get("orientation", "stated")
     place = () if orientation is None else orientation.position
     taken = () if orientation is None else names.ORIENTATION
-    own = {name: Column((name,)) for name in table.columns if _defined(name, robot) and name not in taken}
+    own = {name: name for name in table.columns if _defined(name, robot)}
+    own |= {name: heading.column for name, heading in headings(table.columns, robot).items()}
+    found_out = {name: Column((column,)) for name, column in own.items() if name not in taken}
     in_order = dict(zip(robot.joint_names, joints, strict=bool(joints)))
-    return {**own, **dict(zip(names.POSITION, place, strict=bool(place))), **in_order, **stated}
+    return {**found_out, **dict(zip(names.POSITION, place, strict=bool(place))), **in_order, **stated}
+
+
+def _header_unit(column: Column, table: Table) -> str | None:
+    """Return the unit that a column's header names; none where it is a sum, or another scale than a sign is stated."""
+    plain = len(column.sources) == 1 and abs(column.scale) == 1.0 and not (column.offset or column.time)
+    return bare(found(table, column.sources[0])).unit if plain else None
+
+
+def _units(table: Table, columns: dict[str, Column], robot: Robot) -> dict[str, str]:
+    """Return the units of angles and lengths that headers name, of the first column that has one."""
+    said = {
+        name: _header_unit(columns[name], table) for name in (*names.POSITION, *robot.joint_names) if name in columns
+    }
+    kinds = {"angle_unit": ANGLE_UNITS, "length_unit": LENGTH_UNITS}
+    return {key: unit for key, kind in kinds.items() for unit in reversed(said.values()) if unit in kind}
+
+
+def _in_units(column: Column, table: Table, unit: str) -> Column:
+    """Return a column whose header's unit is converted to that of the campaign's."""
+    scale = size(_header_unit(column, table), unit) if unit else 1.0
+    return column if scale in (1.0, None) else replace(column, scale=column.scale * scale)
 
 
 def _defined(name: str, robot: Robot) -> bool:

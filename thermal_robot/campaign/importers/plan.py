@@ -48,6 +48,12 @@ JOINING = ("key", "targets")
 _SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": SPACE}
 _KNOWN = word(("known", "unknown"), WORD)
 _NAME = text("a name")
+_LAID_OUT: Mapping[str, Kind] = {
+    "separator": word(_SEPARATORS),
+    "skip": whole(0),
+    "header": boolean,
+    "comment": text("the first letters of a comment"),
+}
 _KINDS: dict[str, Mapping[str, Kind]] = {
     "robot": {
         "urdf": text("the path of the robot's URDF file"),
@@ -63,14 +69,8 @@ _KINDS: dict[str, Mapping[str, Kind]] = {
     "payload": {"com": VECTOR},
     "priors": {},
     "gears": {},
-    "table": {
-        "separator": word(_SEPARATORS),
-        "skip": whole(0),
-        "header": boolean,
-        "comment": text("the first letters of a comment"),
-        "key": _NAME,
-        "targets": _NAME,
-    },
+    "table": {**_LAID_OUT, **dict.fromkeys(JOINING, _NAME)},
+    "commands": _LAID_OUT,
     "columns": {},
     "orientation": {},
     "recording": {
@@ -121,10 +121,9 @@ class Plan:
         }
         return Plan(self.file or other.file, merged)
 
-    @property
-    def layout(self) -> Layout:
-        """Of the table."""
-        stated = {key: value for key, value in self.sections.get("table", {}).items() if key not in JOINING}
+    def layout(self, section: str = "table") -> Layout:
+        """Return how a table is laid out; the section is ``table``, or ``commands`` of the second one."""
+        stated = {key: value for key, value in self.sections.get(section, {}).items() if key not in JOINING}
         if "separator" in stated:
             stated["separator"] = _SEPARATORS[stated["separator"]]
         return Layout(**stated)

@@ -17,7 +17,7 @@ from pathlib import Path
 
 from thermal_robot.campaign.importers.given import files_of
 from thermal_robot.campaign.importers.grouped import grouped
-from thermal_robot.campaign.importers.join import joined
+from thermal_robot.campaign.importers.join import commands, joined
 from thermal_robot.campaign.importers.mapped import Source
 from thermal_robot.campaign.importers.plan import JOINING, Plan, planned
 from thermal_robot.campaign.names import listed
@@ -42,7 +42,7 @@ def read(files: Sequence[Path], plan: Plan) -> Source:
     """
     files_of(files, FILES, 2, 2)
     laid_out = set(plan.sections.get("table", {})) - set(JOINING)
-    layout = plan.layout if laid_out else _laid_out(files[0])
+    layout = plan.layout() if laid_out else _laid_out(files[0])
     table = _named(read_table(files[0], layout), plan)
     key = plan.get("table", "key") or _NAMES[-1]
     targets = plan.get("table", "targets")
@@ -50,7 +50,7 @@ def read(files: Sequence[Path], plan: Plan) -> Source:
     if targets:
         table, note = grouped(table, key, targets)
         told.append(note)
-    both, notes = joined(table, read_table(files[1]), key if key in table.columns else "")
+    both, notes = joined(table, commands(files[1], plan), key if key in table.columns else "")
     sections = {"columns": {} if targets else {axis: axis for axis in _AXES}}
     if key in table.columns:
         sections["columns"]["pose"] = key

@@ -51,7 +51,7 @@ def read(files: Sequence[Path], plan: Plan) -> Source:
             raise CampaignError(
                 str(file), "holds poses and no measurements", expected="the table of measured points as a second file"
             )
-        both, notes = joined(read_table(tables[0], plan.layout), commands)
+        both, notes = joined(read_table(tables[0], plan.layout()), commands)
         return Source(both, planned(_UNITS), notes)
     files_of(files, FILES, 1, 1)
     sensor = plan.get("recording", "sensor") or _only_sensor(str(file), documents)

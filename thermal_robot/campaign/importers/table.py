@@ -10,7 +10,7 @@ from pathlib import Path
 
 from thermal_robot.campaign.importers.columns import found
 from thermal_robot.campaign.importers.given import files_of
-from thermal_robot.campaign.importers.join import joined
+from thermal_robot.campaign.importers.join import commands, joined
 from thermal_robot.campaign.importers.mapped import Source
 from thermal_robot.campaign.importers.plan import Plan
 from thermal_robot.campaign.tabular import read_table
@@ -33,9 +33,9 @@ def read(files: Sequence[Path], plan: Plan) -> Source:
     if plan.get("table", "targets") is not None:
         expected = 'the format `points`; or the columns of each target, "x.1" = …, in [columns]'
         raise CampaignError(plan.file, "is for lists of points", column="table.targets", expected=expected)
-    table = read_table(files[0], plan.layout)
+    table = read_table(files[0], plan.layout())
     if len(files) == 1:
         return Source(table, Plan())
     key = plan.get("table", "key")
-    both, notes = joined(table, read_table(files[1]), "" if key is None else found(table, key))
+    both, notes = joined(table, commands(files[1], plan), "" if key is None else found(table, key))
     return Source(both, Plan(), notes)
