@@ -32,7 +32,7 @@ _KINDS: tuple[dict[str, float], ...] = (
 _SPELLED = {
     **{"µm": "um", "μm": "um", "°": "deg", "degree": "deg", "degrees": "deg", "radian": "rad", "radians": "rad"},
     **{"c": "°C", "°c": "°C", "degc": "°C", "n": "N", "nm": "N·m", "n*m": "N·m", "n·m": "N·m", "n m": "N·m"},
-    **{"sec": "s", "-": "", '"': "in", "inch": "in", "inches": "in"},
+    **{"sec": "s", "-": "", '"': "in", "inches": "inch", "feet": "ft"},
 }
 """Other spellings of units, in small letters."""
 _RATES = {"/s2": "/s²", "/s^2": "/s²", "/s²": "/s²", "/s": "/s"}

@@ -18,7 +18,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     """Define the options of ``thermal-robot import``."""
     width = max(map(len, FORMATS))
     parser.epilog = "formats:\n" + "\n".join(
-        f"  {name:{width}}  {module.DOES}\n  {'':{width}}  {module.FILES}" for name, module in FORMATS.items()
+        f"  {name:{width}}  {each.does}\n  {'':{width}}  {each.files}" for name, each in FORMATS.items()
     )
     parser.add_argument("format", metavar="FORMAT", choices=FORMATS, help="what the files are, see below")
     parser.add_argument("files", metavar="FILES", nargs="+", help="to read, as many as the format has")

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
@@ -40,6 +41,52 @@ class Source:
     plan: Plan
     notes: tuple[str, ...] = ()
     comments: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Format:
+    """A format that can be imported.
+
+    Attributes
+    ----------
+    does, files
+        What it reads, and which files, for the help.
+    read
+        Makes a table of them, and says as a mapping would what its columns are.
+    least, most
+        How many files it has.
+    """
+
+    does: str
+    files: str
+    read: Callable[[Sequence[Path], Plan], Source]
+    least: int = 1
+    most: int = 2
+
+    def source(self, files: Sequence[Path], plan: Plan) -> Source:
+        """Read the files.
+
+        Raises
+        ------
+        CampaignError
+            Another number of files than the format has, or what its reader raises.
+        """
+        files_of(files, self.files, self.least, self.most)
+        return self.read(files, plan)
+
+
+def files_of(files: Sequence[Path], expected: str, least: int, most: int) -> None:
+    """Refuse another number of files than a format has.
+
+    Raises
+    ------
+    CampaignError
+        Naming what is expected.
+    """
+    if not least <= len(files) <= most:
+        raise CampaignError(
+            "FILES", "another number of files than this format has", found=str(len(files)), expected=expected
+        )
 
 
 def campaign_of(source: Source, plan: Plan, robot: Robot, name: str) -> tuple[Campaign, tuple[str, ...]]:

@@ -15,32 +15,22 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from thermal_robot.campaign.importers.given import files_of
 from thermal_robot.campaign.importers.grouped import grouped
 from thermal_robot.campaign.importers.join import commands, joined
-from thermal_robot.campaign.importers.mapped import Source
+from thermal_robot.campaign.importers.mapped import Format, Source
 from thermal_robot.campaign.importers.plan import JOINING, Plan, planned
 from thermal_robot.campaign.names import listed
 from thermal_robot.campaign.table import Table
 from thermal_robot.campaign.tabular import SPACE, Layout, read_table
 from thermal_robot.errors import CampaignError
 
-DOES = "points of a laser tracker by name (SpatialAnalyzer, lists of names and x y z), and a table of commands"
-FILES = "POINTS COMMANDS.csv"
 COMMENT = "//"
 _NAMES = ("collection", "group", "target")
 _AXES = ("x", "y", "z")
 
 
-def read(files: Sequence[Path], plan: Plan) -> Source:
-    """Read points and commands, joined by the name of the point; without names, row by row.
-
-    Raises
-    ------
-    CampaignError
-        Another number of files, a line that is no point, points and commands that do not belong together.
-    """
-    files_of(files, FILES, 2, 2)
+def _read(files: Sequence[Path], plan: Plan) -> Source:
+    """Read points and commands, joined by the name of the point; without names, row by row."""
     laid_out = set(plan.sections.get("table", {})) - set(JOINING)
     layout = plan.layout() if laid_out else _laid_out(files[0])
     table = _named(read_table(files[0], layout), plan)
@@ -102,3 +92,11 @@ def _names_before(table: Table) -> int:
         if figures and (len(columns) - count <= len(_AXES) or not all(map(str.isdigit, table.text(name)))):
             return count
     return min(len(_NAMES), len(columns))
+
+
+FORMAT = Format(
+    "points of a laser tracker by name (SpatialAnalyzer, lists of names and x y z), and a table of commands",
+    "POINTS COMMANDS.csv",
+    _read,
+    least=2,
+)

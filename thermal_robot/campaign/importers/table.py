@@ -9,27 +9,15 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from thermal_robot.campaign.importers.columns import found
-from thermal_robot.campaign.importers.given import files_of
 from thermal_robot.campaign.importers.join import commands, joined
-from thermal_robot.campaign.importers.mapped import Source
+from thermal_robot.campaign.importers.mapped import Format, Source
 from thermal_robot.campaign.importers.plan import Plan
 from thermal_robot.campaign.tabular import read_table
 from thermal_robot.errors import CampaignError
 
-DOES = "any table, by a mapping; or two, of what was measured and of what was commanded"
-FILES = "TABLE, or MEASURED COMMANDED"
 
-
-def read(files: Sequence[Path], plan: Plan) -> Source:
-    """Read one table, or two that are joined by the names in ``[table] key``, else row by row.
-
-    Raises
-    ------
-    CampaignError
-        No file or more than two, a table that cannot be read, tables that cannot be joined; targets, which are
-        of a list of points.
-    """
-    files_of(files, FILES, 1, 2)
+def _read(files: Sequence[Path], plan: Plan) -> Source:
+    """Read one table, or two that are joined by the names in ``[table] key``, else row by row."""
     if plan.get("table", "targets") is not None:
         expected = 'the format `points`; or the columns of each target, "x.1" = …, in [columns]'
         raise CampaignError(plan.file, "is for lists of points", column="table.targets", expected=expected)
@@ -39,3 +27,10 @@ def read(files: Sequence[Path], plan: Plan) -> Source:
     key = plan.get("table", "key")
     both, notes = joined(table, commands(files[1], plan), "" if key is None else found(table, key))
     return Source(both, Plan(), notes)
+
+
+FORMAT = Format(
+    "any table, by a mapping; or two, of what was measured and of what was commanded",
+    "TABLE, or MEASURED COMMANDED",
+    _read,
+)
