@@ -40,6 +40,8 @@ class Declaration:
         Line of each key of ``[gears]``, for a message once the robot's joints are known.
     folder
         Against which its paths are resolved.
+    kinematics
+        Path of the calibration that a robot of Universal Robots brings along; ``None`` without one.
     """
 
     file: Path
@@ -47,6 +49,7 @@ class Declaration:
     settings: Settings
     gear_rows: Mapping[str, int | None]
     folder: Path
+    kinematics: Path | None = None
 
     @property
     def robot(self) -> str | Path:
@@ -99,7 +102,8 @@ def read_declaration(path: Path, folder: Path | None = None) -> Declaration:
     folder = file.parent if folder is None else folder
     table = folder / document.string("measurements", "file")
     rows = {joint: document.row("gears", joint) for joint in settings.gears}
-    return Declaration(file, table, settings, rows, folder)
+    kinematics = document.string("robot", "kinematics", None)
+    return Declaration(file, table, settings, rows, folder, folder / kinematics if kinematics else None)
 
 
 def check_gears(declaration: Declaration, joints: tuple[str, ...]) -> None:

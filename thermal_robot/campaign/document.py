@@ -20,7 +20,7 @@ else:
     import tomli as tomllib
 
 SECTIONS: dict[str, tuple[str, ...]] = {
-    "robot": ("urdf", "tool_frame", "root_frame", "gravity", "moves", "reference_temperature"),
+    "robot": ("urdf", "tool_frame", "root_frame", "kinematics", "gravity", "moves", "reference_temperature"),
     "measurements": ("file", "angle_unit", "length_unit"),
     "frames": ("base", "tool", "target"),
     "noise": ("position", "orientation"),
@@ -144,6 +144,7 @@ class Document:
             "urdf": "the path of the robot's URDF file",
             "tool_frame": "the URDF link that carries the target",
             "root_frame": "the URDF link where the chain starts",
+            "kinematics": "the path of a kinematics.yaml of Universal Robots",
             "file": "the path of the table",
         }[key]
         value = self._get(section, key, default, meaning)

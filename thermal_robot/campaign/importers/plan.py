@@ -26,6 +26,7 @@ from thermal_robot.campaign.settings import (
 )
 from thermal_robot.campaign.tabular import SPACE, Layout
 from thermal_robot.campaign.units import Units
+from thermal_robot.campaign.ur_kinematics import with_kinematics
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot, load_robot
 from thermal_robot.schema import (
@@ -59,6 +60,7 @@ _KINDS: dict[str, Mapping[str, Kind]] = {
         "urdf": text("the path of the robot's URDF file"),
         "tool_frame": text("the URDF link that carries the target"),
         "root_frame": text("the URDF link where the chain starts"),
+        "kinematics": text("the path of a kinematics.yaml of Universal Robots"),
         "gravity": GRAVITY,
         "moves": HOW_MOVED,
         "reference_temperature": TEMPERATURE,
@@ -142,12 +144,10 @@ class Plan:
         if urdf is None:
             expected = "--robot URDF, or [robot] urdf in the file of --mapping"
             raise CampaignError(self.file or "import", "no robot is named", expected=expected)
-        return load_robot(
-            urdf,
-            self.get("robot", "tool_frame", ""),
-            root_frame=self.get("robot", "root_frame"),
-            gravity=self.get("robot", "gravity"),
-        )
+        ends = {key: self.get("robot", key) for key in ("root_frame", "gravity")}
+        robot = load_robot(urdf, self.get("robot", "tool_frame", ""), **ends)
+        measured = self.get("robot", "kinematics")
+        return with_kinematics(robot, measured) if measured else robot
 
     def settings(self, robot: Robot) -> Settings:
         """Return what a campaign says once about all its rows, SI.
@@ -198,9 +198,9 @@ def read_mapping(path: Path) -> Plan:
     """
     document = Document(path, SECTIONS)
     sections = {section: _fitted(document, section, content) for section, content in document.data.items()}
-    urdf = sections.get("robot", {}).get("urdf")
-    if urdf is not None and not urdf.startswith((BUILTIN, EXAMPLE_ROBOT_DATA)):
-        sections["robot"]["urdf"] = str(path.parent / urdf)
+    for key, named in sections.get("robot", {}).items():
+        if key in ("urdf", "kinematics") and not named.startswith((BUILTIN, EXAMPLE_ROBOT_DATA)):
+            sections["robot"][key] = str(path.parent / named)
     return Plan(str(path), sections)
 
 
