@@ -18,7 +18,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.campaign.importers.given import read_yaml
 from thermal_robot.errors import CampaignError
-from thermal_robot.kinematics.rewritten import rewritten, xyz_rpy
+from thermal_robot.kinematics.rewritten import rewritten
 from thermal_robot.robot import Robot, load_robot
 
 Array = NDArray[np.float64]
@@ -112,22 +112,3 @@ def _pose(given: Any, file: str, link: str) -> Array:
     pose = np.eye(4)
     pose[:3, :3], pose[:3, 3] = Rotation.from_euler("xyz", figures[3:]).as_matrix(), figures[:3]
     return pose
-
-
-def kinematics_yaml(poses: Mapping[str, Array], notes: list[str]) -> str:
-    """Return the text of a file.
-
-    Parameters
-    ----------
-    poses
-        (4, 4) origin by link, m.
-    notes
-        Lines of a comment that it begins with.
-    """
-    lines = [*(f"# {note}" for note in notes), "kinematics:"]
-    for link, pose in poses.items():
-        figures = " ".join(xyz_rpy(pose)).split()
-        # no exponents: YAML takes 1e-05 for text
-        plain = (np.format_float_positional(float(figure), trim="0") for figure in figures)
-        lines += [f"  {link}:", *(f"    {key}: {figure}" for key, figure in zip(FIGURES, plain, strict=True))]
-    return "\n".join([*lines, "  hash: calib_thermal_robot", ""])

@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from thermal_robot.campaign.ur_kinematics import elements, kinematics_yaml
+from thermal_robot.campaign.ur_kinematics import FIGURES, elements
 from thermal_robot.correction.calibrated import Calibrated
+from thermal_robot.kinematics.rewritten import xyz_rpy
 
 
 def ur_kinematics(robot: Calibrated) -> str:
@@ -53,4 +54,9 @@ def ur_kinematics(robot: Calibrated) -> str:
     notes = robot.notes("a kinematics.yaml")
     if not np.allclose(nominal, real, rtol=0, atol=1e-9):
         notes.append("Frames behind the last joint are displaced as well, which only a URDF holds.")
-    return kinematics_yaml(origins, notes)
+    lines = [*(f"# {note}" for note in notes), "kinematics:"]
+    for link, pose in origins.items():
+        # no exponents: YAML takes 1e-05 for text
+        figures = (np.format_float_positional(float(figure), trim="0") for figure in " ".join(xyz_rpy(pose)).split())
+        lines += [f"  {link}:", *(f"    {key}: {figure}" for key, figure in zip(FIGURES, figures, strict=True))]
+    return "\n".join([*lines, "  hash: calib_thermal_robot", ""])

@@ -121,6 +121,13 @@ def test_a_program_tells_the_order_and_may_hold_points_itself(tmp_path, capsys):
     np.testing.assert_allclose(np.rad2deg(campaign.q), AXES[[2, 0, 3]], atol=1e-9)
 
 
+def test_places_between_axes_are_passed_over(tmp_path, capsys):
+    both = kuka_dat("E6AXIS").replace("ENDDAT", "DECL E6POS XP9={X 1,Y 2,Z 3,A 4,B 5,C 6}\nENDDAT")
+    (tmp_path / "c.dat").write_text(both)
+    (tmp_path / "m.csv").write_text(MEASURED)
+    np.testing.assert_allclose(np.rad2deg(imported(tmp_path, "kuka", "m.csv", "c.dat").q), AXES, atol=1e-9)
+
+
 def test_an_array_of_targets(tmp_path, capsys):
     rows = ",\n".join(f"[{bracket(axes)}, {EXTERNAL}]" for axes in AXES)
     (tmp_path / "c.mod").write_text(f"MODULE m\nCONST jointtarget cal{{4}}:=[{rows}];\nENDMODULE\n")

@@ -73,8 +73,4 @@ def _within(content: Any, *keys: str) -> dict[str, Any]:
     return content if isinstance(content, dict) else {}
 
 
-FORMAT = Format(
-    "calibration data of FIGAROH",
-    "DATA.csv [CONFIG.yaml]",
-    _read,
-)
+FORMAT = Format("calibration data of FIGAROH", "DATA.csv [CONFIG.yaml]", _read)

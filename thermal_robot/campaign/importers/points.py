@@ -15,12 +15,14 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from thermal_robot.campaign.importers.grouped import grouped
+import numpy as np
+
+from thermal_robot.campaign.importers.columns import found
 from thermal_robot.campaign.importers.join import commands, joined
 from thermal_robot.campaign.importers.mapped import Format, Source
 from thermal_robot.campaign.importers.plan import JOINING, Plan, planned
 from thermal_robot.campaign.names import listed
-from thermal_robot.campaign.table import Table
+from thermal_robot.campaign.table import Cells, Table
 from thermal_robot.campaign.tabular import SPACE, Layout, read_table
 from thermal_robot.errors import CampaignError
 
@@ -92,6 +94,47 @@ def _names_before(table: Table) -> int:
         if figures and (len(columns) - count <= len(_AXES) or not all(map(str.isdigit, table.text(name)))):
             return count
     return min(len(_NAMES), len(columns))
+
+
+def grouped(table: Table, key: str, targets: str) -> tuple[Table, str]:
+    """Return a table with a row for each visit of a pose, and in a sentence which targets there are.
+
+    Targets are numbered as they first appear. One that is measured again at a pose begins another visit. A target that
+    a visit lacks has empty cells there.
+
+    Parameters
+    ----------
+    table
+        A line a point, with the columns x, y and z.
+    key, targets
+        Columns of the names of poses, and of those of targets on the tool.
+
+    Raises
+    ------
+    CampaignError
+        A column that is not there; a single target.
+    """
+    import pandas as pd
+
+    lines = pd.DataFrame({"pose": table.text(found(table, key)), "called": table.text(found(table, targets))})
+    order = list(lines["called"].unique())
+    if len(order) < 2:
+        raise CampaignError(
+            table.file,
+            "holds a single target of each pose",
+            column=targets,
+            found=listed(order),
+            expected="names of several targets, or no [table] targets",
+        )
+    lines["visit"] = lines.groupby(["pose", "called"]).cumcount()
+    row = lines.groupby(["pose", "visit"], sort=False).ngroup().to_numpy()
+    _, first = np.unique(row, return_index=True)
+    values = np.full((len(first), len(order), 3), np.nan)
+    values[row, lines["called"].map(order.index)] = np.stack([table.numbers(a, gaps=True) for a in _AXES], axis=1)
+    columns: dict[str, Cells] = {key: list(lines["pose"].iloc[first])}
+    columns |= {f"{axis}.{k + 1}": values[:, k, i] for k in range(len(order)) for i, axis in enumerate(_AXES)}
+    both = Table(table.file, columns, table.rows[first], table.header, warnings=table.warnings)
+    return both, f"{len(order)} targets of each pose, numbered so: {listed(order)}"
 
 
 FORMAT = Format(

@@ -17,10 +17,10 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -28,14 +28,12 @@ from thermal_robot.campaign.importers.join import joined
 from thermal_robot.campaign.importers.mapped import Format, Source
 from thermal_robot.campaign.importers.plan import Plan, planned
 from thermal_robot.campaign.table import Table
-from thermal_robot.campaign.tabular import read_table
+from thermal_robot.campaign.tabular import LARGEST_TABLE, read_table, table_from_frame
 from thermal_robot.errors import CampaignError
 from thermal_robot.files import is_file
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:E[-+]?\d+)?"
 _AXIS = r"A\d|E\d|[re]ax_\w"
-_LARGEST = 64 << 20
-"""Bytes: a million points."""
 _ABSENT = 8.9e9
 """An external axis that ABB's controller does not have is 9E9."""
 _EXTERNAL = tuple(f"eax_{letter}" for letter in "abcdef")
@@ -67,33 +65,16 @@ def _targets(text: str) -> list[Point]:
     return points
 
 
-@dataclass(frozen=True)
-class Language:
-    """How the programs of a maker are read.
-
-    Attributes
-    ----------
-    endings, data
-        Of its files; of the file beside a program that declares its points, empty where the program does.
-    comment
-        What a comment begins with, to the end of the line.
-    statements
-        Finds a point that is declared (``name``) or moved to, by its figures or its name (``to``).
-    points
-        Makes points of the figures.
-    first
-        The column of the first axis.
-    orientation
-        Of places, as the section of a mapping says it.
-    """
+class Language(NamedTuple):
+    """How the programs of a maker are read."""
 
     endings: tuple[str, ...]
-    data: str
-    comment: str
-    statements: re.Pattern[str]
-    points: Callable[[str], list[Point]]
-    first: str
-    orientation: dict[str, Any]
+    data: str  # ending of the file beside a program that declares its points
+    comment: str  # to the end of the line
+    statements: re.Pattern[str]  # a point that is declared (name) or moved to, by its figures or its name (to)
+    points: Callable[[str], list[Point]]  # of the figures
+    first: str  # column of the first axis
+    orientation: dict[str, Any]  # of places, as the section of a mapping says it
 
 
 _KRL = Language(
@@ -126,6 +107,8 @@ _RAPID = Language(
 
 def _program(file: Path, language: Language) -> Table:
     """Return the points of a program as a table: their names, axes and places."""
+    import pandas as pd
+
     beside = [other for other in file.parent.glob(f"{file.stem}.*") if other.suffix.lower() == language.data]
     declared: dict[str, list[Point]] = {}
     moved: list[tuple[str, Point]] = []
@@ -137,26 +120,26 @@ def _program(file: Path, language: Language) -> Table:
             if name and points:
                 declared[name] = points
             moved += [] if name else [(to, point) for point in points]
-    points = moved or [(name, point) for name, several in declared.items() for point in several]
-    keys = dict.fromkeys(key for _, point in points for key in point)
-    columns = {key: np.array([point.get(key, np.nan) for _, point in points]) for key in keys}
-    return Table(str(file), {"name": [name for name, _ in points], **columns}, np.arange(1, len(points) + 1))
+    named = moved or [(name, point) for name, several in declared.items() for point in several]
+    table = table_from_frame(pd.DataFrame([{"name": name, **point} for name, point in named] or [{"name": ""}]))
+    return replace(table, file=str(file))
 
 
 def _text(file: Path, comment: str) -> str:
     """Return the text of a program without its comments."""
-    if not is_file(file) or file.stat().st_size > _LARGEST:
-        raise CampaignError(
-            str(file), "there is no such file, or it is no program", expected="a file of at most 64 MiB"
-        )
+    if not is_file(file) or file.stat().st_size > LARGEST_TABLE:
+        raise CampaignError(str(file), "there is no such file, or it is too large", expected="a program")
     return re.sub(rf"{comment}[^\n]*", "", file.read_bytes().decode("utf-8", errors="replace"))
 
 
 def _read(files: Sequence[Path], plan: Plan, language: Language) -> Source:
     """Read a program of axes and what was measured, a table or a program of places, in either order."""
-    programs = [file.suffix.lower() in language.endings for file in files]
-    tables = [_program(file, language) if program else read_table(file, plan.layout())
-              for file, program in zip(files, programs, strict=True)]  # fmt: skip
+    import pandas as pd
+
+    tables = [
+        _program(file, language) if file.suffix.lower() in language.endings else read_table(file, plan.layout())
+        for file in files
+    ]
     driven = [table for table in tables if language.first in table.columns]
     if len(driven) != 1 or len(tables) != 2:
         raise CampaignError(
@@ -167,22 +150,17 @@ def _read(files: Sequence[Path], plan: Plan, language: Language) -> Source:
         )
     measured = next(table for table in tables if table is not driven[0])
     there = {name: cells for name, cells in measured.columns.items() if not re.fullmatch(_AXIS, name)}
-    measured = replace(measured, columns=there)
-    whole = driven[0].take(~np.isnan(driven[0].numbers(language.first)))
-    axes = {key: cells for key, cells in whole.columns.items() if re.fullmatch(_AXIS, key)}
+    whole = driven[0].take(~np.isnan(driven[0].numbers(language.first, gaps=True)))
+    axes = {name: cells for name, cells in whole.columns.items() if re.fullmatch(_AXIS, name)}
     key, called = _named(measured, whole.text("name"), plan.get("table", "key"))
     sections: dict[str, dict[str, Any]] = {"measurements": {"angle_unit": "deg", "length_unit": "mm"}}
+    commands = replace(whole, columns={**({"name of the command": called} if key else {}), **axes})
     if key:
-        once = np.array(
-            [name not in called[:k] for k, name in enumerate(called)]
-        )  # who drives there twice says it twice
-        commands = replace(whole, columns={"name of the command": called, **axes}).take(once)
         sections["columns"] = {"pose": key}
-    else:
-        commands = replace(whole, columns=axes)
+        commands = commands.take(~pd.Series(called).duplicated().to_numpy())  # a program may go there again
     if set(language.orientation["columns"]) <= set(measured.columns):
         sections["orientation"] = language.orientation
-    both, notes = joined(measured, commands, key)
+    both, notes = joined(replace(measured, columns=there), commands, key)
     return Source(both, planned(sections), notes)
 
 

@@ -76,9 +76,5 @@ def paired(
     own, seen = joints.nearest(middles), target.nearest(middles - lag)
     near = np.abs(target.time[seen] + lag - middles) <= tolerance
     return Pairs(
-        middles[near],
-        joints.values[own[near]],
-        target.values[seen[near]],
-        int((~long).sum()),
-        int((~near).sum()),
+        middles[near], joints.values[own[near]], target.values[seen[near]], int((~long).sum()), int((~near).sum())
     )
