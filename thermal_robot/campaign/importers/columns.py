@@ -71,6 +71,22 @@ class Column:
             values = values - np.nanmin(values)
         return values
 
+    def complete(self, table: Table, name: str = "") -> NDArray[np.float64]:
+        """Return (N,) numbers of which none may be missing; ``name`` is the campaign's column.
+
+        Raises
+        ------
+        CampaignError
+            An empty cell, or what :meth:`numbers` raises.
+        """
+        values = self.numbers(table)
+        if np.isnan(values).any():
+            problem = "a value is missing" + (f", for the column {name!r} of the campaign" if name else "")
+            row, column = int(table.rows[int(np.argmax(np.isnan(values)))]), " + ".join(map(str, self.sources))
+            expected = "a number"
+            raise CampaignError(table.file, problem, row=row, column=column, found="an empty cell", expected=expected)
+        return values
+
     def text(self, table: Table) -> list[str]:
         """Return N texts; those of several columns with a blank between.
 

@@ -194,19 +194,8 @@ def _cells(table: Table, columns: dict[str, Column], robot: Robot) -> dict[str, 
     for name in dict.fromkeys([*(n for n in whole if n in columns), *columns]):
         if name in names.LABELS:
             cells[name] = columns[name].text(table)
-            continue
-        values = columns[name].numbers(table)
-        gaps = np.isnan(values)
-        if name in whole and gaps.any():
-            raise CampaignError(
-                table.file,
-                f"a value is missing, for the column {name!r} of the campaign",
-                row=int(table.rows[int(np.argmax(gaps))]),
-                column=" + ".join(map(str, columns[name].sources)),
-                found="an empty cell",
-                expected="a number",
-            )
-        cells[name] = values
+        else:
+            cells[name] = columns[name].complete(table, name) if name in whole else columns[name].numbers(table)
     return cells
 
 

@@ -66,7 +66,7 @@ class Orientation:
         """
         from scipy.spatial.transform import Rotation
 
-        figures = np.column_stack([_complete(table, column) for column in self.columns])
+        figures = np.column_stack([column.complete(table) for column in self.columns])
         if self.kind == QUATERNION:
             self._refuse(table, no_orientation(figures), "a quaternion whose length is not 1", figures)
             turned = Rotation.from_quat(figures, scalar_first=not self.scalar_last)
@@ -98,19 +98,6 @@ class Orientation:
     def position(self) -> tuple[Column, ...]:
         """The three columns of the position that a matrix of twelve or sixteen has; none elsewhere."""
         return self.columns[3:12:4] if len(self.columns) > 9 else ()
-
-
-def _complete(table: Table, column: Column) -> NDArray[np.float64]:
-    """Return the figures of a column of which none may be missing."""
-    values = column.numbers(table)
-    gaps = np.isnan(values)
-    if gaps.any():
-        source = str(column.sources[0])
-        row = int(table.rows[int(np.argmax(gaps))])
-        raise CampaignError(
-            table.file, "a value is missing", row=row, column=source, found="an empty cell", expected="a number"
-        )
-    return values
 
 
 _KEYS = {

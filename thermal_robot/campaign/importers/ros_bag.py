@@ -13,7 +13,7 @@ import numpy as np
 
 from thermal_robot.campaign import names
 from thermal_robot.campaign.headings import joint_columns
-from thermal_robot.campaign.importers.streams import Stream, stream
+from thermal_robot.campaign.importers.standstill import Stream, stream
 from thermal_robot.campaign.names import listed
 from thermal_robot.errors import CampaignError
 
