@@ -1,4 +1,4 @@
-"""Recordings of a robot and an instrument, each by its own clock, and rows of a campaign where the robot stood still."""
+"""Recordings of a robot and of an instrument, each by its own clock; rows of a campaign where the robot stood still."""
 
 from __future__ import annotations
 
