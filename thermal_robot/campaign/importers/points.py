@@ -18,9 +18,9 @@ from pathlib import Path
 import numpy as np
 
 from thermal_robot.campaign.importers.columns import found
-from thermal_robot.campaign.importers.join import commands, joined
 from thermal_robot.campaign.importers.mapped import Format, Source
 from thermal_robot.campaign.importers.plan import JOINING, Plan, planned
+from thermal_robot.campaign.importers.table import commands, joined
 from thermal_robot.campaign.names import listed
 from thermal_robot.campaign.table import Cells, Table
 from thermal_robot.campaign.tabular import SPACE, Layout, read_table
