@@ -71,6 +71,11 @@ class Column:
             values = values - np.nanmin(values)
         return values
 
+    def header_unit(self, table: Table) -> str | None:
+        """Return the unit that its header names; none of a sum, or where another scale than a sign is stated."""
+        plain = len(self.sources) == 1 and abs(self.scale) == 1.0 and not (self.offset or self.time)
+        return bare(found(table, self.sources[0])).unit if plain else None
+
     def complete(self, table: Table, name: str = "") -> NDArray[np.float64]:
         """Return (N,) numbers of which none may be missing; ``name`` is the campaign's column.
 

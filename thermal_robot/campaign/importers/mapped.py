@@ -10,7 +10,7 @@ import numpy as np
 
 from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign
-from thermal_robot.campaign.headings import bare, headings, size, wanted
+from thermal_robot.campaign.headings import headings, size, wanted
 from thermal_robot.campaign.importers.columns import JOINTS, Column, found
 from thermal_robot.campaign.importers.plan import Plan, planned
 from thermal_robot.campaign.names import listed
@@ -160,24 +160,16 @@ def _columns(table: Table, plan: Plan, robot: Robot) -> dict[str, Column]:
     return {**found_out, **dict(zip(names.POSITION, place, strict=bool(place))), **in_order, **stated}
 
 
-def _header_unit(column: Column, table: Table) -> str | None:
-    """Return the unit that a column's header names; none where it is a sum, or another scale than a sign is stated."""
-    plain = len(column.sources) == 1 and abs(column.scale) == 1.0 and not (column.offset or column.time)
-    return bare(found(table, column.sources[0])).unit if plain else None
-
-
 def _units(table: Table, columns: dict[str, Column], robot: Robot) -> dict[str, str]:
     """Return the units of angles and lengths that headers name, of the first column that has one."""
-    said = {
-        name: _header_unit(columns[name], table) for name in (*names.POSITION, *robot.joint_names) if name in columns
-    }
+    said = {name: columns[name].header_unit(table) for name in (*names.POSITION, *robot.joint_names) if name in columns}
     kinds = {"angle_unit": ANGLE_UNITS, "length_unit": LENGTH_UNITS}
     return {key: unit for key, kind in kinds.items() for unit in reversed(said.values()) if unit in kind}
 
 
 def _in_units(column: Column, table: Table, unit: str) -> Column:
     """Return a column whose header's unit is converted to that of the campaign's."""
-    scale = size(_header_unit(column, table), unit) if unit else 1.0
+    scale = size(column.header_unit(table), unit) if unit else 1.0
     return column if scale in (1.0, None) else replace(column, scale=column.scale * scale)
 
 

@@ -44,7 +44,7 @@ class Orientation:
         Axes of Euler angles, in the order of the columns: capitals turn about the moving axes, small letters about
         the fixed ones.
     unit
-        Of Euler angles and rotation vectors, ``"rad"`` or ``"deg"``.
+        Of Euler angles and rotation vectors, ``"rad"`` or ``"deg"``, where no header names one.
     inverse
         Whether they turn vectors of the measurement frame into the target's.
     """
@@ -67,13 +67,15 @@ class Orientation:
         from scipy.spatial.transform import Rotation
 
         figures = np.column_stack([column.complete(table) for column in self.columns])
+        if self.kind in (EULER, VECTOR):
+            figures *= [ANGLE_UNITS.get(c.header_unit(table) or "", ANGLE_UNITS[self.unit]) for c in self.columns]
         if self.kind == QUATERNION:
             self._refuse(table, no_orientation(figures), "a quaternion whose length is not 1", figures)
             turned = Rotation.from_quat(figures, scalar_first=not self.scalar_last)
         elif self.kind == EULER:
-            turned = Rotation.from_euler(self.sequence, figures * ANGLE_UNITS[self.unit])
+            turned = Rotation.from_euler(self.sequence, figures)
         elif self.kind == VECTOR:
-            turned = Rotation.from_rotvec(figures * ANGLE_UNITS[self.unit])
+            turned = Rotation.from_rotvec(figures)
         else:
             matrices = figures.reshape(len(figures), -1, 3 if len(self.columns) == 9 else 4)[:, :3, :3]
             away = np.abs(matrices @ matrices.swapaxes(1, 2) - np.eye(3)).max(axis=(1, 2)) > _TURNED
