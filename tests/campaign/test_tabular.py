@@ -29,6 +29,8 @@ SEMICOLONS = WHOLE.replace(",", ";").replace("1000", "1000,25")
         pytest.param(WHOLE.replace(",", "\t").encode(), id="tabs"),
         pytest.param(WHOLE.replace(",", ";").encode(), id="semicolons"),
         pytest.param(WHOLE.replace(",", "  ").encode(), id="blanks"),
+        pytest.param(("# by hand\n#2026\n# " + WHOLE.replace(",", " ")).encode(), id="as numpy writes it"),
+        pytest.param(("\n#" + WHOLE).encode(), id="a marked header"),
         pytest.param(WHOLE.replace(",", " , ").encode(), id="blanks around everything"),
         pytest.param(WHOLE.replace("\n", ",\n").encode(), id="separator at the end of each line"),
         pytest.param((WHOLE + "\n,,,,,,\n\n").encode(), id="empty lines at the end"),
@@ -56,6 +58,17 @@ def test_labels_keep_their_commas(tmp_path: Path) -> None:
     campaign = read_campaign(put(tmp_path / "c", table))
     assert campaign.labels["session"].tolist() == ["1,5", "b", ""]
     assert campaign.position[0, 2] == pytest.approx(0.5005)
+
+
+def test_marked_lines_before_the_rows_are_no_rows(tmp_path: Path) -> None:
+    (tmp_path / "t.txt").write_text("# x y\n1 2\n3 4\n")
+    table = tabular.read_table(tmp_path / "t.txt", tabular.Layout(header=False))
+    assert (table.rows.tolist(), table.numbers("2").tolist()) == ([2, 3], [2.0, 4.0])
+    (tmp_path / "t.csv").write_text("#,x\n1,2\n3,4\n")
+    assert list(tabular.read_table(tmp_path / "t.csv").columns) == ["#", "x"]
+    (tmp_path / "t.csv").write_text("# only\n")
+    with pytest.raises(CampaignError, match="has a header but no rows"):
+        tabular.read_table(tmp_path / "t.csv")
 
 
 @pytest.mark.parametrize("ending", ["xlsx", "ods"])

@@ -145,8 +145,9 @@ class Document:
                     found=shown(content),
                     expected=f"a section [{section}]",
                 )
-            known = self.kinds[section]
-            for key in content if isinstance(known, Mapping) else ():
+            kind = self.kinds[section]
+            known = kind if isinstance(kind, Mapping) else dict.fromkeys(content)
+            for key in content:
                 if key not in known:
                     raise CampaignError(
                         self.file,

@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _DECIMAL_COMMA = re.compile(r"[+\-−]?\d*,\d+([eE][+-]?\d+)?")
+_MARKED = re.compile(r" *# *(?=[^\s,;#])")  # a column of numbers that is called # is no mark
 _BLOCK = 1 << 20  # bytes, or characters: what is read of a file at once
 _MOST_BLANK_LINES = 100_000  # in succession: nobody scrolls past so many
 LARGEST_TABLE = 256 << 20
@@ -252,12 +253,29 @@ def _encoding(path: Path) -> tuple[str, tuple[str, ...]]:
 
 
 def _lines(stream: TextIO, layout: Layout, *, even: bool = False) -> Iterator[str]:
-    """Yield the lines; what is left out is blank, so that each keeps its number; of blanks one is left if ``even``."""
+    """Yield the lines; what is left out is blank, so that each keeps its number; of blanks one is left if ``even``.
+
+    Of lines that begin with # before any other the last is the header, as numpy writes it, unless a comment is stated.
+    """
+    marked: str | None = None
+    leading = not layout.comment
     for number, line in enumerate(stream):
         if number < layout.skip or (layout.comment and line.lstrip().startswith(layout.comment)):
-            yield "\n"
-        else:
-            yield f"{SPACE.join(line.split())}\n" if even else line
+            line = "\n"
+        elif even:
+            line = f"{SPACE.join(line.split())}\n"
+        if leading and (found := _MARKED.match(line)):
+            if marked is not None:
+                yield "\n"
+            marked = line[found.end() :] if layout.header else "\n"
+            continue
+        if marked is not None:
+            yield marked
+            marked = None
+        leading = leading and not line.strip()
+        yield line
+    if marked is not None:
+        yield marked
 
 
 def _separator(lines: Iterator[str]) -> str:
