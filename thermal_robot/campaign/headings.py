@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 
 from thermal_robot.campaign import names
 from thermal_robot.campaign.names import listed
-from thermal_robot.campaign.table import Table
+from thermal_robot.campaign.table import Cells, Table
 from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, SI, Units, unit_of
 from thermal_robot.robot import Robot
 
@@ -181,14 +181,19 @@ def named(table: Table, robot: Robot, units: Units) -> Table:
     if not known:
         return table
     called = {heading.column: name for name, heading in known.items()}
-    columns, told = {}, []
+    columns: dict[str, Cells] = {}
+    other: dict[tuple[str, str], list[str]] = {}
     for column, cells in table.columns.items():
         name = called.get(column, column)
         unit = wanted(name, robot, units)
         scale = 1.0 if name == column else size(known[name].unit, unit)
         columns[name] = cells if scale in (1.0, None) else table.numbers(column, gaps=True) * scale
         if columns[name] is not cells:
-            told.append(f"column {column!r} is in {known[name].unit} by its header, not in {unit} as is declared")
+            other.setdefault((known[name].unit or "", unit), []).append(column)
+    told = [
+        f"read in {own}, as headers say, not in {unit} as is declared: {listed(of)}"
+        for (own, unit), of in other.items()
+    ]
     joints = {joint: known[joint].column for joint in robot.joint_names if joint in known}
     if any(joint.lower() not in column.lower() for joint, column in joints.items()):
         told.append(f"columns {listed(joints.values())} are read as the joints {listed(joints)}")
