@@ -2,7 +2,7 @@
 
 from blind_records import J1, J2, L2, crash, effect, record, said
 
-from thermal_robot.blind.laws import laws, sure_laws
+from thermal_robot.blind.score import laws, sure_laws
 
 TRUE = {"unlisted": "cable", "places": [J1], "near": [J1, L2], "quantities": ["time", "order"]}
 

@@ -12,7 +12,7 @@ import pytest
 from thermal_robot import diagnose
 from thermal_robot.blind import real_faults as faults
 from thermal_robot.blind.real import REMAINDERS, RealCase, real_cases
-from thermal_robot.blind.real_judge import judged
+from thermal_robot.blind.real_faults import judged
 from thermal_robot.campaign import read_campaign, read_samples
 from thermal_robot.observations import observe
 

@@ -5,9 +5,8 @@ import json
 import pytest
 from blind_records import crash, record, said, trial, trial_of_several
 
-from thermal_robot.blind.report.markdown import markdown
 from thermal_robot.blind.report.page import html
-from thermal_robot.blind.report.text import text
+from thermal_robot.blind.report.text import markdown, text
 from thermal_robot.blind.score import score
 
 

@@ -64,33 +64,30 @@ def test_lines_are_found_however_a_key_is_written(tmp_path: Path) -> None:
 def test_a_section_in_one_line_is_found(tmp_path: Path) -> None:
     found = document(tmp_path, 'noise = { position = 0.1 }\nrobot.urdf = "a.urdf"\n')
     assert found.row("noise") == 1
-    assert found.number("noise", "position", 0.0) == 0.1
-    assert found.string("robot", "urdf") == "a.urdf"
+    assert found.sections == {"noise": {"position": 0.1}, "robot": {"urdf": "a.urdf"}}
 
 
-def test_what_is_absent_has_its_default(tmp_path: Path) -> None:
+def test_what_must_be_stated_is_told_with_what_it_may_be(tmp_path: Path) -> None:
     found = document(tmp_path, "[robot]\n")
-    assert found.string("robot", "root_frame", None) is None
-    assert found.word("frames", "base", ("unknown", "known"), "unknown") == "unknown"
-    assert found.number("robot", "reference_temperature", 20.0) == 20.0
-    assert found.size("noise", "position") == 0.0
-    assert found.vector("robot", "gravity", None) is None
-    assert found.positive("gears") == {}
-    with pytest.raises(CampaignError, match="is missing") as caught:
-        found.string("robot", "urdf")
-    assert (caught.value.row, caught.value.column) == (1, "robot.urdf")
+    assert found.sections == {"robot": {}}
+    with pytest.raises(
+        CampaignError, match=r"is missing, expected the path of the robot's URDF file, .* under \[robot\]"
+    ) as lost:
+        found.required("robot", "urdf")
+    assert (lost.value.row, lost.value.column) == (1, "robot.urdf")
+    with pytest.raises(CampaignError, match=r'is missing, expected "rad" or "deg" under \[measurements\]') as lost:
+        found.required("measurements", "angle_unit")
+    assert lost.value.row is None
 
 
 def test_numbers_are_floats_and_no_others_pass(tmp_path: Path) -> None:
-    found = document(tmp_path, "[robot]\ngravity = [0, 0, -9]\nreference_temperature = 21\n[gears]\na = 100\n")
-    assert found.vector("robot", "gravity", None) == (0.0, 0.0, -9.0)
-    assert type(found.number("robot", "reference_temperature", 0.0)) is float
-    assert found.positive("gears") == {"a": 100.0}
+    found = document(tmp_path, "[robot]\ngravity = [0, 0, -9]\nreference_temperature = 21\n[gears]\na = 100\n").sections
+    assert found["robot"]["gravity"] == (0.0, 0.0, -9.0)
+    assert type(found["robot"]["reference_temperature"]) is float
+    assert found["gears"] == {"a": 100.0}
     for wrong in ("true", "inf", "nan", '"21"'):
         with pytest.raises(CampaignError, match="a number"):
-            document(tmp_path, f"[robot]\nreference_temperature = {wrong}\n").number(
-                "robot", "reference_temperature", 0.0
-            )
+            document(tmp_path, f"[robot]\nreference_temperature = {wrong}\n")
 
 
 BRACKETS = "[" * 5000 + "]" * 5000
@@ -112,7 +109,7 @@ BRACKETS = "[" * 5000 + "]" * 5000
 )
 def test_a_hostile_value_is_refused(tmp_path: Path, value: str, told: str) -> None:
     with pytest.raises(CampaignError) as refused:
-        document(tmp_path, f"[noise]\nposition = {value}\n").size("noise", "position")
+        document(tmp_path, f"[noise]\nposition = {value}\n")
     assert told in str(refused.value)
     assert len(str(refused.value)) <= 1000
 

@@ -27,13 +27,13 @@ REFUSED = [
         ["no such column", "every movable joint of the chain from 'base'"],
     ),
     (
-        renamed(lift="Lift"),
+        renamed(lift="lifts"),
         1,
         "lift",
-        "the nearest names 'Lift'",
+        "the nearest names 'lifts'",
         ["expected 'turn', 'lift', 'slide', 'roll'"],
     ),
-    (renamed(y="Y"), 1, "y", "the nearest names 'Y'", ["a measured position needs x, y and z"]),
+    (renamed(y="yy"), 1, "y", "the nearest names 'yy'", ["a measured position needs x, y and z"]),
     (with_column("qw", "1", "1", "1"), 1, "qx", "only 'qw'", ["together or not at all"]),
     (with_column("sim.y", "1", "1", "1"), 1, "sim.x", "only 'sim.y'", ["together or not at all"]),
     (

@@ -28,6 +28,9 @@ SEMICOLONS = WHOLE.replace(",", ";").replace("1000", "1000,25")
         pytest.param(WHOLE.replace("\n", "\r").encode(), id="old Mac line ends"),
         pytest.param(WHOLE.replace(",", "\t").encode(), id="tabs"),
         pytest.param(WHOLE.replace(",", ";").encode(), id="semicolons"),
+        pytest.param(WHOLE.replace(",", "  ").encode(), id="blanks"),
+        pytest.param(("# by hand\n#2026\n# " + WHOLE.replace(",", " ")).encode(), id="as numpy writes it"),
+        pytest.param(("\n#" + WHOLE).encode(), id="a marked header"),
         pytest.param(WHOLE.replace(",", " , ").encode(), id="blanks around everything"),
         pytest.param(WHOLE.replace("\n", ",\n").encode(), id="separator at the end of each line"),
         pytest.param((WHOLE + "\n,,,,,,\n\n").encode(), id="empty lines at the end"),
@@ -43,7 +46,7 @@ def test_same_numbers(tmp_path: Path, data: bytes) -> None:
     assert other.warnings == ()
 
 
-@pytest.mark.parametrize("separator", [";", "\t"])
+@pytest.mark.parametrize("separator", [";", "\t", " ", "   "])
 def test_decimal_commas(tmp_path: Path, separator: str) -> None:
     campaign = read_campaign(put(tmp_path / "c", SEMICOLONS.replace(";", separator)))
     assert campaign.position[0, 0] == pytest.approx(1.00025)
@@ -55,6 +58,73 @@ def test_labels_keep_their_commas(tmp_path: Path) -> None:
     campaign = read_campaign(put(tmp_path / "c", table))
     assert campaign.labels["session"].tolist() == ["1,5", "b", ""]
     assert campaign.position[0, 2] == pytest.approx(0.5005)
+
+
+def test_marked_lines_before_the_rows_are_no_rows(tmp_path: Path) -> None:
+    (tmp_path / "t.txt").write_text("# x y\n1 2\n3 4\n")
+    table = tabular.read_table(tmp_path / "t.txt", tabular.Layout(header=False))
+    assert (table.rows.tolist(), table.numbers("2").tolist()) == ([2, 3], [2.0, 4.0])
+    (tmp_path / "t.csv").write_text("#,x\n1,2\n3,4\n")
+    assert list(tabular.read_table(tmp_path / "t.csv").columns) == ["#", "x"]
+    (tmp_path / "t.csv").write_text("# only\n")
+    with pytest.raises(CampaignError, match="has a header but no rows"):
+        tabular.read_table(tmp_path / "t.csv")
+
+
+@pytest.mark.parametrize("ending", ["xlsx", "ods"])
+def test_workbooks(tmp_path: Path, ending: str) -> None:
+    pytest.importorskip({"xlsx": "openpyxl", "ods": "odf"}[ending])
+    folder = put(tmp_path / "c")
+    plain = read_campaign(folder)
+    frame = pd.read_csv(folder / "measurements.csv")
+    with pd.ExcelWriter(folder / f"measurements.{ending}") as book:
+        frame.to_excel(book, sheet_name="Monday", index=False)
+        frame.head(1).to_excel(book, sheet_name="Tuesday", index=False)
+    file = folder / "campaign.toml"
+    file.write_text(file.read_text().replace("measurements.csv", f"measurements.{ending}"))
+    campaign = read_campaign(folder)
+    np.testing.assert_array_equal(plain.q, campaign.q)
+    np.testing.assert_array_equal(plain.position, campaign.position)
+    assert campaign.rows.tolist() == [2, 3, 4]
+    assert "has 2 sheets: the first, 'Monday', was read" in campaign.warnings[0]
+
+
+def test_a_workbook_is_laid_out_as_stated(tmp_path: Path) -> None:
+    pytest.importorskip("openpyxl")
+    cells = [["Log of cell 7", None, None], [None, None, None], ["a", "when", "b"], [1.5, "# no", "2,5"]]
+    when = [pd.Timestamp("2020-07-14 16:39:04"), pd.Timestamp("2020-07-14 16:40:00")]
+    cells += [["// left out", None, None], [2, when[0], "3,5"], [0.1, when[1], None]]
+    pd.DataFrame(cells).to_excel(tmp_path / "t.xlsx", header=False, index=False)
+    table = tabular.read_table(tmp_path / "t.xlsx", tabular.Layout(skip=1, comment="//"))
+    assert (table.header, table.rows.tolist()) == (3, [4, 6, 7])
+    np.testing.assert_array_equal(table.numbers("b", gaps=True), [2.5, 3.5, np.nan])
+    assert table.text("when") == ["# no", *map(str, when)]
+    numbered = tabular.read_table(tmp_path / "t.xlsx", tabular.Layout(skip=3, header=False, comment="//"))
+    assert (list(numbered.columns), numbered.rows.tolist()) == (["1", "2", "3"], [4, 6, 7])
+
+
+def test_a_workbook_without_what_reads_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("openpyxl")
+    pd.DataFrame([[1.0]]).to_excel(tmp_path / "t.xlsx")
+    monkeypatch.setitem(sys.modules, "openpyxl", None)
+    error = refusal(tmp_path, toml=TOML.replace("measurements.csv", "t.xlsx"))
+    assert "workbooks need openpyxl" in str(error)
+    assert 'pip install "thermal-robot[excel]"' in str(error)
+
+
+def test_broken_workbook(tmp_path: Path) -> None:
+    pytest.importorskip("openpyxl")
+    (tmp_path / "t.xlsx").write_bytes(b"PK\x03\x04")
+    error = refusal(tmp_path, toml=TOML.replace("measurements.csv", "t.xlsx"))
+    assert "cannot be read as a workbook" in str(error)
+
+
+@pytest.mark.parametrize("separator", [",", ";", "\t", " "])
+def test_a_row_that_was_taken_for_a_header_is_told(tmp_path: Path, separator: str) -> None:
+    table = WHOLE.split("\n", 1)[1].replace(",", separator)
+    error = refusal(tmp_path, table=table)
+    assert "the first line of" in str(error)
+    assert "was taken for a header" in str(error)
 
 
 def test_rows_are_counted_as_an_editor_does(tmp_path: Path) -> None:
@@ -97,7 +167,7 @@ REFUSED = [
     (ROWS.replace(",2,8", ",2"), 3, None, "8", ["wrong number of fields", "9 as in the header"]),
     (ROWS.replace(",2,8", ",2,8,9"), 3, None, "10", ["wrong number of fields", "9 as in the header"]),
     (ROWS.replace(",2,8", ',"2,8'), 3, None, None, ["cannot be read as CSV", "unexpected end"]),
-    (b"PK\x03\x04...", None, None, None, ["is a workbook", "saved as CSV or Parquet"]),
+    (b"PK\x03\x04...", None, None, None, ["is a workbook", "a name that ends in .xlsx or .ods"]),
     (b"PAR1...", None, None, None, ["Parquet file by its contents", "ends in .parquet"]),
     (
         ROWS.replace("900", "9" * 200_000),

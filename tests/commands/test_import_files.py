@@ -16,10 +16,10 @@ def test_the_help_has_every_format(capsys):
     with pytest.raises(SystemExit):
         cli.main(["import", "--help"])
     text = capsys.readouterr().out
-    for name, module in FORMATS.items():
+    for name, format in FORMATS.items():
         assert f"{name} " in text
-        assert module.DOES in text
-        assert module.FILES in text
+        assert format.does in text
+        assert format.files in text
 
 
 def test_options_count_for_more_than_the_mapping(run, tmp_path):

@@ -5,18 +5,22 @@ import sys
 import numpy as np
 import pandas as pd
 import pytest
+import ur_arm
 from commanded import refused
-from readers import by_mujoco, held
+from readers import by_mujoco, held, model_of
 
 from thermal_robot import CorrectedModel
+from thermal_robot.campaign.ur_kinematics import with_kinematics
 from thermal_robot.commands import robot_files
 from thermal_robot.correction import calibrated
+from thermal_robot.effects import JointOffset
 from thermal_robot.kinematics import tool_poses
 from thermal_robot.robot import load_robot
 
 
 def test_every_file_holds_the_same_robot(run, diagnosed, tmp_path):
-    files = {name: tmp_path / f"{name}.{'csv' if name in ('dh', 'offsets') else 'xml'}" for name in robot_files.OUTPUTS}
+    every = [name for name in robot_files.OUTPUTS if name != "ur_kinematics"]  # which is of other robots
+    files = {name: tmp_path / f"{name}.{'csv' if name in ('dh', 'offsets') else 'xml'}" for name in every}
     options = [word for name, file in files.items() for word in (f"--{name}", file)]
     assert run("correct", diagnosed.model, *options, "--temperature", "26") == (0, "", "")
     model = CorrectedModel.load(diagnosed.model)
@@ -32,6 +36,20 @@ def test_every_file_holds_the_same_robot(run, diagnosed, tmp_path):
     assert "d [mm]" in table
     assert list(pd.read_csv(files["offsets"])["joint"]) == list(model.robot.joint_names)
     assert "at 26 °C" in files["urdf"].read_text(encoding="utf-8")
+
+
+def test_a_robot_of_universal_robots_has_a_file_of_its_own(run, diagnosed, tmp_path):
+    refused(
+        run("correct", diagnosed.model, "--ur-kinematics", tmp_path / "k.yaml"), "'rv_m2' has no shoulder_pan_joint"
+    )
+    assert not (tmp_path / "k.yaml").exists()
+    robot = load_robot(ur_arm.urdf(), "tool0")
+    offsets = np.array([1e-3, -2e-3, 3e-3, 1e-3, 2e-3, 0.0])
+    model_of(robot, (JointOffset(), offsets)).save(tmp_path / "m.json")
+    assert run("correct", tmp_path / "m.json", "--ur-kinematics", tmp_path / "k.yaml") == (0, "", "")
+    q = np.random.default_rng(1).uniform(-3, 3, (5, 6))
+    read = with_kinematics(robot, tmp_path / "k.yaml")
+    np.testing.assert_allclose(read.forward(q), robot.forward(q + offsets), atol=1e-9)
 
 
 def test_a_file_of_a_robot_is_printed(run, diagnosed, tmp_path):

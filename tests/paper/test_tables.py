@@ -5,7 +5,7 @@ from functools import cache
 
 from thermal_robot.paper import PaperInputs, ledger
 from thermal_robot.paper.entry import VERDICTS
-from thermal_robot.paper.tables import WIDTH, markdown, text
+from thermal_robot.paper.ledger import WIDTH, markdown, text
 
 
 @cache

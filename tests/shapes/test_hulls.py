@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from thermal_robot import load_robot
-from thermal_robot.shapes.hulls import hull, hulls
+from thermal_robot.shapes.visuals import hull, hulls
 
 ONE = """<robot name="one"><link name="ground"/><link name="arm">{visual}</link>
 <joint name="turn" type="revolute"><parent link="ground"/><child link="arm"/><axis xyz="0 0 1"/>

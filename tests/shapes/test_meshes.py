@@ -3,8 +3,7 @@
 import pytest
 
 import thermal_robot as tr
-from thermal_robot.shapes.meshes import find_mesh
-from thermal_robot.shapes.visuals import parsed, visuals
+from thermal_robot.shapes.visuals import find_mesh, parsed, visuals
 
 
 @pytest.fixture

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from thermal_robot.kinematics import quaternion_to_rotation
-from thermal_robot.viewer.arrows import arrows, longest, readable, turned_along, unit_arrow
+from thermal_robot.viewer.scene import arrows, longest, readable, turned_along, unit_arrow
 
 SIZE = 2.0
 

@@ -4,10 +4,8 @@ import numpy as np
 from scene_nodes import Nodes
 
 from thermal_robot.kinematics import quaternion_to_rotation
-from thermal_robot.viewer.arrows import longest
-from thermal_robot.viewer.cloud import Cloud
-from thermal_robot.viewer.colours import linear
-from thermal_robot.viewer.settings import ASIDE, GAP
+from thermal_robot.viewer.scene import Cloud, longest
+from thermal_robot.viewer.settings import ASIDE, GAP, linear
 
 
 def ends(node):

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from thermal_robot.viewer.colours import between, colours, linear
-from thermal_robot.viewer.settings import FULL_SHARE, NO_SHARE
+from thermal_robot.viewer.settings import FULL_SHARE, NO_SHARE, between, colours, linear
 
 
 def brightness(colour):

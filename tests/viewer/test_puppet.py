@@ -9,10 +9,8 @@ from scene_nodes import Nodes
 
 from thermal_robot.kinematics import quaternion_to_rotation
 from thermal_robot.viewer import panel
-from thermal_robot.viewer.colours import colours
-from thermal_robot.viewer.puppet import Puppet
-from thermal_robot.viewer.settings import NO_SHARE
-from thermal_robot.viewer.solids import solids
+from thermal_robot.viewer.settings import NO_SHARE, colours
+from thermal_robot.viewer.solids import Puppet, solids
 
 
 @pytest.fixture

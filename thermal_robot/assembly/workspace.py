@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from thermal_robot.assembly.repeatability import tool_covariance
-from thermal_robot.assembly.thermal.displacement import displacement
-from thermal_robot.assembly.thermal.elongation import PerSegment, elongation
+from thermal_robot.assembly.thermal.elongation import PerSegment, displacement, elongation
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics import chain_frames, frame_jacobians
 from thermal_robot.robot import Robot

@@ -117,9 +117,8 @@ def _records(
 
 def _tell(records: list[dict[str, Any]], options: argparse.Namespace) -> None:
     """Print the score and write its files."""
-    from thermal_robot.blind.report.markdown import markdown
     from thermal_robot.blind.report.page import html
-    from thermal_robot.blind.report.text import text
+    from thermal_robot.blind.report.text import markdown, text
     from thermal_robot.blind.score import score
 
     withdrawn = [record for record in records if "withdrawn" in record]

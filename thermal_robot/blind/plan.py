@@ -9,8 +9,7 @@ from typing import get_args
 import numpy as np
 
 from thermal_robot.blind.cases import SEVERAL, Case, Kind, RobotChoice
-from thermal_robot.blind.kinds import Asked, turns
-from thermal_robot.blind.kinds_several import turns_of_several
+from thermal_robot.blind.kinds import Asked, turns, turns_of_several
 from thermal_robot.errors import EffectError, RobotError
 from thermal_robot.robot import load_robot
 

@@ -36,7 +36,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.blind import real_faults as faults
-from thermal_robot.blind.real_judge import judged
+from thermal_robot.blind.real_faults import judged
 from thermal_robot.campaign import Campaign, read_campaign, write_campaign, write_table
 from thermal_robot.inference.rows import in_order
 from thermal_robot.observations import Observations, observe

@@ -4,34 +4,45 @@ from __future__ import annotations
 
 import math
 from collections import defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, fields, is_dataclass
 from typing import Any, get_args
 
 import numpy as np
 
-from thermal_robot.blind.calibration import Calibration, calibration
 from thermal_robot.blind.cases import SEVERAL, Kind
-from thermal_robot.blind.confusion import Confusion, confusion
-from thermal_robot.blind.coverage import Coverage, coverage
-from thermal_robot.blind.detection import Detection, detection
+from thermal_robot.blind.confusion import Confusion, Detection, confusion, detection
+from thermal_robot.blind.coverage import (
+    Calibration,
+    Coverage,
+    Rate,
+    Shrinkage,
+    Spread,
+    calibration,
+    coverage,
+    fresh_ratio,
+    rate,
+    shrinkage,
+    spread,
+    worse,
+)
 from thermal_robot.blind.judged import (
     BAD,
     HEADLINE,
     KNOWN,
+    LAW,
+    Plain,
     Record,
     answer,
     at_work,
     failed,
     found,
     is_miss,
+    is_right_law,
     marks,
     said,
 )
 from thermal_robot.blind.judged_several import said_words, true_words
-from thermal_robot.blind.laws import sure_laws
-from thermal_robot.blind.rate import Rate, rate
-from thermal_robot.blind.shrinkage import Shrinkage, Spread, fresh_ratio, shrinkage, spread, worse
 
 SCHEMA = "thermal-robot/blind/1"
 CONFUSIONS = {"single": ("single", "null", "unlisted"), "hard": ("hard",), "removed": ("removed",)}
@@ -306,3 +317,22 @@ def _plain(value: Any) -> Any:
     if isinstance(value, float) and not math.isfinite(value):
         return None
     return value
+
+
+SURE = 0.9
+
+
+def laws(record: Record) -> Iterator[Plain]:
+    """Yield the laws of a diagnosis that have a probability, found or not."""
+    for effect in said(record)["effects"]:
+        if effect["name"].startswith(LAW) and effect["probability"] is not None:
+            yield effect
+
+
+def sure_laws(records: Sequence[Record]) -> Rate:
+    """Count laws printed at 0.9 or more in all records but real ones, and which of them are right.
+
+    A law where all that is at work is in the library is wrong.
+    """
+    told = [(record, law) for record in records if record["kind"] != "real" for law in laws(record)]
+    return rate(is_right_law(record, law) for record, law in told if law["probability"] >= SURE)

@@ -18,8 +18,8 @@ from pathlib import Path
 from typing import Any, Protocol
 
 from thermal_robot.blind.cases import ASKS, Case
+from thermal_robot.blind.coverage import shares
 from thermal_robot.blind.sealed import open_seal, seal
-from thermal_robot.blind.shares import shares
 from thermal_robot.blind.supervise import examine
 from thermal_robot.errors import ThermalRobotError
 from thermal_robot.files import write_bytes, write_text

@@ -6,17 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
-from thermal_robot.campaign.document import SECTIONS, Document
+from thermal_robot.campaign.document import Document
 from thermal_robot.campaign.names import did_you_mean, listed
-from thermal_robot.campaign.settings import (
-    MOVES,
-    STANDARD_TEMPERATURE,
-    TEMPERATURE,
-    Settings,
-    Vector,
-    as_vector,
-)
-from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, Units
+from thermal_robot.campaign.settings import Settings
 from thermal_robot.errors import CampaignError
 from thermal_robot.files import is_file, is_folder
 
@@ -40,6 +32,8 @@ class Declaration:
         Line of each key of ``[gears]``, for a message once the robot's joints are known.
     folder
         Against which its paths are resolved.
+    kinematics
+        Path of the calibration that a robot of Universal Robots brings along; ``None`` without one.
     """
 
     file: Path
@@ -47,6 +41,7 @@ class Declaration:
     settings: Settings
     gear_rows: Mapping[str, int | None]
     folder: Path
+    kinematics: Path | None = None
 
     @property
     def robot(self) -> str | Path:
@@ -74,32 +69,17 @@ def read_declaration(path: Path, folder: Path | None = None) -> Declaration:
     if not is_file(file):
         raise _absent(path)
     document = Document(file)
-    length = Units(length=document.word("measurements", "length_unit", LENGTH_UNITS)).length_scale
-    noise = [document.size("noise", key) for key in SECTIONS["noise"]]
-    settings = Settings(
-        urdf=document.string("robot", "urdf"),
-        tool_frame=document.string("robot", "tool_frame"),
-        root_frame=document.string("robot", "root_frame", None),
-        gravity=document.vector("robot", "gravity", None),
-        moves=document.word("robot", "moves", MOVES, MOVES[0]),
-        reference_temperature=document.number("robot", "reference_temperature", STANDARD_TEMPERATURE, TEMPERATURE),
-        units=Units(
-            document.word("measurements", "angle_unit", ANGLE_UNITS),
-            document.word("measurements", "length_unit", LENGTH_UNITS),
-        ),
-        base_known=document.word("frames", "base", ("unknown", "known"), "unknown") == "known",
-        tool_known=document.word("frames", "tool", ("unknown", "known"), "unknown") == "known",
-        target=_scaled(document.vector("frames", "target", (0.0, 0.0, 0.0)), length),
-        noise_position=noise[0] * length or None,
-        noise_orientation=noise[1] or None,
-        payload_com=_scaled(document.vector("payload", "com", (0.0, 0.0, 0.0)), length),
-        priors=document.positive("priors"),
-        gears=document.positive("gears"),
-    )
+    for key in ("angle_unit", "length_unit"):
+        document.required("measurements", key)
+    robot = document.sections.get("robot", {})
+    ends = {key: robot.get(key) for key in ("root_frame", "gravity")}
+    named = {key: document.required("robot", key) for key in ("urdf", "tool_frame")}
+    settings = Settings.stated(document.sections, **named, **ends)
     folder = file.parent if folder is None else folder
-    table = folder / document.string("measurements", "file")
+    table = folder / document.required("measurements", "file")
     rows = {joint: document.row("gears", joint) for joint in settings.gears}
-    return Declaration(file, table, settings, rows, folder)
+    kinematics = robot.get("kinematics")
+    return Declaration(file, table, settings, rows, folder, folder / kinematics if kinematics else None)
 
 
 def check_gears(declaration: Declaration, joints: tuple[str, ...]) -> None:
@@ -138,7 +118,3 @@ def _campaigns(folder: Path) -> list[str]:
     except (OSError, ValueError):  # nothing can be proposed where nothing can be read
         return []
     return [f.name for f in (*files, *folders)]
-
-
-def _scaled(vector: Vector, scale: float) -> Vector:
-    return as_vector(value * scale for value in vector)

@@ -4,34 +4,70 @@ from __future__ import annotations
 
 import re
 import sys
-from collections.abc import Iterable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 from thermal_robot.campaign.figures import SMALLEST
 from thermal_robot.campaign.names import did_you_mean
-from thermal_robot.campaign.settings import GEARS, NUMBER, PRIORS, SIGMA, UNIT, VECTOR, WORD
+from thermal_robot.campaign.settings import (
+    ANGLE_UNIT,
+    GEARS,
+    HOW_MOVED,
+    LENGTH_UNIT,
+    PRIORS,
+    SIGMA,
+    TEMPERATURE,
+    VECTOR,
+    WORD,
+)
 from thermal_robot.errors import CampaignError
-from thermal_robot.schema import Kind, MisfitError, alternatives, shown, word
+from thermal_robot.schema import Kind, MisfitError, record, shown, text, word
 
 if sys.version_info >= (3, 11):
     import tomllib
 else:
     import tomli as tomllib
 
-SECTIONS: dict[str, tuple[str, ...]] = {
-    "robot": ("urdf", "tool_frame", "root_frame", "gravity", "moves", "reference_temperature"),
-    "measurements": ("file", "angle_unit", "length_unit"),
-    "frames": ("base", "tool", "target"),
-    "noise": ("position", "orientation"),
-    "payload": ("com",),
-    "priors": (),
-    "gears": (),
-}
-"""Keys by section; priors and gears have keys of the user's own (effects and joints)."""
+_KNOWN = word(("unknown", "known"), WORD)
 
-_NAMED = {"priors": PRIORS, "gears": GEARS}
-_ABSENT: Any = object()
+
+def _named(meaning: str) -> Kind:
+    return text(f"{meaning}, as text in quotes")
+
+
+def _sigma(value: Any, path: str) -> float:
+    sigma = float(SIGMA(value, path))
+    if 0.0 < sigma < SMALLEST:
+        raise MisfitError(path, value, "a number above 0, or 0 for not given", "smaller than any noise")
+    return sigma
+
+
+def _vector(value: Any, path: str) -> Any:
+    try:
+        return VECTOR(value, path)
+    except MisfitError:
+        raise MisfitError(path, value, "three numbers in brackets, such as [0.0, 0.0, 80.0]") from None
+
+
+KINDS: dict[str, Mapping[str, Kind] | Kind] = {
+    "robot": {
+        "urdf": _named("the path of the robot's URDF file"),
+        "tool_frame": _named("the URDF link that carries the target"),
+        "root_frame": _named("the URDF link where the chain starts"),
+        "kinematics": _named("the path of a kinematics.yaml of Universal Robots"),
+        "gravity": _vector,
+        "moves": HOW_MOVED,
+        "reference_temperature": TEMPERATURE,
+    },
+    "measurements": {"file": _named("the path of the table"), "angle_unit": ANGLE_UNIT, "length_unit": LENGTH_UNIT},
+    "frames": {"base": _KNOWN, "tool": _KNOWN, "target": _vector},
+    "noise": {"position": _sigma, "orientation": _sigma},
+    "payload": {"com": _vector},
+    "priors": PRIORS,
+    "gears": GEARS,
+}
+"""What each key of each section of campaign.toml may be; priors and gears have keys of the user's own."""
 _LARGEST_FILE = 1 << 16
 """Bytes: it holds a few lines, and a line for every joint and every effect."""
 
@@ -43,12 +79,17 @@ class Document:
     ----------
     file
         Its path.
+    kinds
+        What each key of each section may be; of a section whose keys are the user's own, what the whole may be.
+
+    Attributes
+    ----------
     sections
-        Keys by section that it may have; a section without any has keys of the user's own.
+        Values by section and key, each of its kind; what is not stated is absent.
     """
 
-    def __init__(self, file: Path, sections: Mapping[str, tuple[str, ...]] = SECTIONS) -> None:
-        self.file, self.sections = str(file), sections
+    def __init__(self, file: Path, kinds: Mapping[str, Mapping[str, Kind] | Kind] = KINDS) -> None:
+        self.file, self.kinds = str(file), kinds
         try:
             if file.stat().st_size > _LARGEST_FILE:
                 raise CampaignError(self.file, "is larger than any campaign.toml", expected="at most 64 KiB")
@@ -69,6 +110,7 @@ class Document:
         except ValueError as error:  # an integer of thousands of digits
             raise CampaignError(self.file, "a number has too many digits to be read", found=str(error)) from error
         self._refuse_unknown()
+        self.sections = {section: self._fitted(section, content) for section, content in self.data.items()}
 
     def row(self, section: str, key: str = "") -> int | None:
         """Return the line of a section or key, ``None`` where it is written in some unusual way."""
@@ -86,13 +128,13 @@ class Document:
 
     def _refuse_unknown(self) -> None:
         for section, content in self.data.items():
-            if section not in self.sections:
+            if section not in self.kinds:
                 raise CampaignError(
                     self.file,
-                    f"unknown section or key{did_you_mean(section, self.sections)}",
+                    f"unknown section or key{did_you_mean(section, self.kinds)}",
                     row=self.row(section),
                     column=section,
-                    expected=f"one of the sections {', '.join(self.sections)}",
+                    expected=f"one of the sections {', '.join(self.kinds)}",
                 )
             if not isinstance(content, dict):
                 raise CampaignError(
@@ -103,87 +145,55 @@ class Document:
                     found=shown(content),
                     expected=f"a section [{section}]",
                 )
-            known = self.sections[section]
-            for key in content if known else ():
+            kind = self.kinds[section]
+            known = kind if isinstance(kind, Mapping) else dict.fromkeys(content)
+            for key in content:
                 if key not in known:
                     raise CampaignError(
                         self.file,
                         f"unknown key{did_you_mean(key, known)}",
                         row=self.row(section, key),
                         column=f"{section}.{key}",
-                        expected=f"one of {', '.join(known)}" if len(known) > 1 else known[0],
+                        expected=f"one of {', '.join(known)}" if len(known) > 1 else next(iter(known)),
                     )
 
-    def _wrong(
-        self, section: str, key: str, found: Any, expected: str, problem: str = "wrong kind of value"
-    ) -> CampaignError:
-        return CampaignError(
-            self.file,
-            problem,
-            row=self.row(section, key),
-            column=f"{section}.{key}",
-            found=shown(found),
-            expected=expected,
-        )
-
-    def _get(self, section: str, key: str, default: Any, expected: str) -> Any:
-        value = self.data.get(section, {}).get(key, default)
-        if value is _ABSENT:
+    def _fitted(self, section: str, content: Any) -> dict[str, Any]:
+        """Return the values of a section; what is not of its kind is told with its line."""
+        known = self.kinds[section]
+        kind = record(known, may_lack=known) if isinstance(known, Mapping) else known
+        try:
+            values: dict[str, Any] = kind(content, section)
+        except MisfitError as error:
+            key = re.split(r"[.\[]", error.path.removeprefix(f"{section}."))[0]
             raise CampaignError(
                 self.file,
-                "is missing",
-                row=self.row(section) if section in self.data else None,
-                column=f"{section}.{key}",
-                expected=f"{expected} under [{section}]",
-            )
-        return value
+                error.problem or "wrong kind of value",
+                row=self.row(section, key) or self.row(section),
+                column=error.path,
+                found=shown(error.value),
+                expected=error.expected,
+            ) from None
+        return values
 
-    def string(self, section: str, key: str, default: Any = _ABSENT) -> Any:
-        """Return a text that is not empty, or the default."""
-        meaning = {
-            "urdf": "the path of the robot's URDF file",
-            "tool_frame": "the URDF link that carries the target",
-            "root_frame": "the URDF link where the chain starts",
-            "file": "the path of the table",
-        }[key]
-        value = self._get(section, key, default, meaning)
-        if value is not None and (not isinstance(value, str) or not value.strip()):
-            raise self._wrong(section, key, value, f"{meaning}, as text in quotes")
-        return value
+    def required(self, section: str, key: str) -> Any:
+        """Return a value that must be stated.
 
-    def word(self, section: str, key: str, allowed: Iterable[str], default: Any = _ABSENT) -> str:
-        """Return one of the allowed words."""
-        kind = word(allowed, UNIT if key.endswith("unit") else WORD)
-        return str(self._fit(section, key, self._get(section, key, default, alternatives(allowed)), kind))
-
-    def number(self, section: str, key: str, default: Any, kind: Kind = NUMBER) -> float:
-        """Return a number of a kind, any finite one where none is given."""
-        return float(self._fit(section, key, self._get(section, key, default, "a number"), kind))
-
-    def size(self, section: str, key: str) -> float:
-        """Return a number that is not negative, 0 when absent."""
-        value = self.number(section, key, 0.0, SIGMA)
-        if 0.0 < value < SMALLEST:
-            raise self._wrong(section, key, value, "a number above 0, or 0 for not given", "smaller than any noise")
-        return value
-
-    def vector(self, section: str, key: str, default: Any) -> Any:
-        """Return three finite numbers, or the default."""
-        value = self._get(section, key, default, "three numbers")
-        if value is None or value is default:
-            return value
-        return self._fit(section, key, value, VECTOR, "three numbers in brackets, such as [0.0, 0.0, 80.0]")
-
-    def positive(self, section: str) -> dict[str, float]:
-        """Return a section whose keys are the user's own, each with a number above 0."""
-        kind, values = _NAMED[section], self.data.get(section, {})
-        return {key: self._fit(section, key, {key: value}, kind)[key] for key, value in values.items()}
-
-    def _fit(self, section: str, key: str, value: Any, kind: Kind, expected: str = "") -> Any:
-        """Return a value of a kind; what is no such value is told with its line."""
+        Raises
+        ------
+        CampaignError
+            It is not.
+        """
+        if key in self.sections.get(section, {}):
+            return self.sections[section][key]
+        known = self.kinds[section]
         try:
-            return kind(value, "")
+            expected = str(known[key](None, key)) if isinstance(known, Mapping) else ""
         except MisfitError as error:
-            found = value if expected else error.value
-            problem = error.problem or "wrong kind of value"
-            raise self._wrong(section, key, found, expected or error.expected, problem) from None
+            expected = error.expected
+        raise CampaignError(
+            self.file,
+            "is missing",
+            row=self.row(section) if section in self.data else None,
+            column=f"{section}.{key}",
+            expected=f"{expected} under [{section}]",
+        )

@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
 
 from thermal_robot.campaign.campaign import Campaign
-from thermal_robot.campaign.names import did_you_mean, listed
+from thermal_robot.campaign.checked import check_joints
 from thermal_robot.campaign.settings import (
     ANGLE_UNIT,
     GEARS,
@@ -20,11 +20,10 @@ from thermal_robot.campaign.settings import (
     VECTOR,
     WORD,
     Settings,
-    Vector,
     as_vector,
 )
 from thermal_robot.campaign.tabular import table_from_frame
-from thermal_robot.campaign.units import SI, Units
+from thermal_robot.campaign.units import SI
 from thermal_robot.campaign.validate import build_campaign
 from thermal_robot.errors import CampaignError, require
 from thermal_robot.robot import Robot
@@ -35,6 +34,7 @@ if TYPE_CHECKING:
 
 FILE = "<table>"
 """What messages call the data frame."""
+_NOISE = "a finite number above 0, or None"
 
 
 def campaign_from_table(
@@ -110,32 +110,31 @@ def campaign_from_table(
     frame = word(("known", "unknown"), WORD)
     angle_unit = table.attrs.get("angle_unit", SI.angle) if angle_unit is None else angle_unit
     length_unit = table.attrs.get("length_unit", SI.length) if length_unit is None else length_unit
-    units = Units(_given("angle_unit", angle_unit, ANGLE_UNIT), _given("length_unit", length_unit, LENGTH_UNIT))
-    settings = Settings(
-        urdf="",
-        tool_frame=robot.tool_frame,
-        root_frame=robot.root_frame,
-        gravity=as_vector(robot.gravity),
-        moves=_given("moves", moves, HOW_MOVED),
-        reference_temperature=_given("reference_temperature", reference_temperature, TEMPERATURE),
-        units=units,
-        base_known=_given("base", base, frame) == "known",
-        tool_known=_given("tool", tool, frame) == "known",
-        target=_vector("target", target, units.length_scale),
-        noise_position=_size("noise_position", noise_position, units.length_scale),
-        noise_orientation=_size("noise_orientation", noise_orientation),
-        payload_com=_vector("payload_com", payload_com, units.length_scale),
-        priors=_given("priors", {} if priors is None else priors, PRIORS),
-        gears=_given("gears", {} if gears is None else gears, GEARS),
-    )
-    for joint in settings.gears:
-        if joint not in robot.joint_names:
-            raise CampaignError(
-                FILE,
-                f"the chain has no such joint{did_you_mean(joint, robot.joint_names)}",
-                column=f"gears.{joint}",
-                expected=f"one of {listed(robot.joint_names)}",
-            )
+    stated = {
+        "robot": {
+            "moves": _given("moves", moves, HOW_MOVED),
+            "reference_temperature": _given("reference_temperature", reference_temperature, TEMPERATURE),
+        },
+        "measurements": {
+            "angle_unit": _given("angle_unit", angle_unit, ANGLE_UNIT),
+            "length_unit": _given("length_unit", length_unit, LENGTH_UNIT),
+        },
+        "frames": {
+            "base": _given("base", base, frame),
+            "tool": _given("tool", tool, frame),
+            "target": _given("target", target, VECTOR, "three numbers"),
+        },
+        "noise": {
+            "position": _given("noise_position", noise_position, optional(SIGMA), _NOISE),
+            "orientation": _given("noise_orientation", noise_orientation, optional(SIGMA), _NOISE),
+        },
+        "payload": {"com": _given("payload_com", payload_com, VECTOR, "three numbers")},
+        "priors": _given("priors", {} if priors is None else priors, PRIORS),
+        "gears": _given("gears", {} if gears is None else gears, GEARS),
+    }
+    ends = {"tool_frame": robot.tool_frame, "root_frame": robot.root_frame, "gravity": as_vector(robot.gravity)}
+    settings = Settings.stated(stated, urdf="", **ends)
+    check_joints(FILE, "gears", settings.gears, robot.joint_names)
     name, measured = _given("name", name, text(empty=True)), _given("measured", measured, boolean)
     return build_campaign(table_from_frame(table, FILE), settings, robot, name=name, measured=measured)
 
@@ -149,13 +148,3 @@ def _given(argument: str, value: Any, kind: Kind, expected: str = "") -> Any:
         found = shown(value if expected else error.value)
         column = argument if expected else error.path
         raise CampaignError(FILE, problem, column=column, found=found, expected=expected or error.expected) from None
-
-
-def _size(argument: str, sigma: float | None, scale: float = 1.0) -> float | None:
-    """Return a standard deviation in SI, ``None`` where it is not given."""
-    given = _given(argument, sigma, optional(SIGMA), "a finite number above 0, or None")
-    return float(given * scale) if given else None
-
-
-def _vector(argument: str, values: Sequence[float], scale: float) -> Vector:
-    return as_vector(value * scale for value in _given(argument, values, VECTOR, "three numbers"))

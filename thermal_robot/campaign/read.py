@@ -11,6 +11,7 @@ from thermal_robot.campaign.declaration import FILE_NAME, check_gears, read_decl
 from thermal_robot.campaign.settings import Settings
 from thermal_robot.campaign.table import Table
 from thermal_robot.campaign.tabular import read_table, table_from_frame
+from thermal_robot.campaign.ur_kinematics import with_kinematics
 from thermal_robot.campaign.validate import build_campaign
 from thermal_robot.errors import CampaignError, RobotError, require
 from thermal_robot.robot import Robot, load_robot
@@ -61,6 +62,8 @@ def read_campaign(path: str | Path, *, folder: str | Path | None = None) -> Camp
         raise RobotError(
             f"{declaration.file}, [robot]: {error}", name=error.name, candidates=error.candidates
         ) from error
+    if declaration.kinematics:
+        robot = with_kinematics(robot, declaration.kinematics)
     check_gears(declaration, robot.joint_names)
     file = Path(os.path.abspath(declaration.file))  # the parent of "." and ".." has a name, too
     name = file.parent.name if file.name == FILE_NAME else file.stem

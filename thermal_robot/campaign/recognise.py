@@ -179,10 +179,7 @@ def _doubts_of_extra(column: str, robot: Robot) -> list[str]:
     if column in names.PER_JOINT:
         meant = f"did you mean '{column}.<joint>'?"
         return [f"column {column!r} names no joint and is kept as an extra covariate; {meant}"]
-    known = [
-        *names.RESERVED,
-        *(f"{quantity}.{joint}" for quantity in names.PER_JOINT for joint in robot.joint_names),
-    ]
+    known = [*names.RESERVED, *(f"{quantity}.{joint}" for quantity in names.PER_JOINT for joint in robot.joint_names)]
     meant = did_you_mean(column, known, cutoff=TYPING_ERROR)
     return [f"column {column!r} is not defined by the format and is kept as an extra covariate{meant}"] if meant else []
 
@@ -225,7 +222,7 @@ def _require(table: Table, wanted: Sequence[str], why: str) -> None:
             found = f"the nearest names {listed(close)}" if close else f"the columns {listed(table.columns)}"
             raise CampaignError(
                 table.file,
-                f"there is no such column; {why}",
+                f"there is no such column; {why}{table.headless}",
                 row=table.header,
                 column=name,
                 found=found,

@@ -27,7 +27,6 @@ ABSOLUTE_ZERO = -273.15
 
 UNIT, WORD = "unknown unit", "unknown word"
 ANGLE_UNIT, LENGTH_UNIT = word(ANGLE_UNITS, UNIT), word(LENGTH_UNITS, UNIT)
-NUMBER = number(expected="a number")
 HOW_MOVED = word(MOVES, WORD)
 TEMPERATURE = number(least=ABSOLUTE_ZERO, expected="a number of °C", problem="no temperature is lower than −273.15 °C")
 VECTOR = listed(number(), 3, "three numbers")
@@ -133,6 +132,36 @@ class Settings:
             "gears": self.gears,
             "units": self.units,
         }
+
+    @classmethod
+    def stated(cls, sections: Mapping[str, Mapping[str, Any]], **ends: Any) -> Settings:
+        """Return the settings of values by section and key, as campaign.toml has them, lengths in its unit.
+
+        Parameters
+        ----------
+        sections
+            Both units at least.
+        ends
+            The robot's reference, the ends of the chain and gravity.
+        """
+        robot, frames, noise = (sections.get(section, {}) for section in ("robot", "frames", "noise"))
+        units = Units(sections["measurements"]["angle_unit"], sections["measurements"]["length_unit"])
+        place, turn = noise.get("position"), noise.get("orientation")
+        return cls(
+            **ends,
+            **{key: robot[key] for key in ("moves", "reference_temperature") if key in robot},
+            units=units,
+            base_known=frames.get("base") == "known",
+            tool_known=frames.get("tool") == "known",
+            target=as_vector(units.length_scale * value for value in frames.get("target", (0.0, 0.0, 0.0))),
+            noise_position=place * units.length_scale if place else None,
+            noise_orientation=turn or None,
+            payload_com=as_vector(
+                units.length_scale * value for value in sections.get("payload", {}).get("com", (0.0, 0.0, 0.0))
+            ),
+            priors=sections.get("priors", {}),
+            gears=sections.get("gears", {}),
+        )
 
     @classmethod
     def from_dict(cls, data: Mapping[str, Any], file: str = "<settings>") -> Settings:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, TypeAlias
 
@@ -20,6 +20,17 @@ Cells: TypeAlias = "Sequence[str] | NDArray[np.float64]"
 
 _FEW = 5  # rows that a sentence names
 _EMPTY = frozenset({"", "nan", "na", "n/a", "null", "none", "<na>"})
+
+
+def without_names(header: Iterable[str], file: str) -> str:
+    """Say that a header holds numbers alone, so that it was a row of the table; empty where it does not."""
+    try:
+        figures = [float(name.replace(",", ".").replace("−", "-")) for name in header]
+    except ValueError:
+        return ""
+    remedy = "write names above it, or `header = false` under [table] of a mapping"
+    told = f"; the first line of {file} is numbers alone and was taken for a header: {remedy}"
+    return told if len(figures) > 1 else ""
 
 
 @dataclass(frozen=True)
@@ -48,6 +59,16 @@ class Table:
     header: int | None = None
     decimal_comma: bool = False
     warnings: tuple[str, ...] = ()
+
+    @property
+    def headless(self) -> str:
+        """What :func:`without_names` says of its header."""
+        return "" if self.header is None else without_names(self.columns, self.file)
+
+    @property
+    def unnamed(self) -> bool:
+        """Whether the file has no header, so that its columns are called 1, 2, 3 …."""
+        return self.header is None and all(name == str(k) for k, name in enumerate(self.columns, start=1))
 
     def told(self, chosen: NDArray[np.bool_]) -> str:
         """Say which rows were chosen (N,), a few of them by number: ``3 rows (4, 7, 9)``."""

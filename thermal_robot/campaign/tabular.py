@@ -1,4 +1,4 @@
-"""Reading CSV, Parquet and pandas data frames into a :class:`~thermal_robot.campaign.table.Table`."""
+"""Reading CSV, Parquet, spreadsheets and pandas data frames into a :class:`~thermal_robot.campaign.table.Table`."""
 
 from __future__ import annotations
 
@@ -6,15 +6,15 @@ import codecs
 import csv
 import re
 from collections import Counter
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, TextIO
+from typing import TYPE_CHECKING, TextIO
 
 import numpy as np
 
 from thermal_robot.campaign.names import LABELS
-from thermal_robot.campaign.table import Cells, Table
+from thermal_robot.campaign.table import Cells, Table, without_names
 from thermal_robot.errors import CampaignError
 from thermal_robot.files import is_file, is_folder
 
@@ -22,6 +22,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 _DECIMAL_COMMA = re.compile(r"[+\-−]?\d*,\d+([eE][+-]?\d+)?")
+_MARKED = re.compile(r" *# *(?=[^\s,;#])")  # a column of numbers that is called # is no mark
 _BLOCK = 1 << 20  # bytes, or characters: what is read of a file at once
 _MOST_BLANK_LINES = 100_000  # in succession: nobody scrolls past so many
 LARGEST_TABLE = 256 << 20
@@ -32,9 +33,11 @@ MOST_COLUMNS = 1000
 """Logs of two arms with every quantity that a controller knows have a few hundred."""
 PARQUET = (".parquet", ".pq")
 """Endings of the names of Parquet files."""
+WORKBOOKS = {".xlsx": "openpyxl", ".xlsm": "openpyxl", ".ods": "odfpy"}
+"""Endings of the names of workbooks, and what pandas reads them with."""
 NO_PARQUET = "Parquet files need pyarrow, which is not installed"
 WITH_PARQUET = 'pip install "thermal-robot[parquet]", or the table as CSV'
-
+WITH_EXCEL = 'pip install "thermal-robot[excel]", or the table as CSV'
 
 SPACE = " "
 """A separator of which any number is one, as of blanks and tabs in a list that is lined up for the eye."""
@@ -47,7 +50,8 @@ class Layout:
     Attributes
     ----------
     separator
-        One character, :data:`SPACE`, or empty: the first line that holds anything tells.
+        One character, :data:`SPACE`, or empty: the first line that holds anything tells, and blanks separate where it
+        has no other separator and the next line falls into as many parts.
     skip
         Lines before the header, or before the first row, that hold something else.
     header
@@ -67,9 +71,9 @@ PLAIN = Layout()
 
 
 def read_table(path: Path, layout: Layout = PLAIN) -> Table:
-    """Read a CSV or, by its ending, a Parquet file.
+    """Read a CSV or, by its ending, a Parquet file or the first sheet of a workbook (.xlsx, .ods).
 
-    Columns of a CSV file may be separated by commas, semicolons or tabs, with decimal commas where the
+    Columns of a CSV file may be separated by commas, semicolons, tabs or blanks, with decimal commas where the
     separator is not a comma; a byte-order mark, Windows line ends and blank lines do no harm.
 
     Parameters
@@ -93,21 +97,36 @@ def read_table(path: Path, layout: Layout = PLAIN) -> Table:
         raise CampaignError(file, "is larger than any table that can be read", expected=f"{LARGEST_TABLE >> 20} MiB")
     if path.suffix.lower() in PARQUET:
         return _read_parquet(path)
+    if path.suffix.lower() in WORKBOOKS:
+        return _read_workbook(path, layout)
     encoding, warnings = _encoding(path)
     with path.open(encoding=encoding, errors="replace", newline="") as stream:
         separator = layout.separator or _separator(_lines(stream, layout))
         stream.seek(0)
         lines = _lines(stream, layout, even=separator == SPACE)
         header, cells, numbers = _records(file, csv.reader(lines, delimiter=separator, strict=True), layout.header)
+    return _table(file, header, cells, numbers, layout.header, separator != ",", warnings)
+
+
+def _table(
+    file: str,
+    header: list[str],
+    cells: list[list[str]],
+    numbers: list[int],
+    named: bool = True,
+    comma: bool = True,
+    warnings: tuple[str, ...] = (),
+) -> Table:
+    """Return what was read of a file; ``numbers`` are the rows of the header and of all others."""
     if len(numbers) < 2:
         raise CampaignError(file, "has a header but no rows", expected="one row per measurement")
     # A separator at the end of every line makes a column of nothing.
     kept = [i for i, name in enumerate(header) if name or any(cells[i])]
     _check_header(file, [header[i] for i in kept], number=numbers[0])
     columns = {header[i]: cells[i] for i in kept}
-    comma = separator != "," and _has_decimal_comma(columns)
+    comma = comma and _has_decimal_comma(columns)
     rows = np.array(numbers[1:], dtype=np.int64)
-    return Table(file, columns, rows, numbers[0] if layout.header else None, comma, warnings)
+    return Table(file, columns, rows, numbers[0] if named else None, comma, warnings)
 
 
 def table_from_frame(frame: pd.DataFrame, file: str = "<table>", *, first_row: int | None = None) -> Table:
@@ -181,6 +200,27 @@ def _read_parquet(path: Path) -> Table:
     return table_from_frame(frame, str(path), first_row=2)
 
 
+def _read_workbook(path: Path, layout: Layout) -> Table:
+    """Return the first sheet of a workbook; its rows are counted as the spreadsheet does."""
+    import pandas as pd
+
+    try:
+        sheets = pd.read_excel(path, sheet_name=None, header=None, dtype=object)
+    except ImportError as error:
+        problem = f"workbooks need {WORKBOOKS[path.suffix.lower()]}, which is not installed"
+        raise CampaignError(str(path), problem, expected=WITH_EXCEL) from error
+    except Exception as error:  # each reader raises its own
+        raise CampaignError(str(path), f"cannot be read as a workbook ({' '.join(str(error).split())})") from error
+    first, frame = next(iter(sheets.items()))
+    _require_size(str(path), *frame.shape)
+    lines = ([_as_text(cell) for cell in row] for row in frame.astype(object).where(frame.notna(), "").to_numpy())
+    kept = ([] if k < layout.skip or (layout.comment and row[0].startswith(layout.comment)) else row
+            for k, row in enumerate(lines))  # fmt: skip
+    header, cells, numbers = _records(str(path), kept, layout.header)
+    more = f"{path} has {len(sheets)} sheets: the first, {first!r}, was read"
+    return _table(str(path), header, cells, numbers, layout.header, warnings=(more,) if len(sheets) > 1 else ())
+
+
 def _encoding(path: Path) -> tuple[str, tuple[str, ...]]:
     """Return how a file's text is encoded, and what was odd about it."""
     file = str(path)
@@ -188,7 +228,11 @@ def _encoding(path: Path) -> tuple[str, tuple[str, ...]]:
         with path.open("rb") as stream:
             head = stream.read(4)
             if head == b"PK\x03\x04":
-                raise CampaignError(file, "is a workbook or an archive", expected="a table saved as CSV or Parquet")
+                raise CampaignError(
+                    file,
+                    "is a workbook or an archive",
+                    expected="a name that ends in .xlsx or .ods, or a table saved as CSV or Parquet",
+                )
             if head == b"PAR1":
                 raise CampaignError(file, "is a Parquet file by its contents", expected="a name that ends in .parquet")
             if head.startswith((b"\xff\xfe", b"\xfe\xff")):
@@ -209,21 +253,44 @@ def _encoding(path: Path) -> tuple[str, tuple[str, ...]]:
 
 
 def _lines(stream: TextIO, layout: Layout, *, even: bool = False) -> Iterator[str]:
-    """Yield the lines; what is left out is blank, so that each keeps its number; of blanks one is left if ``even``."""
+    """Yield the lines; what is left out is blank, so that each keeps its number; of blanks one is left if ``even``.
+
+    Of lines that begin with # before any other the last is the header, as numpy writes it, unless a comment is stated.
+    """
+    marked: str | None = None
+    leading = not layout.comment
     for number, line in enumerate(stream):
         if number < layout.skip or (layout.comment and line.lstrip().startswith(layout.comment)):
-            yield "\n"
-        else:
-            yield f"{SPACE.join(line.split())}\n" if even else line
+            line = "\n"
+        elif even:
+            line = f"{SPACE.join(line.split())}\n"
+        if leading and (found := _MARKED.match(line)):
+            if marked is not None:
+                yield "\n"
+            marked = line[found.end() :] if layout.header else "\n"
+            continue
+        if marked is not None:
+            yield marked
+            marked = None
+        leading = leading and not line.strip()
+        yield line
+    if marked is not None:
+        yield marked
 
 
 def _separator(lines: Iterator[str]) -> str:
-    """Return the separator of the header, the first line that holds anything."""
-    header = next((line for line in lines if line.strip()), "")
-    return ";" if ";" in header else "\t" if "\t" in header else ","
+    """Return the separator of the header, the first line that holds anything: blanks where no other is in it."""
+    held = (line for line in lines if line.strip())
+    header, line = next(held, ""), next(held, "")
+    parts = header.split()
+    figures = all(_DECIMAL_COMMA.fullmatch(part) or "," not in part for part in parts)
+    blanks = len(parts) > 1 and figures and len(line.split()) == len(parts)
+    return next((each for each in (";", "\t") if each in header), SPACE if blanks else ",")
 
 
-def _records(file: str, reader: Any, named: bool = True) -> tuple[list[str], list[list[str]], list[int]]:
+def _records(
+    file: str, reader: Iterable[list[str]], named: bool = True
+) -> tuple[list[str], list[list[str]], list[int]]:
     """Return the header, the cells by column, and the numbers of the lines where header and rows start.
 
     Where columns are not ``named``, the header is 1, 2, 3 … and stands in line 0.
@@ -234,7 +301,8 @@ def _records(file: str, reader: Any, named: bool = True) -> tuple[list[str], lis
     before = 0
     try:
         for fields in reader:
-            start, before = before + 1, reader.line_num
+            # a field may hold the end of a line, which csv counts; a workbook has a row for each
+            start, before = before + 1, getattr(reader, "line_num", before + 1)
             if not any(field.strip() for field in fields):
                 if start - (numbers[-1] if numbers else 0) > _MOST_BLANK_LINES:
                     raise CampaignError(file, f"more than {_MOST_BLANK_LINES} lines in succession are blank", row=start)
@@ -286,7 +354,7 @@ def _check_header(file: str, header: Sequence[str], number: int | None) -> None:
         if count > 1:
             raise CampaignError(
                 file,
-                "duplicate column",
+                f"duplicate column{without_names(header, file)}",
                 row=number,
                 column=name,
                 found=f"it {count} times",

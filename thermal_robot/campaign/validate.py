@@ -14,6 +14,7 @@ from thermal_robot.campaign.campaign import Campaign, FloatArray
 from thermal_robot.campaign.checked import check_covariate, check_quaternions
 from thermal_robot.campaign.figures import LARGEST_COMMAND, SMALLEST, first_beyond
 from thermal_robot.campaign.fill import fill
+from thermal_robot.campaign.headings import named
 from thermal_robot.campaign.names import CLOCK, split_name
 from thermal_robot.campaign.noise import told_by
 from thermal_robot.campaign.of_targets import of_targets
@@ -55,8 +56,9 @@ def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str,
     CampaignError
         Whatever cannot be used, with row and column.
     """
-    columns = recognise(table, robot, measured=measured)
     units = settings.units
+    table = named(table, robot, units)
+    columns = recognise(table, robot, measured=measured)
     told: Posed | None = None
     left_out: list[str] = []
     if columns.targets:

@@ -15,9 +15,10 @@ from numpy.typing import ArrayLike
 from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.declaration import FILE_NAME
+from thermal_robot.campaign.headings import headings
 from thermal_robot.campaign.noise import of_a_point
 from thermal_robot.campaign.tabular import NO_PARQUET, PARQUET, WITH_PARQUET
-from thermal_robot.campaign.units import Units, covariate_scale
+from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, Units, covariate_scale
 from thermal_robot.errors import CampaignError, require
 from thermal_robot.files import whole, write_text
 from thermal_robot.robot import Robot
@@ -223,9 +224,14 @@ def with_commands(
     units
         Of the table's joints and lengths.
     """
-    scales = [units.joint_scale(kind) for kind in robot.joint_types]
-    commanded = dict(zip(robot.joint_names, np.asarray(q).T / np.array(scales)[:, None], strict=True))
-    own = {str(name): commanded[str(name).strip()] for name in samples.columns if str(name).strip() in commanded}
+    commanded = dict(zip(robot.joint_names, np.asarray(q).T, strict=True))
+    called = {heading.column: (joint, heading.unit) for joint, heading in headings(samples.columns, robot).items()}
+    scales = {j: units.joint_scale(kind) for j, kind in zip(robot.joint_names, robot.joint_types, strict=True)}
+    own = {}
+    for name in map(str, samples.columns):
+        joint, unit = called.get(name.strip(), (name.strip(), None))
+        if joint in commanded:
+            own[name] = commanded[joint] / ((LENGTH_UNITS | ANGLE_UNITS)[unit] if unit else scales[joint])
     missed = {names.MISSED: np.asarray(direction) / units.angle_scale}
     return _beside(samples.assign(**own), {**_known(std, outside, units), **missed})
 

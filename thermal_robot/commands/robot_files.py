@@ -15,7 +15,7 @@ from thermal_robot.files import write_text
 if TYPE_CHECKING:
     from thermal_robot.correction import CorrectedModel
 
-OUTPUTS = ("urdf", "mjcf", "dh", "offsets")
+OUTPUTS = ("urdf", "mjcf", "dh", "ur_kinematics", "offsets")
 """Options that name a file to write."""
 READS = ("from_mjcf",)
 """Options that name a file to read."""
@@ -27,6 +27,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     parser.add_argument("--mjcf", metavar="F.xml", help="write it as an MJCF for MuJoCo; needs the extra `blind`")
     parser.add_argument("--from-mjcf", metavar="F.xml", help="MJCF of the nominal robot to write --mjcf from")
     parser.add_argument("--dh", metavar="F.csv", help="write its parameters of Denavit and Hartenberg")
+    parser.add_argument("--ur-kinematics", metavar="F.yaml", help="write it as Universal Robots' kinematics.yaml")
     parser.add_argument("--modified", action="store_true", help="those of Craig's modified convention")
     parser.add_argument("--offsets", metavar="F.csv", help="write what to add to the commands of each joint's zero")
     parser.add_argument(
@@ -57,7 +58,7 @@ def require_of_use(options: argparse.Namespace) -> None:
     for name, outputs in _OF_USE_WITH.items():
         given = getattr(options, name)
         if given is not None and given is not False and not any(getattr(options, output) for output in outputs):
-            *some, last = (f"--{output}" for output in outputs)
+            *some, last = (f"--{output.replace('_', '-')}" for output in outputs)
             listed = f"{', '.join(some)} or {last}" if some else last
             problem = f"is of use with {listed} only"
             raise CampaignError(f"--{name.replace('_', '-')}", problem, expected="one of them, or this option left out")
@@ -78,19 +79,20 @@ def outputs(options: argparse.Namespace, model: CorrectedModel) -> list[tuple[st
     CampaignError, RobotError
         If one of them cannot be made.
     """
-    from thermal_robot.correction import calibrated, calibrated_mjcf, calibrated_urdf, dh_table, zero_offsets
+    from thermal_robot import correction as to
 
     how = {"temperature": options.temperature, "min_sigma": options.min_sigma}
-    robot = calibrated(model, **how)
+    robot = to.calibrated(model, **how)
     if robot.beyond:
         note(robot.beyond, options.loudness)
     own = Path(options.from_mjcf) if options.from_mjcf else None
     units = model.settings.units
     made: dict[str, Callable[[], str]] = {
-        "urdf": lambda: calibrated_urdf(robot),
-        "mjcf": lambda: calibrated_mjcf(robot, own),
-        "dh": lambda: dh_table(robot, "modified" if options.modified else "standard", units).to_csv(index=False),
-        "offsets": lambda: zero_offsets(model, **how).to_csv(index=False),
+        "urdf": lambda: to.calibrated_urdf(robot),
+        "mjcf": lambda: to.calibrated_mjcf(robot, own),
+        "dh": lambda: to.dh_table(robot, "modified" if options.modified else "standard", units).to_csv(index=False),
+        "ur_kinematics": lambda: to.ur_kinematics(robot),
+        "offsets": lambda: to.zero_offsets(model, **how).to_csv(index=False),
     }
     texts = {name: make() for name, make in made.items() if getattr(options, name)}
     return [(getattr(options, name), partial(write_text, text=text)) for name, text in texts.items()]

@@ -9,6 +9,7 @@ from thermal_robot.correction.dh_table import dh_table
 from thermal_robot.correction.model import CorrectedModel
 from thermal_robot.correction.mujoco_models import mjcf_of_urdf
 from thermal_robot.correction.simulator import with_simulator
+from thermal_robot.correction.ur_kinematics import ur_kinematics
 from thermal_robot.correction.zero_offsets import zero_offsets
 
 __all__ = [
@@ -21,6 +22,7 @@ __all__ = [
     "determined",
     "dh_table",
     "mjcf_of_urdf",
+    "ur_kinematics",
     "with_simulator",
     "zero_offsets",
 ]

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from thermal_robot.diagnosis.explained import Arm
 from thermal_robot.kinematics import link_poses
-from thermal_robot.shapes.hulls import hulls
+from thermal_robot.shapes.visuals import hulls
 
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.parts import Where

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.effects.effect import in_words
-from thermal_robot.shapes.hulls import Hull
+from thermal_robot.shapes.visuals import Hull
 
 Array = NDArray[np.float64]
 

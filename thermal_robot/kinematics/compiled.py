@@ -15,7 +15,7 @@ from thermal_robot.kinematics.arm import arm_of
 from thermal_robot.kinematics.scratch import rows_last, scratch
 
 if TYPE_CHECKING:
-    from thermal_robot.kinematics.chained import Chained, Weighted
+    from thermal_robot.kinematics.displaced import Chained, Weighted
 
 Array = NDArray[np.float64]
 

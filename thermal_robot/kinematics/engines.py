@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from thermal_robot.kinematics import compiled, lanes, settings, thin
 
 if TYPE_CHECKING:
-    from thermal_robot.kinematics.chained import Chained, Weighted
+    from thermal_robot.kinematics.displaced import Chained, Weighted
 
 Array = NDArray[np.float64]
 

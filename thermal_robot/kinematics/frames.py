@@ -17,7 +17,7 @@ from thermal_robot.kinematics.scratch import chunks, result, rows_last
 from thermal_robot.kinematics.walk import walk
 
 if TYPE_CHECKING:
-    from thermal_robot.kinematics.chained import Chained
+    from thermal_robot.kinematics.displaced import Chained
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,7 @@ from thermal_robot.kinematics.frames import ChainFrames, as_rows
 from thermal_robot.kinematics.scratch import result
 
 if TYPE_CHECKING:
-    from thermal_robot.kinematics.chained import Chained
+    from thermal_robot.kinematics.displaced import Chained
 
 Array = NDArray[np.float64]
 

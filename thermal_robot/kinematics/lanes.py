@@ -16,7 +16,7 @@ from thermal_robot.kinematics.scratch import chunks, rows_last, scratch
 from thermal_robot.kinematics.walk import walk
 
 if TYPE_CHECKING:
-    from thermal_robot.kinematics.chained import Chained, Weighted
+    from thermal_robot.kinematics.displaced import Chained, Weighted
 
 Array = NDArray[np.float64]
 

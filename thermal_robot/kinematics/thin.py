@@ -15,7 +15,7 @@ from thermal_robot.kinematics.model import FIXED, REVOLUTE, Chain
 from thermal_robot.kinematics.walk import steps
 
 if TYPE_CHECKING:
-    from thermal_robot.kinematics.chained import Chained, Weighted
+    from thermal_robot.kinematics.displaced import Chained, Weighted
 
 Array = NDArray[np.float64]
 

@@ -6,10 +6,9 @@ from collections.abc import Callable
 from pathlib import Path
 
 from thermal_robot.errors import CampaignError, RobotError, require
-from thermal_robot.maps.opened import Map
 from thermal_robot.maps.quantities import columns
 from thermal_robot.maps.question import Joints, Over, Positions, Question, Spec
-from thermal_robot.maps.stores import store
+from thermal_robot.maps.stores import Map, store
 from thermal_robot.robot import Robot
 
 

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.maps.opened import Map
 from thermal_robot.maps.quantities import UNITS
+from thermal_robot.maps.stores import Map
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure

@@ -14,11 +14,8 @@ from thermal_robot.errors import CampaignError
 from thermal_robot.observations import observe
 from thermal_robot.robot import ENDS, Robot, load_robot
 from thermal_robot.schema import fitted, whole
-from thermal_robot.simulation.asked import AtWork, at_work
-from thermal_robot.simulation.commanded import CALL, commanded
-from thermal_robot.simulation.instrument import instrument
-from thermal_robot.simulation.measured import measured
-from thermal_robot.simulation.placed import placed
+from thermal_robot.simulation.commanded import CALL, AtWork, at_work, commanded
+from thermal_robot.simulation.measured import instrument, measured, placed
 
 if TYPE_CHECKING:
     from thermal_robot.urdf_text import WritesUrdf

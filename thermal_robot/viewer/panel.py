@@ -9,10 +9,8 @@ from numpy.typing import NDArray
 
 from thermal_robot.effects.effect import in_words
 from thermal_robot.report.units import percent, quantity
-from thermal_robot.viewer.arrows import longest
-from thermal_robot.viewer.colours import Colour, colours
-from thermal_robot.viewer.scene import Scene
-from thermal_robot.viewer.settings import ASIDE, CHOSEN, CHOSEN_AFTER, GAP, REMAINDER, TOLD
+from thermal_robot.viewer.scene import Scene, longest
+from thermal_robot.viewer.settings import ASIDE, CHOSEN, CHOSEN_AFTER, GAP, REMAINDER, TOLD, Colour, colours
 
 _BOX = "display:inline-block;width:0.8em;height:0.8em;border-radius:0.2em;margin-right:0.5em;background:rgb{}"
 _PART = "margin:0 0.8em 0.7em 0.8em;font-size:0.85em;line-height:1.5"

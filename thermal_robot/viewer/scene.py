@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,12 +13,77 @@ from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis import Diagnosis
 from thermal_robot.errors import CampaignError
 from thermal_robot.inference.frames import register
-from thermal_robot.kinematics import chain_frames, link_poses
+from thermal_robot.kinematics import chain_frames, link_poses, rotation_to_quaternion
 from thermal_robot.observations import Observations, observe
+from thermal_robot.report.units import round_down
 from thermal_robot.robot import Robot
-from thermal_robot.viewer.settings import ABOVE, ASIDE_OF, BACK_BY, MOST_POSES, SMALL_REACH
+from thermal_robot.viewer.settings import (
+    ABOVE,
+    ASIDE,
+    ASIDE_OF,
+    BACK_BY,
+    HEAD_LENGTH,
+    HEAD_RADIUS,
+    LARGE_GAP,
+    LONG_ARROW,
+    LONGEST_ARROW,
+    MOST_POSES,
+    NARROWEST,
+    SHAFT_RADIUS,
+    SMALL_REACH,
+    WIDEST,
+    Colour,
+    linear,
+)
 
 Array = NDArray[np.float64]
+
+
+class Cloud:
+    """The arrows of some rows.
+
+    Parameters
+    ----------
+    nodes
+        What adds them: the ``scene`` of a viser server.
+    name
+        Of the node.
+    scene
+        What is shown.
+    vectors
+        (N, 3) displacements of all rows, m, root frame.
+    colour
+        Of rows that were not set aside.
+    thicker
+        How many times as thick as usual they are.
+    """
+
+    def __init__(
+        self, nodes: Any, name: str, scene: Scene, vectors: Array, colour: Colour, thicker: float = 1.0
+    ) -> None:
+        self._nodes, self._name, self._scene, self._vectors, self._thicker = nodes, name, scene, vectors, thicker
+        self._colours = linear(np.where(scene.aside[:, None], ASIDE, colour).astype(np.uint8))
+        self._node: Any = None
+
+    def show(self, rows: NDArray[np.intp], magnification: float, visible: bool) -> None:
+        """Draw the arrows of k rows, the same number each time, or hide them."""
+        scene = self._scene
+        drawn = arrows(scene.predicted[rows], self._vectors[rows], magnification, scene.size, self._thicker)
+        if self._node is None:
+            self._node = self._nodes.add_batched_meshes_simple(
+                self._name,
+                *unit_arrow(),
+                drawn.turns,
+                drawn.starts,
+                batched_scales=drawn.stretches,
+                batched_colors=self._colours[rows],
+                cast_shadow=False,
+                receive_shadow=False,
+                lod="off",
+            )
+        self._node.batched_positions, self._node.batched_wxyzs = drawn.starts, drawn.turns
+        self._node.batched_scales, self._node.batched_colors = drawn.stretches, self._colours[rows]
+        self._node.visible = visible
 
 
 @dataclass(frozen=True, eq=False)
@@ -157,3 +223,99 @@ def _scene(
         target=nominal.frames.tool[:3, 3],
         shares=shares,
     )
+
+
+_SIDES = 16
+
+
+@dataclass(frozen=True, eq=False)
+class Arrows:
+    """N copies of one arrow that goes from the origin to (0, 0, 1), each turned, stretched and moved.
+
+    Attributes
+    ----------
+    starts
+        (N, 3) where they begin, m.
+    turns
+        (N, 4) unit quaternions wxyz that turn the z axis along them.
+    stretches
+        (N, 3) factors along the arrow's own axes; the last is the length, m.
+    """
+
+    starts: Array
+    turns: Array
+    stretches: Array
+
+
+def arrows(starts: Array, displacements: Array, magnification: float, size: float, thicker: float = 1.0) -> Arrows:
+    """Return the arrows of displacements.
+
+    Parameters
+    ----------
+    starts, displacements
+        (N, 3) m each.
+    magnification
+        How many times longer than the displacements they are.
+    size
+        Of the scene, m: bounds how thick and how long they are.
+    thicker
+        By how much those bounds on the thickness are wider.
+    """
+    lengths = np.minimum(magnification * np.linalg.norm(displacements, axis=1), longest(size))
+    widths = np.clip(thicker * HEAD_RADIUS * lengths, thicker * NARROWEST * size, thicker * WIDEST * size)
+    # an arrow as good as none is a point, not a disc
+    widths = np.minimum(widths, lengths)
+    return Arrows(
+        starts, rotation_to_quaternion(turned_along(displacements)), np.column_stack([widths, widths, lengths])
+    )
+
+
+def longest(size: float) -> float:
+    """Return the length, m, at which arrows are cut in a scene of a size, m."""
+    return LONGEST_ARROW * size
+
+
+def unit_arrow() -> tuple[Array, NDArray[np.int64]]:
+    """Return vertices (V, 3) and faces (F, 3) of the arrow to (0, 0, 1), whose head has the radius 1."""
+    angles = 2.0 * np.pi * np.arange(_SIDES) / _SIDES
+    circle = np.column_stack([np.cos(angles), np.sin(angles)])
+    radii, heights = (SHAFT_RADIUS, SHAFT_RADIUS, 1.0), (0.0, 1.0 - HEAD_LENGTH, 1.0 - HEAD_LENGTH)
+    rings = [np.column_stack([r * circle, np.full(_SIDES, z)]) for r, z in zip(radii, heights, strict=True)]
+    vertices = np.vstack([*rings, [[0.0, 0.0, 0.0], [0.0, 0.0, 1.0]]])
+    here = np.arange(_SIDES)
+    there = (here + 1) % _SIDES
+    foot, tip = 3 * _SIDES, 3 * _SIDES + 1
+    faces = [np.column_stack([np.full(_SIDES, foot), there, here])]
+    for low in (0, _SIDES):
+        high = low + _SIDES
+        faces += [np.column_stack([low + here, low + there, high + there])]
+        faces += [np.column_stack([low + here, high + there, high + here])]
+    faces += [np.column_stack([2 * _SIDES + here, 2 * _SIDES + there, np.full(_SIDES, tip)])]
+    return vertices, np.vstack(faces)
+
+
+def readable(displacements: Array, size: float) -> float:
+    """Return the magnification, 1, 2 or 5 times a power of ten, at which large ones are as long as settings say.
+
+    Parameters
+    ----------
+    displacements
+        (N, 3) m.
+    size
+        Of the scene, m.
+    """
+    large = float(np.quantile(np.linalg.norm(displacements, axis=1), LARGE_GAP)) if len(displacements) else 0.0
+    if large <= 0.0:
+        return 1.0
+    return round_down(max(LONG_ARROW * size / large, 1.0))
+
+
+def turned_along(directions: Array) -> Array:
+    """Return (N, 3, 3): rotations that turn the z axis along each of N directions, and leave it where there is none."""
+    lengths = np.linalg.norm(directions, axis=1, keepdims=True)
+    z = np.where(lengths > 0.0, directions / np.where(lengths > 0.0, lengths, 1.0), [0.0, 0.0, 1.0])
+    # the axis of the root frame that lies farthest from it, made perpendicular
+    helper = np.eye(3)[np.argmin(np.abs(z), axis=1)]
+    x = np.cross(helper, z)
+    x /= np.linalg.norm(x, axis=1, keepdims=True)
+    return np.stack([x, np.cross(z, x), z], axis=2)

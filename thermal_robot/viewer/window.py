@@ -13,11 +13,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.kinematics import rotation_to_quaternion
 from thermal_robot.viewer import panel
-from thermal_robot.viewer.arrows import readable, turned_along
-from thermal_robot.viewer.cloud import Cloud
-from thermal_robot.viewer.colours import Colour
-from thermal_robot.viewer.puppet import Puppet
-from thermal_robot.viewer.scene import Scene
+from thermal_robot.viewer.scene import Cloud, Scene, readable, turned_along
 from thermal_robot.viewer.settings import (
     CHOSEN,
     CHOSEN_AFTER,
@@ -30,8 +26,9 @@ from thermal_robot.viewer.settings import (
     SKY,
     STRONGER,
     THICKER,
+    Colour,
 )
-from thermal_robot.viewer.solids import Solid
+from thermal_robot.viewer.solids import Puppet, Solid
 
 Array = NDArray[np.float64]
 

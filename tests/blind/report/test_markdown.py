@@ -2,7 +2,7 @@
 
 from blind_records import trial
 
-from thermal_robot.blind.report.markdown import markdown
+from thermal_robot.blind.report.text import markdown
 from thermal_robot.blind.score import score
 
 

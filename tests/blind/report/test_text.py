@@ -5,8 +5,7 @@ import re
 import pytest
 from blind_records import record, said, trial, trial_of_several
 
-from thermal_robot.blind.report.markdown import markdown
-from thermal_robot.blind.report.text import text
+from thermal_robot.blind.report.text import markdown, text
 from thermal_robot.blind.score import score
 
 

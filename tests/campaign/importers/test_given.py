@@ -1,17 +1,11 @@
-"""As many files as a format has, and YAML of plain values alone."""
+"""YAML of plain values alone."""
 
 import sys
 
 import pytest
 
-from thermal_robot.campaign.importers.given import files_of, is_yaml, read_yaml
+from thermal_robot.campaign.importers.given import is_yaml, read_yaml
 from thermal_robot.errors import CampaignError
-
-
-def test_another_number_of_files(tmp_path):
-    files_of([tmp_path], "ONE or TWO", 1, 2)
-    with pytest.raises(CampaignError, match="FILES: another number of files than this format has; found 3, expected A"):
-        files_of([tmp_path] * 3, "A", 1, 2)
 
 
 def test_yaml(tmp_path):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from thermal_robot.campaign.importers.mapped import Source, campaign_of
+from thermal_robot.campaign.importers.mapped import Source, campaign_of, files_of
 from thermal_robot.campaign.importers.plan import Plan, planned
 from thermal_robot.campaign.table import Table
 from thermal_robot.errors import CampaignError
@@ -86,3 +86,9 @@ def test_several_targets_come_from_columns_of_other_names_and_rows_without_any_a
     assert found.rows.tolist() == [2, 3, 5, 6, 7]
     assert "1 row (4) left out, without a measured position" in notes
     np.testing.assert_allclose(found.targets.points, points[[0, 1, 3, 4, 5]])
+
+
+def test_another_number_of_files(tmp_path):
+    files_of([tmp_path], "ONE or TWO", 1, 2)
+    with pytest.raises(CampaignError, match="FILES: another number of files than this format has; found 3, expected A"):
+        files_of([tmp_path] * 3, "A", 1, 2)

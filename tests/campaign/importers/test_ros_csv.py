@@ -38,5 +38,17 @@ def test_lines_without_a_header(tmp_path):
     np.testing.assert_allclose(target.values[1], [4, 5, 6, 0.9, 0.1, 0.2, 0.3])
     joints, _ = read(tmp_path, "1,0,,a,hand,b,.1,.9,.2,0,0,0\n2,0,,a,hand,b,.3,.9,.4,0,0,0\n")
     np.testing.assert_allclose(joints.values, [[0.1, 0.2], [0.3, 0.4]])
+    with pytest.raises(CampaignError, match="column 'a': a joint of the chain is not among the names; found 'c', 'b'"):
+        read(tmp_path, "1,0,,c,b,.1,.2\n2,0,,c,b,.3,.4\n")
     with pytest.raises(CampaignError, match="neither joint states nor poses are recognised"):
         read(tmp_path, "1,0,map,1,2\n2,0,map,1,2\n")
+
+
+@pytest.mark.parametrize("suffix", ["", "/position"])
+@pytest.mark.parametrize("behind", ["", ",0,0,nan,nan", ",nan,nan,nan,nan", ",0,0,,", ",0,0,inf,inf"])
+@pytest.mark.parametrize("frame", ["", "base"])
+def test_what_stands_behind_the_positions_does_not_shift_them(tmp_path, frame, behind, suffix):
+    lines = [f"{k},0,{frame},b{suffix},a{suffix},{k / 10},{k / 5}{behind}" for k in (1, 2, 3)]
+    joints, target = read(tmp_path, "\n".join(lines) + "\n")
+    assert target is None
+    np.testing.assert_allclose(joints.values, [[0.2, 0.1], [0.4, 0.2], [0.6, 0.3]])

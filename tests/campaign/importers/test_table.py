@@ -7,6 +7,11 @@ import numpy as np
 import pytest
 from campaign.importers.written import COMMANDS, complaint, imported, put
 
+from thermal_robot.campaign.importers.plan import planned
+from thermal_robot.campaign.importers.table import commands, joined
+from thermal_robot.campaign.table import Table
+from thermal_robot.errors import CampaignError
+
 MAPPING = """
 [robot]
 urdf = "robot.urdf"
@@ -82,6 +87,34 @@ def test_commands_and_measurements_in_two_tables(tmp_path, capsys):
     assert "1 points left out, not commanded: 'P9'" in out
 
 
+def test_two_lists_without_headers_are_described_once(tmp_path, capsys):
+    mapping = "[table]\nheader = false\n[columns]\njoints = [4, 5, 6, 7]\nx = 1\ny = 2\nz = 3\n"
+    rows = "\n".join(COMMANDS.split()[1:]).replace(",", " ")
+    folder = put(tmp_path, p__txt="1 2 3\n4 5 6\n7 8 9.5\n", j__txt=rows, m__toml=mapping, n__toml=mapping[23:])
+    units = ("--angle-unit", "rad", "--length-unit", "m")
+    campaign, out = imported(capsys, folder, "table", "p.txt", "j.txt", "--mapping", str(folder / "m.toml"), *units)
+    np.testing.assert_allclose(campaign.position[2], [7, 8, 9.5])
+    np.testing.assert_allclose(campaign.q[2], [0.5, -0.4, 0.09, -0.4])
+    assert "3 rows read, 3 taken" in out
+    (folder / "made").rename(folder / "first")
+    said = complaint(capsys, folder, "table", "p.txt", "j.txt", "--mapping", str(folder / "n.toml"), *units)
+    assert "the first line of p.txt is numbers alone and was taken for a header" in said
+    assert "`header = false`" in said
+    assert "found 2 and 3 rows, without that line" in said
+
+
+def test_headers_tell_names_and_units(tmp_path, capsys):
+    table = "J1 [deg];J2 [deg];J3 [mm];J4 (rad);X [m];Y (mm);z\n10;20;30;0,4;1,5;20;500\n11;21;60;0,5;1,6;21;510\n"
+    folder = put(tmp_path, log__csv=table + "12;-22;90;0,6;1,7;22;520\n", m__toml='[columns]\nx = "X"\nj = "J1"\n')
+    campaign, _ = imported(capsys, folder, "table", "log.csv")
+    np.testing.assert_allclose(campaign.q[0], [np.deg2rad(10), np.deg2rad(20), 0.03, 0.4])
+    np.testing.assert_allclose(campaign.position[0], [1.5, 0.02, 0.5 if campaign.units.length == "mm" else 500])
+    (folder / "made").rename(folder / "first")
+    units = ("--angle-unit", "rad", "--length-unit", "um", "--mapping", str(folder / "m.toml"))
+    campaign, _ = imported(capsys, folder, "table", "log.csv", *units)
+    np.testing.assert_allclose(campaign.position[0], [1.5, 0.02, 500e-6])
+
+
 @pytest.mark.parametrize(
     ("was", "becomes", "words"),
     [
@@ -127,3 +160,70 @@ def test_the_example_of_the_page_is_imported(tmp_path, capsys):
     np.testing.assert_allclose(campaign.covariates["time"], [0, 47, 147, 196])
     np.testing.assert_allclose(campaign.covariates["payload"], [0, 0, 3, 3])
     assert campaign.measures == "pose"
+
+
+MEASURED = Table("m.csv", {"n": ["b", "a", "b"], "x": ["1,5", "2", "3"]}, np.array([2, 3, 4]), 1, decimal_comma=True)
+COMMANDED = Table("c.csv", {"q": ["0.25", "0.5"], "point": ["a", "b"], "mark": ["u", "v"]}, np.array([2, 3]), 1)
+
+
+def test_by_name_with_repeats_and_each_with_its_decimals():
+    table, notes = joined(MEASURED, COMMANDED, "n")
+    assert notes == ()
+    np.testing.assert_array_equal(table.numbers("x"), [1.5, 2, 3])
+    np.testing.assert_array_equal(table.numbers("q"), [0.5, 0.25, 0.5])
+    assert table.text("mark") == ["v", "u", "v"]
+    assert list(table.columns) == ["n", "x", "q", "mark"]
+    assert table.file == "m.csv with c.csv"
+
+
+def test_in_order():
+    table, notes = joined(MEASURED.take(np.array([True, True, False])), COMMANDED)
+    np.testing.assert_array_equal(table.numbers("q"), [0.25, 0.5])
+    assert notes == ("rows of m.csv and c.csv joined in their order",)
+    with pytest.raises(CampaignError, match="found 3 and 2 rows"):
+        joined(MEASURED, COMMANDED)
+
+
+def test_a_column_in_both_tables_is_refused():
+    twice = Table("c.csv", {**COMMANDED.columns, "x": ["1", "2"]}, COMMANDED.rows, 1)
+    with pytest.raises(CampaignError, match=r"c\.csv, row 1, column 'x': has a column that m\.csv has, too"):
+        joined(MEASURED, twice, "n")
+
+
+PAIRS = [[0.5, 20.0], [0.75, 21.0]]
+POINTS = {
+    "header = false": (False, {}),
+    "a header": (True, {}),
+    "skip": (False, {"skip": 1}),
+    "comment": (True, {"comment": "#"}),
+}
+"""How the first table is laid out: whether it has a header, and what [table] says of it."""
+
+
+def lined(names, separator, comma, above=""):
+    lines = [separator.join(f"{v:g}" for v in row) for row in PAIRS]
+    lines = [line.replace(".", ",") for line in lines] if comma else lines
+    return above + "\n".join([separator.join(names), *lines] if names else lines) + "\n"
+
+
+@pytest.mark.parametrize(("separator", "comma"), [(",", 0), (";", 0), (";", 1), ("\t", 1), (" ", 0), ("  ", 1)])
+@pytest.mark.parametrize("headed", [False, True])
+@pytest.mark.parametrize("how", POINTS)
+def test_the_second_table_is_read_as_the_first_or_as_it_stands(tmp_path, how, headed, separator, comma):
+    header, layout = POINTS[how]
+    above = {"skip": "Log of cell 7\n", "comment": "# by hand\n"}.get(how, "")
+    (tmp_path / "j.txt").write_text(lined(["q", "T"] if headed else [], separator, comma, above))
+    plan = planned({"table": {"header": header, **layout}})
+    table = commands(tmp_path / "j.txt", plan)
+    assert [table.numbers(name).tolist() for name in table.columns] == np.transpose(PAIRS).tolist()
+    assert list(table.columns) == (["q", "T"] if headed else ["1", "2"])
+    (tmp_path / "j.txt").write_text(lined(["q", "T"] if headed else [], separator, comma))
+    plain = commands(tmp_path / "j.txt", planned({"table": {"header": header}, "commands": {"header": headed}}))
+    assert list(plain.columns) == list(table.columns)
+
+
+def test_numbers_of_columns_go_on_in_the_second_table():
+    bare = Table("c", {"1": ["0.25", "0.5"], "2": ["a", "b"]}, np.array([1, 2]))
+    table, _ = joined(MEASURED, bare, "n")
+    assert list(table.columns) == ["n", "x", "3"]
+    np.testing.assert_array_equal(table.numbers("3"), [0.5, 0.25, 0.5])

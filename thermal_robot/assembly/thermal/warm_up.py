@@ -8,8 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from thermal_robot.assembly.thermal.displacement import displacement
-from thermal_robot.assembly.thermal.elongation import STANDARD_TEMPERATURE, PerSegment, elongation, per_segment
+from thermal_robot.assembly.thermal.elongation import (
+    STANDARD_TEMPERATURE,
+    PerSegment,
+    displacement,
+    elongation,
+    per_segment,
+)
 from thermal_robot.errors import RobotError
 from thermal_robot.robot import Robot
 

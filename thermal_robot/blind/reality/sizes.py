@@ -14,7 +14,7 @@ from thermal_robot.blind.reality.fault import Fault, Place
 from thermal_robot.blind.reality.faults import FAULTS
 from thermal_robot.blind.reality.rigid import free_columns
 from thermal_robot.blind.reality.setting import Setting
-from thermal_robot.blind.reality.slopes import Slopes, slopes
+from thermal_robot.blind.reality.unlisted import Slopes, slopes
 
 Array = NDArray[np.float64]
 

@@ -6,9 +6,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from html import escape
 from typing import Any
 
-from thermal_robot.blind.report.parts import section
-from thermal_robot.blind.report.plots import calibration_figure, confusion_figure, shrinkage_figure
-from thermal_robot.blind.report.plots_power import power_figure
+from thermal_robot.blind.report.plots import calibration_figure, confusion_figure, power_figure, shrinkage_figure
+from thermal_robot.blind.report.text import section
 from thermal_robot.blind.report.words import coefficients, count, facts, interval, kind, miss, needed, question
 from thermal_robot.report import units
 from thermal_robot.report.html_parts import bullets, document, figure, paragraph, row, signature, table

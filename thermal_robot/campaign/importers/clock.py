@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from thermal_robot.campaign.importers.streams import Array, Stream
+from thermal_robot.campaign.importers.standstill import Array, Stream
 from thermal_robot.errors import CampaignError
 from thermal_robot.kinematics import align, exp3, tool_poses
 from thermal_robot.robot import Robot

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.campaign.headings import bare
 from thermal_robot.campaign.names import did_you_mean, listed
 from thermal_robot.campaign.table import Table
 from thermal_robot.errors import CampaignError
@@ -70,6 +71,27 @@ class Column:
             values = values - np.nanmin(values)
         return values
 
+    def header_unit(self, table: Table) -> str | None:
+        """Return the unit that its header names; none of a sum, or where another scale than a sign is stated."""
+        plain = len(self.sources) == 1 and abs(self.scale) == 1.0 and not (self.offset or self.time)
+        return bare(found(table, self.sources[0])).unit if plain else None
+
+    def complete(self, table: Table, name: str = "") -> NDArray[np.float64]:
+        """Return (N,) numbers of which none may be missing; ``name`` is the campaign's column.
+
+        Raises
+        ------
+        CampaignError
+            An empty cell, or what :meth:`numbers` raises.
+        """
+        values = self.numbers(table)
+        if np.isnan(values).any():
+            problem = "a value is missing" + (f", for the column {name!r} of the campaign" if name else "")
+            row, column = int(table.rows[int(np.argmax(np.isnan(values)))]), " + ".join(map(str, self.sources))
+            expected = "a number"
+            raise CampaignError(table.file, problem, row=row, column=column, found="an empty cell", expected=expected)
+        return values
+
     def text(self, table: Table) -> list[str]:
         """Return N texts; those of several columns with a blank between.
 
@@ -113,14 +135,17 @@ def found(table: Table, source: str | int) -> str:
         There is none.
     """
     names = list(table.columns)
+    if source in names or (table.header is None and str(source) in names):  # without a header numbers are names
+        return str(source)
     if isinstance(source, int) and source <= len(names):
         return names[source - 1]
-    if source in table.columns:
-        return str(source)
+    known = [name for name in names if bare(name).column == source]
+    if len(known) == 1:
+        return known[0]
     meant = did_you_mean(str(source), names) if isinstance(source, str) else ""
     raise CampaignError(
         table.file,
-        f"there is no such column{meant}",
+        f"there is no such column{meant}{table.headless}",
         row=table.header,
         column=str(source),
         found=f"the columns {listed(names)}" if table.header else f"{len(names)} columns without names",

@@ -17,31 +17,22 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from thermal_robot.campaign.importers.given import files_of, is_yaml, read_yaml
-from thermal_robot.campaign.importers.mapped import Source
+from thermal_robot.campaign.importers.given import is_yaml, read_yaml
+from thermal_robot.campaign.importers.mapped import Format, Source, files_of
 from thermal_robot.campaign.importers.plan import Plan, planned
 from thermal_robot.campaign.tabular import read_table
 from thermal_robot.errors import CampaignError
 
-DOES = "calibration data of FIGAROH"
-FILES = "DATA.csv [CONFIG.yaml]"
 _UNIVERSE = "universe"
 """What Pinocchio calls the frame before the first joint: the root of the URDF."""
 
 
-def read(files: Sequence[Path], plan: Plan) -> Source:
-    """Read the data; the first marker is the target.
-
-    Raises
-    ------
-    CampaignError
-        Another number of files, a table or a YAML file that cannot be read, a YAML file that is no such configuration.
-    """
-    files_of(files, FILES, 1, 2)
+def _read(files: Sequence[Path], plan: Plan) -> Source:
+    """Read the data; the first marker is the target."""
     tables = [file for file in files if not is_yaml(file)]
     configurations = [file for file in files if is_yaml(file)]
-    files_of(tables, FILES, 1, 1)
-    table = read_table(tables[0], plan.layout)
+    files_of(tables, "DATA.csv [CONFIG.yaml]", 1, 1)
+    table = read_table(tables[0], plan.layout())
     sections = _configured(configurations[0]) if configurations else {}
     sections["measurements"] = {"angle_unit": "rad", "length_unit": "m"}
     sections["columns"] = {axis: f"{axis}1" for axis in "xyz"}
@@ -80,3 +71,6 @@ def _within(content: Any, *keys: str) -> dict[str, Any]:
     for key in keys:
         content = content.get(key) if isinstance(content, dict) else None
     return content if isinstance(content, dict) else {}
+
+
+FORMAT = Format("calibration data of FIGAROH", "DATA.csv [CONFIG.yaml]", _read)

@@ -1,20 +1,17 @@
-"""The formats that can be imported: one registry.
+"""The formats that can be imported: one registry."""
 
-A format says what it reads (``DOES``), which files (``FILES``), and has ``read(files, plan)``, which returns a
-:class:`~thermal_robot.campaign.importers.mapped.Source`: a table, and what its columns are as a mapping would say it.
-"""
+from thermal_robot.campaign.importers import figaroh, points, programs, published, robot_calibration, rosbag, table
+from thermal_robot.campaign.importers.mapped import Format
 
-from types import ModuleType
-
-from thermal_robot.campaign.importers import figaroh, ipa_ur10, jacobi, points, robot_calibration, rosbag, table
-
-FORMATS: dict[str, ModuleType] = {
-    "table": table,
-    "points": points,
-    "figaroh": figaroh,
-    "robot_calibration": robot_calibration,
-    "rosbag": rosbag,
-    "jacobi": jacobi,
-    "ipa_ur10": ipa_ur10,
+FORMATS: dict[str, Format] = {
+    "table": table.FORMAT,
+    "points": points.FORMAT,
+    "kuka": programs.KUKA,
+    "rapid": programs.RAPID,
+    "figaroh": figaroh.FORMAT,
+    "robot_calibration": robot_calibration.FORMAT,
+    "rosbag": rosbag.FORMAT,
+    "jacobi": published.JACOBI,
+    "ipa_ur10": published.IPA_UR10,
 }
-"""Modules by format, in the order of the help."""
+"""Formats by name, in the order of the help."""

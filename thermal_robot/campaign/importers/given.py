@@ -1,8 +1,7 @@
-"""The files that an importer is given: as many as it needs, each what it should be."""
+"""YAML files that an importer is given."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -12,20 +11,6 @@ from thermal_robot.files import is_file, is_folder
 _LARGEST_YAML = 64 << 20
 """Bytes: ten thousand samples of a calibration as text; it takes a minute to read them."""
 WITH_YAML = 'pip install "thermal-robot[yaml]"'
-
-
-def files_of(files: Sequence[Path], expected: str, least: int, most: int) -> None:
-    """Refuse another number of files than a format has.
-
-    Raises
-    ------
-    CampaignError
-        Naming what is expected.
-    """
-    if not least <= len(files) <= most:
-        raise CampaignError(
-            "FILES", "another number of files than this format has", found=str(len(files)), expected=expected
-        )
 
 
 def is_yaml(file: Path) -> bool:

@@ -2,22 +2,23 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 import numpy as np
 
 from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign
+from thermal_robot.campaign.headings import headings, size, wanted
 from thermal_robot.campaign.importers.columns import JOINTS, Column, found
-from thermal_robot.campaign.importers.plan import Plan
+from thermal_robot.campaign.importers.plan import Plan, planned
 from thermal_robot.campaign.names import listed
 from thermal_robot.campaign.table import Cells, Table
+from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS
 from thermal_robot.campaign.validate import build_campaign
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot
-
-"""Rows that a sentence names; who left out more looks for a cause, not for rows."""
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,52 @@ class Source:
     comments: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True)
+class Format:
+    """A format that can be imported.
+
+    Attributes
+    ----------
+    does, files
+        What it reads, and which files, for the help.
+    read
+        Makes a table of them, and says as a mapping would what its columns are.
+    least, most
+        How many files it has.
+    """
+
+    does: str
+    files: str
+    read: Callable[[Sequence[Path], Plan], Source]
+    least: int = 1
+    most: int = 2
+
+    def source(self, files: Sequence[Path], plan: Plan) -> Source:
+        """Read the files.
+
+        Raises
+        ------
+        CampaignError
+            Another number of files than the format has, or what its reader raises.
+        """
+        files_of(files, self.files, self.least, self.most)
+        return self.read(files, plan)
+
+
+def files_of(files: Sequence[Path], expected: str, least: int, most: int) -> None:
+    """Refuse another number of files than a format has.
+
+    Raises
+    ------
+    CampaignError
+        Naming what is expected.
+    """
+    if not least <= len(files) <= most:
+        raise CampaignError(
+            "FILES", "another number of files than this format has", found=str(len(files)), expected=expected
+        )
+
+
 def campaign_of(source: Source, plan: Plan, robot: Robot, name: str) -> tuple[Campaign, tuple[str, ...]]:
     """Return the campaign of a table, and in sentences how many rows it has and what was left out.
 
@@ -63,6 +110,9 @@ def campaign_of(source: Source, plan: Plan, robot: Robot, name: str) -> tuple[Ca
     """
     table = source.table
     columns = _columns(table, plan, robot)
+    plan = plan.over(planned({"measurements": _units(table, columns, robot)}))
+    settings = plan.settings(robot)
+    columns = {name: _in_units(column, table, wanted(name, robot, settings.units)) for name, column in columns.items()}
     measured = np.zeros(len(table.rows), dtype=bool)
     places = [name for name in columns if name in names.POSITION or names.target_of(name)]
     for axis in places:
@@ -82,7 +132,7 @@ def campaign_of(source: Source, plan: Plan, robot: Robot, name: str) -> tuple[Ca
     if spare:
         notes.append(f"columns left out: {listed(spare)}")
     ready = Table(table.file, cells, table.rows, table.header, warnings=table.warnings)
-    campaign = build_campaign(ready, plan.settings(robot), robot, name=name)
+    campaign = build_campaign(ready, settings, robot, name=name)
     # what follows from the order of the rows is not recorded: it will follow again
     kept = {name: values for name, values in campaign.covariates.items() if name not in campaign.derived}
     return replace(campaign, covariates=kept, derived=()), (*source.notes, *notes)
@@ -103,9 +153,24 @@ def _columns(table: Table, plan: Plan, robot: Robot) -> dict[str, Column]:
     orientation = plan.get("orientation", "stated")
     place = () if orientation is None else orientation.position
     taken = () if orientation is None else names.ORIENTATION
-    own = {name: Column((name,)) for name in table.columns if _defined(name, robot) and name not in taken}
+    own = {name: name for name in table.columns if _defined(name, robot)}
+    own |= {name: heading.column for name, heading in headings(table.columns, robot).items()}
+    found_out = {name: Column((column,)) for name, column in own.items() if name not in taken}
     in_order = dict(zip(robot.joint_names, joints, strict=bool(joints)))
-    return {**own, **dict(zip(names.POSITION, place, strict=bool(place))), **in_order, **stated}
+    return {**found_out, **dict(zip(names.POSITION, place, strict=bool(place))), **in_order, **stated}
+
+
+def _units(table: Table, columns: dict[str, Column], robot: Robot) -> dict[str, str]:
+    """Return the units of angles and lengths that headers name, of the first column that has one."""
+    said = {name: columns[name].header_unit(table) for name in (*names.POSITION, *robot.joint_names) if name in columns}
+    kinds = {"angle_unit": ANGLE_UNITS, "length_unit": LENGTH_UNITS}
+    return {key: unit for key, kind in kinds.items() for unit in reversed(said.values()) if unit in kind}
+
+
+def _in_units(column: Column, table: Table, unit: str) -> Column:
+    """Return a column whose header's unit is converted to that of the campaign's."""
+    scale = size(column.header_unit(table), unit) if unit else 1.0
+    return column if scale in (1.0, None) else replace(column, scale=column.scale * scale)
 
 
 def _defined(name: str, robot: Robot) -> bool:
@@ -121,19 +186,8 @@ def _cells(table: Table, columns: dict[str, Column], robot: Robot) -> dict[str, 
     for name in dict.fromkeys([*(n for n in whole if n in columns), *columns]):
         if name in names.LABELS:
             cells[name] = columns[name].text(table)
-            continue
-        values = columns[name].numbers(table)
-        gaps = np.isnan(values)
-        if name in whole and gaps.any():
-            raise CampaignError(
-                table.file,
-                f"a value is missing, for the column {name!r} of the campaign",
-                row=int(table.rows[int(np.argmax(gaps))]),
-                column=" + ".join(map(str, columns[name].sources)),
-                found="an empty cell",
-                expected="a number",
-            )
-        cells[name] = values
+        else:
+            cells[name] = columns[name].complete(table, name) if name in whole else columns[name].numbers(table)
     return cells
 
 

@@ -44,7 +44,7 @@ class Orientation:
         Axes of Euler angles, in the order of the columns: capitals turn about the moving axes, small letters about
         the fixed ones.
     unit
-        Of Euler angles and rotation vectors, ``"rad"`` or ``"deg"``.
+        Of Euler angles and rotation vectors, ``"rad"`` or ``"deg"``, where no header names one.
     inverse
         Whether they turn vectors of the measurement frame into the target's.
     """
@@ -66,14 +66,16 @@ class Orientation:
         """
         from scipy.spatial.transform import Rotation
 
-        figures = np.column_stack([_complete(table, column) for column in self.columns])
+        figures = np.column_stack([column.complete(table) for column in self.columns])
+        if self.kind in (EULER, VECTOR):
+            figures *= [ANGLE_UNITS.get(c.header_unit(table) or "", ANGLE_UNITS[self.unit]) for c in self.columns]
         if self.kind == QUATERNION:
             self._refuse(table, no_orientation(figures), "a quaternion whose length is not 1", figures)
             turned = Rotation.from_quat(figures, scalar_first=not self.scalar_last)
         elif self.kind == EULER:
-            turned = Rotation.from_euler(self.sequence, figures * ANGLE_UNITS[self.unit])
+            turned = Rotation.from_euler(self.sequence, figures)
         elif self.kind == VECTOR:
-            turned = Rotation.from_rotvec(figures * ANGLE_UNITS[self.unit])
+            turned = Rotation.from_rotvec(figures)
         else:
             matrices = figures.reshape(len(figures), -1, 3 if len(self.columns) == 9 else 4)[:, :3, :3]
             away = np.abs(matrices @ matrices.swapaxes(1, 2) - np.eye(3)).max(axis=(1, 2)) > _TURNED
@@ -98,19 +100,6 @@ class Orientation:
     def position(self) -> tuple[Column, ...]:
         """The three columns of the position that a matrix of twelve or sixteen has; none elsewhere."""
         return self.columns[3:12:4] if len(self.columns) > 9 else ()
-
-
-def _complete(table: Table, column: Column) -> NDArray[np.float64]:
-    """Return the figures of a column of which none may be missing."""
-    values = column.numbers(table)
-    gaps = np.isnan(values)
-    if gaps.any():
-        source = str(column.sources[0])
-        row = int(table.rows[int(np.argmax(gaps))])
-        raise CampaignError(
-            table.file, "a value is missing", row=row, column=source, found="an empty cell", expected="a number"
-        )
-    return values
 
 
 _KEYS = {

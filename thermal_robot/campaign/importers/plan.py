@@ -7,72 +7,35 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
+from thermal_robot.campaign.document import KINDS as OF_CAMPAIGN
 from thermal_robot.campaign.document import Document
 from thermal_robot.campaign.importers.columns import columns_kind
 from thermal_robot.campaign.importers.orientation import orientation_kind
-from thermal_robot.campaign.settings import (
-    ANGLE_UNIT,
-    GEARS,
-    GRAVITY,
-    HOW_MOVED,
-    LENGTH_UNIT,
-    PRIORS,
-    SIGMA,
-    TEMPERATURE,
-    VECTOR,
-    WORD,
-    Settings,
-    as_vector,
-)
+from thermal_robot.campaign.settings import ANGLE_UNIT, LENGTH_UNIT, Settings, as_vector
 from thermal_robot.campaign.tabular import SPACE, Layout
-from thermal_robot.campaign.units import Units
+from thermal_robot.campaign.ur_kinematics import with_kinematics
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot, load_robot
-from thermal_robot.schema import (
-    NOT_NEGATIVE,
-    POSITIVE,
-    Kind,
-    MisfitError,
-    boolean,
-    number,
-    record,
-    shown,
-    text,
-    whole,
-    word,
-)
+from thermal_robot.schema import NOT_NEGATIVE, POSITIVE, Kind, boolean, number, record, text, whole, word
 from thermal_robot.urdf_text import BUILTIN, EXAMPLE_ROBOT_DATA
 
 JOINING = ("key", "targets")
 """What ``[table]`` says of names, and not of how a file is laid out."""
 _SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": SPACE}
-_KNOWN = word(("known", "unknown"), WORD)
 _NAME = text("a name")
-_KINDS: dict[str, Mapping[str, Kind]] = {
-    "robot": {
-        "urdf": text("the path of the robot's URDF file"),
-        "tool_frame": text("the URDF link that carries the target"),
-        "root_frame": text("the URDF link where the chain starts"),
-        "gravity": GRAVITY,
-        "moves": HOW_MOVED,
-        "reference_temperature": TEMPERATURE,
-    },
+_LAID_OUT: Mapping[str, Kind] = {
+    "separator": word(_SEPARATORS),
+    "skip": whole(0),
+    "header": boolean,
+    "comment": text("the first letters of a comment"),
+}
+KINDS: dict[str, Mapping[str, Kind] | Kind] = {
+    **OF_CAMPAIGN,
     "measurements": {"angle_unit": ANGLE_UNIT, "length_unit": LENGTH_UNIT},
-    "frames": {"base": _KNOWN, "tool": _KNOWN, "target": VECTOR},
-    "noise": {"position": SIGMA, "orientation": SIGMA},
-    "payload": {"com": VECTOR},
-    "priors": {},
-    "gears": {},
-    "table": {
-        "separator": word(_SEPARATORS),
-        "skip": whole(0),
-        "header": boolean,
-        "comment": text("the first letters of a comment"),
-        "key": _NAME,
-        "targets": _NAME,
-    },
-    "columns": {},
-    "orientation": {},
+    "table": {**_LAID_OUT, **dict.fromkeys(JOINING, _NAME)},
+    "commands": _LAID_OUT,
+    "columns": columns_kind,
+    "orientation": orientation_kind,
     "recording": {
         "joints": _NAME,
         "pose": _NAME,
@@ -85,11 +48,7 @@ _KINDS: dict[str, Mapping[str, Kind]] = {
         "settling": NOT_NEGATIVE,
     },
 }
-_OWN: dict[str, Kind] = {"priors": PRIORS, "gears": GEARS, "orientation": orientation_kind, "columns": columns_kind}
-SECTIONS: dict[str, tuple[str, ...]] = {
-    section: () if section in _OWN else tuple(kinds) for section, kinds in _KINDS.items()
-}
-"""Keys by section: those of campaign.toml but the name of the table, and how the table is read."""
+"""What each key of each section may be: those of campaign.toml but the name of the table, and how tables are read."""
 
 
 @dataclass(frozen=True)
@@ -121,10 +80,9 @@ class Plan:
         }
         return Plan(self.file or other.file, merged)
 
-    @property
-    def layout(self) -> Layout:
-        """Of the table."""
-        stated = {key: value for key, value in self.sections.get("table", {}).items() if key not in JOINING}
+    def layout(self, section: str = "table") -> Layout:
+        """Return how a table is laid out; the section is ``table``, or ``commands`` of the second one."""
+        stated = {key: value for key, value in self.sections.get(section, {}).items() if key not in JOINING}
         if "separator" in stated:
             stated["separator"] = _SEPARATORS[stated["separator"]]
         return Layout(**stated)
@@ -143,12 +101,10 @@ class Plan:
         if urdf is None:
             expected = "--robot URDF, or [robot] urdf in the file of --mapping"
             raise CampaignError(self.file or "import", "no robot is named", expected=expected)
-        return load_robot(
-            urdf,
-            self.get("robot", "tool_frame", ""),
-            root_frame=self.get("robot", "root_frame"),
-            gravity=self.get("robot", "gravity"),
-        )
+        ends = {key: self.get("robot", key) for key in ("root_frame", "gravity")}
+        robot = load_robot(urdf, self.get("robot", "tool_frame", ""), **ends)
+        measured = self.get("robot", "kinematics")
+        return with_kinematics(robot, measured) if measured else robot
 
     def settings(self, robot: Robot) -> Settings:
         """Return what a campaign says once about all its rows, SI.
@@ -158,35 +114,18 @@ class Plan:
         CampaignError
             Units of angles or lengths that are not stated.
         """
-        for key in _KINDS["measurements"]:
+        for key in ("angle_unit", "length_unit"):
             if self.get("measurements", key) is None:
                 expected = f"[measurements] {key} in the file of --mapping"
                 raise CampaignError(self.file or "import", f"no {key} is stated", expected=expected)
-        units = Units(self.get("measurements", "angle_unit"), self.get("measurements", "length_unit"))
-        scale = units.length_scale
-        noise = self.get("noise", "position")
-        plain = {key: self.get("robot", key) for key in ("moves", "reference_temperature")}
-        return Settings(
-            urdf="",
-            tool_frame=robot.tool_frame,
-            root_frame=robot.root_frame,
-            gravity=as_vector(robot.gravity),
-            units=units,
-            base_known=self.get("frames", "base") == "known",
-            tool_known=self.get("frames", "tool") == "known",
-            target=as_vector(value * scale for value in self.get("frames", "target", (0.0, 0.0, 0.0))),
-            noise_position=noise * scale if noise else None,
-            noise_orientation=self.get("noise", "orientation") or None,
-            payload_com=as_vector(value * scale for value in self.get("payload", "com", (0.0, 0.0, 0.0))),
-            priors=self.sections.get("priors", {}),
-            gears=self.sections.get("gears", {}),
-            **{key: value for key, value in plain.items() if value is not None},
-        )
+        ends = {"tool_frame": robot.tool_frame, "root_frame": robot.root_frame, "gravity": as_vector(robot.gravity)}
+        return Settings.stated(self.sections, urdf="", **ends)
 
 
 def planned(sections: Mapping[str, Mapping[str, Any]]) -> Plan:
     """Return the plan that a format brings along, written as a mapping is."""
-    return Plan("", {section: _kind(section)(content, section) for section, content in sections.items()})
+    kinds = {s: record(k, may_lack=k) if isinstance(k, Mapping) else k for s, k in KINDS.items()}
+    return Plan("", {section: kinds[section](content, section) for section, content in sections.items()})
 
 
 def read_mapping(path: Path) -> Plan:
@@ -197,30 +136,8 @@ def read_mapping(path: Path) -> Plan:
     CampaignError
         No such file, a syntax error, a section or key that is unknown, a value of the wrong kind: with its line.
     """
-    document = Document(path, SECTIONS)
-    sections = {section: _fitted(document, section, content) for section, content in document.data.items()}
-    urdf = sections.get("robot", {}).get("urdf")
-    if urdf is not None and not urdf.startswith((BUILTIN, EXAMPLE_ROBOT_DATA)):
-        sections["robot"]["urdf"] = str(path.parent / urdf)
+    sections = Document(path, KINDS).sections
+    for key, named in sections.get("robot", {}).items():
+        if key in ("urdf", "kinematics") and not named.startswith((BUILTIN, EXAMPLE_ROBOT_DATA)):
+            sections["robot"][key] = str(path.parent / named)
     return Plan(str(path), sections)
-
-
-def _fitted(document: Document, section: str, content: Any) -> dict[str, Any]:
-    try:
-        values: dict[str, Any] = _kind(section)(content, section)
-    except MisfitError as error:
-        keys = error.path.removeprefix(f"{section}.").split(".")[0].split("[")[0]
-        raise CampaignError(
-            document.file,
-            error.problem or "wrong kind of value",
-            row=document.row(section, keys) or document.row(section),
-            column=error.path,
-            found=shown(error.value),
-            expected=error.expected,
-        ) from None
-    return values
-
-
-def _kind(section: str) -> Kind:
-    """Kind of a section: known keys, of which none is needed, or keys of the user's own."""
-    return _OWN.get(section) or record(_KINDS[section], may_lack=_KINDS[section])

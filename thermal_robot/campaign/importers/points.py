@@ -15,34 +15,26 @@ from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 
-from thermal_robot.campaign.importers.given import files_of
-from thermal_robot.campaign.importers.grouped import grouped
-from thermal_robot.campaign.importers.join import joined
-from thermal_robot.campaign.importers.mapped import Source
+import numpy as np
+
+from thermal_robot.campaign.importers.columns import found
+from thermal_robot.campaign.importers.mapped import Format, Source
 from thermal_robot.campaign.importers.plan import JOINING, Plan, planned
+from thermal_robot.campaign.importers.table import commands, joined
 from thermal_robot.campaign.names import listed
-from thermal_robot.campaign.table import Table
+from thermal_robot.campaign.table import Cells, Table
 from thermal_robot.campaign.tabular import SPACE, Layout, read_table
 from thermal_robot.errors import CampaignError
 
-DOES = "points of a laser tracker by name (SpatialAnalyzer, lists of names and x y z), and a table of commands"
-FILES = "POINTS COMMANDS.csv"
 COMMENT = "//"
 _NAMES = ("collection", "group", "target")
 _AXES = ("x", "y", "z")
 
 
-def read(files: Sequence[Path], plan: Plan) -> Source:
-    """Read points and commands, joined by the name of the point; without names, row by row.
-
-    Raises
-    ------
-    CampaignError
-        Another number of files, a line that is no point, points and commands that do not belong together.
-    """
-    files_of(files, FILES, 2, 2)
+def _read(files: Sequence[Path], plan: Plan) -> Source:
+    """Read points and commands, joined by the name of the point; without names, row by row."""
     laid_out = set(plan.sections.get("table", {})) - set(JOINING)
-    layout = plan.layout if laid_out else _laid_out(files[0])
+    layout = plan.layout() if laid_out else _laid_out(files[0])
     table = _named(read_table(files[0], layout), plan)
     key = plan.get("table", "key") or _NAMES[-1]
     targets = plan.get("table", "targets")
@@ -50,7 +42,7 @@ def read(files: Sequence[Path], plan: Plan) -> Source:
     if targets:
         table, note = grouped(table, key, targets)
         told.append(note)
-    both, notes = joined(table, read_table(files[1]), key if key in table.columns else "")
+    both, notes = joined(table, commands(files[1], plan), key if key in table.columns else "")
     sections = {"columns": {} if targets else {axis: axis for axis in _AXES}}
     if key in table.columns:
         sections["columns"]["pose"] = key
@@ -102,3 +94,52 @@ def _names_before(table: Table) -> int:
         if figures and (len(columns) - count <= len(_AXES) or not all(map(str.isdigit, table.text(name)))):
             return count
     return min(len(_NAMES), len(columns))
+
+
+def grouped(table: Table, key: str, targets: str) -> tuple[Table, str]:
+    """Return a table with a row for each visit of a pose, and in a sentence which targets there are.
+
+    Targets are numbered as they first appear. One that is measured again at a pose begins another visit. A target that
+    a visit lacks has empty cells there.
+
+    Parameters
+    ----------
+    table
+        A line a point, with the columns x, y and z.
+    key, targets
+        Columns of the names of poses, and of those of targets on the tool.
+
+    Raises
+    ------
+    CampaignError
+        A column that is not there; a single target.
+    """
+    import pandas as pd
+
+    lines = pd.DataFrame({"pose": table.text(found(table, key)), "called": table.text(found(table, targets))})
+    order = list(lines["called"].unique())
+    if len(order) < 2:
+        raise CampaignError(
+            table.file,
+            "holds a single target of each pose",
+            column=targets,
+            found=listed(order),
+            expected="names of several targets, or no [table] targets",
+        )
+    lines["visit"] = lines.groupby(["pose", "called"]).cumcount()
+    row = lines.groupby(["pose", "visit"], sort=False).ngroup().to_numpy()
+    _, first = np.unique(row, return_index=True)
+    values = np.full((len(first), len(order), 3), np.nan)
+    values[row, lines["called"].map(order.index)] = np.stack([table.numbers(a, gaps=True) for a in _AXES], axis=1)
+    columns: dict[str, Cells] = {key: list(lines["pose"].iloc[first])}
+    columns |= {f"{axis}.{k + 1}": values[:, k, i] for k in range(len(order)) for i, axis in enumerate(_AXES)}
+    both = Table(table.file, columns, table.rows[first], table.header, warnings=table.warnings)
+    return both, f"{len(order)} targets of each pose, numbered so: {listed(order)}"
+
+
+FORMAT = Format(
+    "points of a laser tracker by name (SpatialAnalyzer, lists of names and x y z), and a table of commands",
+    "POINTS COMMANDS.csv",
+    _read,
+    least=2,
+)

@@ -17,29 +17,20 @@ from typing import Any
 
 import numpy as np
 
-from thermal_robot.campaign.importers.given import files_of, is_yaml, read_yaml
-from thermal_robot.campaign.importers.join import joined
-from thermal_robot.campaign.importers.mapped import Source
+from thermal_robot.campaign.importers.given import is_yaml, read_yaml
+from thermal_robot.campaign.importers.mapped import Format, Source, files_of
 from thermal_robot.campaign.importers.plan import Plan, planned
+from thermal_robot.campaign.importers.table import joined
 from thermal_robot.campaign.names import listed
 from thermal_robot.campaign.table import Table
 from thermal_robot.campaign.tabular import read_table
 from thermal_robot.errors import CampaignError
 
-DOES = "samples of ROS robot_calibration as YAML; or its capture poses, and a table of measured points"
-FILES = "SAMPLES.yaml, or POSES.yaml MEASURED.csv"
 _UNITS = {"measurements": {"angle_unit": "rad", "length_unit": "m"}}
 
 
-def read(files: Sequence[Path], plan: Plan) -> Source:
-    """Read samples; the first feature of ``[recording] sensor`` is the target unless ``feature`` says another.
-
-    Raises
-    ------
-    CampaignError
-        Another number of files, a YAML file that is none of the two kinds, a sensor that is not there.
-    """
-    files_of(files, FILES, 1, 2)
+def _read(files: Sequence[Path], plan: Plan) -> Source:
+    """Read samples; the first feature of ``[recording] sensor`` is the target unless ``feature`` says another."""
     file = next((file for file in files if is_yaml(file)), files[0])
     documents = read_yaml(file)
     if len(documents) == 1 and isinstance(documents[0], list) and any(_is_sample(item) for item in documents[0]):
@@ -51,9 +42,9 @@ def read(files: Sequence[Path], plan: Plan) -> Source:
             raise CampaignError(
                 str(file), "holds poses and no measurements", expected="the table of measured points as a second file"
             )
-        both, notes = joined(read_table(tables[0], plan.layout), commands)
+        both, notes = joined(read_table(tables[0], plan.layout()), commands)
         return Source(both, planned(_UNITS), notes)
-    files_of(files, FILES, 1, 1)
+    files_of(files, "SAMPLES.yaml, or POSES.yaml MEASURED.csv", 1, 1)
     sensor = plan.get("recording", "sensor") or _only_sensor(str(file), documents)
     feature = plan.get("recording", "feature", 1)
     rows = [_sample(str(file), k, sample, sensor, feature) for k, sample in enumerate(documents)]
@@ -124,3 +115,10 @@ def _only_sensor(file: str, documents: Sequence[Any]) -> str:
 
 def _odd(file: str, index: int, found: Any, expected: str) -> CampaignError:
     return CampaignError(file, "is no sample", key=f"[{index}]", found=repr(found)[:80], expected=expected)
+
+
+FORMAT = Format(
+    "samples of ROS robot_calibration as YAML; or its capture poses, and a table of measured points",
+    "SAMPLES.yaml, or POSES.yaml MEASURED.csv",
+    _read,
+)

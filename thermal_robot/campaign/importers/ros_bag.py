@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 
 from thermal_robot.campaign import names
-from thermal_robot.campaign.importers.streams import Stream, stream
+from thermal_robot.campaign.headings import joint_columns
+from thermal_robot.campaign.importers.standstill import Stream, stream
 from thermal_robot.campaign.names import listed
 from thermal_robot.errors import CampaignError
 
@@ -99,10 +100,10 @@ def _joint_stream(file: str, messages: Sequence[Any], joints: Sequence[str]) -> 
         return None
     times, rows = [], []
     for stamp, message, _ in messages:
-        where = {name: k for k, name in enumerate(message.name)}
-        if all(joint in where for joint in joints):  # a hand may speak in messages of its own
+        where = joint_columns(message.name, joints)
+        if len(where) == len(joints):  # a hand may speak in messages of its own
             times.append(_instant(stamp, message))
-            rows.append([message.position[where[joint]] for joint in joints])
+            rows.append([message.position[message.name.index(where[joint])] for joint in joints])
     if not rows:
         recorded = sorted({name for _, message, _ in messages for name in message.name})
         raise CampaignError(

@@ -10,6 +10,7 @@ one after another: sec, nanosec, frame, the names, the positions, then velocitie
 
 from __future__ import annotations
 
+import itertools
 import re
 from collections.abc import Sequence
 from pathlib import Path
@@ -17,7 +18,9 @@ from pathlib import Path
 import numpy as np
 
 from thermal_robot.campaign import names
-from thermal_robot.campaign.importers.streams import Array, Stream, stream
+from thermal_robot.campaign.headings import joint_columns
+from thermal_robot.campaign.importers.standstill import Array, Stream, stream
+from thermal_robot.campaign.names import listed
 from thermal_robot.campaign.table import Table
 from thermal_robot.campaign.tabular import Layout, read_table
 from thermal_robot.errors import CampaignError
@@ -79,16 +82,9 @@ def _joints(table: Table, joints: Sequence[str]) -> dict[str, str]:
     """Return the column of each joint; nothing where there is none of any."""
     named = {table.text(name)[0]: f"field.position{name[len('field.name'):]}"
              for name in table.columns if re.fullmatch(r"field\.name\d+", name)}  # fmt: skip
-    columns = {}
-    for joint in joints:
-        ending = f"/{joint}/position"
-        series = [name for name in table.columns if name.endswith(ending)]
-        if joint in table.columns:
-            columns[joint] = joint
-        elif named.get(joint) in table.columns:
-            columns[joint] = named[joint]
-        elif len(series) == 1:
-            columns[joint] = series[0]
+    columns = joint_columns(table.columns, joints)
+    series = joint_columns(named, joints)
+    columns |= {joint: named[name] for joint, name in series.items() if named[name] in table.columns}
     if columns and len(columns) < len(joints):
         lacking = next(joint for joint in joints if joint not in columns)
         raise CampaignError(
@@ -118,14 +114,20 @@ def _target(table: Table) -> dict[str, str]:
 def _without_header(table: Table, joints: Sequence[str]) -> tuple[Stream | None, Stream | None]:
     """Return the stream of a file whose fields have an order and no names."""
     fields = list(table.columns)
-    texts = [name for name in fields[_BEFORE_NAMES:] if table.first_text(name) is not None or table.is_empty(name)]
     time = table.numbers(fields[0]) + table.numbers(fields[1]) * _NANOSECOND
-    labels = [table.text(name)[0] for name in texts]
+    # texts, or nothing where a frame has no name; figures that are nan throughout, as efforts, are no texts
+    texts = list(itertools.takewhile(lambda name: table.first_text(name) is not None or not any(table.columns[name]),
+                                     fields[_BEFORE_NAMES:]))  # fmt: skip
     first = _BEFORE_NAMES + len(texts)
-    if set(joints) <= set(labels):
-        recorded = labels[1:]  # the first text is the frame
-        columns = [fields[first + recorded.index(joint)] for joint in joints]
-        return stream(table.file, time, _figures(table, columns), joints), None
+    recorded = [table.text(name)[0] for name in texts[1:]]  # the first text is the frame
+    columns = joint_columns(recorded, joints)
+    if columns and len(columns) == len(joints):
+        wanted = [fields[first + recorded.index(columns[joint])] for joint in joints]
+        return stream(table.file, time, _figures(table, wanted), joints), None
+    if len(recorded) > 1:
+        lacking = next(joint for joint in joints if joint not in columns)
+        raise CampaignError(table.file, "a joint of the chain is not among the names", column=lacking,
+                            found=listed(recorded), expected=f"all of {listed(joints)}")  # fmt: skip
     rest = fields[first:]
     if len(rest) in (len(names.POSITION), len(names.MEASURED)):
         order = ("x", "y", "z", "qx", "qy", "qz", "qw")[: len(rest)]

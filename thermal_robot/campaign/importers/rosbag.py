@@ -13,35 +13,23 @@ import numpy as np
 
 from thermal_robot.campaign import names
 from thermal_robot.campaign.importers.clock import lag
-from thermal_robot.campaign.importers.given import files_of
-from thermal_robot.campaign.importers.mapped import Source
+from thermal_robot.campaign.importers.mapped import Format, Source
 from thermal_robot.campaign.importers.plan import Plan, planned
 from thermal_robot.campaign.importers.ros_bag import ENDINGS, read_bag
 from thermal_robot.campaign.importers.ros_csv import read_streams
-from thermal_robot.campaign.importers.standstill import Pairs, paired
-from thermal_robot.campaign.importers.streams import Array, Stream
+from thermal_robot.campaign.importers.standstill import Array, Pairs, Stream, paired
 from thermal_robot.campaign.table import Cells, Table
 from thermal_robot.campaign.units import Units
 from thermal_robot.errors import CampaignError
 from thermal_robot.files import is_folder
 from thermal_robot.robot import Robot
 
-DOES = "joint_states and poses of the target: ROS bags, or CSV of rostopic, ros2 topic echo, PlotJuggler"
-FILES = "BAG, or BAG POSES.csv, or JOINT_STATES.csv POSES.csv"
 _UNITS = {"measurements": {"angle_unit": "rad", "length_unit": "m"}}
 _LIMITS = ("tolerance", "standstill", "velocity", "settling")
 
 
-def read(files: Sequence[Path], plan: Plan) -> Source:
-    """Read both recordings, estimate how their clocks differ unless it is stated, and pair them at standstill.
-
-    Raises
-    ------
-    CampaignError
-        Another number of files, one that cannot be read, no recording of joints or of the target, recordings that do
-        not show one motion, no standstill.
-    """
-    files_of(files, FILES, 1, 2)
+def _read(files: Sequence[Path], plan: Plan) -> Source:
+    """Read both recordings, estimate how their clocks differ unless it is stated, and pair them at standstill."""
     own = planned(_UNITS)
     robot = plan.robot()
     settings = plan.over(own).settings(robot)
@@ -112,3 +100,10 @@ def _table(joints: Stream, target: Stream, pairs: Pairs, scale: Array) -> Table:
     columns.update(zip(target.names, pairs.target.T, strict=True))
     columns["time"] = pairs.times - pairs.times[0]
     return Table(f"{joints.file} with {target.file}", columns, np.arange(1, len(pairs.times) + 1))
+
+
+FORMAT = Format(
+    "joint_states and poses of the target: ROS bags, or CSV of rostopic, ros2 topic echo, PlotJuggler",
+    "BAG, or BAG POSES.csv, or JOINT_STATES.csv POSES.csv",
+    _read,
+)

@@ -67,7 +67,7 @@ def import_files(format: str, files: Sequence[Path], directory: Path, plan: Plan
                 str(directory / name), "is read from, and would be overwritten", expected="another folder to write"
             )
     _require_imported(directory / FILE_NAME)
-    source = FORMATS[format].read(files, given)
+    source = FORMATS[format].source(files, given)
     full = given.over(source.plan)
     campaign, notes = campaign_of(source, full, full.robot(), Path(directory).resolve().name)
     origin = f"{IMPORTED} {format}` from {', '.join(Path(file).name for file in files)}."

@@ -1,12 +1,16 @@
-"""Rows of a campaign from recordings in motion: one for each time that the robot stood still."""
+"""Recordings of a robot and of an instrument, each by its own clock; rows of a campaign where the robot stood still."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
-from thermal_robot.campaign.importers.streams import Array, Stream
+from thermal_robot.errors import CampaignError
+
+Array = NDArray[np.float64]
 
 WINDOW = 0.2
 """s over which the velocity of a joint is taken: it averages the steps of an encoder, 1e-5 rad of which are then
@@ -20,6 +24,59 @@ SETTLING = 0.25
 """s after stopping that are not used: arms swing out at some 10 Hz, and controllers settle."""
 TOLERANCE = 0.05
 """s between a row's instant and the sample paired with it; instruments measure twenty times a second or more."""
+
+
+@dataclass(frozen=True)
+class Stream:
+    """N samples of k quantities.
+
+    Attributes
+    ----------
+    file
+        Where they come from, for messages.
+    time
+        (N,) s, increasing.
+    values
+        (N, k) in the unit of the recording.
+    names
+        Of the k columns: joints, or x y z and perhaps qw qx qy qz.
+    """
+
+    file: str
+    time: Array
+    values: Array
+    names: tuple[str, ...]
+
+    def between(self, times: Array) -> Array:
+        """Return (M, k) values between the samples, on straight lines; held beyond the ends."""
+        return np.column_stack([np.interp(times, self.time, column) for column in self.values.T])
+
+    def scaled(self, scale: Array) -> Stream:
+        """Return the stream in other units, (k,) of them to one of its own."""
+        return replace(self, values=self.values * scale)
+
+    def nearest(self, times: Array) -> NDArray[np.int64]:
+        """Return (M,) indices of the samples that are nearest in time."""
+        after = np.clip(np.searchsorted(self.time, times), 1, len(self.time) - 1)
+        earlier = times - self.time[after - 1] < self.time[after] - times
+        return np.where(earlier, after - 1, after)
+
+
+def stream(file: str, time: Array, values: Array, names: Sequence[str]) -> Stream:
+    """Return a stream in the sequence of its clock, without samples that have a gap and without repeated instants.
+
+    Raises
+    ------
+    CampaignError
+        Fewer than two samples.
+    """
+    kept = ~(np.isnan(time) | np.isnan(values).any(axis=1))
+    _, first = np.unique(time[kept], return_index=True)
+    if len(first) < 2:
+        raise CampaignError(
+            file, "has fewer than two samples", found=f"{len(first)} of {', '.join(names)}", expected="a recording"
+        )
+    return Stream(file, time[kept][first], values[kept][first], tuple(names))
 
 
 @dataclass(frozen=True)
@@ -76,9 +133,5 @@ def paired(
     own, seen = joints.nearest(middles), target.nearest(middles - lag)
     near = np.abs(target.time[seen] + lag - middles) <= tolerance
     return Pairs(
-        middles[near],
-        joints.values[own[near]],
-        target.values[seen[near]],
-        int((~long).sum()),
-        int((~near).sum()),
+        middles[near], joints.values[own[near]], target.values[seen[near]], int((~long).sum()), int((~near).sum())
     )

@@ -1,8 +1,23 @@
-"""The tables of Landgraf et al.: decimal commas, Euler angles, time stamps that some series have lost."""
+"""Published data sets: sums, Euler angles, stamps that are lost; the files themselves are read in test_originals."""
 
 import numpy as np
 import pytest
 from campaign.importers.written import imported, put, rotations
+
+TABLE = """step_order,x_t,y_t,z_t,x_dif,y_dif,z_dif,joint_1,joint_2,joint_3,joint_4
+0,100.0,200.0,300.0,0.5,-0.5,0.25,10,20,30,40
+1,110.0,200.0,300.0,0.5,-0.5,0.25,11,22,33,44
+2,120.0,210.0,300.0,0.5,-0.5,0.25,12,24,36,48
+"""
+
+
+def test_targets_and_differences_are_added(tmp_path, capsys):
+    folder = put(tmp_path, grid__csv=TABLE)
+    campaign, _ = imported(capsys, folder, "jacobi", "grid.csv")
+    np.testing.assert_allclose(1e3 * campaign.position[0], [100.5, 199.5, 300.25])
+    np.testing.assert_allclose(np.rad2deg(campaign.q[:, 0]), [10, 11, 12])
+    assert campaign.covariates["order"].tolist() == [0, 1, 2]
+
 
 HEADER = "Timestamp;turn;lift;slide;roll;measurement_temperature;measurement_x;measurement_y;measurement_z;"
 HEADER += "measurement_rx;measurement_ry;measurement_rz\n"

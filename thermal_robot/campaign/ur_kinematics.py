@@ -1,0 +1,114 @@
+"""The calibration that a robot of Universal Robots brings from the factory, as ROS has it: kinematics.yaml, in and out.
+
+Source: github.com/UniversalRobots/Universal_Robots_ROS2_Description, ``config/<model>/default_kinematics.yaml`` and
+``urdf/inc/ur_common.xacro``; ``ur_calibration`` of the driver extracts one from a robot. Under ``kinematics`` each of
+shoulder, upper_arm, forearm, wrist_1, wrist_2 and wrist_3 has x y z (m) and roll pitch yaw (rad, about fixed axes): the
+origin of the joint that carries this link. All joints turn about the z axis of their own frames. ``hash`` says which
+robot it is of.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.campaign.importers.given import read_yaml
+from thermal_robot.errors import CampaignError
+from thermal_robot.kinematics.rewritten import rewritten
+from thermal_robot.robot import Robot, load_robot
+
+Array = NDArray[np.float64]
+
+LINKS = {
+    "shoulder": "shoulder_pan_joint",
+    "upper_arm": "shoulder_lift_joint",
+    "forearm": "elbow_joint",
+    "wrist_1": "wrist_1_joint",
+    "wrist_2": "wrist_2_joint",
+    "wrist_3": "wrist_3_joint",
+}
+"""Links of the file, and how the names of the joints end that carry them: a robot may have a prefix."""
+FIGURES = ("x", "y", "z", "roll", "pitch", "yaw")
+FARTHEST, MOST_TURNED = 0.01, 0.1
+"""m and rad by which an origin may differ from the nominal one: robots leave the factory within some 3 mm and 10 mrad,
+and of two models or of two conventions at least one origin differs by more."""
+
+
+def elements(robot: Robot, file: str) -> dict[str, int]:
+    """Return the chain's element of each link's joint.
+
+    Raises
+    ------
+    CampaignError
+        The chain lacks one of them, or its axis is not z.
+    """
+    chain = robot.chain
+    found = {}
+    for link, ending in LINKS.items():
+        own = [k for k, name in enumerate(chain.names) if name.endswith(ending)]
+        if len(own) != 1 or not np.allclose(chain.axes[own[0]], [0.0, 0.0, 1.0]):
+            raise CampaignError(
+                file,
+                f"is for robots of Universal Robots, and {robot.name!r} has no {ending} that turns about its z axis",
+                expected="a URDF made of ur_description for ROS 2, whose frames are those of kinematics.yaml",
+            )
+        found[link] = own[0]
+    return found
+
+
+def with_kinematics(robot: Robot, file: str | Path) -> Robot:
+    """Return the robot with the joint origins of a kinematics.yaml.
+
+    Parameters
+    ----------
+    robot
+        Of ur_description, whole from its base to its flange.
+    file
+        The calibration.
+
+    Raises
+    ------
+    CampaignError
+        A file that is none, of another model, or a robot of other frames.
+    """
+    documents = read_yaml(Path(file))
+    held = documents[0].get("kinematics") if documents and isinstance(documents[0], Mapping) else None
+    origins = {}
+    for link, k in elements(robot, str(file)).items():
+        pose = _pose(held.get(link) if isinstance(held, Mapping) else None, str(file), link)
+        nominal = np.eye(4)
+        nominal[:3, :3], nominal[:3, 3] = robot.chain.rotations[k], robot.chain.translations[k]
+        away = np.linalg.norm(pose[:3, 3] - nominal[:3, 3])
+        turned = np.linalg.norm(pose[:3, :3] - nominal[:3, :3]) / np.sqrt(2.0)
+        if away > FARTHEST or turned > MOST_TURNED:
+            raise CampaignError(
+                str(file),
+                f"is of another model than {robot.name!r}, or the robot is not ur_description's",
+                key=f"kinematics.{link}",
+                found=f"{1e3 * away:.1f} mm and {turned:.2g} rad from the origin in the URDF",
+                expected=f"at most {1e3 * FARTHEST:g} mm and {MOST_TURNED:g} rad",
+            )
+        origins[robot.chain.names[k]] = pose
+    urdf = rewritten(robot.urdf, origins, notes=[f"Joint origins of {Path(file).name}."])
+    return load_robot(urdf, robot.tool_frame, root_frame=robot.root_frame, gravity=robot.gravity)
+
+
+def _pose(given: Any, file: str, link: str) -> Array:
+    """Return (4, 4) of a link's six figures."""
+    from scipy.spatial.transform import Rotation
+
+    try:
+        # what has an exponent and no point is text to YAML
+        figures = [float(given[key]) for key in FIGURES]
+    except (TypeError, KeyError, ValueError):
+        figures = [np.nan]
+    if not np.isfinite(figures).all():
+        expected = f"{', '.join(FIGURES)} under kinematics: {link}"
+        raise CampaignError(file, "is no kinematics.yaml", key=f"kinematics.{link}", expected=expected)
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = Rotation.from_euler("xyz", figures[3:]).as_matrix(), figures[:3]
+    return pose
