@@ -65,3 +65,30 @@ UNMIXED, MIXED_FLOOR = 1.0 - 1e-6, 1e-6
 mixture, of its largest, below which nothing is given back: readings have six digits."""
 TURN = math.pi
 """rad: a half turn, by which conventions of a joint's zero differ, or by half of it."""
+PRIOR_LENGTH, PRIOR_TURN, PRIOR_ZERO = 0.02, 0.1, 0.5
+"""Of the arm's length, and rad of an axis and of a joint's zero: one sigma to which a free calibration holds what it
+moves. Little of what is determined is held by it; the zeros are freest, as a horn is soon mounted a tooth farther."""
+ANOTHERS = 1e6
+"""Times the precision of what a joint has of its own: to which that is held which another joint has."""
+CALIBRATION_STEPS, CALIBRATED = 30, 1e-3
+"""Steps at most of that calibration, and the share of its cost by which the last one falls."""
+STEP_SHARES = (1.0, 0.5, 0.25, 0.1)
+"""Of a step, in the order in which they are tried, until one leads downhill."""
+ROUNDED = 1e-9
+"""Share of a frame's own weight by which what nothing determines is held."""
+MEDIAN = 1.54
+"""Median length of a normal vector in three dimensions, of its sigma per axis."""
+LONGEST_ERROR, CLEARLY = 0.015, 5.0
+"""Of the arm's length, and times what the calibration leaves: a joint that sits farther than both from its place is
+that of another robot. Industrial arms err by a thousandth, printed servo arms by a hundredth; what is not geometric
+feigns a placement that is wrong by up to some times of what it leaves."""
+PARTS, PART_ROWS = 4, 12
+"""Parts at most into which rows in their order are divided for frames of their own, and rows of each at least: a base
+that was moved once or twice then stands still in most of them, and twelve rows determine two frames three times."""
+SCALE_ERROR = 0.05
+"""By which a common factor of the links is another model's: cameras without a scale bar err by a hundredth."""
+FACTOR_OFF, FACTOR_ROUNDS = 1.0, 25
+"""Natural logarithm by which a common factor of the links may be off the ratio of the two volumes, and steps in which
+it is found: to a thousandth."""
+HAND_JOINTS, ENDS = 6, 6
+"""Joints that a robot at hand may have beside those of the chain, a gripper's; and ends of an arm: those of a hand."""

@@ -1,0 +1,98 @@
+"""Judge by what a calibration has to move: lengths that no robot errs by are those of another model."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+from thermal_robot.campaign import Campaign
+from thermal_robot.diagnosis.data_faults import settings
+from thermal_robot.diagnosis.data_faults.known_robots import fitting
+from thermal_robot.diagnosis.data_faults.readings import Readings
+from thermal_robot.diagnosis.data_faults.recalibrated import Recalibrated, arm_length
+from thermal_robot.diagnosis.parts import AnotherModel, Misfit
+from thermal_robot.robot import Robot
+
+Array = NDArray[np.float64]
+
+
+def another_robot(campaign: Campaign) -> Misfit | None:
+    """Tell whether it takes another robot, or another motion, to bring commands and measurements together.
+
+    Where frames alone leave a gap, every joint's placement is calibrated. Rows of one session, or a quarter of them in
+    their order, may have frames of their own: a base that was moved is no other robot.
+
+    Parameters
+    ----------
+    campaign
+        With measurements.
+
+    Returns
+    -------
+    Misfit or None
+        With the model that is meant, as far as it can be told; ``None`` where a robot of this kind can err so.
+    """
+    if campaign.simulated_position is not None or campaign.samples <= settings.DRAWN:
+        return None
+    whole = Readings.of(campaign)
+    rows = np.linspace(0, campaign.samples - 1, min(campaign.samples, settings.SAMPLED)).round().astype(np.int64)
+    readings = replace(whole.take(rows), base_known=False, tool_known=False)
+    near = settings.MISFIT * readings.spread()
+    gap = float(np.median(readings.distance(readings.align())))
+    if gap <= near:
+        return None
+    factor, longer = _lengthened(readings)
+    shorter = gap > settings.FALL * float(np.median(_aligned(replace(readings, robot=longer))))
+    common = factor if shorter and abs(factor - 1.0) > settings.SCALE_ERROR else None
+    misfit = None
+    for parts in (np.zeros(len(rows), dtype=np.int64), _parts(campaign, rows)):
+        misfit = _judged(Recalibrated.of(readings, parts, longer if shorter else readings.robot), common)
+        if misfit is None:
+            return None
+    known = fitting(readings, near)
+    if known is None or misfit is None:
+        return misfit
+    return replace(misfit, model=replace(misfit.model or AnotherModel(), fits=known[0], remains=known[1]))
+
+
+def _judged(found: Recalibrated, factor: float | None) -> Misfit | None:
+    left, (joint, far) = float(found.left(3)), found.longest()
+    off = far > max(settings.LONGEST_ERROR * arm_length(found.readings.robot), settings.CLEARLY * found.left())
+    if left > settings.ANOTHER_MOTION * found.readings.spread():
+        return Misfit(away=left, model=None if factor is None else AnotherModel(factor))
+    return Misfit(away=left, model=AnotherModel(factor, joint, far)) if off or factor is not None else None
+
+
+def _parts(campaign: Campaign, rows: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(N,) the session of each row, or which quarter of them it belongs to."""
+    sessions = campaign.labels.get("session")
+    if sessions is not None and len(np.unique(sessions[rows])) > 1:
+        return np.unique(sessions[rows], return_inverse=True)[1]
+    count = min(settings.PARTS, len(rows) // settings.PART_ROWS) or 1
+    return np.arange(len(rows)) * count // len(rows)
+
+
+def _aligned(readings: Readings) -> Array:
+    return readings.distance(readings.align())
+
+
+def _lengthened(readings: Readings) -> tuple[float, Robot]:
+    """Return the common factor by which the links fit best, and the robot with such links."""
+    robot = readings.robot
+    measured = float(np.linalg.norm(np.ptp(readings.position, axis=0)))
+    first = np.log(max(measured, settings.LEAST_GAP) / readings.spread())
+
+    def longer(factor: float) -> Robot:
+        return replace(robot, chain=replace(robot.chain, translations=factor * robot.chain.translations))
+
+    def gap(exponent: float) -> float:
+        there = replace(readings, robot=longer(float(np.exp(exponent))))
+        return float(np.log(np.median(there.distance(there.align(coarse=True))) + settings.LEAST_GAP))
+
+    bounds = (first - settings.FACTOR_OFF, first + settings.FACTOR_OFF)
+    found = minimize_scalar(gap, bounds=bounds, method="bounded", options={"maxiter": settings.FACTOR_ROUNDS})
+    factor = float(np.exp(found.x))
+    return factor, longer(factor)
