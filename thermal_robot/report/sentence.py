@@ -7,7 +7,7 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from thermal_robot.diagnosis.parts import Finding, Misfit, Unexplained
+    from thermal_robot.diagnosis.parts import AnotherModel, Finding, Misfit, Unexplained
     from thermal_robot.diagnosis.result import Diagnosis
 
 MOST_WORDS = 45
@@ -17,6 +17,7 @@ _MOST_OF_A_NAME = 9  # words: of a longer title the headline says the beginning
 _WEIGHTY = 0.01  # of the gap on held-out rows: an effect with less is counted among the smaller ones
 _CARRIES = 1.5  # times what is left of the fitted rows: more on held-out rows is not called noise
 _UNKNOWN = ", which may or may not be noise: the campaign states none"
+_ANOTHER_UNIT = 200.0  # times too long or too short: a unit, not a model
 _SURE = 0.995  # a probability above it would be rounded to 100 %, which is never claimed
 _NOTHING = 0.9995e-9  # m: what is less rounds to no nanometre
 # m: from which length on it is read times so much in which unit; what rounds to 1 mm is never written as 1e+03 µm
@@ -92,7 +93,9 @@ def unnamed(diagnosis: Diagnosis) -> list[Finding]:
 
 
 def _misfit(misfit: Misfit, reach: float) -> str:
-    fault = misfit.fault
+    fault, model = misfit.fault, misfit.model
+    if model is not None:
+        return _another_model(model)
     if fault is None:
         left = f"{misfit.turned:.2g} rad" if misfit.away is None else f"{length(misfit.away)} of {length(reach)}"
         return (
@@ -102,6 +105,23 @@ def _misfit(misfit: Misfit, reach: float) -> str:
     struck = f" in {len(fault.rows)} rows" if fault.rows else ""
     fall = f"{length(fault.rms_before)} to {length(fault.rms_after)}"
     return f"The table is at fault{struck}, not the robot: {fault.what}. Mended, the gap falls from {fall}."
+
+
+def _another_model(model: AnotherModel) -> str:
+    """Say in what the robot that was measured differs from the URDF, and which one it may be."""
+    factor, known = model.factor, ""
+    if factor is not None and not 1.0 / _ANOTHER_UNIT < factor < _ANOTHER_UNIT:
+        unit = "stands in mm: its links are a thousand times too long" if factor < 1.0 else "has links far too short"
+        return f"Robot and table do not describe the same motion: the URDF {unit}."
+    if factor is not None:
+        what = f"the links are about {factor:.2g} times as long as in the URDF"
+    elif model.joint:
+        what = f"{model.joint} would have to sit {length(model.off)} from where the URDF has it"
+    else:
+        what = "the URDF is of another robot"
+    if model.fits is not None:
+        known = f" {model.fits} fits: {length(model.remains)} remain."
+    return f"Robot and table do not describe the same motion: {what}. Is it another model of the family?{known}"
 
 
 def _sure(diagnosis: Diagnosis) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -19,7 +20,7 @@ from thermal_robot.robot import Robot
 Array = NDArray[np.float64]
 
 
-def another_robot(campaign: Campaign) -> Misfit | None:
+def another_robot(campaign: Campaign, progress: Callable[[str], None] = lambda _: None) -> Misfit | None:
     """Tell whether it takes another robot, or another motion, to bring commands and measurements together.
 
     Where frames alone leave a gap, every joint's placement is calibrated. Rows of one session, or a quarter of them in
@@ -29,6 +30,8 @@ def another_robot(campaign: Campaign) -> Misfit | None:
     ----------
     campaign
         With measurements.
+    progress
+        Called with a few words where a gap asks for it.
 
     Returns
     -------
@@ -44,6 +47,7 @@ def another_robot(campaign: Campaign) -> Misfit | None:
     gap = float(np.median(readings.distance(readings.align())))
     if gap <= near:
         return None
+    progress("another robot")
     factor, longer = _lengthened(readings)
     shorter = gap > settings.FALL * float(np.median(_aligned(replace(readings, robot=longer))))
     common = factor if shorter and abs(factor - 1.0) > settings.SCALE_ERROR else None
@@ -59,8 +63,9 @@ def another_robot(campaign: Campaign) -> Misfit | None:
 
 
 def _judged(found: Recalibrated, factor: float | None) -> Misfit | None:
-    left, (joint, far) = float(found.left(3)), found.longest()
-    off = far > max(settings.LONGEST_ERROR * arm_length(found.readings.robot), settings.CLEARLY * found.left())
+    left, (joint, far, times) = found.left(3), found.farthest()
+    most = settings.FARTHEST_ALONE if times > settings.ALONE else settings.FARTHEST
+    off = far > max(most * arm_length(found.readings.robot), settings.CLEARLY * found.left())
     if left > settings.ANOTHER_MOTION * found.readings.spread():
         return Misfit(away=left, model=None if factor is None else AnotherModel(factor))
     return Misfit(away=left, model=AnotherModel(factor, joint, far)) if off or factor is not None else None

@@ -79,14 +79,17 @@ class Recalibrated:
         shift = (back @ (own.translations[index] - was.translations[index])[:, :, None])[:, :, 0]
         return shift, log3(back @ own.rotations[index])
 
-    def longest(self) -> tuple[str, float]:
-        """Return the joint that sits farthest from where the URDF has it, and how far, m: a slide's own way is free."""
+    def farthest(self) -> tuple[str, float, float]:
+        """Return the joint that sits farthest from its place in the URDF, how far, m, and over the median of all.
+
+        A slide's own way is its zero and does not count.
+        """
         (shift, _), (_, index), chain = self.moved, self._placed, self.robot.chain
         slides = (chain.kinds[index] == PRISMATIC)[:, None]
         axes = chain.axes[index]
         far = np.linalg.norm(shift - slides * axes * (shift * axes).sum(axis=1)[:, None], axis=1)
         j = int(np.argmax(far))
-        return chain.names[index[j]], float(far[j])
+        return chain.names[index[j]], float(far[j]), float(far[j] / max(np.median(far), settings.LEAST_GAP))
 
     @property
     def gap(self) -> Array:

@@ -78,10 +78,12 @@ ROUNDED = 1e-9
 """Share of a frame's own weight by which what nothing determines is held."""
 MEDIAN = 1.54
 """Median length of a normal vector in three dimensions, of its sigma per axis."""
-LONGEST_ERROR, CLEARLY = 0.015, 5.0
-"""Of the arm's length, and times what the calibration leaves: a joint that sits farther than both from its place is
-that of another robot. Industrial arms err by a thousandth, printed servo arms by a hundredth; what is not geometric
-feigns a placement that is wrong by up to some times of what it leaves."""
+FARTHEST, FARTHEST_ALONE, ALONE = 0.02, 0.01, 6.0
+"""Of the arm's length, by which no joint sits off its place: industrial arms err by a thousandth, printed servo arms by
+a hundredth; half of it where the joint is alone with it, so many times farther off than the median of all: chance makes
+that two or three."""
+CLEARLY = 5.0
+"""Times what a calibration leaves: what is not geometric feigns that a joint sits off by up to some times as much."""
 PARTS, PART_ROWS = 4, 12
 """Parts at most into which rows in their order are divided for frames of their own, and rows of each at least: a base
 that was moved once or twice then stands still in most of them, and twelve rows determine two frames three times."""
