@@ -9,7 +9,7 @@ import numpy as np
 from scipy.spatial.distance import cdist
 
 from thermal_robot.campaign.campaign import Campaign
-from thermal_robot.campaign.mistakes import mistakes
+from thermal_robot.campaign.mistakes import FEWEST_ROWS, mistakes
 from thermal_robot.campaign.names import listed
 from thermal_robot.kinematics import tool_poses
 
@@ -27,7 +27,7 @@ FEWEST_COMMANDS = 3
 """Rows from which small commands are a habit and not an accident."""
 FARTHEST_TARGET = 3.0
 """Reaches of the arm within which a target sits on it: a long tool is shorter, a length read in a unit a thousand times
-too large is longer by far. The next two bounds are as coarse for the same reason."""
+too large is longer by far. The next three bounds are as coarse for the same reason."""
 WORST_INSTRUMENT = 0.01
 """Share of the reach that is an instrument's one-sigma at most: 1 cm for an arm of 1 m, worse than a tape measure."""
 LONGEST_ARM, SHORTEST_ARM, THOUSAND = 100.0, 0.01, 1000.0
@@ -36,6 +36,9 @@ what lengths are wrong that stand in mm, or were converted to m twice."""
 LONG_TOOL, WORST_ARM, PAIRED = 0.5, 0.05, 200
 """m: as far as a target whose place is to be fitted may sit from the tool frame: a welding gun, a long pointer; share
 of the reach by which no arm errs; and rows, spread evenly, whose distances from each other are looked at."""
+LARGEST_EXTENT = 4.0
+"""Reaches (with the target) over which measured positions extend at most: the ball that the target can reach is two
+across; the other two allow for commands outside it."""
 SMALLEST_EXTENT = 1 / 200
 """Share of the reach over which measured positions extend at least, once enough joints move: 5 mm for an arm of 1 m."""
 MOVES = 0.5
@@ -48,8 +51,7 @@ def doubts(campaign: Campaign) -> list[str]:
     """Return the sentences, none for an ordinary campaign."""
     return [
         *_angle_unit(campaign),
-        *_length_unit(campaign),
-        *_apart(campaign),
+        *([*_length_unit(campaign)] or _apart(campaign)),
         *_limits(campaign),
         *_time(campaign),
         *_speed(campaign),
@@ -105,9 +107,7 @@ def _length_unit(campaign: Campaign) -> Iterator[str]:
     factor = another_unit(campaign)
     if factor is not None:
         wrong = (
-            "stands in mm: its links are a thousand times too long"
-            if factor < 1.0
-            else "has links a thousand times too short"
+            "stands in mm: its links are a thousand times too long" if factor < 1.0 else "is a thousand times too short"
         )
         yield f"the URDF {wrong}, {reach:.3g} m together"
         return
@@ -124,14 +124,15 @@ def _length_unit(campaign: Campaign) -> Iterator[str]:
     extent = float(np.ptp(campaign.position, axis=0).max())
     # A target on the last axes stays in place while they turn, so more than three joints have to move.
     moved = int((np.ptp(campaign.q, axis=0) > MOVES).sum())
-    if extent < SMALLEST_EXTENT * reach and moved > MOVING_JOINTS:
+    if extent > LARGEST_EXTENT * (reach + target) or (extent < SMALLEST_EXTENT * reach and moved > MOVING_JOINTS):
         yield f"the measured positions extend over {extent:.3g} m and {ask}"
 
 
 def _apart(campaign: Campaign) -> Iterator[str]:
     """Compare two measured points with what commands and target allow: whatever the base, their distance stays."""
     reach = _reach(campaign)
-    if campaign.position is None or campaign.simulated_position is not None or not np.isfinite(reach):
+    simulated = campaign.simulated_position is not None
+    if campaign.position is None or simulated or campaign.samples < FEWEST_ROWS or not np.isfinite(reach):
         return
     rows = np.linspace(0, campaign.samples - 1, min(campaign.samples, PAIRED)).round().astype(int)
     poses, measured = tool_poses(campaign.robot, campaign.q[rows]), campaign.position[rows]

@@ -111,7 +111,9 @@ def _another_model(model: AnotherModel) -> str:
     """Say in what the robot that was measured differs from the URDF, and which one it may be."""
     factor, known = model.factor, ""
     if factor is not None and not 1.0 / _ANOTHER_UNIT < factor < _ANOTHER_UNIT:
-        unit = "stands in mm: its links are a thousand times too long" if factor < 1.0 else "has links far too short"
+        unit = (
+            "stands in mm: its links are a thousand times too long" if factor < 1.0 else "is a thousand times too short"
+        )
         return f"Robot and table do not describe the same motion: the URDF {unit}."
     if factor is not None:
         what = f"the links are about {factor:.2g} times as long as in the URDF"

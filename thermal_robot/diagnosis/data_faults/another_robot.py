@@ -39,17 +39,16 @@ def another_robot(campaign: Campaign, progress: Callable[[str], None] = lambda _
         With the model that is meant, as far as it can be told; ``None`` where a robot of this kind can err so.
     """
     if campaign.simulated_position is not None or campaign.samples <= settings.DRAWN:
-        return None
+        return None  # another simulator is no other robot
     whole = Readings.of(campaign)
     rows = np.linspace(0, campaign.samples - 1, min(campaign.samples, settings.SAMPLED)).round().astype(np.int64)
     readings = replace(whole.take(rows), base_known=False, tool_known=False)
-    near = settings.MISFIT * readings.spread()
-    gap = float(np.median(readings.distance(readings.align())))
-    if gap <= near:
+    near, gap = settings.MISFIT * readings.spread(), _left(readings)
+    if gap <= near or near < settings.LEAST_GAP or sum(segment.movable for segment in campaign.robot.segments) < 2:
         return None
     progress("another robot")
     factor, longer = _lengthened(readings)
-    shorter = gap > settings.FALL * float(np.median(_aligned(replace(readings, robot=longer))))
+    shorter = gap > settings.FALL * _left(replace(readings, robot=longer))
     common = factor if shorter and abs(factor - 1.0) > settings.SCALE_ERROR else None
     misfit = None
     for parts in (np.zeros(len(rows), dtype=np.int64), _parts(campaign, rows)):
@@ -63,25 +62,31 @@ def another_robot(campaign: Campaign, progress: Callable[[str], None] = lambda _
 
 
 def _judged(found: Recalibrated, factor: float | None) -> Misfit | None:
-    left, (joint, far, times) = found.left(3), found.farthest()
+    (away, turned, both), (joint, far, times) = found.left(), found.farthest()
+    if turned > settings.ANOTHER_TURN:
+        places = Recalibrated.of(replace(found.readings, orientation=None), found.parts, found.robot)
+        return _judged(places, factor) or Misfit(turned=turned)
+    if away > settings.ANOTHER_MOTION * found.readings.spread():
+        return Misfit(away=away, model=None if factor is None else AnotherModel(factor))
     most = settings.FARTHEST_ALONE if times > settings.ALONE else settings.FARTHEST
-    off = far > max(most * arm_length(found.readings.robot), settings.CLEARLY * found.left())
-    if left > settings.ANOTHER_MOTION * found.readings.spread():
-        return Misfit(away=left, model=None if factor is None else AnotherModel(factor))
-    return Misfit(away=left, model=AnotherModel(factor, joint, far)) if off or factor is not None else None
+    off = far > max(most * arm_length(found.readings.robot), settings.CLEARLY * both)
+    return Misfit(away=away, model=AnotherModel(factor, joint, far)) if off or factor is not None else None
 
 
 def _parts(campaign: Campaign, rows: NDArray[np.int64]) -> NDArray[np.int64]:
     """(N,) the session of each row, or which quarter of them it belongs to."""
     sessions = campaign.labels.get("session")
-    if sessions is not None and len(np.unique(sessions[rows])) > 1:
-        return np.unique(sessions[rows], return_inverse=True)[1]
+    if sessions is not None:
+        _, parts, counts = np.unique(sessions[rows], return_inverse=True, return_counts=True)
+        if len(counts) > 1 and counts.min() >= settings.PART_ROWS:
+            return parts
     count = min(settings.PARTS, len(rows) // settings.PART_ROWS) or 1
     return np.arange(len(rows)) * count // len(rows)
 
 
-def _aligned(readings: Readings) -> Array:
-    return readings.distance(readings.align())
+def _left(readings: Readings) -> float:
+    """Return the median distance, m, that frames alone leave."""
+    return float(np.median(readings.distance(readings.align())))
 
 
 def _lengthened(readings: Readings) -> tuple[float, Robot]:

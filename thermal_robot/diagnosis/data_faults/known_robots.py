@@ -37,7 +37,8 @@ def fitting(readings: Readings, near: float) -> tuple[str, float] | None:
         for robot in _chains(name, own.joint_names, own.joint_types, own.root_frame, own.tool_frame):
             other = replace(readings, robot=robot, q=readings.q[:, _order(robot, own)])
             left = float(np.median(other.distance(other.align())))
-            if left < min(least, settings.MISFIT * other.spread()):
+            better = least if best is None else settings.LIKE_ANOTHER * least
+            if left < min(better, settings.MISFIT * other.spread()):
                 least, best = left, name
     return None if best is None else (best, least)
 

@@ -96,15 +96,17 @@ class Recalibrated:
         """(N, m) measured − predicted in the root frame's axes: m, and turns times the length of a lever."""
         return self._seen()[2]
 
-    def left(self, measures: int = 6) -> float:
-        """Return the rms distance that so many unknowns leave of one without them, m, as its median tells it.
+    def left(self) -> tuple[float, float, float]:
+        """Return the rms distance, m, the rms turn, rad, and the rms of both, m, that so many unknowns leave of one.
 
-        Of all that was measured, turns at the length of a lever, or of positions alone (3 measures).
+        As medians tell them: few rows that nothing explains do not count.
         """
-        distance = np.linalg.norm(self.gap[:, :measures], axis=1)
         unknown = 6 * len(self._placed[0]) + len(self.bases) * (6 + self.gap.shape[1])
-        freedom = self.gap.size / max(self.gap.size - unknown, len(distance))
-        return float(middle(distance)) / settings.MEDIAN * np.sqrt(3.0 * freedom)
+        freedom = self.gap.size / max(self.gap.size - unknown, len(self.gap))
+        parts = (self.gap[:, :3], self.gap[:, 3:] / inference.LEVER, self.gap)
+        away, turned, both = (np.median(np.linalg.norm(part, axis=1)) for part in parts)
+        scale = np.sqrt(3.0 * freedom) / settings.MEDIAN
+        return float(scale * away), float(scale * turned), float(scale * both)
 
     def _seen(self) -> tuple[object, Array, Array]:
         readings, parts = self.readings, self.parts

@@ -78,7 +78,7 @@ ROUNDED = 1e-9
 """Share of a frame's own weight by which what nothing determines is held."""
 MEDIAN = 1.54
 """Median length of a normal vector in three dimensions, of its sigma per axis."""
-FARTHEST, FARTHEST_ALONE, ALONE = 0.02, 0.01, 6.0
+FARTHEST, FARTHEST_ALONE, ALONE = 0.02, 0.01, 10.0
 """Of the arm's length, by which no joint sits off its place: industrial arms err by a thousandth, printed servo arms by
 a hundredth; half of it where the joint is alone with it, so many times farther off than the median of all: chance makes
 that two or three."""
@@ -94,3 +94,5 @@ FACTOR_OFF, FACTOR_ROUNDS = 1.0, 25
 it is found: to a thousandth."""
 HAND_JOINTS, ENDS = 6, 6
 """Joints that a robot at hand may have beside those of the chain, a gripper's; and ends of an arm: those of a hand."""
+LIKE_ANOTHER = 0.9
+"""Times what a robot at hand leaves, above which another one is like it: the same arm with other limits, or a hand."""
