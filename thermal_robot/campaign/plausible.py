@@ -106,10 +106,9 @@ def _length_unit(campaign: Campaign) -> Iterator[str]:
     reach = _reach(campaign)
     factor = another_unit(campaign)
     if factor is not None:
-        wrong = (
-            "stands in mm: its links are a thousand times too long" if factor < 1.0 else "is a thousand times too short"
-        )
-        yield f"the URDF {wrong}, {reach:.3g} m together"
+        short = "the links of the URDF are a thousand times too short"
+        wrong = short if factor > 1.0 else "the URDF stands in mm: its links are a thousand times too long"
+        yield f"{wrong}, {reach:.3g} m together"
         return
     if not np.isfinite(reach):
         return

@@ -100,7 +100,8 @@ def _misfit(misfit: Misfit, reach: float) -> str:
         left = f"{misfit.turned:.2g} rad" if misfit.away is None else f"{length(misfit.away)} of {length(reach)}"
         return (
             f"Robot and table do not describe the same motion ({left} remain): check units, signs and order of the "
-            "joints, axes of the instrument, order of the quaternion, and that all rows belong to one set-up."
+            "joints, axes of the instrument, order of the quaternion, and that all rows belong to one set-up and the "
+            "URDF to this robot."
         )
     struck = f" in {len(fault.rows)} rows" if fault.rows else ""
     fall = f"{length(fault.rms_before)} to {length(fault.rms_after)}"
@@ -111,10 +112,9 @@ def _another_model(model: AnotherModel) -> str:
     """Say in what the robot that was measured differs from the URDF, and which one it may be."""
     factor, known = model.factor, ""
     if factor is not None and not 1.0 / _ANOTHER_UNIT < factor < _ANOTHER_UNIT:
-        unit = (
-            "stands in mm: its links are a thousand times too long" if factor < 1.0 else "is a thousand times too short"
-        )
-        return f"Robot and table do not describe the same motion: the URDF {unit}."
+        unit = "the URDF stands in mm: its links are a thousand times too long"
+        unit = unit if factor < 1.0 else "the links of the URDF are a thousand times too short"
+        return f"Robot and table do not describe the same motion: {unit}."
     if factor is not None:
         what = f"the links are about {factor:.2g} times as long as in the URDF"
     elif model.joint:

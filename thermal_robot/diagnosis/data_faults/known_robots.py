@@ -31,16 +31,25 @@ def fitting(readings: Readings, near: float) -> tuple[str, float] | None:
         Distance, m, within which a robot fits; ``None`` is returned where none does.
     """
     own = readings.robot
-    named = [name for name in shipped() if set(own.joint_names) <= _movable(name)]
-    least, best = near, None
-    for name in named or shipped():
+    alike = [name for name in shipped() if set(own.joint_names) <= _movable(name)]
+    best = None
+    for name in (*alike, *(name for name in shipped() if name not in alike)):
+        if best is not None and name not in alike:
+            break
         for robot in _chains(name, own.joint_names, own.joint_types, own.root_frame, own.tool_frame):
             other = replace(readings, robot=robot, q=readings.q[:, _order(robot, own)])
             left = float(np.median(other.distance(other.align())))
-            better = least if best is None else settings.LIKE_ANOTHER * least
-            if left < min(better, settings.MISFIT * other.spread()):
-                least, best = left, name
-    return None if best is None else (best, least)
+            least = near if best is None else settings.LIKE_ANOTHER * best[1]
+            if left < min(least, settings.MISFIT * other.spread()):
+                best = name, left
+    return best
+
+
+def _order(robot: Robot, own: Robot) -> list[int]:
+    """Return which column of the table drives each joint: that of its name, else that of its place in the chain."""
+    if set(robot.joint_names) == set(own.joint_names):
+        return [own.joint_names.index(name) for name in robot.joint_names]
+    return list(range(robot.n))
 
 
 @cache
@@ -51,13 +60,6 @@ def _movable(name: str) -> frozenset[str]:
     except RobotError:
         return frozenset()
     return frozenset(found[1] for joint in joints if _MOVES.search(joint) and (found := _NAME.search(joint)))
-
-
-def _order(robot: Robot, own: Robot) -> list[int]:
-    """Return which column of the table drives each joint: that of its name, else that of its place in the chain."""
-    if set(robot.joint_names) == set(own.joint_names):
-        return [own.joint_names.index(name) for name in robot.joint_names]
-    return list(range(robot.n))
 
 
 @cache
