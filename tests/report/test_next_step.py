@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import pytest
 
-from thermal_robot.diagnosis.parts import AnotherModel, DataFault, Misfit, Wanted
+from thermal_robot.diagnosis.another_model import AnotherModel
+from thermal_robot.diagnosis.parts import DataFault, Misfit, Wanted
 from thermal_robot.report.next_step import advice
 from thermal_robot.report.plain_text import text
 
@@ -91,3 +92,5 @@ def test_the_robot_that_was_measured_is_to_be_taken(case):
     assert advice(replace(case("found"), misfit=Misfit(model=AnotherModel(factor=1.7)))) == (
         "Take the URDF of the robot that was measured; then diagnose again."
     )
+    unit = AnotherModel(factor=1e-3)
+    assert advice(replace(case("found"), misfit=Misfit(model=unit))).startswith("Write the lengths of the URDF in m;")

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.diagnosis.another_model import AnotherModel
 from thermal_robot.effects.effect import in_words
 from thermal_robot.effects.law_size import Size
 
@@ -143,39 +144,15 @@ class DataFault:
 
 
 @dataclass(frozen=True)
-class AnotherModel:
-    """The robot that was measured is not that of the URDF, as far as the table tells it.
-
-    Attributes
-    ----------
-    factor
-        How many times as long as in the URDF its links are; ``None`` where they have no common factor.
-    joint, off
-        The joint that sits farthest from where the URDF has it, and how far, m.
-    fits, remains
-        A robot at hand that fits the table, as :func:`~thermal_robot.load_robot` takes it, and the median distance that
-        it leaves, m; ``None`` where none fits.
-    """
-
-    factor: float | None = None
-    joint: str = ""
-    off: float = 0.0
-    fits: str | None = None
-    remains: float = 0.0
-
-
-@dataclass(frozen=True)
 class Misfit:
     """Robot and table do not belong together, so that nothing is said of the robot.
 
     Attributes
     ----------
-    fault
-        The fault of the table that would mend it; ``None`` where none does.
+    fault, model
+        The fault of the table that would mend it, or what is told of another robot; ``None`` where neither is.
     away, turned
         Where none does: rms distance, m, or rms turn, rad, that the best explanation leaves; ``None`` for what fits.
-    model
-        What is told of the robot that was measured, where it is another than the URDF's.
     """
 
     fault: DataFault | None = None

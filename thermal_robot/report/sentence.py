@@ -7,7 +7,8 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from thermal_robot.diagnosis.parts import AnotherModel, Finding, Misfit, Unexplained
+    from thermal_robot.diagnosis.another_model import AnotherModel
+    from thermal_robot.diagnosis.parts import Finding, Misfit, Unexplained
     from thermal_robot.diagnosis.result import Diagnosis
 
 MOST_WORDS = 45
@@ -17,7 +18,6 @@ _MOST_OF_A_NAME = 9  # words: of a longer title the headline says the beginning
 _WEIGHTY = 0.01  # of the gap on held-out rows: an effect with less is counted among the smaller ones
 _CARRIES = 1.5  # times what is left of the fitted rows: more on held-out rows is not called noise
 _UNKNOWN = ", which may or may not be noise: the campaign states none"
-_ANOTHER_UNIT = 200.0  # times too long or too short: a unit, not a model
 _SURE = 0.995  # a probability above it would be rounded to 100 %, which is never claimed
 _NOTHING = 0.9995e-9  # m: what is less rounds to no nanometre
 # m: from which length on it is read times so much in which unit; what rounds to 1 mm is never written as 1e+03 µm
@@ -111,7 +111,7 @@ def _misfit(misfit: Misfit, reach: float) -> str:
 def _another_model(model: AnotherModel) -> str:
     """Say in what the robot that was measured differs from the URDF, and which one it may be."""
     factor, known = model.factor, ""
-    if factor is not None and not 1.0 / _ANOTHER_UNIT < factor < _ANOTHER_UNIT:
+    if factor is not None and model.in_another_unit:
         unit = "the URDF stands in mm: its links are a thousand times too long"
         unit = unit if factor < 1.0 else "the links of the URDF are a thousand times too short"
         return f"Robot and table do not describe the same motion: {unit}."

@@ -9,13 +9,14 @@ import numpy as np
 
 from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.plausible import another_unit
+from thermal_robot.diagnosis.another_model import AnotherModel
 from thermal_robot.diagnosis.answer import Conclusion
 from thermal_robot.diagnosis.data_faults import data_fault, settings
 from thermal_robot.diagnosis.data_faults.another_robot import another_robot
 from thermal_robot.diagnosis.data_faults.find import misfit
 from thermal_robot.diagnosis.data_faults.readings import Readings
 from thermal_robot.diagnosis.examine import examine
-from thermal_robot.diagnosis.parts import AnotherModel, Misfit
+from thermal_robot.diagnosis.parts import Misfit
 from thermal_robot.diagnosis.unsettled import unsettled
 from thermal_robot.effects import Effect
 from thermal_robot.inference.fit import Fit, fit

@@ -13,7 +13,14 @@ from thermal_robot.diagnosis.data_faults import settings
 from thermal_robot.diagnosis.data_faults.readings import Readings
 from thermal_robot.inference import settings as inference
 from thermal_robot.inference.alternation import middle, soft
-from thermal_robot.kinematics import chain_frames, exp6, log3, placement_sensitivities, quaternion_to_rotation
+from thermal_robot.kinematics import (
+    ChainFrames,
+    chain_frames,
+    exp6,
+    log3,
+    placement_sensitivities,
+    quaternion_to_rotation,
+)
 from thermal_robot.kinematics.lie import exp3, skew
 from thermal_robot.kinematics.model import PRISMATIC
 from thermal_robot.robot import Robot
@@ -108,7 +115,7 @@ class Recalibrated:
         scale = np.sqrt(3.0 * freedom) / settings.MEDIAN
         return float(scale * away), float(scale * turned), float(scale * both)
 
-    def _seen(self) -> tuple[object, Array, Array]:
+    def _seen(self) -> tuple[ChainFrames, Array, Array]:
         readings, parts = self.readings, self.parts
         frames = chain_frames(self.robot, readings.q)
         point = frames.tool_position + (frames.tool_rotation @ self.points[parts][:, :, None])[:, :, 0]
@@ -138,12 +145,13 @@ class Recalibrated:
         design, known = design.reshape(rows * measures, -1), np.arange(flat.shape[2])
         matrix, vector = design.T @ design, design.T @ (gap * weight[:, None]).ravel()
         held = np.arange(len(known), len(matrix))
-        matrix[known, known] *= 1.0 + settings.ROUNDED
+        matrix[known, known] += settings.ROUNDED * matrix.diagonal()[known].max()
         matrix[np.ix_(held, held)] += self.held
         vector[held] -= self.held @ self._state
         step, cost = np.linalg.solve(matrix, vector), self._cost(scale)
         for share in settings.STEP_SHARES:
-            ahead = self._ahead(share * step[known], share * step[held])
+            taken: Array = share * step
+            ahead = self._ahead(taken[known], taken[held])
             if (after := ahead._cost(scale)) < cost:
                 return ahead, cost - after < settings.CALIBRATED * cost
         return None, True
@@ -158,14 +166,12 @@ class Recalibrated:
         away = (self.gap**2).sum(axis=1) / scale**2
         return float(wide * np.log1p(away / wide).sum() + self._state @ self.held @ self._state)
 
-    def _frame_columns(self, frames: object, point: Array, measures: int) -> Array:
+    def _frame_columns(self, frames: ChainFrames, point: Array, measures: int) -> Array:
         """(N, m, F) derivative of the prediction by base and target of each part."""
         columns = np.zeros((len(point), measures, len(self.bases), 6 + measures))
         for part in range(len(self.bases)):
             own = self.parts == part
-            columns[own, :3, part, :6] = np.concatenate(
-                [np.broadcast_to(np.eye(3), (own.sum(), 3, 3)), -skew(point[own])], axis=2
-            )
+            columns[own, :3, part, :3], columns[own, :3, part, 3:6] = np.eye(3), -skew(point[own])
             for first in range(0, measures, 3):
                 columns[own, first : first + 3, part, 6 + first : 9 + first] = frames.tool_rotation[own]
             columns[own, 3:, part, 3:6] = np.eye(3)[: measures - 3]

@@ -75,7 +75,7 @@ CALIBRATION_STEPS, CALIBRATED = 30, 1e-3
 STEP_SHARES = (1.0, 0.5, 0.25, 0.1)
 """Of a step, in the order in which they are tried, until one leads downhill."""
 ROUNDED = 1e-9
-"""Share of a frame's own weight by which what nothing determines is held."""
+"""Of the largest weight of a frame's motion, by which those are held that nothing determines."""
 MEDIAN = 1.54
 """Median length of a normal vector in three dimensions, of its sigma per axis."""
 FARTHEST, FARTHEST_ALONE, ALONE = 0.02, 0.01, 10.0
