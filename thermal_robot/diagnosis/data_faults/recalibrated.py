@@ -150,7 +150,7 @@ class Recalibrated:
         vector[held] -= self.held @ self._state
         step, cost = np.linalg.solve(matrix, vector), self._cost(scale)
         for share in settings.STEP_SHARES:
-            taken: Array = share * step
+            taken = np.asarray(share * step, dtype=float)
             ahead = self._ahead(taken[known], taken[held])
             if (after := ahead._cost(scale)) < cost:
                 return ahead, cost - after < settings.CALIBRATED * cost
