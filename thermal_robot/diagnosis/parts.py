@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.diagnosis.another_model import AnotherModel
+from thermal_robot.diagnosis.another_model import AnotherModel as AnotherModel
 from thermal_robot.effects.effect import in_words
 from thermal_robot.effects.law_size import Size
 

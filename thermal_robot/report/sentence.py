@@ -7,8 +7,7 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from thermal_robot.diagnosis.another_model import AnotherModel
-    from thermal_robot.diagnosis.parts import Finding, Misfit, Unexplained
+    from thermal_robot.diagnosis.parts import AnotherModel, Finding, Misfit, Unexplained
     from thermal_robot.diagnosis.result import Diagnosis
 
 MOST_WORDS = 45
