@@ -5,6 +5,7 @@ from __future__ import annotations
 import difflib
 import re
 import xml.etree.ElementTree as ElementTree
+from collections.abc import Iterator
 from pathlib import Path
 from typing import NamedTuple, Protocol, runtime_checkable
 
@@ -107,10 +108,24 @@ def _decoded(content: bytes) -> str:
             return content.decode(errors="replace")
 
 
-def _builtin_path(name: str) -> Path:
+def shipped() -> Iterator[str]:
+    """Yield the names of the robots of the package and of example-robot-data, where that is installed."""
+    yield from (BUILTIN + path.stem for path in sorted(_builtin_folder().glob("*.urdf")))
+    try:
+        from example_robot_data.robots_loader import ROBOTS
+    except ImportError:
+        return
+    yield from (EXAMPLE_ROBOT_DATA + name for name in ROBOTS)
+
+
+def _builtin_folder() -> Path:
     package = Path(__file__).parent
     # A wheel carries the folder inside the package, a checkout beside it.
-    folder = next((f for f in (package / "robots", package.parent / "robots") if f.is_dir()), package / "robots")
+    return next((f for f in (package / "robots", package.parent / "robots") if f.is_dir()), package / "robots")
+
+
+def _builtin_path(name: str) -> Path:
+    folder = _builtin_folder()
     known = sorted(path.stem for path in folder.glob("*.urdf"))
     if name not in known:
         raise unknown(name, known, "built-in robot")

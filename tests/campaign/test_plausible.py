@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 from campaign.spoilt import ROWS, TOML, read, with_column
+from other_robots import base_moved, lengthened, measured, read_with
 
 from thermal_robot.campaign import Campaign, read_campaign
-from thermal_robot.campaign.plausible import doubts
+from thermal_robot.campaign.plausible import another_unit, doubts
 from thermal_robot.kinematics import tool_poses
 from thermal_robot.robot import Robot
 
@@ -108,3 +110,27 @@ def test_labels_of_one_pose_may_differ_by_what_a_controller_repeats(tmp_path: Pa
     rows = table + "\n0.9,-0.4,90,-0.4,800,250,520,4,9,c\n"
     assert read(tmp_path, table=rows).warnings == ()
     assert any("'a'" in w for w in read(tmp_path, table=rows.replace("0.1005", "0.102")).warnings)
+
+
+@pytest.mark.parametrize(("scale", "said"), [(1000.0, "the URDF stands in mm"), (1e-3, "a thousand times too short")])
+def test_a_urdf_in_another_unit_is_told(rv_m2: Robot, scale: float, said: str) -> None:
+    scaled = lengthened(rv_m2, dict.fromkeys((s.name for s in rv_m2.segments), scale))
+    q = np.random.default_rng(2).uniform(rv_m2.lower, rv_m2.upper, (30, 5))
+    (told,) = doubts(Campaign("c", scaled, q, tool_poses(rv_m2, q)[:, :3, 3]))
+    assert said in told
+    assert another_unit(Campaign("c", rv_m2, q, None)) is None
+
+
+@pytest.mark.parametrize("factor", [1.0, 3.0])
+def test_points_farther_apart_than_commands_lead_are_told(rv_m2: Robot, factor: float) -> None:
+    sister = lengthened(rv_m2, dict.fromkeys((s.name for s in rv_m2.segments), factor))
+    campaign = read_with(measured(sister, 1, lever=0.3, joint_offset=0.05), rv_m2)
+    told = [sentence for sentence in doubts(campaign) if "no place of base and target mends that" in sentence]
+    assert len(told) == (factor > 1.0)
+
+
+def test_a_base_that_moved_between_sessions_takes_no_points_apart(rv_m2: Robot) -> None:
+    campaign = base_moved(measured(rv_m2, 2), 30, seed=1)
+    labelled = replace(campaign, labels={"session": np.repeat(["a", "b"], 30)})
+    assert any("unless one was moved" in sentence for sentence in doubts(campaign))
+    assert not any("unless one was moved" in sentence for sentence in doubts(labelled))

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import pytest
 
+from thermal_robot.diagnosis.another_model import AnotherModel
 from thermal_robot.diagnosis.parts import DataFault, Misfit, Wanted
 from thermal_robot.report.next_step import advice
 from thermal_robot.report.plain_text import text
@@ -83,3 +84,13 @@ def test_a_table_at_fault_is_to_be_mended_first(case):
     assert advice(replace(case("found"), misfit=Misfit(fault))) == (
         "Change the sign of its column; then diagnose again."
     )
+
+
+def test_the_robot_that_was_measured_is_to_be_taken(case):
+    known = AnotherModel(factor=1.7, fits="example-robot-data:ur5", remains=1e-3)
+    assert "such as example-robot-data:ur5" in advice(replace(case("found"), misfit=Misfit(model=known)))
+    assert advice(replace(case("found"), misfit=Misfit(model=AnotherModel(factor=1.7)))) == (
+        "Take the URDF of the robot that was measured; then diagnose again."
+    )
+    unit = AnotherModel(factor=1e-3)
+    assert advice(replace(case("found"), misfit=Misfit(model=unit))).startswith("Write the lengths of the URDF in m;")

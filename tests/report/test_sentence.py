@@ -7,7 +7,16 @@ from itertools import product
 import numpy as np
 import pytest
 
-from thermal_robot.diagnosis.parts import DataFault, Dependence, Finding, FoldScheme, Location, Misfit, Unexplained
+from thermal_robot.diagnosis.parts import (
+    AnotherModel,
+    DataFault,
+    Dependence,
+    Finding,
+    FoldScheme,
+    Location,
+    Misfit,
+    Unexplained,
+)
 from thermal_robot.effects import library
 from thermal_robot.report.sentence import MOST_WORDS, headline, length, listed
 
@@ -239,6 +248,28 @@ def test_robot_and_table_that_do_not_fit_are_not_explained(case):
     turned = headline(replace(base, misfit=Misfit(turned=1.5)))
     assert "(1.5 rad remain)" in turned
     assert "thermal" not in text + turned
+
+
+@pytest.mark.parametrize(
+    ("model", "said"),
+    [
+        (
+            AnotherModel(factor=1.7),
+            "the links are about 1.7 times as long as in the URDF. Is it another model of the family?",
+        ),
+        (
+            AnotherModel(joint="elbow_joint", off=0.205),
+            "elbow_joint would have to sit 205 mm from where the URDF has it.",
+        ),
+        (AnotherModel(1.7, fits="example-robot-data:ur5", remains=9e-4), "example-robot-data:ur5 fits: 900 µm remain."),
+        (AnotherModel(fits="builtin:rv_m2", remains=9e-4), "the URDF is of another robot."),
+        (AnotherModel(factor=1e-3), "the URDF stands in mm: its links are a thousand times too long."),
+    ],
+)
+def test_another_robot_is_said_with_what_tells_it(case, model, said):
+    text = headline(replace(case("found"), misfit=Misfit(away=1e-3, model=model)))
+    assert text.startswith("Robot and table do not describe the same motion: the ") or model.joint
+    assert said in text
 
 
 def test_a_fault_of_the_table_is_said_with_what_it_explains_and_its_remedy(case):

@@ -6,6 +6,7 @@ import math
 from collections.abc import Iterator
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.marks import FEWEST_ROWS, SAME_COMMAND, doubled, marks, step_of
@@ -26,6 +27,12 @@ FARTHEST_TARGET = 3.0
 too large is longer by far. The next three bounds are as coarse for the same reason."""
 WORST_INSTRUMENT = 0.01
 """Share of the reach that is an instrument's one-sigma at most: 1 cm for an arm of 1 m, worse than a tape measure."""
+LONGEST_ARM, SHORTEST_ARM, THOUSAND = 100.0, 0.01, 1000.0
+"""m: what no arm exceeds, nor falls short of: mobile cranes reach 90 m, arms under a microscope some centimetres; by
+what lengths are wrong that stand in mm, or were converted to m twice."""
+LONG_TOOL, WORST_ARM, PAIRED = 0.5, 0.05, 200
+"""m: as far as a target whose place is to be fitted may sit from the tool frame: a welding gun, a long pointer; share
+of the reach by which no arm errs; and rows, spread evenly, whose distances from each other are looked at."""
 LARGEST_EXTENT = 4.0
 """Reaches (with the target) over which measured positions extend at most: the ball that the target can reach is two
 across; the other two allow for commands outside it."""
@@ -64,7 +71,7 @@ def doubts(campaign: Campaign) -> list[str]:
         *lost,
         *doubled(campaign),
         *_angle_unit(campaign),
-        *_length_unit(seen),
+        *([*_length_unit(seen)] or _apart(seen)),
         *_limits(campaign),
         *_time(campaign),
         *_speed(campaign),
@@ -115,10 +122,31 @@ def _reach(campaign: Campaign) -> float:
     return sum(segment.length for segment in robot.segments) + float(travel.sum())
 
 
+def another_unit(campaign: Campaign) -> float | None:
+    """Return by what the URDF's lengths have to be multiplied to be m; ``None`` where an arm may be so long.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> another_unit(tr.demo_campaign()) is None
+    True
+    """
+    length = sum(segment.length for segment in campaign.robot.segments)
+    if length > LONGEST_ARM:
+        return 1.0 / THOUSAND
+    return THOUSAND if 0.0 < length < SHORTEST_ARM else None
+
+
 def _length_unit(campaign: Campaign) -> Iterator[str]:
     """Compare lengths with the arm's reach: a wrong unit is wrong by a thousand, so coarse bounds do."""
     robot, unit = campaign.robot, campaign.units.length
     reach = _reach(campaign)
+    factor = another_unit(campaign)
+    if factor is not None:
+        short = "the links of the URDF are a thousand times too short"
+        wrong = short if factor > 1.0 else "the URDF stands in mm: its links are a thousand times too long"
+        yield f"{wrong}, {reach:.3g} m together"
+        return
     if not np.isfinite(reach):
         return
     ask = f'the arm reaches {reach:.3g} m: is length_unit = "{unit}" right?'
@@ -134,6 +162,33 @@ def _length_unit(campaign: Campaign) -> Iterator[str]:
     moved = int((np.ptp(campaign.q, axis=0) > MOVES).sum())
     if extent > LARGEST_EXTENT * (reach + target) or (extent < SMALLEST_EXTENT * reach and moved > MOVING_JOINTS):
         yield f"the measured positions extend over {extent:.3g} m and {ask}"
+
+
+def _apart(campaign: Campaign) -> Iterator[str]:
+    """Compare two measured points with what commands and target allow: whatever the base, their distance stays."""
+    reach = _reach(campaign)
+    simulated = campaign.simulated_position is not None
+    if campaign.position is None or simulated or campaign.samples < FEWEST_ROWS or not np.isfinite(reach):
+        return
+    rows = np.linspace(0, campaign.samples - 1, min(campaign.samples, PAIRED)).round().astype(int)
+    poses, measured = tool_poses(campaign.robot, campaign.q[rows]), campaign.position[rows]
+    led, lie = cdist(poses[:, :3, 3], poses[:, :3, 3]), cdist(measured, measured)
+    turns = poses[:, :3, :3].reshape(len(rows), 9)
+    target = float(np.linalg.norm(campaign.target))
+    lever = target if campaign.tool_known else max(target, LONG_TOOL)
+    # two points of the tool come apart by the norm of the difference of their turns, 2 sin(angle / 2), times the lever
+    allowed = led + lever * np.sqrt(np.maximum(3.0 - turns @ turns.T, 0.0)) + WORST_ARM * reach
+    sessions = campaign.labels.get("session")
+    if sessions is not None:
+        allowed[sessions[rows][:, None] != sessions[rows]] = np.inf
+    i, j = np.unravel_index(int((lie - allowed).argmax()), lie.shape)
+    if lie[i, j] > allowed[i, j]:
+        first, second = sorted((int(campaign.rows[rows[i]]), int(campaign.rows[rows[j]])))
+        yield (
+            f"rows {first} and {second} were measured {lie[i, j]:.3g} m apart, and their commands lead "
+            f"{led[i, j]:.3g} m apart: no place of base and target mends that, unless one was moved in between; is the "
+            f'URDF that of the robot, and is length_unit = "{campaign.units.length}" right?'
+        )
 
 
 def _limits(campaign: Campaign) -> Iterator[str]:

@@ -18,8 +18,7 @@ from thermal_robot.diagnosis.beside_scatter import beside_scatter
 from thermal_robot.diagnosis.beside_steps import beside_steps
 from thermal_robot.diagnosis.cautions import usable
 from thermal_robot.diagnosis.credible import credible
-from thermal_robot.diagnosis.data_faults import data_fault
-from thermal_robot.diagnosis.data_faults.misfit import another_motion, delivered, frames_alone
+from thermal_robot.diagnosis.data_faults.misfit import another_motion, delivered, frames_alone, unfit
 from thermal_robot.diagnosis.deviations import as_remainder_says
 from thermal_robot.diagnosis.examine import examine
 from thermal_robot.diagnosis.growing.begun import can_grow
@@ -27,7 +26,6 @@ from thermal_robot.diagnosis.growing.settings import KEPT
 from thermal_robot.diagnosis.growing.updated import ready
 from thermal_robot.diagnosis.held_out import held_out
 from thermal_robot.diagnosis.in_full import in_full
-from thermal_robot.diagnosis.parts import Misfit
 from thermal_robot.diagnosis.result import Diagnosis, told
 from thermal_robot.diagnosis.rippled import rippled
 from thermal_robot.diagnosis.schemes import worse_elsewhere
@@ -156,14 +154,13 @@ def _names(argument: str, given: Iterable[str]) -> tuple[str, ...]:
 
 def _concluded(campaign: Campaign, candidates: Sequence[Effect], progress: Callable[[str], None]) -> Conclusion:
     """Explain the gap, unless robot and table do not belong together: a fault of the table comes before the robot's."""
-    fault = data_fault(campaign, progress)
-    if fault is not None:
-        return replace(frames_alone(campaign, candidates), misfit=Misfit(fault))
-    last = _explained(fit(campaign, candidates, progress), progress)
-    misfit = another_motion(last.fit)
-    if misfit is not None:
-        return replace(frames_alone(campaign, candidates), misfit=misfit)
-    return delivered(last, candidates)
+    misfit = unfit(campaign, progress)
+    if misfit is None:
+        last = _explained(fit(campaign, candidates, progress), progress)
+        misfit = another_motion(last.fit)
+        if misfit is None:
+            return delivered(last, candidates)
+    return replace(frames_alone(campaign, candidates), misfit=misfit)
 
 
 def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:

@@ -9,6 +9,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.diagnosis.another_model import AnotherModel as AnotherModel
 from thermal_robot.effects.effect import in_words
 from thermal_robot.effects.law_size import Size
 
@@ -148,8 +149,8 @@ class Misfit:
 
     Attributes
     ----------
-    fault
-        The fault of the table that would mend it; ``None`` where none does.
+    fault, model
+        The fault of the table that would mend it, or what is told of another robot; ``None`` where neither is.
     away, turned
         Where none does: rms distance, m, or rms turn, rad, that the best explanation leaves; ``None`` for what fits.
     """
@@ -157,6 +158,7 @@ class Misfit:
     fault: DataFault | None = None
     away: float | None = None
     turned: float | None = None
+    model: AnotherModel | None = None
 
 
 def is_frame(found: Sequence[Finding], name: str) -> bool:

@@ -19,8 +19,12 @@ def advice(diagnosis: Diagnosis) -> str:
     """Return what to do or to measure next in one sentence; empty where nothing is needed."""
     wanted = diagnosis.wanted
     if diagnosis.misfit is not None:
-        fault = diagnosis.misfit.fault
+        fault, model = diagnosis.misfit.fault, diagnosis.misfit.model
         first = f"{fault.remedy[:1].upper()}{fault.remedy[1:]}" if fault else "Mend the table"
+        if model is not None and model.in_another_unit:
+            first = "Write the lengths of the URDF in m"
+        elif model is not None:
+            first = f"Take the URDF of the robot that was measured{f', such as {model.fits}' if model.fits else ''}"
         return f"{first}; then diagnose again."
     if wanted is None:
         return ""

@@ -7,7 +7,7 @@ from itertools import product
 from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
-    from thermal_robot.diagnosis.parts import Finding, Misfit, Unexplained
+    from thermal_robot.diagnosis.parts import AnotherModel, Finding, Misfit, Unexplained
     from thermal_robot.diagnosis.result import Diagnosis
 
 MOST_WORDS = 45
@@ -92,16 +92,37 @@ def unnamed(diagnosis: Diagnosis) -> list[Finding]:
 
 
 def _misfit(misfit: Misfit, reach: float) -> str:
-    fault = misfit.fault
+    fault, model = misfit.fault, misfit.model
+    if model is not None:
+        return _another_model(model)
     if fault is None:
         left = f"{misfit.turned:.2g} rad" if misfit.away is None else f"{length(misfit.away)} of {length(reach)}"
         return (
             f"Robot and table do not describe the same motion ({left} remain): check units, signs and order of the "
-            "joints, axes of the instrument, order of the quaternion, and that all rows belong to one set-up."
+            "joints, axes of the instrument, order of the quaternion, and that all rows belong to one set-up and the "
+            "URDF to this robot."
         )
     struck = f" in {len(fault.rows)} rows" if fault.rows else ""
     fall = f"{length(fault.rms_before)} to {length(fault.rms_after)}"
     return f"The table is at fault{struck}, not the robot: {fault.what}. Mended, the gap falls from {fall}."
+
+
+def _another_model(model: AnotherModel) -> str:
+    """Say in what the robot that was measured differs from the URDF, and which one it may be."""
+    factor, known = model.factor, ""
+    if factor is not None and model.in_another_unit:
+        unit = "the URDF stands in mm: its links are a thousand times too long"
+        unit = unit if factor < 1.0 else "the links of the URDF are a thousand times too short"
+        return f"Robot and table do not describe the same motion: {unit}."
+    if factor is not None:
+        what = f"the links are about {factor:.2g} times as long as in the URDF"
+    elif model.joint:
+        what = f"{model.joint} would have to sit {length(model.off)} from where the URDF has it"
+    else:
+        what = "the URDF is of another robot"
+    if model.fits is not None:
+        known = f" {model.fits} fits: {length(model.remains)} remain."
+    return f"Robot and table do not describe the same motion: {what}. Is it another model of the family?{known}"
 
 
 def _sure(diagnosis: Diagnosis) -> str:

@@ -6,10 +6,12 @@ from dataclasses import replace
 import jsonschema
 import numpy as np
 import pytest
+from other_robots import lengthened, measured, read_with
 from simulate import simulate
 from spoilt_tables import SPOILT, measured_at
 
 from thermal_robot import diagnose
+from thermal_robot.diagnosis.data_faults.misfit import unfit
 from thermal_robot.effects import RANDOM
 from thermal_robot.report import schema
 
@@ -40,6 +42,28 @@ def test_what_nothing_mends_is_unusable_too(sound):
     assert found.misfit.away > 0.02 * found.reach
     assert found.verdict == ()
     assert found.reason.startswith("Robot and table do not describe the same motion")
+
+
+def test_the_urdf_of_another_model_is_refused_and_nothing_is_claimed(rv_m2):
+    sister = lengthened(rv_m2, {"joint_3": 1.7, "joint_4": 1.4})
+    found = diagnose(read_with(measured(sister, 1, geometric=3e-4), rv_m2))
+    assert not found.usable
+    assert found.verdict == ()
+    assert found.misfit.model.joint in {"joint_3", "joint_4"}
+    assert "Is it another model of the family?" in found.reason
+    assert "Take the URDF of the robot that was measured" in found.reason
+
+
+def test_the_urdfs_unit_comes_before_faults_of_the_table(rv_m2):
+    scaled = lengthened(rv_m2, dict.fromkeys((s.name for s in rv_m2.segments), 1000.0))
+    found = unfit(read_with(measured(rv_m2, 1), scaled))
+    assert found.fault is None
+    assert found.model.factor == 1e-3
+
+
+def test_a_fault_that_mends_the_table_comes_before_another_robot(sound):
+    assert unfit(SPOILT["reversed joint"](sound)).fault.kinds == ("reversed joint",)
+    assert unfit(sound) is None
 
 
 def test_a_sound_table_is_usable(sound):

@@ -2,14 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
 
 from thermal_robot.campaign import Campaign
+from thermal_robot.campaign.plausible import another_unit
+from thermal_robot.diagnosis.another_model import AnotherModel
 from thermal_robot.diagnosis.answer import Conclusion
-from thermal_robot.diagnosis.data_faults import settings
+from thermal_robot.diagnosis.data_faults import data_fault, settings
+from thermal_robot.diagnosis.data_faults.another_robot import another_robot
+from thermal_robot.diagnosis.data_faults.find import misfit
+from thermal_robot.diagnosis.data_faults.readings import Readings
 from thermal_robot.diagnosis.examine import examine
 from thermal_robot.diagnosis.parts import Misfit
 from thermal_robot.diagnosis.unsettled import unsettled
@@ -19,6 +24,23 @@ from thermal_robot.inference.random_gap import nothing_random
 
 _NEEDED = "a table that fits the robot"
 _SETTLED = "a fit that settles"
+
+
+def unfit(campaign: Campaign, progress: Callable[[str], None] = lambda _: None) -> Misfit | None:
+    """Judge robot and table before any effect: the URDF's unit, faults of the table, another robot.
+
+    A fault that leaves a gap no robot leaves is none where another robot leaves clearly less.
+    """
+    factor = another_unit(campaign)
+    if factor is not None:
+        return Misfit(model=AnotherModel(factor))
+    fault = data_fault(campaign, progress)
+    if fault is not None and fault.rms_after < misfit(Readings.of(campaign)):
+        return Misfit(fault)
+    other = another_robot(campaign, progress)
+    if fault is None or (other is not None and other.model and settings.FALL * (other.away or 0.0) < fault.rms_after):
+        return other
+    return Misfit(fault)
 
 
 def another_motion(fitted: Fit) -> Misfit | None:

@@ -65,3 +65,34 @@ UNMIXED, MIXED_FLOOR = 1.0 - 1e-6, 1e-6
 mixture, of its largest, below which nothing is given back: readings have six digits."""
 TURN = math.pi
 """rad: a half turn, by which conventions of a joint's zero differ, or by half of it."""
+PRIOR_LENGTH, PRIOR_TURN, PRIOR_ZERO = 0.02, 0.1, 0.5
+"""Of the arm's length, and rad of an axis and of a joint's zero: one sigma to which a free calibration holds what it
+moves. Little of what is determined is held by it; the zeros are freest, as a horn is soon mounted a tooth farther."""
+ANOTHERS = 1e6
+"""Times the precision of what a joint has of its own: to which that is held which another joint has."""
+CALIBRATION_STEPS, CALIBRATED = 30, 1e-3
+"""Steps at most of that calibration, and the share of its cost by which the last one falls."""
+STEP_SHARES = (1.0, 0.5, 0.25, 0.1)
+"""Of a step, in the order in which they are tried, until one leads downhill."""
+ROUNDED = 1e-9
+"""Of the largest weight of a frame's motion, by which those are held that nothing determines."""
+MEDIAN = 1.54
+"""Median length of a normal vector in three dimensions, of its sigma per axis."""
+FARTHEST, FARTHEST_ALONE, ALONE = 0.02, 0.01, 10.0
+"""Of the arm's length, by which no joint sits off its place: industrial arms err by a thousandth, printed servo arms by
+a hundredth; half of it where the joint is alone with it, so many times farther off than the median of all: chance makes
+that two or three."""
+CLEARLY = 5.0
+"""Times what a calibration leaves: what is not geometric feigns that a joint sits off by up to some times as much."""
+PARTS, PART_ROWS = 4, 12
+"""Parts at most into which rows in their order are divided for frames of their own, and rows of each at least: a base
+that was moved once or twice then stands still in most of them, and twelve rows determine two frames three times."""
+SCALE_ERROR = 0.05
+"""By which a common factor of the links is another model's: cameras without a scale bar err by a hundredth."""
+FACTOR_OFF, FACTOR_ROUNDS = 1.0, 25
+"""Natural logarithm by which a common factor of the links may be off the ratio of the two volumes, and steps in which
+it is found: to a thousandth."""
+HAND_JOINTS, ENDS = 6, 6
+"""Joints that a robot at hand may have beside those of the chain, a gripper's; and ends of an arm: those of a hand."""
+LIKE_ANOTHER = 0.9
+"""Times what a robot at hand leaves, above which another one is like it: the same arm with other limits, or a hand."""
