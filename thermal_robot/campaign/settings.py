@@ -22,6 +22,9 @@ STANDARD_TEMPERATURE = 20.0
 
 MOST_PIPED = 500_000_000
 """Bytes that are taken from standard input: a million rows of forty columns; a pipe that never ends must end here."""
+STILL = 1e-4
+"""rad or m within which a joint stands still: the encoder of one that is held jitters by a microradian, seldom by fifty,
+and nothing that follows a joint's position shows over less."""
 ABSOLUTE_ZERO = -273.15
 """°C."""
 
