@@ -51,8 +51,8 @@ def drawn(rng: Random) -> Files:
 
 
 def _arm(rng: Random) -> str:
-    """A serial arm of 3 to 7 joints with masses; one may slide, one may mimic, a fixed link may stand between."""
-    count = rng.randint(3, 7)
+    """A serial arm of 2 to 7 joints with masses; one may slide, one may mimic, a fixed link may stand between."""
+    count = rng.choice((2, 3, 3, 4, 4, 5, 6, 7))
     slide = rng.randrange(count) if rng.random() < 0.35 else -1
     follower = rng.randrange(1, count) if rng.random() < 0.25 else -1
     parts, parent = [link("l0", 10.0, "0 0 0.1")], "l0"
@@ -100,12 +100,12 @@ def _conditions(rng: Random, chance: np.random.Generator, robot: Robot, q: np.nd
     elif rng.random() < 0.5:
         found["order"] = np.arange(rows) + 1.0
     for name in ("temperature", *links):
-        if rng.random() < (0.5 if name == "temperature" else 0.2):
+        if rng.random() < (0.4 if name == "temperature" else 0.06):
             found[name] = 20.0 + rng.choice((0.0, 0.05, 5.0)) * np.sin(time / 900.0) + rng.choice((0.0, 3.0))
     if rng.random() < 0.3:
         found["payload"] = chance.choice([0.0, 2.0, 5.0], rows) if rng.random() < 0.8 else np.full(rows, 3.0)
     for name in names:
-        if rng.random() < 0.3:
+        if rng.random() < 0.15:
             found[f"approach.{name}"] = chance.choice([-1.0, 0.0, 1.0], rows)
     if rng.random() < 0.2:
         found["speed"] = chance.choice([0.1, 1.0], rows)
