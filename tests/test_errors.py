@@ -18,6 +18,7 @@ RAISED = [
     CampaignError("t.csv", "a value is missing", row=3, column="x", found="''", expected="a number"),
     CampaignError("t.csv", "is empty"),
     errors.EffectError("no effect 'drif'"),
+    errors.OwnEffectError("effect 'drift': reads() raised KeyError('time')"),
     errors.UnknownEffectError("no effect named 'drif' was considered"),
     errors.EstimationError("too few rows"),
     errors.SealError("these answers were changed"),
@@ -25,7 +26,7 @@ RAISED = [
 
 
 def test_there_is_one_root():
-    assert len(KINDS) == 7
+    assert len(KINDS) == 8
     assert all(issubclass(kind, ThermalRobotError) for kind in KINDS)
     assert not issubclass(ThermalRobotError, (ValueError, OSError))  # caught by nobody who means something else
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from simulate import simulate
 
-from thermal_robot import CorrectedModel, diagnose
+from thermal_robot import Campaign, CorrectedModel, diagnose
 from thermal_robot.inference.columns import block
 from thermal_robot.prediction import sensitivity
 
@@ -66,6 +66,15 @@ def test_a_row_outside_what_was_measured_is_marked_and_less_sure(warm):
     assert farther.outside[0] in ((), *inside.outside)
     assert all("joint_2" in names for names in farther.outside[20:])
     assert (warmer.std.mean(axis=1) > 1.5 * inside.std.mean(axis=1)).mean() > 0.95
+
+
+def test_a_held_joint_that_reads_a_microradian_more_is_not_outside(warm):
+    model = warm[1].model
+    joint = model.robot.joint_names[0]
+    spread = replace(model.spread, ranges={joint: (0.2, 0.2)})
+    q = np.zeros((3, model.robot.n))
+    q[:, 0] = [0.2, 0.2 + 3e-6, 0.21]
+    assert spread.outside(Campaign("held", model.robot, q)) == ((), (), (joint,))
 
 
 def test_a_column_that_is_not_read_does_not_mark(warm):

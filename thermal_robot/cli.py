@@ -5,8 +5,10 @@ from __future__ import annotations
 import argparse
 import os
 import sys
+import traceback
 from collections.abc import Sequence
 from contextlib import suppress
+from pathlib import Path
 
 from thermal_robot.blind import command as blind
 from thermal_robot.commands import (
@@ -28,8 +30,8 @@ from thermal_robot.commands import (
 from thermal_robot.commands import (
     map as workspace,
 )
-from thermal_robot.console import NORMAL, add_loudness, heard
-from thermal_robot.errors import ThermalRobotError
+from thermal_robot.console import NORMAL, VERBOSE, add_loudness, heard
+from thermal_robot.errors import OwnEffectError, ThermalRobotError, ours
 from thermal_robot.parser import BAD_INPUT, DONE, FAILED, INTERRUPTED, STATUSES, Parser
 from thermal_robot.streams import piped
 
@@ -67,7 +69,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     -------
     int
         0 done, 1 a failure of the program or of what it prints to, 2 bad input, 130 interrupted; one line on stderr
-        says which.
+        says which. Of a failure of the program ``-v`` prints the traceback, too.
     """
     options = _parser().parse_args(arguments)
     with suppress(AttributeError):  # a terminal without this letter or that is no reason to stop
@@ -77,6 +79,8 @@ def main(arguments: Sequence[str] | None = None) -> int:
         with heard(options.loudness), piped(options):
             options.run(options)
         sys.stdout.flush()  # a disk may be full only now
+    except OwnEffectError as error:
+        return _complain(str(error), FAILED)
     except ThermalRobotError as error:
         return _complain(str(error), BAD_INPUT)
     except KeyboardInterrupt:
@@ -87,6 +91,11 @@ def main(arguments: Sequence[str] | None = None) -> int:
     except OSError as error:
         _let_go()
         return _complain(f"cannot print: {error.strerror or error}", FAILED)
+    except Exception as error:
+        if options.loudness == VERBOSE:
+            traceback.print_exc()
+        last = traceback.extract_tb(error.__traceback__)[-1]
+        return _complain(ours(f"{error!r} in {Path(last.filename).name}, line {last.lineno}"), FAILED)
     return DONE
 
 

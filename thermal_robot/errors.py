@@ -131,6 +131,13 @@ class EffectError(ThermalRobotError):
     """
 
 
+class OwnEffectError(EffectError):
+    """An effect of the program itself that breaks its contract, which no campaign may bring about: exit status 1."""
+
+    def __init__(self, message: str) -> None:
+        super().__init__(ours(message))
+
+
 class UnknownEffectError(EffectError, KeyError):
     """A name that no effect of an answer has, asked for as a key is."""
 
@@ -147,6 +154,16 @@ class EstimationError(ThermalRobotError):
     ...     print(error)
     2 different poses are too few: 9 unknowns of the frames need at least 7 of them, and effects many more
     """
+
+
+def ours(what: str) -> str:
+    """Return what is told of a fault of the program: whose it is, and what helps to mend it."""
+    from thermal_robot import __version__
+
+    return (
+        f"{what}; this is an error of thermal_robot {__version__}, not of your campaign: please send this line to its "
+        "authors, with the command, campaign.toml, the table and the URDF, or as few rows of it as bring the line back"
+    )
 
 
 class SealError(ThermalRobotError):

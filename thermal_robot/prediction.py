@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign
+from thermal_robot.campaign.settings import STILL
 from thermal_robot.effects import Effect, gate, settings
 from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.stack import chunks
@@ -100,7 +101,7 @@ class Spread:
             values = samples.q[:, joints.index(name)] if name in joints else samples.covariates.get(name)
             if values is None:
                 continue
-            allowed = settings.BESIDE * (high - low)
+            allowed = max(settings.BESIDE * (high - low), STILL if name in joints else 0.0)
             for row in np.flatnonzero((values < low - allowed) | (values > high + allowed)):
                 left[row].append(name)
         return tuple(tuple(names) for names in left)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from helpers import commanded
 
-from thermal_robot.campaign.turning import SLIPS, arrivals, since_turns, strained
+from thermal_robot.campaign.turning import SLIPS, arrivals, moves, since_turns, strained
 
 
 def along(path, **columns):
@@ -24,6 +24,14 @@ def test_a_joint_that_rests_has_not_turned():
     assert along([0.0, 2.0, 2.0, 3.0, 3.0, 1.0, 1.0]) == [0.0, 2.0, 2.0, 3.0, 3.0, -2.0, -2.0]
     assert along([1.0, 1.0, 1.0]) == [0.0, 0.0, 0.0]
     assert along([1.0, 1.0, 0.5]) == [0.0, 0.0, -0.5]
+
+
+def test_a_joint_that_is_held_remembers_nothing_and_came_from_nowhere():
+    read = 0.4 + 1e-6 * np.random.default_rng(1).normal(size=40)
+    assert not moves(read)
+    assert along(read) == came(read) == [0.0] * 40
+    assert moves(np.column_stack([read, 2e3 * read, read + np.arange(40) * 1e-5])).tolist() == [False, True, True]
+    assert moves(np.zeros((0, 3))).tolist() == [False] * 3
 
 
 def test_rows_count_in_the_order_of_the_clock():

@@ -83,6 +83,29 @@ def test_only_and_without_choose_among_the_effects(run, folder):
     refused(run("diagnose", folder, "--without", "drif"), "'drif'", "did you mean 'drift'?")
 
 
+def test_a_failure_of_the_program_is_told_as_its_own(run, folder, monkeypatch):
+    def fails(_):
+        raise ValueError("zero-size\narray")
+
+    monkeypatch.setattr("thermal_robot.commands.check.run", fails)
+    status, out, err = run("check", folder)
+    assert (status, out, err.count("\n")) == (1, "", 1)
+    for word in ("zero-size", "test_cli.py", __version__, "not of your campaign", "send"):
+        assert word in err
+    assert "Traceback" not in err
+    assert "Traceback" in run("check", folder, "-v")[2]
+
+
+def test_a_fault_of_an_effect_of_the_program_is_no_bad_input(run, folder, monkeypatch):
+    def broken(*_):
+        raise KeyError("time")
+
+    monkeypatch.setattr(type(library()["joint_offset"]), "parameters", broken)
+    status, _, err = run("diagnose", folder, "--only", "joint_offset")
+    assert (status, err.count("\n")) == (1, 1)
+    assert "not of your campaign" in err
+
+
 def test_bad_input_is_said_in_one_line(run, folder, tmp_path):
     refused(run("check", tmp_path / "absent"), "absent")
     refused(run("diagnose", tmp_path), "campaign.toml")

@@ -28,6 +28,7 @@ from thermal_robot.effects import (
     library,
 )
 from thermal_robot.effects.gate import checked, driver, independent
+from thermal_robot.errors import OwnEffectError
 from thermal_robot.inference.columns import block
 from thermal_robot.observations import observe
 
@@ -397,6 +398,27 @@ def test_joints_that_are_named_exist(observations):
         checked(JointOffset(places="joint_2"), observations)
     with pytest.raises(EffectError, match="'joint_offset': excluded holds 'elbow', expected any of joint_1, joint_2"):
         checked(JointOffset(excluded=("elbow",)), observations)
+
+
+@pytest.mark.parametrize("name", library())
+def test_any_place_of_the_robot_may_be_excluded_from_where_an_effect_does_nothing(rv_m2, name):
+    seen, effect = rich(rv_m2), library()[name]
+    for place in {*rv_m2.urdf_joints, *rv_m2.urdf_links} - set(PLACES.get(name, ())):
+        left = checked(replace(effect, excluded=(place,)), seen)
+        assert [p.name for p in left] == [p.name for p in checked(effect, seen)]
+
+
+def test_a_fault_of_the_programs_own_effect_is_told_as_its_own(observations, monkeypatch):
+    def broken(*_):
+        raise KeyError("time")
+
+    monkeypatch.setattr(JointOffset, "reads", broken)
+    with pytest.raises(OwnEffectError, match=r"'joint_offset': reads\(\) raised KeyError.* not of your campaign"):
+        gate.reads(JointOffset(), observations)
+    monkeypatch.setattr(Answers, "reads", broken, raising=False)
+    with pytest.raises(EffectError, match=r"reads\(\) raised KeyError\('time'\)$") as told:
+        gate.reads(Answers(), observations)
+    assert not isinstance(told.value, OwnEffectError)
 
 
 def test_a_model_keeps_its_joints_and_one_of_old_needs_none(rv_m2, tmp_path):

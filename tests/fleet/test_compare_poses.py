@@ -58,6 +58,22 @@ def test_a_changed_zero_shows_as_the_arm_would_move(one):
     assert found.rms == pytest.approx(np.sqrt((left**2).sum() / width), rel=0.03)
 
 
+def test_a_joint_that_is_held_is_the_same_to_the_jitter_of_its_encoder(one):
+    """Ranges of a held joint that miss each other by a microradian are one; by more, nothing is common."""
+    joint = one.model.robot.joint_names[4]
+
+    def held(at, rows):
+        ranges = {**one.model.spread.ranges, joint: (at, at)}
+        model = replace(one.model, spread=replace(one.model.spread, ranges=ranges))
+        q = rows.q.copy()
+        q[:, 4] = at
+        return replace(one, model=model, rows=replace(rows, q=q))
+
+    for apart, common in ((0.0, True), (2e-6, True), (-2e-6, True), (0.1, False)):
+        (found,) = predicted([held(0.3, one.rows), held(0.3 + apart, one.rows)], ["a", "b"])
+        assert bool(found.note) != common
+
+
 def test_every_pair_is_compared(one):
     days = [one, diagnosed(2, frame="there"), diagnosed(3, moved(4e-4))]
     found = predicted(days, ["a", "b", "c"])

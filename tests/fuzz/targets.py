@@ -14,6 +14,7 @@ from random import Random
 import tomli_w
 from fuzz import checks, corpus, harmless, mutate
 from fuzz.corpus import Files
+from fuzz.drawn import drawn
 from fuzz.extremes import NUMBERS, WORDS
 from fuzz.frames import spoilt_frame
 
@@ -257,6 +258,7 @@ TARGETS = {
         Target("arguments", arguments, checks.arguments),
         Target("same", same, checks.same),
         Target("diagnose", whole, checks.diagnosis, seconds=60.0),
+        Target("drawn", drawn, checks.diagnosis, seconds=240.0),
     )
 }
 """By name."""

@@ -10,7 +10,7 @@ from fuzz.targets import ITSELF, TARGETS
 
 from thermal_robot.campaign import read_campaign
 
-TRIALS = {"arguments": 12, "diagnose": 8, "same": 100, "model": 150, "parquet": 150}
+TRIALS = {"arguments": 12, "diagnose": 8, "drawn": 6, "same": 100, "model": 150, "parquet": 150}
 """Of a target; 250 of the others: about a minute in all."""
 
 

@@ -24,12 +24,14 @@ LONGEST = 1000
 
 def judged(target, folder: Path) -> tuple[str, str, str]:
     """Return the outcome of a trial, what was said, and where it happened."""
-    from thermal_robot.errors import ThermalRobotError
+    from thermal_robot.errors import OwnEffectError, ThermalRobotError
 
     with warnings.catch_warnings(record=True) as heard:
         warnings.simplefilter("always")
         try:
             target.check(folder)
+        except OwnEffectError as error:
+            return "traceback", str(error), _place(error)
         except ThermalRobotError as error:
             said = str(error)
             plain = said and len(said) <= LONGEST and not any(c < " " or c == "\x7f" for c in said)

@@ -12,8 +12,8 @@ from simulate import simulate
 from time_constants import DRIFT, LAG, NOISE, campaign
 
 from thermal_robot import diagnose
-from thermal_robot.effects import choose
-from thermal_robot.inference.fit import fit
+from thermal_robot.effects import choose, gate
+from thermal_robot.inference.fit import fit, less
 
 
 def constant_of(effects, kind):
@@ -36,6 +36,19 @@ def test_what_was_chosen_is_what_was_fitted():
     known = fit(campaign("rv_m2", 1, DRIFT, 0.4, 20.0), choose((), ()))
     blocks = [known.explanation.linear.blocks[b] for b in known.explanation.best.blocks]
     assert [b.effect for b in blocks] == [effect for effect, _ in known.effects]
+
+
+@pytest.mark.parametrize(("name", "place"), [("link_compliance", "upper_arm"), ("thermal_elongation", "upper_arm")])
+def test_a_place_is_left_out_of_every_setting_though_one_reads_other_places(rv_m2, name, place):
+    """The setting that follows an inclinometer, or a single sensor, has parameters in its link alone."""
+    data = simulate(rv_m2, ["joint_offset"], seed=2, samples=50)[0]
+    wave = np.sin(np.arange(50.0))
+    columns = {"tilt.forearm.x": 1e-3 * wave, "tilt.forearm.y": 2e-3 * wave[::-1], "temperature.forearm": 20.0 + wave}
+    known = fit(replace(data, covariates={**data.covariates, **columns}), choose([name], (), ()))
+    rest = less(known, name, place=place)
+    for effect in rest.variants[name]:
+        assert place not in {p.place for p in gate.checked(effect, rest.nominal)}
+    assert {p.place for effect in rest.variants[name] for p in gate.checked(effect, rest.nominal)}
 
 
 def test_effects_and_sets_of_effects_share_one_probability(rv_m2):

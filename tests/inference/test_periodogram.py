@@ -21,6 +21,25 @@ def drawn(seed, reach=3.0, order=None, size=0.0):
     return q, moves, target, target.seat(moves)
 
 
+@pytest.mark.parametrize("jitter", [0.0, 1e-9, 1e-6, 1e-5])
+def test_a_joint_that_is_held_has_no_orders(jitter):
+    noise = np.random.default_rng(3).uniform(-jitter, jitter, ROWS)
+    assert len(orders(0.7 + noise)) == 0
+
+
+def test_a_joint_that_creeps_has_orders_though_no_two_positions_are_far_apart():
+    assert len(orders(np.linspace(0.2, 0.25, 2000))) > 0
+
+
+@pytest.mark.parametrize("jitter", [0.0, 1e-6, 1e-5])
+def test_positions_on_a_lattice_know_no_order_above_its_own_whatever_the_encoder_reads(jitter):
+    rng = np.random.default_rng(4)
+    q = 0.05 * rng.integers(0, 60, 400) + rng.uniform(-jitter, jitter, 400)
+    assert 0.98 * np.pi / 0.05 < orders(q)[-1] <= 1.001 * np.pi / 0.05
+    free = rng.uniform(0.0, 3.0, 400)
+    assert orders(free)[-1] > 150.0
+
+
 def wave(q, order):
     return np.column_stack([np.ones_like(q), np.sin(order * q), np.cos(order * q)])
 

@@ -64,17 +64,17 @@ class Campaign:
         (N, 4) measured orientations, unit quaternions wxyz that turn vectors of the target's frame into the
         measurement frame, either sign; ``None`` when not measured.
     covariates
-        (N,) per name as in the table (``"time"``, ``"temperature.<link>"``, ``"approach.<joint>"`` …), SI
-        units, no NaN: gaps were filled on reading.
+        (N,) per name as in the table (``"time"``, ``"temperature.<link>"`` …), SI, no NaN: gaps were filled.
     extra
         Names of those covariates that the format does not define; in the unit of the file.
     derived
         Names of those covariates that were not recorded but follow from the order of the rows.
+    turned
+        Quantities whose columns were read with the other sign (:mod:`thermal_robot.campaign.turned`).
     labels
         (N,) text for ``"session"``, ``"pose"`` and ``"path"`` where the table has them; ``""`` where a cell is empty.
     simulated_position, simulated_orientation
-        (N, 3) m and (N, 4) wxyz in the root frame: what the user's own simulator predicts; ``None`` if it is
-        not given.
+        (N, 3) m and (N, 4) wxyz in the root frame: what the user's own simulator predicts; ``None`` if not given.
     base_known, tool_known
         Whether the measurements are in the root frame, and whether the target is where ``target`` says.
     target
@@ -150,6 +150,7 @@ class Campaign:
     missing: Mapping[str, NDArray[np.bool_]] = field(default_factory=dict)
     urdf: str = ""
     travelled: Mapping[str, FloatArray] = field(default_factory=dict)
+    turned: tuple[str, ...] = ()
 
     def __post_init__(self) -> None:
         file = f"<{self.name}>"
@@ -225,7 +226,7 @@ class Campaign:
         if self.moves not in MOVES:
             expected = " or ".join(map(repr, MOVES))
             raise CampaignError(file, "unknown word", column="moves", found=repr(self.moves), expected=expected)
-        for key in ("extra", "derived", "warnings"):
+        for key in ("extra", "derived", "turned", "warnings"):
             names = getattr(self, key)
             if not isinstance(names, (tuple, list)) or not all(isinstance(name, str) for name in names):
                 raise CampaignError(
@@ -331,6 +332,7 @@ class Campaign:
             payload_com=as_vector(self.payload_com),
             priors=dict(self.priors),
             gears=dict(self.gears),
+            turned=self.turned,
         )
 
     def take(self, rows: ArrayLike) -> Campaign:

@@ -22,6 +22,9 @@ STANDARD_TEMPERATURE = 20.0
 
 MOST_PIPED = 500_000_000
 """Bytes that are taken from standard input: a million rows of forty columns; a pipe that never ends must end here."""
+STILL = 1e-4
+"""rad or m within which a joint stands still: the encoder of one that is held jitters by a microradian, seldom by
+fifty, and nothing that follows a joint's position shows over less."""
 ABSOLUTE_ZERO = -273.15
 """°C."""
 
@@ -82,6 +85,8 @@ class Settings:
         Expected size (one sigma) of an effect's parameters, by the effect's name, in their unit.
     gears
         Transmission ratio by joint name.
+    turned
+        Quantities whose columns are read with the other sign.
     """
 
     urdf: str
@@ -99,6 +104,7 @@ class Settings:
     payload_com: Vector = (0.0, 0.0, 0.0)
     priors: Mapping[str, float] = field(default_factory=dict)
     gears: Mapping[str, float] = field(default_factory=dict)
+    turned: tuple[str, ...] = ()
 
     def to_dict(self) -> dict[str, Any]:
         """Return a dict of strings, numbers, booleans, lists and dicts only, ready for JSON; lengths in m."""
@@ -118,6 +124,7 @@ class Settings:
             "payload_com": list(self.payload_com),
             "priors": dict(self.priors),
             "gears": dict(self.gears),
+            **({"turned": list(self.turned)} if self.turned else {}),
         }
 
     def of_rows(self) -> dict[str, Any]:
@@ -199,13 +206,14 @@ _KEYS: dict[str, Kind] = {
     "payload_com": VECTOR,
     "priors": PRIORS,
     "gears": GEARS,
+    "turned": listed(text("the name of a quantity")),
 }
 
 
 def settings_kind(value: Any, path: str) -> Settings:
     """Kind of the settings in a file (:mod:`thermal_robot.schema`)."""
-    # those who wrote no word of moves were fitted to what was recorded alone
-    values = record(_KEYS)({"moves": "unknown", **value} if isinstance(value, Mapping) else value, path)
+    # those who wrote no word of moves were fitted to what was recorded alone, in its own sign
+    values = record(_KEYS)({"moves": "unknown", "turned": (), **value} if isinstance(value, Mapping) else value, path)
     sigmas = {key: values[key] or None for key in ("noise_position", "noise_orientation")}
     return Settings(**{**values, **sigmas, "units": Units(**values["units"])})
 

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.campaign.names import CLOCK
+from thermal_robot.campaign.settings import STILL
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
@@ -16,7 +17,19 @@ SLIPS = tuple(2.0 ** (k / 4) for k in range(-28, 9))
 """rad or m: how far a joint goes before an element slips; from 8 mm, a twentieth of a short stroke, to more than half a
 turn, four a factor of two: a sum of two neighbours is within 2 % of an element that slips between them. They are the
 same for every campaign, so that a law that was found in one can be told in another."""
-_STILL = 1e-6  # rad or m: what a command differs by from the one before when the joint is not moved
+
+
+def moves(q: Array) -> NDArray[np.bool_]:
+    """Tell which joints move, (n,) of positions (N, n) in rad or m; one answer of one joint's (N,).
+
+    One that stays within :data:`~thermal_robot.campaign.settings.STILL` is held, whatever its encoder reads.
+
+    Examples
+    --------
+    >>> moves(np.array([[0.5, 0.300001], [0.7, 0.299999]])).tolist()
+    [True, False]
+    """
+    return np.asarray(np.ptp(q, axis=0) > STILL if len(q) else np.zeros(q.shape[1:], dtype=bool))
 
 
 def since_turns(
@@ -108,11 +121,11 @@ def _strains(path: Array) -> Array:
 def _since_turn(path: Array) -> Array:
     """(N,) the same of one joint that passes positions (N,) in this order."""
     moved = np.diff(path)
-    way = np.where(np.abs(moved) > _STILL, np.sign(moved), 0.0)
+    way = np.where(np.abs(moved) > STILL, np.sign(moved), 0.0)
     # a joint that rests keeps the direction that it had
     moves = np.arange(len(way))
     way = way[np.maximum.accumulate(np.where(way != 0.0, moves, 0))] if len(way) else way
     turned = np.zeros(len(way), dtype=bool)
     turned[1:] = way[1:] * way[:-1] < 0.0
     start = np.maximum.accumulate(np.where(turned, moves, 0)) if len(way) else moves
-    return np.concatenate([np.zeros(1), path[1:] - path[start]])
+    return np.concatenate([np.zeros(1), np.where(way != 0.0, path[1:] - path[start], 0.0)])

@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from thermal_robot.campaign import Campaign, Settings, read_samples, read_table, with_commands, with_prediction
 from thermal_robot.campaign.table import Table
+from thermal_robot.campaign.turned import read_alike
 from thermal_robot.correction.arrays import of_arrays
 from thermal_robot.correction.commands import Commands, corrected, nominal_positions
 from thermal_robot.correction.required import require_finite, require_needed
@@ -268,6 +269,7 @@ class CorrectedModel:
         """Return samples with what the model reads, and nothing else that a table may hold."""
         if not isinstance(samples, Campaign):
             samples = self.samples(samples)
+        samples = read_alike(samples, self.robot, self.settings.turned)
         require_needed(samples, self.needs, [effect for effect, _ in self.effects], self.simulated)
         read = {name: values for name, values in samples.covariates.items() if name in self.needs}
         return self._in_sequence(replace(samples, covariates=read))

@@ -13,6 +13,7 @@ from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.diagnosis.calibration import Calibration, of_fit
 from thermal_robot.diagnosis.cautions import usable
 from thermal_robot.diagnosis.diagnose import check_priors, solvable
+from thermal_robot.diagnosis.signs import as_counted
 from thermal_robot.effects import KINEMATIC, Effect, library, named
 from thermal_robot.errors import CampaignError, EffectError, require
 from thermal_robot.inference.named import fit_named
@@ -77,8 +78,8 @@ def calibrate(
         raise CampaignError(campaign.name, "nothing was measured", expected="a campaign with measured positions")
     campaign, notes = usable(campaign)
     with _libraries().limit(limits=1), solvable(campaign):
-        fit = fit_named(campaign, chosen, progress)
-    return of_fit(fit, tuple(effect.name for effect in chosen), (*campaign.warnings, *notes))
+        fit = fit_named(as_counted(campaign), chosen, progress)
+    return of_fit(fit, tuple(effect.name for effect in chosen), (*fit.campaign.warnings, *notes))
 
 
 @cache

@@ -13,11 +13,9 @@ from thermal_robot.campaign.marks import copies, marks
 from thermal_robot.diagnosis.cancelling import cancelling, cancelling_within
 from thermal_robot.diagnosis.credible import outsized
 from thermal_robot.diagnosis.parts import Refused, Sensitivity
-from thermal_robot.diagnosis.signs import wrong_sides
 from thermal_robot.effects import gate
 from thermal_robot.inference import settings
 from thermal_robot.inference.fit import Fit
-from thermal_robot.kinematics.gravity import gravity_torques
 
 
 def usable(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
@@ -43,7 +41,7 @@ def usable(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
 
 
 def contradicted(campaign: Campaign) -> list[str]:
-    """Return warnings where encoder readings or torques contradict the commands: the log is wrong, not the robot."""
+    """Return warnings where encoder readings contradict the commands: the log is wrong, not the robot."""
     found = []
     for j, name in enumerate(campaign.robot.joint_names):
         read = campaign.covariates.get(f"encoder.{name}")
@@ -60,26 +58,7 @@ def contradicted(campaign: Campaign) -> list[str]:
             )
         elif abs(middle) > settings.CONTRADICTED:
             found.append(f"encoder.{name} is {middle:.3g} from the commands throughout: another zero, or another unit")
-    return [*found, *_against_gravity(campaign)]
-
-
-def _against_gravity(campaign: Campaign) -> Iterator[str]:
-    """Say where reported torques have the sign of none that hold the arm."""
-    robot = campaign.robot
-    columns = {j: f"torque.{name}" for j, name in enumerate(robot.joint_names)}
-    joints = [j for j, column in columns.items() if column in campaign.covariates]
-    if not joints or not robot.has_masses:
-        return
-    payload = campaign.covariates.get("payload")
-    holding = gravity_torques(robot, campaign.q, payload=payload, payload_com=campaign.payload_com)[:, joints]
-    read = np.column_stack([campaign.covariates[columns[j]] for j in joints])
-    one, other = (values - values.mean(axis=0) for values in (holding, read))
-    alike = float((one * other).sum() / max(np.linalg.norm(one) * np.linalg.norm(other), settings.TINY))
-    if alike < settings.AGAINST_GRAVITY:
-        yield (
-            f"torque.* goes against the torques that hold the URDF's masses (correlation {alike:.2f}): the sign of "
-            "torque.* is reversed, or gravity points up"
-        )
+    return found
 
 
 def cautions(
@@ -110,7 +89,6 @@ def cautions(
             "directions of approach were not recorded: they follow from the order of the rows, as of a robot that goes "
             'straight from pose to pose; if it does not, write moves = "unknown" under [robot]'
         )
-    notes += wrong_sides(fitted)
     notes += [f"{one.words}: it may stand in for something else" for one in outsized(fitted)]
     for name, times in cancelling_within(fitted):
         notes.append(

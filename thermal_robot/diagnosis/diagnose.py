@@ -29,6 +29,7 @@ from thermal_robot.diagnosis.in_full import in_full
 from thermal_robot.diagnosis.result import Diagnosis, told
 from thermal_robot.diagnosis.rippled import rippled
 from thermal_robot.diagnosis.schemes import worse_elsewhere
+from thermal_robot.diagnosis.signs import as_counted
 from thermal_robot.diagnosis.unlisted import as_laws_say, one_more_law
 from thermal_robot.diagnosis.where import without_laws
 from thermal_robot.diagnosis.word import worth_their_word
@@ -109,7 +110,7 @@ def diagnose(
     campaign, notes = usable(campaign)
     # matrices are small: threads that wait for each other cost several times what they bring, and the last bits
     with threadpool_limits(1), solvable(campaign):
-        last = _concluded(campaign, candidates, progress)
+        last = _concluded(campaign, candidates, effects, progress)
         shrinkage = held_out(last.fit, progress)
         progress("places")
         found = answer(
@@ -152,11 +153,13 @@ def _names(argument: str, given: Iterable[str]) -> tuple[str, ...]:
     return names
 
 
-def _concluded(campaign: Campaign, candidates: Sequence[Effect], progress: Callable[[str], None]) -> Conclusion:
+def _concluded(
+    campaign: Campaign, candidates: Sequence[Effect], own: Sequence[Effect], progress: Callable[[str], None]
+) -> Conclusion:
     """Explain the gap, unless robot and table do not belong together: a fault of the table comes before the robot's."""
     misfit = unfit(campaign, progress)
     if misfit is None:
-        last = _explained(fit(campaign, candidates, progress), progress)
+        last = _explained(fit(as_counted(campaign, own), candidates, progress), progress)
         misfit = another_motion(last.fit)
         if misfit is None:
             return delivered(last, candidates)

@@ -297,9 +297,20 @@ def _expected(fit: Fit, offered: Observations, leading: Sequence[Combination]) -
 
 def _root(design: Array, precision: Array) -> Array:
     """(K, m, p) root of the covariance of design · N(0, precision⁻¹), the precision at least that of the prior, 1."""
-    value, vector = np.linalg.eigh(precision)
-    # below the prior's there is rounding alone, where the noise is next to nothing
-    return np.asarray(design @ (vector / np.sqrt(np.maximum(value, 1.0))))
+    value, vector = _eigen(precision)
+    return np.asarray(design @ (vector / np.sqrt(value)))
+
+
+def _inverse(matrix: Array) -> tuple[Array, Array]:
+    """Return inverse and log determinant of symmetric matrices (..., m, m) that are at least the identity."""
+    value, vector = _eigen(matrix)
+    return (vector / value[..., None, :]) @ np.swapaxes(vector, -1, -2), np.log(value).sum(axis=-1)
+
+
+def _eigen(matrix: Array) -> tuple[Array, Array]:
+    """Return eigenvalues and vectors of matrices at least the identity: below it there is rounding alone."""
+    value, vector = np.linalg.eigh(matrix)
+    return np.maximum(value, 1.0), vector
 
 
 class _Conditional:
@@ -310,10 +321,9 @@ class _Conditional:
         past = root[list(chosen)].reshape(len(chosen) * measures, root.shape[2])
         own = np.einsum("nap,nbp->nab", root, root) + np.eye(measures)
         self.own, self.cross, self.past = own, root @ past.T, past @ past.T + np.eye(len(past))
-        self.gain = self.cross @ np.linalg.inv(self.past)
+        self.gain = self.cross @ _inverse(self.past)[0]
         self.covariance = own - self.gain @ self.cross.transpose(0, 2, 1)
-        self.log_det = np.linalg.slogdet(self.covariance)[1]
-        self.inverse = np.linalg.inv(self.covariance)
+        self.inverse, self.log_det = _inverse(self.covariance)
         self.weighed = self.inverse @ self.gain
 
 

@@ -17,9 +17,10 @@ FEW_PAYLOADS = 6
 LOAD, PAYS, TRIAL = 2.0, 1.3, 10
 """kg that nearly every arm carries, offered where no payload was recorded; times what poses without it tell, less is
 not worth a second set-up; and of how many samples that is asked."""
-WRONG_SIDE, INSISTS = 3.0, 7.0
-"""Standard deviations from which a parameter is on the side where it cannot be, and the natural logarithm, 1 in 1000,
-by which an explanation with such ones must be more probable than any other for that to be told."""
+WRONG_SIDE, INSISTS, LEAVES_LESS = 3.0, 7.0, 0.95
+"""Standard deviations from which a parameter tells its side; the natural logarithm, 1 in 1000, by which an explanation
+with a quantity turned round must be more probable than any without; and what it may leave of what those leave: beside a
+tenth of the remainder's mean square, errors that no effect has may decide the sign of a small one."""
 PRIOR_FACTOR, COMPARED = 3.0, 8
 """Factor of all prior sizes, down and up, under which the verdict is weighed again, and among how many explanations."""
 MATERIAL_PLACE, MOST_PLACES = 0.03, 8

@@ -82,7 +82,7 @@ class Backlash(Effect):
     name: ClassVar[str] = "backlash"
     title: ClassVar[str] = "lost motion in the joints"
     singular: ClassVar[str] = "lost motion"
-    if_negative: ClassVar[str] = "approach is reversed"
+    sided_by: ClassVar[tuple[str, ...]] = ("approach",)
     size_spread: ClassVar[float] = 1.0
 
     def missing(self, observations: Observations) -> tuple[str, ...]:

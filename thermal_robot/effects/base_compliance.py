@@ -50,7 +50,11 @@ class BaseCompliance(Effect):
     name: ClassVar[str] = "base_compliance"
     title: ClassVar[str] = "a base that yields under the arm"
     size_spread: ClassVar[float] = UNSOURCED
-    if_negative: ClassVar[str] = "gravity points up, or the sign of tilt.* is reversed"
+
+    @property
+    def sided_by(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Gravity, unless the turns were measured."""
+        return () if self.tilt else ("gravity",)
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return what would give the base's turn, unless the tilt or the moment of known masses varies."""

@@ -218,8 +218,9 @@ class Effect(ABC):
     """What it is in plain words, for a sentence; the name with spaces where a class states none."""
     singular: ClassVar[str] = ""
     """What it is in a single joint, for a sentence; the title where a class states none."""
-    if_negative: ClassVar[str] = "check the sign of what it grows with"
-    """The usual mistake where the data want parameters negative that cannot be, for a sentence."""
+    sided_by: ClassVar[tuple[str, ...]] = ()
+    """Quantities that give parameters that cannot be negative their side: of ``torque``, ``approach``, ``temperature``
+    and ``gravity`` the first that the campaign has."""
     sized_as: ClassVar[str] = ""
     """What is said of all that it does in each joint, such as ``peak to peak``; empty where its parameters say it."""
     needs: ClassVar[tuple[str, ...]] = ()

@@ -18,7 +18,7 @@ import numpy as np
 
 from thermal_robot.effects.effect import Array, Channel, Driver, Effect, Parameter, Response
 from thermal_robot.effects.settings import KEPT
-from thermal_robot.errors import EffectError
+from thermal_robot.errors import EffectError, OwnEffectError
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -69,7 +69,7 @@ def declared(effect: Effect, observations: Observations) -> tuple[Parameter, ...
     with np.errstate(all="ignore"):
         answer = _asked(effect, "parameters", observations)
     if not isinstance(answer, (tuple, list)) or not all(isinstance(parameter, Parameter) for parameter in answer):
-        raise EffectError(f"effect {effect.name!r} answers {type(answer).__name__}, expected a tuple of Parameter")
+        raise _broken(effect, f" answers {type(answer).__name__}, expected a tuple of Parameter")
     return _kept(effect, tuple(answer), observations.robot)
 
 
@@ -90,7 +90,7 @@ def _first_asked(effect: Effect, observations: Observations) -> tuple[Parameter,
     if effect not in of_robot:
         found = _parameters(effect, observations)
         if any(r.values.shape not in ((), (6,)) for p in found for r in p.responses):
-            raise EffectError(f"effect {effect.name!r}: constant is True, and a response has a value for each row")
+            raise _broken(effect, ": constant is True, and a response has a value for each row")
         of_robot[effect] = found
     return of_robot[effect]
 
@@ -100,7 +100,7 @@ def _parameters(effect: Effect, observations: Observations) -> tuple[Parameter, 
     answer = _asked(effect, "parameters", observations)
     spread: Any = effect.size_spread
     if not isinstance(spread, (int, float)) or not 0.0 < spread < np.inf:
-        raise EffectError(f"effect {effect.name!r}: size_spread is {spread!r}, expected a number above 0")
+        raise _broken(effect, f": size_spread is {spread!r}, expected a number above 0")
     return _seen(effect, answer, observations)
 
 
@@ -117,18 +117,17 @@ def independent(effect: Effect, observations: Observations) -> tuple[Parameter, 
 
 def _seen(effect: Effect, answer: Any, observations: Observations) -> tuple[Parameter, ...]:
     if not isinstance(answer, (tuple, list)):
-        raise EffectError(f"effect {effect.name!r} answers {type(answer).__name__}, expected a tuple of Parameter")
+        raise _broken(effect, f" answers {type(answer).__name__}, expected a tuple of Parameter")
     names = set()
     for k, parameter in enumerate(answer):
         if not isinstance(parameter, Parameter):
-            raise EffectError(
-                f"effect {effect.name!r}, parameter {k + 1}: found {type(parameter).__name__}, expected a Parameter"
-            )
+            found = type(parameter).__name__
+            raise _broken(effect, f", parameter {k + 1}: found {found}, expected a Parameter")
         problem = _wrong(parameter, observations)
         if not problem and parameter.name in names:
             problem = "the name is used twice"
         if problem:
-            raise EffectError(f"effect {effect.name!r}, parameter {parameter.name!r}: {problem}")
+            raise _broken(effect, f", parameter {parameter.name!r}: {problem}")
         names.add(parameter.name)
     return tuple(answer)
 
@@ -149,9 +148,7 @@ def driver(effect: Effect, observations: Observations, parameters: Sequence[Para
         fits = isinstance(values, np.ndarray) and values.shape == error.shape and values.dtype.kind == "f"
         if isinstance(name, str) and isinstance(unit, str) and fits and np.isfinite(values).all():
             return name, unit, values
-    raise EffectError(
-        f"effect {effect.name!r}: driver answers {answer!r}, expected name, unit and {len(error)} finite values"
-    )
+    raise _broken(effect, f": driver answers {answer!r}, expected name, unit and {len(error)} finite values")
 
 
 def missing(effect: Effect, observations: Observations) -> tuple[str, ...]:
@@ -177,7 +174,7 @@ def reads(effect: Effect, observations: Observations) -> tuple[str, ...]:
     """
     answer = _texts(effect, "reads answers", _asked(effect, "reads", observations))
     if any(column not in observations.covariates for column in answer):
-        raise EffectError(f"effect {effect.name!r}: reads answers {answer!r}, expected columns of the campaign")
+        raise _broken(effect, f": reads answers {answer!r}, expected columns of the campaign")
     return answer
 
 
@@ -210,7 +207,7 @@ def fading(effect: Effect, observations: Observations) -> Array | None:
         return None
     rows, share = observations.campaign.samples, np.asarray(answer)
     if share.shape != (rows,) or share.dtype.kind != "f" or not ((share > 0.0) & (share <= 1.0)).all():
-        raise EffectError(f"effect {effect.name!r}: fading answers {answer!r}, expected ({rows},) shares above 0")
+        raise _broken(effect, f": fading answers {answer!r}, expected ({rows},) shares above 0")
     return share
 
 
@@ -235,7 +232,7 @@ def nearby(effect: Effect, factor: float) -> tuple[Effect, ...]:
     """
     answer = _settings(effect, "nearby", _asked(effect, "nearby", factor))
     if effect not in answer:
-        raise EffectError(f"effect {effect.name!r}: nearby answers {answer!r}, expected it to hold itself, {effect!r}")
+        raise _broken(effect, f": nearby answers {answer!r}, expected it to hold itself, {effect!r}")
     return answer
 
 
@@ -283,9 +280,7 @@ def _one_setting(effect: Effect, question: str, *about: Any) -> Effect | None:
     answer = _asked(effect, question, *about)
     if answer is None or _is_setting(effect, answer):
         return answer  # type: ignore[no-any-return]
-    raise EffectError(
-        f"effect {effect.name!r}: {question} answers {answer!r}, expected None or an effect named {effect.name!r}"
-    )
+    raise _broken(effect, f": {question} answers {answer!r}, expected None or an effect named {effect.name!r}")
 
 
 def arguments(effect: Effect) -> dict[str, Any]:
@@ -304,7 +299,7 @@ def arguments(effect: Effect) -> dict[str, Any]:
     except (TypeError, ValueError):
         pass
     expected = "numbers, texts and tuples of them by name"
-    raise EffectError(f"effect {effect.name!r}: arguments answers {answer!r}, expected {expected}")
+    raise _broken(effect, f": arguments answers {answer!r}, expected {expected}")
 
 
 def _asked(effect: Effect, question: str, *about: Any) -> Any:
@@ -314,18 +309,27 @@ def _asked(effect: Effect, question: str, *about: Any) -> Any:
     try:
         return getattr(effect, question)(*about)
     except Exception as error:  # somebody else's code may raise anything
-        raise EffectError(f"effect {effect.name!r}: {question}() raised {error!r}") from error
+        raise _broken(effect, f": {question}() raised {error!r}") from error
+
+
+def _broken(effect: Effect, what: str) -> EffectError:
+    """Return the error of an effect that breaks the contract: the program's own is no fault of who uses it."""
+    own = type(effect).__module__.split(".")[0] == __package__.split(".")[0]
+    return OwnEffectError(f"effect {effect.name!r}{what}") if own else EffectError(f"effect {effect.name!r}{what}")
 
 
 def _kept(effect: Effect, parameters: tuple[Parameter, ...], robot: Robot) -> tuple[Parameter, ...]:
     """Return the parameters in the joints and links that the effect names, all where it names none; none excluded."""
-    known = dict.fromkeys((*robot.joint_names, *places_of(parameters)))
-    for field, named in (("places", effect.places), ("excluded", effect.excluded)):
+    known = (*robot.joint_names, *places_of(parameters))
+    # what an effect does not do in a place of the robot may be excluded from there
+    for field, named, among in (
+        ("places", effect.places, known),
+        ("excluded", effect.excluded, (*known, *robot.urdf_joints, *robot.urdf_links)),
+    ):
         for place in _texts(effect, f"{field} is", named):
-            if place not in known:
-                raise EffectError(
-                    f"effect {effect.name!r}: {field} holds {place!r}, expected any of {', '.join(known)}"
-                )
+            if place not in among:
+                expected = ", ".join(dict.fromkeys(among))
+                raise EffectError(f"effect {effect.name!r}: {field} holds {place!r}, expected any of {expected}")
     local = {p: p.kind in ("joint", "link") for p in parameters}
     left = (p for p in parameters if not (local[p] and p.place in effect.excluded))
     return tuple(p for p in left if not effect.places or (local[p] and p.place in effect.places))
@@ -334,14 +338,14 @@ def _kept(effect: Effect, parameters: tuple[Parameter, ...], robot: Robot) -> tu
 def _texts(effect: Effect, what: str, answer: Any) -> tuple[str, ...]:
     if isinstance(answer, (tuple, list)) and all(isinstance(text, str) and text for text in answer):
         return tuple(answer)
-    raise EffectError(f"effect {effect.name!r}: {what} {answer!r}, expected a tuple of texts")
+    raise _broken(effect, f": {what} {answer!r}, expected a tuple of texts")
 
 
 def _settings(effect: Effect, question: str, answer: Any) -> tuple[Effect, ...]:
     if isinstance(answer, (tuple, list)) and answer and all(_is_setting(effect, other) for other in answer):
         return tuple(answer)
     expected = f"effects named {effect.name!r}, at least one"
-    raise EffectError(f"effect {effect.name!r}: {question} answers {answer!r}, expected a tuple of {expected}")
+    raise _broken(effect, f": {question} answers {answer!r}, expected a tuple of {expected}")
 
 
 def _is_setting(effect: Effect, answer: Any) -> bool:

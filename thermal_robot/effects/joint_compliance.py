@@ -58,7 +58,7 @@ class JointCompliance(Effect):
     name: ClassVar[str] = "joint_compliance"
     title: ClassVar[str] = "joints that yield to load (gear or servo)"
     singular: ClassVar[str] = "a yielding to load"
-    if_negative: ClassVar[str] = "the sign of torque.* is reversed, or gravity points up"
+    sided_by: ClassVar[tuple[str, ...]] = ("torque", "gravity")
     size_spread: ClassVar[float] = 1.0
 
     def missing(self, observations: Observations) -> tuple[str, ...]:

@@ -60,7 +60,11 @@ class LinkCompliance(Effect):
 
     name: ClassVar[str] = "link_compliance"
     title: ClassVar[str] = "links that bend under load"
-    if_negative: ClassVar[str] = "gravity points up"
+
+    @property
+    def sided_by(self) -> tuple[str, ...]:  # type: ignore[override]
+        """Gravity, unless the turns were measured."""
+        return () if self.tilt else ("gravity",)
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return what would give a load, unless one that bends a segment, or a measured tilt, varies.

@@ -1,11 +1,13 @@
 """Every number that was chosen in the effects: its value, its unit, and why that one."""
 
+from thermal_robot.campaign.settings import STILL
+
 KEPT = 4
 """Effects whose parameters are kept for the next who asks, those asked for last: the settings of an effect in single
 places come one after another, and the responses of all effects would fill the memory."""
 READS_TO: dict[str, tuple[float, float]] = {
-    "rad": (1e-4, 2e-3),
-    "m": (1e-4, 1e-3),
+    "rad": (STILL, 2e-3),
+    "m": (STILL, 1e-3),
     "rad/s": (1e-3, 1e-2),
     "m/s": (1e-3, 1e-2),
     "rad/s²": (1e-2, 1e-1),

@@ -68,7 +68,7 @@ class ThermalElongation(Effect):
 
     name: ClassVar[str] = "thermal_elongation"
     title: ClassVar[str] = "thermal elongation of the links"
-    if_negative: ClassVar[str] = "links shrink when warm, check the temperature column"
+    sided_by: ClassVar[tuple[str, ...]] = ("temperature",)
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return ``temperature`` unless a temperature that applies to a segment varies."""

@@ -15,6 +15,7 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.campaign.settings import STILL
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.diagnosis.result import Diagnosis
 from thermal_robot.effects.apply import displacement
@@ -52,7 +53,7 @@ def _pair(a: Diagnosis | Known, b: Diagnosis | Known, names: tuple[str, str]) ->
     common = _common(a.model, b.model)
     joints = a.model.robot.joint_names
     low, high = (np.array([common[name][end] for name in joints]) for end in (0, 1))
-    q = q[((q >= low) & (q <= high)).all(axis=1)]
+    q = q[((q >= low - STILL) & (q <= high + STILL)).all(axis=1)]
     if len(q) < compare_settings.TRIED:
         return replace(nothing, note="the two did not measure a common part of the workspace")
     at = [observed(found.model, q, common) for found in (a, b)]
@@ -87,7 +88,9 @@ def _common(a: CorrectedModel, b: CorrectedModel) -> dict[str, tuple[float, floa
     found = {}
     for name in (*a.robot.joint_names, *dict.fromkeys((*first, *second))):
         ends = [ranges[name] for ranges in (first, second) if name in ranges]
-        found[name] = max(low for low, _ in ends), min(high for _, high in ends)
+        low, high = max(low for low, _ in ends), min(high for _, high in ends)
+        held = name in a.robot.joint_names and high < low <= high + STILL
+        found[name] = (high, low) if held else (low, high)
     return found
 
 

@@ -17,6 +17,7 @@ from thermal_robot.campaign.names import did_you_mean
 from thermal_robot.diagnosis import Diagnosis
 from thermal_robot.diagnosis.cautions import usable
 from thermal_robot.diagnosis.data_faults.misfit import another_motion
+from thermal_robot.diagnosis.signs import as_counted
 from thermal_robot.effects import RANDOM, choose, library
 from thermal_robot.errors import CampaignError, EffectError, require
 from thermal_robot.fleet import wear_settings as settings
@@ -200,7 +201,7 @@ def _fitted(member: _Member, chosen: tuple[str, ...], number: int, count: int, p
     progress(f"campaign {number + 1} of {count}")
     if given.position is None or not given.samples:
         raise CampaignError(given.name, "nothing was measured", expected="a campaign with measured positions")
-    found = fit(usable(given)[0], choose(chosen, (), ()))
+    found = fit(as_counted(usable(given)[0]), choose(chosen, (), ()))
     if another_motion(found) is not None:
         raise CampaignError(
             given.name, "robot and table do not describe the same motion",

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotrf, dpotri, dpotrs, dtrtrs
 from scipy.spatial.distance import cdist
 
+from thermal_robot.campaign.turning import moves as moving
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference import settings
 from thermal_robot.inference.grouped import Grouped
@@ -351,7 +352,7 @@ def forms(observations: Observations) -> tuple[Form, ...]:
 def _at_one_place(observations: Observations, what: str, functions: Array, measures: int, *, anew: bool) -> list[Form]:
     """Return a form for each joint that moves, and one for the base, with the same functions (N, k)."""
     moves, names = observations.joint_sensitivity[:, :measures], observations.robot.joint_names
-    seen = [j for j in range(moves.shape[2]) if np.ptp(observations.q[:, j]) > 0.0]
+    seen = np.flatnonzero(moving(observations.q))
     found = [Form(f"{what}, {names[j]}", functions, moves[:, :, [j]], anew, ("joint", names[j])) for j in seen]
     base = observations.base_sensitivity[:, :measures]
     return [*found, Form(f"{what}, base", functions, base, anew, ("base", "base"))]
@@ -364,8 +365,7 @@ def _together(observations: Observations) -> list[Array]:
     """
     campaign = observations.campaign
     varying = [observations.covariates[c] for c in observations.covariates if observations.varies(c)]
-    inputs = np.column_stack([campaign.q, *varying])
-    inputs = inputs[:, np.ptp(inputs, axis=0) > 0.0]
+    inputs = np.column_stack([campaign.q[:, moving(campaign.q)], *varying])
     inputs = (inputs - inputs.mean(axis=0)) / inputs.std(axis=0)
     landmarks = inputs[np.unique(np.linspace(0, len(inputs) - 1, settings.LANDMARKS).astype(int))]
     square = [cdist(points, landmarks, "sqeuclidean") for points in (inputs, landmarks)]

@@ -9,6 +9,7 @@ from dataclasses import replace
 import numpy as np
 
 from thermal_robot.campaign.names import CLOCK
+from thermal_robot.campaign.turning import moves
 from thermal_robot.effects import Effect, Parameter, Response, gate, library
 from thermal_robot.effects.law import Discovered
 from thermal_robot.effects.quantities import GRAVITY, REACH, TURN, quantities, unit
@@ -119,7 +120,7 @@ def memory(observations: Observations) -> list[Discovered]:
     found, past, known = [], observations.campaign.since_turn, quantities(observations)
     clock = next((name for name in CLOCK if name in observations.covariates and name in known), None)
     for joint in observations.robot.joint_names:
-        if joint in past and np.ptp(past[joint]) > 0.0:
+        if joint in past and moves(past[joint]):
             smooth = law_of(observations, Discovered(place=joint), TURN + joint, past[joint])
             found += [smooth, *hystereses(smooth, past[joint])[:2]]
         if clock:

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.campaign.settings import STILL
+from thermal_robot.campaign.turning import moves
 from thermal_robot.inference import settings
 from thermal_robot.inference.target import Seat
 
@@ -18,9 +20,9 @@ def orders(q: Array, slides: bool = False) -> Array:
     its alias: positions on a lattice of spacing d know no order above π/d (Shannon). A joint of very many turns is
     looked at up to :data:`settings.MOST_ORDERS` of them.
     """
-    reach = float(np.ptp(q))
-    if reach <= settings.SAME_COMMAND:
+    if not moves(q):
         return np.zeros(0)
+    reach = float(np.ptp(q))
     lowest = np.pi / reach if slides else settings.LOWEST_ORDER
     highest = 2.0 * np.pi / settings.SHORTEST_PERIOD if slides else settings.HIGHEST_ORDER
     step = settings.ORDER_STEP * 2.0 * np.pi / reach
@@ -106,8 +108,11 @@ def _waves(q: Array, at: Array) -> NDArray[np.complex128]:
 
 def _nyquist(q: Array) -> float:
     """Return the order above which positions on a lattice repeat themselves; infinite where they lie on none."""
-    gaps = np.diff(np.unique(q))
-    gaps = gaps[gaps > settings.SAME_COMMAND]
-    spacing = float(gaps.min())
-    steps = gaps / spacing
+    levels = np.unique(q)
+    gaps = np.diff(levels)
+    gaps = gaps[gaps > STILL]
+    if not len(gaps):
+        return np.inf
+    spacing = float(levels[-1] - levels[0]) / float(np.round(gaps / gaps.min()).sum())
+    steps = (levels - levels[0]) / spacing
     return np.pi / spacing if np.abs(steps - np.round(steps)).max() < settings.LATTICE else np.inf

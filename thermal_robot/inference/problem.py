@@ -217,7 +217,7 @@ def whitened_columns(columns: Array, whitening: Whitening) -> Array:
 def _white(stack: Array, used: NDArray[np.int64], whitening: Whitening) -> Array:
     """Whiten columns (n, m, K) of the rows in use, in their place."""
     stack *= (np.sqrt(whitening.weights[used])[:, None] / whitening.sigma(used))[:, :, None]
-    flat = stack.reshape(-1, stack.shape[2])
+    flat = stack.reshape(stack.shape[0] * stack.shape[1], stack.shape[2])
     return flat if whitening.smooth is None else whitening.smooth.whitened(flat)
 
 
@@ -253,7 +253,8 @@ def parameter_values(linear: Linear, problem: Gram, found: Combination) -> dict[
         basis, sizes = problem.bases[index], linear.blocks[index].sizes
         stop = start + basis.shape[1]
         mean = sizes * (basis @ found.values[start:stop])
-        hidden = (np.eye(len(sizes)) - basis @ basis.T) * found.scales[index] ** 2
+        hidden = np.eye(len(sizes)) - basis @ basis.T
+        hidden = hidden @ hidden.T * found.scales[index] ** 2  # a projection still, and rounding is not negative
         covariance = basis @ found.covariance[start:stop, start:stop] @ basis.T + hidden
         result[index] = (mean, sizes[:, None] * covariance * sizes)
         start = stop

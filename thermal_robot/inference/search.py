@@ -91,8 +91,13 @@ class Search:
         except EstimationError:
             if not key:
                 raise
-            # rounding hides what blocks so nearly alike bring
-            return replace(self.evaluate(()), blocks=key, log_evidence=-np.inf)
+            # rounding hides what blocks so nearly alike bring: nothing
+            width = len(self.gram.columns_of(key))
+            bare, nothing = self.evaluate(()), np.zeros((width, width))
+            scales = dict.fromkeys(key, 1.0)
+            return replace(
+                bare, blocks=key, log_evidence=-np.inf, scales=scales, values=np.zeros(width), covariance=nothing
+            )
 
     def run(self, start: Sequence[int] = ()) -> Combination:
         """Climb from a combination, and look on purpose for what single steps miss, until nothing is better.

@@ -9,6 +9,7 @@ import numpy as np
 
 from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.tabular import table_from_frame
+from thermal_robot.campaign.turned import read_alike
 from thermal_robot.campaign.validate import build_campaign
 from thermal_robot.diagnosis.growing import settings
 from thermal_robot.diagnosis.growing.choice import Choice
@@ -53,6 +54,7 @@ def received(old: Campaign, rows: Campaign | pd.DataFrame, needs: tuple[str, ...
     if old.targets is not None or rows.targets is not None:
         expected = "rows of one target; diagnose all rows together"
         raise CampaignError(rows.name, "several targets of each pose, whose places all rows tell", expected=expected)
+    rows = read_alike(rows, old.robot, old.turned)
     for column in needs:
         if column not in rows.covariates:
             raise CampaignError(rows.name, "lacks what the chosen effects read", column=column, expected="this column")
