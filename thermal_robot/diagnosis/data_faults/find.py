@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis.data_faults import of_joints, of_measurements, of_pairing, settings
 from thermal_robot.diagnosis.data_faults.kind import Kind
+from thermal_robot.diagnosis.data_faults.marks import marks_of_missing
 from thermal_robot.diagnosis.data_faults.readings import Readings, rms
 from thermal_robot.diagnosis.data_faults.screen import Screen
 from thermal_robot.diagnosis.data_faults.struck import Struck, Tried, consensus, misfit, mixture, part_of
@@ -34,6 +35,8 @@ def data_fault(campaign: Campaign, progress: Callable[[str], None] = lambda _: N
     if campaign.samples <= settings.DRAWN:
         return None
     readings = Readings.of(campaign)
+    if (marks := marks_of_missing(campaign, readings)) is not None:
+        return marks
     every = Struck.whole(readings)
     apart = every.median > misfit(readings)
     if apart:

@@ -12,12 +12,12 @@ from scipy.spatial.transform import Rotation
 
 from thermal_robot.diagnosis.data_faults.kind import Kind, Repair
 from thermal_robot.diagnosis.data_faults.readings import Readings, Rows
+from thermal_robot.diagnosis.data_faults.settings import ALIKE, FARTHEST, INCHES, METRIC
 
 Array = NDArray[np.float64]
 
-METRIC = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
-INCH = 0.0254
-"""m."""
+UNITS_OF_FILES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6, "inch": 0.0254}
+"""m in one of the unit."""
 
 
 def _at_places(change: Callable[[Array], Array]) -> Repair:
@@ -39,23 +39,21 @@ def _turned(change: Callable[[Array], Array]) -> Repair:
     return repair
 
 
-def _metric(readings: Readings) -> Iterator[tuple[str, Repair]]:
-    for unit, size in METRIC.items():
-        if unit != readings.length_unit:
-            yield f"{unit}, not in {readings.length_unit}", _at_places(lambda p, by=size / _read(readings): p * by)  # type: ignore[misc]
+def _sizes(steps: tuple[float, ...]) -> Callable[[Readings], Iterator[tuple[str, Repair]]]:
+    """Propose factors; one that is no unit beside the declared one was applied where it should not have been, or twice."""
 
+    def proposals(readings: Readings) -> Iterator[tuple[str, Repair]]:
+        if readings.spread() > FARTHEST:
+            return
+        read = UNITS_OF_FILES[readings.length_unit]
+        for by in (sign for step in steps for sign in (step, 1.0 / step)):
+            size = f"lengths are {by if by > 1.0 else 1.0 / by:.4g} times too {'small' if by > 1.0 else 'large'}"
+            unit = next((own for own, one in UNITS_OF_FILES.items() if abs(one / read / by - 1.0) < ALIKE), "")
+            inch = "" if unit or steps is METRIC else ": inches?"
+            said = f"positions stand in {unit}, not in {readings.length_unit}: {size}" if unit else f"{size}{inch}"
+            yield said, _at_places(lambda p, by=by: p * by)  # type: ignore[misc]
 
-def _inches(readings: Readings) -> Iterator[tuple[str, Repair]]:
-    """Read as the declared unit; or converted from it where it was none, and the other way round."""
-    exact = INCH / _read(readings)
-    for by in dict.fromkeys(round(by, 9) for by in (exact, 25.4, 1 / 25.4) if by != 1.0):
-        size = f"{by:.3g} times too small" if by > 1.0 else f"{1 / by:.3g} times too large"
-        stand = f"positions stand in inches, not in {readings.length_unit}: " if by == round(exact, 9) else ""
-        yield f"{stand}lengths are {size}{'' if stand else ': inches?'}", _at_places(lambda p, by=by: p * by)  # type: ignore[misc]
-
-
-def _read(readings: Readings) -> float:
-    return {**METRIC, "inch": INCH}[readings.length_unit]
+    return proposals
 
 
 def _axes_exchanged(_: Readings) -> Iterator[tuple[str, Repair]]:
@@ -121,8 +119,8 @@ def _angles_in_degrees(readings: Readings) -> Iterator[tuple[str, Repair]]:
 
 
 UNITS = (
-    Kind("metric unit", "positions stand in {}", "correct length_unit", _metric),
-    Kind("inch", "{}", 'set length_unit = "inch", or convert them', _inches),
+    Kind("metric unit", "{}", "correct length_unit", _sizes(METRIC)),
+    Kind("inch", "{}", 'set length_unit = "inch", or convert them', _sizes(INCHES)),
 )
 AXES = (
     Kind("exchanged axes", "the columns {} are exchanged", "exchange their headers", _axes_exchanged),

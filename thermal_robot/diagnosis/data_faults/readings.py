@@ -86,19 +86,10 @@ class Readings:
         )
 
     def take(self, rows: NDArray[np.int64]) -> Readings:
-        """Return some of the rows, by number."""
+        """Return some of the rows, by number; (S, K) numbers give readings side by side."""
         columns: dict[str, Any] = {
             name: None if (column := getattr(self, name)) is None else column[rows]
             for name in (*COLUMNS, "clock", "known")
-        }
-        return replace(self, **columns)
-
-    def picked(self, rows: NDArray[np.int64]) -> Readings:
-        """Return other rows (S, K) of each of the readings that stand side by side."""
-        columns = {
-            name: np.take_along_axis(column, rows[:, :, None], axis=1)
-            for name in COLUMNS
-            if (column := getattr(self, name)) is not None
         }
         return replace(self, **columns)
 

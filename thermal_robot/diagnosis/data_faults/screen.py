@@ -166,5 +166,5 @@ class Screen:
 def _extends(readings: Readings) -> bool:
     """Tell whether measured and predicted points are about as far from each other."""
     points = readings.poses[:, :3, 3] if readings.simulated_position is None else readings.simulated_position
-    times = [float(np.sqrt((own - own.mean(axis=0)) ** 2).sum()) for own in (readings.position, points)]
+    times = [float(np.abs(own - own.mean(axis=0)).sum()) for own in (readings.position, points)]
     return times[0] <= settings.EXTENT * times[1] and times[1] <= settings.EXTENT * times[0]

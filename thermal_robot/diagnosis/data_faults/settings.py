@@ -36,7 +36,7 @@ DRAWS, DRAWN = 300, 5
 is free of them, so that nine of 300 are; fewer rows do not determine two frames."""
 DRAWS_HALVED = 10
 """Of the draws one in so many goes on, with the rows that it brings near."""
-ABREAST = 512
+ABREAST = 256
 """Candidates whose frames are fitted side by side: more would not stay in the processor's memory."""
 WORSE = 10.0
 """Times the least of the numbers tried, above which no difference is made when one is refined."""
@@ -61,6 +61,10 @@ AGAIN = 0.25
 EXTENT = 2.0
 """Times that the extent of the measured points may differ from that of the predicted ones, for their unit to be right:
 a target beside the tool frame changes it by less, and units differ by 2.54 and more."""
+METRIC, INCHES = (10.0, 100.0, 1e3, 1e6), (25.4, 2.54, 1.0 / 0.0254)
+"""Times that lengths may be too small or too large: units of metres by each other, and inches by mm, cm and m."""
+ALIKE = 1e-9
+"""Relative difference up to which two factors are one."""
 FARTHEST = 100.0
 """m: the arm's volume above which it is the robot's lengths that are wrong, and no unit of the table is tried."""
 KUKA_JOINTS, KUKA_REVERSED = 6, [0, 3, 5]
@@ -71,6 +75,8 @@ PAIRED_PATTERNS = 128
 """Patterns of signs, those of fewest joints, that are tried together with another fault."""
 MARKS = 3
 """Rows that must hold one and the same value, at different commands, for it to be a mark and not a measurement."""
+BEYOND = 3.0
+"""Times the extent of most other values that a mark is away from them: no pose of the arm is."""
 TOLD = 4
 """Alternatives that are told at most."""
 WINDOW = 100

@@ -179,12 +179,11 @@ def consensus(sample: Readings) -> Placed:
     Fischler and Bolles, *Communications of the ACM* 24 (1981). All draws go side by side.
     """
     rng = np.random.default_rng(settings.SEED)
-    own = stacked([sample] * settings.DRAWS)
     rows = np.array([rng.choice(len(sample.q), settings.DRAWN, replace=False) for _ in range(settings.DRAWS)])
     best, least = sample.align(coarse=True), np.inf
     for _ in range(1 + settings.PART_ROUNDS):
-        frames = own.picked(rows).align(coarse=True)
-        distance = own.distance(frames)
+        frames = sample.take(rows).align(coarse=True)
+        distance = sample.distance(frames)
         reach = np.quantile(distance, settings.NEAREST, axis=1)
         first = int(reach.argmin())
         if reach[first] < least:
@@ -192,7 +191,7 @@ def consensus(sample: Readings) -> Placed:
         # go on from the most promising draws, each with the rows that it brings near
         order = np.argsort(reach, kind="stable")[: max(len(reach) // settings.DRAWS_HALVED, 1)]
         near = max(int(settings.NEAREST * distance.shape[1]), settings.DRAWN)
-        own, rows = stacked([sample] * len(order)), np.argsort(distance[order], axis=1)[:, :near]
+        rows = np.argsort(distance[order], axis=1)[:, :near]
     return best
 
 
