@@ -76,7 +76,7 @@ def _best(screen: Screen, tried: Sequence[Tried], before: float, kinds: Sequence
     struck = screen.struck
     likely = sorted(tried, key=attrgetter("typical"))[: settings.FULLY]
     full = [own for t in likely if (own := struck.tried(t.fault, t.place)) is not None]
-    full = [t for t in full if t.median < settings.STILL * t.still]
+    full = [t for t in full if t.median < settings.STILL[len(t.fault) - 1] * t.still]
     if not full:
         return []
     scale = max(min(t.median for t in full), settings.LEAST_GAP)
