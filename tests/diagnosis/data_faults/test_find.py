@@ -15,8 +15,10 @@ from thermal_robot import read_campaign
 from thermal_robot.campaign import campaign_from_table
 from thermal_robot.diagnosis.data_faults import data_fault
 from thermal_robot.diagnosis.data_faults.find import KINDS
+from thermal_robot.diagnosis.data_faults.of_measurements import TURNS
 
 NOISE = 25e-6
+OF_TURNS = {kind.name for kind in TURNS}
 DATA = os.environ.get("THERMAL_ROBOT_DATA")
 PUBLIC = ("ur5_jacobi", "open_cases/case_001", "open_cases/case_005", "open_cases/case_012", "open_cases/case_015")
 
@@ -29,7 +31,7 @@ def sound():
 
 def test_every_kind_of_fault_is_tried_here():
     assert {kind.name for kind in KINDS} == set(SPOILT)
-    assert len(KINDS) == 14
+    assert len(KINDS) == 18
 
 
 @pytest.mark.parametrize("kind", SPOILT)
@@ -84,7 +86,7 @@ def test_what_the_instrument_stands_on_cannot_tell_is_said_to_be_so(sound):
 def test_faults_of_public_campaigns_are_named(name):
     campaign = read_campaign(Path(DATA) / name)
     assert data_fault(campaign) is None
-    asked = [k for k in SPOILT if "quaternion" not in k or campaign.orientation is not None]
+    asked = [k for k in SPOILT if k not in OF_TURNS or campaign.orientation is not None]
     asked = [k for k in asked if k != "clock offset" or "time" in campaign.covariates]
     named = [k for k in asked if (found := data_fault(SPOILT[k](campaign))) is not None and k in found.kinds]
     assert len(named) >= 0.9 * len(asked)

@@ -9,6 +9,7 @@ from __future__ import annotations
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from functools import cached_property
+from operator import attrgetter
 
 import numpy as np
 from numpy.typing import NDArray
@@ -58,7 +59,8 @@ class Screen:
         turns = [p for p in self._measured if p.kind in of_measurements.TURNS]
         if self.struck.readings.orientation is None:
             return looked
-        near = sorted(looked, key=lambda t: t.typical)[: settings.SURVIVORS]
+        looked.sort(key=attrgetter("typical"))
+        near = [t for two in (False, True) for t in [t for t in looked if (len(t.fault) > 1) is two][: settings.SURVIVORS]]
         more = [((*t.fault, *turn), t.place) for t in near for turn in ((), *((p,) for p in turns))]
         return self._looked([own for own in more if len(own[0]) <= 2], turns=True)
 
@@ -114,19 +116,21 @@ class Screen:
         if struck.frames is None and len(struck.rows) > settings.WINDOW:
             part = window(struck.readings)
             struck = replace(struck, readings=part, rows=np.ones(len(part.q), dtype=bool), distance=np.zeros(len(part.q)))
-        found = [self._typical(struck, family.of(number)) for number in family.tried]
+        found = [self._typical(struck, (family.of(number),)) for number in family.tried]
         k = int(np.argmin(found))
+        if found[k] * settings.PROMISING > self._typical(struck, ()):
+            return None
         low, high = family.tried[max(k - 1, 0)], family.tried[min(k + 1, len(found) - 1)]
         least = minimize_scalar(
-            lambda number: np.log(min(self._typical(struck, family.of(number)), found[k] * settings.WORSE)),
+            lambda number: np.log(min(self._typical(struck, (family.of(number),)), found[k] * settings.WORSE)),
             bounds=(low, high),
             method="bounded",
             options={"maxiter": settings.OFFSET_ROUNDS, "xatol": settings.OFFSET_SETTLED * (high - low)},
         )
         return family.of(float(least.x) if least.fun < np.log(found[k]) else family.tried[k])
 
-    def _typical(self, struck: Struck, proposal: Proposal) -> float:
-        part = struck.sketch((proposal,), settings.RELAXED)
+    def _typical(self, struck: Struck, fault: Fault) -> float:
+        part = struck.sketch(fault, settings.RELAXED)
         if part is None:
             return np.inf
         left = part.relaxed()[0] if struck.frames is None else part.distance(struck.frames)

@@ -95,6 +95,8 @@ NEAR_OFFSETS, FAR_OFFSETS, SMALLEST_OFFSET = 6.0, 200.0, 0.02
 third on."""
 OFFSET_RATIO = 1.4
 """Of one offset to the next where they are geometric: within a sixth of the true one the gap falls sixfold."""
+PROMISING = 1.2
+"""Times that the gap falls at the best of the offsets tried, for it to be refined: beside the true one it does."""
 OFFSET_ROUNDS, OFFSET_SETTLED = 40, 1e-5
 """Steps at most in which an offset is refined, and the share of its bracket at which that ends."""
 SEED = 13
