@@ -99,8 +99,10 @@ def _exchange(campaign, rng):
 
 
 def _one_joint(change):
+    """Of a joint between the first and the last, whose zeros the unknown frames take up."""
+
     def spoil(campaign, rng):
-        joint = int(rng.integers(campaign.robot.n))
+        joint = int(rng.integers(1, campaign.robot.n - 1))
         return with_joints(campaign, change(rng), joint), [campaign.robot.joint_names[joint]]
 
     return spoil
