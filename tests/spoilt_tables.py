@@ -70,10 +70,10 @@ SPOILT = {
     "conjugate quaternion": lambda c: replace(c, orientation=c.orientation * [1.0, -1.0, -1.0, -1.0]),
     "shifted rows": lambda c: measured_at(c, np.roll(np.arange(c.samples), 1)),
     "clock offset": lambda c: joints_read_at(c, 9.0),
-    "angles of orientations": lambda c: turned_by(
-        c, lambda turns: Rotation.from_euler("XYZ", turns.as_euler("zyx"))
+    "angles of orientations": lambda c: turned_by(c, lambda turns: Rotation.from_euler("XYZ", turns.as_euler("zyx"))),
+    "angles in degrees": lambda c: turned_by(
+        c, lambda turns: Rotation.from_euler("xyz", turns.as_euler("xyz") / 57.29578)
     ),
-    "angles in degrees": lambda c: turned_by(c, lambda turns: Rotation.from_euler("xyz", turns.as_euler("xyz") / 57.29578)),
 }
 
 

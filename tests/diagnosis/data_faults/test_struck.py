@@ -37,10 +37,12 @@ def test_nobody_strays_from_a_sound_table(sound):
     assert part_of(readings, readings.align()) is None
 
 
-def test_rows_that_choose_between_two_tables_are_told_apart(sound):
-    readings, struck = spoilt(sound, 0.3)
+@pytest.mark.parametrize("share", [0.55, 0.65])
+def test_rows_that_choose_between_two_tables_are_told_apart(sound, share):
+    readings, struck = spoilt(sound, share)
     found = mixture(Struck.whole(readings), KINDS)
     assert (found.rows != struck).mean() < 0.05
+    assert mixture(Struck.whole(Readings.of(sound)), KINDS) is None
 
 
 def test_a_sketch_has_so_many_rows_and_is_none_where_most_are_not_determined(sound):

@@ -85,7 +85,9 @@ def _best(screen: Screen, tried: Sequence[Tried], before: float, kinds: Sequence
         return []
     said = [_log_likelihood(t, scale) * struck.count for t in full]
     alike = [t for t, own in zip(full, said, strict=True) if own > max(said) - settings.TIE]
-    return sorted((t for t in alike if not any(_says_more(t, other) for other in alike)), key=lambda t: _usual(t, kinds))
+    return sorted(
+        (t for t in alike if not any(_says_more(t, other) for other in alike)), key=lambda t: _usual(t, kinds)
+    )
 
 
 def _says_more(one: Tried, other: Tried) -> bool:

@@ -99,7 +99,12 @@ def _zeros(*shifts: float) -> Callable[[Readings], Iterator[tuple[str, Repair]]]
 
 
 KINDS = (
-    Kind("reversed joint", "{} is reversed: it counts the other way round", "change the sign of its column", _reversed(False)),
+    Kind(
+        "reversed joint",
+        "{} is reversed: it counts the other way round",
+        "change the sign of its column",
+        _reversed(False),
+    ),
     Kind("reversed joints", "{}", "change the sign of their columns", _reversed(True)),
     Kind("coupled joints", "the column of {} (coupled, as on a Fanuc's pendant)", "undo the coupling", _coupled),
     Kind("exchanged joints", "the columns of {} are exchanged", "exchange their headers", _exchanged),

@@ -60,7 +60,9 @@ class Screen:
         if self.struck.readings.orientation is None:
             return looked
         looked.sort(key=attrgetter("typical"))
-        near = [t for two in (False, True) for t in [t for t in looked if (len(t.fault) > 1) is two][: settings.SURVIVORS]]
+        near = [
+            t for two in (False, True) for t in [t for t in looked if (len(t.fault) > 1) is two][: settings.SURVIVORS]
+        ]
         more = [((*t.fault, *turn), t.place) for t in near for turn in ((), *((p,) for p in turns))]
         return self._looked([own for own in more if len(own[0]) <= 2], turns=True)
 
@@ -70,7 +72,9 @@ class Screen:
         signs = of_joints.sign_patterns(self.struck.readings.robot.n)[: settings.PAIRED_PATTERNS]
         scores: list[Array] = []
         made: list[Fault] = []
-        turned = [Proposal(self._reversed((own < 0).sum()), *of_joints.reversing(own, self.struck.readings)) for own in signs]
+        turned = [
+            Proposal(self._reversed((own < 0).sum()), *of_joints.reversing(own, self.struck.readings)) for own in signs
+        ]
         for other in others:
             part = self.struck.sketch((other,), settings.RELAXED)
             if part is None:
@@ -115,7 +119,9 @@ class Screen:
         struck = self.struck
         if struck.frames is None and len(struck.rows) > settings.WINDOW:
             part = window(struck.readings)
-            struck = replace(struck, readings=part, rows=np.ones(len(part.q), dtype=bool), distance=np.zeros(len(part.q)))
+            struck = replace(
+                struck, readings=part, rows=np.ones(len(part.q), dtype=bool), distance=np.zeros(len(part.q))
+            )
         found = [self._typical(struck, (family.of(number),)) for number in family.tried]
         k = int(np.argmin(found))
         if found[k] * settings.PROMISING > self._typical(struck, ()):
