@@ -108,6 +108,11 @@ def _one_joint(change):
     return spoil
 
 
+def _quarter(rng):
+    by = rng.choice([-1, 1]) * np.pi / 2
+    return lambda q: q + by
+
+
 def _all_joints(change):
     return lambda campaign, rng: (with_joints(campaign, change, *range(campaign.robot.n)), ["all joints"])
 
@@ -123,7 +128,7 @@ DRAWN = {
     "exchanged joints": _exchange,
     "degrees read as rad": _all_joints(np.rad2deg),
     "rad read as degrees": _all_joints(np.deg2rad),
-    "zero off by 90°": _one_joint(lambda rng: lambda q, by=rng.choice([-1, 1]) * np.pi / 2: q + by),
+    "zero off by 90°": _one_joint(_quarter),
     "zero off by 180°": _one_joint(lambda rng: lambda q: q + np.pi),
     "metric unit": _sized(1e3, 1e-3, 1e2),
     "inch": _sized(25.4, 1 / 25.4, 1 / 0.0254),

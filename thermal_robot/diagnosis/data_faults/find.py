@@ -1,4 +1,4 @@
-"""Find the fault of the data that repairs a campaign, or the two: every candidate is tried and judged in the same way."""
+"""Find the fault of the data that repairs a campaign, or the two: all candidates are judged in the same way."""
 
 from __future__ import annotations
 

@@ -219,7 +219,7 @@ def _many(own: Array, lead: tuple[int, ...], times: int, axes: int) -> Array:
 
 def stacked(several: Sequence[Readings]) -> Readings:
     """Return readings of as many rows side by side: each column has them in front."""
-    columns = {
+    columns: dict[str, Any] = {
         name: np.stack([getattr(own, name) for own in several])
         for name in COLUMNS
         if getattr(several[0], name) is not None

@@ -17,7 +17,7 @@ from scipy.optimize import minimize_scalar
 
 from thermal_robot.diagnosis.data_faults import of_joints, of_measurements, of_pairing, settings
 from thermal_robot.diagnosis.data_faults.kind import Fault, Kind, Offsets, Proposal
-from thermal_robot.diagnosis.data_faults.readings import Readings, Rows, stacked
+from thermal_robot.diagnosis.data_faults.readings import Readings, stacked
 from thermal_robot.diagnosis.data_faults.struck import Struck, Tried, window
 from thermal_robot.inference.alternation import middle, soft
 
@@ -159,7 +159,7 @@ class Screen:
         return [(own[k][0], place[k]) for k in order[: min(many, settings.MOST_SURVIVORS)]]
 
     def _looked(self, chosen: Chosen, *, turns: bool = False) -> list[Tried]:
-        """Return the faults with what rigid frames leave on a few rows; a unit must give points the extent that they need."""
+        """Return the faults with what rigid frames leave on a few rows; points must have the extent of the motion."""
         parts = [self.struck.sketch(fault, settings.SKETCHED) for fault, _ in chosen]
         own = [k for k, part in enumerate(parts) if part is not None and _extends(part)]
         self.asked += len(chosen)

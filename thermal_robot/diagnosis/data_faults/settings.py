@@ -46,9 +46,9 @@ SAMPLED, SKETCHED = 150, 40
 """Rows on which candidates are compared, spread evenly: a median is then known to a tenth; and those on which they are
 first looked at."""
 STILL = (0.1, 0.03)
-"""Of what a robot that does not move leaves, for one fault and for two: with more left a repair only makes the joints stand
-still, and mends nothing. Of 25 public and simulated robots none leaves more than a fiftieth; of pairs there are many
-thousands."""
+"""Of what a robot that does not move leaves, for one fault and for two: with more left a repair only makes the joints
+stand still, and mends nothing. Of 25 public and simulated robots none leaves more than a fiftieth; of pairs there are
+many thousands."""
 FEWEST_RELAXED, RIDGE = 18, 1e-10
 """Rows for a map of place and turn together, which has 13 numbers an axis: with fewer it fits whatever is there; and
 what steadies its equations, of their trace: an arm in a plane does not determine them all."""
@@ -81,7 +81,7 @@ BEYOND = 3.0
 TOLD = 4
 """Alternatives that are told at most."""
 WINDOW = 100
-"""Rows, one after the other, on which clocks are compared: what was mixed is given back by inverting a matrix of them."""
+"""Rows, one after the other, on which clocks are compared: to give back what was mixed a matrix of them is inverted."""
 COARSE_ROUNDS = 40
 """Alternations of base and tool in a first look: what fits has come within a tenth of its gap by then."""
 FULLY = 12

@@ -1,4 +1,4 @@
-"""Which rows a fault of the data may have struck: all, those that stray from the others, or those that fit better mended.
+"""Which rows a fault of the data may have struck: all, those that stray, or those that fit better mended.
 
 What a repair is worth is how far it brings down the gap, its median over the rows, with the unknown frames fitted
 exactly and robustly: faults of a table are large, and nothing else is fitted.
@@ -108,7 +108,7 @@ class Struck:
         return mended.take(own[np.linspace(0, len(own) - 1, min(most, self.rows.sum())).round().astype(np.int64)])
 
     def tried(self, fault: Fault, begun: Array | None = None) -> Tried | None:
-        """Mend a fault in these rows; see what is left on a sample of them, aligned from a place and the declared one."""
+        """Mend a fault in these rows; see what a sample of them leaves, aligned from a place and the declared one."""
         part = self.sketch(fault, settings.SAMPLED)
         if part is None:
             return None
