@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, permutations
 
 import numpy as np
 from numpy.typing import NDArray
@@ -65,8 +65,8 @@ def _reversed(several: bool) -> Callable[[Readings], Iterator[tuple[str, Repair,
 def _coupled(readings: Readings) -> Iterator[tuple[str, Repair]]:
     """Pendants that count a joint from the ground, not from the link before it, and wrists that turn together."""
     names = readings.robot.joint_names
-    for j, k in ((j, k) for j in range(len(names)) for k in (j - 1, j + 1) if 0 <= k < len(names)):
-        if readings.robot.joint_types[j] != "prismatic" != readings.robot.joint_types[k]:
+    for j, k in permutations(range(len(names)), 2):
+        if abs(j - k) == 1 and readings.robot.joint_types[j] != "prismatic" != readings.robot.joint_types[k]:
             for word, sign in (("minus", 1.0), ("plus", -1.0)):
                 place = f"{names[j]} holds {names[j]} {word} {names[k]}"
                 yield place, _changed([j, k], lambda two, s=sign: two + two[..., 1:] * [s, 0.0])  # type: ignore[misc]

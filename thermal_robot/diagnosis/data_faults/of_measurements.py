@@ -40,7 +40,7 @@ def _turned(change: Callable[[Array], Array]) -> Repair:
 
 
 def _sizes(steps: tuple[float, ...]) -> Callable[[Readings], Iterator[tuple[str, Repair]]]:
-    """Propose factors; one that is no unit beside the declared one was applied twice, or where it should not have been."""
+    """Propose factors; one that is no unit beside the declared one was applied twice, or where none was due."""
 
     def proposals(readings: Readings) -> Iterator[tuple[str, Repair]]:
         if readings.spread() > FARTHEST:
