@@ -94,23 +94,31 @@ def alternate(
         poses = tool_poses(campaign.robot, campaign.q[some])
         origin, turns = poses[:, :3, 3], poses[:, :3, :3]
     place = np.repeat(declared.tool[None, :3, 3], len(targets), axis=0) if campaign.tool_known else np.array(targets)
-    state = _Alternating(measured, origin, turns, campaign.base_known, campaign.tool_known, declared.base, place)
-    for _ in range(rounds):
-        if state.step():
-            break
+    state = Alternating(measured, origin, turns, campaign.base_known, campaign.tool_known, declared.base, place)
+    state.run(rounds)
     best = int(np.argmin(state.cost))
     base, weights = state.base[best], state.weights[best]
     tool = declared.tool.copy()
     tool[:3, 3] = state.place[best]
     if campaign.orientation is not None and turns is not None and not campaign.tool_known:
-        seen = turns.transpose(0, 2, 1) @ base[:3, :3].T @ quaternion_to_rotation(campaign.orientation[some])
-        u, _, vt = np.linalg.svd(np.einsum("n,nij->ij", weights, seen))
-        tool[:3, :3] = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
+        tool[:3, :3] = turned(turns, base, quaternion_to_rotation(campaign.orientation[some]), weights)
     return float(state.cost[best]), Frames(base, tool)
 
 
-class _Alternating:
-    """S alternations side by side: bases (S, 4, 4), places (S, 3), weights (S, N), medians (S,), and who moves."""
+def turned(turns: Array, base: Array, measured: Array, weights: Array) -> Array:
+    """(..., 3, 3) turn of the target on the tool frame: the weighted mean (..., N) of what each row says."""
+    seen = turns.swapaxes(-1, -2) @ base[..., None, :3, :3].swapaxes(-1, -2) @ measured
+    u, _, vt = np.linalg.svd(np.einsum("...n,...nij->...ij", weights, seen))
+    upright = np.ones(u.shape[:-1])
+    upright[..., 2] = np.linalg.det(u @ vt)
+    return np.asarray((u * upright[..., None, :]) @ vt)
+
+
+class Alternating:
+    """S alternations side by side: bases (S, 4, 4), places (S, 3), weights (S, N), medians (S,), and who moves.
+
+    Measured points and origins (N, 3) and turns (N, 3, 3) are those of all, or have the S in front.
+    """
 
     def __init__(
         self,
@@ -126,23 +134,31 @@ class _Alternating:
         self._base_known, self._tool_known = base_known, tool_known
         self.base = np.repeat(base[None], len(place), axis=0)
         self.place, self.cost = place, np.full(len(place), np.inf)
-        self.weights = np.ones((len(place), len(measured)))
+        self.weights = np.ones((len(place), measured.shape[-2]))
         self._moving = np.arange(len(place))
+
+    def run(self, rounds: int) -> None:
+        """Alternate so many times at most."""
+        for _ in range(rounds):
+            if self.step():
+                break
 
     def step(self) -> bool:
         """Take one alternation of those that still move; tell whether none is left."""
         moving = self._moving
         base, place, weights = self.base[moving], self.place[moving], self.weights[moving]
-        predicted = self._predicted(place)
+        measured, origin = (own if own.ndim == 2 else own[moving] for own in (self._measured, self._origin))
+        turns = self._turns if self._turns is None or self._turns.ndim == 3 else self._turns[moving]
+        predicted = _predicted(origin, turns, place)
         if not self._base_known:
-            base = align(predicted, self._measured, weights)
+            base = align(predicted, measured, weights)
         turned, shift = base[:, :3, :3], base[:, None, :3, 3]
-        if self._turns is not None and not self._tool_known:
+        if turns is not None and not self._tool_known:
             # (measured in the root frame − origin) = R t: the mean over rows of Rᵀ(…), since each R is orthogonal
-            local = np.einsum("nji,snj->sni", self._turns, (self._measured - shift) @ turned - self._origin)
+            local = np.einsum("...nji,...nj->...ni", turns, (measured - shift) @ turned - origin)
             place = (weights[:, None] @ local)[:, 0] / weights.sum(axis=1)[:, None]
-            predicted = self._predicted(place)
-        away = self._measured - predicted @ turned.transpose(0, 2, 1) - shift
+            predicted = _predicted(origin, turns, place)
+        away = measured - predicted @ turned.transpose(0, 2, 1) - shift
         distance = np.sqrt((away * away).sum(axis=2))
         before, cost = self.cost[moving], middle(distance)
         self.base[moving], self.place[moving], self.cost[moving] = base, place, cost
@@ -150,8 +166,9 @@ class _Alternating:
         self._moving = moving[~(np.abs(before - cost) < settings.START_SETTLED * cost)]
         return not len(self._moving)
 
-    def _predicted(self, place: Array) -> Array:
-        """(S, N, 3) origin and place in the root frame, or what the simulator says."""
-        if self._turns is None:
-            return np.repeat(self._origin[None], len(place), axis=0)
-        return np.asarray(self._origin + (self._turns @ place[:, None, :, None])[..., 0])
+
+def _predicted(origin: Array, turns: Array | None, place: Array) -> Array:
+    """(S, N, 3) origin and place in the root frame, or what the simulator says."""
+    if turns is None:
+        return np.broadcast_to(origin, (len(place), *origin.shape[-2:]))
+    return np.asarray(origin + (turns @ place[:, None, :, None])[..., 0])

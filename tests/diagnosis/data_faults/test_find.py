@@ -9,14 +9,17 @@ import pytest
 from conftest import load_arm
 from several import LONG, table_of
 from simulate import simulate
-from spoilt_tables import SPOILT, measured_at, paired_late, with_joints
+from spoilt_tables import DRAWN, SPOILT, coupled, measured_at, paired_late, with_joints
 
 from thermal_robot import read_campaign
 from thermal_robot.campaign import campaign_from_table
 from thermal_robot.diagnosis.data_faults import data_fault
 from thermal_robot.diagnosis.data_faults.find import KINDS
+from thermal_robot.diagnosis.data_faults.of_measurements import TURNS
+from thermal_robot.robot import load_robot
 
 NOISE = 25e-6
+OF_TURNS = {kind.name for kind in TURNS}
 DATA = os.environ.get("THERMAL_ROBOT_DATA")
 PUBLIC = ("ur5_jacobi", "open_cases/case_001", "open_cases/case_005", "open_cases/case_012", "open_cases/case_015")
 
@@ -29,7 +32,7 @@ def sound():
 
 def test_every_kind_of_fault_is_tried_here():
     assert {kind.name for kind in KINDS} == set(SPOILT)
-    assert len(KINDS) == 14
+    assert len(KINDS) == 18
 
 
 @pytest.mark.parametrize("kind", SPOILT)
@@ -84,7 +87,7 @@ def test_what_the_instrument_stands_on_cannot_tell_is_said_to_be_so(sound):
 def test_faults_of_public_campaigns_are_named(name):
     campaign = read_campaign(Path(DATA) / name)
     assert data_fault(campaign) is None
-    asked = [k for k in SPOILT if "quaternion" not in k or campaign.orientation is not None]
+    asked = [k for k in SPOILT if k not in OF_TURNS or campaign.orientation is not None]
     asked = [k for k in asked if k != "clock offset" or "time" in campaign.covariates]
     named = [k for k in asked if (found := data_fault(SPOILT[k](campaign))) is not None and k in found.kinds]
     assert len(named) >= 0.9 * len(asked)
@@ -116,3 +119,94 @@ def test_a_fault_of_the_axes_is_named_where_several_targets_tell_the_pose(kind, 
     found = data_fault(campaign_from_table(arm, struck))
     assert kind in found.kinds
     assert found.rms_after < 20.0 * NOISE
+
+
+@pytest.mark.parametrize("kind", DRAWN)
+@pytest.mark.parametrize(("arm", "seed"), [("rv_m2", 1), ("panda", 2), ("ur10", 3)])
+def test_faults_of_drawn_joints_and_sizes_are_named(kind, arm, seed):
+    rng = np.random.default_rng(seed)
+    sound = simulate(load_arm(arm), ["joint_offset"], samples=50, seed=seed, noise=NOISE, ratio=(20.0, 60.0))[0]
+    spoilt, words = DRAWN[kind](sound, rng)
+    found = data_fault(spoilt)
+    assert kind in found.kinds
+    assert all(word in found.what for word in words)
+
+
+PAIRS = [
+    ("reversed joint", "metric unit"),
+    ("reversed joints", "inch"),
+    ("reversed joints", "degrees read as rad"),
+    ("exchanged joints", "inch"),
+    ("coupled joints", "reversed joint"),
+    ("zero off by 90°", "degrees read as rad"),
+    ("coupled joints", "mirrored axis"),
+    ("zero off by 180°", "exchanged joints"),
+]
+
+
+@pytest.mark.parametrize("pair", PAIRS, ids=" + ".join)
+@pytest.mark.parametrize("seed", [1, 2])
+def test_two_faults_at_once_are_named_in_one_sentence(pair, seed):
+    rng = np.random.default_rng(seed)
+    arm = load_arm(["ur10", "panda"][seed % 2])
+    spoilt = simulate(arm, ["joint_offset"], samples=60, seed=seed, noise=NOISE, ratio=(20.0, 60.0))[0]
+    for kind in pair:
+        spoilt, _ = DRAWN[kind](spoilt, rng)
+    found = data_fault(spoilt)
+    assert set(pair) <= set(found.kinds)
+    assert " and " in found.what
+    assert found.rms_after < 0.02 * found.rms_before
+
+
+@pytest.mark.parametrize("unit", ["quaternion order", "conjugate quaternion", "angles of orientations"])
+def test_turns_of_another_convention_are_named_beside_a_fault_of_the_joints(sound, unit):
+    found = data_fault(SPOILT[unit](SPOILT["reversed joint"](sound)))
+    assert set(found.kinds) == {"reversed joint", unit}
+    assert "elbow_joint is reversed" in found.what
+
+
+# a wrist whose axes meet above a turning column, links in one plane: its own mirror image
+_LINK = '<joint name="{0}" type="revolute"><parent link="{1}"/><child link="{2}"/><origin xyz="{3}"/><axis xyz="{4}"/>'
+_LINK += '<limit lower="-3" upper="3" effort="1" velocity="1"/></joint>'
+MIRRORED = [("0 0 0.4", "0 0 1"), ("0.1 0 0", "0 1 0"), ("0 0 0.6", "0 1 0")]
+MIRRORED += [("0.2 0 0.1", "1 0 0"), ("0.5 0 0", "0 1 0"), ("0.1 0 0", "1 0 0")]
+
+
+def test_reversed_joints_come_before_the_mirrored_instrument_that_does_the_same():
+    links = "".join(f'<link name="l{k}"/>' for k in range(7))
+    joints = "".join(_LINK.format(f"a{k + 1}", f"l{k}", f"l{k + 1}", *own) for k, own in enumerate(MIRRORED))
+    arm = load_robot(f'<robot name="mirrored">{links}{joints}</robot>', tool_frame="l6")
+    sound = simulate(arm, ["joint_offset"], samples=60, seed=1, noise=NOISE)[0]
+    found = data_fault(with_joints(sound, np.negative, 0, 3, 5))
+    assert found.kinds == ("reversed joints", "exchanged axes", "mirrored axis")
+    assert found.what.startswith("a1, a4 and a6 count the other way round (as a KUKA's do), or ")
+    only = data_fault(with_joints(sound, np.negative, 1, 4))
+    assert "a2 and a5 count the other way round" in only.what
+
+
+@pytest.mark.parametrize("factor", [1e3, 1e-3, 25.4, 1.0 / 25.4, 0.0254, 1.0 / 0.0254])
+@pytest.mark.parametrize("some", [False, True])
+def test_another_unit_is_told_by_its_factor_in_all_rows_or_in_some(sound, factor, some):
+    struck = np.random.default_rng(0).random(sound.samples) < (0.3 if some else 2.0)
+    spoilt = replace(sound, position=np.where(struck[:, None], factor, 1.0) * sound.position)
+    found = data_fault(spoilt)
+    assert found.kinds == (("metric unit",) if round(np.log10(factor), 6) % 1.0 == 0.0 else ("inch",))
+    assert f"lengths are {max(factor, 1.0 / factor):.4g} times too {'large' if factor > 1.0 else 'small'}" in found.what
+    assert found.rows == (tuple(int(r) for r in sound.rows[struck]) if some else ())
+
+
+def test_what_makes_the_robot_stand_still_mends_nothing():
+    """Positions of another robot in a corner of its own: with joints that hardly move any table fits a little."""
+    arm, other = load_arm("ur10"), load_arm("panda")
+    sound = simulate(arm, samples=60, seed=2)[0]
+    foreign = simulate(other, samples=60, seed=5)[0].position
+    assert data_fault(replace(sound, position=0.05 * foreign)) is None
+
+
+@pytest.mark.parametrize("sign", [-1.0, 1.0])
+@pytest.mark.parametrize(("joint", "other"), [(2, 1), (4, 5), (5, 4)])
+def test_a_coupling_is_told_with_its_sign(sound, joint, other, sign):
+    found = data_fault(coupled(sound, joint, other, sign))
+    assert "coupled joints" in found.kinds
+    names, word = sound.robot.joint_names, "plus" if sign > 0 else "minus"
+    assert f"{names[joint]} holds {names[joint]} {word} {names[other]}" in found.what

@@ -23,11 +23,25 @@ class Proposal:
         Where it struck, in words: joints, columns, how many rows; several are listed where data cannot tell them.
     repair
         Mends it.
+    joints
+        Those that are turned round, where that is what is wrong: a larger set that fits no better says nothing more.
     """
 
     kind: Kind
     place: str
     repair: Repair
+    joints: frozenset[str] = frozenset()
+
+
+Fault = tuple[Proposal, ...]
+"""What is wrong with a table: nothing, one fault, or two at once, mended one after the other."""
+
+
+def repaired(fault: Fault, readings: Readings, struck: Rows) -> Readings:
+    """Return the readings with one repair after the other in the rows struck; a row must stay known in each."""
+    for proposal in fault:
+        readings = proposal.repair(readings, struck)
+    return readings
 
 
 @dataclass(frozen=True)
@@ -59,7 +73,7 @@ class Kind:
     remedy
         What to do about it.
     proposals
-        Yields place and repair of each fault of this kind that readings may have.
+        Yields place and repair of each fault of this kind that readings may have, and the joints turned round, if any.
     offsets
         Yields families of such faults that differ by a number.
     """
@@ -67,15 +81,15 @@ class Kind:
     name: str
     says: str
     remedy: str
-    proposals: Callable[[Readings], Iterable[tuple[str, Repair]]] = lambda _: ()
+    proposals: Callable[[Readings], Iterable[tuple[str, Repair] | tuple[str, Repair, frozenset[str]]]] = lambda _: ()
     offsets: Callable[[Readings], Iterable[tuple[tuple[float, ...], Callable[[float], tuple[str, Repair]]]]] = (
         lambda _: ()
     )
 
     def proposed(self, readings: Readings) -> Iterator[Proposal]:
         """Yield the faults of this kind that readings may have."""
-        for place, repair in self.proposals(readings):
-            yield Proposal(self, place, repair)
+        for found in self.proposals(readings):
+            yield Proposal(self, *found)
 
     def families(self, readings: Readings) -> Iterator[Offsets]:
         """Yield the families of such faults."""

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import replace
-from itertools import combinations
+from itertools import combinations, permutations
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from thermal_robot.campaign.units import LENGTH_UNITS
 from thermal_robot.diagnosis.data_faults.kind import Kind, Repair
 from thermal_robot.diagnosis.data_faults.readings import Readings, Rows
+from thermal_robot.diagnosis.data_faults.settings import ALIKE, FARTHEST, INCHES, METRIC
 
 Array = NDArray[np.float64]
-
-METRIC = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "um": 1e-6}
-INCH = {"inch": 0.0254}
 
 
 def _at_places(change: Callable[[Array], Array]) -> Repair:
@@ -38,12 +37,19 @@ def _turned(change: Callable[[Array], Array]) -> Repair:
     return repair
 
 
-def _units(units: dict[str, float]) -> Callable[[Readings], Iterator[tuple[str, Repair]]]:
+def _sizes(steps: tuple[float, ...]) -> Callable[[Readings], Iterator[tuple[str, Repair]]]:
+    """Propose factors; one that is no unit beside the declared one was applied twice, or where none was due."""
+
     def proposals(readings: Readings) -> Iterator[tuple[str, Repair]]:
+        if readings.spread() > FARTHEST:
+            return
         read = LENGTH_UNITS[readings.length_unit]
-        for unit, size in units.items():
-            if size != read:
-                yield f"{unit}, not in {readings.length_unit}", _at_places(lambda p, by=size / read: p * by)  # type: ignore[misc]
+        for by in (sign for step in steps for sign in (step, 1.0 / step)):
+            size = f"lengths are {by if by > 1.0 else 1.0 / by:.4g} times too {'small' if by > 1.0 else 'large'}"
+            unit = next((own for own, one in LENGTH_UNITS.items() if abs(one / read / by - 1.0) < ALIKE), "")
+            inch = "" if unit or steps is METRIC else ": inches?"
+            said = f"positions stand in {unit}, not in {readings.length_unit}: {size}" if unit else f"{size}{inch}"
+            yield said, _at_places(lambda p, by=by: p * by)  # type: ignore[misc]
 
     return proposals
 
@@ -51,7 +57,7 @@ def _units(units: dict[str, float]) -> Callable[[Readings], Iterator[tuple[str, 
 def _axes_exchanged(_: Readings) -> Iterator[tuple[str, Repair]]:
     for i, j in combinations(range(3), 2):
         order = [{i: j, j: i}.get(k, k) for k in range(3)]
-        yield f"{'xyz'[i]} and {'xyz'[j]}", _at_places(lambda p, order=order: p[:, order])  # type: ignore[misc]
+        yield f"{'xyz'[i]} and {'xyz'[j]}", _at_places(lambda p, order=order: p[..., order])  # type: ignore[misc]
 
 
 def _mirrored(_: Readings) -> Iterator[tuple[str, Repair]]:
@@ -65,8 +71,8 @@ _CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
 
 def _ordered(readings: Readings) -> Iterator[tuple[str, Repair]]:
     if readings.orientation is not None:
-        yield "x y z w", _turned(lambda wxyz: np.roll(wxyz, 1, axis=1))
-        yield "x y z w and conjugate", _turned(lambda wxyz: np.roll(wxyz, 1, axis=1) * _CONJUGATE)
+        yield "x y z w", _turned(lambda wxyz: np.roll(wxyz, 1, axis=-1))
+        yield "x y z w and conjugate", _turned(lambda wxyz: np.roll(wxyz, 1, axis=-1) * _CONJUGATE)
 
 
 def _conjugate(readings: Readings) -> Iterator[tuple[str, Repair]]:
@@ -74,11 +80,51 @@ def _conjugate(readings: Readings) -> Iterator[tuple[str, Repair]]:
         yield "", _turned(lambda wxyz: wxyz * _CONJUGATE)
 
 
-KINDS = (
-    Kind("metric unit", "positions stand in {}", "correct length_unit", _units(METRIC)),
-    Kind("inch", "positions stand in {}", "convert them", _units(INCH)),
+ANGLES = {
+    "xyz": "rotations about fixed x, y, z",
+    "zyx": "rotations about fixed z, y, x",
+    "zyz": "rotations about fixed z, y, z",
+    "XYZ": "rotations about turning x, y, z",
+    "ZYX": "rotations about turning z, y, x",
+    "ZYZ": "rotations about turning z, y, z",
+    "rotvec": "a rotation vector",
+}
+"""Three numbers that tell a turn, as SciPy names them, and in words."""
+
+
+def _three(quaternions: Array, meant: str) -> Array:
+    """(N, 3) rad, of which these (N, 4) quaternions were made."""
+    turn = Rotation.from_quat(np.roll(quaternions, -1, axis=-1))
+    return np.asarray(turn.as_rotvec() if meant == "rotvec" else turn.as_euler(meant, suppress_warnings=True))
+
+
+def _wxyz(three: Array, meant: str) -> Array:
+    turn = Rotation.from_rotvec(three) if meant == "rotvec" else Rotation.from_euler(meant, three)
+    return np.asarray(np.roll(turn.as_quat(), 1, axis=-1))
+
+
+def _angles(readings: Readings) -> Iterator[tuple[str, Repair]]:
+    if readings.orientation is not None:
+        for taken, meant in permutations(ANGLES, 2):
+            change = lambda wxyz, taken=taken, meant=meant: _wxyz(_three(wxyz, taken), meant)  # noqa: E731
+            yield f"{ANGLES[meant]}, not of {ANGLES[taken]}", _turned(change)
+
+
+def _angles_in_degrees(readings: Readings) -> Iterator[tuple[str, Repair]]:
+    if readings.orientation is not None:
+        for own, words in ANGLES.items():
+            yield words, _turned(lambda wxyz, own=own: _wxyz(np.rad2deg(_three(wxyz, own)), own))  # type: ignore[misc]
+
+
+UNITS = (
+    Kind("metric unit", "{}", "correct length_unit", _sizes(METRIC)),
+    Kind("inch", "{}", 'set length_unit = "inch", or convert them', _sizes(INCHES)),
+)
+AXES = (
     Kind("exchanged axes", "the columns {} are exchanged", "exchange their headers", _axes_exchanged),
     Kind("mirrored axis", "axis {} of the instrument points the other way", "change its sign", _mirrored),
+)
+TURNS = (
     Kind("quaternion order", "quaternions stand in the order {}", "put the scalar first", _ordered),
     Kind(
         "conjugate quaternion",
@@ -86,4 +132,7 @@ KINDS = (
         "change the sign of qx, qy, qz",
         _conjugate,
     ),
+    Kind("angles of orientations", "orientations are made of {}", "convert them anew", _angles),
+    Kind("angles in degrees", "angles in rad are read as degrees in {}", "convert them anew", _angles_in_degrees),
 )
+KINDS = (*UNITS, *AXES, *TURNS)

@@ -34,11 +34,50 @@ PART_ROUNDS = 2
 DRAWS, DRAWN = 300, 5
 """Draws of so many rows, from which frames are begun where half of the rows may be wrong: with five rows one draw in 32
 is free of them, so that nine of 300 are; fewer rows do not determine two frames."""
+DRAWS_HALVED = 10
+"""Of the draws one in so many goes on, with the rows that it brings near."""
+ABREAST = 256
+"""Candidates whose frames are fitted side by side: more would not stay in the processor's memory."""
+WORSE = 10.0
+"""Times the least of the numbers tried, above which no difference is made when one is refined."""
 NEAREST = 0.4
 """Share of the rows, nearest to the prediction, by which such a beginning is judged."""
 SAMPLED, SKETCHED = 150, 40
 """Rows on which candidates are compared, spread evenly: a median is then known to a tenth; and those on which they are
 first looked at."""
+STILL = (0.1, 0.03)
+"""Of what a robot that does not move leaves, for one fault and for two: with more left a repair only makes the joints
+stand still, and mends nothing. Of 25 public and simulated robots none leaves more than a fiftieth; of pairs there are
+many thousands."""
+FEWEST_RELAXED, RIDGE = 18, 1e-10
+"""Rows for a map of place and turn together, which has 13 numbers an axis: with fewer it fits whatever is there; and
+what steadies its equations, of their trace: an arm in a plane does not determine them all."""
+RELAXED = 60
+"""Rows on which maps are fitted to each candidate: 180 equations for 39 numbers."""
+SURVIVORS, NEAR, MOST_SURVIVORS = 24, 3.0, 128
+"""Candidates for the joints that are looked at with rigid frames: so many, and all that leave less than so many times
+the least, since they may do the same, but not more than these."""
+AGAIN = 0.25
+"""Share of the candidates, the best, to which maps are fitted anew without the rows that stray."""
+EXTENT = 2.0
+"""Times that the extent of the measured points may differ from that of the predicted ones, for their unit to be right:
+a target beside the tool frame changes it by less, and units differ by 2.54 and more."""
+METRIC, INCHES = (10.0, 100.0, 1e3, 1e6), (25.4, 2.54, 1.0 / 0.0254)
+"""Times that lengths may be too small or too large: units of metres by each other, and inches by mm, cm and m."""
+ALIKE = 1e-9
+"""Relative difference up to which two factors are one."""
+FARTHEST = 100.0
+"""m: the arm's volume above which it is the robot's lengths that are wrong, and no unit of the table is tried."""
+KUKA_JOINTS, KUKA_REVERSED = 6, [0, 3, 5]
+"""Of an arm's joints those that a KUKA counts against the usual direction."""
+MOST_PATTERNS, FEW_REVERSED = 10, 3
+"""Joints up to which every pattern of signs is tried: 1023; beyond, up to so many reversed ones."""
+PAIRED_PATTERNS = 128
+"""Patterns of signs, those of fewest joints, that are tried together with another fault."""
+TOLD = 4
+"""Alternatives that are told at most."""
+WINDOW = 100
+"""Rows, one after the other, on which clocks are compared: to give back what was mixed a matrix of them is inverted."""
 COARSE_ROUNDS = 40
 """Alternations of base and tool in a first look: what fits has come within a tenth of its gap by then."""
 FULLY = 12

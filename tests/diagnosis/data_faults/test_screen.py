@@ -1,0 +1,62 @@
+"""Among thousands of candidates the true one is looked at, whatever else is wrong on the other side."""
+
+import numpy as np
+import pytest
+from conftest import load_arm
+from simulate import simulate
+from spoilt_tables import SPOILT
+
+from thermal_robot.diagnosis.data_faults.find import KINDS
+from thermal_robot.diagnosis.data_faults.readings import Readings
+from thermal_robot.diagnosis.data_faults.screen import Screen
+from thermal_robot.diagnosis.data_faults.struck import Struck
+
+
+@pytest.fixture(scope="module")
+def sound():
+    return simulate(load_arm("ur10"), ["joint_offset"], samples=60, seed=4, turning=3e-5)[0]
+
+
+def screened(*spoil, campaign):
+    for one in spoil:
+        campaign = SPOILT[one](campaign)
+    return Screen(Struck.whole(Readings.of(campaign)), KINDS)
+
+
+def best(tried, faults):
+    own = min((t for t in tried if len(t.fault) == faults), key=lambda t: t.typical)
+    return {p.kind.name for p in own.fault}, own
+
+
+@pytest.mark.parametrize("joints", ["reversed joints", "exchanged joints", "rad read as degrees"])
+@pytest.mark.parametrize("measured", ["inch", "mirrored axis", "quaternion order", "angles of orientations"])
+def test_a_fault_on_each_side_is_found(sound, joints, measured):
+    screen = screened(joints, measured, campaign=sound)
+    kinds, own = best(screen.both_sides(), 2)
+    assert kinds == {joints, measured}
+    assert own.typical < 2e-3
+    assert screen.asked > 100
+
+
+def test_two_faults_of_the_joints_are_found(sound):
+    screen = screened("coupled joints", "reversed joints", campaign=sound)
+    kinds, own = best(screen.two_of_joints(), 2)
+    assert kinds == {"coupled joints", "reversed joints"}
+    assert own.typical < 2e-3
+
+
+def test_of_faults_that_differ_by_a_number_the_best_is_asked(sound):
+    screen = screened("clock offset", campaign=sound)
+    kinds, own = best(screen.both_sides(), 1)
+    assert kinds == {"clock offset"}
+    assert own.typical < 2e-3
+
+
+def test_known_frames_are_not_fitted(sound):
+    readings = Readings.of(SPOILT["reversed joint"](sound))
+    rows = np.ones(sound.samples, dtype=bool)
+    frames = Readings.of(sound).align()
+    screen = Screen(Struck(readings, rows, readings.distance(frames), frames), KINDS)
+    kinds, own = best(screen.singly(), 1)
+    assert kinds == {"reversed joint"}
+    assert own.typical < 2e-3
