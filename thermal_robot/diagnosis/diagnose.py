@@ -31,7 +31,7 @@ from thermal_robot.diagnosis.parts import Misfit
 from thermal_robot.diagnosis.result import Diagnosis, told
 from thermal_robot.diagnosis.rippled import rippled
 from thermal_robot.diagnosis.schemes import worse_elsewhere
-from thermal_robot.diagnosis.unlisted import as_laws_say, one_more_law
+from thermal_robot.diagnosis.unlisted import as_laws_say, eventful, one_more_law
 from thermal_robot.diagnosis.where import without_laws
 from thermal_robot.diagnosis.word import worth_their_word
 from thermal_robot.effects import RANDOM, Effect, choose, library
@@ -169,14 +169,15 @@ def _concluded(campaign: Campaign, candidates: Sequence[Effect], progress: Calla
 def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
     """Let laws that nobody wrote down compete with the known effects, then ask what of the rest is random.
 
+    Events come first: what happened once, from one row to another, is no error of the robot.
     One law after another joins the explanation, while each is worth its place and regions held out do not get worse.
     Of effects that cancel each other one is kept; one of a size that no robot reaches is not.
     """
-    known, cancelled = credible(in_full(rippled(known, progress), progress), progress)
+    known, cancelled = credible(in_full(rippled(eventful(known, progress), progress), progress), progress)
     stages = [known]
     most = settings.MOST_LAWS if known.campaign.samples < settings.MANY_ROWS else 1
     while len(stages) <= most:
-        wider = one_more_law(stages[-1], len(stages), progress)
+        wider = one_more_law(stages[-1], progress)
         if wider is None:
             break
         stages.append(wider)

@@ -68,7 +68,7 @@ def quantity(observations: Observations, name: str) -> Array | None:
     if name.startswith(TURN):
         return observations.campaign.since_turn.get(name.removeprefix(TURN))
     if name == "order":
-        return np.arange(observations.campaign.samples, dtype=float)
+        return observations.campaign.rows - 2.0  # the place in the file, which rows that are left out do not change
     labels = observations.campaign.labels.get(name)
     if labels is None or len(set(labels.tolist())) < 2:
         return None
