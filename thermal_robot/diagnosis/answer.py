@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.correction import CorrectedModel
+from thermal_robot.diagnosis import settings
 from thermal_robot.diagnosis.cautions import cautions
 from thermal_robot.diagnosis.criteria import criteria
 from thermal_robot.diagnosis.examine import Examined
@@ -103,7 +104,11 @@ def answer(
     )
     chance = [f for f in random_findings(fit, last.chance) if asked(f.name)]
     found = by_share(titled((*systematic, *chance), (*candidates, *random_effects())))
-    groups, probability = separates(found), _probability(last)
+    gap = _gap(last, shrinkage)
+    if gap.worse is not None:
+        found = tuple(replace(f, probability=_at_most(f.probability)) for f in found)
+        notes = (*notes, f"the correction harms rows held out by {gap.worse.name}: no probability above 90 % is told")
+    groups, probability = separates(found), _probability(last, gap)
     return Diagnosis(
         campaign=campaign.name,
         robot=campaign.robot.name,
@@ -112,7 +117,7 @@ def answer(
         measures=campaign.measures,
         joint_names=campaign.robot.joint_names,
         outliers=tuple(campaign.rows[fit.explanation.outliers].tolist()),
-        gap=_gap(last, shrinkage),
+        gap=gap,
         effects=found,
         where=where,
         unexplained=last.unexplained,
@@ -133,10 +138,16 @@ def answer(
     )
 
 
-def _probability(last: Conclusion) -> float:
+def _probability(last: Conclusion, gap: Gap) -> float:
     """Return how probable exactly the effects of the fit are; with what was refused at work they are not all."""
     exactly = last.fit.probability_of_just({effect.name for effect, _ in last.fit.effects})
-    return min([exactly, *(1.0 - refused.probability for refused in last.refused.values() if not refused.place)])
+    exactly = min([exactly, *(1.0 - refused.probability for refused in last.refused.values() if not refused.place)])
+    return exactly if gap.worse is None else min(exactly, settings.SUREST_IF_WORSE)
+
+
+def _at_most(probability: float | None) -> float | None:
+    """Return a probability as far as it may be told of what does not carry over to other sessions or regions."""
+    return None if probability is None else min(probability, settings.SUREST_IF_WORSE)
 
 
 def _gap(last: Conclusion, shrinkage: Shrinkage) -> Gap:

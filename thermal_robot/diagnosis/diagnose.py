@@ -35,6 +35,7 @@ from thermal_robot.diagnosis.unlisted import as_laws_say, eventful, one_more_law
 from thermal_robot.diagnosis.where import without_laws
 from thermal_robot.diagnosis.word import worth_their_word
 from thermal_robot.effects import RANDOM, Effect, choose, library
+from thermal_robot.effects.law import PREFIX
 from thermal_robot.errors import CampaignError, EstimationError, require
 from thermal_robot.inference import settings
 from thermal_robot.inference.discover import discovered
@@ -174,10 +175,10 @@ def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
     Of effects that cancel each other one is kept; one of a size that no robot reaches is not.
     """
     known, cancelled = credible(in_full(rippled(eventful(known, progress), progress), progress), progress)
-    stages = [known]
+    stages, happened = [known], sum(name.startswith(PREFIX) for name in known.variants)
     most = settings.MOST_LAWS if known.campaign.samples < settings.MANY_ROWS else 1
     while len(stages) <= most:
-        wider = one_more_law(stages[-1], progress)
+        wider = one_more_law(stages[-1], happened + len(stages), progress)
         if wider is None:
             break
         stages.append(wider)

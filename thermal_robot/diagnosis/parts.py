@@ -251,6 +251,11 @@ class Gap:
         """Whether the noise is known apart from the remainder itself: stated, or seen where commands are repeated."""
         return self.noise_source != "remainder"
 
+    @property
+    def worse(self) -> FoldScheme | None:
+        """Hold-out by session or region that the correction leaves more of than there was; ``None`` where none is."""
+        return next((s for s in self.schemes if s.name in ("session", "region") and s.shrinkage < 0.0), None)
+
 
 @dataclass(frozen=True)
 class Where:

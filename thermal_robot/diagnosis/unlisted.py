@@ -4,24 +4,25 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
-from itertools import count
 
 from thermal_robot.diagnosis.parts import Dependence, Location, Unexplained
 from thermal_robot.effects.law import PREFIX, Discovered
+from thermal_robot.effects.law_words import is_event
 from thermal_robot.inference import settings
 from thermal_robot.inference.discover import Discovery, candidates, worthwhile
-from thermal_robot.inference.events import events, is_event
+from thermal_robot.inference.events import events
 from thermal_robot.inference.explain import Discrepancy
 from thermal_robot.inference.fit import Fit, refit
 
 
-def one_more_law(fit: Fit, progress: Callable[[str], None], happened: Sequence[Discovered] | None = None) -> Fit | None:
+def one_more_law(
+    fit: Fit, number: int, progress: Callable[[str], None], happened: Sequence[Discovered] | None = None
+) -> Fit | None:
     """Let laws that nobody wrote down compete with all known effects for a place in the fit.
 
     Returns ``None`` if no law is worth its place. Events that ``happened`` are among the laws; they are looked for
     where absent.
     """
-    number = next(k for k in count(1) if f"{PREFIX}{k}" not in fit.variants)
     progress(f"causes that nobody listed: scan {number}")
     laws = candidates(fit, number, happened)
     begin = worthwhile(fit, laws) if laws else None
@@ -39,9 +40,9 @@ def eventful(fit: Fit, progress: Callable[[str], None]) -> Fit:
     that says more than the event does leaves the fit as it is: it has its turn later.
     """
     progress("events: from row to row, from session to session")
-    for _ in range(settings.MOST_LAWS):
+    for number in range(1, settings.MOST_LAWS + 1):
         happened = events(fit)
-        wider = one_more_law(fit, progress, happened) if happened else None
+        wider = one_more_law(fit, number, progress, happened) if happened else None
         if wider is None or not is_event(wider.effects[-1][0]):
             return fit
         fit = wider

@@ -169,7 +169,7 @@ SHAPES: dict[str, Shape] = {
     "ramp": Shape(_ramp, ("at the start", "rise over the campaign"), "in proportion", runs_on=True),
     "quadratic": Shape(_quadratic, ("constant", "linear", "quadratic"), "quadratic", runs_on=True),
     "step": Shape(_step, ("before", "after"), "a step at {mark}", "sudden", size="step", noun="a step"),
-    "run": Shape(_run, ("elsewhere", "there"), "another value from {mark} on for a while", size="step", noun="a step"),
+    "run": Shape(_run, ("elsewhere", "there"), "another value for a while", size="step", noun="a step"),
     "slide": Shape(
         _slide, ("before", "after"), "a smooth step at {mark}", "gradual", width=True, size="step", noun="a step"
     ),

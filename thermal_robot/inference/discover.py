@@ -73,13 +73,11 @@ def candidates(fit: Fit, number: int, happened: Sequence[Discovered] | None = No
         targets += [thin.target(blocks, sound=True) for blocks in remainders[:2]]
     found, _ = scan(thin.observations, targets, [effect for own in fit.variants.values() for effect in own[:1]])
     offered = [_offered(thin, target, own) for target, own in zip(targets, found, strict=True)]
-    happened = events(fit) if happened is None else happened
-    chosen = list(happened)
+    chosen = list((events(fit) if happened is None else happened)[: settings.LIKELY_EVENTS])
     for k in range(max(map(len, offered), default=0)):  # the first of each remainder, in turn
         chosen += [own[k] for own in offered if k < len(own)]
     named = dict.fromkeys(replace(law, name=f"{PREFIX}{number}") for law in chosen)
-    most = settings.COMPARED_LAWS + len(happened)
-    return tuple(islice((law for law in named if not listed(thin, law)), most))
+    return tuple(islice((law for law in named if not listed(thin, law)), settings.COMPARED_LAWS))
 
 
 def listed(thin: Thin, law: Discovered) -> bool:

@@ -80,8 +80,11 @@ class _Sums:
         """Return (C,) log evidence gained by a move of each run."""
         return self.gains(self.summed[runs[:, 1]] - self.summed[runs[:, 0]])
 
-    def shared(self, rows: Rows) -> float:
-        """Return the log evidence gained by a move of rows (N,), less those few that speak most for it: all must."""
+    def of_rows(self, rows: Rows) -> float:
+        """Return the log evidence gained by a move of rows (N,), and by it in all but the few that speak most for it.
+
+        It is the smaller of both: in an event all rows share, in gross errors side by side a few.
+        """
         d = self.moves.shape[2]
         whole = self.own[rows].sum(axis=0)
         gram, vector = whole[: d * d].reshape(d, d), whole[-d:]
@@ -91,7 +94,8 @@ class _Sums:
         out = np.flatnonzero(rows)[np.argsort(-better)[:few]]
         total = max(self.total - float((self.white[out] ** 2).sum()), settings.TINY)
         freedom = max(self.freedom - few * self.white.shape[1], 1)
-        return float(self.gains((whole - self.own[out].sum(axis=0))[None], total, freedom)[0])
+        fewer = self.gains((whole - self.own[out].sum(axis=0))[None], total, freedom)
+        return float(min(self.gains(whole[None])[0], fewer[0]))
 
 
 def events(fit: Fit) -> tuple[Discovered, ...]:
@@ -176,15 +180,14 @@ def _at_place(
         better = _plainest(sums, near[good])
         moved = better is not None and not np.array_equal(better, best)
         best, step = (better, step) if moved else (best, step // 2)
-    yield from _told(observations, place, sums, best, order, float(kinds * places * len(inner) ** 2 / 2.0))
-    for number, (label, own) in enumerate(sessions.items()) if len(sessions) > 1 else ():
-        there = own[order]
-        gain = min(sums.gains(sums.own[there].sum(axis=0)[None])[0], sums.shared(there) if there.sum() > fewest else -np.inf)
-        tried = float(kinds * places * len(sessions))
-        law = replace(place, quantity="session", shape="apart", marks=(float(number),), labels=tuple(sessions))
-        law = replace(law, origin=0.0, span=len(sessions) - 1.0, tried=tried)
-        if _worth(gain, tried) > 0.0:
-            yield _worth(gain, tried), law
+    yield from _told(observations, place, sums, best, order, float(kinds * places * len(inner) ** 2))
+    tried = float(kinds * places * len(sessions))
+    for number, own in sorted(enumerate(sessions.values()), key=lambda item: item[1].sum()):
+        if kinds == 3 and fewest <= own.sum() < rows - fewest:
+            law = replace(place, quantity="session", shape="apart", marks=(float(number),), labels=tuple(sessions))
+            worth = _worth(sums.of_rows(own[order]), tried)
+            if worth > 0.0:
+                yield worth, replace(law, origin=0.0, span=len(sessions) - 1.0, tried=tried)
 
 
 def _grid(rows: int, fewest: int) -> Runs:
@@ -213,7 +216,7 @@ def _told(
         return
     rows = np.zeros(len(order), dtype=bool)
     rows[run[0] : run[1]] = True
-    worth = _worth(min(float(sums.of_runs(run[None])[0]), sums.shared(rows)), tried)
+    worth = _worth(sums.of_rows(rows), tried)
     name = next((name for name in CLOCK if observations.varies(name)), "order")
     clock = quantity(observations, name)
     if worth <= 0.0 or clock is None:
@@ -230,12 +233,4 @@ def _told(
 def _sessions(labels: NDArray[np.str_] | None) -> dict[str, Rows]:
     """Return (N,) the rows of each session by its label; empty where none was recorded."""
     return {} if labels is None else {str(label): labels == label for label in np.unique(labels)}
-
-
-def is_event(law: object) -> bool:
-    """Tell whether a law is an event: another value from one row to another, or in a session."""
-    if not isinstance(law, Discovered) or law.by or law.of or law.kind == "link":
-        return False
-    in_time = law.quantity in CLOCK and law.shape in ("step", "run")
-    return in_time or (law.quantity == "session" and law.shape in ("apart", "levels"))
 
