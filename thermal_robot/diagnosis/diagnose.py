@@ -27,6 +27,7 @@ from thermal_robot.diagnosis.growing.settings import KEPT
 from thermal_robot.diagnosis.growing.updated import ready
 from thermal_robot.diagnosis.held_out import held_out
 from thermal_robot.diagnosis.in_full import in_full
+from thermal_robot.diagnosis.not_executed import not_executed
 from thermal_robot.diagnosis.parts import Misfit
 from thermal_robot.diagnosis.result import Diagnosis, told
 from thermal_robot.diagnosis.rippled import rippled
@@ -110,6 +111,8 @@ def diagnose(
     if campaign.position is None or not campaign.samples:
         raise CampaignError(campaign.name, "nothing was measured", expected="a campaign with measured positions")
     campaign, notes = usable(campaign)
+    campaign, left = not_executed(campaign)
+    notes += left
     # matrices are small: threads that wait for each other cost several times what they bring, and the last bits
     with threadpool_limits(1), solvable(campaign):
         last = _concluded(campaign, candidates, progress)

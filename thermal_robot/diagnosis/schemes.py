@@ -47,15 +47,15 @@ def worst_folds(fit: Fit) -> tuple[FoldScheme, ...]:
     model = Model.of(fit.explanation, blocks(fit.campaign))
     plain = model.bare(fit.before)
     known = events_known(fit, plain, model)
-    found = [_judged(*(known if name == "session" else (plain, model)), name, *of) for name, *of in schemes(fit)]
+    found = [_judged(*((plain, model) if name == "time" else known), name, *of) for name, *of in schemes(fit)]
     return tuple(sorted((f for f in found if f is not None), key=lambda f: -f.rms_after))
 
 
 def events_known(fit: Fit, plain: Model, model: Model) -> tuple[Model, Model]:
     """Return the models of the frames alone and of a fit once what its events moved is taken out of the gap.
 
-    What stands elsewhere in a session is not told by the others: whether the rest carries over to it can be asked only
-    where that is known, as by registering anew.
+    What stands elsewhere in a session is not told by the others, nor what stood elsewhere in all rows of a region:
+    whether the rest carries over to these can be asked only where that is known, as by registering anew.
     """
     e, held = fit.explanation, list(zip(fit.explanation.best.blocks, fit.effects, strict=True))
     events = [(b, effect) for b, (effect, _) in held if is_event(effect)]

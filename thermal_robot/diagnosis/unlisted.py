@@ -43,7 +43,7 @@ def eventful(fit: Fit, progress: Callable[[str], None]) -> Fit:
     for number in range(1, settings.MOST_LAWS + 1):
         happened = events(fit)
         wider = one_more_law(fit, number, progress, happened) if happened else None
-        if wider is None or not is_event(wider.effects[-1][0]):
+        if wider is None or not any(is_event(law) and law.name == f"{PREFIX}{number}" for law, _ in wider.effects):
             return fit
         fit = wider
     return fit

@@ -8,7 +8,7 @@ explained. What is found is a law like others: it has to beat them, and known ef
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -118,13 +118,13 @@ def events(fit: Fit) -> tuple[Discovered, ...]:
     found: dict[tuple[str, str], tuple[float, Discovered]] = {}
     places = list(_places(observations))
     moves = [block(observations, place).columns for place in places]
-    for target in _targets(fit):
+    for target, instead in _targets(fit):
         for place, own in zip(places, moves, strict=True):
             sums = _Sums.of(target, own, order)
             for worth, law in _at_place(observations, place, sums, order, sessions, len(places)):
                 key = (law.kind, law.place)
-                if worth > found.get(key, (0.0, law))[0]:
-                    found[key] = (worth, law)
+                if worth - instead > found.get(key, (0.0, law))[0]:
+                    found[key] = (worth - instead, law)
     return tuple(law for _, law in sorted(found.values(), key=lambda item: -item[0]))
 
 
@@ -137,15 +137,25 @@ def _places(observations: Observations) -> Iterator[Discovered]:
         yield replace(plain, kind="joint", place=joint)
 
 
-def _targets(fit: Fit) -> Iterator[Target]:
-    """Yield what a fit leaves of all rows but single gross errors: as they stand, and less of what is far off."""
+def _targets(fit: Fit) -> Iterator[tuple[Target, float]]:
+    """Yield what a fit leaves of all rows but single gross errors, and what an event in it has to gain at least.
+
+    Once as these rows stand, once less of what is far off; and without each effect, which may stand in for an event:
+    that has to gain more than the effect does.
+    """
     e = fit.explanation
-    columns = [e.linear.blocks[b].columns for b in e.best.blocks]
-    design = np.concatenate([e.linear.frames, *columns], axis=2)
     single = e.outliers & ~gathered(fit, e.outliers)
-    relative = fit.campaign.relative_noise
-    yield Target.of(e.linear.gap, design, ~single, relative)
-    yield Target.of(e.linear.gap, design, e.outliers & ~single, relative)
+    blocks = e.best.blocks
+
+    def target(some: Iterable[int], trusted: Rows) -> Target:
+        design = np.concatenate([e.linear.frames, *(e.linear.blocks[b].columns for b in some)], axis=2)
+        return Target.of(e.linear.gap, design, trusted, fit.campaign.relative_noise)
+
+    yield target(blocks, ~single), 0.0
+    yield target(blocks, e.outliers & ~single), 0.0
+    for out in blocks if len(blocks) <= settings.LEFT_OUT else ():
+        rest = target([b for b in blocks if b != out], ~single)
+        yield rest, rest.worth(e.linear.blocks[out].columns).gain
 
 
 def gathered(fit: Fit, aside: Rows) -> Rows:

@@ -65,3 +65,6 @@ UNMIXED, MIXED_FLOOR = 1.0 - 1e-6, 1e-6
 mixture, of its largest, below which nothing is given back: readings have six digits."""
 TURN = math.pi
 """rad: a half turn, by which conventions of a joint's zero differ, or by half of it."""
+STILL = 3.0
+"""Times the median gap within which measured places are one: the instrument alone scatters less, and two commands that
+are far apart are never so near by chance."""
