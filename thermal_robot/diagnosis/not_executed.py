@@ -58,7 +58,7 @@ def not_executed(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
             named = f"row {numbers[0]} was" if len(rows) == 1 else f"rows {numbers[0]} to {numbers[-1]} were"
             before = int(campaign.rows[order[max(rows[0] - 1, 0)]])
             notes.append(f"{named} not executed as written: {words.format(before)}; left out of the fit")
-    return campaign.take(np.sort(order[~out])), tuple(notes)
+    return campaign.take(np.sort(order[~out])) if notes else campaign, tuple(notes)
 
 
 def _still(readings: Readings, far: Flags, near: float) -> Iterator[tuple[Rows, str]]:
@@ -82,6 +82,6 @@ def _behind(readings: Readings, far: Flags, near: float, frames: Frames) -> Iter
         fits = far & (shifted.distance(frames) <= faults.STRAY * near)
         ends = np.flatnonzero(np.diff(fits, prepend=False, append=False)).reshape(-1, 2)
         for first, last in ends:
-            if settings.RUN <= last - first < max(faults.FEW_STRAYS * len(far), settings.RUN + 1):
+            if settings.RUN <= last - first <= max(faults.MOST_BEHIND * len(far), settings.RUN):
                 other = f"{abs(by)} row{'' if abs(by) == 1 else 's'} {'before' if by < 0 else 'later'}"
                 yield np.arange(first, last), f"measured was the pose that is commanded {other}"

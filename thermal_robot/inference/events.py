@@ -81,19 +81,16 @@ class _Sums:
         return self.gains(self.summed[runs[:, 1]] - self.summed[runs[:, 0]])
 
     def of_rows(self, rows: Rows) -> float:
-        """Return the log evidence gained by a move of rows (N,), and by it in all but the few that speak most for it.
+        """Return the log evidence gained by a move of rows (N,), and by it in all but the few that are farthest off.
 
         It is the smaller of both: in an event all rows share, in gross errors side by side a few.
         """
-        d = self.moves.shape[2]
-        whole = self.own[rows].sum(axis=0)
-        gram, vector = whole[: d * d].reshape(d, d), whole[-d:]
-        left = self.white[rows] - self.moves[rows] @ np.linalg.lstsq(gram, vector, rcond=None)[0]
-        better = (self.white[rows] ** 2).sum(axis=1) - (left**2).sum(axis=1)
+        far = np.where(rows, (self.white**2).sum(axis=1), -1.0)
         few = max(int(np.ceil(settings.EVENT_CARRYING * rows.sum())), settings.FEWEST_ASIDE)
-        out = np.flatnonzero(rows)[np.argsort(-better)[:few]]
-        total = max(self.total - float((self.white[out] ** 2).sum()), settings.TINY)
+        out = np.argsort(-far)[:few]
+        total = max(self.total - float(far[out].sum()), settings.TINY)
         freedom = max(self.freedom - few * self.white.shape[1], 1)
+        whole = self.own[rows].sum(axis=0)
         fewer = self.gains((whole - self.own[out].sum(axis=0))[None], total, freedom)
         return float(min(self.gains(whole[None])[0], fewer[0]))
 
@@ -111,7 +108,7 @@ def events(fit: Fit) -> tuple[Discovered, ...]:
     tuple of Discovered
         Steps in time, runs, and sessions that are apart, each with the number of laws among which it was picked.
     """
-    if fit.campaign.samples > settings.RIPPLE_ROWS or not len(fit.campaign.q) > 2 * settings.FEWEST_IN_EVENT:
+    if fit.campaign.samples > settings.RIPPLE_ROWS or fit.campaign.samples < settings.FEWEST_WITH_EVENTS:
         return ()
     observations = fit.corrected
     order, sessions = in_order(fit.campaign), _sessions(fit.campaign.labels.get("session"))
@@ -176,7 +173,7 @@ def _at_place(
     places: int,
 ) -> Iterator[tuple[float, Discovered]]:
     """Yield what the best step, the best run and the best session at a place are worth, and their laws."""
-    rows, fewest = len(order), max(settings.FEWEST_IN_EVENT, -(-2 * sums.moves.shape[2] // sums.white.shape[1]) + 1)
+    rows, fewest = len(order), settings.FEWEST_ASIDE + -(-2 * sums.moves.shape[2] // sums.white.shape[1])
     kinds = 3 if len(sessions) > 1 else 2
     inner = np.arange(fewest, rows - fewest + 1)
     steps = np.concatenate([np.column_stack([0 * inner, inner]), np.column_stack([inner, 0 * inner + rows])])

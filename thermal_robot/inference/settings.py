@@ -282,10 +282,10 @@ FEWEST_ASIDE = 3
 ASIDE_MARKS = 24
 """Of the rows set aside, between whose values ranges are tried: a twentieth of them is not missed."""
 
-FEWEST_IN_EVENT, EVENT_MARKS, EVENT_CARRYING, LIKELY_EVENTS = 4, 32, 0.2, 3
-"""Rows of an event, fewer of which may be gross errors side by side; marks, spread evenly, between which runs are looked
-for first; the share of its rows, those that speak most for it, without which the others must still speak for it; and
-places, the likeliest ones, of an event that are compared."""
+FEWEST_WITH_EVENTS, EVENT_MARKS, EVENT_CARRYING, LIKELY_EVENTS = 20, 32, 0.2, 3
+"""Rows of a campaign, of fewer of which a part says nothing by itself; marks, spread evenly, between which runs are
+looked for first; the share of an event's rows, the farthest off, without which the others must still speak for it; and
+places of an event, the likeliest ones, that are compared."""
 NEAR_IN_ORDER = 5
 """Rows before and behind one set aside among which others count as near: of gross errors at 3 %, two more are there
 once in twenty-five."""

@@ -65,6 +65,7 @@ UNMIXED, MIXED_FLOOR = 1.0 - 1e-6, 1e-6
 mixture, of its largest, below which nothing is given back: readings have six digits."""
 TURN = math.pi
 """rad: a half turn, by which conventions of a joint's zero differ, or by half of it."""
-STILL = 3.0
+STILL, MOST_BEHIND = 3.0, 0.1
 """Times the median gap within which measured places are one: the instrument alone scatters less, and two commands that
-are far apart are never so near by chance."""
+are far apart are never so near by chance. And the share of the rows up to which some that follow each other may be left
+out as measured a command too early or too late: of more the table is to be paired anew."""
