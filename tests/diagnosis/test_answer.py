@@ -1,5 +1,7 @@
 """The parts of an answer, put together from the last explanation."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from simulate import simulate
@@ -60,3 +62,18 @@ def test_what_was_not_asked_for_is_not_said(rv_m2):
     assert not {"drift", "encoder_resolution"} & {f.name for f in without.effects}
     assert without.left_out == ("drift", "encoder_resolution")
     assert "by request (--without drift encoder_resolution)" in str(without)
+
+
+def test_nothing_above_nine_in_ten_is_told_of_what_harms_other_sessions(rv_m2):
+    """A drift that each of two sessions goes through its own way: of one, the other says the wrong thing."""
+    campaign, _, _ = simulate(rv_m2, ["backlash"], seed=1, ratio=(3.0, 4.0))
+    late = np.arange(campaign.samples) >= campaign.samples // 2
+    along = np.linspace(0.0, 8e-4, campaign.samples)[:, None] * [1.0, 0.5, -0.5]
+    bent = campaign.position + np.where(late[:, None], 8e-4 * np.array([1.0, 0.5, -0.5]) - along, along)
+    told = diagnose(replace(campaign, position=bent, labels={"session": np.where(late, "b", "a")}), only=["drift"])
+    assert told.gap.worse is not None
+    assert told.gap.worse.shrinkage < 0.0
+    assert told.probability <= 0.9
+    assert all(f.probability is None or f.probability <= 0.9 for f in told.effects)
+    assert told.summary.startswith(f"Correcting harms rows held out by {told.gap.worse.name}")
+    assert any("no probability above 90%" in warning for warning in told.warnings)

@@ -1,4 +1,4 @@
-"""Events: rows in which base, target or a joint's zero stands elsewhere are found together, and sound rows have none."""
+"""Events: rows in which base, target or a joint stands elsewhere are found together, and sound rows have none."""
 
 from dataclasses import replace
 

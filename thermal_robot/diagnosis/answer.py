@@ -16,11 +16,11 @@ from thermal_robot.diagnosis.examine import Examined
 from thermal_robot.diagnosis.findings import by_share, findings, separates, titled
 from thermal_robot.diagnosis.held_out import Shrinkage
 from thermal_robot.diagnosis.numbered import numbered
-from thermal_robot.diagnosis.parts import Gap, Misfit, Refused, Rows, Unexplained
+from thermal_robot.diagnosis.parts import Finding, Gap, Misfit, Refused, Rows, Unexplained
 from thermal_robot.diagnosis.predictive import uncertainty
 from thermal_robot.diagnosis.random_findings import random_findings
 from thermal_robot.diagnosis.result import Diagnosis
-from thermal_robot.diagnosis.schemes import hardest, worst_folds
+from thermal_robot.diagnosis.schemes import hardest, harmed, worst_folds
 from thermal_robot.diagnosis.sensitivity import prior_sensitivity
 from thermal_robot.diagnosis.wanted import wanted
 from thermal_robot.diagnosis.where import locate
@@ -105,9 +105,7 @@ def answer(
     chance = [f for f in random_findings(fit, last.chance) if asked(f.name)]
     found = by_share(titled((*systematic, *chance), (*candidates, *random_effects())))
     gap = _gap(last, shrinkage)
-    if gap.worse is not None:
-        found = tuple(replace(f, probability=_at_most(f.probability)) for f in found)
-        notes = (*notes, f"the correction harms rows held out by {gap.worse.name}: no probability above 90 % is told")
+    found, harms = _no_surer(found, gap)
     groups, probability = separates(found), _probability(last, gap)
     return Diagnosis(
         campaign=campaign.name,
@@ -126,7 +124,7 @@ def answer(
         separates=groups,
         model=model_of(fit, None if last.misfit else last.left.floor),
         rows=_rows(fit, shrinkage),
-        warnings=(*campaign.warnings, *notes, *last.notes, *cautions(fit, last.refused, sensitivity)),
+        warnings=(*campaign.warnings, *notes, *harms, *last.notes, *cautions(fit, last.refused, sensitivity)),
         sensitivity=sensitivity,
         fit=fit,
         remaining=remaining,
@@ -145,9 +143,14 @@ def _probability(last: Conclusion, gap: Gap) -> float:
     return exactly if gap.worse is None else min(exactly, settings.SUREST_IF_WORSE)
 
 
-def _at_most(probability: float | None) -> float | None:
-    """Return a probability as far as it may be told of what does not carry over to other sessions or regions."""
-    return None if probability is None else min(probability, settings.SUREST_IF_WORSE)
+def _no_surer(found: tuple[Finding, ...], gap: Gap) -> tuple[tuple[Finding, ...], list[str]]:
+    """Cap the probabilities of what harms rows held out by session or region, and say why."""
+    if gap.worse is None:
+        return found, []
+    most = settings.SUREST_IF_WORSE
+    capped = (f if f.probability is None else replace(f, probability=min(f.probability, most)) for f in found)
+    note = f"the correction harms rows held out by {gap.worse.name}: no probability above {most:.0%} is told"
+    return tuple(capped), [note]
 
 
 def _gap(last: Conclusion, shrinkage: Shrinkage) -> Gap:
@@ -169,6 +172,7 @@ def _gap(last: Conclusion, shrinkage: Shrinkage) -> Gap:
         rms(after[:, 3:]) if turned else None,
         schemes,
         hardest(schemes, shrinkage.overall),
+        harmed(schemes),
     )
 
 

@@ -75,7 +75,7 @@ def _still(readings: Readings, far: Flags, near: float) -> Iterator[tuple[Rows, 
 
 
 def _behind(readings: Readings, far: Flags, near: float, frames: Frames) -> Iterator[tuple[Rows, str]]:
-    """Yield the runs, of few of the rows, in which the measured pose belongs to a command some rows before or behind."""
+    """Yield the runs, of few of the rows, in which the measured pose belongs to a command some rows away."""
     for by in (sign * k for k in range(1, faults.MOST_SHIFT + 1) for sign in (-1, 1)):
         own = np.clip(np.arange(len(far)) + by, 0, len(far) - 1)
         shifted = replace(readings, q=readings.q[own])

@@ -233,7 +233,7 @@ class Gap:
     """Rms distances in m over the rows that are not outliers; of orientation in rad, ``None`` if not measured.
 
     ``schemes`` are other ways of holding rows out, the hardest first; ``hardest`` is the first of them where it leaves
-    clearly more than ``held_out`` does, else ``None``.
+    clearly more than ``held_out`` does, ``worse`` that by session or region where the correction harms; else ``None``.
     """
 
     rms_before: float
@@ -245,16 +245,12 @@ class Gap:
     orientation_after: float | None = None
     schemes: tuple[FoldScheme, ...] = ()
     hardest: FoldScheme | None = None
+    worse: FoldScheme | None = None
 
     @property
     def noise_known(self) -> bool:
         """Whether the noise is known apart from the remainder itself: stated, or seen where commands are repeated."""
         return self.noise_source != "remainder"
-
-    @property
-    def worse(self) -> FoldScheme | None:
-        """Hold-out by session or region that the correction leaves more of than there was; ``None`` where none is."""
-        return next((s for s in self.schemes if s.name in ("session", "region") and s.shrinkage < 0.0), None)
 
 
 @dataclass(frozen=True)

@@ -75,6 +75,11 @@ def hardest(schemes: Sequence[FoldScheme], average: HeldOut) -> FoldScheme | Non
     return next((s for s in schemes[:1] if s.rms_after > settings.HARDER * average.rms_after), None)
 
 
+def harmed(schemes: Sequence[FoldScheme]) -> FoldScheme | None:
+    """Return the way of holding out by session or region that the correction harms; ``None`` where there is none."""
+    return next((s for s in schemes if s.name in ("session", "region") and s.shrinkage < 0.0), None)
+
+
 def worse_elsewhere(narrow: Fit, wider: Fit) -> bool:
     """Tell whether a wider explanation is worse on held-out regions of joint space.
 

@@ -64,7 +64,8 @@ class _Sums:
     def solved(self, sums: Array) -> tuple[Array, Array]:
         """Return (C,) squares that a move of some rows explains, and its ranks, from (C, ·) sums over these rows."""
         d, r = self.moves.shape[2], self.rank
-        whole, design = sums[:, : d * d].reshape(-1, d, d), sums[:, d * d : d * (d + r)].reshape(-1, r, d)
+        runs = len(sums)
+        whole, design = sums[:, : d * d].reshape(runs, d, d), sums[:, d * d : d * (d + r)].reshape(runs, r, d)
         gram = whole - design.transpose(0, 2, 1) @ design
         return explained_by(gram, sums[:, d * (d + r) :], np.einsum("cii->ci", whole))
 
@@ -240,4 +241,3 @@ def _told(
 def _sessions(labels: NDArray[np.str_] | None) -> dict[str, Rows]:
     """Return (N,) the rows of each session by its label; empty where none was recorded."""
     return {} if labels is None else {str(label): labels == label for label in np.unique(labels)}
-

@@ -93,7 +93,7 @@ def unnamed(diagnosis: Diagnosis) -> list[Finding]:
 
 
 def _worse(diagnosis: Diagnosis) -> str:
-    """Begin with where the correction does harm: of another session or region all that follows is not to be believed."""
+    """Begin with where the correction does harm: of another session or region the rest is not to be believed."""
     scheme = diagnosis.gap.worse
     if scheme is None:
         return ""
