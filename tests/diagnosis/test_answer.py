@@ -1,12 +1,11 @@
 """The parts of an answer, put together from the last explanation."""
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from simulate import simulate
 
 from thermal_robot import diagnose
+from thermal_robot.diagnosis.parts import FoldScheme
 from thermal_robot.effects import RANDOM, library
 
 
@@ -64,16 +63,13 @@ def test_what_was_not_asked_for_is_not_said(rv_m2):
     assert "by request (--without drift encoder_resolution)" in str(without)
 
 
-def test_nothing_above_nine_in_ten_is_told_of_what_harms_other_sessions(rv_m2):
-    """A drift that each of two sessions goes through its own way: of one, the other says the wrong thing."""
-    campaign, _, _ = simulate(rv_m2, ["backlash"], seed=1, ratio=(3.0, 4.0))
-    late = np.arange(campaign.samples) >= campaign.samples // 2
-    along = np.linspace(0.0, 8e-4, campaign.samples)[:, None] * [1.0, 0.5, -0.5]
-    bent = campaign.position + np.where(late[:, None], 8e-4 * np.array([1.0, 0.5, -0.5]) - along, along)
-    told = diagnose(replace(campaign, position=bent, labels={"session": np.where(late, "b", "a")}), only=["drift"])
-    assert told.gap.worse is not None
-    assert told.gap.worse.shrinkage < 0.0
-    assert told.probability <= 0.9
-    assert all(f.probability is None or f.probability <= 0.9 for f in told.effects)
-    assert told.summary.startswith(f"Correcting harms rows held out by {told.gap.worse.name}")
-    assert any("no probability above 90%" in warning for warning in told.warnings)
+@pytest.mark.parametrize(("name", "capped"), [("session", True), ("region", True), ("temperature", False)])
+def test_nothing_above_nine_in_ten_is_told_of_what_harms_other_sessions(rv_m2, monkeypatch, name, capped):
+    harmful = FoldScheme(name, "one after the other", 4, 60, 1e-4, 2e-4, -3.0, 1e-6)
+    monkeypatch.setattr("thermal_robot.diagnosis.answer.worst_folds", lambda fit: (harmful,))
+    told = diagnose(simulate(rv_m2, ["backlash"], seed=1, ratio=(5.0, 6.0))[0], only=["backlash"])
+    assert told.verdict == ("backlash",)
+    assert (told.probability <= 0.9) == capped
+    assert all(f.probability is None or f.probability <= 0.9 for f in told.effects) == capped
+    assert told.summary.startswith(f"Correcting harms rows held out by {name}") == capped
+    assert any("no probability above 90%" in warning for warning in told.warnings) == capped
