@@ -94,7 +94,7 @@ def answer(
     """
     fit, shrinkage, laws = numbered(last.fit, shrinkage, last.laws)
     last = replace(last, fit=fit, laws=laws)
-    campaign, remaining = fit.campaign, last.left.unexplained
+    campaign, remaining, gap = fit.campaign, last.left.unexplained, _gap(last, shrinkage)
     sensitivity = prior_sensitivity(fit)
     shares = {name: value for name, (value, _) in shrinkage.shares.items()}
     where, locations = locate(fit, shares)
@@ -103,9 +103,8 @@ def answer(
         fit, shrinkage.shares, locations, {d.law.name: d.probability for d in last.laws}, last.refused
     )
     chance = [f for f in random_findings(fit, last.chance) if asked(f.name)]
-    found = by_share(titled((*systematic, *chance), (*candidates, *random_effects())))
-    gap = _gap(last, shrinkage)
-    found, harms = _no_surer(found, gap)
+    known = (*candidates, *random_effects())
+    found, harms = _no_surer(by_share(titled((*systematic, *chance), known)), gap)
     groups, probability = separates(found), _probability(last, gap)
     return Diagnosis(
         campaign=campaign.name,
