@@ -99,9 +99,8 @@ def answer(
     shares = {name: value for name, (value, _) in shrinkage.shares.items()}
     where, locations = locate(fit, shares)
     held = [effect.name for effect, _ in fit.effects]
-    systematic = findings(
-        fit, shrinkage.shares, locations, {d.law.name: d.probability for d in last.laws}, last.refused
-    )
+    of_laws = {d.law.name: d.probability for d in last.laws}
+    systematic = findings(fit, shrinkage.shares, locations, of_laws, last.refused)
     chance = [f for f in random_findings(fit, last.chance) if asked(f.name)]
     known = (*candidates, *random_effects())
     found, harms = _no_surer(by_share(titled((*systematic, *chance), known)), gap)
