@@ -47,7 +47,8 @@ def worst_folds(fit: Fit) -> tuple[FoldScheme, ...]:
     model = Model.of(fit.explanation, blocks(fit.campaign))
     plain = model.bare(fit.before)
     known = events_known(fit, plain, model)
-    found = [_judged(*((plain, model) if of[0] == "time" else known), *of) for of in schemes(fit)]
+    apart = {"time": (plain, model)}
+    found = [_judged(*apart.get(name, known), name, words, tests) for name, words, tests in schemes(fit)]
     return tuple(sorted((f for f in found if f is not None), key=lambda f: -f.rms_after))
 
 
