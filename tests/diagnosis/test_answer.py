@@ -5,6 +5,7 @@ import pytest
 from simulate import simulate
 
 from thermal_robot import diagnose
+from thermal_robot.diagnosis.parts import FoldScheme
 from thermal_robot.effects import RANDOM, library
 
 
@@ -60,3 +61,15 @@ def test_what_was_not_asked_for_is_not_said(rv_m2):
     assert not {"drift", "encoder_resolution"} & {f.name for f in without.effects}
     assert without.left_out == ("drift", "encoder_resolution")
     assert "by request (--without drift encoder_resolution)" in str(without)
+
+
+@pytest.mark.parametrize(("name", "capped"), [("session", True), ("region", True), ("temperature", False)])
+def test_nothing_above_nine_in_ten_is_told_of_what_harms_other_sessions(rv_m2, monkeypatch, name, capped):
+    harmful = FoldScheme(name, "one after the other", 4, 60, 1e-4, 2e-4, -3.0, 1e-6)
+    monkeypatch.setattr("thermal_robot.diagnosis.answer.worst_folds", lambda fit: (harmful,))
+    told = diagnose(simulate(rv_m2, ["backlash"], seed=1, ratio=(5.0, 6.0))[0], only=["backlash"])
+    assert told.verdict == ("backlash",)
+    assert (told.probability <= 0.9) == capped
+    assert all(f.probability is None or f.probability <= 0.9 for f in told.effects) == capped
+    assert told.summary.startswith(f"Correcting harms rows held out by {name}") == capped
+    assert any("no probability above 90%" in warning for warning in told.warnings) == capped

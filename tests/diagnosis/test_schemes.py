@@ -7,11 +7,14 @@ import pytest
 from diagnosis.simulated import forced
 from simulate import simulate
 
+from thermal_robot import simulate as simulated
 from thermal_robot.diagnosis.parts import FoldScheme, HeldOut
-from thermal_robot.diagnosis.schemes import hardest, worse_elsewhere, worst_folds
+from thermal_robot.diagnosis.schemes import hardest, harmed, worse_elsewhere, worst_folds
+from thermal_robot.diagnosis.unlisted import eventful
 from thermal_robot.effects import choose
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.fit import fit
+from thermal_robot.kinematics import exp6
 
 NOISE = 25e-6
 SEEDS = range(8)
@@ -75,6 +78,30 @@ def test_the_hardest_is_told_where_it_leaves_clearly_more_than_the_average():
     assert hardest(found, average).name == "reach"
     assert hardest(found, replace(average, rms_after=1.3e-4)) is None
     assert hardest((), average) is None
+
+
+def test_harm_to_other_sessions_and_regions_is_told_and_no_other():
+    found = [FoldScheme(name, name, 2, 40, 1e-4, 2e-4, -3.0, 1e-6) for name in ("reach", "temperature", "region")]
+    assert harmed(found).name == "region"
+    assert harmed(found[:2]) is None
+    assert harmed([replace(found[2], shrinkage=0.1)]) is None
+
+
+def test_a_target_mounted_anew_for_a_session_does_not_count_against_what_carries_over(rv_m2):
+    """Lost motion in all sessions; in one of them the target sits elsewhere: held out, it is taken as it was found."""
+    tools = (exp6(np.array([0.03, 0.02, 0.09, 0.0, 0.0, 0.0])), exp6(np.array([0.0306, 0.0205, 0.0896, 0.0, 0.0, 0.0])))
+    campaign, other = (
+        in_sessions(simulated(rv_m2, {"backlash": 3e-4}, rows=100, noise=NOISE, base=np.eye(4), tool=tool, seed=3))
+        for tool in tools
+    )
+    there = campaign.labels["session"] == "day 2"
+    moved = np.where(there[:, None], other.position, campaign.position)
+    alone = {s.name: s for s in worst_folds(fit(campaign, choose(("backlash",), (), ())))}
+    known = eventful(fit(replace(campaign, position=moved), choose(("backlash",), (), ())), lambda _: None)
+    (event,) = [law for law, _ in known.effects if law.name == "discovered.1"]
+    assert (event.kind, event.quantity, event.labels[int(event.marks[0])]) == ("tool", "session", "day 2")
+    for name, scheme in {s.name: s for s in worst_folds(known)}.items():
+        assert scheme.rms_after == pytest.approx(alone[name].rms_after, rel=0.1), name
 
 
 def test_folds_by_time_are_those_of_the_diagnosis(rv_m2):

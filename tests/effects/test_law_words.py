@@ -3,13 +3,17 @@
 from dataclasses import replace
 from itertools import product
 
+import numpy as np
 import pytest
+from helpers import SAMPLES, commanded
 
 from thermal_robot.effects import Backlash, library
 from thermal_robot.effects.law import Discovered
-from thermal_robot.effects.law_words import TELLS, USUALLY, WHETHER, called, kind_of, usually
+from thermal_robot.effects.law_size import Size
+from thermal_robot.effects.law_words import TELLS, USUALLY, WHETHER, called, event, is_event, kind_of, usually
 from thermal_robot.effects.quantities import GRAVITY, REACH, TURN
 from thermal_robot.effects.shapes import SHAPES
+from thermal_robot.observations import observe
 
 JOINTS = ("shoulder", "elbow")
 NAMES = (
@@ -103,3 +107,58 @@ def test_a_step_between_sessions_says_so():
     assert called(apart) == "the tool standing elsewhere in session s2"
     joint = replace(apart, kind="joint", place="elbow")
     assert joint.describe() == "the zero of joint elbow is another in session s2"
+
+
+def clocked(robot, order=range(SAMPLES), **labels):
+    campaign = commanded(robot, {"time": 60.0 * np.array(order, dtype=float)}, labels=labels)
+    return observe(replace(campaign, rows=np.arange(SAMPLES) + 2))
+
+
+BASE = Discovered(kind="base", place="base", quantity="time", shape="step", marks=(390.0,), span=540.0, unit="s")
+FAR = (Size("step", 1.2e-3, 1e-5, "m"), Size("step", 3e-4, 1e-5, "rad"))
+
+
+@pytest.mark.parametrize(
+    ("law", "short", "whole"),
+    [
+        (
+            BASE,
+            "the base 1.2 mm off from row 9 on",
+            "from row 9 on (time 420 s) the base or the instrument stands 1.2 mm",
+        ),
+        (replace(BASE, marks=(150.0,)), "the base 1.2 mm off in rows 2–4", "in rows 2 to 4 (time 0 to 120 s) the base"),
+        (
+            replace(BASE, kind="tool", place="tool", shape="run", marks=(150.0, 390.0)),
+            "the target 1.2 mm off in rows 5–8",
+            "in rows 5 to 8 (time 180 to 360 s) the target sits 1.2 mm and 0.3 mrad elsewhere on the tool",
+        ),
+    ],
+)
+def test_an_event_is_told_by_the_rows_of_the_file_in_which_it_shows(rv_m2, law, short, whole):
+    """What is seldom is told: of a step the shorter side."""
+    told = event(law, clocked(rv_m2), FAR)
+    assert told[0] == short
+    assert told[1].startswith(whole)
+
+
+def test_an_event_of_a_joint_and_of_a_session_is_told_as_such(rv_m2):
+    seen = clocked(rv_m2, session=np.array(["a"] * 4 + ["b"] * 3 + ["a"] * 3))
+    there = replace(BASE, kind="joint", place="joint_3", quantity="session", shape="apart", marks=(1.0,), span=1.0)
+    there = replace(there, labels=("a", "b"))
+    short, whole = event(there, seen, [Size("difference", 1.1e-3, 1e-5, "rad")])
+    assert short == "joint_3 1.1 mrad off in rows 6–8"
+    assert whole == "in session b (rows 6 to 8) joint_3 counts from a zero 1.1 mrad off"
+    # rows of the other session do not follow each other: the session says it
+    assert event(replace(there, marks=(0.0,)), seen, FAR) == ("", "")
+
+
+def test_rows_that_are_not_side_by_side_in_the_file_and_other_laws_are_not_told_by_rows(rv_m2):
+    assert event(BASE, clocked(rv_m2, [9, 0, 8, 1, 7, 2, 6, 3, 5, 4]), FAR) == ("", "")
+    for law in (replace(BASE, quantity="temperature"), replace(BASE, shape="ramp", marks=())):
+        assert not is_event(law)
+        assert event(law, clocked(rv_m2), FAR) == ("", "")
+
+
+def test_an_event_is_usually_something_set_up_anew():
+    assert usually(BASE, JOINTS) == "a base or an instrument that was set up anew"
+    assert usually(replace(BASE, kind="joint", place="elbow"), JOINTS) == "a joint that was referenced anew"

@@ -9,6 +9,7 @@ from thermal_robot.effects.shapes import SHAPES
 X = np.linspace(-2.0, 4.0, 121)
 MARKS = {
     "step": (0.7,),
+    "run": (0.2, 1.9),
     "slide": (0.7, 0.3),
     "hinge": (0.7, 1.0),
     "bump": (0.7, 0.3),

@@ -176,6 +176,16 @@ def test_the_hardest_hold_out_stands_beside_the_average(case):
     assert told(case("found"), hardest=harmful).endswith("; but it harms rows held out by temperature.")
 
 
+@pytest.mark.parametrize("name", ["session", "region"])
+def test_a_headline_begins_with_the_harm_to_other_sessions_and_regions(case, name):
+    harmful = FoldScheme(name, "one after the other", 4, 90, 4.1e-4, 5e-4, -0.49, 1e-6)
+    base = case("found")
+    text = headline(replace(base, gap=replace(base.gap, hardest=harmful, worse=harmful)))
+    assert text.startswith(f"Correcting harms rows held out by {name} (500 µm with it, 410 µm without): the gap of ")
+    assert text.count("harms") == 1
+    assert len(text.split()) <= MOST_WORDS
+
+
 LONG = "an effect of somebody's own whose title is a whole sentence, and then another one"
 
 

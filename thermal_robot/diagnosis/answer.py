@@ -9,17 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.correction import CorrectedModel
+from thermal_robot.diagnosis import settings
 from thermal_robot.diagnosis.cautions import cautions
 from thermal_robot.diagnosis.criteria import criteria
 from thermal_robot.diagnosis.examine import Examined
 from thermal_robot.diagnosis.findings import by_share, findings, separates, titled
 from thermal_robot.diagnosis.held_out import Shrinkage
 from thermal_robot.diagnosis.numbered import numbered
-from thermal_robot.diagnosis.parts import Gap, Misfit, Refused, Rows, Unexplained
+from thermal_robot.diagnosis.parts import Finding, Gap, Misfit, Refused, Rows, Unexplained
 from thermal_robot.diagnosis.predictive import uncertainty
 from thermal_robot.diagnosis.random_findings import random_findings
 from thermal_robot.diagnosis.result import Diagnosis
-from thermal_robot.diagnosis.schemes import hardest, worst_folds
+from thermal_robot.diagnosis.schemes import hardest, harmed, worst_folds
 from thermal_robot.diagnosis.sensitivity import prior_sensitivity
 from thermal_robot.diagnosis.wanted import wanted
 from thermal_robot.diagnosis.where import locate
@@ -93,17 +94,17 @@ def answer(
     """
     fit, shrinkage, laws = numbered(last.fit, shrinkage, last.laws)
     last = replace(last, fit=fit, laws=laws)
-    campaign, remaining = fit.campaign, last.left.unexplained
+    campaign, remaining, gap = fit.campaign, last.left.unexplained, _gap(last, shrinkage)
     sensitivity = prior_sensitivity(fit)
     shares = {name: value for name, (value, _) in shrinkage.shares.items()}
     where, locations = locate(fit, shares)
     held = [effect.name for effect, _ in fit.effects]
-    systematic = findings(
-        fit, shrinkage.shares, locations, {d.law.name: d.probability for d in last.laws}, last.refused
-    )
+    of_laws = {d.law.name: d.probability for d in last.laws}
+    systematic = findings(fit, shrinkage.shares, locations, of_laws, last.refused)
     chance = [f for f in random_findings(fit, last.chance) if asked(f.name)]
-    found = by_share(titled((*systematic, *chance), (*candidates, *random_effects())))
-    groups, probability = separates(found), _probability(last)
+    known = (*candidates, *random_effects())
+    found, harms = _no_surer(by_share(titled((*systematic, *chance), known)), gap)
+    groups, probability = separates(found), _probability(last, gap)
     return Diagnosis(
         campaign=campaign.name,
         robot=campaign.robot.name,
@@ -112,7 +113,7 @@ def answer(
         measures=campaign.measures,
         joint_names=campaign.robot.joint_names,
         outliers=tuple(campaign.rows[fit.explanation.outliers].tolist()),
-        gap=_gap(last, shrinkage),
+        gap=gap,
         effects=found,
         where=where,
         unexplained=last.unexplained,
@@ -121,7 +122,7 @@ def answer(
         separates=groups,
         model=model_of(fit, None if last.misfit else last.left.floor),
         rows=_rows(fit, shrinkage),
-        warnings=(*campaign.warnings, *notes, *last.notes, *cautions(fit, last.refused, sensitivity)),
+        warnings=(*campaign.warnings, *notes, *harms, *last.notes, *cautions(fit, last.refused, sensitivity)),
         sensitivity=sensitivity,
         fit=fit,
         remaining=remaining,
@@ -133,10 +134,21 @@ def answer(
     )
 
 
-def _probability(last: Conclusion) -> float:
+def _probability(last: Conclusion, gap: Gap) -> float:
     """Return how probable exactly the effects of the fit are; with what was refused at work they are not all."""
     exactly = last.fit.probability_of_just({effect.name for effect, _ in last.fit.effects})
-    return min([exactly, *(1.0 - refused.probability for refused in last.refused.values() if not refused.place)])
+    exactly = min([exactly, *(1.0 - refused.probability for refused in last.refused.values() if not refused.place)])
+    return exactly if gap.worse is None else min(exactly, settings.SUREST_IF_WORSE)
+
+
+def _no_surer(found: tuple[Finding, ...], gap: Gap) -> tuple[tuple[Finding, ...], list[str]]:
+    """Cap the probabilities of what harms rows held out by session or region, and say why."""
+    if gap.worse is None:
+        return found, []
+    most = settings.SUREST_IF_WORSE
+    capped = (f if f.probability is None else replace(f, probability=min(f.probability, most)) for f in found)
+    note = f"the correction harms rows held out by {gap.worse.name}: no probability above {most:.0%} is told"
+    return tuple(capped), [note]
 
 
 def _gap(last: Conclusion, shrinkage: Shrinkage) -> Gap:
@@ -158,6 +170,7 @@ def _gap(last: Conclusion, shrinkage: Shrinkage) -> Gap:
         rms(after[:, 3:]) if turned else None,
         schemes,
         hardest(schemes, shrinkage.overall),
+        harmed(schemes),
     )
 
 

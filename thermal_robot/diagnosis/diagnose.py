@@ -26,14 +26,16 @@ from thermal_robot.diagnosis.growing.settings import KEPT
 from thermal_robot.diagnosis.growing.updated import ready
 from thermal_robot.diagnosis.held_out import held_out
 from thermal_robot.diagnosis.in_full import in_full
+from thermal_robot.diagnosis.not_executed import not_executed
 from thermal_robot.diagnosis.result import Diagnosis, told
 from thermal_robot.diagnosis.rippled import rippled
 from thermal_robot.diagnosis.schemes import worse_elsewhere
 from thermal_robot.diagnosis.signs import as_counted
-from thermal_robot.diagnosis.unlisted import as_laws_say, one_more_law
+from thermal_robot.diagnosis.unlisted import as_laws_say, eventful, one_more_law
 from thermal_robot.diagnosis.where import without_laws
 from thermal_robot.diagnosis.word import worth_their_word
 from thermal_robot.effects import RANDOM, Effect, choose, library
+from thermal_robot.effects.law import PREFIX
 from thermal_robot.errors import CampaignError, EstimationError, require
 from thermal_robot.inference import settings
 from thermal_robot.inference.discover import discovered
@@ -108,6 +110,8 @@ def diagnose(
     if campaign.position is None or not campaign.samples:
         raise CampaignError(campaign.name, "nothing was measured", expected="a campaign with measured positions")
     campaign, notes = usable(campaign)
+    campaign, left = not_executed(campaign)
+    notes += left
     # matrices are small: threads that wait for each other cost several times what they bring, and the last bits
     with threadpool_limits(1), solvable(campaign):
         last = _concluded(campaign, candidates, effects, progress)
@@ -169,14 +173,15 @@ def _concluded(
 def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
     """Let laws that nobody wrote down compete with the known effects, then ask what of the rest is random.
 
+    Events come first: what happened once, from one row to another, is no error of the robot.
     One law after another joins the explanation, while each is worth its place and regions held out do not get worse.
     Of effects that cancel each other one is kept; one of a size that no robot reaches is not.
     """
-    known, cancelled = credible(in_full(rippled(known, progress), progress), progress)
-    stages = [known]
+    known, cancelled = credible(in_full(rippled(eventful(known, progress), progress), progress), progress)
+    stages, happened = [known], sum(name.startswith(PREFIX) for name in known.variants)
     most = settings.MOST_LAWS if known.campaign.samples < settings.MANY_ROWS else 1
     while len(stages) <= most:
-        wider = one_more_law(stages[-1], len(stages), progress)
+        wider = one_more_law(stages[-1], happened + len(stages), progress)
         if wider is None:
             break
         stages.append(wider)

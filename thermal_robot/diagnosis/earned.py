@@ -10,7 +10,7 @@ from scipy.special import stdtrit
 
 from thermal_robot.diagnosis.one_walk import Model, Walk
 from thermal_robot.diagnosis.schemes import schemes
-from thermal_robot.effects.law import Discovered
+from thermal_robot.effects.law_words import is_event
 from thermal_robot.inference import settings
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.rows import blocks
@@ -71,7 +71,8 @@ def earned(fit: Fit) -> dict[str, Earned]:
 
     An extrapolation to the coldest rows or to a region asks more than most true effects can give: their lower bound
     there is not above zero in one case of twenty (twice the noise, 75 rows). It therefore only refuses what does harm.
-    A law with a level for each session says nothing of a session that is held out, and is not asked.
+    An event says nothing of rows held out with all that it did, as a session or the warmest rows, and is asked in
+    blocks of consecutive rows alone.
 
     Returns
     -------
@@ -92,7 +93,7 @@ def earned(fit: Fit) -> dict[str, Earned]:
         noise = model.whitening.sigma(number)
         left = walk.residuals(every)[judged] / noise
         for k, (effect, _) in enumerate(fit.effects):
-            if isinstance(effect, Discovered) and effect.shape == "levels" and effect.quantity == name:
+            if name != "time" and is_event(effect):
                 continue
             without = walk.residuals([b for b in every if b != k])[judged] / noise
             found[effect.name].append(_gained(name, left, without - left, block[number]))

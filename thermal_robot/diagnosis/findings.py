@@ -12,7 +12,7 @@ from thermal_robot.diagnosis.rivals import rivals, unknown_frames, within_frames
 from thermal_robot.effects import Effect
 from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.effects.law_size import Size, in_joints, sizes
-from thermal_robot.effects.law_words import called, usually
+from thermal_robot.effects.law_words import called, event, usually
 from thermal_robot.inference.fit import Fit
 
 Shares = dict[str, tuple[float, tuple[float, float]]]
@@ -81,13 +81,15 @@ def findings(
 def _of_law(fit: Fit, law: Discovered, block: int) -> dict[str, Any]:
     """Return the fields of a finding that only a law has: what it follows, in which shape, how far, and in words."""
     e, values = fit.explanation, fitted_values(fit, block)
+    size = sizes(law, fit.nominal, values, e.values[block][1])
+    short, whole = event(law, fit.nominal, size)
     return {
         "quantity": law.follows,
         "shape": law.shape,
-        "describes": law.describe(),
+        "describes": whole or law.describe(),
         "of": law.of or None,
-        "title": called(law),
-        "size": sizes(law, fit.nominal, values, e.values[block][1]),
+        "title": short or called(law),
+        "size": size,
         "usually": usually(law, fit.campaign.robot.joint_names) or None,
     }
 

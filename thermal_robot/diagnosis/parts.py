@@ -235,7 +235,7 @@ class Gap:
     """Rms distances in m over the rows that are not outliers; of orientation in rad, ``None`` if not measured.
 
     ``schemes`` are other ways of holding rows out, the hardest first; ``hardest`` is the first of them where it leaves
-    clearly more than ``held_out`` does, else ``None``.
+    clearly more than ``held_out`` does, ``worse`` that by session or region where the correction harms; else ``None``.
     """
 
     rms_before: float
@@ -247,6 +247,7 @@ class Gap:
     orientation_after: float | None = None
     schemes: tuple[FoldScheme, ...] = ()
     hardest: FoldScheme | None = None
+    worse: FoldScheme | None = None
 
     @property
     def noise_known(self) -> bool:

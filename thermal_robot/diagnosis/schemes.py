@@ -16,8 +16,11 @@ from numpy.typing import NDArray
 from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis.one_walk import Model, Walk, deviation
 from thermal_robot.diagnosis.parts import FoldScheme, HeldOut
+from thermal_robot.effects.law_words import is_event
 from thermal_robot.inference import settings
+from thermal_robot.inference.columns import block
 from thermal_robot.inference.fit import Fit
+from thermal_robot.inference.problem import Linear
 from thermal_robot.inference.rows import blocks, each, neighbourhoods
 
 Array = NDArray[np.float64]
@@ -43,13 +46,39 @@ def worst_folds(fit: Fit) -> tuple[FoldScheme, ...]:
     """
     model = Model.of(fit.explanation, blocks(fit.campaign))
     plain = model.bare(fit.before)
-    found = [_judged(plain, model, *scheme) for scheme in schemes(fit)]
+    known = events_known(fit, plain, model)
+    apart = {"time": (plain, model)}
+    found = [_judged(*apart.get(name, known), name, words, tests) for name, words, tests in schemes(fit)]
     return tuple(sorted((f for f in found if f is not None), key=lambda f: -f.rms_after))
+
+
+def events_known(fit: Fit, plain: Model, model: Model) -> tuple[Model, Model]:
+    """Return the models of the frames alone and of a fit once what its events moved is taken out of the gap.
+
+    What stands elsewhere in a session is not told by the others, nor what stood elsewhere in all rows of a region:
+    whether the rest carries over to these can be asked only where that is known, as by registering anew.
+    """
+    e, held = fit.explanation, list(zip(fit.explanation.best.blocks, fit.effects, strict=True))
+    events = [(b, effect) for b, (effect, _) in held if is_event(effect)]
+    if not events:
+        return plain, model
+    before = fit.before.gap - sum(block(fit.nominal, effect).columns @ e.values[b][0] for b, effect in events)
+    after = e.linear.gap - sum(e.linear.contribution(b, e.values[b][0]) for b, _ in events)
+    rest = [k for k, (_, (effect, _)) in enumerate(held) if not is_event(effect)]
+    linear = Linear(after, e.linear.frames, tuple(model.linear.blocks[k] for k in rest))
+    bare = Linear(before, plain.linear.frames, ())
+    scales = tuple(model.scales[k] for k in rest)
+    return replace(plain, linear=bare, seen={}), replace(model, linear=linear, scales=scales, seen={})
 
 
 def hardest(schemes: Sequence[FoldScheme], average: HeldOut) -> FoldScheme | None:
     """Return the least favourable scheme where it leaves clearly more than the average; ``None`` where it does not."""
     return next((s for s in schemes[:1] if s.rms_after > settings.HARDER * average.rms_after), None)
+
+
+def harmed(schemes: Sequence[FoldScheme]) -> FoldScheme | None:
+    """Return the way of holding out by session or region that the correction harms; ``None`` where there is none."""
+    return next((s for s in schemes if s.name in ("session", "region") and s.shrinkage < 0.0), None)
 
 
 def worse_elsewhere(narrow: Fit, wider: Fit) -> bool:
@@ -58,10 +87,10 @@ def worse_elsewhere(narrow: Fit, wider: Fit) -> bool:
     It then overfits: large contributions cancel where poses were measured and not between them.
     """
     kept = ~(narrow.explanation.outliers | wider.explanation.outliers)
-    block, tests = blocks(narrow.campaign), each(neighbourhoods(narrow.campaign, settings.FOLDS))
+    rows, tests = blocks(narrow.campaign), each(neighbourhoods(narrow.campaign, settings.FOLDS))
     left = []
     for fit in (narrow, wider):
-        walk = Walk.over(replace(Model.of(fit.explanation, block), kept=kept), tests)
+        walk = Walk.over(replace(Model.of(fit.explanation, rows), kept=kept), tests)
         if not walk.tests:
             return False
         left.append(walk.squares(range(len(fit.effects))).total / walk.rows)

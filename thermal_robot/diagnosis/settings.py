@@ -37,3 +37,6 @@ NEARLY_ALL = 2.576
 UNSETTLED = 1.5
 """Times what the linear model leaves: an exact one that leaves more is another model. They agree to a thousandth where
 errors are those of robots."""
+SUREST_IF_WORSE = 0.9
+"""Probability above which nothing is told of a correction that harms rows held out by session or region: what does not
+carry over may be no cause."""

@@ -11,6 +11,7 @@ from thermal_robot.diagnosis.earned import Earned, earned
 from thermal_robot.diagnosis.held_out import held_out
 from thermal_robot.diagnosis.parts import Refused
 from thermal_robot.effects.law import PREFIX
+from thermal_robot.effects.law_words import is_event
 from thermal_robot.inference import settings
 from thermal_robot.inference.explain import log_odds
 from thermal_robot.inference.fit import Fit, less
@@ -20,8 +21,8 @@ def worth_their_word(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, di
     """Take effects and laws out of a fit one after another, the worst first, until all that stay earn their word.
 
     A law stays if it predicts rows held out better (:func:`~thermal_robot.diagnosis.earned.earned`) and the interval of
-    its share is above zero, a known effect unless it predicts them worse, or is less than nine times as probable as
-    nothing in its place.
+    its share is above zero, which is not asked of an event, as that shows in few blocks of rows. A known effect stays
+    unless it predicts them worse, or is less than nine times as probable as nothing in its place.
 
     Returns
     -------
@@ -34,11 +35,10 @@ def worth_their_word(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, di
     refused: dict[str, Refused] = {}
     while True:
         judged = {name: e for name, e in earned(fit).items() if e.harms or (name.startswith(PREFIX) and not e.helps)}
-        if not judged and any(effect.name.startswith(PREFIX) for effect, _ in fit.effects):
+        laws = {law.name for law, _ in fit.effects if law.name.startswith(PREFIX) and not is_event(law)}
+        if not judged and laws:
             shares = held_out(fit).shares
-            judged = {
-                name: e for name, e in earned(fit).items() if name.startswith(PREFIX) and shares[name][1][0] <= 0.0
-            }
+            judged = {name: e for name, e in earned(fit).items() if name in laws and shares[name][1][0] <= 0.0}
         faint = {} if judged else in_question(fit)
         if not judged and not faint:
             return fit, refused

@@ -10,12 +10,16 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from thermal_robot.campaign.names import CLOCK
 from thermal_robot.effects.quantities import GRAVITY, REACH, TURN
 from thermal_robot.effects.shapes import SHAPES
 
 if TYPE_CHECKING:
     from thermal_robot.effects.law import Discovered
+    from thermal_robot.effects.law_size import Size
+    from thermal_robot.observations import Observations
 
 _LOAD = "something that yields to load"
 _SLIPS = "warming, or something that slips"
@@ -108,7 +112,8 @@ def kind_of(quantity: str, place: str, joints: Sequence[str]) -> str:
 
 def usually(law: Discovered, joints: Sequence[str]) -> str:
     """Say what a law of that place and that quantity usually is; empty where nobody can say."""
-    kinds = [kind_of(name, law.place, joints) for name in (law.quantity, law.by) if name]
+    names = ["session"] if is_event(law) else [law.quantity, law.by]  # what was set up anew, once or for a session
+    kinds = [kind_of(name, law.place, joints) for name in names if name]
     found = (USUALLY.get((law.kind, kind)) or USUALLY.get((_ANY, kind), "") for kind in kinds)
     return next((words for words in found if words), "")
 
@@ -134,3 +139,63 @@ def _follows(law: Discovered) -> str:
     if law.by:
         return f"{law.quantity} times {law.by}"
     return "its position" if law.kind == "joint" and law.quantity == law.place else law.quantity
+
+
+def is_event(law: object) -> bool:
+    """Tell whether a law is an event: base, tool or a joint's zero elsewhere from row to row, or in a session."""
+    from thermal_robot.effects.law import Discovered
+
+    if not isinstance(law, Discovered) or law.by or law.of or law.kind == "link":
+        return False
+    in_time = law.quantity in CLOCK and law.shape in ("step", "run")
+    return in_time or (law.quantity == "session" and law.shape in ("apart", "levels"))
+
+
+def event(law: Discovered, observations: Observations, sizes: Sequence[Size]) -> tuple[str, str]:
+    """Tell an event by the rows in which it shows: in a few words, and in a sentence without a full stop.
+
+    Parameters
+    ----------
+    law
+        A law.
+    observations
+        The rows that were measured.
+    sizes
+        How far it moved, as fitted.
+
+    Returns
+    -------
+    short, whole
+        Both empty for what is no event, for levels of more than one session, and where its rows do not follow each
+        other in the file: no row then tells when it was.
+    """
+    rows = law.at_rows(observations) if is_event(law) and law.shape != "levels" else None
+    there = np.zeros(0, dtype=bool) if rows is None else rows[0][:, 1] > 0.0
+    if law.shape == "step" and 2 * there.sum() > len(there):
+        there = ~there  # what was seldom is told
+    own = np.flatnonzero(there)
+    if rows is None or not len(own) or np.ptp(own) >= len(own):
+        return "", ""
+    numbers = observations.campaign.rows[own]
+    when, brief = f"in rows {numbers[0]} to {numbers[-1]}", f"in rows {numbers[0]}–{numbers[-1]}"
+    if law.shape == "step" and there[-1]:
+        when = brief = f"from row {numbers[0]} on"
+    if law.labels:
+        full = f"in session {law.labels[int(law.marks[0])]} ({when.removeprefix('in ')})"
+    else:
+        clock = np.asarray(law.values(observations))[own]
+        until = "" if brief == when else f" to {clock[-1]:.4g}"
+        full = f"{when} ({law.quantity} {clock[0]:.4g}{until}{' ' * bool(law.unit)}{law.unit})"
+    far = " and ".join(_amount(s.value, s.unit) for s in sizes if s.value > 2.0 * s.std) or "a little"
+    first = far.split(" and ")[0]
+    if law.kind == "joint":
+        return f"{law.place} {first} off {brief}", f"{full} {law.place} counts from a zero {far} off"
+    if law.kind == "base":
+        return f"the base {first} off {brief}", f"{full} the base or the instrument stands {far} elsewhere"
+    return f"the target {first} off {brief}", f"{full} the target sits {far} elsewhere on the tool"
+
+
+def _amount(value: float, unit: str) -> str:
+    """Return a length or an angle in thousandths of its unit, or millionths where it is small."""
+    factor, prefix = (1e3, "m") if value >= 1e-4 else (1e6, "µ")
+    return f"{factor * value:.2g} {prefix}{unit}" if value < 0.1 else f"{value:.2g} {unit}"

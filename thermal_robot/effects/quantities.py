@@ -68,7 +68,8 @@ def quantity(observations: Observations, name: str) -> Array | None:
     if name.startswith(TURN):
         return observations.campaign.since_turn.get(name.removeprefix(TURN))
     if name == "order":
-        return np.arange(observations.campaign.samples, dtype=float)
+        # the place in the file, which rows that are left out do not change
+        return np.asarray(observations.campaign.rows - 2, dtype=float)
     labels = observations.campaign.labels.get(name)
     if labels is None or len(set(labels.tolist())) < 2:
         return None

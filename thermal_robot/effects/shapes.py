@@ -7,6 +7,7 @@ constant   1
 ramp       1, u
 quadratic  1, u, u²
 step       x ≤ m, x > m                                            where it steps
+run        outside, m₁ < x < m₂                                    where it begins and ends
 slide      ½ (1 ∓ tanh((x − m) / w))                               middle, width
 hinge      1, max(x − m, 0) / span, or on the other side           where it bends, side ±1
 bump       1, exp(−½ ((x − m) / w)²)                               middle, width
@@ -101,6 +102,11 @@ def _step(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Arr
     return np.column_stack([~late, late]).astype(float)
 
 
+def _run(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
+    inside = (x > marks[0]) & (x < marks[1])
+    return np.column_stack([~inside, inside]).astype(float)
+
+
 def _slide(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
     middle, width = marks
     late = 0.5 * (1.0 + np.tanh((x - middle) / width))
@@ -163,6 +169,7 @@ SHAPES: dict[str, Shape] = {
     "ramp": Shape(_ramp, ("at the start", "rise over the campaign"), "in proportion", runs_on=True),
     "quadratic": Shape(_quadratic, ("constant", "linear", "quadratic"), "quadratic", runs_on=True),
     "step": Shape(_step, ("before", "after"), "a step at {mark}", "sudden", size="step", noun="a step"),
+    "run": Shape(_run, ("elsewhere", "there"), "another value for a while", size="step", noun="a step"),
     "slide": Shape(
         _slide, ("before", "after"), "a smooth step at {mark}", "gradual", width=True, size="step", noun="a step"
     ),

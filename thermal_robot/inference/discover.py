@@ -15,6 +15,7 @@ from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import orthonormal, without
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.discrepancy import forms
+from thermal_robot.inference.events import events
 from thermal_robot.inference.explain import explain, log_priors
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.problem import Linear
@@ -49,7 +50,7 @@ class Discovery:
     quantities: tuple[tuple[str, float], ...]
 
 
-def candidates(fit: Fit, number: int) -> tuple[Discovered, ...]:
+def candidates(fit: Fit, number: int, happened: Sequence[Discovered] | None = None) -> tuple[Discovered, ...]:
     """Return the laws that may be worth their place, best first.
 
     Several remainders are scanned: that of the explanation, and unless one effect leaves but noise, that of the laws
@@ -62,6 +63,8 @@ def candidates(fit: Fit, number: int) -> tuple[Discovered, ...]:
         An explanation.
     number
         Of the law: it is called ``discovered.<number>``.
+    happened
+        Events that may have happened, which come first; they are looked for where absent.
     """
     thin = Thin.of(fit)
     remainders = list(dict.fromkeys(_remainders(fit)))
@@ -70,7 +73,7 @@ def candidates(fit: Fit, number: int) -> tuple[Discovered, ...]:
         targets += [thin.target(blocks, sound=True) for blocks in remainders[:2]]
     found, _ = scan(thin.observations, targets, [effect for own in fit.variants.values() for effect in own[:1]])
     offered = [_offered(thin, target, own) for target, own in zip(targets, found, strict=True)]
-    chosen: list[Discovered] = []
+    chosen = list((events(fit) if happened is None else happened)[: settings.LIKELY_EVENTS])
     for k in range(max(map(len, offered), default=0)):  # the first of each remainder, in turn
         chosen += [own[k] for own in offered if k < len(own)]
     named = dict.fromkeys(replace(law, name=f"{PREFIX}{number}") for law in chosen)

@@ -57,10 +57,9 @@ ROUNDING = 1e-9
 UNSEEN, ALIAS = 1e-12, 1e-6
 """m and rad: what an expected size moves by less is rounding. Of a column's length: where less is left of it once
 others are projected out, it is an exact alias of them."""
-TINY = 1e-300
-"""Keeps a quotient of nothing from being infinite."""
-BETTER = 1e-9
-"""Log evidence, natural logarithm: a smaller difference makes no explanation better than another."""
+TINY, BETTER = 1e-300, 1e-9
+"""Keeps a quotient of nothing from being infinite; and log evidence, natural logarithm: a smaller difference makes no
+explanation better than another."""
 SAME_COMMAND = 1e-6
 """rad or m: commands nearer than this repeat each other; controllers print fewer digits."""
 
@@ -186,10 +185,8 @@ CONTAINS = 25.0
 
 # --- laws that nobody wrote down ---
 
-KNOTS = 5
-"""Of a smooth law: five suffice for most (Harrell 2001)."""
-FEW_LEVELS = 6
-"""A quantity with no more values than this is one of levels."""
+KNOTS, FEW_LEVELS = 5, 6
+"""Of a smooth law: five suffice for most (Harrell 2001). A quantity with no more values than this is one of levels."""
 OUTER_KNOTS = 0.02
 """Quantile of the outer knots: beyond it, a few rows alone would bend the law."""
 NARROW_KNOTS = 0.2
@@ -206,12 +203,9 @@ COARSER = 3.0
 """Nats that a law of the clock must gain beyond one of the sessions at its place, 20 to 1: else these say enough."""
 LINK_QUANTITIES = 6
 """A segment has six components: only so many quantities that speak elsewhere are tried there."""
-SHAPED = 6
-"""Candidates of each remainder whose shape is looked at."""
-LEFT_OUT = 4
-"""Effects of an explanation, up to which a law is looked for in the remainder without each of them."""
-COMPARED_LAWS = 8
-"""Candidates that are compared jointly with the known effects."""
+SHAPED, LEFT_OUT, COMPARED_LAWS = 6, 4, 8
+"""Candidates of each remainder whose shape is looked at; effects of an explanation, up to which a law is looked for in
+the remainder without each of them; and candidates that are compared jointly with the known effects."""
 MOST_LAWS = 4
 """Laws of one campaign: a fifth no longer helps anybody to find the cause."""
 FEWEST_LEFT = 5
@@ -246,10 +240,8 @@ RELAXED_WITHIN = (0.02, 0.06, 0.2)
 """Of the campaign's time: time constants from which a joint that relaxes after each start is refined; 3 times apart."""
 SPLINE_FLOOR = 1e-8
 """Of the largest singular value: functions of a quantity below it are no functions of their own."""
-NAMED = 5
-"""Places, and quantities, that are listed of a remainder."""
-LIKELY_PLACE = 0.01
-"""Probability of a place below which it is not listed."""
+NAMED, LIKELY_PLACE = 5, 0.01
+"""Places, and quantities, that are listed of a remainder; and the probability of a place below which it is not."""
 WORSE_ELSEWHERE = 1.05
 """Times the rms in regions held out: an explanation that leaves more goes astray between the poses measured."""
 
@@ -277,10 +269,17 @@ SPOILT = 0.03
 """Of all rows: as many an instrument spoils where its noise is clean; a tracker's lost beams are fewer."""
 HEAVY_SIGMAS = 4.0
 """Standard deviations of chance by which a kurtosis must exceed the normal one to speak of heavy tails."""
-FEWEST_ASIDE = 3
-"""Rows set aside below which nothing can be said of what they have in common: two are always side by side."""
-ASIDE_MARKS = 24
-"""Of the rows set aside, between whose values ranges are tried: a twentieth of them is not missed."""
+FEWEST_ASIDE, ASIDE_MARKS = 3, 24
+"""Rows set aside below which nothing can be said of what they have in common, as two are always side by side; and of
+those set aside, between whose values ranges are tried: a twentieth of them is not missed."""
+
+FEWEST_WITH_EVENTS, EVENT_MARKS, EVENT_CARRYING, LIKELY_EVENTS = 20, 32, 0.2, 3
+"""Rows of a campaign, of fewer of which a part says nothing by itself; marks, spread evenly, between which runs are
+looked for first; the share of an event's rows, the farthest off, without which the others must still speak for it; and
+places of an event, the likeliest ones, that are compared."""
+NEAR_IN_ORDER = 5
+"""Rows before and behind one set aside among which others count as near: of gross errors at 3 %, two more are there
+once in twenty-five."""
 
 # --- scatter ---
 

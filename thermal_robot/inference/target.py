@@ -194,13 +194,13 @@ class Seat:
         inside = seen.transpose(0, 1, 3, 2).reshape(laws, r, k * d)
         gram = whole - inside.transpose(0, 2, 1) @ inside
         vector = (functions.transpose(0, 2, 1) @ self.remainder).reshape(laws, k * d)
-        explained, rank = _explained(gram, vector, np.einsum("cii->ci", whole))
+        explained, rank = explained_by(gram, vector, np.einsum("cii->ci", whole))
         rest = np.maximum(self.total - explained, settings.TINY)
         gain = 0.5 * self.freedom * np.log(self.total / rest) - 0.5 * rank * np.log(self.freedom)
         return np.where((rank == 0) | (self.freedom - rank < settings.FEWEST_LEFT), -np.inf, gain)
 
 
-def _explained(gram: Array, vector: Array, whole: Array) -> tuple[Array, Array]:
+def explained_by(gram: Array, vector: Array, whole: Array) -> tuple[Array, Array]:
     """(C,) sums of squares that columns explain, and their ranks, from (C, K, K), (C, K) and squared lengths (C, K)."""
     own = np.einsum("cii->ci", gram)
     # what is left of an exact alias of the design is rounding, no column

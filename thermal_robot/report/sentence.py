@@ -64,10 +64,11 @@ def _wordings(diagnosis: Diagnosis) -> Iterator[str]:
         yield f"The gap of {size} is scatter: {names} ({_sure(diagnosis)}){rest}; no correction removes scatter."
     else:
         first, rivals = (_MOST_CAUSES, 2, 1), (True, False)
+        worse, the = _worse(diagnosis), "the" if diagnosis.gap.worse else "The"
         for most, beside in product(first, rivals):
             names = _causes(diagnosis, causes, most, beside)
             for told in _how_far(diagnosis, remaining, len(causes) > 1):
-                yield f"The gap of {size} comes from {names} ({_sure(diagnosis)}); {told}."
+                yield f"{worse}{the} gap of {size} comes from {names} ({_sure(diagnosis)}); {told}."
 
 
 def systematic(diagnosis: Diagnosis) -> list[Finding]:
@@ -89,6 +90,15 @@ def unnamed(diagnosis: Diagnosis) -> list[Finding]:
     """Return the causes that the headline counts without naming them."""
     text = headline(diagnosis)
     return [f for f in systematic(diagnosis) if _name(diagnosis, f) not in text]
+
+
+def _worse(diagnosis: Diagnosis) -> str:
+    """Begin with where the correction does harm: of another session or region the rest is not to be believed."""
+    scheme = diagnosis.gap.worse
+    if scheme is None:
+        return ""
+    pair = f"{length(scheme.rms_after)} with it, {length(scheme.rms_before)} without"
+    return f"Correcting harms rows held out by {scheme.name} ({pair}): "
 
 
 def _misfit(misfit: Misfit, reach: float) -> str:
@@ -162,7 +172,9 @@ def _how_far(diagnosis: Diagnosis, remaining: Unexplained, several: bool) -> Ite
         yield f"correcting harms held-out data: {pair}"
         return
     leaves, hard = length(held.rms_after), ""
-    if gap.hardest is not None and gap.hardest.shrinkage < 0.0:
+    if gap.worse is not None:
+        hard = ""  # said first
+    elif gap.hardest is not None and gap.hardest.shrinkage < 0.0:
         hard = f"; but it harms rows held out by {gap.hardest.name}"
     elif gap.hardest is not None:
         hard = f"; held out by {gap.hardest.name}, {length(gap.hardest.rms_after)}"

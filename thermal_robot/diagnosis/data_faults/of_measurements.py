@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from thermal_robot.campaign.units import LENGTH_UNITS
 from thermal_robot.diagnosis.data_faults.kind import Kind, Repair
 from thermal_robot.diagnosis.data_faults.readings import Readings, Rows
-from thermal_robot.diagnosis.data_faults.settings import ALIKE, FARTHEST, INCHES, METRIC
+from thermal_robot.diagnosis.data_faults.settings import ALIKE, INCHES, LARGEST_VOLUME, METRIC
 
 Array = NDArray[np.float64]
 
@@ -41,7 +41,7 @@ def _sizes(steps: tuple[float, ...]) -> Callable[[Readings], Iterator[tuple[str,
     """Propose factors; one that is no unit beside the declared one was applied twice, or where none was due."""
 
     def proposals(readings: Readings) -> Iterator[tuple[str, Repair]]:
-        if readings.spread() > FARTHEST:
+        if readings.spread() > LARGEST_VOLUME:
             return
         read = LENGTH_UNITS[readings.length_unit]
         for by in (sign for step in steps for sign in (step, 1.0 / step)):

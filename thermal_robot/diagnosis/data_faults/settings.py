@@ -66,7 +66,7 @@ METRIC, INCHES = (10.0, 100.0, 1e3, 1e6), (25.4, 2.54, 1.0 / 0.0254)
 """Times that lengths may be too small or too large: units of metres by each other, and inches by mm, cm and m."""
 ALIKE = 1e-9
 """Relative difference up to which two factors are one."""
-FARTHEST = 100.0
+LARGEST_VOLUME = 100.0
 """m: the arm's volume above which it is the robot's lengths that are wrong, and no unit of the table is tried."""
 KUKA_JOINTS, KUKA_REVERSED = 6, [0, 3, 5]
 """Of an arm's joints those that a KUKA counts against the usual direction."""
@@ -135,3 +135,7 @@ HAND_JOINTS, ENDS = 6, 6
 """Joints that a robot at hand may have beside those of the chain, a gripper's; and ends of an arm: those of a hand."""
 LIKE_ANOTHER = 0.9
 """Times what a robot at hand leaves, above which another one is like it: the same arm with other limits, or a hand."""
+SAME_PLACE, MOST_BEHIND = 3.0, 0.1
+"""Times the median gap within which measured places are one: the instrument alone scatters less, and two commands that
+are far apart are never so near by chance. And the share of the rows up to which some that follow each other may be left
+out as measured a command too early or too late: of more the table is to be paired anew."""
