@@ -57,7 +57,24 @@ def uncertainty(fit: Fit, needs: tuple[str, ...], floor: float) -> Spread:
     noise = np.sqrt(np.maximum(total**2 - beyond**2, 0.0)) / share
     e = fit.explanation
     expected = [e.linear.blocks[b].sizes * e.best.scales[b] for b in e.best.blocks]
-    return Spread(covariance, beyond, noise, ranges, wider, np.concatenate([*expected, np.zeros(0)]))
+    prior, session = np.concatenate([*expected, np.zeros(0)]), campaign.labels.get("session")
+    levels = {} if session is None else {"session": tuple(np.unique(session).tolist())}
+    return Spread(covariance, beyond, noise, ranges, wider, prior, levels, _between(fit, session))
+
+
+def _between(fit: Fit, session: Array | None) -> Array | None:
+    """(3,) one sigma per axis by which sessions differ in what is left, measurement frame, m; ``None`` for one session.
+
+    The variance of their means less what the rows of each make it by chance.
+    """
+    kept = ~fit.explanation.outliers
+    left = fit.corrected.gap[kept, :3] @ fit.corrected.frames.base[:3, :3].T
+    runs = [] if session is None else [left[session[kept] == run] for run in np.unique(session[kept])]
+    runs = [run for run in runs if len(run) > 1]
+    if len(runs) < 2:
+        return None
+    chance = np.mean([run.var(axis=0, ddof=1) / len(run) for run in runs], axis=0)
+    return np.asarray(np.sqrt(np.maximum(np.var([run.mean(axis=0) for run in runs], axis=0, ddof=1) - chance, 0.0)))
 
 
 def _quiet(campaign: Campaign, rows: NDArray[np.int64]) -> tuple[NDArray[np.bool_], float]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from textwrap import fill
@@ -29,6 +30,7 @@ from thermal_robot.effects.effect import (
     at_tool,
     in_words,
 )
+from thermal_robot.effects.fading import Fading, ends, left_at
 from thermal_robot.effects.quantities import TURN, driving, quantity, strains, unit
 from thermal_robot.effects.shapes import SHAPES
 from thermal_robot.schema import word
@@ -41,7 +43,7 @@ _COMPONENTS = ("along x", "along y", "along z", "about x", "about y", "about z")
 
 
 @dataclass(frozen=True)
-class Discovered(Effect):
+class Discovered(Fading):
     """An error enters at one place and follows one quantity x by a law f(x) = Σ_k c_k φ_k(x).
 
     The functions φ_k belong to its shape (:mod:`thermal_robot.effects.shapes`). In a joint f is an angle (or a
@@ -80,12 +82,11 @@ class Discovered(Effect):
         Name of the known effect that changes with the quantity, and its arguments as JSON text; empty where none does.
     tried
         Among how many laws it was picked.
-    found
-        Least and largest value of what it follows, and of the second quantity, where it was found; empty for no matter.
     """
 
     title: ClassVar[str] = "an unlisted law"
     size_spread: ClassVar[float] = UNSOURCED
+    size_most: ClassVar[float] = settings.LAW_MOST
     name: str = PREFIX + "1"  # type: ignore[misc]
     kind: Annotated[str, word(("joint", "link", "base", "tool"))] = "joint"
     place: str = ""
@@ -105,7 +106,6 @@ class Discovered(Effect):
     of: str = ""
     of_arguments: str = "{}"
     tried: Count = 1.0
-    found: tuple[float, ...] = ()
 
     @property
     def share(self) -> float:
@@ -154,17 +154,18 @@ class Discovered(Effect):
         if of == "strains":
             return strains(observations, self.quantity.removeprefix(TURN), self.marks)
         since, run = self._since_start(observations, clock)
-        return (
-            since[:, None]
-            if of == "run"
-            else np.where(run[:, None] == np.arange(len(self.runs)), since[:, None], np.inf)
-        )
+        if of == "run":
+            return since[:, None]
+        new = run[:, None] < 0
+        # of a session that was not there it starts with the mean of all: exp(−ln R) = 1 / R
+        since = since[:, None] + new * abs(self.marks[0]) * np.log(len(self.runs))
+        return np.where((run[:, None] == np.arange(len(self.runs))) | new, since, np.inf)
 
     def _since_start(self, observations: Observations, clock: Array) -> tuple[Array, NDArray[np.int64]]:
         """(N,) time since the row's session began, and the number of that session.
 
-        A session that was not there began with the first of its rows, and is taken for the last; a row of none belongs
-        to the last that had begun.
+        A session that was not there began with the first of its rows, and has the number −1; a row of none belongs to
+        the last that had begun.
         """
         starts, rows = np.array(self.starts), observations.campaign.labels.get("session")
         run = np.clip(np.searchsorted(np.sort(starts), clock, side="right") - 1, 0, len(starts) - 1)
@@ -173,7 +174,7 @@ class Discovered(Effect):
         for label in np.unique(rows) if rows is not None and self.runs else ():
             own = rows == label
             known = label in self.runs
-            run[own] = self.runs.index(label) if known else int(starts.argmax())
+            run[own] = self.runs.index(label) if known else -1
             began[own] = starts[run[own]] if known else clock[own].min()
         return np.maximum(clock - began, 0.0), run
 
@@ -181,10 +182,10 @@ class Discovered(Effect):
         campaign = observations.campaign
         if self.shape == "constant":
             return np.zeros(campaign.samples)
-        if self.labels and self.quantity in campaign.labels:
+        if self.labels and (self.quantity in campaign.labels or campaign.position is None):
             number = {label: float(k) for k, label in enumerate(self.labels)}
-            # of a session that was not there nothing is known: it is taken for the last
-            return np.array([number.get(label, len(self.labels) - 1.0) for label in campaign.labels[self.quantity]])
+            rows = campaign.labels.get(self.quantity, np.full(campaign.samples, ""))
+            return np.array([number.get(label, np.nan) for label in rows])
         if self.quantity == "order" and self.quantity not in observations.covariates and campaign.position is None:
             # what is to be predicted without a clock comes after the campaign
             return np.full(campaign.samples, self.origin + self.span)
@@ -205,45 +206,61 @@ class Discovered(Effect):
         return shape.functions(values, self.marks, self.origin, self.span), labels
 
     def at_rows(self, observations: Observations) -> tuple[Array, tuple[str, ...]] | None:
-        """Return the (N, K) functions at the rows, and a name for each; ``None`` where the campaign cannot tell."""
+        """Return the (N, K) functions at the rows, and a name for each; ``None`` where the campaign cannot tell.
+
+        At a label that was not there they are the mean of those at the others.
+        """
         if (values := self._followed(observations)) is None:
             return None
-        ends = self.found if SHAPES[self.shape].runs_on else ()
-        functions, labels = self.functions(np.clip(values, ends[0], ends[1]) if ends else values)
-        if (left := self.fading(observations)) is not None:
-            functions = functions * left[:, None]
-        if not self.by or self.shape == "product":
-            return functions, labels
-        if (second := quantity(observations, self.by)) is None:
+        second = quantity(observations, self.by) if self.by and self.shape != "product" else None
+        if self.by and self.shape != "product" and second is None:
             return None
-        v = ((np.clip(second, ends[2], ends[3]) if ends else second) - self.by_origin) / self.by_span
-        return np.column_stack([functions, functions * v[:, None]]), (*labels, *(f"{n}, × {self.by}" for n in labels))
+        left, ranges = np.ones(observations.campaign.samples), list(zip(self.found[::2], self.found[1::2], strict=True))
+        for (name, driver), (low, high) in zip(self._driven(observations), ranges, strict=False):
+            # what has changed by the end of the campaign stays
+            left = left if name in CLOCK else left * left_at(driver, low, high)
+        if ranges and not self._goes_round(*ranges[0]):
+            values = np.clip(values, *ranges[0])
+        functions, labels = self.functions(values)
+        if self.labels and np.isnan(values).any():
+            functions[np.isnan(values)] = self.functions(np.arange(float(len(self.labels))))[0].mean(axis=0)
+        if second is not None:
+            v = ((np.clip(second, *ranges[1]) if ranges else second) - self.by_origin) / self.by_span
+            functions = np.column_stack([functions, functions * v[:, None]])
+            labels = (*labels, *(f"{name}, × {self.by}" for name in labels))
+        return self.faded(functions, left), labels
 
-    def _reads(self, observations: Observations) -> list[tuple[str, Array | None]]:
-        """Return the quantities that it runs on with, and their (N,) values."""
-        by = [(self.by, quantity(observations, self.by))] if self.by and self.shape != "product" else []
-        return [(self.quantity, self.values(observations)), *by]
+    def _goes_round(self, low: float, high: float) -> bool:
+        """Whether it is a wave that its range holds whole."""
+        return self.shape == "harmonic" and self.marks[0] * (high - low) >= 2.0 * np.pi
 
-    def delivered(self, observations: Observations) -> Discovered:
-        """Return the law with the range in which it was found."""
-        ends = [(float(v.min()), float(v.max())) for _, v in self._reads(observations) if v is not None]
-        return replace(self, found=tuple(end for pair in ends for end in pair)) if SHAPES[self.shape].runs_on else self
+    def _driven(self, observations: Observations) -> list[tuple[str, Array]]:
+        """Return what it ends with, by name: what it follows, the second quantity, and both where they go together.
 
-    def fading(self, observations: Observations) -> Array | None:
-        """Return (N,) how much of the law is left; ``None`` where its shape ends by itself, or no range is known.
-
-        Beyond where it was found, if it would run on and nobody knows that it does, it keeps the value of the edge, and
-        of that ever less, as a normal process of no mean does. What has changed by the end of the campaign stays.
+        Two that go one way in all rows say nothing of where they do not. Empty for a law that ends by itself.
         """
-        if not self.found or not SHAPES[self.shape].runs_on:
-            return None
-        left = np.ones(observations.campaign.samples)
-        for k, (name, values) in enumerate(self._reads(observations)):
-            low, high = self.found[2 * k : 2 * k + 2]
-            if values is not None and name not in CLOCK:
-                beyond = (values - np.clip(values, low, high)) / (settings.FADES * ((high - low) or 1.0))
-                left *= np.exp(-0.5 * beyond**2)
-        return np.maximum(left, settings.FADED)
+        first, values = self._first(observations), self.values(observations)
+        if self.labels or SHAPES[self.shape].of != "quantity" or self.shape == "constant" or first is None:
+            return []
+        second = quantity(observations, self.by) if self.by else None
+        if second is None or values is None:
+            return [(self.quantity, first)]
+        if self.shape == "product":
+            return [(self.quantity, values), (self.by, second), (self.quantity, first)]
+        u, v = (first - self.origin) / self.span, (second - self.by_origin) / self.by_span
+        both = self.quantity if self.quantity in CLOCK else self.by
+        return [(self.quantity, first), (self.by, second), (both, u + v), (both, u - v)]
+
+    def delivered(self, observations: Observations) -> Effect:
+        """Return the law with the range in which it was found, and the effect in it with its own."""
+        law, rows = self, self.at_rows(observations)
+        if self.modulated is not None:
+            kept = gate.arguments(gate.delivered(self.modulated, observations))
+            law = replace(self, of_arguments=json.dumps({k: v for k, v in kept.items() if k != "places"}))
+        if rows is None or not (driven := self._driven(observations)):
+            return law
+        means = tuple(rows[0].mean(axis=0).tolist())
+        return replace(law, found=tuple(end for _, values in driven for end in ends(values)), means=means)
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """Return one parameter a function and component; rad or m, or the unit of the effect in the law."""

@@ -1,0 +1,100 @@
+"""Effects that only a curve through measured rows tells: beyond these rows they fall back to their mean.
+
+A function of x, of mean m over the rows where it was found, is there what it is. At a distance d beyond the range of
+width r it is m + (f(x̂) − m) exp(−½ (d / (s r))²), x̂ the nearer end and s = :data:`settings.FADES`: continuous, never
+further from m than at the edge, and a hundredth of that at three s r. The mean stays: it is a constant error of the
+place, a zero or a frame, and what was fitted beside the function takes it for granted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from thermal_robot.effects import settings
+from thermal_robot.effects.effect import Array, Effect, Parameter, at_joint
+from thermal_robot.effects.quantities import unit
+
+if TYPE_CHECKING:
+    from thermal_robot.observations import Observations
+
+
+@dataclass(frozen=True)
+class Fading(Effect):
+    """An effect with the range that it was found in.
+
+    Attributes
+    ----------
+    found
+        Least and largest value of what drives it, where it was found; empty where it is to have no end.
+    means
+        Of each of its functions over the rows where it was found; zero where absent.
+    fades
+        Whether it fades beyond, or keeps the value of the edge.
+    """
+
+    found: tuple[float, ...] = field(default=(), kw_only=True)
+    means: tuple[float, ...] = field(default=(), kw_only=True)
+    fades: bool = field(default=True, kw_only=True)
+
+    def arguments(self) -> dict[str, Any]:
+        """Return the constructor's arguments, for saving; the range only where it has one."""
+        given = super().arguments()
+        return {k: v for k, v in given.items() if self.found or k not in ("found", "means", "fades")}
+
+    def unfaded(self) -> Effect:
+        """Return it as it keeps the value of the edge."""
+        return replace(self, fades=False) if self.found else self
+
+    def faded(self, functions: Array, left: Array) -> Array:
+        """(N, K) functions, of which so much (N,) or (N, K) is left of what they differ by from their means."""
+        means = np.array(self.means) if self.means else np.zeros(functions.shape[1])
+        return np.asarray(means + (functions - means) * left.reshape(len(functions), -1)) if self.fades else functions
+
+
+def ends(values: Array) -> tuple[float, float]:
+    """Return the least and the largest of (N,) values."""
+    return float(values.min()), float(values.max())
+
+
+def left_at(values: Array, low: float, high: float) -> Array:
+    """(N,) what is left of an effect at values of what drives it, found from one end to the other."""
+    beyond = (values - np.clip(values, low, high)) / (settings.FADES * ((high - low) or 1.0))
+    return np.asarray(np.exp(-0.5 * beyond**2))
+
+
+@dataclass(frozen=True)
+class Waves(Fading):
+    """Waves of the joints' own positions: a sine and a cosine of each order.
+
+    Where the range holds no whole wave it is a piece of a curve, and ends with the range; else it goes on as a wave
+    while it fades. One of a whole order that was seen in all of a turn is known everywhere.
+    """
+
+    def waves(self, observations: Observations, of: Sequence[tuple[str, float, str, float]]) -> tuple[Parameter, ...]:
+        """Return two amplitudes for each joint, order, words and expected size; rad, or m where it slides."""
+        robot, found = observations.robot, []
+        for k, (joint, order, words, size) in enumerate(of):
+            j, own = robot.joint_names.index(joint), unit(robot, joint)
+            x, left = observations.q[:, j], np.ones(len(observations.q))
+            if self.found:
+                low, high = self.found[2 * j : 2 * j + 2]
+                turns = (high - low) / (2.0 * np.pi)
+                if robot.joint_types[j] == "prismatic" or order % 1.0 or turns < 1.0:
+                    left = left_at(x, low, high)
+                x = x if turns * order >= 1.0 else np.clip(x, low, high)
+            functions = np.column_stack([np.sin(order * x), np.cos(order * x)])
+            part = replace(self, means=self.means[2 * k : 2 * k + 2])
+            for what, values in zip(("sine", "cosine"), part.faded(functions, left).T, strict=True):
+                label = f"{what}, order {order:.6g}{words}"
+                found.append(Parameter(label, own, size, "joint", joint, (at_joint(j, values),)))
+        return tuple(found)
+
+    def delivered(self, observations: Observations) -> Effect:
+        """Return the waves with the range of each joint, and the mean of each wave there."""
+        means = [float(np.mean(p.responses[0].values)) for p in replace(self, found=()).parameters(observations)]
+        found = [end for q in observations.q.T for end in ends(q)]
+        return replace(self, found=tuple(found), means=tuple(means))
