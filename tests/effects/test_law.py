@@ -387,15 +387,6 @@ def test_a_law_falls_back_to_its_mean_beyond_what_was_measured(rich, shape):
         assert np.ptp(kept) <= 1e-18  # what was given up is what the edge has beside the mean
 
 
-def test_a_wave_goes_on_as_a_wave_where_its_range_held_a_whole_one(rich):
-    law = replace(RAMP, quantity="wind", shape="harmonic", marks=(20.0,))
-    law = gate.delivered(law, carrying(rich, np.linspace(0.5, 1.5, SAMPLES)))
-    beyond = 1.5 + np.linspace(0.01, 0.2, 40)
-    found = sizes(rich, law, np.array([0.0, 1e-4, 0.0]), beyond)
-    assert (np.diff(np.sign(np.diff(found))) != 0).any()  # it turns, as no kept value does
-    assert np.abs(found).max() <= 1.2e-4
-
-
 @pytest.mark.parametrize("shape", ["ramp", "product"])
 def test_a_law_of_two_quantities_ends_where_they_no_longer_go_together(rich, shape):
     q = np.linspace(-0.4, 0.6, SAMPLES)[:, None]

@@ -60,7 +60,7 @@ class Drift(Fading):
     def elsewhere(self, observations: Observations) -> Drift:
         """Return it as it begins with that campaign, at the same rate."""
         clock = observations.clock
-        return self if clock is None else replace(self, origin=float(clock.min()))
+        return self if clock is None else replace(self, origin=float(clock.min()), found=())
 
     def delivered(self, observations: Observations) -> Effect:
         """Return it as it begins and ends with the campaign."""

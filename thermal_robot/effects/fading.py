@@ -67,34 +67,42 @@ def left_at(values: Array, low: float, high: float) -> Array:
 
 
 @dataclass(frozen=True)
-class Waves(Fading):
-    """Waves of the joints' own positions: a sine and a cosine of each order.
+class OfPosition(Fading):
+    """Functions of the joints' own positions: all that a joint has end together, as they may cancel in part.
 
-    Where the range holds no whole wave it is a piece of a curve, and ends with the range; else it goes on as a wave
-    while it fades. One of a whole order that was seen in all of a turn is known everywhere.
+    Over less than a turn a gain, slow waves and laws look alike, and only their sum is known. What has seen a whole
+    turn is known everywhere, if it comes back after a turn or is a gain; so is the gain of a joint that slides.
     """
+
+    def ended(self, observations: Observations, joint: int, order: float = 0.0) -> tuple[Array, Array]:
+        """Return (N,) positions at which functions of a joint are read, and what is left of them; order 0 is a gain."""
+        x, slides = observations.q[:, joint], observations.robot.joint_types[joint] == "prismatic"
+        if not self.found:
+            return x, np.ones(len(x))
+        low, high = self.found[2 * joint : 2 * joint + 2]
+        turns = (high - low) / (2.0 * np.pi)
+        if (slides and not order) or (not slides and turns >= 1.0 and not order % 1.0):
+            return x, np.ones(len(x))
+        return np.clip(x, low, high), left_at(x, low, high)
+
+    def elsewhere(self, observations: Observations) -> Effect:
+        """Return the functions without a range: another campaign has its own."""
+        return replace(self, found=(), means=())
 
     def waves(self, observations: Observations, of: Sequence[tuple[str, float, str, float]]) -> tuple[Parameter, ...]:
         """Return two amplitudes for each joint, order, words and expected size; rad, or m where it slides."""
         robot, found = observations.robot, []
         for k, (joint, order, words, size) in enumerate(of):
             j, own = robot.joint_names.index(joint), unit(robot, joint)
-            x, left = observations.q[:, j], np.ones(len(observations.q))
-            if self.found:
-                low, high = self.found[2 * j : 2 * j + 2]
-                turns = (high - low) / (2.0 * np.pi)
-                if robot.joint_types[j] == "prismatic" or order % 1.0 or turns < 1.0:
-                    left = left_at(x, low, high)
-                x = x if turns * order >= 1.0 else np.clip(x, low, high)
-            functions = np.column_stack([np.sin(order * x), np.cos(order * x)])
+            x, left = self.ended(observations, j, order)
             part = replace(self, means=self.means[2 * k : 2 * k + 2])
-            for what, values in zip(("sine", "cosine"), part.faded(functions, left).T, strict=True):
+            functions = part.faded(np.column_stack([np.sin(order * x), np.cos(order * x)]), left)
+            for what, values in zip(("sine", "cosine"), functions.T, strict=True):
                 label = f"{what}, order {order:.6g}{words}"
                 found.append(Parameter(label, own, size, "joint", joint, (at_joint(j, values),)))
         return tuple(found)
 
     def delivered(self, observations: Observations) -> Effect:
-        """Return the waves with the range of each joint, and the mean of each wave there."""
+        """Return the functions with the range of each joint, and the mean of each there."""
         means = [float(np.mean(p.responses[0].values)) for p in replace(self, found=()).parameters(observations)]
-        found = [end for q in observations.q.T for end in ends(q)]
-        return replace(self, found=tuple(found), means=tuple(means))
+        return replace(self, found=tuple(end for q in observations.q.T for end in ends(q)), means=tuple(means))

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 from thermal_robot.effects.arguments import Count, Positive
 from thermal_robot.effects.effect import Array, Driver, Effect, Parameter
-from thermal_robot.effects.fading import Waves
+from thermal_robot.effects.fading import OfPosition
 from thermal_robot.effects.quantities import position_of
 
 if TYPE_CHECKING:
@@ -21,7 +21,7 @@ _NEAR = 0.2  # orders: as near as a wave's peak tells an order, over a good part
 
 
 @dataclass(frozen=True)
-class JointRipple(Waves):
+class JointRipple(OfPosition):
     """A joint errs by waves of its own position: q_actual = q_command + Σ_k a_k sin(n_k q) + b_k cos(n_k q).
 
     Teeth, balls and the motor's own wheel come round n times in a turn of the joint; n need be no whole number. Strain

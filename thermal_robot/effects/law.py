@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pprint import pformat
 from textwrap import fill
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
@@ -187,8 +188,7 @@ class Discovered(Fading):
             rows = campaign.labels.get(self.quantity, np.full(campaign.samples, ""))
             return np.array([number.get(label, np.nan) for label in rows])
         if self.quantity == "order" and self.quantity not in observations.covariates and campaign.position is None:
-            # what is to be predicted without a clock comes after the campaign
-            return np.full(campaign.samples, self.origin + self.span)
+            return np.full(campaign.samples, self.origin + self.span)  # to be predicted: after the campaign
         return quantity(observations, self.quantity)
 
     def functions(self, values: Array) -> tuple[Array, tuple[str, ...]]:
@@ -210,16 +210,15 @@ class Discovered(Fading):
 
         At a label that was not there they are the mean of those at the others.
         """
-        if (values := self._followed(observations)) is None:
-            return None
-        second = quantity(observations, self.by) if self.by and self.shape != "product" else None
-        if self.by and self.shape != "product" and second is None:
+        values, two = self._followed(observations), bool(self.by) and self.shape != "product"
+        second = quantity(observations, self.by) if two else None
+        if values is None or (two and second is None):
             return None
         left, ranges = np.ones(observations.campaign.samples), list(zip(self.found[::2], self.found[1::2], strict=True))
         for (name, driver), (low, high) in zip(self._driven(observations), ranges, strict=False):
             # what has changed by the end of the campaign stays
             left = left if name in CLOCK else left * left_at(driver, low, high)
-        if ranges and not self._goes_round(*ranges[0]):
+        if ranges:
             values = np.clip(values, *ranges[0])
         functions, labels = self.functions(values)
         if self.labels and np.isnan(values).any():
@@ -230,15 +229,8 @@ class Discovered(Fading):
             labels = (*labels, *(f"{name}, × {self.by}" for name in labels))
         return self.faded(functions, left), labels
 
-    def _goes_round(self, low: float, high: float) -> bool:
-        """Whether it is a wave that its range holds whole."""
-        return self.shape == "harmonic" and self.marks[0] * (high - low) >= 2.0 * np.pi
-
     def _driven(self, observations: Observations) -> list[tuple[str, Array]]:
-        """Return what it ends with, by name: what it follows, the second quantity, and both where they go together.
-
-        Two that go one way in all rows say nothing of where they do not. Empty for a law that ends by itself.
-        """
+        """Return what it ends with, by name: what it follows, a second quantity, and how these two go together."""
         first, values = self._first(observations), self.values(observations)
         if self.labels or SHAPES[self.shape].of != "quantity" or self.shape == "constant" or first is None:
             return []
@@ -273,8 +265,7 @@ class Discovered(Fading):
             return tuple(_times(p, f, n) for f, n in zip(functions.T, labels, strict=True) for p in whole)
         found = []
         if self.kind == "joint":
-            j = robot.joint_names.index(self.place)
-            own = unit(robot, self.place)
+            j, own = robot.joint_names.index(self.place), unit(robot, self.place)
             for function, label in zip(functions.T, labels, strict=True):
                 found.append(Parameter(label, own, 3e-4, "joint", self.place, (at_joint(j, function),)))
             return tuple(found)
@@ -292,10 +283,9 @@ class Discovered(Fading):
         if not shape.mark:
             return (self,)
         shift = (factor - 1.0) * 0.04 * self.span
-        moved = [self, self.shifted(shift), self.shifted(-shift)]
-        if shape.width:
-            moved += [replace(self, marks=(self.marks[0], self.marks[1] * f)) for f in (factor, 1.0 / factor)]
-        return tuple(moved)
+        widths = (factor, 1.0 / factor) if shape.width else ()
+        wider = (replace(self, marks=(self.marks[0], self.marks[1] * f)) for f in widths)
+        return self, self.shifted(shift), self.shifted(-shift), *wider
 
     def shifted(self, by: float) -> Discovered:
         """Return the same law with its mark moved; a step does not stay between sessions, a time stays above 0."""
@@ -318,7 +308,7 @@ class Discovered(Fading):
             Of the effect.
         """
         fields = {k: v for k, v in self.arguments().items() if k != "name"}
-        lines = "\n".join(f"    {key}: Any = {_literal(value)}" for key, value in fields.items())
+        lines = "\n".join(f"    {key}: Any = {pformat(value, width=100)}" for key, value in fields.items())
         title = "".join(part.capitalize() for part in name.split("_"))
         found = fill(", ".join(f"{v:.4g}" for v in values), 100, initial_indent="    ", subsequent_indent="    ")
         what = self.describe()
@@ -367,9 +357,8 @@ class Discovered(Fading):
     def _responder(self, observations: Observations) -> tuple[Callable[[Array], Response], str]:
         if self.kind in ("base", "tool"):
             return at_base if self.kind == "base" else at_tool, self.kind
-        segments = observations.robot.segments
-        s = next(s for s, segment in enumerate(segments) if segment.name == self.place)
-        return lambda twist: at_segment(s, twist), segments[s].parent_link
+        s, segment = next((s, own) for s, own in enumerate(observations.robot.segments) if own.name == self.place)
+        return lambda twist: at_segment(s, twist), segment.parent_link
 
 
 def _whole(mark: float) -> str:
@@ -384,12 +373,6 @@ def _times(parameter: Parameter, function: Array, label: str) -> Parameter:
         for r in parameter.responses
     )
     return replace(parameter, label=f"{parameter.label}, {label}", responses=responses, positive=False)
-
-
-def _literal(value: object) -> str:
-    if isinstance(value, tuple) and value:
-        return "(\n" + "".join(f"        {item!r},\n" for item in value) + "    )"
-    return repr(value)
 
 
 _SOURCE = '''"""{what}.

@@ -11,7 +11,7 @@ import numpy as np
 
 from thermal_robot.effects.arguments import Order
 from thermal_robot.effects.effect import SOURCED, Array, Driver, Effect, Parameter
-from thermal_robot.effects.fading import Waves
+from thermal_robot.effects.fading import OfPosition
 from thermal_robot.effects.quantities import position_of
 from thermal_robot.schema import word
 
@@ -25,7 +25,7 @@ _NOT_LEARNT = 0.05  # of the logarithm of its size: a curve that could grow woul
 
 
 @dataclass(frozen=True)
-class TransmissionError(Waves):
+class TransmissionError(OfPosition):
     """Every joint deviates periodically: q_actual = q_command + Σ_k a_k sin(k q) + b_k cos(k q).
 
     An eccentric wheel or encoder disc on the joint's side gives order 1, an oval one order 2; where the campaign
