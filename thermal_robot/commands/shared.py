@@ -94,7 +94,7 @@ def told_later(options: argparse.Namespace, model: CorrectedModel, samples: Camp
 def _unseen(model: CorrectedModel, samples: Campaign, label: str) -> str:
     """Say what a model does at labels that it has not seen."""
     known = model.spread.levels[label] if model.spread else ()
-    new = sorted({*samples.labels.get(label, ())} - {*known, ""})
+    new = sorted({str(own) for own in samples.labels.get(label, ())} - {*known, ""})
     there = f"the model has not seen {', '.join(map(repr, new))}" if new else f"rows do not say which {label} is theirs"
     apart = "std.x std.y std.z hold what these differ by" if len(known) > 1 else "nobody knows how others differ"
     return f"{there}, but {', '.join(map(repr, known))}; predicted as their mean, and {apart}"

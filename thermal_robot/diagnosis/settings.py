@@ -36,3 +36,6 @@ NEARLY_ALL = 2.576
 UNSETTLED = 1.5
 """Times what the linear model leaves: an exact one that leaves more is another model. They agree to a thousandth where
 errors are those of robots."""
+LEAST_SEEN = 1e-4
+"""Of the strongest direction of the frames, squared: one that the rows tell to a hundredth of that takes nothing over,
+as it would move far rows a hundred times as much."""

@@ -3,7 +3,8 @@
 A function of x, of mean m over the rows where it was found, is there what it is. At a distance d beyond the range of
 width r it is m + (f(x̂) − m) exp(−½ (d / (s r))²), x̂ the nearer end and s = :data:`settings.FADES`: continuous, never
 further from m than at the edge, and a hundredth of that at three s r. The mean stays: it is a constant error of the
-place, a zero or a frame, and what was fitted beside the function takes it for granted.
+place, a zero or a frame, and what was fitted beside the function takes it for granted. Where nothing was but the
+unknown frames, m is what these take over of the function as they are fitted without it: there is registration alone.
 """
 
 from __future__ import annotations
@@ -15,11 +16,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from thermal_robot.effects import settings
-from thermal_robot.effects.effect import Array, Effect, Parameter, at_joint
+from thermal_robot.effects.effect import Array, Effect, Parameter, at_base, at_joint, at_tool
 from thermal_robot.effects.quantities import unit
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
+
+_OF_A_MODEL = ("found", "means", "rests", "fades")
 
 
 @dataclass(frozen=True)
@@ -32,18 +35,26 @@ class Fading(Effect):
         Least and largest value of what drives it, where it was found; empty where it is to have no end.
     means
         Of each of its functions over the rows where it was found; zero where absent.
+    rests
+        Twists of the base (6) and of the tool (6) that frames take over of a unit of each parameter; empty for none.
     fades
         Whether it fades beyond, or keeps the value of the edge.
     """
 
     found: tuple[float, ...] = field(default=(), kw_only=True)
     means: tuple[float, ...] = field(default=(), kw_only=True)
+    rests: tuple[float, ...] = field(default=(), kw_only=True)
     fades: bool = field(default=True, kw_only=True)
 
     def arguments(self) -> dict[str, Any]:
         """Return the constructor's arguments, for saving; the range only where it has one."""
         given = super().arguments()
-        return {k: v for k, v in given.items() if self.found or k not in ("found", "means", "fades")}
+        return {k: v for k, v in given.items() if self.found or k not in _OF_A_MODEL}
+
+    @property
+    def endless(self) -> Effect:
+        """It without a range."""
+        return replace(self, found=(), means=(), rests=())
 
     def unfaded(self) -> Effect:
         """Return it as it keeps the value of the edge."""
@@ -53,6 +64,14 @@ class Fading(Effect):
         """(N, K) functions, of which so much (N,) or (N, K) is left of what they differ by from their means."""
         means = np.array(self.means) if self.means else np.zeros(functions.shape[1])
         return np.asarray(means + (functions - means) * left.reshape(len(functions), -1)) if self.fades else functions
+
+    def registered(self, parameters: Sequence[Parameter], left: Sequence[Array]) -> tuple[Parameter, ...]:
+        """Return parameters with what the frames take over of each where so much, (N,) each, is left of it."""
+        if not self.rests or not self.fades:
+            return tuple(parameters)
+        twists = [np.outer(1.0 - own, self.rests[12 * k : 12 * k + 12]) for k, own in enumerate(left)]
+        taken = [(at_base(twist[:, :6]), at_tool(twist[:, 6:])) for twist in twists]
+        return tuple(replace(p, responses=(*p.responses, *t)) for p, t in zip(parameters, taken, strict=True))
 
 
 def ends(values: Array) -> tuple[float, float]:
@@ -87,11 +106,11 @@ class OfPosition(Fading):
 
     def elsewhere(self, observations: Observations) -> Effect:
         """Return the functions without a range: another campaign has its own."""
-        return replace(self, found=(), means=())
+        return self.endless
 
     def waves(self, observations: Observations, of: Sequence[tuple[str, float, str, float]]) -> tuple[Parameter, ...]:
         """Return two amplitudes for each joint, order, words and expected size; rad, or m where it slides."""
-        robot, found = observations.robot, []
+        robot, found, parts = observations.robot, [], []
         for k, (joint, order, words, size) in enumerate(of):
             j, own = robot.joint_names.index(joint), unit(robot, joint)
             x, left = self.ended(observations, j, order)
@@ -100,9 +119,10 @@ class OfPosition(Fading):
             for what, values in zip(("sine", "cosine"), functions.T, strict=True):
                 label = f"{what}, order {order:.6g}{words}"
                 found.append(Parameter(label, own, size, "joint", joint, (at_joint(j, values),)))
-        return tuple(found)
+                parts.append(left)
+        return self.registered(found, parts)
 
     def delivered(self, observations: Observations) -> Effect:
         """Return the functions with the range of each joint, and the mean of each there."""
-        means = [float(np.mean(p.responses[0].values)) for p in replace(self, found=()).parameters(observations)]
+        means = [float(np.mean(p.responses[0].values)) for p in self.endless.parameters(observations)]
         return replace(self, found=tuple(end for q in observations.q.T for end in ends(q)), means=tuple(means))

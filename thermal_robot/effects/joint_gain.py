@@ -29,12 +29,13 @@ class JointGain(OfPosition):
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """One gain error a joint; dimensionless."""
-        found = []
+        found, parts = [], []
         for j, joint in enumerate(observations.robot.joint_names):
             x, left = self.ended(observations, j)
             values = replace(self, means=self.means[j : j + 1]).faded(x[:, None], left)[:, 0]
             found.append(Parameter("gain error", "1", 5e-4, "joint", joint, (at_joint(j, values),)))
-        return tuple(found)
+            parts.append(left)
+        return self.registered(found, parts)
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
         """Return the joint's own position."""

@@ -5,8 +5,6 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from pprint import pformat
-from textwrap import fill
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
@@ -32,6 +30,7 @@ from thermal_robot.effects.effect import (
     in_words,
 )
 from thermal_robot.effects.fading import Fading, ends, left_at
+from thermal_robot.effects.law_source import source
 from thermal_robot.effects.quantities import TURN, driving, quantity, strains, unit
 from thermal_robot.effects.shapes import SHAPES
 from thermal_robot.schema import word
@@ -193,16 +192,16 @@ class Discovered(Fading):
 
     def functions(self, values: Array) -> tuple[Array, tuple[str, ...]]:
         """Return (N, K) the functions φ at values of what the shape is of, and a name for each."""
-        shape = SHAPES[self.shape]
-        labels = shape.labels
+        shape, clock = SHAPES[self.shape], self.quantity in CLOCK
+        start = "the start" if clock else f"{self.quantity} {self._marked(self.origin)}"
+        over = "the campaign" if clock else f"{self._marked(self.span)} of {self.quantity}"
+        labels = tuple(label.format(start=start, range=over) for label in shape.labels)
         if shape.each and self.labels:
             labels += tuple(f"at {self.labels[int(mark)]}" for mark in self.marks)
-        elif shape.each:
-            told = len(set(self.marks))  # as many digits as tell the marks apart
-            digits = next(d for d in range(3, 18) if len({f"{m:.{d}g}" for m in self.marks}) == told)
+        elif shape.each:  # as many digits as tell the marks apart
+            digits = next(d for d in range(3, 18) if len({f"{m:.{d}g}" for m in self.marks}) == len(set(self.marks)))
             labels += tuple(f"at {self._marked(mark, digits)}" for mark in self.marks)
-        if shape.of == "runs":
-            labels += tuple(f"at the start of {run}" for run in self.runs)
+        labels += tuple(f"at the start of {run}" for run in self.runs if shape.of == "runs")
         return shape.functions(values, self.marks, self.origin, self.span), labels
 
     def at_rows(self, observations: Observations) -> tuple[Array, tuple[str, ...]] | None:
@@ -214,11 +213,7 @@ class Discovered(Fading):
         second = quantity(observations, self.by) if two else None
         if values is None or (two and second is None):
             return None
-        left, ranges = np.ones(observations.campaign.samples), list(zip(self.found[::2], self.found[1::2], strict=True))
-        for (name, driver), (low, high) in zip(self._driven(observations), ranges, strict=False):
-            # what has changed by the end of the campaign stays
-            left = left if name in CLOCK else left * left_at(driver, low, high)
-        if ranges:
+        if ranges := self._ranges:
             values = np.clip(values, *ranges[0])
         functions, labels = self.functions(values)
         if self.labels and np.isnan(values).any():
@@ -227,7 +222,18 @@ class Discovered(Fading):
             v = ((np.clip(second, *ranges[1]) if ranges else second) - self.by_origin) / self.by_span
             functions = np.column_stack([functions, functions * v[:, None]])
             labels = (*labels, *(f"{name}, × {self.by}" for name in labels))
-        return self.faded(functions, left), labels
+        return self.faded(functions, self._left(observations)), labels
+
+    @property
+    def _ranges(self) -> list[tuple[float, float]]:
+        return list(zip(self.found[::2], self.found[1::2], strict=True))
+
+    def _left(self, observations: Observations) -> Array:
+        """(N,) how much is left of it; what has changed by the end of the campaign stays."""
+        left = np.ones(observations.campaign.samples)
+        for (name, driver), (low, high) in zip(self._driven(observations), self._ranges, strict=False):
+            left = left if name in CLOCK else left * left_at(driver, low, high)
+        return left
 
     def _driven(self, observations: Observations) -> list[tuple[str, Array]]:
         """Return what it ends with, by name: what it follows, a second quantity, and how these two go together."""
@@ -256,10 +262,12 @@ class Discovered(Fading):
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """Return one parameter a function and component; rad or m, or the unit of the effect in the law."""
-        robot, rows = observations.robot, self.at_rows(observations)
-        if rows is None:
-            return ()
-        functions, labels = rows
+        rows = self.at_rows(observations)
+        found = () if rows is None else self._of(observations, *rows)
+        return self.registered(found, [self._left(observations)] * len(found))
+
+    def _of(self, observations: Observations, functions: Array, labels: tuple[str, ...]) -> tuple[Parameter, ...]:
+        robot = observations.robot
         if self.modulated is not None:
             whole = gate.checked(self.modulated, observations)
             return tuple(_times(p, f, n) for f, n in zip(functions.T, labels, strict=True) for p in whole)
@@ -307,12 +315,7 @@ class Discovered(Fading):
         name
             Of the effect.
         """
-        fields = {k: v for k, v in self.arguments().items() if k != "name"}
-        lines = "\n".join(f"    {key}: Any = {pformat(value, width=100)}" for key, value in fields.items())
-        title = "".join(part.capitalize() for part in name.split("_"))
-        found = fill(", ".join(f"{v:.4g}" for v in values), 100, initial_indent="    ", subsequent_indent="    ")
-        what = self.describe()
-        return _SOURCE.format(title=title, name=name, lines=lines, values=found, what=what[:1].upper() + what[1:])
+        return source(self, values, name)
 
     def describe(self) -> str:
         """Say in a few words where the error enters and what it follows."""
@@ -373,28 +376,3 @@ def _times(parameter: Parameter, function: Array, label: str) -> Parameter:
         for r in parameter.responses
     )
     return replace(parameter, label=f"{parameter.label}, {label}", responses=responses, positive=False)
-
-
-_SOURCE = '''"""{what}.
-
-Found in a campaign by thermal_robot, named by hand.
-"""
-
-from dataclasses import dataclass
-from typing import Any
-
-from thermal_robot.effects.law import Discovered
-
-
-@dataclass(frozen=True)
-class {title}(Discovered):
-    """{what}.
-
-    In the campaign where it was found its values were, in SI:
-
-{values}
-    """
-
-    name: Any = "{name}"
-{lines}
-'''

@@ -25,9 +25,9 @@ TWIN = 0.01
 LAW_MOST = 30.0
 """Times the expected size of a law, that one sigma of it is at most: 9 mrad in a joint, 3 mm and 3 mrad elsewhere. Lost
 motion of worn arms is 8 to 9 mrad, a target that was mounted anew sits some millimetres elsewhere."""
-FADES = 0.25
+FADES = 0.1
 """Of the range in which a curve was found: so far beyond it e^−½ of what it differs by from its mean is left. One with
-five knots turns within a quarter of its range, so that half a range away next to nothing of it is known."""
+five knots turns within a quarter of its range: so far away nothing of it is known."""
 BESIDE = 0.02
 """Of the range that was measured: a row that leaves it by less is not called outside. A hundred rows of a range leave a
 hundredth of it open at either end, and the next one of them falls there now and then."""

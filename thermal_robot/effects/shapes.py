@@ -52,7 +52,8 @@ class Shape:
     functions
         The φ of the table above.
     labels
-        A name for each, but for those that belong to one of the marks each.
+        A name for each, but for those that belong to one of the marks each; ``{start}`` and ``{range}`` stand for its
+        origin and its span, in the quantity's unit.
     words
         The shape in a sentence; ``{mark}`` stands for its first mark with the quantity's unit, ``{order}`` without.
     mark
@@ -157,15 +158,15 @@ def _smooth(x: Array, marks: tuple[float, ...], origin: float, span: float) -> A
 
 SHAPES: dict[str, Shape] = {
     "constant": Shape(_constant, ("constant",), "constant", noun="a constant error"),
-    "ramp": Shape(_ramp, ("at the start", "rise over the campaign"), "in proportion"),
+    "ramp": Shape(_ramp, ("at {start}", "rise over {range}"), "in proportion"),
     "quadratic": Shape(_quadratic, ("constant", "linear", "quadratic"), "quadratic"),
     "step": Shape(_step, ("before", "after"), "a step at {mark}", "sudden", size="step", noun="a step"),
     "slide": Shape(
         _slide, ("before", "after"), "a smooth step at {mark}", "gradual", width=True, size="step", noun="a step"
     ),
-    "hinge": Shape(_hinge, ("constant", "slope beyond, over the range"), "a bend at {mark}", "gradual"),
+    "hinge": Shape(_hinge, ("constant", "slope beyond, over {range}"), "a bend at {mark}", "gradual"),
     "bump": Shape(_bump, ("constant", "height"), "a bump at {mark}", "gradual", width=True, size="bump", noun="a bump"),
-    "drag": Shape(_drag, ("constant", "slope over the range", "of its sign"), "its slope and its sign"),
+    "drag": Shape(_drag, ("constant", "slope over {range}", "of its sign"), "its slope and its sign"),
     "harmonic": Shape(
         _harmonic, ("constant", "sine", "cosine"), "harmonic of order {order:g}", size="peak to peak", noun="a wave"
     ),
