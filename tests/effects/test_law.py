@@ -432,3 +432,16 @@ def test_an_effect_in_a_law_ends_with_its_own_range(rich):
     delivered = gate.delivered(law, rich)
     far = carrying(rich, 1.0, rich.q[:, 2].max() + 2.0 * np.ptp(rich.q[:, 2]))
     assert np.abs(displacement(far, [(delivered, values)])[0].joint[:, 2]).max() < inside
+
+
+@pytest.mark.parametrize(
+    ("quantity", "unit", "told"),
+    [
+        ("time", "s", ("at the start", "rise over the campaign")),
+        ("payload", "kg", ("at payload 0.5 kg", "rise over 1.5 kg of payload")),
+        ("joint_2", "rad", ("at joint_2 0.5 rad", "rise over 1.5 rad of joint_2")),
+    ],
+)
+def test_a_slope_is_told_by_what_it_is_over(quantity, unit, told):
+    law = Discovered(place="joint_3", quantity=quantity, shape="ramp", origin=0.5, span=1.5, unit=unit)
+    assert law.functions(np.linspace(0.5, 2.0, 5))[1] == told
