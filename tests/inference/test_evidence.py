@@ -163,8 +163,8 @@ def test_a_block_of_which_the_data_see_nothing_changes_nothing_but_the_odds(pres
 
 def test_a_block_grows_no_further_than_it_may():
     """What no robot reaches is as improbable as at the largest size, and no less by a size that grows with it."""
-    linear, whitening = small_problem(3, present=(1,))
-    large = replace(linear, gap=linear.gap + 1e4 * linear.blocks[1].columns.sum(axis=2))
+    linear, whitening = small_problem(3, present=(1,), held=1e6)
+    large = replace(linear, gap=linear.gap + 1e3 * linear.blocks[1].columns.sum(axis=2))
     free = evidence(gram(large, whitening), (1,), 0.0, None)
     blocks = tuple(replace(item, most=30.0) for item in linear.blocks)
     bounded = evidence(gram(replace(large, blocks=blocks), whitening), (1,), 0.0, None)
