@@ -315,7 +315,7 @@ class Discovered(Fading):
         name
             Of the effect.
         """
-        return source(self, values, name)
+        return source(self.arguments(), self.describe(), values, name)
 
     def describe(self) -> str:
         """Say in a few words where the error enters and what it follows."""

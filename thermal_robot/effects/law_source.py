@@ -2,30 +2,30 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from pprint import pformat
 from textwrap import fill
-from typing import TYPE_CHECKING
+from typing import Any
 
-if TYPE_CHECKING:
-    from thermal_robot.effects.effect import Array
-    from thermal_robot.effects.law import Discovered
+from thermal_robot.effects.effect import Array
 
 
-def source(law: Discovered, values: Array, name: str) -> str:
+def source(arguments: Mapping[str, Any], what: str, values: Array, name: str) -> str:
     """Return the text of a Python file with a law as an effect.
 
     Parameters
     ----------
-    law, values
-        As it was fitted, (P,) SI; the values stand in the file as a comment, as an effect holds none.
+    arguments, what
+        Of the law, and what it is in words.
+    values
+        As it was fitted, (P,) SI; they stand in the file as a comment, as an effect holds none.
     name
         Of the effect.
     """
-    fields = {k: v for k, v in law.arguments().items() if k != "name"}
+    fields = {k: v for k, v in arguments.items() if k != "name"}
     lines = "\n".join(f"    {key}: Any = {pformat(value, width=100)}" for key, value in fields.items())
     title = "".join(part.capitalize() for part in name.split("_"))
     found = fill(", ".join(f"{v:.4g}" for v in values), 100, initial_indent="    ", subsequent_indent="    ")
-    what = law.describe()
     return _SOURCE.format(title=title, name=name, lines=lines, values=found, what=what[:1].upper() + what[1:])
 
 
