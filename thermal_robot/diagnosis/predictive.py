@@ -66,7 +66,7 @@ def uncertainty(fit: Fit, needs: tuple[str, ...], floor: float) -> Spread:
     return Spread(covariance, beyond, noise, ranges, wider, prior, levels, _between(fit, session))
 
 
-def _between(fit: Fit, session: Array | None) -> Array | None:
+def _between(fit: Fit, session: NDArray[np.str_] | None) -> Array | None:
     """(3,) one sigma per axis by which sessions differ in what is left, measurement frame, m; ``None`` for one session.
 
     The variance of their means less what the rows of each make it by chance.
@@ -86,7 +86,8 @@ def registered(fit: Fit, held: Sequence[tuple[Effect, Array]]) -> tuple[tuple[Ef
 
     The frames take over of a column what they do as they are fitted without it, by the products of all columns.
     """
-    if not all(isinstance(effect, Fading) and effect.found for effect, _ in held):
+    fading = [(effect, values) for effect, values in held if isinstance(effect, Fading) and effect.found]
+    if len(fading) < len(held):
         return tuple(held)
     model, names = Model.of(fit.explanation, blocks(fit.campaign)), frame_columns(fit.corrected)[1]
     gram, flat = model.whole[0], model.flat
@@ -94,8 +95,8 @@ def registered(fit: Fit, held: Sequence[tuple[Effect, Array]]) -> tuple[tuple[Ef
     twists = np.zeros((12, gram.shape[1] - 1 - flat))
     known = whitener(gram[:flat, :flat], LEAST_SEEN)
     twists[places] = known @ (known.T @ gram[:flat, flat:-1])
-    found = []
-    for (effect, values), own in zip(held, model.spans, strict=True):
+    found: list[tuple[Effect, Array]] = []
+    for (effect, values), own in zip(fading, model.spans, strict=True):
         kept = {p.name: twists[:, k] for p, k in zip(gate.checked(effect, fit.nominal), own - flat, strict=True)}
         every = gate.checked(replace(effect, places=(), excluded=()), fit.nominal)
         rests = np.concatenate([kept.get(p.name, np.zeros(12)) for p in every]).tolist()
