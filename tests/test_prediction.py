@@ -6,7 +6,9 @@ import numpy as np
 import pytest
 from simulate import simulate
 
+import thermal_robot as tr
 from thermal_robot import Campaign, CorrectedModel, diagnose
+from thermal_robot.effects.law import Discovered
 from thermal_robot.inference.columns import block
 from thermal_robot.prediction import sensitivity
 
@@ -98,3 +100,61 @@ def test_who_takes_effects_out_is_told_no_deviation(warm):
     _, found, fresh, _ = warm
     assert np.isnan(replace(found.model, effects=(), needs=()).prediction(fresh).std).all()
     assert np.isnan(replace(found.model, spread=None).prediction(fresh).std).all()
+
+
+LABELS = ("a", "b", "c", "d", "e")
+
+
+@pytest.fixture(scope="module")
+def sessions():
+    """A diagnosis of five sessions, in each of which the tool sits a millimetre elsewhere; and a sixth one."""
+    rng = np.random.default_rng(5)
+    levels = tuple(float(k) for k in range(5))
+    law = Discovered(
+        kind="tool",
+        place="tool",
+        quantity="session",
+        shape="levels",
+        marks=levels,
+        span=4.0,
+        labels=LABELS,
+        turns=False,
+    )
+    places = rng.normal(0.0, 1e-3, (5, 3))
+    arm = {"tool_frame": "tool0", "rows": 100}
+    asked = {"session": np.repeat(LABELS, 20)}
+    measured = tr.simulate("builtin:rv_m2", {law: places.ravel()}, conditions=asked, noise=20e-6, seed=3, **arm)
+    found = diagnose(measured, only="joint_offset")
+    other = rng.normal(0.0, 1e-3, (40, 3))  # of forty other sessions
+    miss = []
+    for place in other:
+        moved = np.tile(place, 5)
+        there = tr.simulate("builtin:rv_m2", {law: moved}, conditions=asked, seed=4, **arm)
+        miss.append(there.position)
+    return found, there, np.array(miss), law, places
+
+
+def test_a_session_that_was_not_seen_is_said_and_widens_the_deviation(sessions):
+    found, rows, others, _, _ = sessions
+    assert found.verdict == ("discovered.1",)
+    new = found.model.prediction(replace(rows, labels={"session": np.full(100, "x")}, position=None))
+    assert all("session" in names for names in new.outside)
+    z2 = ((others - new.position) ** 2 / new.std**2).mean()
+    assert 0.3 < z2 < 3.0  # by what five sessions differ by, forty others differ from their mean
+    known = found.model.prediction(replace(rows, position=None))
+    assert not any("session" in names for names in known.outside)
+    assert known.std.max() < 0.1 * new.std.min()
+    unsaid = found.model.prediction(replace(rows, labels={}, position=None))
+    assert all("session" in names for names in unsaid.outside)
+    np.testing.assert_allclose(unsaid.std, new.std, rtol=1e-12)
+
+
+def test_a_saved_model_knows_its_sessions(sessions, tmp_path):
+    found, rows, *_ = sessions
+    found.model.save(tmp_path / "model.json")
+    again = CorrectedModel.load(tmp_path / "model.json")
+    rows = replace(rows, labels={"session": np.full(100, "x")}, position=None)
+    before, after = found.model.prediction(rows), again.prediction(rows)
+    assert again.spread.levels == {"session": LABELS}
+    np.testing.assert_allclose(after.std, before.std, rtol=1e-12)
+    assert after.outside == before.outside

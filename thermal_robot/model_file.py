@@ -143,7 +143,8 @@ def _spread(value: Any, path: str) -> Spread:
     """Take what makes a prediction uncertain."""
     three = listed(NOT_NEGATIVE, 3, "three standard deviations")
     known = {"covariance": _covariance, "beyond": three, "noise": three, "ranges": mapping(_ends)}
-    more = {"wider": _covariance, "prior": listed(NOT_NEGATIVE)}
+    more = {"wider": _covariance, "prior": listed(NOT_NEGATIVE), "between": three}
+    more["levels"] = mapping(listed(text("a label")))
     held = record({**known, **more}, may_lack=tuple(more))(value, path)
     if held.get("wider", held["covariance"]).shape != held["covariance"].shape:
         raise MisfitError(below(path, "wider"), value["wider"], "a matrix of the shape of covariance")
@@ -151,7 +152,9 @@ def _spread(value: Any, path: str) -> Spread:
     if prior is not None and len(prior) > len(held["covariance"]):
         raise MisfitError(below(path, "prior"), value["prior"], "a deviation for each parameter of the effects")
     beyond, noise = (np.array(held[name]) for name in ("beyond", "noise"))
-    return Spread(held["covariance"], beyond, noise, held["ranges"], held.get("wider"), prior)
+    between = np.array(held["between"]) if "between" in held else None
+    levels = {name: tuple(own) for name, own in held.get("levels", {}).items()}
+    return Spread(held["covariance"], beyond, noise, held["ranges"], held.get("wider"), prior, levels, between)
 
 
 def _written_robot(robot: Robot) -> dict[str, Any]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.settings import STILL
 from thermal_robot.effects import Effect, gate, settings
+from thermal_robot.effects.law import Discovered
 from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.stack import chunks
 from thermal_robot.observations import Observations
@@ -38,6 +39,10 @@ class Spread:
     prior
         (P,) standard deviation that each of the effects' parameters was expected to have before the data, in its unit;
         ``None`` where a file of an older program does not say.
+    levels
+        By label, such as the session: those that were measured.
+    between
+        (3,) one sigma per axis by which what is left of one label's rows differs from that of another's, m.
     """
 
     covariance: Array
@@ -46,13 +51,16 @@ class Spread:
     ranges: Mapping[str, tuple[float, float]] = field(default_factory=dict)
     wider: Array | None = None
     prior: Array | None = None
+    levels: Mapping[str, tuple[str, ...]] = field(default_factory=dict)
+    between: Array | None = None
 
     def to_dict(self) -> dict[str, Any]:
         """Return lists and numbers, ready for JSON."""
         arrays = {name: getattr(self, name).tolist() for name in ("covariance", "beyond", "noise")}
-        more = {"wider": self.wider, "prior": self.prior}
+        more = {"wider": self.wider, "prior": self.prior, "between": self.between}
         told = {name: values.tolist() for name, values in more.items() if values is not None}
-        return {**arrays, **told, "ranges": {name: list(ends) for name, ends in self.ranges.items()}}
+        levels = {"levels": {name: list(own) for name, own in self.levels.items()}} if self.levels else {}
+        return {**arrays, **told, **levels, "ranges": {name: list(ends) for name, ends in self.ranges.items()}}
 
     def std(
         self,
@@ -86,15 +94,34 @@ class Spread:
         variance += self.beyond**2 + (self.noise**2 if noise else 0.0)
         first = moved.shape[2] - sum(len(values) for _, values in effects)
         for effect, values in effects:
-            own, left = slice(first, first + len(values)), gate.fading(effect, observations)
+            own, edge = slice(first, first + len(values)), gate.unfaded(effect)
             first = own.stop
-            if left is not None and (left < 1.0).any():
-                # what it may still be where nobody knows: as much as was given up
-                variance += (moved[:, :, own] @ values * ((1.0 - left) / left)[:, None]) ** 2
+            if edge != effect:  # what it may still be where nobody knows: as much as was given up
+                given_up = sensitivity(observations, [edge])[:, :, -len(values) :] - moved[:, :, own]
+                variance += (given_up @ values) ** 2
+        for label, levels in self.levels.items():
+            new = np.flatnonzero([label in names for names in outside])
+            if new.size and len(levels) > 1:
+                variance[new] += self._apart(observations, effects, label)[new] * (1.0 + 1.0 / len(levels))
         return np.asarray(np.sqrt(variance))
 
-    def outside(self, samples: Campaign) -> tuple[tuple[str, ...], ...]:
-        """Return for each row the joints and columns in which it leaves what was measured."""
+    def _apart(self, observations: Observations, effects: Sequence[tuple[Effect, Array]], label: str) -> Array:
+        """(N, 3) variance per axis of what the effects, and what they leave, do at the levels of a label, m²."""
+        campaign, moved = observations.campaign, []
+        for level in self.levels[label]:
+            labels = {**campaign.labels, label: np.full(campaign.samples, level)}
+            there = replace(observations, campaign=replace(campaign, labels=labels))
+            at = [sensitivity(there, [effect])[:, :, -len(values) :] @ values for effect, values in effects]
+            moved.append(sum(at, np.zeros((campaign.samples, 3))))
+        left = np.zeros(3) if self.between is None else self.between
+        return np.asarray(np.var(moved, axis=0, ddof=1) + left**2)
+
+    def outside(self, samples: Campaign, effects: Sequence[tuple[Effect, Array]] = ()) -> tuple[tuple[str, ...], ...]:
+        """Return for each row the joints, columns and labels in which it leaves what was measured.
+
+        Rows without a label stand at no level of it: that counts where one of the effects follows it.
+        """
+        followed = {effect.quantity for effect, _ in effects if isinstance(effect, Discovered) and effect.labels}
         joints = samples.robot.joint_names
         left: list[list[str]] = [[] for _ in range(samples.samples)]
         for name, (low, high) in self.ranges.items():
@@ -104,6 +131,10 @@ class Spread:
             allowed = max(settings.BESIDE * (high - low), STILL if name in joints else 0.0)
             for row in np.flatnonzero((values < low - allowed) | (values > high + allowed)):
                 left[row].append(name)
+        for label, levels in self.levels.items():
+            own = np.full(samples.samples, "" if label in followed else levels[0])
+            for row in np.flatnonzero(~np.isin(samples.labels.get(label, own), levels)):
+                left[row].append(label)
         return tuple(tuple(names) for names in left)
 
 
@@ -119,7 +150,7 @@ class Prediction(NamedTuple):
     std
         (N, 3) one standard deviation per axis, measurement frame, m; NaN where the model does not tell.
     outside
-        Per row: the joints and columns in which it leaves what was measured.
+        Per row: the joints, columns and labels in which it leaves what was measured.
     """
 
     position: Array

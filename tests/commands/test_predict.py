@@ -6,7 +6,7 @@ import numpy as np
 import pandas as pd
 from commanded import refused, table
 
-from thermal_robot import read_campaign
+from thermal_robot import CorrectedModel, read_campaign
 from thermal_robot.campaign import write_campaign
 
 NOISE = 25e-6
@@ -98,3 +98,18 @@ def test_units_of_the_campaign_are_units_of_its_prediction(run, folder, diagnose
         assert run("predict", model, where / "measurements.csv", "-o", tmp_path / "p.csv")[0] == 0
         places.append(pd.read_csv(tmp_path / "p.csv")[[*PLACE, *STD]].to_numpy())
     np.testing.assert_allclose(places[1], 1e3 * places[0], rtol=0, atol=1e-2)
+
+
+def test_predict_tells_a_session_that_the_model_has_not_seen(run, folder, diagnosed, tmp_path):
+    model = CorrectedModel.load(diagnosed.model)
+    spread = replace(model.spread, levels={"session": ("mon", "tue")}, between=np.array([1e-3, 0.0, 0.0]))
+    replace(model, spread=spread).save(tmp_path / "model.json")
+    rows = pd.read_csv(folder / "fresh.csv")
+    for session, said in (("wed", "the model has not seen 'wed', but 'mon', 'tue'"), ("mon", "")):
+        rows.assign(session=session).to_csv(tmp_path / "rows.csv", index=False)
+        status, _, told = run("predict", tmp_path / "model.json", tmp_path / "rows.csv", "-o", tmp_path / "p.csv")
+        assert status == 0
+        assert (said in told) if said else not told
+        written = pd.read_csv(tmp_path / "p.csv", keep_default_na=False)
+        assert written["outside"].str.contains("session").all() == bool(said)
+        assert (written["std.x"] > 1.0).all() == bool(said)  # mm

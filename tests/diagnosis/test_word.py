@@ -1,6 +1,7 @@
 """What rows held out refuse goes out of a fit again; what is at work stays."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -158,3 +159,12 @@ def test_two_that_one_of_is_at_work_are_not_in_question(rv_m2):
     assert in_question(known) == {}
     both = known.explanation.probability(range(len(known.families)))
     assert both == pytest.approx(1.0, abs=1e-6)
+
+
+def test_a_law_far_less_probable_than_its_rivals_is_not_found(rv_m2, monkeypatch):
+    data = simulate(rv_m2, ["joint_gain"], seed=1, samples=60, ratio=(5.0, 5.0))[0]
+    known = fit(data, choose(("joint_gain",), (), ()))
+    laws = [SimpleNamespace(name=f"discovered.{k}") for k in (1, 2)]
+    said = [SimpleNamespace(law=law, probability=p) for law, p in zip(laws, (1e-85, 0.4), strict=True)]
+    monkeypatch.setattr(word, "discovered", lambda _: said)
+    assert in_question(known) == {"discovered.1": 1e-85}

@@ -159,3 +159,17 @@ def test_a_block_of_which_the_data_see_nothing_changes_nothing_but_the_odds(pres
             assert found.noise == pytest.approx(plain.noise, rel=1e-3)
             np.testing.assert_allclose(found.values, plain.values, rtol=1e-2)
     assert set(search.run().blocks) <= {0, 1, 2}
+
+
+def test_a_block_grows_no_further_than_it_may():
+    """What no robot reaches is as improbable as at the largest size, and no less by a size that grows with it."""
+    linear, whitening = small_problem(3, present=(1,), held=1e6)
+    large = replace(linear, gap=linear.gap + 1e3 * linear.blocks[1].columns.sum(axis=2))
+    free = evidence(gram(large, whitening), (1,), 0.0, None)
+    blocks = tuple(replace(item, most=30.0) for item in linear.blocks)
+    bounded = evidence(gram(replace(large, blocks=blocks), whitening), (1,), 0.0, None)
+    assert free.scales[1] > 100.0
+    assert bounded.scales[1] == pytest.approx(30.0)
+    assert bounded.log_evidence < free.log_evidence - 100.0
+    small = evidence(gram(replace(linear, blocks=blocks), whitening), (1,), 0.0, None)
+    assert small.log_evidence == pytest.approx(evidence(gram(linear, whitening), (1,), 0.0, None).log_evidence)

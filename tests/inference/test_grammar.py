@@ -130,3 +130,9 @@ def test_each_joint_remembers_its_own_turns_if_rows_are_in_an_order(here):
     assert {(law.shape, law.starts) for law in started} == {("relaxing", (here.covariates["time"].min(),))}
     assert memory(observed(here.robot, covariates={})) == []
     assert memory(observe(commanded(here.robot))) == []
+
+
+def test_a_wave_does_not_change_with_its_own_position(rv_m2):
+    """It would be any law of that position, of many functions that cancel."""
+    found = modulated(observed(rv_m2), [library()["transmission_error"], library()["joint_gain"]])
+    assert not any(law.quantity == law.place for law in found)

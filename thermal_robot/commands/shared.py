@@ -82,6 +82,19 @@ def page(found: Diagnosis, path: Path, files: Iterable[Path] = ()) -> None:
 
 
 def told_later(options: argparse.Namespace, model: CorrectedModel, samples: Campaign, file: str) -> None:
-    """Say so where the rows of a table count as measured after the campaign, as their order counts anew."""
+    """Say so where the order of a table's rows counts anew, and where the model has not seen their session."""
     if model.counts_anew(samples):
         note(f"order in {Path(file).name} counts its own rows; predicted as after the campaign", options.loudness)
+    left = model.spread.outside(samples, model.effects) if model.spread else ()
+    for label in model.spread.levels if model.spread else ():
+        if any(label in names for names in left):
+            note(f"{label} in {Path(file).name}: {_unseen(model, samples, label)}", options.loudness)
+
+
+def _unseen(model: CorrectedModel, samples: Campaign, label: str) -> str:
+    """Say what a model does at labels that it has not seen."""
+    known = model.spread.levels[label] if model.spread else ()
+    new = sorted({str(own) for own in samples.labels.get(label, ())} - {*known, ""})
+    there = f"the model has not seen {', '.join(map(repr, new))}" if new else f"rows do not say which {label} is theirs"
+    apart = "std.x std.y std.z hold what these differ by" if len(known) > 1 else "nobody knows how others differ"
+    return f"{there}, but {', '.join(map(repr, known))}; predicted as their mean, and {apart}"

@@ -110,7 +110,7 @@ def corrected(
     there = replace(samples, q=q, travelled=samples.since_turn)
     if spread is None:
         return Commands(q, np.full((samples.samples, 3), np.nan), ((),) * samples.samples, found.turned)
-    outside = spread.outside(there)
+    outside = spread.outside(there, effects)
     std = spread.std(observe(there, frames, displacement=displaced(q)), effects, outside, noise=False)
     return Commands(q, std, outside, found.turned)
 

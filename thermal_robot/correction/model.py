@@ -169,7 +169,7 @@ class CorrectedModel:
         orientation = rotation_to_quaternion(self.frames.base[:3, :3] @ corrected.rotation) if turned else None
         if self.spread is None:
             return Prediction(position, orientation, np.full_like(position, np.nan), ((),) * len(position))
-        outside = self.spread.outside(samples)
+        outside = self.spread.outside(samples, self.effects)
         std = self.spread.std(corrected, self.effects, outside, noise)
         return Prediction(position, orientation, std, outside)
 

@@ -17,7 +17,7 @@ from thermal_robot.diagnosis.findings import by_share, findings, separates, titl
 from thermal_robot.diagnosis.held_out import Shrinkage
 from thermal_robot.diagnosis.numbered import numbered
 from thermal_robot.diagnosis.parts import Finding, Gap, Misfit, Refused, Rows, Unexplained
-from thermal_robot.diagnosis.predictive import uncertainty
+from thermal_robot.diagnosis.predictive import registered, uncertainty
 from thermal_robot.diagnosis.random_findings import random_findings
 from thermal_robot.diagnosis.result import Diagnosis
 from thermal_robot.diagnosis.schemes import hardest, harmed, worst_folds
@@ -192,7 +192,7 @@ def model_of(fit: Fit, floor: float | None) -> CorrectedModel:
         robot=campaign.robot,
         settings=campaign.settings,
         frames=fit.corrected.frames,
-        effects=tuple((gate.delivered(effect, fit.nominal), values) for effect, values in fit.effects),
+        effects=registered(fit, [(gate.delivered(effect, fit.nominal), values) for effect, values in fit.effects]),
         measures=campaign.measures,
         needs=needs,
         simulated=campaign.simulated_position is not None,

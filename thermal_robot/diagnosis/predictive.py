@@ -12,6 +12,7 @@ of :mod:`thermal_robot.diagnosis.deviations`.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -19,8 +20,11 @@ from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis.one_walk import Model, Walk
-from thermal_robot.diagnosis.settings import LOOSE
+from thermal_robot.diagnosis.settings import LEAST_SEEN, LOOSE
+from thermal_robot.effects import Effect, gate
+from thermal_robot.effects.fading import Fading
 from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import whitener
 from thermal_robot.inference.columns import frame_columns
 from thermal_robot.inference.discrepancy import Spectrum
 from thermal_robot.inference.fit import Fit
@@ -57,7 +61,47 @@ def uncertainty(fit: Fit, needs: tuple[str, ...], floor: float) -> Spread:
     noise = np.sqrt(np.maximum(total**2 - beyond**2, 0.0)) / share
     e = fit.explanation
     expected = [e.linear.blocks[b].sizes * e.best.scales[b] for b in e.best.blocks]
-    return Spread(covariance, beyond, noise, ranges, wider, np.concatenate([*expected, np.zeros(0)]))
+    prior, session = np.concatenate([*expected, np.zeros(0)]), campaign.labels.get("session")
+    levels = {} if session is None else {"session": tuple(np.unique(session).tolist())}
+    return Spread(covariance, beyond, noise, ranges, wider, prior, levels, _between(fit, session))
+
+
+def _between(fit: Fit, session: NDArray[np.str_] | None) -> Array | None:
+    """(3,) one sigma per axis by which sessions differ in what is left, measurement frame, m; ``None`` for one session.
+
+    The variance of their means less what the rows of each make it by chance.
+    """
+    kept = ~fit.explanation.outliers
+    left = fit.corrected.gap[kept, :3] @ fit.corrected.frames.base[:3, :3].T
+    runs = [] if session is None else [left[session[kept] == run] for run in np.unique(session[kept])]
+    runs = [run for run in runs if len(run) > 1]
+    if len(runs) < 2:
+        return None
+    chance = np.mean([run.var(axis=0, ddof=1) / len(run) for run in runs], axis=0)
+    return np.asarray(np.sqrt(np.maximum(np.var([run.mean(axis=0) for run in runs], axis=0, ddof=1) - chance, 0.0)))
+
+
+def registered(fit: Fit, held: Sequence[tuple[Effect, Array]]) -> tuple[tuple[Effect, Array], ...]:
+    """Return effects that, where they fade, leave what registration alone does; as they are where others do not fade.
+
+    The frames take over of a column what they do as they are fitted without it, by the products of all columns.
+    """
+    fading = [(effect, values) for effect, values in held if isinstance(effect, Fading) and effect.found]
+    if len(fading) < len(held):
+        return tuple(held)
+    model, names = Model.of(fit.explanation, blocks(fit.campaign)), frame_columns(fit.corrected)[1]
+    gram, flat = model.whole[0], model.flat
+    places = [k if name == "base" else 6 + k - names.index("tool") for k, name in enumerate(names)]
+    twists = np.zeros((12, gram.shape[1] - 1 - flat))
+    known = whitener(gram[:flat, :flat], LEAST_SEEN)
+    twists[places] = known @ (known.T @ gram[:flat, flat:-1])
+    found: list[tuple[Effect, Array]] = []
+    for (effect, values), own in zip(fading, model.spans, strict=True):
+        kept = {p.name: twists[:, k] for p, k in zip(gate.checked(effect, fit.nominal), own - flat, strict=True)}
+        every = gate.checked(replace(effect, places=(), excluded=()), fit.nominal)
+        rests = np.concatenate([kept.get(p.name, np.zeros(12)) for p in every]).tolist()
+        found.append((replace(effect, means=(), rests=tuple(rests)), values))
+    return tuple(found)
 
 
 def _quiet(campaign: Campaign, rows: NDArray[np.int64]) -> tuple[NDArray[np.bool_], float]:

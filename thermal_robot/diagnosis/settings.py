@@ -40,3 +40,6 @@ errors are those of robots."""
 SUREST_IF_WORSE = 0.9
 """Probability above which nothing is told of a correction that harms rows held out by session or region: what does not
 carry over may be no cause."""
+LEAST_SEEN = 1e-4
+"""Of the strongest direction of the frames, squared: one that the rows tell to a hundredth of that takes nothing over,
+as it would move far rows a hundred times as much."""

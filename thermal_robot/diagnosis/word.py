@@ -13,6 +13,7 @@ from thermal_robot.diagnosis.parts import Refused
 from thermal_robot.effects.law import PREFIX
 from thermal_robot.effects.law_words import is_event
 from thermal_robot.inference import settings
+from thermal_robot.inference.discover import discovered
 from thermal_robot.inference.explain import log_odds
 from thermal_robot.inference.fit import Fit, less
 
@@ -54,12 +55,14 @@ def worth_their_word(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, di
 
 
 def in_question(fit: Fit) -> dict[str, float]:
-    """Return by name the known effects of a fit that are little more probable than nothing in their place: the odds.
+    """Return by name the effects and laws of a fit that are little more probable than nothing in their place: the odds.
 
-    What others could do in its place does not count here: two of which one is at work are told as confounded.
+    What others could do in its place does not count here: two of which one is at work are told as confounded. A law
+    goes, too, that is far less probable than those that follow something else, or elsewhere.
     """
-    known = (n for n in fit.names_of(fit.explanation.best) if not n.startswith(PREFIX))
-    return {name: odds for name in known if (odds := fit.odds(name)) < settings.NAMING_ODDS}
+    odds = {name: fit.odds(name) for name in fit.names_of(fit.explanation.best)}
+    unlikely = {d.law.name: d.probability for d in discovered(fit) if d.probability * settings.NAMING_ODDS < 1.0}
+    return {name: own for name, own in odds.items() if own < settings.NAMING_ODDS} | unlikely
 
 
 def _refused(fit: Fit, judged: Earned) -> Refused:

@@ -10,6 +10,7 @@ import numpy as np
 
 from thermal_robot.effects.arguments import NotNegative, Positive
 from thermal_robot.effects.effect import TWIST, UNSOURCED, Array, Driver, Effect, Parameter, at_base
+from thermal_robot.effects.fading import Fading, ends
 from thermal_robot.effects.quantities import driving
 
 if TYPE_CHECKING:
@@ -17,12 +18,12 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Drift(Effect):
+class Drift(Fading):
     """The base moves by a twist that grows with time from zero at the first measurement: exp(β(t)) T.
 
     Linear, β(t) = β (t − t₀)/span, or exponential, β(t) = β (1 − exp(−(t − t₀)/τ)) / (1 − exp(−span/τ)), so that β is
     the displacement over the campaign in both. Expected size 0.1 mm and 0.1 mrad. ``order`` takes the place of
-    ``time`` where there is no time column.
+    ``time`` where there is no time column. A model holds what it had become by the end of the campaign.
 
     Attributes
     ----------
@@ -59,7 +60,15 @@ class Drift(Effect):
     def elsewhere(self, observations: Observations) -> Drift:
         """Return it as it begins with that campaign, at the same rate."""
         clock = observations.clock
-        return self if clock is None else replace(self, origin=float(clock.min()))
+        return self if clock is None else replace(self, origin=float(clock.min()), found=())
+
+    def delivered(self, observations: Observations) -> Effect:
+        """Return it as it begins and ends with the campaign."""
+        return self if observations.clock is None else replace(self, found=ends(observations.clock))
+
+    def unfaded(self) -> Effect:
+        """Return it as it goes on after the campaign."""
+        return replace(self, found=())
 
     def nearby(self, factor: float) -> tuple[Effect, ...]:
         """Time constants longer and shorter by a factor; beside the linear law, long ones."""
@@ -72,7 +81,7 @@ class Drift(Effect):
         clock = observations.clock
         if clock is None:
             return ()
-        elapsed = (clock - self.origin) / self.span
+        elapsed = ((np.clip(clock, *self.found) if self.found else clock) - self.origin) / self.span
         tau = self.time_constant
         grown = elapsed if tau == 0.0 else np.expm1(-elapsed / tau) / np.expm1(-1.0 / tau)
         return tuple(

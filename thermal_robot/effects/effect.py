@@ -25,7 +25,7 @@ Register it under the entry point group ``thermal_robot.effects`` or pass it to 
 others want to know of it stands in the same class, each with a default: ``title`` (in plain words), ``size_spread``
 (how well its sizes are known), ``frame`` and ``contained_in`` (what it cannot be told from), ``missing`` and ``reads``
 (columns), ``variants``, ``nearby`` and ``in_full`` (settings), ``driver`` (what it is drawn against), ``sized_as``
-(whether what it does in each joint is told), ``fading`` (where it is not known to go on). Every effect has the
+(whether what it does in each joint is told), ``unfaded`` (where it is not known to go on). Every effect has the
 arguments ``places`` and ``excluded`` besides its own: only the parameters in these joints or links, or not in those,
 are kept, by the gate.
 
@@ -228,6 +228,8 @@ class Effect(ABC):
     size_spread: ClassVar[float] = SOURCED
     """How firmly the expected sizes of its parameters are known: standard deviation of the logarithm of their common
     factor, which is learnt from the data."""
+    size_most: ClassVar[float] = float("inf")
+    """Times the expected sizes, to which that factor may grow: what no robot reaches is as improbable then as it is."""
     random: ClassVar[bool] = False
     """Whether it scatters: no mean follows from it; see :class:`thermal_robot.effects.random_effect.RandomEffect`."""
     frame: ClassVar[str] = ""
@@ -343,12 +345,9 @@ class Effect(ABC):
         """Return the effect as it is in another campaign of the robot, with that one's record in place of its own."""
         return self
 
-    def fading(self, observations: Observations) -> Array | None:
-        """Return (N,) what part of the effect its responses hold; ``None`` where they hold all of it.
-
-        Less than one in rows where nobody knows whether it goes on as where it was found.
-        """
-        return None
+    def unfaded(self) -> Effect:
+        """Return the effect as it is where it does not fade in rows of which nobody knows whether it goes on there."""
+        return self
 
     def arguments(self) -> dict[str, Any]:
         """Return the constructor's arguments, for saving; ``places`` and ``excluded`` only where they are set."""

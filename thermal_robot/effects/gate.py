@@ -194,21 +194,9 @@ def elsewhere(effect: Effect, observations: Observations) -> Effect:
     return _settings(effect, "elsewhere", (_asked(effect, "elsewhere", observations),))[0]
 
 
-def fading(effect: Effect, observations: Observations) -> Array | None:
-    """Return (N,) what part of an effect its responses hold, ``None`` for all (:meth:`Effect.fading`).
-
-    Raises
-    ------
-    EffectError
-        If it is not one share a row, above 0 and at most 1.
-    """
-    answer = _asked(effect, "fading", observations)
-    if answer is None:
-        return None
-    rows, share = observations.campaign.samples, np.asarray(answer)
-    if share.shape != (rows,) or share.dtype.kind != "f" or not ((share > 0.0) & (share <= 1.0)).all():
-        raise _broken(effect, f": fading answers {answer!r}, expected ({rows},) shares above 0")
-    return share
+def unfaded(effect: Effect) -> Effect:
+    """Return an effect as it is where it does not fade (:meth:`Effect.unfaded`); raises as :func:`delivered`."""
+    return _settings(effect, "unfaded", (_asked(effect, "unfaded"),))[0]
 
 
 def variants(effect: Effect, observations: Observations) -> tuple[Effect, ...]:

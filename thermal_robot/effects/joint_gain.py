@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
-from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, at_joint
+from thermal_robot.effects.effect import Array, Driver, Parameter, at_joint
+from thermal_robot.effects.fading import OfPosition
 from thermal_robot.effects.quantities import position_of
 
 if TYPE_CHECKING:
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class JointGain(Effect):
+class JointGain(OfPosition):
     """Every joint moves by a little more or less than commanded: q_actual = q_command + g_j q_command.
 
     Expected size 5e-4, and seldom above 1e-3: a belt's pitch, a ball screw's lead or a mis-set ratio, where the encoder
@@ -28,10 +29,13 @@ class JointGain(Effect):
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """One gain error a joint; dimensionless."""
-        return tuple(
-            Parameter("gain error", "1", 5e-4, "joint", joint, (at_joint(j, observations.q[:, j]),))
-            for j, joint in enumerate(observations.robot.joint_names)
-        )
+        found, parts = [], []
+        for j, joint in enumerate(observations.robot.joint_names):
+            x, left = self.ended(observations, j)
+            values = replace(self, means=self.means[j : j + 1]).faded(x[:, None], left)[:, 0]
+            found.append(Parameter("gain error", "1", 5e-4, "joint", joint, (at_joint(j, values),)))
+            parts.append(left)
+        return self.registered(found, parts)
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
         """Return the joint's own position."""

@@ -7,11 +7,10 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, ClassVar
 
-import numpy as np
-
 from thermal_robot.effects.arguments import Count, Positive
-from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, at_joint
-from thermal_robot.effects.quantities import position_of, unit
+from thermal_robot.effects.effect import Array, Driver, Effect, Parameter
+from thermal_robot.effects.fading import OfPosition
+from thermal_robot.effects.quantities import position_of
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -22,7 +21,7 @@ _NEAR = 0.2  # orders: as near as a wave's peak tells an order, over a good part
 
 
 @dataclass(frozen=True)
-class JointRipple(Effect):
+class JointRipple(OfPosition):
     """A joint errs by waves of its own position: q_actual = q_command + Σ_k a_k sin(n_k q) + b_k cos(n_k q).
 
     Teeth, balls and the motor's own wheel come round n times in a turn of the joint; n need be no whole number. Strain
@@ -65,15 +64,9 @@ class JointRipple(Effect):
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """Two amplitudes a wave; rad, or m where the joint slides."""
-        robot = observations.robot
-        found = []
-        for joint, order in zip(self.joints, self.orders, strict=True):
-            j, own = robot.joint_names.index(joint), unit(robot, joint)
-            for what, wave in (("sine", np.sin), ("cosine", np.cos)):
-                values = at_joint(j, wave(order * observations.q[:, j]))
-                label = f"{what}, order {order:.6g}{_of_motor(order, observations.campaign.gears.get(joint))}"
-                found.append(Parameter(label, own, _AMPLITUDE, "joint", joint, (values,)))
-        return tuple(found)
+        gears, pairs = observations.campaign.gears, zip(self.joints, self.orders, strict=True)
+        of = [(joint, order, _of_motor(order, gears.get(joint)), _AMPLITUDE) for joint, order in pairs]
+        return self.waves(observations, of)
 
     def at(self, place: str) -> Effect | None:
         """Waves have joints of their own."""

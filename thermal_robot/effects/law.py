@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from textwrap import fill
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
@@ -29,6 +29,8 @@ from thermal_robot.effects.effect import (
     at_tool,
     in_words,
 )
+from thermal_robot.effects.fading import Fading, ends, left_at
+from thermal_robot.effects.law_source import source
 from thermal_robot.effects.quantities import TURN, driving, quantity, strains, unit
 from thermal_robot.effects.shapes import SHAPES
 from thermal_robot.schema import word
@@ -41,7 +43,7 @@ _COMPONENTS = ("along x", "along y", "along z", "about x", "about y", "about z")
 
 
 @dataclass(frozen=True)
-class Discovered(Effect):
+class Discovered(Fading):
     """An error enters at one place and follows one quantity x by a law f(x) = Σ_k c_k φ_k(x).
 
     The functions φ_k belong to its shape (:mod:`thermal_robot.effects.shapes`). In a joint f is an angle (or a
@@ -80,12 +82,11 @@ class Discovered(Effect):
         Name of the known effect that changes with the quantity, and its arguments as JSON text; empty where none does.
     tried
         Among how many laws it was picked.
-    found
-        Least and largest value of what it follows, and of the second quantity, where it was found; empty for no matter.
     """
 
     title: ClassVar[str] = "an unlisted law"
     size_spread: ClassVar[float] = UNSOURCED
+    size_most: ClassVar[float] = settings.LAW_MOST
     name: str = PREFIX + "1"  # type: ignore[misc]
     kind: Annotated[str, word(("joint", "link", "base", "tool"))] = "joint"
     place: str = ""
@@ -105,7 +106,6 @@ class Discovered(Effect):
     of: str = ""
     of_arguments: str = "{}"
     tried: Count = 1.0
-    found: tuple[float, ...] = ()
 
     @property
     def share(self) -> float:
@@ -154,17 +154,18 @@ class Discovered(Effect):
         if of == "strains":
             return strains(observations, self.quantity.removeprefix(TURN), self.marks)
         since, run = self._since_start(observations, clock)
-        return (
-            since[:, None]
-            if of == "run"
-            else np.where(run[:, None] == np.arange(len(self.runs)), since[:, None], np.inf)
-        )
+        if of == "run":
+            return since[:, None]
+        new = run[:, None] < 0
+        # of a session that was not there it starts with the mean of all: exp(−ln R) = 1 / R
+        since = since[:, None] + new * abs(self.marks[0]) * np.log(len(self.runs))
+        return np.where((run[:, None] == np.arange(len(self.runs))) | new, since, np.inf)
 
     def _since_start(self, observations: Observations, clock: Array) -> tuple[Array, NDArray[np.int64]]:
         """(N,) time since the row's session began, and the number of that session.
 
-        A session that was not there began with the first of its rows, and is taken for the last; a row of none belongs
-        to the last that had begun.
+        A session that was not there began with the first of its rows, and has the number −1; a row of none belongs to
+        the last that had begun.
         """
         starts, rows = np.array(self.starts), observations.campaign.labels.get("session")
         run = np.clip(np.searchsorted(np.sort(starts), clock, side="right") - 1, 0, len(starts) - 1)
@@ -173,7 +174,7 @@ class Discovered(Effect):
         for label in np.unique(rows) if rows is not None and self.runs else ():
             own = rows == label
             known = label in self.runs
-            run[own] = self.runs.index(label) if known else int(starts.argmax())
+            run[own] = self.runs.index(label) if known else -1
             began[own] = starts[run[own]] if known else clock[own].min()
         return np.maximum(clock - began, 0.0), run
 
@@ -181,83 +182,98 @@ class Discovered(Effect):
         campaign = observations.campaign
         if self.shape == "constant":
             return np.zeros(campaign.samples)
-        if self.labels and self.quantity in campaign.labels:
+        if self.labels and (self.quantity in campaign.labels or campaign.position is None):
             number = {label: float(k) for k, label in enumerate(self.labels)}
-            # of a session that was not there nothing is known: it is taken for the last
-            return np.array([number.get(label, len(self.labels) - 1.0) for label in campaign.labels[self.quantity]])
+            rows = campaign.labels.get(self.quantity, np.full(campaign.samples, ""))
+            return np.array([number.get(label, np.nan) for label in rows])
         if self.quantity == "order" and self.quantity not in observations.covariates and campaign.position is None:
-            # what is to be predicted without a clock comes after the campaign
-            return np.full(campaign.samples, self.origin + self.span)
+            return np.full(campaign.samples, self.origin + self.span)  # to be predicted: after the campaign
         return quantity(observations, self.quantity)
 
     def functions(self, values: Array) -> tuple[Array, tuple[str, ...]]:
         """Return (N, K) the functions φ at values of what the shape is of, and a name for each."""
-        shape = SHAPES[self.shape]
-        labels = shape.labels
+        shape, clock = SHAPES[self.shape], self.quantity in CLOCK
+        start = "the start" if clock else f"{self.quantity} {self._marked(self.origin)}"
+        over = "the campaign" if clock else f"{self._marked(self.span)} of {self.quantity}"
+        labels = tuple(label.format(start=start, range=over) for label in shape.labels)
         if shape.each and self.labels:
             labels += tuple(f"at {self.labels[int(mark)]}" for mark in self.marks)
-        elif shape.each:
-            told = len(set(self.marks))  # as many digits as tell the marks apart
-            digits = next(d for d in range(3, 18) if len({f"{m:.{d}g}" for m in self.marks}) == told)
+        elif shape.each:  # as many digits as tell the marks apart
+            digits = next(d for d in range(3, 18) if len({f"{m:.{d}g}" for m in self.marks}) == len(set(self.marks)))
             labels += tuple(f"at {self._marked(mark, digits)}" for mark in self.marks)
-        if shape.of == "runs":
-            labels += tuple(f"at the start of {run}" for run in self.runs)
+        labels += tuple(f"at the start of {run}" for run in self.runs if shape.of == "runs")
         return shape.functions(values, self.marks, self.origin, self.span), labels
 
     def at_rows(self, observations: Observations) -> tuple[Array, tuple[str, ...]] | None:
-        """Return the (N, K) functions at the rows, and a name for each; ``None`` where the campaign cannot tell."""
-        if (values := self._followed(observations)) is None:
-            return None
-        ends = self.found if SHAPES[self.shape].runs_on else ()
-        functions, labels = self.functions(np.clip(values, ends[0], ends[1]) if ends else values)
-        if (left := self.fading(observations)) is not None:
-            functions = functions * left[:, None]
-        if not self.by or self.shape == "product":
-            return functions, labels
-        if (second := quantity(observations, self.by)) is None:
-            return None
-        v = ((np.clip(second, ends[2], ends[3]) if ends else second) - self.by_origin) / self.by_span
-        return np.column_stack([functions, functions * v[:, None]]), (*labels, *(f"{n}, × {self.by}" for n in labels))
+        """Return the (N, K) functions at the rows, and a name for each; ``None`` where the campaign cannot tell.
 
-    def _reads(self, observations: Observations) -> list[tuple[str, Array | None]]:
-        """Return the quantities that it runs on with, and their (N,) values."""
-        by = [(self.by, quantity(observations, self.by))] if self.by and self.shape != "product" else []
-        return [(self.quantity, self.values(observations)), *by]
-
-    def delivered(self, observations: Observations) -> Discovered:
-        """Return the law with the range in which it was found."""
-        ends = [(float(v.min()), float(v.max())) for _, v in self._reads(observations) if v is not None]
-        return replace(self, found=tuple(end for pair in ends for end in pair)) if SHAPES[self.shape].runs_on else self
-
-    def fading(self, observations: Observations) -> Array | None:
-        """Return (N,) how much of the law is left; ``None`` where its shape ends by itself, or no range is known.
-
-        Beyond where it was found, if it would run on and nobody knows that it does, it keeps the value of the edge, and
-        of that ever less, as a normal process of no mean does. What has changed by the end of the campaign stays.
+        At a label that was not there they are the mean of those at the others.
         """
-        if not self.found or not SHAPES[self.shape].runs_on:
+        values, two = self._followed(observations), bool(self.by) and self.shape != "product"
+        second = quantity(observations, self.by) if two else None
+        if values is None or (two and second is None):
             return None
+        if ranges := self._ranges:
+            values = np.clip(values, *ranges[0])
+        functions, labels = self.functions(values)
+        if self.labels and np.isnan(values).any():
+            functions[np.isnan(values)] = self.functions(np.arange(float(len(self.labels))))[0].mean(axis=0)
+        if second is not None:
+            v = ((np.clip(second, *ranges[1]) if ranges else second) - self.by_origin) / self.by_span
+            functions = np.column_stack([functions, functions * v[:, None]])
+            labels = (*labels, *(f"{name}, × {self.by}" for name in labels))
+        return self.faded(functions, self._left(observations)), labels
+
+    @property
+    def _ranges(self) -> list[tuple[float, float]]:
+        return list(zip(self.found[::2], self.found[1::2], strict=True))
+
+    def _left(self, observations: Observations) -> Array:
+        """(N,) how much is left of it; what has changed by the end of the campaign stays."""
         left = np.ones(observations.campaign.samples)
-        for k, (name, values) in enumerate(self._reads(observations)):
-            low, high = self.found[2 * k : 2 * k + 2]
-            if values is not None and name not in CLOCK:
-                beyond = (values - np.clip(values, low, high)) / (settings.FADES * ((high - low) or 1.0))
-                left *= np.exp(-0.5 * beyond**2)
-        return np.maximum(left, settings.FADED)
+        for (name, driver), (low, high) in zip(self._driven(observations), self._ranges, strict=False):
+            left = left if name in CLOCK else left * left_at(driver, low, high)
+        return left
+
+    def _driven(self, observations: Observations) -> list[tuple[str, Array]]:
+        """Return what it ends with, by name: what it follows, a second quantity, and how these two go together."""
+        first, values = self._first(observations), self.values(observations)
+        if self.labels or SHAPES[self.shape].of != "quantity" or self.shape == "constant" or first is None:
+            return []
+        second = quantity(observations, self.by) if self.by else None
+        if second is None or values is None:
+            return [(self.quantity, first)]
+        if self.shape == "product":
+            return [(self.quantity, values), (self.by, second), (self.quantity, first)]
+        u, v = (first - self.origin) / self.span, (second - self.by_origin) / self.by_span
+        both = self.quantity if self.quantity in CLOCK else self.by
+        return [(self.quantity, first), (self.by, second), (both, u + v), (both, u - v)]
+
+    def delivered(self, observations: Observations) -> Effect:
+        """Return the law with the range in which it was found, and the effect in it with its own."""
+        law, rows = self, self.at_rows(observations)
+        if self.modulated is not None:
+            kept = gate.arguments(gate.delivered(self.modulated, observations))
+            law = replace(self, of_arguments=json.dumps({k: v for k, v in kept.items() if k != "places"}))
+        if rows is None or not (driven := self._driven(observations)):
+            return law
+        means = tuple(rows[0].mean(axis=0).tolist())
+        return replace(law, found=tuple(end for _, values in driven for end in ends(values)), means=means)
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """Return one parameter a function and component; rad or m, or the unit of the effect in the law."""
-        robot, rows = observations.robot, self.at_rows(observations)
-        if rows is None:
-            return ()
-        functions, labels = rows
+        rows = self.at_rows(observations)
+        found = () if rows is None else self._of(observations, *rows)
+        return self.registered(found, [self._left(observations)] * len(found))
+
+    def _of(self, observations: Observations, functions: Array, labels: tuple[str, ...]) -> tuple[Parameter, ...]:
+        robot = observations.robot
         if self.modulated is not None:
             whole = gate.checked(self.modulated, observations)
             return tuple(_times(p, f, n) for f, n in zip(functions.T, labels, strict=True) for p in whole)
         found = []
         if self.kind == "joint":
-            j = robot.joint_names.index(self.place)
-            own = unit(robot, self.place)
+            j, own = robot.joint_names.index(self.place), unit(robot, self.place)
             for function, label in zip(functions.T, labels, strict=True):
                 found.append(Parameter(label, own, 3e-4, "joint", self.place, (at_joint(j, function),)))
             return tuple(found)
@@ -275,10 +291,9 @@ class Discovered(Effect):
         if not shape.mark:
             return (self,)
         shift = (factor - 1.0) * 0.04 * self.span
-        moved = [self, self.shifted(shift), self.shifted(-shift)]
-        if shape.width:
-            moved += [replace(self, marks=(self.marks[0], self.marks[1] * f)) for f in (factor, 1.0 / factor)]
-        return tuple(moved)
+        widths = (factor, 1.0 / factor) if shape.width else ()
+        wider = (replace(self, marks=(self.marks[0], self.marks[1] * f)) for f in widths)
+        return self, self.shifted(shift), self.shifted(-shift), *wider
 
     def shifted(self, by: float) -> Discovered:
         """Return the same law with its mark moved; a step does not stay between sessions, a time stays above 0."""
@@ -300,12 +315,7 @@ class Discovered(Effect):
         name
             Of the effect.
         """
-        fields = {k: v for k, v in self.arguments().items() if k != "name"}
-        lines = "\n".join(f"    {key}: Any = {_literal(value)}" for key, value in fields.items())
-        title = "".join(part.capitalize() for part in name.split("_"))
-        found = fill(", ".join(f"{v:.4g}" for v in values), 100, initial_indent="    ", subsequent_indent="    ")
-        what = self.describe()
-        return _SOURCE.format(title=title, name=name, lines=lines, values=found, what=what[:1].upper() + what[1:])
+        return source(self.arguments(), self.describe(), values, name)
 
     def describe(self) -> str:
         """Say in a few words where the error enters and what it follows."""
@@ -350,9 +360,8 @@ class Discovered(Effect):
     def _responder(self, observations: Observations) -> tuple[Callable[[Array], Response], str]:
         if self.kind in ("base", "tool"):
             return at_base if self.kind == "base" else at_tool, self.kind
-        segments = observations.robot.segments
-        s = next(s for s, segment in enumerate(segments) if segment.name == self.place)
-        return lambda twist: at_segment(s, twist), segments[s].parent_link
+        s, segment = next((s, own) for s, own in enumerate(observations.robot.segments) if own.name == self.place)
+        return lambda twist: at_segment(s, twist), segment.parent_link
 
 
 def _whole(mark: float) -> str:
@@ -367,34 +376,3 @@ def _times(parameter: Parameter, function: Array, label: str) -> Parameter:
         for r in parameter.responses
     )
     return replace(parameter, label=f"{parameter.label}, {label}", responses=responses, positive=False)
-
-
-def _literal(value: object) -> str:
-    if isinstance(value, tuple) and value:
-        return "(\n" + "".join(f"        {item!r},\n" for item in value) + "    )"
-    return repr(value)
-
-
-_SOURCE = '''"""{what}.
-
-Found in a campaign by thermal_robot, named by hand.
-"""
-
-from dataclasses import dataclass
-from typing import Any
-
-from thermal_robot.effects.law import Discovered
-
-
-@dataclass(frozen=True)
-class {title}(Discovered):
-    """{what}.
-
-    In the campaign where it was found its values were, in SI:
-
-{values}
-    """
-
-    name: Any = "{name}"
-{lines}
-'''

@@ -53,7 +53,8 @@ class Shape:
     functions
         The φ of the table above.
     labels
-        A name for each, but for those that belong to one of the marks each.
+        A name for each, but for those that belong to one of the marks each; ``{start}`` and ``{range}`` stand for its
+        origin and its span, in the quantity's unit.
     words
         The shape in a sentence; ``{mark}`` stands for its first mark with the quantity's unit, ``{order}`` without.
     mark
@@ -68,8 +69,6 @@ class Shape:
     of
         What the functions are of: the (N,) ``quantity``; the (N, K) ``strains`` of elements of slips as marked; the
         (N, 1) time since the ``run`` began, or since each of the ``runs`` began, infinite in the others (N, R).
-    runs_on
-        Whether it goes on rising or falling beyond what was measured, where nobody knows that it does.
     """
 
     functions: Functions
@@ -81,7 +80,6 @@ class Shape:
     size: str = "range"
     noun: str = "an error"
     of: Literal["quantity", "strains", "run", "runs"] = "quantity"
-    runs_on: bool = False
 
 
 def _constant(x: Array, marks: tuple[float, ...], origin: float, span: float) -> Array:
@@ -166,20 +164,20 @@ def _smooth(x: Array, marks: tuple[float, ...], origin: float, span: float) -> A
 
 SHAPES: dict[str, Shape] = {
     "constant": Shape(_constant, ("constant",), "constant", noun="a constant error"),
-    "ramp": Shape(_ramp, ("at the start", "rise over the campaign"), "in proportion", runs_on=True),
-    "quadratic": Shape(_quadratic, ("constant", "linear", "quadratic"), "quadratic", runs_on=True),
+    "ramp": Shape(_ramp, ("at {start}", "rise over {range}"), "in proportion"),
+    "quadratic": Shape(_quadratic, ("constant", "linear", "quadratic"), "quadratic"),
     "step": Shape(_step, ("before", "after"), "a step at {mark}", "sudden", size="step", noun="a step"),
     "run": Shape(_run, ("elsewhere", "there"), "another value for a while", size="step", noun="a step"),
     "slide": Shape(
         _slide, ("before", "after"), "a smooth step at {mark}", "gradual", width=True, size="step", noun="a step"
     ),
-    "hinge": Shape(_hinge, ("constant", "slope beyond, over the range"), "a bend at {mark}", "gradual", runs_on=True),
+    "hinge": Shape(_hinge, ("constant", "slope beyond, over {range}"), "a bend at {mark}", "gradual"),
     "bump": Shape(_bump, ("constant", "height"), "a bump at {mark}", "gradual", width=True, size="bump", noun="a bump"),
-    "drag": Shape(_drag, ("constant", "slope over the range", "of its sign"), "its slope and its sign", runs_on=True),
+    "drag": Shape(_drag, ("constant", "slope over {range}", "of its sign"), "its slope and its sign"),
     "harmonic": Shape(
         _harmonic, ("constant", "sine", "cosine"), "harmonic of order {order:g}", size="peak to peak", noun="a wave"
     ),
-    "product": Shape(_product, ("constant", "at the largest product"), "in proportion to the product", runs_on=True),
+    "product": Shape(_product, ("constant", "at the largest product"), "in proportion to the product"),
     "hysteresis": Shape(_hysteresis, ("constant",), "springs that slip", each=True, of="strains"),
     "relaxing": Shape(
         _relaxing, ("constant", "at the start"), "it settles within {mark} of each start", "gradual", of="run"
@@ -187,6 +185,6 @@ SHAPES: dict[str, Shape] = {
     "relaxing each": Shape(_relaxing, ("constant",), "it settles within {mark} of each start", "gradual", of="runs"),
     "levels": Shape(_levels, (), "a value at each of its levels", each=True, size="difference"),
     "apart": Shape(_apart, ("elsewhere", "there"), "one apart from the others", size="difference", noun="an offset"),
-    "smooth": Shape(_smooth, (), "smooth", each=True, runs_on=True),
+    "smooth": Shape(_smooth, (), "smooth", each=True),
 }
 """Every shape by its name."""

@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import numpy as np
 
 from thermal_robot.effects.arguments import Order
-from thermal_robot.effects.effect import SOURCED, Array, Driver, Effect, Parameter, at_joint
-from thermal_robot.effects.quantities import position_of, unit
+from thermal_robot.effects.effect import SOURCED, Array, Driver, Effect, Parameter
+from thermal_robot.effects.fading import OfPosition
+from thermal_robot.effects.quantities import position_of
 from thermal_robot.schema import word
 
 if TYPE_CHECKING:
@@ -24,7 +25,7 @@ _NOT_LEARNT = 0.05  # of the logarithm of its size: a curve that could grow woul
 
 
 @dataclass(frozen=True)
-class TransmissionError(Effect):
+class TransmissionError(OfPosition):
     """Every joint deviates periodically: q_actual = q_command + Σ_k a_k sin(k q) + b_k cos(k q).
 
     An eccentric wheel or encoder disc on the joint's side gives order 1, an oval one order 2; where the campaign
@@ -72,16 +73,12 @@ class TransmissionError(Effect):
         """Two amplitudes a joint and order; rad. Prismatic joints have a period only with a ratio in rad/m."""
         robot, gears = observations.robot, observations.campaign.gears
         found = []
-        for j, (joint, kind) in enumerate(zip(robot.joint_names, robot.joint_types, strict=True)):
+        for joint, kind in zip(robot.joint_names, robot.joint_types, strict=True):
             turns = [1.0] if kind != "prismatic" and self.side != "motor" else []
             turns += [float(gears[joint])] if joint in gears and self.side != "joint" else []
-            own = unit(robot, joint)
-            for ratio, k in itertools.product(turns, self.harmonics):
-                order, size = ratio * k, _amplitude(k, self.harmonics)
-                for what, wave in (("sine", np.sin), ("cosine", np.cos)):
-                    values = at_joint(j, wave(order * observations.q[:, j]))
-                    found.append(Parameter(f"{what}, order {order:g}", own, size, "joint", joint, (values,)))
-        return tuple(found)
+            every = itertools.product(turns, self.harmonics)
+            found += [(joint, ratio * k, "", _amplitude(k, self.harmonics)) for ratio, k in every]
+        return self.waves(observations, found)
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
         """Return the joint's own position."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.diagnosis.result import Diagnosis
 from thermal_robot.effects import Effect, Parameter, gate
+from thermal_robot.effects.fading import OfPosition
 from thermal_robot.effects.law import Discovered
 from thermal_robot.effects.law_words import called
 from thermal_robot.errors import EffectError
@@ -133,7 +134,8 @@ def _parameters(effect: Effect, fit: Fit | Known) -> tuple[Parameter, ...]:
 
 def _there(effect: Effect, fit: Fit | Known) -> Effect:
     """Return an effect as it is in a campaign; a model has no record to take anything from."""
-    return gate.elsewhere(effect, fit.corrected) if isinstance(fit, Fit) else effect
+    recorded = isinstance(fit, Fit) or isinstance(effect, OfPosition)  # these have nothing of it but their range
+    return gate.elsewhere(effect, fit.corrected) if recorded else effect
 
 
 def _sizes(effect: Effect, fit: Fit | Known, told: Sequence[Parameter]) -> Array:

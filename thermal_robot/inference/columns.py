@@ -36,6 +36,8 @@ class Block:
         (P,) expected size of each parameter, the campaign's ``[priors]`` applied.
     spread
         Standard deviation of the logarithm of their common factor.
+    most
+        That factor, at most.
     """
 
     effect: Effect
@@ -43,6 +45,7 @@ class Block:
     source: Observations | Array
     sizes: Array
     spread: float = UNSOURCED
+    most: float = np.inf
 
     @property
     def columns(self) -> Array:
@@ -88,7 +91,7 @@ def block(observations: Observations, effect: Effect) -> Block:
         # one size is stated for the whole effect: its parameters keep their default proportions
         sizes = sizes * (campaign.priors[effect.name] / sizes[0])
     bare = tuple(parameter.bare for parameter in parameters)
-    return Block(effect, bare, observations, sizes, effect.size_spread)
+    return Block(effect, bare, observations, sizes, effect.size_spread, effect.size_most)
 
 
 def moved_by(observations: Observations, parameters: Sequence[Parameter]) -> Array:

@@ -7,7 +7,7 @@ blocks that are in the combination. F is projected out first. For a combination 
 
 with G = X'X and b = X'y restricted to γ. Noise s and scales λ_b are found at their most probable values, s by MacKay's
 fixed point (*Neural Computation* 4, 1992), ln λ_b by Newton's steps; their priors are scaled inverse chi-square about
-the stated noise, and log-normal about the stated sizes;
+the stated noise, and log-normal about the stated sizes, cut off where no robot reaches;
 ln λ is integrated out by Laplace's method, s held. Parameters that cannot be negative have half a normal prior
 (:mod:`thermal_robot.inference.posterior`).
 """
@@ -93,7 +93,8 @@ def evidence(
     variance = start.noise**2 if start else (gram.noise_dof + gram.total) / (gram.noise_dof + gram.equations)
     variance, spread = max(variance, settings.LEAST_VARIANCE), gram.spreads[list(blocks)]
     known = prior + gram.offset
-    peak = _most_probable(gram, columns, scale, spread, variance, floor - known, settled)
+    most = np.full(len(scale), np.inf) if gram.most is None else gram.most[list(blocks)]
+    peak = _most_probable(gram, columns, np.minimum(scale, most), spread, most, variance, floor - known, settled)
     found, scale, variance = peak.posterior, peak.scale, peak.variance
     log_evidence = known + _log_joint(gram, columns, found, scale, spread, variance) + _log_volume(peak.bend, spread)
     log_evidence += peak.promised or 0.0
@@ -118,7 +119,14 @@ class _Peak:
 
 
 def _most_probable(
-    gram: Gram, columns: Columns, scale: Array, spread: Array, variance: float, floor: float, settled: float
+    gram: Gram,
+    columns: Columns,
+    scale: Array,
+    spread: Array,
+    most: Array,
+    variance: float,
+    floor: float,
+    settled: float,
 ) -> _Peak:
     """Return the most probable scales and variance of the noise, left early where the log evidence stays below."""
     held = gram.noise_dof
@@ -129,7 +137,7 @@ def _most_probable(
         step, gain = found.step(bend, scale, spread)
         if (found.free != free).any() and step @ before < -settings.TAKEN_BACK * (before @ before):
             reach *= 0.5  # to and fro between two sets of dropped columns: the mode lies where they meet
-        free, before, step = found.free, step, reach * step
+        free, before, step = found.free, step, np.minimum(reach * step, np.log(most / scale))
         residual = float(gram.total - (2 * columns.vector - columns.matrix @ found.values) @ found.values)
         left = max(held + gram.equations - float(found.effective.sum()), 1.0)
         target = max((held + max(residual, 0.0)) / left, settings.LEAST_VARIANCE)

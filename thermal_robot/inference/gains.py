@@ -79,6 +79,8 @@ def gains(gram: Gram, base: Combination, blocks: Sequence[int]) -> list[tuple[in
         log = -0.5 * np.log1p(np.divide(seen, left_over[:, :, None], out=part), out=part).sum(axis=2)
         log -= 0.5 * (log_scale / spread) ** 2 + np.log(np.sqrt(2.0 * np.pi) * spread / step)
         log -= 0.5 * freedom * np.log(left_over / rest)
+        if gram.most is not None:
+            log[log_scale > np.log(gram.most[alike.blocks])[:, None]] = -np.inf
         log += _on_their_sides(alike, square, left_over)
         top = log.max(axis=1)
         gain = top + np.log(np.exp(log - top[:, None]).sum(axis=1))

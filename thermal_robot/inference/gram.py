@@ -30,6 +30,8 @@ class Gram:
         Per block: how many directions of it the data see.
     spreads
         (B,) of each block: standard deviation of ln λ before the data.
+    most
+        (B,) λ of each block, at most; ``None`` where nothing bounds any.
     equations
         n: scalar equations with weight, less the rank of the frames.
     noise_dof
@@ -50,6 +52,7 @@ class Gram:
     equations: float
     noise_dof: float
     offset: float = 0.0
+    most: Array | None = None
 
     def columns_of(self, blocks: Sequence[int]) -> NDArray[np.int64]:
         """(D_γ,) numbers of the reduced columns of some blocks."""
@@ -69,4 +72,5 @@ class Gram:
             positive=self.positive[own],
             ranks=tuple(self.ranks[b] for b in blocks),
             spreads=self.spreads[list(blocks)],
+            most=None if self.most is None else self.most[list(blocks)],
         )

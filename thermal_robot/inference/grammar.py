@@ -33,7 +33,8 @@ def modulated(observations: Observations, effects: Iterable[Effect] | None = Non
 
     An effect whose response is the same in all rows, such as a zero that is off, is left out: times a law it is a plain
     law of that joint. So is what drives the effect itself: lost motion times the direction of approach is a zero that
-    is off. An effect that is not installed is left out, too, as a saved law could not be read.
+    is off, a wave times a law of the same position any law of it. An effect that is not installed is left out, too, as
+    a saved law could not be read.
 
     Parameters
     ----------
@@ -54,7 +55,8 @@ def modulated(observations: Observations, effects: Iterable[Effect] | None = Non
         arguments = {k: v for k, v in gate.arguments(setting).items() if k not in ("places", "excluded")}
         for joint in _changing(setting, observations):
             driver = _driver(setting, observations, joint)
-            names = [*(name for name in conditions(observations, joint) if name != driver), joint]
+            followed = (*conditions(observations, joint), joint)
+            names = [name for name in followed if driver not in (name, f"position of {name}")]
             plain = [follow[name] for name in names if name in known]
             text = json.dumps(arguments)
             found += [replace(law, place=joint, of=effect.name, of_arguments=text) for law in plain]
