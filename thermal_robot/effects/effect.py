@@ -58,6 +58,8 @@ SOURCED, UNSOURCED = 0.5, 1.5
 within a factor of 3.6 of it; where nobody knows it, three times more or less is no surprise."""
 TWIST = (*((f"translation {axis}", "m") for axis in "xyz"), *((f"rotation {axis}", "rad") for axis in "xyz"))
 """Name and unit of each component of a twist."""
+ALONE = 0.1 / len(TWIST)
+"""Weight of each component of a misplaced frame alone, beside all together: one frame in ten is off in one alone."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -230,7 +230,7 @@ def in_joints(finding: Finding) -> str:
 
 
 def rivals(finding: Finding, diagnosis: Diagnosis) -> str:
-    """Say of which effect it is a part, or what it cannot be told from and how to see the one not preferred."""
+    """Say of which effect it is a part, or what it cannot be told from and how to see what is not preferred."""
     if not finding.confounded_with:
         return ""
     if finding.status == "contained":
@@ -239,7 +239,7 @@ def rivals(finding: Finding, diagnosis: Diagnosis) -> str:
     others = [name for name in finding.confounded_with if not diagnosis.is_frame(name)]
     if finding.name not in diagnosis.verdict or not others:
         return said
-    return f"{said}; --without {finding.name} shows {one_of(others)} in its place"
+    return f"{said}; --without {finding.name} shows what would then stand in its place"
 
 
 def left_out(diagnosis: Diagnosis) -> str:
