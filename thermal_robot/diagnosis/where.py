@@ -18,6 +18,7 @@ from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.laws import smooth_columns
 from thermal_robot.inference.settings import TINY
 from thermal_robot.observations import Observations
+from thermal_robot.percents import percent
 
 Array = NDArray[np.float64]
 
@@ -46,7 +47,7 @@ def without_laws(fit: Fit, left: Unexplained) -> Unexplained:
         left,
         rms=float(np.sqrt(left.rms**2 + taken2)),
         p_value=max(min(left.p_value, *chance), 0.0),
-        reasons=(f"{what} {taken2 / max(taken2 + rest2, TINY):.0%} of what the known effects leave", *left.reasons),
+        reasons=(f"{what} {percent(taken2 / max(taken2 + rest2, TINY), 0)} of what the known effects leave", *left.reasons),
     )
 
 

@@ -86,7 +86,7 @@ def chance(p_value: float | None) -> str:
         return units.MISSING
     if p_value < 1e-5:
         return "below 0.001 %"
-    return f"{100.0 * p_value:.0f} %" if p_value > 0.1 else f"{100.0 * p_value:.2g} %"
+    return units.percent(p_value, 0) if p_value > 0.1 else f"{100.0 * p_value:.2g} %"
 
 
 def effects(comparison: Plain) -> Iterator[tuple[str, str, str, str]]:
@@ -132,4 +132,4 @@ def predictions(comparison: Plain) -> Iterator[tuple[str, str, str, str, str]]:
             continue
         difference, stated = units.together((p["rms"], p["stated"]), "m")
         verdict = "agree" if p["agrees"] else "differ by more than noise: a model is wrong, or the robot changed"
-        yield both, difference, stated, f"{p['beyond']:.0%} of {p['poses']}", verdict
+        yield both, difference, stated, f"{units.percent(p['beyond'], 0)} of {p['poses']}", verdict

@@ -6,6 +6,8 @@ from collections.abc import Iterator, Sequence
 from itertools import product
 from typing import TYPE_CHECKING
 
+from thermal_robot.report import units
+
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.parts import Finding, Misfit, Unexplained
     from thermal_robot.diagnosis.result import Diagnosis
@@ -106,7 +108,7 @@ def _misfit(misfit: Misfit, reach: float) -> str:
 
 def _sure(diagnosis: Diagnosis) -> str:
     probability = diagnosis.probability
-    return f"{100 * probability:.0f} % sure" if probability < _SURE else "more than 99 % sure"
+    return f"{units.percent(probability, 0)} sure" if probability < _SURE else "more than 99 % sure"
 
 
 def _causes(diagnosis: Diagnosis, causes: Sequence[Finding], most: int, beside: bool) -> str:
@@ -145,11 +147,11 @@ def _how_far(diagnosis: Diagnosis, remaining: Unexplained, several: bool) -> Ite
         hard = f"; but it harms rows held out by {gap.hardest.name}"
     elif gap.hardest is not None:
         hard = f"; held out by {gap.hardest.name}, {length(gap.hardest.rms_after)}"
-    full = f"correcting for {it} removes {100 * held.shrinkage:.1f} % of its mean square on held-out data"
+    full = f"correcting for {it} removes {units.percent(held.shrinkage)} of its mean square on held-out data"
     scatter = "; there is also scatter" * bool(scattering(diagnosis))
     yield f"{full} and leaves {leaves}{_rest(diagnosis, remaining)}{hard}{scatter}"
     yield f"{full} and leaves {leaves}{_rest(diagnosis, remaining)}{hard}"
-    short = f"correcting removes {100 * held.shrinkage:.1f} % on held-out data and leaves {leaves}"
+    short = f"correcting removes {units.percent(held.shrinkage)} on held-out data and leaves {leaves}"
     yield f"{short}{_rest(diagnosis, remaining)}{hard}"
     apart = remaining.flagged and remaining.rms > held.rms_after  # of rows set aside: the others are not called more
     more = (", outliers left out" if apart else ", more than noise") if remaining.flagged else ""
