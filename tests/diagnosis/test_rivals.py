@@ -56,7 +56,7 @@ def test_what_is_at_work_for_sure_has_no_rival(known):
 
 @pytest.mark.parametrize("seed", range(33, 37))
 def test_what_could_do_the_same_and_is_improbable_is_no_rival(rv_m2, seed):
-    """A joint that its weight always seats on one side is off by a constant: lost motion might do that, at its price."""
+    """A joint that its weight always seats on one side is off by a constant, as by lost motion, at its price."""
     off = {"joint_offset": {"joint_2": 8e-4}}
     found = diagnose(program(rv_m2, off, rows=70, tool=(0.05, 0.03, 0.1), noise=15e-6, base_known=False, seed=seed))
     assert found.finding("backlash").probability < 0.05

@@ -8,7 +8,10 @@ SUMMARY = {
     "outcomes": {"diagnosed": 28, "failed": 1, "unusable": 1},
     "failures": [["hall_1/arm_05", "failed", "measurements.csv, row 3: <nonsense>"]],
     "effects": [
-        {"effect": "joint_offset", "found": 12, "testable": 28, "confounded": 2, "places": {f"joint_{k}": 2 for k in range(6)}},
+        {
+            "effect": "joint_offset", "found": 12, "testable": 28, "confounded": 2,
+            "places": {f"joint_{k}": 2 for k in range(6)},
+        },
         {"effect": "drift", "found": 0, "testable": 28, "confounded": 0, "places": {}},
     ],
     "gathered": [

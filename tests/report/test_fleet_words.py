@@ -21,7 +21,8 @@ def test_the_headline_counts():
 
 
 def test_what_was_never_found_is_left_out():
-    assert list(found(SUMMARY)) == [("joint offset", "12 of 28, in 2 or another", "joint_0 2, joint_1 2, joint_2 2, joint_3 2, …")]
+    places = "joint_0 2, joint_1 2, joint_2 2, joint_3 2, …"
+    assert list(found(SUMMARY)) == [("joint offset", "12 of 28, in 2 or another", places)]
 
 
 def test_what_gathers_says_where_and_how_probable_that_is_by_chance():

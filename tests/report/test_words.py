@@ -286,7 +286,7 @@ def test_a_law_elsewhere_has_a_size_of_translation_and_one_of_rotation(law_case)
 
 
 def test_rows_set_aside_are_counted_and_named(case):
-    assert set_aside(case("found")) == "as outliers: rows 17, 80"
+    assert set_aside(case("found")) == "as outliers: rows 17, 80 of the file (its header is row 1)"
     assert rows_used(case("found")) == "118 of 120 rows, 2 set aside"
     assert (set_aside(case("nothing")), rows_used(case("nothing"))) == ("no row", "all 120 rows")
 

@@ -32,10 +32,10 @@ def within_frames(fit: Fit, block: int) -> bool:
 
 
 def rivals(fit: Fit, explained: Mapping[str, int]) -> dict[str, tuple[str, ...]]:
-    """Return by effect the effects that it is confounded with: each is another's only rival for its place.
+    """Return by effect the effects that it is confounded with.
 
-    An effect of the fit is confounded with a known one outside it where that one, fitted anew in its place, is nearly as
-    probable: by more than ``IN_ITS_PLACE`` it alone of all that is not in the fit is at work, and the effect is not.
+    An effect of the fit is confounded with a known one outside it where that one, fitted anew in its place, is nearly
+    as probable: by more than ``IN_ITS_PLACE`` it is at work and the effect is not, and nothing else joins it.
 
     Parameters
     ----------

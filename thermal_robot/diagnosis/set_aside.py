@@ -29,7 +29,8 @@ def too_many(fit: Fit, left: Remainder) -> tuple[float, str]:
     if count <= share * samples:
         return 1.0, ""
     p = float(bdtrc(count - 1, samples, share))
-    return p, f"{count} of {samples} rows were set aside ({percent(count / samples, 0)}): more than gross errors account for"
+    told = f"{count} of {samples} rows were set aside ({percent(count / samples, 0)})"
+    return p, f"{told}: more than gross errors account for"
 
 
 def _heavy(left: Remainder) -> bool:

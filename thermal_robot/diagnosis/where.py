@@ -43,11 +43,12 @@ def without_laws(fit: Fit, left: Unexplained) -> Unexplained:
     taken2 = float((moved**2).sum(axis=1).mean())
     rest2 = float((fit.corrected.gap[kept, :3] ** 2).sum(axis=1).mean())
     what = "a law explains" if len(blocks) == 1 else f"{len(blocks)} laws explain"
+    part = percent(taken2 / max(taken2 + rest2, TINY), 0)
     return replace(
         left,
         rms=float(np.sqrt(left.rms**2 + taken2)),
         p_value=max(min(left.p_value, *chance), 0.0),
-        reasons=(f"{what} {percent(taken2 / max(taken2 + rest2, TINY), 0)} of what the known effects leave", *left.reasons),
+        reasons=(f"{what} {part} of what the known effects leave", *left.reasons),
     )
 
 

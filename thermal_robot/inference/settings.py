@@ -366,7 +366,7 @@ UNHELD = 30.0
 NAMING_ODDS = 9.0
 """Of an effect against nothing in its place: who takes a gear apart for what is named is then wrong once in ten."""
 IN_ITS_PLACE = 0.01
-"""Probability that another effect is at work in an effect's place, from which both are told: a lesser one is no doubt."""
+"""Probability that another effect is at work in an effect's place, from which both are told: less is no doubt."""
 INTERVAL = (0.025, 0.975)
 """Quantiles of every interval."""
 LEAST_HELD = 1e-6

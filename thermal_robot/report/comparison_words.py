@@ -23,14 +23,15 @@ STATUS = {
 def headline(comparison: Plain) -> str:
     """Return what stayed and what changed in one plain sentence or two."""
     same = [e["title"] for e in comparison["effects"] if e["status"] == "shared"]
-    lost = [e["title"] for e in comparison["effects"] if e["status"] in ("contradicts", "not_needed")]
+    lost = [e["title"] for e in comparison["effects"] if e["name"] in comparison["verdict"]["lost"]]
     names = [c["name"] for c in comparison["campaigns"]]
     kept = [c for c in comparison["changes"] if _status(comparison, c["effect"]) != "contradicts"]
     told = []
     if kept:
         told.append(f"{_upper(listed([change_in_short(c) for c in kept[:3]]))}{_more(len(kept) - 3)}.")
     elif not lost:
-        told.append(f"Nothing changed between {listed(names)}.")
+        what = "What differs" if comparison["changes"] else "Nothing changed"
+        told.append(f"{what} between {listed(names)}{' has no name' * bool(comparison['changes'])}.")
     if same:
         told.append(f"They share {listed(same)}." if not kept else f"The same in all: {listed(same)}.")
     if lost:
@@ -94,7 +95,8 @@ def effects(comparison: Plain) -> Iterator[tuple[str, str, str, str]]:
     for effect in comparison["effects"]:
         if effect["status"] == "absent":
             continue
-        status = STATUS[effect["status"]] + (f": {effect['reason']}" if effect["reason"] else "")
+        status = STATUS[effect["status"] if effect["named"] or effect["status"] != "contradicts" else "absent"]
+        status += f": {effect['reason']}" if effect["reason"] else ""
         ratio = f"{effect['chi2']:.1f} on {effect['degrees']}" if effect["degrees"] else units.MISSING
         yield effect["name"], status, ratio, chance(effect["p_value"]) if effect["degrees"] else units.MISSING
 

@@ -83,8 +83,14 @@ def scattering(diagnosis: Diagnosis) -> list[Finding]:
 
 
 def weighty(causes: Sequence[Finding], most: int = _MOST_CAUSES) -> list[Finding]:
-    """Return the causes that a headline names: those that weigh something, at most so many, but always the first."""
-    return [f for f in causes if (f.shrinkage or 0.0) >= _WEIGHTY][:most] or list(causes[:1])
+    """Return the causes that a headline names: those of some weight and size, at most so many, but always one."""
+    known = [f for f in causes if sized(f)]
+    return [f for f in known if (f.shrinkage or 0.0) >= _WEIGHTY][:most] or (known or list(causes))[:1]
+
+
+def sized(finding: Finding) -> bool:
+    """Whether the data determine any parameter of an effect: one without is not named first."""
+    return not finding.parameters or any(p.identified for p in finding.parameters)
 
 
 def unnamed(diagnosis: Diagnosis) -> list[Finding]:

@@ -121,8 +121,9 @@ def rows_in_words(rows: Sequence[int], most: int = 10) -> str:
 
 
 def set_aside(diagnosis: Diagnosis) -> str:
-    """Say which rows were set aside: ``as outliers: rows 8, 24, 74, 90``."""
-    return f"as outliers: {rows_in_words(diagnosis.outliers)}" if diagnosis.outliers else "no row"
+    """Say which rows were set aside, and how rows are counted: ``as outliers: rows 8, 24, 74, 90 of the file ...``."""
+    rows = f"as outliers: {rows_in_words(diagnosis.outliers)} of the file (its header is row 1)"
+    return rows if diagnosis.outliers else "no row"
 
 
 def struck(diagnosis: Diagnosis) -> str:
