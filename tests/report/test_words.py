@@ -318,7 +318,7 @@ def test_rivals_are_named_with_the_way_to_see_them(case):
     base = case("confounded")
     said = "these data cannot tell it from drift"
     found = replace(base.effects[1], confounded_with=("drift",))
-    assert rivals(found, base) == f"{said}; --without joint_offset shows drift in its place"
+    assert rivals(found, base) == f"{said}; --without joint_offset shows what would then stand in its place"
     assert rivals(replace(found, name="somebodys_own"), base) == said
     assert rivals(base.effects[0], base) == ""
     frame = Finding("base_frame", "not_testable", needs=('frames.base = "known"',))
