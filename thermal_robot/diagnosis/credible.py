@@ -77,13 +77,14 @@ def _doubts(fit: Fit) -> Iterator[Doubt]:
     yield from large
 
 
-def credible(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, Refused]]:
+def credible(fit: Fit, progress: Callable[[str], None], *, all_doubts: bool = True) -> tuple[Fit, dict[str, Refused]]:
     """Leave out one of two parts of effects that cancel, and parts of a size that no robot reaches, the worst first.
 
     A part is what an effect does in one joint or link. The explanation is chosen again without each part in doubt, and
     that one is left out without which rows held out are predicted best; none is where they are then predicted clearly
     worse, but for a size that is physically impossible. Where rows are very many, only the worst of the others is
-    weighed; of more still, the whole effect, which takes less time.
+    weighed; of more still, the whole effect, which takes less time. Without ``all_doubts`` only what cannot be is left
+    out.
 
     Returns
     -------
@@ -96,7 +97,7 @@ def credible(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, 
     refused: dict[str, Refused] = {}
     weighed: set[tuple[tuple[str, str], ...]] = set()
     whole = fit.campaign.samples > settings.RIPPLE_ROWS
-    most = settings.MOST_DOUBTS if fit.campaign.samples <= settings.ENOUGH_ROWS else 1
+    most = all_doubts * (settings.MOST_DOUBTS if fit.campaign.samples <= settings.ENOUGH_ROWS else 1)
     while doubt := next((d for d in _doubts(fit) if d.parts not in weighed and (most or d.impossible)), None):
         weighed.add(doubt.parts)
         most -= not doubt.impossible
