@@ -121,8 +121,8 @@ def cautions(
         notes.append(f"{pair.words}; both are kept, and neither is to be believed by itself")
     for name, why in refused.items():
         if why.share is not None:
-            told = f"rows held out are predicted no better with {name} (share {percent(why.share)})"
-            notes.append(f"{told}: not reported as found")
+            share = percent(why.share)
+            notes.append(f"rows held out are predicted no better with {name} (share {share}): not reported as found")
         if why.reason:
             notes.append(why.reason)
     notes += _fragile(sensitivity)
