@@ -320,9 +320,10 @@ def _asked(effect: Effect, question: str, *about: Any) -> Any:
 def _kept(effect: Effect, parameters: tuple[Parameter, ...], robot: Robot) -> tuple[Parameter, ...]:
     """Return the parameters in the joints and links that the effect names, all where it names none; none excluded."""
     known = dict.fromkeys((*robot.joint_names, *places_of(parameters)))
+    links = {segment.parent_link for segment in robot.segments}  # of a setting that has no parameter there
     for field, named in (("places", effect.places), ("excluded", effect.excluded)):
         for place in _texts(effect, f"{field} is", named):
-            if place not in known:
+            if place not in known and not (field == "excluded" and place in links):
                 raise EffectError(
                     f"effect {effect.name!r}: {field} holds {place!r}, expected any of {', '.join(known)}"
                 )
