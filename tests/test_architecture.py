@@ -17,6 +17,7 @@ PACKAGE = "thermal_robot"
 ORDER = (
     "errors",
     "files",
+    "percents",
     "compiling",
     "schema",
     "tables",
@@ -53,7 +54,7 @@ ORDER = (
 )
 """Rooms from the ground up: each may import those before it."""
 FREE = {
-    "report": {"errors", "files", "report"},
+    "report": {"errors", "files", "percents", "report"},
     "assembly": {"errors", "compiling", "kinematics", "robot", "tables", "assembly"},
     "maps": {"errors", "kinematics", "robot", "assembly", "maps"},
     "paper": {"errors", "kinematics", "robot", "assembly", "paper"},

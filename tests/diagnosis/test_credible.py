@@ -8,6 +8,7 @@ from helpers import NOISE
 from simulate import simulate
 
 from thermal_robot.diagnosis import credible as room
+from thermal_robot.diagnosis import diagnose
 from thermal_robot.diagnosis.cancelling import Cancelling
 from thermal_robot.diagnosis.cautions import cautions
 from thermal_robot.diagnosis.credible import credible, goes_astray, outsized
@@ -15,6 +16,7 @@ from thermal_robot.effects import LinkCompliance, choose, gate
 from thermal_robot.inference.fit import fit, less
 from thermal_robot.inference.frames import register
 from thermal_robot.observations import observe
+from thermal_robot.simulation import simulate as program
 
 
 def test_rows_set_aside_count_where_a_model_goes_astray(rv_m2):
@@ -107,3 +109,24 @@ def test_one_joint_alone_is_left_out_of_an_effect(rv_m2):
         for cut in (*others.variants["joint_gain"], *(cut for cut, _ in others.effects)):
             assert place not in [p.place for p in gate.checked(cut, known.nominal)]
         assert (goes_astray(others) > 2.0 * goes_astray(known)) == (place == best)
+
+
+BEYOND = {"thermal_elongation": (1.2e-4, 2e-5), "instrument_scale": (2.3e-3, 4e-4)}
+
+
+@pytest.mark.parametrize("name", BEYOND)
+def test_what_no_material_and_no_instrument_does_is_not_found(rv_m2, name):
+    """Links of five times the expansion of aluminium stand in for something else, however well they fit."""
+    impossible, possible = (
+        diagnose(program(rv_m2, {name: size}, rows=60, noise=2e-5, base_known=False, seed=3)) for size in BEYOND[name]
+    )
+    assert name in possible.verdict
+    assert name not in impossible.verdict
+    assert impossible.finding(name).probability == 0.0
+    assert any("physically possible" in warning for warning in impossible.warnings)
+
+
+def test_what_a_campaign_expects_may_be(rv_m2):
+    """Links of a polymer, where that is stated."""
+    campaign = program(rv_m2, {"thermal_elongation": 1.2e-4}, rows=60, noise=2e-5, base_known=False, seed=3)
+    assert "thermal_elongation" in diagnose(replace(campaign, priors={"thermal_elongation": 1e-4})).verdict

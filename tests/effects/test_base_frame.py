@@ -3,6 +3,7 @@
 import numpy as np
 from helpers import commanded, tool_at, tool_with
 
+from thermal_robot import diagnose, simulate
 from thermal_robot.effects import BaseFrame
 from thermal_robot.observations import observe
 
@@ -22,3 +23,20 @@ def test_it_is_an_error_of_the_base_and_says_what_would_make_it_one(rv_m2):
     assert BaseFrame.frame == "base"
     assert BaseFrame().missing(observe(commanded(rv_m2))) == ('frames.base = "known"',)
     assert BaseFrame().missing(observe(commanded(rv_m2, base_known=True))) == ()
+
+
+def test_a_turn_about_the_first_axis_alone_is_told_with_that_joints_zero(rv_m2):
+    """No measurement of the tool tells which of the two it is, whichever was at work."""
+    for at_work in ({"base_frame": {"rotation z": 2e-3}}, {"joint_offset": {"joint_1": 2e-3}}):
+        found = diagnose(simulate(rv_m2, at_work, rows=60, noise=2e-5, seed=1))
+        pair = {"base_frame", "joint_offset"}
+        assert len(found.verdict) == 1
+        assert all({name, *found.finding(name).confounded_with} == pair for name in pair)
+        assert min(found.finding(name).probability for name in pair) > 0.01
+
+
+def test_a_base_that_is_off_in_all_components_is_told_in_all(rv_m2):
+    off = {"base_frame": [1e-3, -2e-3, 1e-3, 1e-3, 2e-3, -1e-3]}
+    found = diagnose(simulate(rv_m2, off, rows=60, noise=2e-5, seed=1)).finding("base_frame")
+    assert found.status == "found"
+    assert len(found.parameters) == 6

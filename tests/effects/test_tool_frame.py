@@ -3,8 +3,10 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 from helpers import commanded, tool_with
 
+from thermal_robot import diagnose, simulate
 from thermal_robot.effects import ToolFrame
 from thermal_robot.kinematics import tool_poses
 from thermal_robot.observations import observe
@@ -35,3 +37,11 @@ def test_it_is_an_error_of_the_tool_and_says_what_would_make_it_one(rv_m2):
     assert ToolFrame().missing(observe(replace(plain, tool_known=True))) == ()
     simulated = replace(plain, simulated_position=np.zeros((10, 3)))
     assert ToolFrame().missing(observe(simulated)) == ()
+
+
+@pytest.mark.parametrize("measures", [{"measures": "position"}, {"measures": "pose", "noise_orientation": 5e-5}])
+def test_a_turn_about_the_last_axis_alone_is_told_with_that_joints_zero(rv_m2, measures):
+    off = {"joint_offset": {rv_m2.joint_names[-1]: 3e-3}}
+    found = diagnose(simulate(rv_m2, off, rows=60, noise=2e-5, tool=(0.05, 0.03, 0.1), seed=1, **measures))
+    pair = {"tool_frame", "joint_offset"}
+    assert all({name, *found.finding(name).confounded_with} == pair for name in pair)

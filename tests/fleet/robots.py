@@ -75,12 +75,13 @@ def deviations(rng, robots):
 def told_rows(name, labels, effects, gap=1e-4, outcome="diagnosed", reason=""):
     """Rows as a campaign's diagnosis would give: effects by name with (found, places, {parameter: (value, std)})."""
     campaign = {"campaign": name, **labels, "model": "arm", "outcome": outcome, "reason": reason, "rms_before": gap}
+    campaign |= {"rms_after": 2e-5, "unexplained": False}
     if not effects:
         return [campaign]
     rows = []
     for effect, (found, place, values) in effects.items():
         free = [{"name": p, "value": float(v), "std": float(s), "unit": "rad"} for p, (v, s) in values.items()]
-        row = {**campaign, "rms_after": 2e-5, "effect": effect, "status": "found" if found else "not_found"}
+        row = {**campaign, "effect": effect, "status": "found" if found else "not_found"}
         row |= {"probability": 0.99 if found else 0.01, "shrinkage": 0.9 if found else 0.0, "free": free}
         row["places"] = [{"kind": "joint", "name": place, "share": 0.9}] if found else []
         rows.append(row)

@@ -54,3 +54,22 @@ def test_several_campaigns_of_a_robot_count_once_and_laws_by_what_they_follow(tm
     assert not count.parameters
     assert gathered == ()
     assert [c.campaign for c in cases] == ["d1", "d2"]
+
+
+def test_every_robot_with_a_gap_is_listed_what_is_in_doubt_or_unexplained_too(tmp_path):
+    gaps = {"sure": 6e-5, "doubtful": 3e-4, "strange": 2e-4, "sound": 1e-5}
+    rows = {
+        name: told_rows(name, {}, {e: (name == "sure", "joint_2", {}) for e in ("backlash", "drift")}, gap=gap)
+        for name, gap in gaps.items()
+    }
+    backlash, drift = rows["doubtful"]
+    backlash |= {"status": "confounded", "confounded_with": ["drift"], "places": rows["sure"][0]["places"]}
+    drift |= {"status": "confounded", "confounded_with": ["backlash"]}
+    for row in rows["strange"]:
+        row["unexplained"] = True
+    file = write_told(tmp_path / "t.parquet", rows.values(), ())
+    counts, _, cases = counted(file, overview(file, ()))
+    told = [(case.robot, case.effect, case.confounded_with) for case in cases]
+    assert told[:2] == [("doubtful", "backlash", ("drift",)), ("strange", "", ())]
+    assert {case[0] for case in told[2:]} == {"sure"}
+    assert {c.effect: (c.found, c.confounded) for c in counts} == {"backlash": (2, 1), "drift": (1, 0)}

@@ -8,8 +8,11 @@ SUMMARY = {
     "outcomes": {"diagnosed": 28, "failed": 1, "unusable": 1},
     "failures": [["hall_1/arm_05", "failed", "measurements.csv, row 3: <nonsense>"]],
     "effects": [
-        {"effect": "joint_offset", "found": 12, "testable": 28, "places": {f"joint_{k}": 2 for k in range(6)}},
-        {"effect": "drift", "found": 0, "testable": 28, "places": {}},
+        {
+            "effect": "joint_offset", "found": 12, "testable": 28, "confounded": 2,
+            "places": {f"joint_{k}": 2 for k in range(6)},
+        },
+        {"effect": "drift", "found": 0, "testable": 28, "confounded": 0, "places": {}},
     ],
     "gathered": [
         {
@@ -42,6 +45,7 @@ SUMMARY = {
         {
             "robot": f"arm_{k:02d}", "campaign": f"hall/arm_{k:02d}", "rms_before": 2e-4, "rms_after": 3e-5,
             "effect": "joint_offset", "probability": 0.97, "shrinkage": 0.9, "place": "joint_2",
+            "confounded_with": ["base_frame"] if k == 1 else [],
         }
         for k in range(20)
     ],

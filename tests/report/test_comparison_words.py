@@ -11,9 +11,11 @@ def change(**more):
     return plain | {"chi2": 31.4, "degrees": 1, "p_value": 2e-7} | more
 
 
-def comparison(changes=(), statuses=("shared",)):
+def comparison(changes=(), statuses=("shared",), lost=None):
     effects = [{"name": s, "title": f"what is {s}", "status": s} for s in statuses]
-    return {"changes": list(changes), "effects": effects, "campaigns": [{"name": "april"}, {"name": "may"}]}
+    lost = [s for s in statuses if s in ("contradicts", "not_needed")] if lost is None else lost
+    campaigns = [{"name": "april"}, {"name": "may"}]
+    return {"changes": list(changes), "effects": effects, "campaigns": campaigns, "verdict": {"lost": lost}}
 
 
 def test_nothing_changed_is_said():
@@ -26,6 +28,15 @@ def test_a_change_and_a_lost_name_are_said():
     assert said.endswith("What is contradicts loses its name.")
     both = words.headline(comparison([], ("contradicts", "not_needed")))
     assert both == "What is contradicts and what is not_needed lose their name."
+
+
+def test_what_no_diagnosis_named_has_no_name_to_lose():
+    said = words.headline(comparison([change(effect="contradicts")], ("contradicts",), lost=[]))
+    assert said == "What differs between april and may has no name."
+    row = {"name": "own", "status": "contradicts", "reason": "april alone needs it", "degrees": 0, "p_value": 1.0}
+    for named, status in ((["april"], "loses its name"), ([], "not at work")):
+        told = next(words.effects({"effects": [{**row, "named": named}]}))
+        assert told[1] == f"{status}: april alone needs it"
 
 
 def test_a_change_is_told_with_its_values():

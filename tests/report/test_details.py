@@ -52,3 +52,9 @@ def test_where_a_correction_harms_it_says_so(case, shrinkage):
 
 def test_robot_and_table_that_do_not_fit_have_no_details(law_case):
     assert list(details(replace(law_case(), misfit=Misfit(away=0.3)))) == []
+
+
+def test_where_each_is_surer_than_all_together_it_says_what_shares_the_rest(case):
+    (said,) = details(replace(case("found"), probability=0.9))
+    assert said.startswith("That nothing else is at work is 90.0 % sure, less than each by itself")
+    assert said.endswith("joint offset (2.0 %).")

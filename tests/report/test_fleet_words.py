@@ -21,7 +21,8 @@ def test_the_headline_counts():
 
 
 def test_what_was_never_found_is_left_out():
-    assert list(found(SUMMARY)) == [("joint offset", "12 of 28", "joint_0 2, joint_1 2, joint_2 2, joint_3 2, …")]
+    places = "joint_0 2, joint_1 2, joint_2 2, joint_3 2, …"
+    assert list(found(SUMMARY)) == [("joint offset", "12 of 28, in 2 or another", places)]
 
 
 def test_what_gathers_says_where_and_how_probable_that_is_by_chance():
@@ -44,9 +45,11 @@ def test_who_stands_out_has_a_probability_and_what_is_usual():
 
 
 def test_cases_and_failures():
-    assert next(cases(SUMMARY)) == (
-        "arm_00", "hall/arm_00", "joint offset", "joint_2", "97.0 %", "200 µm", "30.0 µm",
-    )  # fmt: skip
+    first, second, *_ = cases(SUMMARY)
+    assert first == ("arm_00", "hall/arm_00", "joint offset", "joint_2", "97.0 %", "200 µm", "30.0 µm")
+    assert second[2] == "joint offset (or base frame)"
+    nothing = {**SUMMARY["found"][0], "effect": "", "place": "", "probability": None}
+    assert next(cases({**SUMMARY, "found": [nothing]}))[2:5] == ("no effect explains it", "", "–")
     assert list(failures(SUMMARY)) == ["hall_1/arm_05 (failed): measurements.csv, row 3: <nonsense>"]
 
 

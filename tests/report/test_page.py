@@ -219,7 +219,7 @@ def test_the_hardest_way_of_holding_out_is_told(case):
 def test_the_page_says_what_the_text_says(case, law_case):
     page = Reader(html(replace(law_case(), left_out=("drift",)))).words
     for said in (
-        "as outliers: rows 17, 80",
+        "as outliers: rows 17, 80 of the file (its header is row 1)",
         "118 of 120 rows, 2 set aside",
         "by request (--without drift)",
         "± is one standard",

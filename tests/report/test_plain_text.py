@@ -123,7 +123,7 @@ def test_where_tells_base_tool_and_instrument(case):
 
 
 def test_rows_set_aside_are_listed_up_to_ten(case):
-    assert "set aside  as outliers: rows 17, 80" in text(case("found"))
+    assert "set aside  as outliers: rows 17, 80 of the file (its header is row 1)" in text(case("found"))
     assert "set aside  no row" in text(case("nothing"))
     many = text(replace(case("found"), outliers=tuple(range(2, 18))))
     assert "104 of 120 rows, 16 set aside" in many

@@ -18,6 +18,7 @@ from thermal_robot.diagnosis.parts import (
     Unexplained,
 )
 from thermal_robot.effects import library
+from thermal_robot.report.details import details
 from thermal_robot.report.sentence import MOST_WORDS, headline, length, listed
 
 
@@ -309,3 +310,13 @@ def test_a_fault_of_the_table_is_said_with_what_it_explains_and_its_remedy(case)
 )
 def test_a_length_is_read_at_sight(metres, written):
     assert length(metres) == written
+
+
+def test_what_has_no_size_is_not_named_first(case):
+    base = case("found")
+    unseen = tuple(replace(p, value=None, std=None, identified=False) for p in base.effects[0].parameters)
+    vague = replace(base.effects[0], parameters=unseen, shrinkage=0.6)
+    other = replace(base.effects[0], name="drift", title="drift of the base", shrinkage=0.2)
+    both = replace(base, effects=(vague, other), verdict=(vague.name, "drift"))
+    assert "comes from drift of the base and a smaller one" in headline(both)
+    assert f"How large it is these data do not determine: {both.title(vague.name)}." in details(both)

@@ -286,7 +286,7 @@ def test_a_law_elsewhere_has_a_size_of_translation_and_one_of_rotation(law_case)
 
 
 def test_rows_set_aside_are_counted_and_named(case):
-    assert set_aside(case("found")) == "as outliers: rows 17, 80"
+    assert set_aside(case("found")) == "as outliers: rows 17, 80 of the file (its header is row 1)"
     assert rows_used(case("found")) == "118 of 120 rows, 2 set aside"
     assert (set_aside(case("nothing")), rows_used(case("nothing"))) == ("no row", "all 120 rows")
 
@@ -318,7 +318,7 @@ def test_rivals_are_named_with_the_way_to_see_them(case):
     base = case("confounded")
     said = "these data cannot tell it from drift"
     found = replace(base.effects[1], confounded_with=("drift",))
-    assert rivals(found, base) == f"{said}; --without joint_offset shows drift in its place"
+    assert rivals(found, base) == f"{said}; --without joint_offset shows what would then stand in its place"
     assert rivals(replace(found, name="somebodys_own"), base) == said
     assert rivals(base.effects[0], base) == ""
     frame = Finding("base_frame", "not_testable", needs=('frames.base = "known"',))

@@ -40,6 +40,7 @@ from thermal_robot.blind.real_faults import judged
 from thermal_robot.campaign import Campaign, read_campaign, write_campaign, write_table
 from thermal_robot.inference.rows import in_order
 from thermal_robot.observations import Observations, observe
+from thermal_robot.percents import percent
 
 Array = NDArray[np.float64]
 Fault = Literal["nothing", "offset", "scale", "backlash", "slip", "temperature", "hidden", "later"]
@@ -260,7 +261,7 @@ def _joint_fault(campaign: Campaign, rng: np.random.Generator, remainder: float,
         truth = _truth("slip", ratio, size, name)
         truth |= {"effects": ["geometric"], "unlisted": "slip", "quantities": ["time", "order"]}
         truth["places"] = truth["parts"]["slip"]["places"]
-        return changed, truth, f"{name} slips by {1e3 * size:.2g} mrad after {share:.0%} of the rows"
+        return changed, truth, f"{name} slips by {1e3 * size:.2g} mrad after {percent(share, 0)} of the rows"
     if fault == "backlash":
         return changed, _truth("backlash", ratio, size, name), f"{1e3 * size:.2g} mrad of lost motion in {name}"
     return changed, _truth("joint_offset", ratio, size, name), f"zero of {name} off by {1e3 * size:.2g} mrad"

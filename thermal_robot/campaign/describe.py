@@ -14,6 +14,7 @@ from thermal_robot.campaign.noise import of_a_point
 from thermal_robot.campaign.units import covariate_scale, unit_of
 from thermal_robot.campaign.validate import SAME_CONFIGURATION
 from thermal_robot.errors import require
+from thermal_robot.percents import percent
 from thermal_robot.tables import html_table
 
 _MOST_SESSIONS = 8
@@ -109,7 +110,7 @@ def _joints(campaign: Campaign) -> Iterator[Sequence[str]]:
         q = campaign.q[:, j] / scale
         lower, upper = float(robot.lower[j]) / scale, float(robot.upper[j]) / scale
         if np.isfinite(lower) and np.isfinite(upper) and upper > lower:
-            limits, used = _range(lower, upper), f"{np.ptp(q) / (upper - lower):.0%}"
+            limits, used = _range(lower, upper), percent(np.ptp(q) / (upper - lower), 0)
         else:
             limits, used = "none", ""
         yield name, kind, _range(q.min(), q.max()), limits, campaign.units.joint_unit(kind), used

@@ -16,6 +16,7 @@ from thermal_robot.diagnosis.parts import Refused, Sensitivity
 from thermal_robot.effects import gate
 from thermal_robot.inference import settings
 from thermal_robot.inference.fit import Fit
+from thermal_robot.percents import percent
 
 
 def usable(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
@@ -98,8 +99,8 @@ def cautions(
         notes.append(f"{pair.words}; both are kept, and neither is to be believed by itself")
     for name, why in refused.items():
         if why.share is not None:
-            told = f"rows held out are predicted no better with {name} (share {why.share:.1%}): not reported as found"
-            notes.append(told)
+            share = percent(why.share)
+            notes.append(f"rows held out are predicted no better with {name} (share {share}): not reported as found")
         if why.reason:
             notes.append(why.reason)
     notes += _fragile(sensitivity)

@@ -32,26 +32,28 @@ class Doubt:
         Why, in a sentence without a full stop.
     times
         By how much they are in doubt, as a ratio.
+    impossible
+        Whether it cannot be, whatever rows held out say.
     """
 
     parts: tuple[tuple[str, str], ...]
     words: str
     times: float
+    impossible: bool = False
 
 
 def outsized(fit: Fit) -> tuple[Doubt, ...]:
-    """Return each parameter that is surely far outside a size that stands on sources, the farthest first."""
+    """Return each parameter that surely cannot be, or is far outside a size that stands on sources, the worst first."""
     found = []
     for effect, values, item, sure in surely(fit):
-        if effect.size_spread >= UNSOURCED:
-            continue
-        for k in np.flatnonzero(sure > settings.OUTSIDE):
+        known = settings.OUTSIDE if effect.size_spread < UNSOURCED else np.inf
+        for k in np.flatnonzero((sure > known) | (sure * item.sizes > item.most)):
             own, times = item.parameters[k], float(np.abs(values[k]) / item.sizes[k])
-            words = (
-                f"{effect.title}: {own.name} is {times:.0f} times its expected size, which no robot is known to reach"
-            )
-            found.append(Doubt((_part(effect.name, own.kind, own.place),), words, times))
-    return tuple(sorted(found, key=lambda doubt: -doubt.times))
+            impossible = bool(sure[k] * item.sizes[k] > item.most[k])
+            never = "is physically possible" if impossible else "any robot is known to reach"
+            words = f"{effect.title}: {own.name} is {times:.0f} times its expected size, more than {never}"
+            found.append(Doubt((_part(effect.name, own.kind, own.place),), words, times, impossible))
+    return tuple(sorted(found, key=lambda doubt: (not doubt.impossible, -doubt.times)))
 
 
 def surely(fit: Fit) -> Iterator[tuple[Effect, Array, Block, Array]]:
@@ -67,18 +69,22 @@ def _part(name: str, kind: str, place: str) -> tuple[str, str]:
 
 
 def _doubts(fit: Fit) -> Iterator[Doubt]:
+    large = outsized(fit)
+    yield from (doubt for doubt in large if doubt.impossible)
     for pair in cancelling(fit):
         parts = (_part(name, *site) for name, site in zip(pair.effects, pair.sites, strict=True))
         yield Doubt(tuple(parts), pair.words, pair.times)
-    yield from outsized(fit)
+    yield from large
 
 
-def credible(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, Refused]]:
+def credible(fit: Fit, progress: Callable[[str], None], *, all_doubts: bool = True) -> tuple[Fit, dict[str, Refused]]:
     """Leave out one of two parts of effects that cancel, and parts of a size that no robot reaches, the worst first.
 
     A part is what an effect does in one joint or link. The explanation is chosen again without each part in doubt, and
     that one is left out without which rows held out are predicted best; none is where they are then predicted clearly
-    worse. Where rows are very many, only the worst is weighed; of more still, the whole effect, which takes less time.
+    worse, but for a size that is physically impossible. Where rows are very many, only the worst of the others is
+    weighed; of more still, the whole effect, which takes less time. Without ``all_doubts`` only what cannot be is left
+    out.
 
     Returns
     -------
@@ -91,14 +97,15 @@ def credible(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, 
     refused: dict[str, Refused] = {}
     weighed: set[tuple[tuple[str, str], ...]] = set()
     whole = fit.campaign.samples > settings.RIPPLE_ROWS
-    most = settings.MOST_DOUBTS if fit.campaign.samples <= settings.ENOUGH_ROWS else 1
-    while len(weighed) < most and (doubt := next((d for d in _doubts(fit) if d.parts not in weighed), None)):
+    most = all_doubts * (settings.MOST_DOUBTS if fit.campaign.samples <= settings.ENOUGH_ROWS else 1)
+    while doubt := next((d for d in _doubts(fit) if d.parts not in weighed and (most or d.impossible)), None):
         weighed.add(doubt.parts)
+        most -= not doubt.impossible
         progress(doubt.words)
         others = {part: less(fit, part[0], progress, "" if whole else part[1]) for part in doubt.parts}
         left = {part: goes_astray(other) for part, other in others.items()}
         out = min(left, key=lambda part: left[part])
-        if left[out] > settings.WORSE_ELSEWHERE * goes_astray(fit):
+        if left[out] > settings.WORSE_ELSEWHERE * goes_astray(fit) and not doubt.impossible:
             continue
         best = {part: other.explanation.best.log_evidence for part, other in others.items()}
         chance = max((float(expit(best[instead] - best[out])) for instead in best if instead != out), default=0.0)

@@ -20,6 +20,7 @@ from thermal_robot.inference.laws import harmonics, smooth_columns
 from thermal_robot.inference.rows import in_a_row, in_order
 from thermal_robot.inference.target import Worth
 from thermal_robot.observations import Observations
+from thermal_robot.percents import percent
 
 Array = NDArray[np.float64]
 
@@ -207,7 +208,7 @@ def _scan(fit: Fit, left: Remainder) -> tuple[tuple[float, str], tuple[Location,
         depends.setdefault(t.quantity, min(1.0, t.worth.p_value * len(tested)))
     first = material[0]
     at = in_words("joint", first.place) if first.kind == "joint" else f"the {first.place}"
-    reason = f"a law of {first.quantity} at {at} explains {first.worth.share:.0%} of what remains"
+    reason = f"a law of {first.quantity} at {at} explains {percent(first.worth.share, 0)} of what remains"
     named = tuple(Dependence(q, p) for q, p in list(depends.items())[: settings.NAMED])
     return (depends[first.quantity], reason), locations, named, first.worth.share
 

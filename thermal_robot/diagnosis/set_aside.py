@@ -12,6 +12,7 @@ from thermal_robot.inference import settings
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.robust import distance_limit
 from thermal_robot.observations import Observations
+from thermal_robot.percents import percent
 
 Array = NDArray[np.float64]
 
@@ -28,7 +29,8 @@ def too_many(fit: Fit, left: Remainder) -> tuple[float, str]:
     if count <= share * samples:
         return 1.0, ""
     p = float(bdtrc(count - 1, samples, share))
-    return p, f"{count} of {samples} rows were set aside ({count / samples:.0%}): more than gross errors account for"
+    told = f"{count} of {samples} rows were set aside ({percent(count / samples, 0)})"
+    return p, f"{told}: more than gross errors account for"
 
 
 def _heavy(left: Remainder) -> bool:

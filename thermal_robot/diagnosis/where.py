@@ -18,6 +18,7 @@ from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.laws import smooth_columns
 from thermal_robot.inference.settings import TINY
 from thermal_robot.observations import Observations
+from thermal_robot.percents import percent
 
 Array = NDArray[np.float64]
 
@@ -42,11 +43,12 @@ def without_laws(fit: Fit, left: Unexplained) -> Unexplained:
     taken2 = float((moved**2).sum(axis=1).mean())
     rest2 = float((fit.corrected.gap[kept, :3] ** 2).sum(axis=1).mean())
     what = "a law explains" if len(blocks) == 1 else f"{len(blocks)} laws explain"
+    part = percent(taken2 / max(taken2 + rest2, TINY), 0)
     return replace(
         left,
         rms=float(np.sqrt(left.rms**2 + taken2)),
         p_value=max(min(left.p_value, *chance), 0.0),
-        reasons=(f"{what} {taken2 / max(taken2 + rest2, TINY):.0%} of what the known effects leave", *left.reasons),
+        reasons=(f"{what} {part} of what the known effects leave", *left.reasons),
     )
 
 

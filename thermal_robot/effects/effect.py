@@ -58,6 +58,8 @@ SOURCED, UNSOURCED = 0.5, 1.5
 within a factor of 3.6 of it; where nobody knows it, three times more or less is no surprise."""
 TWIST = (*((f"translation {axis}", "m") for axis in "xyz"), *((f"rotation {axis}", "rad") for axis in "xyz"))
 """Name and unit of each component of a twist."""
+ALONE = 0.1 / len(TWIST)
+"""Weight of each component of a misplaced frame alone, beside all together: one frame in ten is off in one alone."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,6 +164,9 @@ class Parameter:
         What one unit does in the channels.
     positive
         Whether it cannot be negative, as no joint is stiffer than rigid: its prior is half a normal one.
+    most
+        Largest value that is physically possible, in that unit; one that is surely larger is no part of a diagnosis.
+        What a campaign states to be expected raises it in proportion.
     """
 
     label: str
@@ -171,6 +176,7 @@ class Parameter:
     place: str
     responses: tuple[Response, ...]
     positive: bool = False
+    most: float = np.inf
 
     @property
     def name(self) -> str:
@@ -180,7 +186,7 @@ class Parameter:
     @cached_property
     def bare(self) -> Parameter:
         """It without its responses, which may be large."""
-        return Parameter(self.label, self.unit, self.size, self.kind, self.place, (), self.positive)
+        return Parameter(self.label, self.unit, self.size, self.kind, self.place, (), self.positive, self.most)
 
 
 @dataclass(frozen=True)

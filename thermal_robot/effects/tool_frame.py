@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from thermal_robot.effects.effect import TWIST, UNSOURCED, Effect, Parameter, at_tool
+from thermal_robot.effects.effect import ALONE, TWIST, UNSOURCED, Effect, Parameter, at_tool
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -25,9 +25,13 @@ class ToolFrame(Effect):
     turns
         Whether the three rotations are parameters, too; ``None`` asks the campaign. A model keeps what it was fitted
         with, as commands to be predicted carry no measured orientation.
+    alone
+        The one component that is off, by its name; empty where all are. Turned about the last joint's axis, the tool is
+        where that joint's zero offset would put it.
     """
 
     turns: bool | None = None
+    alone: str = ""
 
     name: ClassVar[str] = "tool_frame"
     title: ClassVar[str] = "a misplaced tool frame"
@@ -40,9 +44,15 @@ class ToolFrame(Effect):
         # a simulator predicts the declared target: an unknown tool is not refitted to it
         return () if campaign.tool_known or campaign.simulated_position is not None else ('frames.tool = "known"',)
 
+    @property
+    def weight(self) -> float:
+        """One target in ten is off in a single component."""
+        return ALONE if self.alone else 1.0
+
     def variants(self, observations: Observations) -> tuple[Effect, ...]:
-        """Return this effect with the components that the campaign shows."""
-        return (replace(self, turns=self._turns(observations)),)
+        """Return the components that the campaign shows together, and each of all alone."""
+        own = replace(self, turns=self._turns(observations))
+        return (own, *(replace(own, alone=component) for component, _ in TWIST))
 
     def _turns(self, observations: Observations) -> bool:
         return observations.campaign.measures == "pose" if self.turns is None else self.turns
@@ -51,5 +61,6 @@ class ToolFrame(Effect):
         """Return the tool's twist in the tool frame: m, and rad where orientation is measured."""
         return tuple(
             Parameter(component, unit, 2e-3, "tool", "tool", (at_tool(np.eye(6)[k]),))
-            for k, (component, unit) in enumerate(TWIST[: 6 if self._turns(observations) else 3])
+            for k, (component, unit) in enumerate(TWIST)
+            if (self.alone == component if self.alone else k < 3 or self._turns(observations))
         )

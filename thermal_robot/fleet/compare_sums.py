@@ -87,12 +87,16 @@ def sums(found: Diagnosis, fit: Fit, listed: Sequence[Candidate], number: int) -
 
 
 def _projected(full: Array, flat: int) -> tuple[Array, Array]:
-    """(P, P) and (P,) products without the first columns, what rounding leaves of their aliases set to zero."""
+    """(P, P) and (P,) products without the first columns, what is left of their aliases set to zero.
+
+    Rounding leaves something, and so does a base that rocks: a shift of the first link is then no more exactly one of
+    the base, and a campaign would tell it to decimetres.
+    """
     along = whitener(full[:flat, :flat]).T @ full[:flat, flat:]
     rest, before = full[flat:, flat:] - along.T @ along, np.diag(full)[flat:-1]
     matrix, vector = 0.5 * (rest + rest.T)[:-1, :-1], rest[:-1, -1]
     value, axes = np.linalg.eigh(matrix)
-    floor = max(settings.INFORMATION_FLOOR, settings.PROJECTED_FLOOR * float(before.max(initial=0.0)))
+    floor = max(compare_settings.SAYS, settings.PROJECTED_FLOOR * float(before.max(initial=0.0)))
     seen = value > floor
     return (axes[:, seen] * value[seen]) @ axes[:, seen].T, axes[:, seen] @ (axes[:, seen].T @ vector)
 

@@ -227,7 +227,7 @@ class Comparison:
     @property
     def lost(self) -> tuple[str, ...]:
         """Names of the effects that some diagnosis names, and that lose their name."""
-        return tuple(e.name for e in self.effects if e.status in ("contradicts", "not_needed"))
+        return tuple(e.name for e in self.effects if e.status in ("contradicts", "not_needed") and e.named)
 
     @property
     def summary(self) -> str:

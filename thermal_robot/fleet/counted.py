@@ -5,6 +5,7 @@ from __future__ import annotations
 import heapq
 from collections import Counter
 from dataclasses import dataclass, field, replace
+from itertools import groupby
 from pathlib import Path
 from typing import Any
 
@@ -15,7 +16,7 @@ from thermal_robot.fleet import settings
 from thermal_robot.fleet.listed import CAMPAIGN
 from thermal_robot.fleet.table import Overview, findings
 
-_FOUND = ("found", "contained")
+_FOUND = ("found", "contained", "confounded")
 
 
 @dataclass(frozen=True)
@@ -27,7 +28,9 @@ class Count:
     effect
         Its name; laws that were discovered count as one by what they follow.
     found, testable
-        In how many robots.
+        In how many robots; found where the data cannot tell it from another, too.
+    confounded
+        In how many of those in which it was found the data cannot tell it from another.
     places
         In how many of them which place has the largest share, most often first.
     parameters
@@ -37,6 +40,7 @@ class Count:
     effect: str
     found: int
     testable: int
+    confounded: int
     places: dict[str, int]
     parameters: bool
 
@@ -61,30 +65,35 @@ class Gathered:
 
 @dataclass(frozen=True)
 class Case:
-    """An effect that was found in a campaign: with what probability, which share of the gap (m) it has, and where."""
+    """An effect that was found in a campaign: with what probability, which share of the gap (m) it has, and where.
+
+    ``confounded_with`` names what the data cannot tell it from. Without a name it is a gap that no effect explains.
+    """
 
     robot: str
     campaign: str
     rms_before: float
     rms_after: float
-    effect: str
-    probability: float
-    shrinkage: float
-    place: str
+    effect: str = ""
+    probability: float | None = None
+    shrinkage: float | None = None
+    place: str = ""
+    confounded_with: tuple[str, ...] = ()
 
 
 @dataclass
 class _Tally:
-    """Of one effect: the robots in which it can be tested, and was found, and the places."""
+    """Of one effect: the robots in which it can be tested, was found, and found beyond doubt, and the places."""
 
     robots: int
     testable: NDArray[np.bool_] = field(init=False)
     found: NDArray[np.bool_] = field(init=False)
+    alone: NDArray[np.bool_] = field(init=False)
     places: Counter[str] = field(default_factory=Counter)
     known: bool = True
 
     def __post_init__(self) -> None:
-        self.testable, self.found = (np.zeros(self.robots, dtype=bool) for _ in range(2))
+        self.testable, self.found, self.alone = (np.zeros(self.robots, dtype=bool) for _ in range(3))
 
 
 def counted(table: Path, known: Overview) -> tuple[tuple[Count, ...], tuple[Gathered, ...], tuple[Case, ...]]:
@@ -105,18 +114,22 @@ def counted(table: Path, known: Overview) -> tuple[tuple[Count, ...], tuple[Gath
     names, robot_of = list(known.robots.values), known.robot_of()
     tallies: dict[str, _Tally] = {}
     worst: list[tuple[float, int, int, Case]] = []
-    for number, row in enumerate(findings(table)):
-        effect = row["effect"] if row["quantity"] is None else f"a law of {row['quantity']}"
-        tally = tallies.setdefault(effect, _Tally(len(names), known=row["quantity"] is None))
-        campaign = known.numbers[row[CAMPAIGN]]
+    for name, rows in groupby(findings(table), key=lambda row: row[CAMPAIGN]):
+        campaign, told = known.numbers[name], []
         robot = robot_of[campaign]
-        tally.testable[robot] |= row["status"] != "not_testable"
-        if row["status"] in _FOUND:
-            place = row["places"][0]["name"] if row["places"] else ""
-            if not tally.found[robot]:
-                tally.places.update([place] if place else [])
-            tally.found[robot] = True
-            case = _case(names[robot], effect, place, row)
+        for row in rows:
+            effect = row["effect"] if row["quantity"] is None else f"a law of {row['quantity']}"
+            tally = tallies.setdefault(effect, _Tally(len(names), known=row["quantity"] is None))
+            tally.testable[robot] |= row["status"] != "not_testable"
+            if _at_work(row):
+                told.append(_case(names[robot], effect, row))
+                if not tally.found[robot] and told[-1].place:
+                    tally.places[told[-1].place] += 1
+                tally.found[robot] = True
+                tally.alone[robot] |= row["status"] != "confounded"
+        if not told and row["unexplained"]:
+            told = [Case(names[robot], name, row["rms_before"], row["rms_after"])]
+        for number, case in enumerate(told):
             (heapq.heappush if len(worst) < settings.MOST_LISTED else heapq.heappushpop)(
                 worst, (case.rms_before, -campaign, -number, case)
             )
@@ -124,14 +137,28 @@ def counted(table: Path, known: Overview) -> tuple[tuple[Count, ...], tuple[Gath
     return _counts(tallies), _gathered(tallies, known), found
 
 
-def _case(robot: str, effect: str, place: str, row: dict[str, Any]) -> Case:
+def _at_work(row: dict[str, Any]) -> bool:
+    """Whether an effect explains the gap, or a part of it: of two that are confounded only the one that was fitted."""
+    return row["status"] in _FOUND and (row["status"] != "confounded" or bool(row["places"]))
+
+
+def _case(robot: str, effect: str, row: dict[str, Any]) -> Case:
     told = {name: row[name] for name in ("rms_before", "rms_after", "probability", "shrinkage")}
-    return Case(robot=robot, campaign=row[CAMPAIGN], effect=effect, place=place, **told)
+    place = row["places"][0]["name"] if row["places"] else ""
+    others = tuple(row["confounded_with"] or ()) if row["status"] == "confounded" else ()
+    return Case(robot=robot, campaign=row[CAMPAIGN], effect=effect, place=place, confounded_with=others, **told)
 
 
 def _counts(tallies: dict[str, _Tally]) -> tuple[Count, ...]:
     counts = [
-        Count(effect, int(t.found.sum()), int((t.testable | t.found).sum()), dict(t.places.most_common()), t.known)
+        Count(
+            effect,
+            int(t.found.sum()),
+            int((t.testable | t.found).sum()),
+            int((t.found & ~t.alone).sum()),
+            dict(t.places.most_common()),
+            t.known,
+        )
         for effect, t in tallies.items()
     ]
     return tuple(sorted(counts, key=lambda c: (-c.found, c.effect)))

@@ -107,6 +107,8 @@ def findings(table: Path) -> Iterator[dict[str, Any]]:
         "shrinkage",
         "quantity",
         "places",
+        "confounded_with",
+        "unexplained",
     ]
     return (row for row in _records(table, columns) if row["effect"] is not None)
 

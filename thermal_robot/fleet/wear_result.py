@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from thermal_robot.files import write_text
+from thermal_robot.percents import percent
 
 SCHEMA = "thermal-robot/wear/1"
 
@@ -238,7 +239,7 @@ def _lines(wear: Wear) -> Iterator[str]:
     days = f", {first.date} to {last.date}, {last.time:.0f} days" if wear.dated else ", in order; no dates, so no rates"
     yield f"campaigns    {len(wear.campaigns)}{days}"
     yield f"alarms       at most {_share(wear.false_alarm)} of series without a change ring"
-    yield f"scatter      {wear.scatter:.2f} of what the deviations say; nothing moved: {wear.nothing:.1%}"
+    yield f"scatter      {wear.scatter:.2f} of what the deviations say; nothing moved: {percent(wear.nothing)}"
     for worn in wear.parameters:
         if worn.alarm:
             yield ""
@@ -246,7 +247,7 @@ def _lines(wear: Wear) -> Iterator[str]:
     likely = [w for w in wear.parameters if not w.alarm and w.comparable and w.moved > _LIKELY]
     if likely:
         yield ""
-        yield from (f"perhaps      {_moves(wear, w)}: {w.moved:.0%}, but no alarm" for w in likely)
+        yield from (f"perhaps      {_moves(wear, w)}: {percent(w.moved, 0)}, but no alarm" for w in likely)
     yield ""
     yield from _others(wear, {w.parameter for w in likely})
     yield from (f"note         {note}" for note in wear.notes)
@@ -254,7 +255,7 @@ def _lines(wear: Wear) -> Iterator[str]:
 
 def _of_one(wear: Wear, worn: Worn) -> Iterator[str]:
     yield f"ALARM        {_moves(wear, worn)}"
-    kinds = ", ".join(f"{kind} {p:.0%}" for kind, p in worn.kinds.items() if p >= 0.005)
+    kinds = ", ".join(f"{kind} {percent(p, 0)}" for kind, p in worn.kinds.items() if p >= 0.005)
     yield f"             chance of such an alarm without a change: at most {worn.chance:.1g}; {kinds}"
     if worn.jump:
         a, b = wear.campaigns[worn.jump.earliest], wear.campaigns[worn.jump.latest]
@@ -268,7 +269,7 @@ def _of_one(wear: Wear, worn: Worn) -> Iterator[str]:
 def _others(wear: Wear, named: set[str]) -> Iterator[str]:
     stays = [w for w in wear.parameters if w.comparable and not w.alarm and w.parameter not in named]
     if stays:
-        yield f"stays        {'; '.join(f'{w.parameter} (moved: {w.moved:.1%})' for w in stays)}"
+        yield f"stays        {'; '.join(f'{w.parameter} (moved: {percent(w.moved)})' for w in stays)}"
     yield from (f"limit        {w.parameter}: {_reaches(w.crossing, w.unit)}" for w in stays if w.crossing is not None)
     hidden = [w for w in wear.parameters if not w.comparable]
     for reason in dict.fromkeys(w.reason for w in hidden):
@@ -283,7 +284,7 @@ def _moves(wear: Wear, worn: Worn) -> str:
         a, b = wear.campaigns[worn.jump.after], wear.campaigns[worn.jump.after + 1]
         where = f"between {_when(wear, a.name, a.date)} and {_when(wear, b.name, b.date)}"
         size = f"{worn.jump.size:+.3g} ± {worn.jump.std:.2g} {worn.unit}"
-        return f"{name} jumped by {size} {where} ({worn.jump.probability:.0%})"
+        return f"{name} jumped by {size} {where} ({percent(worn.jump.probability, 0)})"
     if worn.rate is not None:
         return f"{name} moves by {worn.rate.value:+.3g} ± {worn.rate.std:.2g} {worn.unit} a day"
     how = "moves steadily" if worn.kind == "trend" else "wanders"

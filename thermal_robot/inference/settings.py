@@ -364,11 +364,8 @@ UNHELD = 30.0
 """
 NAMING_ODDS = 9.0
 """Of an effect against nothing in its place: who takes a gear apart for what is named is then wrong once in ten."""
-TELLS_APART = 3.0
-"""Log evidence, natural logarithm, by which an effect must beat another in its place: 20 to 1, a probability of 95 %.
-"""
-EXACT_LEVEL = 0.01
-"""Chance that noise makes an exact alias look like none."""
+IN_ITS_PLACE = 0.01
+"""Probability that another effect is at work in an effect's place, from which both are told: less is no doubt."""
 INTERVAL = (0.025, 0.975)
 """Quantiles of every interval."""
 LEAST_HELD = 1e-6

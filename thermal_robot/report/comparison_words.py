@@ -23,14 +23,15 @@ STATUS = {
 def headline(comparison: Plain) -> str:
     """Return what stayed and what changed in one plain sentence or two."""
     same = [e["title"] for e in comparison["effects"] if e["status"] == "shared"]
-    lost = [e["title"] for e in comparison["effects"] if e["status"] in ("contradicts", "not_needed")]
+    lost = [e["title"] for e in comparison["effects"] if e["name"] in comparison["verdict"]["lost"]]
     names = [c["name"] for c in comparison["campaigns"]]
     kept = [c for c in comparison["changes"] if _status(comparison, c["effect"]) != "contradicts"]
     told = []
     if kept:
         told.append(f"{_upper(listed([change_in_short(c) for c in kept[:3]]))}{_more(len(kept) - 3)}.")
     elif not lost:
-        told.append(f"Nothing changed between {listed(names)}.")
+        what = "What differs" if comparison["changes"] else "Nothing changed"
+        told.append(f"{what} between {listed(names)}{' has no name' * bool(comparison['changes'])}.")
     if same:
         told.append(f"They share {listed(same)}." if not kept else f"The same in all: {listed(same)}.")
     if lost:
@@ -86,7 +87,7 @@ def chance(p_value: float | None) -> str:
         return units.MISSING
     if p_value < 1e-5:
         return "below 0.001 %"
-    return f"{100.0 * p_value:.0f} %" if p_value > 0.1 else f"{100.0 * p_value:.2g} %"
+    return units.percent(p_value, 0) if p_value > 0.1 else f"{100.0 * p_value:.2g} %"
 
 
 def effects(comparison: Plain) -> Iterator[tuple[str, str, str, str]]:
@@ -94,7 +95,8 @@ def effects(comparison: Plain) -> Iterator[tuple[str, str, str, str]]:
     for effect in comparison["effects"]:
         if effect["status"] == "absent":
             continue
-        status = STATUS[effect["status"]] + (f": {effect['reason']}" if effect["reason"] else "")
+        status = STATUS[effect["status"] if effect["named"] or effect["status"] != "contradicts" else "absent"]
+        status += f": {effect['reason']}" if effect["reason"] else ""
         ratio = f"{effect['chi2']:.1f} on {effect['degrees']}" if effect["degrees"] else units.MISSING
         yield effect["name"], status, ratio, chance(effect["p_value"]) if effect["degrees"] else units.MISSING
 
@@ -132,4 +134,4 @@ def predictions(comparison: Plain) -> Iterator[tuple[str, str, str, str, str]]:
             continue
         difference, stated = units.together((p["rms"], p["stated"]), "m")
         verdict = "agree" if p["agrees"] else "differ by more than noise: a model is wrong, or the robot changed"
-        yield both, difference, stated, f"{p['beyond']:.0%} of {p['poses']}", verdict
+        yield both, difference, stated, f"{units.percent(p['beyond'], 0)} of {p['poses']}", verdict

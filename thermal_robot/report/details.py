@@ -6,7 +6,10 @@ from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
 from thermal_robot.report import units
-from thermal_robot.report.sentence import listed, scattering, systematic, unnamed
+from thermal_robot.report.sentence import listed, scattering, sized, systematic, unnamed
+
+_SURER = 0.05  # by which a single effect is surer than all together, so that a reader asks why
+_TOLD, _MOST = 0.01, 3  # probability from which another effect is told that may be at work, too, and how many are
 
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.result import Diagnosis
@@ -23,6 +26,9 @@ def details(diagnosis: Diagnosis) -> Iterator[str]:
         if f.confounded_with:
             rivals = " or ".join(map(diagnosis.title, f.confounded_with))
             yield f"{_begun(diagnosis.title(f.name))} cannot be told apart from {rivals}."
+    if unsized := [diagnosis.title(f.name) for f in causes if not sized(f)]:
+        yield f"How large it is these data do not determine: {listed(unsized)}."
+    yield from _more(diagnosis)
     if causes and chance:
         names = listed([diagnosis.title(f.name) for f in chance])
         yield f"There is also scatter, which no correction removes: {names}."
@@ -31,6 +37,19 @@ def details(diagnosis: Diagnosis) -> Iterator[str]:
         shapes = "the shape of the law that was" if laws == 1 else f"the shapes of the {laws} laws that were"
         yield f"{which} has {shapes} found."
     yield from _elsewhere(diagnosis)
+
+
+def _more(diagnosis: Diagnosis) -> Iterator[str]:
+    """Say what else may be at work, where each effect is surer by itself than that there is no other."""
+    joint, own = diagnosis.probability, [diagnosis.finding(name).probability or 0.0 for name in diagnosis.verdict]
+    if not own or min(own) - joint < _SURER:
+        return
+    told = {f.name: f.probability for f in diagnosis.effects if f.probability and f.name not in diagnosis.verdict}
+    others = sorted((name for name in told if told[name] >= _TOLD), key=lambda name: -told[name])[:_MOST]
+    named = listed([f"{diagnosis.title(name)} ({units.percent(told[name])})" for name in others])
+    beside = f", most probably {named}" if others else ""
+    told_apart = f"That nothing else is at work is {units.percent(joint)} sure, less than each by itself"
+    yield f"{told_apart}: the rest is others{beside}."
 
 
 def _begun(words: str) -> str:

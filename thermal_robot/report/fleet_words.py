@@ -36,7 +36,8 @@ def found(summary: Plain) -> Iterator[tuple[str, ...]]:
             places = list(effect["places"].items())
             told = ", ".join(f"{place} {n}" for place, n in places[:_MOST_PLACES])
             told += ", …" if len(places) > _MOST_PLACES else ""
-            yield _named(effect["effect"]), f"{effect['found']} of {effect['testable']}", told
+            count = f"{effect['found']} of {effect['testable']}"
+            yield _named(effect["effect"]), count + f", in {(n := effect['confounded'])} or another" * bool(n), told
 
 
 def gathered(summary: Plain) -> Iterator[tuple[str, ...]]:
@@ -74,11 +75,13 @@ def apart(summary: Plain) -> Iterator[tuple[str, ...]]:
 
 
 def cases(summary: Plain) -> Iterator[tuple[str, ...]]:
-    """Yield what was found in which campaign, the largest gaps first."""
+    """Yield what was found in which campaign, the largest gaps first, and what else it may be."""
     for c in summary["found"]:
         before, after = (units.quantity(c[name], "m") for name in ("rms_before", "rms_after"))
         chance = units.probability(c["probability"])
-        yield c["robot"], c["campaign"], _named(c["effect"]), c["place"], chance, before, after
+        effect = _named(c["effect"] or "no effect explains it")
+        effect += f" (or {' or '.join(map(_named, c['confounded_with']))})" * bool(c["confounded_with"])
+        yield c["robot"], c["campaign"], effect, c["place"], chance, before, after
 
 
 def failures(summary: Plain) -> Iterator[str]:

@@ -98,7 +98,7 @@ def _si(place: Place) -> str:
 
 
 def _heading(place: Place) -> str:
-    return plain(f"{place.words}: {100.0 * place.share:.0f} %")
+    return plain(f"{place.words}: {units.percent(place.share, 0)}")
 
 
 def _seen(place: Place) -> Array:

@@ -6,6 +6,8 @@ from collections.abc import Iterator, Sequence
 from itertools import product
 from typing import TYPE_CHECKING
 
+from thermal_robot.report import units
+
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.parts import AnotherModel, Finding, Misfit, Unexplained
     from thermal_robot.diagnosis.result import Diagnosis
@@ -82,8 +84,14 @@ def scattering(diagnosis: Diagnosis) -> list[Finding]:
 
 
 def weighty(causes: Sequence[Finding], most: int = _MOST_CAUSES) -> list[Finding]:
-    """Return the causes that a headline names: those that weigh something, at most so many, but always the first."""
-    return [f for f in causes if (f.shrinkage or 0.0) >= _WEIGHTY][:most] or list(causes[:1])
+    """Return the causes that a headline names: those of some weight and size, at most so many, but always one."""
+    known = [f for f in causes if sized(f)]
+    return [f for f in known if (f.shrinkage or 0.0) >= _WEIGHTY][:most] or (known or list(causes))[:1]
+
+
+def sized(finding: Finding) -> bool:
+    """Whether the data determine any parameter of an effect: one without is not named first."""
+    return not finding.parameters or any(p.identified for p in finding.parameters)
 
 
 def unnamed(diagnosis: Diagnosis) -> list[Finding]:
@@ -137,7 +145,7 @@ def _another_model(model: AnotherModel) -> str:
 
 def _sure(diagnosis: Diagnosis) -> str:
     probability = diagnosis.probability
-    return f"{100 * probability:.0f} % sure" if probability < _SURE else "more than 99 % sure"
+    return f"{units.percent(probability, 0)} sure" if probability < _SURE else "more than 99 % sure"
 
 
 def _causes(diagnosis: Diagnosis, causes: Sequence[Finding], most: int, beside: bool) -> str:
@@ -178,11 +186,11 @@ def _how_far(diagnosis: Diagnosis, remaining: Unexplained, several: bool) -> Ite
         hard = f"; but it harms rows held out by {gap.hardest.name}"
     elif gap.hardest is not None:
         hard = f"; held out by {gap.hardest.name}, {length(gap.hardest.rms_after)}"
-    full = f"correcting for {it} removes {100 * held.shrinkage:.1f} % of its mean square on held-out data"
+    full = f"correcting for {it} removes {units.percent(held.shrinkage)} of its mean square on held-out data"
     scatter = "; there is also scatter" * bool(scattering(diagnosis))
     yield f"{full} and leaves {leaves}{_rest(diagnosis, remaining)}{hard}{scatter}"
     yield f"{full} and leaves {leaves}{_rest(diagnosis, remaining)}{hard}"
-    short = f"correcting removes {100 * held.shrinkage:.1f} % on held-out data and leaves {leaves}"
+    short = f"correcting removes {units.percent(held.shrinkage)} on held-out data and leaves {leaves}"
     yield f"{short}{_rest(diagnosis, remaining)}{hard}"
     apart = remaining.flagged and remaining.rms > held.rms_after  # of rows set aside: the others are not called more
     more = (", outliers left out" if apart else ", more than noise") if remaining.flagged else ""

@@ -7,10 +7,11 @@ from dataclasses import dataclass
 from math import floor, isfinite, log10
 from typing import TYPE_CHECKING
 
+from thermal_robot.percents import MISSING as MISSING
+from thermal_robot.percents import percent as percent
+
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.parts import Estimate
-
-MISSING = "–"
 
 # leading unit: (smallest size in SI, what it is multiplied by, what it is then called), largest first
 _LADDERS: dict[str, tuple[tuple[float, float, str], ...]] = {
@@ -112,14 +113,6 @@ def _spread(value: float, std: float, best: Scale) -> str:
         return f"{number(value)} ± {number(std, 2)}{unit}"
     decimals = min(_decimals(std, 2), _decimals(largest, 6))
     return f"{value:.{decimals}f} ± {std:.{decimals}f}{unit}".replace("-", "−")
-
-
-def percent(share: float | None) -> str:
-    """Write a share as ``96.0 %``."""
-    if share is None or not isfinite(share):
-        return MISSING
-    rounded = round(100.0 * share, 1) + 0.0
-    return f"{rounded:.1f} %".replace("-", "−")
 
 
 def interval(bounds: tuple[float, float] | None) -> str:

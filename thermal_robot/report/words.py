@@ -121,8 +121,9 @@ def rows_in_words(rows: Sequence[int], most: int = 10) -> str:
 
 
 def set_aside(diagnosis: Diagnosis) -> str:
-    """Say which rows were set aside: ``as outliers: rows 8, 24, 74, 90``."""
-    return f"as outliers: {rows_in_words(diagnosis.outliers)}" if diagnosis.outliers else "no row"
+    """Say which rows were set aside, and how rows are counted: ``as outliers: rows 8, 24, 74, 90 of the file ...``."""
+    rows = f"as outliers: {rows_in_words(diagnosis.outliers)} of the file (its header is row 1)"
+    return rows if diagnosis.outliers else "no row"
 
 
 def struck(diagnosis: Diagnosis) -> str:
@@ -230,7 +231,7 @@ def in_joints(finding: Finding) -> str:
 
 
 def rivals(finding: Finding, diagnosis: Diagnosis) -> str:
-    """Say of which effect it is a part, or what it cannot be told from and how to see the one not preferred."""
+    """Say of which effect it is a part, or what it cannot be told from and how to see what is not preferred."""
     if not finding.confounded_with:
         return ""
     if finding.status == "contained":
@@ -239,7 +240,7 @@ def rivals(finding: Finding, diagnosis: Diagnosis) -> str:
     others = [name for name in finding.confounded_with if not diagnosis.is_frame(name)]
     if finding.name not in diagnosis.verdict or not others:
         return said
-    return f"{said}; --without {finding.name} shows {one_of(others)} in its place"
+    return f"{said}; --without {finding.name} shows what would then stand in its place"
 
 
 def left_out(diagnosis: Diagnosis) -> str:

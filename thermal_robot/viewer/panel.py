@@ -27,7 +27,7 @@ def of_row(scene: Scene, row: int, magnification: float) -> str:
     along = ", ".join(f"{axis} {quantity(part, 'm')}" for axis, part in zip("xyz", gap.tolist(), strict=True))
     aside = ", set aside as an outlier" if scene.aside[row] else ""
     lines = [
-        f"<b>row {scene.rows[row]}</b> of the table, {row + 1} of {len(scene.rows)}{aside}",
+        f"<b>row {scene.rows[row]}</b> of the file{aside}",
         f"{_mark(CHOSEN)}gap {_length(gap)}",
         f"<span style='opacity:0.7'>{along}</span>",
     ]
