@@ -15,11 +15,10 @@ from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis.data_faults import settings as faults
-from thermal_robot.diagnosis.data_faults.readings import Readings
+from thermal_robot.diagnosis.data_faults.readings import Placed, Readings
 from thermal_robot.diagnosis.data_faults.struck import misfit, spread
 from thermal_robot.inference import settings
 from thermal_robot.inference.rows import in_order
-from thermal_robot.observations import Frames
 
 Rows = NDArray[np.int64]
 Flags = NDArray[np.bool_]
@@ -74,7 +73,7 @@ def _still(readings: Readings, far: Flags, near: float) -> Iterator[tuple[Rows, 
         k += stays + 1
 
 
-def _behind(readings: Readings, far: Flags, near: float, frames: Frames) -> Iterator[tuple[Rows, str]]:
+def _behind(readings: Readings, far: Flags, near: float, frames: Placed) -> Iterator[tuple[Rows, str]]:
     """Yield the runs, of few of the rows, in which the measured pose belongs to a command some rows away."""
     for by in (sign * k for k in range(1, faults.MOST_SHIFT + 1) for sign in (-1, 1)):
         own = np.clip(np.arange(len(far)) + by, 0, len(far) - 1)

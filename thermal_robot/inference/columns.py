@@ -36,7 +36,7 @@ class Block:
         (P,) expected size of each parameter, the campaign's ``[priors]`` applied.
     spread
         Standard deviation of the logarithm of their common factor.
-    most
+    largest_scale
         That factor, at most.
     """
 
@@ -45,7 +45,7 @@ class Block:
     source: Observations | Array
     sizes: Array
     spread: float = UNSOURCED
-    most: float = np.inf
+    largest_scale: float = np.inf
 
     @property
     def columns(self) -> Array:

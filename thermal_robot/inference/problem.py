@@ -153,7 +153,7 @@ def normal_equations(
         equations - known.shape[1],
         whitening.held,
         -0.5 * (log_det + (whitening.smooth.log_det if whitening.smooth else 0.0)),
-        np.array([b.most for b in linear.blocks]),
+        np.array([b.largest_scale for b in linear.blocks]),
     )
 
 
