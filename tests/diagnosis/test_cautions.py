@@ -104,7 +104,7 @@ def test_what_was_refused_is_said(rv_m2):
     known = fit(simulate(rv_m2, seed=2)[0], choose(("drift",), (), ()))
     assert cautions(known) == ()
     (refused,) = cautions(known, {"joint_gain": Refused(0.01, -0.053)})
-    assert refused == ("rows held out are predicted no better with joint_gain (share -5.3%): not reported as found")
+    assert refused == ("rows held out are predicted no better with joint_gain (share −5.3 %): not reported as found")
 
 
 def test_a_verdict_that_hangs_on_the_stated_sizes_says_so(rv_m2):

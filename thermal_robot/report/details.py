@@ -44,9 +44,9 @@ def _more(diagnosis: Diagnosis) -> Iterator[str]:
     joint, own = diagnosis.probability, [diagnosis.finding(name).probability or 0.0 for name in diagnosis.verdict]
     if not own or min(own) - joint < _SURER:
         return
-    told = {f.name: f.probability for f in diagnosis.effects if f.probability and f.name not in diagnosis.verdict}
+    told = {f.name: f.probability for f in diagnosis.effects if f.probability and f.status == "not_found"}
     others = sorted((name for name in told if told[name] >= _TOLD), key=lambda name: -told[name])[:_MOST]
-    named = listed([f"{diagnosis.title(name)} ({units.percent(told[name])})" for name in others])
+    named = listed([f"{diagnosis.title(name)} ({units.probability(told[name])})" for name in others])
     beside = f", most probably {named}" if others else ""
     told_apart = f"That nothing else is at work is {units.percent(joint)} sure, less than each by itself"
     yield f"{told_apart}: the rest is others{beside}."
