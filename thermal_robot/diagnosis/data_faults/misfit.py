@@ -13,8 +13,8 @@ from thermal_robot.diagnosis.another_model import AnotherModel
 from thermal_robot.diagnosis.answer import Conclusion
 from thermal_robot.diagnosis.data_faults import data_fault, settings
 from thermal_robot.diagnosis.data_faults.another_robot import another_robot
-from thermal_robot.diagnosis.data_faults.struck import misfit
 from thermal_robot.diagnosis.data_faults.readings import Readings
+from thermal_robot.diagnosis.data_faults.struck import misfit
 from thermal_robot.diagnosis.examine import examine
 from thermal_robot.diagnosis.parts import Misfit
 from thermal_robot.diagnosis.unsettled import unsettled
