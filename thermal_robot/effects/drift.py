@@ -81,7 +81,7 @@ class Drift(Fading):
         clock = observations.clock
         if clock is None:
             return ()
-        elapsed = ((np.clip(clock, *self.found) if self.found else clock) - self.origin) / self.span
+        elapsed = ((np.clip(clock, self.found[0], self.found[1]) if self.found else clock) - self.origin) / self.span
         tau = self.time_constant
         grown = elapsed if tau == 0.0 else np.expm1(-elapsed / tau) / np.expm1(-1.0 / tau)
         return tuple(
