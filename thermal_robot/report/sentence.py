@@ -45,7 +45,7 @@ def _wordings(diagnosis: Diagnosis) -> Iterator[str]:
     size, left = length(diagnosis.gap.rms_before), diagnosis.unexplained
     remaining = diagnosis.remaining or left
     if diagnosis.misfit is not None:
-        yield _misfit(diagnosis.misfit, diagnosis.reach)
+        yield from _misfit(diagnosis.misfit, diagnosis.reach)
     elif not diagnosis.verdict and not left.flagged:
         floor = length(diagnosis.gap.noise_floor)
         if diagnosis.gap.noise_known:
@@ -109,20 +109,28 @@ def _worse(diagnosis: Diagnosis) -> str:
     return f"Correcting harms rows held out by {scheme.name} ({pair}): "
 
 
-def _misfit(misfit: Misfit, reach: float) -> str:
+def _misfit(misfit: Misfit, reach: float) -> Iterator[str]:
+    """Yield what does not belong together; of faults that data cannot tell apart the usual ones are kept longest."""
     fault, model = misfit.fault, misfit.model
     if model is not None:
-        return _another_model(model)
+        yield _another_model(model)
+        return
     if fault is None:
         left = f"{misfit.turned:.2g} rad" if misfit.away is None else f"{length(misfit.away)} of {length(reach)}"
-        return (
+        yield (
             f"Robot and table do not describe the same motion ({left} remain): check units, signs and order of the "
             "joints, axes of the instrument, order of the quaternion, and that all rows belong to one set-up and the "
             "URDF to this robot."
         )
+        return
     struck = f" in {len(fault.rows)} rows" if fault.rows else ""
     fall = f"{length(fault.rms_before)} to {length(fault.rms_after)}"
-    return f"The table is at fault{struck}, not the robot: {fault.what}. Mended, the gap falls from {fall}."
+    faults = fault.what.split(", or ")
+    for count in range(len(faults), 0, -1):
+        what = ", or ".join(faults[:count])
+        said = f"The table is at fault{struck}, not the robot: {what}."
+        yield f"{said} Mended, the gap falls from {fall}."
+        yield said
 
 
 def _another_model(model: AnotherModel) -> str:

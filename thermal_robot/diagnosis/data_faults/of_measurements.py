@@ -47,7 +47,7 @@ def _sizes(steps: tuple[float, ...]) -> Callable[[Readings], Iterator[tuple[str,
         for by in (sign for step in steps for sign in (step, 1.0 / step)):
             size = f"lengths are {by if by > 1.0 else 1.0 / by:.4g} times too {'small' if by > 1.0 else 'large'}"
             unit = next((own for own, one in LENGTH_UNITS.items() if abs(one / read / by - 1.0) < ALIKE), "")
-            inch = "" if unit or steps is METRIC else ": inches?"
+            inch = "" if unit or steps is METRIC else " (inches?)"
             said = f"positions stand in {unit}, not in {readings.length_unit}: {size}" if unit else f"{size}{inch}"
             yield said, _at_places(lambda p, by=by: p * by)  # type: ignore[misc]
 
@@ -118,11 +118,11 @@ def _angles_in_degrees(readings: Readings) -> Iterator[tuple[str, Repair]]:
 
 UNITS = (
     Kind("metric unit", "{}", "correct length_unit", _sizes(METRIC)),
-    Kind("inch", "{}", 'set length_unit = "inch", or convert them', _sizes(INCHES)),
+    Kind("inch", "{}", "convert them, or correct length_unit", _sizes(INCHES)),
 )
 AXES = (
-    Kind("exchanged axes", "the columns {} are exchanged", "exchange their headers", _axes_exchanged),
-    Kind("mirrored axis", "axis {} of the instrument points the other way", "change its sign", _mirrored),
+    Kind("exchanged axes", "columns {} are exchanged", "exchange their headers", _axes_exchanged),
+    Kind("mirrored axis", "the instrument's axis {} is mirrored", "change its sign", _mirrored),
 )
 TURNS = (
     Kind("quaternion order", "quaternions stand in the order {}", "put the scalar first", _ordered),
