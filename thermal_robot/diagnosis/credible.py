@@ -82,7 +82,7 @@ def credible(fit: Fit, progress: Callable[[str], None], *, all_doubts: bool = Tr
 
     A part is what an effect does in one joint or link. The explanation is chosen again without each part in doubt, and
     that one is left out without which rows held out are predicted best; none is where they are then predicted clearly
-    worse, but for a size that is physically impossible. Where rows are very many, only the worst of the others is
+    worse. A size that is physically impossible must bring more to stay. Where rows are very many, only the worst of the others is
     weighed; of more still, the whole effect, which takes less time. Without ``all_doubts`` only what cannot be is left
     out.
 
@@ -92,7 +92,7 @@ def credible(fit: Fit, progress: Callable[[str], None], *, all_doubts: bool = Tr
         With what is left.
     refused
         What was left out, by its name: the probability of a known effect all of which was, by the evidence of the two
-        explanations that keep one of a pair; of a size that is impossible, zero.
+        explanations that keep one of a pair.
     """
     refused: dict[str, Refused] = {}
     weighed: set[tuple[tuple[str, str], ...]] = set()
@@ -105,7 +105,8 @@ def credible(fit: Fit, progress: Callable[[str], None], *, all_doubts: bool = Tr
         others = {part: less(fit, part[0], progress, "" if whole else part[1]) for part in doubt.parts}
         left = {part: goes_astray(other) for part, other in others.items()}
         out = min(left, key=lambda part: left[part])
-        if left[out] > settings.WORSE_ELSEWHERE * goes_astray(fit) and not doubt.impossible:
+        dear = settings.IMPOSSIBLE_COST if doubt.impossible else settings.WORSE_ELSEWHERE
+        if left[out] > dear * goes_astray(fit):
             continue
         best = {part: other.explanation.best.log_evidence for part, other in others.items()}
         chance = max((float(expit(best[instead] - best[out])) for instead in best if instead != out), default=0.0)
