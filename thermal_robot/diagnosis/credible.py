@@ -82,9 +82,9 @@ def credible(fit: Fit, progress: Callable[[str], None], *, all_doubts: bool = Tr
 
     A part is what an effect does in one joint or link. The explanation is chosen again without each part in doubt, and
     that one is left out without which rows held out are predicted best; none is where they are then predicted clearly
-    worse. A size that is physically impossible must bring more to stay. Where rows are very many, only the worst of the others is
-    weighed; of more still, the whole effect, which takes less time. Without ``all_doubts`` only what cannot be is left
-    out.
+    worse. A size that is physically impossible must bring more to stay. Where rows are very many, only the worst of the
+    others is weighed; of more still, the whole effect, which takes less time. Without ``all_doubts`` only what cannot
+    be is left out.
 
     Returns
     -------
