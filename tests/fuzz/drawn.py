@@ -29,7 +29,7 @@ def drawn(rng: Random) -> Files:
     text = _arm(rng)
     robot = load_robot(text, "tool")
     chance = np.random.default_rng(rng.getrandbits(32))
-    rows = rng.randint(30, 60)
+    rows = rng.randint(24, 40)
     q, read = _commands(rng, chance, robot, rows)
     conditions = _conditions(rng, chance, robot, q)
     noise, measures = rng.choice((0.0, 1e-9, 1e-5, 1e-4, 1e-3)), rng.choice(("position", "position", "pose"))
@@ -51,8 +51,8 @@ def drawn(rng: Random) -> Files:
 
 
 def _arm(rng: Random) -> str:
-    """A serial arm of 2 to 7 joints with masses; one may slide, one may mimic, a fixed link may stand between."""
-    count = rng.choice((2, 3, 3, 4, 4, 5, 6, 7))
+    """A serial arm of 2 to 6 joints with masses; one may slide, one may mimic, a fixed link may stand between."""
+    count = rng.choice((2, 2, 3, 3, 3, 4, 4, 6))
     slide = rng.randrange(count) if rng.random() < 0.35 else -1
     follower = rng.randrange(1, count) if rng.random() < 0.25 else -1
     parts, parent = [link("l0", 10.0, "0 0 0.1")], "l0"
