@@ -6,6 +6,7 @@ mimic, masses that are wrong, torques that count the other way, copied rows: wha
 
 from __future__ import annotations
 
+import json
 import re
 from random import Random
 
@@ -43,11 +44,14 @@ def drawn(rng: Random) -> Files:
         noise_orientation=3.0 * noise if measures == "pose" else 0.0,
         tool=(0.05, 0.02, 0.1),
         base_known=rng.random() < 0.3,
-        tool_known=rng.random() < 0.2,
+        tool_known=rng.random() < 0.3,
         seed=rng.getrandbits(30),
     )
     files = corpus.files_of(campaign)
-    return {**files, "robot.urdf": _weighed(rng, text).encode(), **_table(rng, chance, files, robot, read)}
+    files |= {"robot.urdf": _weighed(rng, text).encode(), **_table(rng, chance, files, robot, read)}
+    if rng.random() < 0.7:  # a few effects are asked for, which is cheap
+        files["only.json"] = json.dumps(rng.sample(list(library()), rng.choice((1, 1, 2, 3, 5)))).encode()
+    return files
 
 
 def _arm(rng: Random) -> str:
@@ -81,7 +85,7 @@ def _commands(rng: Random, chance: np.random.Generator, robot: Robot, rows: int)
     if rng.random() < 0.2:  # one step of each joint
         q = np.round(q * 2.0) / 2.0
     read = q.copy()
-    for j in range(robot.n):
+    for j in rng.sample(range(robot.n), robot.n - 1):  # where nothing moves there is nothing to diagnose
         if rng.random() < 0.25:
             q[:, j] = rng.choice((0.0, q[0, j]))
             read[:, j] = q[:, j] + rng.choice((0.0, 1e-9, 3e-7, 1e-6, 2e-5, 2e-4)) * chance.normal(size=rows)
