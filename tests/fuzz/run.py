@@ -74,6 +74,7 @@ class Worker:
                 text=True,
                 env=alone,
             )
+        self.process.stdout.readline()  # it is ready: what it imports is not the trial's time
         return self.process
 
     def _dead(self, process: subprocess.Popen[str], late: bool) -> tuple[str, str, str]:
