@@ -105,7 +105,8 @@ class Grouped:
             turned = own.transpose(0, 2, 1)
             along = np.add.reduceat(turned @ white(numbers[which]), starts, axis=0)
             inside = np.add.reduceat(turned @ own, starts, axis=0) + tight[groups][:, :, None] * np.eye(own.shape[2])
-            found = found + equations_of(along).T @ equations_of(np.linalg.solve(inside, along))
+            solved = np.asarray(np.linalg.solve(inside, along), dtype=np.float64)
+            found = found + np.asarray(equations_of(along).T @ equations_of(solved))
         return found
 
     def _back(self, moves: Array, group: NDArray[np.int64], inner: Array, shape: tuple[int, ...]) -> Array:
