@@ -8,7 +8,9 @@ import pytest
 from helpers import numbers
 from simulate import simulate
 
+import thermal_robot
 from thermal_robot import EffectError, EstimationError, ThermalRobotError, diagnose
+from thermal_robot.effects.joint_offset import JointOffset
 from thermal_robot.kinematics import rotation_to_quaternion
 from thermal_robot.observations import Frames, observe
 
@@ -211,3 +213,21 @@ def test_a_prior_that_rules_one_joint_out_leaves_it_to_the_placement_there(offse
 def test_withholding_everything_is_refused(offset):
     with pytest.raises(EffectError):
         diagnose(offset, only=["drift"], without=["drift"])
+
+
+@pytest.mark.parametrize("turning", [None, 3e-5], ids=["positions", "poses"])
+@pytest.mark.parametrize("only", [("joint_offset",), ("tool_frame",)])
+def test_where_base_and_tool_are_known_one_effect_is_enough_to_ask_for(rv_m2, only, turning):
+    # no column of a frame is fitted, and the gap is far beyond what one expects
+    offsets = [2e-2, -2e-2, 1e-2, 5e-3, 1.5e-2]
+    told = dict(commands=simulate(rv_m2, seed=5)[0].q[:30], noise=NOISE, tool=(0.05, 0.02, 0.1))
+    told |= dict(base_known=True, tool_known=True)
+    if turning is not None:
+        told |= dict(measures="pose", noise_orientation=turning)
+    found = diagnose(thermal_robot.simulate(rv_m2, [(JointOffset(), offsets)], **told), only=only)
+    assert np.isfinite(numbers(found.to_dict())).all()
+    if only == ("joint_offset",):
+        assert found.verdict == only
+        told_of = {p.name.removeprefix("zero offset, "): p for p in found.finding(only[0]).parameters}
+        for joint, true in zip(rv_m2.joint_names, offsets, strict=True):
+            assert abs(told_of[joint].value - true) < 5.0 * told_of[joint].std

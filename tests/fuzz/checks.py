@@ -133,8 +133,9 @@ def same(folder: Path) -> None:
 
 
 def diagnosis(folder: Path) -> None:
-    """A diagnosis is finite throughout, is told, and its model predicts."""
-    found = diagnose(folder)
+    """A diagnosis is finite throughout, is told, and its model predicts; ``only.json`` may name what is asked for."""
+    asked = folder / "only.json"
+    found = diagnose(folder, only=json.loads(asked.read_bytes()) if asked.is_file() else None)
     json.dumps(found.to_dict(), allow_nan=False)
     assert str(found)
     if found.usable:

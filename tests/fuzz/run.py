@@ -3,9 +3,9 @@
 usage: python tests/fuzz/run.py [--hours H | --minutes M | --trials N] [--target NAME ...] [--seed S] [--jobs J]
        python tests/fuzz/run.py --replay FOLDER ...
 
-Each target has its share of the time. A finding is saved in a folder with the files that bring it back and a
-``finding.json`` that says what happened, in ``--into``; up to three for one cause. The table that is printed last is
-that of docs/reliability.md.
+Each target has its share of the time. A finding is printed as it comes, and saved in a folder with the files that
+bring it back and a ``finding.json`` that says what happened, in ``--into``; up to three for one cause. The table that
+is printed last is that of docs/reliability.md.
 """
 
 from __future__ import annotations
@@ -74,6 +74,7 @@ class Worker:
                 text=True,
                 env=alone,
             )
+        self.process.stdout.readline()  # it is ready: what it imports is not the trial's time
         return self.process
 
     def _dead(self, process: subprocess.Popen[str], late: bool) -> tuple[str, str, str]:
@@ -115,6 +116,7 @@ class Tally:
             kind = said.split(":")[0] if outcome == "traceback" else ""
             cause = (target, outcome, kind, place)
             self.causes[cause] += 1
+            print(f"{target} {number}: {outcome} at {place}: {said}", file=sys.stderr, flush=True)
             if self.causes[cause] > KEPT:
                 return
             folder = self.into / target / f"{outcome}-{number}"

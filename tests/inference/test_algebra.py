@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from thermal_robot.inference.algebra import orthonormal, ridge, solve, whitener, without
+from thermal_robot.inference.algebra import equations_of, orthonormal, ridge, solve, whitener, without
 
 UNITS = 10.0 ** np.array([-9.0, -3.0, 0.0, 2.0, 6.0])  # metres beside microradians beside counts
 
@@ -120,3 +120,12 @@ def test_ridge_leaves_a_flat_column_that_nothing_determines_where_it_is():
     rest = np.delete(own, 1, axis=1)
     other = np.column_stack([rest, values])
     np.testing.assert_allclose(np.delete(found, 1), ridge(other.T @ other, 1, np.ones(3)), rtol=1e-9)
+
+
+@pytest.mark.parametrize("shape", [(4, 3, 2), (4, 3, 0), (0, 6, 2), (0, 3, 0)])
+def test_every_component_of_a_row_is_an_equation_even_where_nothing_is_unknown(shape):
+    own = np.arange(float(np.prod(shape))).reshape(shape)
+    flat = equations_of(own)
+    assert flat.shape == (shape[0] * shape[1], shape[2])
+    assert [list(row) for row in flat] == [list(own[n, c]) for n in range(shape[0]) for c in range(shape[1])]
+    assert orthonormal(flat).shape[0] == len(flat)

@@ -7,7 +7,9 @@ import pytest
 from simulate import simulate
 from time_constants import DRIFT, LAG, campaign
 
+import thermal_robot
 from thermal_robot.effects import choose
+from thermal_robot.effects.backlash import Backlash
 from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.explain import Noise, explain
 from thermal_robot.inference.frames import register
@@ -89,3 +91,23 @@ def test_an_effect_at_work_stays_beside_a_constant(rv_m2):
     data = simulate(rv_m2, ["joint_gain", LAG], seed=3, ratio=(5.0, 6.0))[0]
     seen, explanation = explained(data, ("joint_gain", LAG))
     assert [e.name for e, _ in refined(explanation, seen, 1.6)] == ["joint_gain", LAG]
+
+
+def test_a_share_of_friction_is_moved_no_closer_than_the_data_tell(rv_m2, monkeypatch):
+    # a joint whose share differs from the others' has a price, however little it differs: that says nothing of the step
+    chance, rows = np.random.default_rng(4), 80
+    plain = simulate(rv_m2, samples=rows, seed=4)[0]
+    approach = {f"approach.{j}": chance.choice([-1.0, 1.0], rows) for j in rv_m2.joint_names}
+    seen = observe(thermal_robot.simulate(rv_m2, commands=plain.q, conditions=approach))
+    true = next(e for e in Backlash().variants(seen) if e.held)
+    parameters = len(true.parameters(seen))
+    told = dict(conditions=approach, noise=2e-5, tool=(0.05, 0.02, 0.1), seed=4)
+    data = thermal_robot.simulate(rv_m2, [(true, np.full(parameters, 2e-3))], commands=plain.q, **told)
+    asked, nearby = [], Backlash.nearby
+    monkeypatch.setattr(Backlash, "nearby", lambda self, factor: asked.append(factor) or nearby(self, factor))
+    seen = observe(data, register(data))
+    linear = Linear(seen.gap, frame_columns(seen)[0], (block(seen, true),))
+    explanation = explain(linear, Noise(data.noise_position), starts=[(0,)])
+    ((found, _),) = refined(explanation, seen, 1.6)
+    assert found.apart == 0
+    assert min(factor for factor in asked if factor > 1.0) > 1.001

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.effects.effect import in_words
 from thermal_robot.inference import settings
-from thermal_robot.inference.algebra import orthonormal, without
+from thermal_robot.inference.algebra import equations_of, orthonormal, without
 from thermal_robot.inference.fit import Fit
 
 Array = NDArray[np.float64]
@@ -84,8 +84,8 @@ def _moved(fit: Fit) -> Iterator[tuple[str, list[tuple[str, str]], Array]]:
     """
     e = fit.explanation
     noise = np.broadcast_to(e.whitening.sigma() * e.best.noise, e.linear.gap.shape).reshape(-1, 1)
-    basis = orthonormal(e.linear.frames.reshape(len(noise), e.linear.frames.shape[2]) / noise)
+    basis = orthonormal(equations_of(e.linear.frames) / noise)
     for b, (effect, values) in zip(e.best.blocks, fit.effects, strict=True):
         item = e.linear.blocks[b]
-        moved = item.columns.reshape(len(noise), -1) * values / noise
+        moved = equations_of(item.columns) * values / noise
         yield effect.name, [(p.kind, p.place) for p in item.parameters], without(moved, basis)

@@ -39,7 +39,7 @@ from thermal_robot.effects.law import PREFIX
 from thermal_robot.errors import CampaignError, EstimationError, require
 from thermal_robot.inference import settings
 from thermal_robot.inference.discover import discovered
-from thermal_robot.inference.fit import Fit, fit
+from thermal_robot.inference.fit import Fit, fit, require_enough
 from thermal_robot.inference.random_gap import random_gap
 
 
@@ -163,6 +163,7 @@ def _concluded(
     """Explain the gap, unless robot and table do not belong together: a fault of the table comes before the robot's."""
     misfit = unfit(campaign, progress)
     if misfit is None:
+        require_enough(campaign)  # before signs are asked, which fit frames too
         last = _explained(fit(as_counted(campaign, own), candidates, progress), progress)
         misfit = another_motion(last.fit)
         if misfit is None:

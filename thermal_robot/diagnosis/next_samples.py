@@ -28,6 +28,7 @@ from thermal_robot.diagnosis import settings
 from thermal_robot.diagnosis.optimal_design import most_informative
 from thermal_robot.effects import gate
 from thermal_robot.errors import CampaignError
+from thermal_robot.inference.algebra import equations_of
 from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.evidence import Combination
 from thermal_robot.inference.fit import Fit
@@ -318,7 +319,7 @@ class _Conditional:
 
     def __init__(self, root: Array, chosen: Sequence[int]) -> None:
         measures = root.shape[1]
-        past = root[list(chosen)].reshape(len(chosen) * measures, root.shape[2])
+        past = equations_of(root[list(chosen)])
         own = np.einsum("nap,nbp->nab", root, root) + np.eye(measures)
         self.own, self.cross, self.past = own, root @ past.T, past @ past.T + np.eye(len(past))
         self.gain = self.cross @ _inverse(self.past)[0]

@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from scipy.special import stdtrit
 
 from thermal_robot.inference import settings
-from thermal_robot.inference.algebra import ridge
+from thermal_robot.inference.algebra import equations_of, ridge
 from thermal_robot.inference.explain import Explanation
 from thermal_robot.inference.problem import Linear, Whitening
 from thermal_robot.inference.rows import each
@@ -150,7 +150,7 @@ class Model:
         for chunk in chunks(len(numbers)):
             white = self._white(numbers[chunk])
             for own, some in zip(found, np.split(white, groups, axis=1), strict=True):
-                flat = some.reshape(-1, size)
+                flat = equations_of(some)
                 own += flat.T @ flat
         return found
 

@@ -10,7 +10,7 @@ import numpy as np
 from thermal_robot.effects import gate, library
 from thermal_robot.effects.law import PREFIX
 from thermal_robot.inference import settings
-from thermal_robot.inference.algebra import orthonormal, without
+from thermal_robot.inference.algebra import equations_of, orthonormal, without
 from thermal_robot.inference.fit import Fit
 
 
@@ -25,9 +25,8 @@ def within_frames(fit: Fit, block: int) -> bool:
     item, linear = fit.explanation.linear.blocks[block], fit.explanation.linear
     if not linear.frames.size or not item.parameters:
         return False
-    columns = item.columns.reshape(-1, len(item.parameters)) * item.sizes
-    flat = linear.frames.reshape(-1, linear.frames.shape[2])
-    left = without(columns, orthonormal(flat))
+    columns = equations_of(item.columns) * item.sizes
+    left = without(columns, orthonormal(equations_of(linear.frames)))
     return bool(np.linalg.norm(left) < settings.ALIAS * np.linalg.norm(columns))
 
 

@@ -12,7 +12,7 @@ from thermal_robot.diagnosis.parts import Location, Unexplained, Where
 from thermal_robot.effects.channel import by_place, column
 from thermal_robot.effects.law import PREFIX
 from thermal_robot.effects.quantities import quantities
-from thermal_robot.inference.algebra import orthonormal, without
+from thermal_robot.inference.algebra import equations_of, orthonormal, without
 from thermal_robot.inference.columns import Block
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.laws import smooth_columns
@@ -73,17 +73,14 @@ def locate(fit: Fit, shrinkage: dict[str, float]) -> tuple[Where, dict[str, tupl
     e = fit.explanation
     rows = np.flatnonzero(~e.outliers)
     gap = fit.nominal.gap[rows, :3]
-    frames = e.linear.frames[rows].reshape(-1, e.linear.frames.shape[2]) if e.linear.frames.shape[2] else None
-    basis = orthonormal(frames) if frames is not None else None
+    basis = orthonormal(equations_of(e.linear.frames[rows]))
     locations: dict[str, tuple[Location, ...]] = {}
     by_kind: dict[str, dict[str, float]] = defaultdict(lambda: defaultdict(float))
     for b, (effect, values) in zip(e.best.blocks, fit.effects, strict=True):
         block = e.linear.blocks[b]
         power: dict[tuple[str, str], float] = {}
         for site, displaced in _displaced(fit.corrected, block, values).items():
-            moved = displaced[rows].ravel()
-            if basis is not None:
-                moved = without(moved, basis)
+            moved = without(displaced[rows].ravel(), basis)
             power[site] = float((moved.reshape(len(rows), -1)[:, :3] ** 2).sum())
         total = sum(power.values()) or 1.0
         share = max(shrinkage.get(effect.name, 0.0), 0.0)

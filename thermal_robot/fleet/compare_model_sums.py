@@ -19,6 +19,7 @@ from thermal_robot.fleet.compare_effects import Candidate
 from thermal_robot.fleet.compare_model import Known
 from thermal_robot.fleet.compare_sums import Sums
 from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import equations_of
 from thermal_robot.inference.columns import block, frame_columns, moved_by
 
 Array = NDArray[np.float64]
@@ -47,7 +48,7 @@ def sums_of_model(known: Known, listed: Sequence[Candidate], number: int) -> Sum
     across: list[Array] = []
     for (effect, _), start in zip(known.effects, starts, strict=False):
         own = block(known.corrected, effect).columns
-        own = _flat(own) * prior[start : start + own.shape[2]]
+        own = equations_of(own) * prior[start : start + own.shape[2]]
         told = _expressed(known, effect, own, listed, flat, number)
         if told is not None:
             kept += range(start, start + own.shape[1])
@@ -65,13 +66,8 @@ def _columns(known: Known, listed: Sequence[Candidate], number: int) -> list[Arr
     for item in listed:
         own = item.parameters[number]
         columns = moved_by(known.corrected, own) * item.sizes if own else np.zeros((len(known.q), 3, len(item.told)))
-        found.append(_flat(columns))
+        found.append(equations_of(columns))
     return found
-
-
-def _flat(columns: Array) -> Array:
-    """(3N, P) of (N, 3, P), where P may be 0."""
-    return columns.reshape(columns.shape[0] * columns.shape[1], columns.shape[2])
 
 
 def _expressed(
@@ -84,7 +80,7 @@ def _expressed(
     name = f"{effect.name} of {known.campaign}" if isinstance(effect, Discovered) else effect.name
     alike = [k for k, item in enumerate(listed) if item.name == name and item.parameters[number]]
     inside = [k for k, item in enumerate(listed) if item.effect.told_inside and item.parameters[number]]
-    frames = _flat(frame_columns(known.corrected)[0])
+    frames = equations_of(frame_columns(known.corrected)[0])
     for chosen in (alike, sorted({*alike, *inside})) if alike else ():
         every = np.column_stack([*(flat[k] for k in chosen), frames])
         length = np.linalg.norm(every, axis=0)

@@ -22,7 +22,7 @@ from thermal_robot.effects.apply import displacement
 from thermal_robot.fleet import compare_settings
 from thermal_robot.fleet.compare_model import Known, observed, poses
 from thermal_robot.fleet.comparison import Predicted
-from thermal_robot.inference.algebra import orthonormal
+from thermal_robot.inference.algebra import equations_of, orthonormal
 from thermal_robot.observations import Observations
 from thermal_robot.prediction import sensitivity
 
@@ -111,7 +111,7 @@ def _gauge(a: CorrectedModel, b: CorrectedModel, at: Observations) -> Array:
     if not parts:
         return np.zeros((3 * len(at.q), 0))
     columns = np.concatenate(parts, axis=2)
-    return orthonormal(columns.reshape(-1, columns.shape[2]))
+    return orthonormal(equations_of(columns))
 
 
 def _left(values: Array, gauge: Array) -> Array:

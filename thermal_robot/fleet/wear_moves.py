@@ -27,7 +27,7 @@ from numpy.typing import NDArray
 from scipy.special import logsumexp
 
 from thermal_robot.fleet import wear_settings as settings
-from thermal_robot.inference.algebra import whitener
+from thermal_robot.inference.algebra import equations_of, whitener
 
 Array = NDArray[np.float64]
 
@@ -87,7 +87,7 @@ class Series:
     def crossed(self) -> Array:
         """(P K, P) B: products of moves, parameter after parameter, with constants."""
         found = np.einsum("ik,kpq->piq", self.shapes, self.matrices)
-        return np.asarray(found.reshape(-1, found.shape[2]))
+        return equations_of(found)
 
     @cached_property
     def information(self) -> Array:

@@ -14,6 +14,11 @@ from thermal_robot.inference import settings
 Array = NDArray[np.float64]
 
 
+def equations_of(columns: Array) -> Array:
+    """(n·m, K) of columns (n, m, K): an equation a row; n and K may be 0, as where base and tool are known."""
+    return columns.reshape(columns.shape[0] * columns.shape[1], columns.shape[2])
+
+
 def whitener(gram: Array, floor: float = settings.SEEN) -> Array:
     """Return R (D, r) with Rᵀ G R = 1: it makes columns with the Gram matrix G (D, D) orthonormal.
 

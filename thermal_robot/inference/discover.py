@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from thermal_robot.effects import Effect
 from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.inference import settings
-from thermal_robot.inference.algebra import orthonormal, without
+from thermal_robot.inference.algebra import equations_of, orthonormal, without
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.discrepancy import forms
 from thermal_robot.inference.events import events
@@ -86,17 +86,13 @@ def listed(thin: Thin, law: Discovered) -> bool:
         return False
     own = [item for item in thin.linear.blocks if item.effect.places == (law.place,)]
     free = [item.columns for item in own if constant(item.effect, thin.observations)] + [thin.linear.frames]
-    columns = _flat(block(thin.observations, law).columns)
+    columns = equations_of(block(thin.observations, law).columns)
     length = np.linalg.norm(columns, axis=0).max()
     for item in own:
-        basis = orthonormal(_flat(np.concatenate([item.columns, *free], axis=2)))
+        basis = orthonormal(equations_of(np.concatenate([item.columns, *free], axis=2)))
         if np.linalg.norm(without(columns, basis), axis=0).max() < settings.ALIAS * length:
             return True
     return False
-
-
-def _flat(columns: Array) -> Array:
-    return columns.reshape(-1, columns.shape[2])
 
 
 def _remainders(fit: Fit) -> Iterator[tuple[int, ...]]:

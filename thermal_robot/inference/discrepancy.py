@@ -26,6 +26,7 @@ from scipy.spatial.distance import cdist
 from thermal_robot.campaign.turning import moves as moving
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import equations_of
 from thermal_robot.inference.grouped import Grouped
 from thermal_robot.inference.part import Part
 from thermal_robot.inference.rows import repeated_poses
@@ -203,7 +204,7 @@ class Spectrum:
         for chunk, rows in stack.chunks() if stack.different else ():
             for k, (part, own) in enumerate(zip(self.parts, self.apart(rows), strict=True)):
                 if part.wide:
-                    flat = own.reshape(-1, own.shape[2])
+                    flat = equations_of(own)
                     found[k][chunk.start * own.shape[1] :][: len(flat)] = flat
                 else:
                     found[k] += part.adjoint(own, chunk)
@@ -303,7 +304,7 @@ class Spectrum:
         basis, variance = self.eigen(tau, floor)
         columns = white(np.flatnonzero(rows))
         own = basis[np.repeat(rows, len(self.axes))]
-        along = own.T @ columns.reshape(-1, columns.shape[2])
+        along = own.T @ equations_of(columns)
         return np.asarray(along.T @ np.linalg.solve(np.diag(1.0 / variance) + own.T @ own, along))
 
     def degrees(self, tau: float) -> float:

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.inference.algebra import ridge
+from thermal_robot.inference.algebra import equations_of, ridge
 
 Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
@@ -30,11 +30,10 @@ def left_out(columns: Array, values: Array, flat: int, prior: Array, folds: Sequ
         (N,) rows of each fold.
     """
     stack = np.concatenate([columns, values[:, :, None]], axis=2)
-    size = stack.shape[2]
-    whole = _products(stack.reshape(-1, size))
+    whole = _products(equations_of(stack))
     total = 0.0
     for fold in folds:
-        held = stack[fold].reshape(-1, size)
+        held = equations_of(stack[fold])
         fitted = ridge(whole - _products(held), flat, prior)
         total += float(((held[:, -1] - held[:, :-1] @ fitted) ** 2).sum())
     return total

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from thermal_robot.campaign import Campaign
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
-from thermal_robot.inference.algebra import solve
+from thermal_robot.inference.algebra import equations_of, solve
 from thermal_robot.inference.alternation import alternate, middle, soft, starts
 from thermal_robot.inference.columns import frame_columns
 from thermal_robot.kinematics import exp6
@@ -93,7 +93,7 @@ def refined_frames(campaign: Campaign, frames: Frames, robust: bool) -> Frames:
             weight = np.sqrt(soft(distance)) if robust else np.ones(len(distance))
             root_weight[:, part] = weight[:, None] / (middle(distance) + settings.NO_DISTANCE)
         root_weight = root_weight / relative
-        design = (columns * root_weight[:, :, None]).reshape(-1, len(names))
+        design = equations_of(columns * root_weight[:, :, None])
         step = solve(design.T @ design, design.T @ (gap * root_weight).ravel())
         frames = moved(frames, step, names)
         if np.abs(step).max() < settings.REFINE_SETTLED:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import equations_of
 from thermal_robot.inference.stack import Stack, chunks
 
 Array = NDArray[np.float64]
@@ -60,7 +61,7 @@ class Grouped:
         for groups, rows, starts in _in_chunks(self.group):
             each = self.moves[rows].transpose(0, 2, 1) @ stack.rows(rows)
             found[groups] = self.vector[groups].transpose(0, 2, 1) @ np.add.reduceat(each, starts, axis=0)
-        return [found.reshape(-1, found.shape[2])]
+        return [equations_of(found)]
 
     def products(self, tau: float, along: list[Array], plain: Array) -> Array:
         """Return Sᵀ(1 + τ²BBᵀ)⁻¹S, from :meth:`along` and SᵀS."""
@@ -104,8 +105,8 @@ class Grouped:
             turned = own.transpose(0, 2, 1)
             along = np.add.reduceat(turned @ white(numbers[which]), starts, axis=0)
             inside = np.add.reduceat(turned @ own, starts, axis=0) + tight[groups][:, :, None] * np.eye(own.shape[2])
-            solved, flat = np.linalg.solve(inside, along), (-1, along.shape[2])
-            found = found + along.reshape(flat).T @ solved.reshape(flat)
+            solved = np.asarray(np.linalg.solve(inside, along), dtype=np.float64)
+            found = found + np.asarray(equations_of(along).T @ equations_of(solved))
         return found
 
     def _back(self, moves: Array, group: NDArray[np.int64], inner: Array, shape: tuple[int, ...]) -> Array:

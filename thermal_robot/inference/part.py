@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.inference.algebra import equations_of
 from thermal_robot.inference.stack import chunks
 
 Array = NDArray[np.float64]
@@ -41,7 +42,7 @@ class Part:
         """Bᵀ times the columns (r, m, s) of some rows: (c k, s)."""
         functions, moves = self.rows(chunk)
         carried = np.moveaxis(np.matmul(np.swapaxes(moves, -1, -2), stack), 1, 0)
-        return np.asarray(np.matmul(functions.T, carried).reshape(-1, stack.shape[2]))
+        return np.asarray(equations_of(np.matmul(functions.T, carried)))
 
     def times(self, inner: Array, chunk: slice) -> Array:
         """B times (c k, s), for some rows: (r, m, s)."""
@@ -59,7 +60,7 @@ class Part:
         if self.wide:
             functions, moves = self.rows(slice(None))
             m, c = moves.shape[-2:]
-            flat = np.broadcast_to(moves, (len(functions), m, c)).reshape(-1, c)
+            flat = equations_of(np.broadcast_to(moves, (len(functions), m, c)))
             return np.asarray(np.repeat(np.repeat(functions @ functions.T, m, 0), m, 1) * (flat @ flat.T))
         c, count = self.moves.shape[-1], self.functions.shape[1]
         found = np.zeros((c, count, c, count))

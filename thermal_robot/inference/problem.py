@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.inference import settings
-from thermal_robot.inference.algebra import solve, whitener
+from thermal_robot.inference.algebra import equations_of, solve, whitener
 from thermal_robot.inference.columns import Block
 from thermal_robot.inference.discrepancy import Smooth
 from thermal_robot.inference.evidence import Combination
@@ -218,7 +218,7 @@ def whitened_columns(columns: Array, whitening: Whitening) -> Array:
 def _white(stack: Array, used: NDArray[np.int64], whitening: Whitening) -> Array:
     """Whiten columns (n, m, K) of the rows in use, in their place."""
     stack *= (np.sqrt(whitening.weights[used])[:, None] / whitening.sigma(used))[:, :, None]
-    flat = stack.reshape(stack.shape[0] * stack.shape[1], stack.shape[2])
+    flat = equations_of(stack)
     return flat if whitening.smooth is None else whitening.smooth.whitened(flat)
 
 

@@ -11,7 +11,7 @@ from scipy.special import chdtrc
 
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference import settings
-from thermal_robot.inference.algebra import solve
+from thermal_robot.inference.algebra import equations_of, solve
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.generalised import generalised
 from thermal_robot.inference.problem import Linear
@@ -206,7 +206,7 @@ def _refitted(fit: Fit, scatter: Scatter, used: NDArray[np.bool_], even: Array) 
         return gap
     covariance = scatter.covariance(fit.corrected.joint_sensitivity[used, : gap.shape[1]] / even[used, :, None])
     white = generalised(Linear(gap[used], design[used], ()), covariance, np.ones(gap.shape[1]))
-    columns = white.frames.reshape(-1, design.shape[2])
+    columns = equations_of(white.frames)
     return np.asarray(gap - design @ solve(columns.T @ columns, columns.T @ white.gap.ravel()))
 
 

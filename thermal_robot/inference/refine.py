@@ -114,24 +114,27 @@ def heard(explanation: Explanation) -> Whitening:
 def _moved(kept: Products, observations: Observations, blocks: Sequence[Block], place: int, factor: float) -> Block:
     """Return the block at one place with the setting of its effect that nothing nearby betters."""
     item, before, after = blocks[place], blocks[:place], blocks[place + 1 :]
+    seen: dict[Effect, float] = {}
 
     def evidence(own: Block) -> float:
-        # one that stands apart is as rare as an effect
-        return _evaluated(kept, [*before, own, *after])[2].log_evidence + log_odds() * own.effect.apart
+        if own.effect not in seen:
+            seen[own.effect] = _evaluated(kept, [*before, own, *after])[2].log_evidence
+        return seen[own.effect]
 
-    own = evidence(item)
     for _ in range(settings.REFINED_TRIES):
         near = [block(observations, e) for e in gate.nearby(item.effect, factor) if e != item.effect]
         near = [n for n in near if len(n.sizes) == len(item.sizes)]
-        gains = [evidence(n) - own for n in near]
         if not near:
             break
+        more = [evidence(n) - evidence(item) for n in near]
+        # one that stands apart is as rare as an effect, however close it is
+        gains = [own + log_odds() * (n.effect.apart - item.effect.apart) for n, own in zip(near, more, strict=True)]
         best = int(np.argmax(gains))
         if gains[best] > settings.REFINED_GAIN:
-            item, own = near[best].held, own + gains[best]
+            item = near[best].held
             continue
         apart = gate.nearby(item.effect, 1.0)  # settings that do not come closer
-        if all(g > -settings.REFINED_FLAT for n, g in zip(near, gains, strict=True) if n.effect not in apart):
+        if all(own > -settings.REFINED_FLAT for n, own in zip(near, more, strict=True) if n.effect not in apart):
             break
         factor = float(np.sqrt(factor))
     return item

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from thermal_robot.effects import Effect, gate
 from thermal_robot.effects.apply import displacement
 from thermal_robot.inference import settings
-from thermal_robot.inference.algebra import orthonormal, without
+from thermal_robot.inference.algebra import equations_of, orthonormal, without
 from thermal_robot.inference.columns import Block, block, frame_columns
 from thermal_robot.inference.discrepancy import Form, forms
 from thermal_robot.inference.explain import Explanation, explain
@@ -207,10 +207,9 @@ def _listed(
 
     What is kept stays in any case.
     """
-    frames = frame_columns(observations)[0]
-    basis = orthonormal(frames.reshape(frames.shape[0] * frames.shape[1], frames.shape[2]))
-    names, moves = observations.robot.joint_names, observations.joint_sensitivity[:, : frames.shape[1]]
-    flat = moves.reshape(-1, len(names))
+    frames, names = frame_columns(observations)[0], observations.robot.joint_names
+    basis = orthonormal(equations_of(frames))
+    flat = equations_of(observations.joint_sensitivity[:, : frames.shape[1]])
     left = np.linalg.norm(without(flat, basis), axis=0)
     hidden = {
         n for n, seen in zip(names, left > settings.ALIAS * np.linalg.norm(flat, axis=0), strict=True) if not seen

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import equations_of
 
 Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
@@ -91,7 +92,7 @@ class Stack:
         """(K, K) products of the columns, summed over the equations."""
         found = np.zeros((len(self.different),) * 2)
         for _, rows in self.chunks():
-            flat = rows.reshape(-1, rows.shape[2])
+            flat = equations_of(rows)
             found += flat.T @ flat
         return np.asarray(found[np.ix_(self.number, self.number)])
 

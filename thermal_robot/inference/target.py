@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.special import fdtrc
 
 from thermal_robot.inference import settings
-from thermal_robot.inference.algebra import orthonormal, whitener, without
+from thermal_robot.inference.algebra import equations_of, orthonormal, whitener, without
 from thermal_robot.inference.robust import robust_noise
 
 Array = NDArray[np.float64]
@@ -74,7 +74,7 @@ class Target:
         weight = np.ones(len(gap))
         for _ in range(settings.CAUCHY_ROUNDS):
             root = np.sqrt(weight)[:, None] / noise
-            flat = (design * root[:, :, None]).reshape(root.size, design.shape[2])
+            flat = equations_of(design * root[:, :, None])
             basis = orthonormal(flat)
             white = (gap * root).ravel()
             white = without(white, basis)
@@ -83,7 +83,7 @@ class Target:
             weight = 1.0 / (1.0 + ((left / noise) ** 2).sum(axis=1) / (3.0 * measures))
         if trusted is not None and trusted.any():
             root = np.where(trusted[:, None], 1.0 / noise, root)
-            basis = orthonormal((design * root[:, :, None]).reshape(root.size, design.shape[2]))
+            basis = orthonormal(equations_of(design * root[:, :, None]))
             white = (gap * root).ravel()
             white = without(white, basis)
         return cls(white, root, basis)
@@ -95,7 +95,7 @@ class Target:
 
     def worth(self, columns: Array) -> Worth:
         """Return what further columns (N, m, K) explain; nothing where they would leave too few degrees of freedom."""
-        whole = (columns * self.root[:, :, None]).reshape(len(self.white), -1)
+        whole = equations_of(columns * self.root[:, :, None])
         flat = without(whole, self.basis)
         # what is left of an exact alias of the design is rounding, no column
         flat[:, np.linalg.norm(flat, axis=0) < settings.ALIAS * np.linalg.norm(whole, axis=0)] = 0.0

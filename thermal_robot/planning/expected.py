@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 from thermal_robot.diagnosis import settings as design
 from thermal_robot.effects import Effect, Parameter
 from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import equations_of
 from thermal_robot.inference.columns import Block, block, frame_columns
 from thermal_robot.inference.problem import Linear, Whitening, whitened
 from thermal_robot.observations import Observations
@@ -150,7 +151,7 @@ class Columns:
     @property
     def precision(self) -> Array:
         """(f + P, f + P) of the posterior, in units of the expected sizes."""
-        flat = self.root.reshape(-1, self.root.shape[2])
+        flat = equations_of(self.root)
         return np.asarray(flat.T @ flat + np.eye(flat.shape[1]))
 
 

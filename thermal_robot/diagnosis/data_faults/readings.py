@@ -199,7 +199,7 @@ class Readings:
         ridge = RIDGE * (np.trace(gram, axis1=-2, axis2=-1)[..., None, None] + LEAST_GAP**2)
         found = np.linalg.solve(gram + ridge * np.eye(parts.shape[-1]), weighted @ wanted)
         left = np.sqrt(_norm2(wanted - parts @ found)) / (middle(size)[..., None] + LEAST_GAP)
-        place = np.broadcast_to(self.declared.tool[:3, 3], (*found.shape[:-2], 3))
+        place = np.array(np.broadcast_to(self.declared.tool[:3, 3], (*found.shape[:-2], 3)))  # one that is written to
         if parts.shape[-1] == 12:  # m = R o + Σ pₖ R A eₖ: the coefficients of A's entries are pₖ times those of o
             turn, times = found[..., :3, :], found[..., 3:, :].reshape(*found.shape[:-2], 3, 3, 3)
             place = np.einsum("...rkl,...rl->...k", times, turn) / (_norm2(turn).sum(axis=-1)[..., None] + LEAST_GAP**2)

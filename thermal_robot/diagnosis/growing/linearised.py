@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis.growing.choice import Choice, Point
 from thermal_robot.effects.gate import checked
+from thermal_robot.inference.algebra import equations_of
 from thermal_robot.inference.columns import Block, frame_columns, moved_by
 from thermal_robot.inference.gauss_newton import corrected_observations
 from thermal_robot.observations import Observations
@@ -86,7 +87,7 @@ def products(rows: Array, weights: Array) -> Array:
     groups = rows.shape[1] // 3
     found = np.zeros((groups, rows.shape[2], rows.shape[2]))
     for own, part in zip(found, np.split(rows * np.sqrt(weights)[:, None, None], groups, axis=1), strict=True):
-        flat = part.reshape(-1, rows.shape[2])
+        flat = equations_of(part)
         own += flat.T @ flat
     return found
 

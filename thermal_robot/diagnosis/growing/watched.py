@@ -27,7 +27,7 @@ from thermal_robot.diagnosis.growing.grown import Grown
 from thermal_robot.diagnosis.growing.linearised import Seen
 from thermal_robot.diagnosis.growing.settled import Single
 from thermal_robot.inference import settings as chosen
-from thermal_robot.inference.algebra import whitener
+from thermal_robot.inference.algebra import equations_of, whitener
 from thermal_robot.inference.columns import Block
 from thermal_robot.inference.robust import distance_limit
 
@@ -90,7 +90,7 @@ class Watch:
         white, k = self._innovation(before, new), len(before.fitted.step)
         total = before.sums.rows + before.single.campaign.samples + len(white)
         near = (white[:, :, -1] ** 2).sum(axis=1) <= distance_limit(before.choice.measures, total)
-        flat = white[near].reshape(-1, white.shape[2])
+        flat = equations_of(white[near])
         own, left = flat[:, :k], flat[:, k:]
         root = whitener(self._precision(before) + own.T @ own)
         along = root.T @ (own.T @ left)
