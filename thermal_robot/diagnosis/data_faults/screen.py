@@ -156,6 +156,8 @@ class Screen:
         order = best[np.argsort(again, kind="stable")]
         again = np.sort(again)
         many = max(settings.SURVIVORS, int((again <= settings.NEAR * max(again[0], settings.LEAST_GAP)).sum()))
+        if own[0][1].maps_place:  # a rigid motion leaves more than a map, and a mend less than a robot at rest
+            many = min(many, int((again <= settings.NEAR * settings.STILL[0]).sum()))
         return [(own[k][0], place[k]) for k in order[: min(many, settings.MOST_SURVIVORS)]]
 
     def _looked(self, chosen: Chosen, *, turns: bool = False) -> list[Tried]:
