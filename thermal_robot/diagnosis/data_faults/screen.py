@@ -54,7 +54,7 @@ class Screen:
         units = [p for p in self._measured if p.kind in of_measurements.UNITS]
         axes = [p for p in self._measured if p.kind in of_measurements.AXES]
         sides: list[Fault] = [(), *((p,) for p in (*units, *axes)), *((u, a) for u in units for a in axes)]
-        asked = [((*own, *side), *seen) for own, *seen in joints for side in sides if len(own) + len(side) <= 2]
+        asked = [((*own, *side), at, left) for own, at, left in joints for side in sides if len(own) + len(side) <= 2]
         looked = self._looked(asked)
         turns = [p for p in self._measured if p.kind in of_measurements.TURNS]
         if self.struck.readings.orientation is None:
