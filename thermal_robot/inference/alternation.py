@@ -6,7 +6,7 @@ each until its own median distance settles: what one start finds does not depend
 
 from __future__ import annotations
 
-from typing import Protocol
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,6 +17,13 @@ from thermal_robot.observations import Frames
 from thermal_robot.robot import Robot
 
 Array = NDArray[np.float64]
+
+
+class Placed(NamedTuple):
+    """Where the robot stands and the target sits: (..., 4, 4) each, for columns side by side."""
+
+    base: Array
+    tool: Array
 
 
 class Paired(Protocol):
@@ -66,43 +73,59 @@ def alternate(
     targets: Array,
     rounds: int = settings.START_ROUNDS,
     some: NDArray[np.int64] | slice = slice(None),
-) -> tuple[float, Frames]:
+    poses: Array | None = None,
+) -> tuple[Array, Placed]:
     """Alternate the rigid alignment of the base with the linear fit of the target's place, robustly.
 
     Parameters
     ----------
     campaign
-        With measurements.
+        With measurements; its columns may have several in front (..., N), which go side by side.
     declared
         Frames as declared; known ones stay.
     targets
-        (S, 3) where the target may sit on the tool frame, m: from each of them.
+        (..., S, 3) where the target may sit on the tool frame, m: from each of them.
     rounds
         Alternations at most.
     some
         Rows that are looked at.
+    poses
+        (..., N, 4, 4) of the tool frame in these rows, where they are at hand.
 
     Returns
     -------
     tuple
-        Of the start that ends nearest: median distance that is left, m, and the frames.
+        Of the start that ends nearest: (...) median distance that is left, m, and the frames.
     """
-    measured = np.asarray(campaign.position)[some]
+    lead, many = campaign.q.shape[:-2], targets.shape[-2]
+    measured, turns = np.asarray(campaign.position)[..., some, :], None
     if campaign.simulated_position is not None:
-        origin, turns = np.asarray(campaign.simulated_position)[some], None
+        origin = campaign.simulated_position[..., some, :]
     else:
-        poses = tool_poses(campaign.robot, campaign.q[some])
-        origin, turns = poses[:, :3, 3], poses[:, :3, :3]
-    place = np.repeat(declared.tool[None, :3, 3], len(targets), axis=0) if campaign.tool_known else np.array(targets)
-    state = Alternating(measured, origin, turns, campaign.base_known, campaign.tool_known, declared.base, place)
+        poses = tool_poses(campaign.robot, campaign.q[some]) if poses is None else poses
+        origin, turns = poses[..., :3, 3], poses[..., :3, :3]
+    begun = declared.tool[:3, 3] if campaign.tool_known else targets
+    begun = np.array(np.broadcast_to(begun, (*lead, many, 3))).reshape(-1, 3)
+    repeated = _repeated(measured, lead, many), _repeated(origin, lead, many)
+    several = None if turns is None else _repeated(turns, lead, many, 3)
+    state = Alternating(*repeated, several, campaign.base_known, campaign.tool_known, declared.base, begun)
     state.run(rounds)
-    best = int(np.argmin(state.cost))
-    base, weights = state.base[best], state.weights[best]
-    tool = declared.tool.copy()
-    tool[:3, 3] = state.place[best]
+    best = np.arange(0, len(begun), many) + state.cost.reshape(-1, many).argmin(axis=1)
+    base = state.base[best].reshape(*lead, 4, 4)
+    tool = np.repeat(declared.tool[None], len(best), axis=0).reshape(*lead, 4, 4)
+    tool[..., :3, 3] = state.place[best].reshape(*lead, 3)
     if campaign.orientation is not None and turns is not None and not campaign.tool_known:
-        tool[:3, :3] = turned(turns, base, quaternion_to_rotation(campaign.orientation[some]), weights)
-    return float(state.cost[best]), Frames(base, tool)
+        weights = state.weights[best].reshape(*lead, -1)
+        tool[..., :3, :3] = turned(turns, base, quaternion_to_rotation(campaign.orientation[..., some, :]), weights)
+    return state.cost[best].reshape(lead)[()], Placed(base, tool)
+
+
+def _repeated(own: Array, lead: tuple[int, ...], times: int, axes: int = 2) -> Array:
+    """(S·times, ...) columns side by side, each so many times; as they are where there are none in front."""
+    if not lead:
+        return own
+    shape = own.shape[own.ndim - axes :]
+    return np.repeat(np.broadcast_to(own, (*lead, *shape)).reshape(-1, *shape), times, axis=0)
 
 
 def turned(turns: Array, base: Array, measured: Array, weights: Array) -> Array:

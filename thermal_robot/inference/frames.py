@@ -65,7 +65,7 @@ def found_frames(campaign: Campaign) -> Frames:
     if rows < 3:
         raise EstimationError("at least three rows are needed to fit the unknown frames")
     some = np.linspace(0, rows - 1, min(rows, settings.START_ROWS)).astype(np.int64)
-    return alternate(campaign, frames, frames.tool[:3, 3] + starts(campaign), some=some)[1]
+    return Frames(*alternate(campaign, frames, frames.tool[:3, 3] + starts(campaign), some=some)[1])
 
 
 def moved(frames: Frames, step: Array, names: tuple[str, ...]) -> Frames:

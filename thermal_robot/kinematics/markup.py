@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TypeAlias
 from xml.parsers import expat
 
@@ -76,6 +77,7 @@ def bare(content: bytes) -> bytes:
     return _HIDDEN.sub(lambda span: re.sub(rb"[^\n]", b" ", span[0]), content)
 
 
+@lru_cache(maxsize=1)  # a robot is read, checked and cut out of the same text
 def tags(content: bytes, source: str = "") -> tuple[Tag, ...]:
     """Return the elements in the order in which they begin; comments are not read, so they may hold anything.
 

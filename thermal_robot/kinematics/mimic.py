@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.errors import RobotError
-from thermal_robot.kinematics.markup import encoded, tags
+from thermal_robot.kinematics.markup import bare, encoded, tags
 from thermal_robot.kinematics.urdf import nearest
 
 Array = NDArray[np.float64]
@@ -74,9 +74,9 @@ class Coupling:
         return int(found[0]) if len(found) else None
 
 
-def mimics(urdf: str) -> dict[str, Mimic]:
+def mimics(urdf: str, source: str = "the robot description") -> dict[str, Mimic]:
     """Read what every joint with a ``<mimic>`` tag follows, which Pinocchio's default parsing drops."""
-    found, every = {}, tags(encoded(urdf), "the robot description")
+    found, every = {}, tags(bare(encoded(urdf)), source)
     for tag in every:
         if tag.path == ("robot", "joint", "mimic") and (name := every[tag.parent].attributes.get("name")):
             said = tag.attributes

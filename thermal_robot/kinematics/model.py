@@ -148,7 +148,7 @@ def build_chain_model(
     tool = _find_link(full, links, tool_frame, "tool frame")
     elements = _elements_between(full, root, tool)
     # a fixed joint stays where it is, whatever it is said to mimic
-    found = {name: mimic for name, mimic in mimics(urdf).items() if full.existJointName(name)}
+    found = {name: mimic for name, mimic in mimics(urdf, source).items() if full.existJointName(name)}
     ends = followed(found, _joint_names(full), [full.frames[e].name for e in elements])
     held = held_configuration(full, ends)
     moving = [full.frames[e] for e in elements if full.frames[e].type == pin.FrameType.JOINT]

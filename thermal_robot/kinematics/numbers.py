@@ -9,6 +9,7 @@ from __future__ import annotations
 import difflib
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from functools import lru_cache
 
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics.markup import Tag, bare, encoded, tags
@@ -57,6 +58,7 @@ _MEANT_OF_LIMIT = {"min": "lower", "low": "lower", "max": "upper", "high": "uppe
 Attributes = Mapping[str, str]
 
 
+@lru_cache(maxsize=1)
 def require_numbers(urdf: str, source: str) -> None:
     """Refuse a URDF with a word it does not know that places or moves something, a figure that is none, and too much.
 

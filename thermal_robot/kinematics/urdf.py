@@ -10,6 +10,7 @@ import sys
 import tempfile
 import threading
 from collections.abc import Iterable, Iterator, Sequence
+from functools import lru_cache
 
 import pinocchio as pin
 
@@ -20,6 +21,7 @@ from thermal_robot.kinematics.markup import IS_XACRO, Edit, Tag, bare, changed, 
 _STREAMS = threading.Lock()
 
 
+@lru_cache(maxsize=1)
 def parse_urdf(urdf: str, source: str) -> pin.Model:
     """Build the Pinocchio model of a whole URDF; meshes are not read.
 

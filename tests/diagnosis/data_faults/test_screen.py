@@ -1,5 +1,7 @@
 """Among thousands of candidates the true one is looked at, whatever else is wrong on the other side."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from conftest import load_arm
@@ -60,3 +62,13 @@ def test_known_frames_are_not_fitted(sound):
     kinds, own = best(screen.singly(), 1)
     assert kinds == {"reversed joint"}
     assert own.typical < 2e-3
+
+
+def test_where_not_even_a_map_leaves_little_nothing_is_looked_at(sound):
+    """A joint that does something else than its column says: neither units nor axes nor two faults mend it."""
+    q = np.array(sound.q)
+    q[:, 1] = np.sin(2.0 * q[:, 1]) + 0.3 * q[:, 2]
+    screen = Screen(Struck.whole(Readings.of(replace(sound, q=q, orientation=None, noise_orientation=None))), KINDS)
+    assert [t for t in screen.both_sides() if len(t.fault) == 2] == []
+    assert screen.two_of_joints() == []
+    assert screen.asked > 10_000  # they count as tried all the same

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterator
 from dataclasses import replace
 from functools import cache
+from itertools import islice
 
 import numpy as np
 
@@ -70,7 +71,7 @@ def _chains(name: str, joints: tuple[str, ...], kinds: tuple[str, ...], root: st
         return ()
     slides = [kind == "prismatic" for kind in kinds]
     found = (robot for robot in _loaded(name, root, tool) if [k == "prismatic" for k in robot.joint_types] == slides)
-    return tuple(robot for robot in found if not alike or set(robot.joint_names) == set(joints))[:1]
+    return tuple(islice((robot for robot in found if not alike or set(robot.joint_names) == set(joints)), 1))
 
 
 def _loaded(name: str, root: str, tool: str) -> Iterator[Robot]:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis.data_faults.settings import COARSE_ROUNDS, FEWEST_RELAXED, LEAST_GAP, RIDGE, STRAY
 from thermal_robot.inference import settings
-from thermal_robot.inference.alternation import Alternating, middle, starts, turned
+from thermal_robot.inference.alternation import Placed, alternate, middle, starts
 from thermal_robot.kinematics import log3, quaternion_to_rotation, tool_poses
 from thermal_robot.observations import Frames
 from thermal_robot.robot import Robot
@@ -22,13 +22,6 @@ Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
 COLUMNS = ("q", "position", "orientation", "simulated_position")
 """Those that have a row a measurement and may be repaired."""
-
-
-class Placed(NamedTuple):
-    """Where the robot stands and the target sits: (..., 4, 4) each, for readings side by side."""
-
-    base: Array
-    tool: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,27 +121,9 @@ class Readings:
         place = self.declared.tool[:3, 3]
         if begun is None or self.tool_known or self.simulated_position is not None:
             begun = place + (starts(self)[:1] if coarse else starts(self))
-        lead, many = self.q.shape[:-2], begun.shape[-2]
-        begun = np.broadcast_to(begun, (*lead, many, 3)).reshape(-1, 3)
-        turns = None if self.simulated_position is not None else self.poses[..., :3, :3]
-        origin = self.poses[..., :3, 3] if self.simulated_position is None else self.simulated_position
-        measured = self.position
-        if lead:
-            measured, origin = (_many(own, lead, many, 2) for own in (measured, origin))
-            turns = None if turns is None else _many(turns, lead, many, 3)
-        state = Alternating(
-            measured, origin, turns, self.base_known, self.tool_known, self.declared.base, np.array(begun)
-        )
-        state.run(COARSE_ROUNDS if coarse else settings.START_ROUNDS)
-        best = np.arange(0, len(begun), many) + state.cost.reshape(-1, many).argmin(axis=1)
-        base = state.base[best].reshape(*lead, 4, 4)
-        tool = np.repeat(self.declared.tool[None], len(best), axis=0).reshape(*lead, 4, 4)
-        tool[..., :3, 3] = state.place[best].reshape(*lead, 3)
-        if self.orientation is not None and turns is not None and not self.tool_known:
-            weights = state.weights[best].reshape(*lead, -1)
-            seen = quaternion_to_rotation(self.orientation)
-            tool[..., :3, :3] = turned(self.poses[..., :3, :3], base, seen, weights)
-        return Placed(base, tool)
+        rounds = COARSE_ROUNDS if coarse else settings.START_ROUNDS
+        poses = self.poses if self.simulated_position is None else None
+        return alternate(self, self.declared, begun, rounds, poses=poses)[1]
 
     def distance(self, frames: Placed, *, turns: bool = True) -> Array:
         """(..., N) distance between measured and predicted pose, m; a turn counts by what it moves at a lever's length.
@@ -165,6 +140,12 @@ class Readings:
             away = log3(seen @ (poses[..., :3, :3] @ tool[..., :3, :3]).swapaxes(-1, -2))
             away2 = away2 + settings.LEVER**2 * _norm2(away)
         return np.asarray(np.sqrt(away2))
+
+    @property
+    def maps_place(self) -> bool:
+        """Whether :meth:`relaxed` fits the target's place, too, or it is known: no rigid motion then leaves less."""
+        known = self.simulated_position is not None or self.tool_known
+        return known or self.q.shape[-2] >= FEWEST_RELAXED
 
     def relaxed(self, weights: Array | None = None) -> tuple[Array, Array]:
         """Fit any affine map of place and turn of the tool frame instead of a rigid motion: one linear problem.
@@ -209,12 +190,6 @@ class Readings:
 def _norm2(vectors: Array) -> Array:
     """(...) squares of lengths (..., 3)."""
     return np.asarray((vectors * vectors).sum(axis=-1))
-
-
-def _many(own: Array, lead: tuple[int, ...], times: int, axes: int) -> Array:
-    """(S·times, ...) columns of readings side by side, each so many times."""
-    shape = own.shape[own.ndim - axes :]
-    return np.repeat(np.broadcast_to(own, (*lead, *shape)).reshape(-1, *shape), times, axis=0)
 
 
 def stacked(several: Sequence[Readings]) -> Readings:

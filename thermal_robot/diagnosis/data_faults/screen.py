@@ -22,8 +22,8 @@ from thermal_robot.diagnosis.data_faults.struck import Struck, Tried, window
 from thermal_robot.inference.alternation import middle, soft
 
 Array = NDArray[np.float64]
-Chosen = list[tuple[Fault, Array]]
-"""Faults, and (3,) where the target then sits on the tool, m."""
+Chosen = list[tuple[Fault, Array, float]]
+"""Faults, (3,) where the target then sits on the tool, m, and what is left at least, of what a robot at rest leaves."""
 
 
 class Screen:
@@ -54,7 +54,7 @@ class Screen:
         units = [p for p in self._measured if p.kind in of_measurements.UNITS]
         axes = [p for p in self._measured if p.kind in of_measurements.AXES]
         sides: list[Fault] = [(), *((p,) for p in (*units, *axes)), *((u, a) for u in units for a in axes)]
-        asked = [((*own, *side), place) for own, place in joints for side in sides if len(own) + len(side) <= 2]
+        asked = [((*own, *side), at, left) for own, at, left in joints for side in sides if len(own) + len(side) <= 2]
         looked = self._looked(asked)
         turns = [p for p in self._measured if p.kind in of_measurements.TURNS]
         if self.struck.readings.orientation is None:
@@ -63,7 +63,7 @@ class Screen:
         near = [
             t for two in (False, True) for t in [t for t in looked if (len(t.fault) > 1) is two][: settings.SURVIVORS]
         ]
-        more = [((*t.fault, *turn), t.place) for t in near for turn in ((), *((p,) for p in turns))]
+        more = [((*t.fault, *turn), t.place, 0.0) for t in near for turn in ((), *((p,) for p in turns))]
         return self._looked([own for own in more if len(own[0]) <= 2], turns=True)
 
     def two_of_joints(self) -> list[Tried]:
@@ -156,13 +156,19 @@ class Screen:
         order = best[np.argsort(again, kind="stable")]
         again = np.sort(again)
         many = max(settings.SURVIVORS, int((again <= settings.NEAR * max(again[0], settings.LEAST_GAP)).sum()))
-        return [(own[k][0], place[k]) for k in order[: min(many, settings.MOST_SURVIVORS)]]
+        least = again * own[0][1].maps_place
+        chosen = zip(order, least, strict=True)
+        return [(own[k][0], place[k], float(at)) for k, at in [*chosen][: min(many, settings.MOST_SURVIVORS)]]
 
     def _looked(self, chosen: Chosen, *, turns: bool = False) -> list[Tried]:
-        """Return the faults with what rigid frames leave on a few rows; points must have the extent of the motion."""
-        parts = [self.struck.sketch(fault, settings.SKETCHED) for fault, _ in chosen]
-        own = [k for k, part in enumerate(parts) if part is not None and _extends(part)]
+        """Return the faults with what rigid frames leave on a few rows; points must have the extent of the motion.
+
+        Those of which even a map leaves more than a mend may are passed over.
+        """
         self.asked += len(chosen)
+        chosen = [own for own in chosen if own[2] <= settings.NEAR * settings.STILL[max(len(own[0]), 1) - 1]]
+        parts = [self.struck.sketch(fault, settings.SKETCHED) for fault, *_ in chosen]
+        own = [k for k, part in enumerate(parts) if part is not None and _extends(part)]
         found: list[Tried] = []
         for first in range(0, len(own), settings.ABREAST):
             some = own[first : first + settings.ABREAST]

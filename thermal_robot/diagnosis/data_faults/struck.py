@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from thermal_robot.diagnosis.data_faults import settings
 from thermal_robot.diagnosis.data_faults.kind import Fault, Kind, Proposal, repaired
-from thermal_robot.diagnosis.data_faults.readings import Placed, Readings, Rows, stacked
-from thermal_robot.inference.alternation import middle
+from thermal_robot.diagnosis.data_faults.readings import Readings, Rows, stacked
+from thermal_robot.inference.alternation import Placed, middle
 
 Array = NDArray[np.float64]
 
