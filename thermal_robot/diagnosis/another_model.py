@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-UNIT = 200.0
-"""Times too long or too short that all links are where a unit is wrong, not the model: mm read as m are a thousand."""
+UNIT = 30.0
+"""Times too long or too short that all links are where a unit is wrong, not the model: inches read as m are 39, cm a
+hundred, mm a thousand; sisters differ by three."""
 
 
 @dataclass(frozen=True)

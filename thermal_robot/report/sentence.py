@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from itertools import product
 from typing import TYPE_CHECKING
 
+from thermal_robot.campaign.plausible import in_another_unit
 from thermal_robot.report import units
 
 if TYPE_CHECKING:
@@ -45,7 +46,7 @@ def _wordings(diagnosis: Diagnosis) -> Iterator[str]:
     size, left = length(diagnosis.gap.rms_before), diagnosis.unexplained
     remaining = diagnosis.remaining or left
     if diagnosis.misfit is not None:
-        yield _misfit(diagnosis.misfit, diagnosis.reach)
+        yield from _misfit(diagnosis.misfit, diagnosis.reach)
     elif not diagnosis.verdict and not left.flagged:
         floor = length(diagnosis.gap.noise_floor)
         if diagnosis.gap.noise_known:
@@ -109,29 +110,31 @@ def _worse(diagnosis: Diagnosis) -> str:
     return f"Correcting harms rows held out by {scheme.name} ({pair}): "
 
 
-def _misfit(misfit: Misfit, reach: float) -> str:
+def _misfit(misfit: Misfit, reach: float) -> Iterator[str]:
     fault, model = misfit.fault, misfit.model
     if model is not None:
-        return _another_model(model)
-    if fault is None:
+        yield _another_model(model)
+    elif fault is None:
         left = f"{misfit.turned:.2g} rad" if misfit.away is None else f"{length(misfit.away)} of {length(reach)}"
-        return (
+        yield (
             f"Robot and table do not describe the same motion ({left} remain): check units, signs and order of the "
             "joints, axes of the instrument, order of the quaternion, and that all rows belong to one set-up and the "
             "URDF to this robot."
         )
-    struck = f" in {len(fault.rows)} rows" if fault.rows else ""
-    fall = f"{length(fault.rms_before)} to {length(fault.rms_after)}"
-    return f"The table is at fault{struck}, not the robot: {fault.what}. Mended, the gap falls from {fall}."
+    else:
+        struck = f" in {len(fault.rows)} rows" if fault.rows else ""
+        fall = f"Mended, the gap falls from {length(fault.rms_before)} to {length(fault.rms_after)}."
+        ways = fault.alternatives
+        others = "", ", or another fault alike", f", or {len(ways) - 1} other faults alike"
+        for what, rest in product((fault.what, ways[0] + others[min(len(ways), 3) - 1]), (f" {fall}", "")):
+            yield f"The table is at fault{struck}, not the robot: {what}{'' if what.endswith('?') else '.'}{rest}"
 
 
 def _another_model(model: AnotherModel) -> str:
     """Say in what the robot that was measured differs from the URDF, and which one it may be."""
     factor, known = model.factor, ""
     if factor is not None and model.in_another_unit:
-        unit = "the URDF stands in mm: its links are a thousand times too long"
-        unit = unit if factor < 1.0 else "the links of the URDF are a thousand times too short"
-        return f"Robot and table do not describe the same motion: {unit}."
+        return f"Robot and table do not describe the same motion: {in_another_unit(factor)}."
     if factor is not None:
         what = f"the links are about {factor:.2g} times as long as in the URDF"
     elif model.joint:
