@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from thermal_robot.diagnosis.parts import Dependence, Estimate, Finding, FoldScheme, Location
+from thermal_robot.diagnosis.signs import SAID
 from thermal_robot.effects.law_size import Size
 from thermal_robot.report.words import (
     NO_BREAK,
@@ -155,10 +156,10 @@ def test_places_are_told_largest_first_and_small_ones_counted():
 
 
 def test_that_a_quantity_is_read_with_the_other_sign_comes_before_all_else(case):
-    read = "torque.* counts the load, not the motor: it is read with the other sign"
-    told = replace(case("found"), warnings=("column 'a' is empty", read))
-    assert turned(told) == [f"Note: {read}."]
-    assert str(told).startswith(f"Note: {read}.\n{told.summary[:40]}")
+    read = SAID["torque"]
+    told = replace(case("found"), warnings=("column 'a' is empty", *SAID.values()))
+    assert turned(told) == [f"Note: {said}." for said in SAID.values()]
+    assert str(replace(told, warnings=(read,))).startswith(f"Note: {read}.\n{told.summary[:40]}")
     assert turned(case("found")) == []
     assert places(finding()) == ""
 

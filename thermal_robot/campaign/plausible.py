@@ -143,7 +143,8 @@ def another_unit(campaign: Campaign) -> float | None:
         return THOUSAND if 0.0 < length < SHORTEST_ARM else None
     if campaign.position is not None:
         led = tool_poses(campaign.robot, campaign.q)[:, :3, 3]
-        times = np.linalg.norm(np.ptp(led, axis=0)) / max(np.linalg.norm(np.ptp(campaign.position, axis=0)), TINY)
+        wide, seen = (float(np.linalg.norm(np.ptp(own, axis=0))) for own in (led, campaign.position))
+        times = max(wide, TINY) / max(seen, TINY)
         for unit in URDF_UNITS:
             if abs(np.log(times * LENGTH_UNITS[unit])) < APART:
                 return LENGTH_UNITS[unit]

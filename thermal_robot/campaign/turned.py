@@ -10,8 +10,6 @@ from thermal_robot.robot import Robot, load_robot
 
 GRAVITY = "gravity"
 """The quantity that no column holds: the robot has it."""
-OTHER_SIGN = "read with the other sign"
-"""Words of every sentence that says of a quantity that it is turned round."""
 
 
 def turned_round(campaign: Campaign, quantity: str) -> Campaign:

@@ -14,8 +14,6 @@ from thermal_robot.effects.effect import in_words
 from thermal_robot.effects.law_size import Size
 
 Array = NDArray[np.float64]
-OR = ", or "
-"""Between what is wrong and what may be instead."""
 Status = Literal["found", "not_found", "not_testable", "confounded", "contained"]
 
 
@@ -143,11 +141,6 @@ class DataFault:
     rms_before: float
     rms_after: float
     rows: tuple[int, ...] = ()
-
-    @property
-    def alternatives(self) -> list[str]:
-        """What is wrong, or may be instead."""
-        return self.what.split(OR)
 
 
 @dataclass(frozen=True)

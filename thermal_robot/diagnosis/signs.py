@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign
-from thermal_robot.campaign.turned import GRAVITY, OTHER_SIGN, turned_round
+from thermal_robot.campaign.turned import GRAVITY, turned_round
 from thermal_robot.diagnosis import settings
 from thermal_robot.effects import Effect, Parameter, choose, gate
 from thermal_robot.inference.columns import Block, block, frame_columns
@@ -33,11 +33,12 @@ from thermal_robot.observations import observe
 Array = NDArray[np.float64]
 Sides = tuple[NDArray[np.str_], ...]
 SAID = {
-    "torque": f"torque.* counts the load, not the motor: it is {OTHER_SIGN}",
-    "approach": f"approach.* tells whence each joint came, not which way it went: it is {OTHER_SIGN}",
-    "temperature": f"temperature falls where links grow: its differences from reference_temperature are {OTHER_SIGN}",
-    GRAVITY: f"gravity points the other way than stated, as of an arm that hangs: it is {OTHER_SIGN}; write it under "
-    "[robot]",
+    "torque": "torque.* counts the load, not the motor: it is read with the other sign",
+    "approach": "approach.* tells whence each joint came, not which way it went: it is read with the other sign",
+    "temperature": "temperature falls where links grow: its differences from reference_temperature are read with the "
+    "other sign",
+    GRAVITY: "gravity points the other way than stated, as of an arm that hangs: it is read with the other sign; write "
+    "it under [robot]",
 }
 """By quantity: what is told first where it is turned round."""
 STRAIGHT = (

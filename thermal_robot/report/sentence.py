@@ -6,7 +6,6 @@ from collections.abc import Iterator, Sequence
 from itertools import product
 from typing import TYPE_CHECKING
 
-from thermal_robot.campaign.plausible import in_another_unit
 from thermal_robot.report import units
 
 if TYPE_CHECKING:
@@ -21,6 +20,7 @@ _WEIGHTY = 0.01  # of the gap on held-out rows: an effect with less is counted a
 _CARRIES = 1.5  # times what is left of the fitted rows: more on held-out rows is not called noise
 _UNKNOWN = ", which may or may not be noise: the campaign states none"
 _SURE = 0.995  # a probability above it would be rounded to 100 %, which is never claimed
+_OR = ", or "  # between what is wrong with a table and what may be instead
 _NOTHING = 0.9995e-9  # m: what is less rounds to no nanometre
 # m: from which length on it is read times so much in which unit; what rounds to 1 mm is never written as 1e+03 µm
 _LENGTHS = ((0.9995, 1.0, "m"), (0.9995e-3, 1e3, "mm"), (0.0, 1e6, "µm"))
@@ -124,7 +124,7 @@ def _misfit(misfit: Misfit, reach: float) -> Iterator[str]:
     else:
         struck = f" in {len(fault.rows)} rows" if fault.rows else ""
         fall = f"Mended, the gap falls from {length(fault.rms_before)} to {length(fault.rms_after)}."
-        ways = fault.alternatives
+        ways = fault.what.split(_OR)
         others = "", ", or another fault alike", f", or {len(ways) - 1} other faults alike"
         for what, rest in product((fault.what, ways[0] + others[min(len(ways), 3) - 1]), (f" {fall}", "")):
             yield f"The table is at fault{struck}, not the robot: {what}{'' if what.endswith('?') else '.'}{rest}"
@@ -133,8 +133,8 @@ def _misfit(misfit: Misfit, reach: float) -> Iterator[str]:
 def _another_model(model: AnotherModel) -> str:
     """Say in what the robot that was measured differs from the URDF, and which one it may be."""
     factor, known = model.factor, ""
-    if factor is not None and model.in_another_unit:
-        return f"Robot and table do not describe the same motion: {in_another_unit(factor)}."
+    if model.in_another_unit:
+        return f"Robot and table do not describe the same motion: {model.unit}."
     if factor is not None:
         what = f"the links are about {factor:.2g} times as long as in the URDF"
     elif model.joint:

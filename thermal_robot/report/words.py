@@ -7,7 +7,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from thermal_robot.campaign.turned import OTHER_SIGN
 from thermal_robot.report import units
 
 if TYPE_CHECKING:
@@ -168,7 +167,7 @@ def more(count: int, largest: float) -> str:
 
 def turned(diagnosis: Diagnosis) -> list[str]:
     """Say first which quantities are read with the other sign: all else rests on it."""
-    return [f"Note: {said}." for said in diagnosis.warnings if OTHER_SIGN in said]
+    return [f"Note: {said}." for said in diagnosis.warnings if "read with the other sign" in said]
 
 
 def verdict(diagnosis: Diagnosis) -> str:

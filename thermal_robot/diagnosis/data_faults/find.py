@@ -14,7 +14,7 @@ from thermal_robot.diagnosis.data_faults.kind import Kind
 from thermal_robot.diagnosis.data_faults.readings import Readings, rms
 from thermal_robot.diagnosis.data_faults.screen import Screen
 from thermal_robot.diagnosis.data_faults.struck import Struck, Tried, consensus, misfit, mixture, part_of
-from thermal_robot.diagnosis.parts import OR, DataFault
+from thermal_robot.diagnosis.parts import DataFault
 
 Array = NDArray[np.float64]
 
@@ -116,7 +116,7 @@ def _told(campaign: Campaign, struck: Struck, found: Sequence[Tried]) -> DataFau
     hit = struck.hit(best)
     return DataFault(
         kinds=tuple(dict.fromkeys(kind.name for kinds in alike for kind in kinds)),
-        what=OR.join(_words(own) for own in alike.values()),
+        what=", or ".join(_words(own) for own in alike.values()),
         remedy=", or ".join(dict.fromkeys(" and ".join(kind.remedy for kind in kinds) for kinds in alike)),
         rms_before=rms(struck.distance[struck.rows]),
         rms_after=rms(best.distance[best.distance <= settings.STRAY * best.median]),
