@@ -64,6 +64,7 @@ SPOILT = {
     "zero off by 180°": lambda c: with_joints(c, lambda angle: angle + np.pi, 2),
     "metric unit": lambda c: replace(c, position=1000.0 * c.position),
     "inch": lambda c: replace(c, position=c.position / 25.4),
+    "foot": lambda c: replace(c, position=c.position / 0.3048),
     "exchanged axes": lambda c: replace(c, position=c.position[:, [1, 0, 2]]),
     "mirrored axis": lambda c: replace(c, position=c.position * [1.0, 1.0, -1.0]),
     "quaternion order": lambda c: replace(c, orientation=np.roll(c.orientation, -1, axis=1)),

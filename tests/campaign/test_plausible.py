@@ -112,7 +112,15 @@ def test_labels_of_one_pose_may_differ_by_what_a_controller_repeats(tmp_path: Pa
     assert any("'a'" in w for w in read(tmp_path, table=rows.replace("0.1005", "0.102")).warnings)
 
 
-@pytest.mark.parametrize(("scale", "said"), [(1000.0, "the URDF stands in mm"), (1e-3, "a thousand times too short")])
+@pytest.mark.parametrize(
+    ("scale", "said"),
+    [
+        (1000.0, "the URDF stands in mm: its links are a thousand times too long"),
+        (100.0, "the URDF stands in cm: its links are a hundred times too long"),
+        (1 / 0.0254, "the URDF stands in inch: its links are 39 times too long"),
+        (1e-3, "a thousand times too short"),
+    ],
+)
 def test_a_urdf_in_another_unit_is_told(rv_m2: Robot, scale: float, said: str) -> None:
     scaled = lengthened(rv_m2, dict.fromkeys((s.name for s in rv_m2.segments), scale))
     q = np.random.default_rng(2).uniform(rv_m2.lower, rv_m2.upper, (30, 5))

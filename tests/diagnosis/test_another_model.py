@@ -5,6 +5,10 @@ import pytest
 from thermal_robot.diagnosis.another_model import AnotherModel
 
 
-@pytest.mark.parametrize(("factor", "told"), [(None, False), (0.5, False), (25.4, False), (1e3, True), (1e-3, True)])
+@pytest.mark.parametrize(
+    ("factor", "told"), [(None, False), (0.5, False), (25.4, False), (0.01, True), (1e3, True), (1e-3, True)]
+)
 def test_a_unit_is_told_from_a_sister(factor, told):
-    assert AnotherModel(factor, joint="joint_3", off=0.2).in_another_unit is told
+    model = AnotherModel(factor, joint="joint_3", off=0.2)
+    assert model.in_another_unit is told
+    assert bool(model.unit) is told

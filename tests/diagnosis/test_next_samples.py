@@ -230,6 +230,14 @@ def test_samples_are_within_limits_and_conditions_within_reach(arm, monkeypatch)
     assert len(np.unique(chosen.q, axis=0)) == 10
 
 
+def test_no_sample_is_colder_than_absolute_zero(rv_m2):
+    rng = np.random.default_rng(3)
+    cold = {"temperature": np.where(np.arange(60) % 9, 20.0, -273.0)}  # a mark of a missing value, above −273.15
+    campaign = Campaign("cold", rv_m2, commands(rv_m2, 60, rng, 0.4), np.zeros((60, 3)), covariates=cold)
+    offered = candidates(fit(campaign, ()))
+    assert offered.covariates["temperature"].min() == -273.15
+
+
 def test_the_same_seed_gives_the_same_samples_and_json_is_plain(rv_m2):
     _, campaign, pair, _ = doubtful(rv_m2, heat_or_drift, 11)
     found = fit(campaign, choose(pair, (), ()))

@@ -19,6 +19,7 @@ from thermal_robot.diagnosis.parts import (
 )
 from thermal_robot.effects import library
 from thermal_robot.report.details import details
+from thermal_robot.report.next_step import advice
 from thermal_robot.report.sentence import MOST_WORDS, headline, length, listed
 
 
@@ -291,6 +292,21 @@ def test_a_fault_of_the_table_is_said_with_what_it_explains_and_its_remedy(case)
     )
     part = headline(replace(told, misfit=Misfit(replace(fault, rows=(3, 7)))))
     assert part.startswith("The table is at fault in 2 rows, not the robot")
+
+
+@pytest.mark.parametrize("more", [1, 3])
+def test_faults_too_many_for_a_headline_are_counted_there_and_named_in_the_advice(case, more):
+    ways = [f"{' '.join(f'joint_{j},' for j in range(20))} way {k}" for k in range(1 + more)]
+    told = replace(case("found"), misfit=Misfit(DataFault(("reversed joint",), ", or ".join(ways), "turn", 0.41, 6e-4)))
+    text = headline(told)
+    assert len(text.split()) <= MOST_WORDS
+    assert f"{ways[0]}, or {'another fault' if more == 1 else '3 other faults'} alike." in text
+    assert all(way in advice(told) for way in ways)
+
+
+def test_a_question_ends_with_its_own_mark(case):
+    fault = DataFault(("inch",), "lengths are 2.54 times too large: inches?", "convert them", 0.41, 6e-4)
+    assert "inches? Mended" in headline(replace(case("found"), misfit=Misfit(fault)))
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from thermal_robot.diagnosis.parts import Dependence, Estimate, Finding, FoldScheme, Location
+from thermal_robot.diagnosis.signs import SAID
 from thermal_robot.effects.law_size import Size
 from thermal_robot.report.words import (
     NO_BREAK,
@@ -32,6 +33,7 @@ from thermal_robot.report.words import (
     sentences,
     set_aside,
     told_as,
+    turned,
     verdict,
     with_aside,
 )
@@ -149,6 +151,16 @@ def test_places_are_told_largest_first_and_small_ones_counted():
         "joint j0 50.0 %, joint j1 20.0 %, joint j2 10.0 %, joint j3 5.0 % and 2 more, at most 4.0 %"
     )
     assert places(finding(locations=where[5:])) == "joint j5 0.1 %"
+    none = (*where[:4], Location("joint", "j6", 0.0))
+    assert places(finding(locations=none)).endswith("joint j3 5.0 % and 1 more, less than 0.1 %")
+
+
+def test_that_a_quantity_is_read_with_the_other_sign_comes_before_all_else(case):
+    read = SAID["torque"]
+    told = replace(case("found"), warnings=("column 'a' is empty", *SAID.values()))
+    assert turned(told) == [f"Note: {said}." for said in SAID.values()]
+    assert str(replace(told, warnings=(read,))).startswith(f"Note: {read}.\n{told.summary[:40]}")
+    assert turned(case("found")) == []
     assert places(finding()) == ""
 
 

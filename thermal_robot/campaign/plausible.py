@@ -11,6 +11,7 @@ from scipy.spatial.distance import cdist
 from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.marks import FEWEST_ROWS, SAME_COMMAND, doubled, marks, step_of
 from thermal_robot.campaign.names import listed
+from thermal_robot.campaign.units import LENGTH_UNITS
 from thermal_robot.kinematics import align, tool_poses
 
 LIMIT_TOLERANCE = 1e-6
@@ -29,7 +30,13 @@ WORST_INSTRUMENT = 0.01
 """Share of the reach that is an instrument's one-sigma at most: 1 cm for an arm of 1 m, worse than a tape measure."""
 LONGEST_ARM, SHORTEST_ARM, THOUSAND = 100.0, 0.01, 1000.0
 """m: what no arm exceeds, nor falls short of: mobile cranes reach 90 m, arms under a microscope some centimetres; by
-what lengths are wrong that stand in mm, or were converted to m twice."""
+what lengths are wrong that were converted to m twice."""
+LONG_ARM, APART, TINY = 10.0, 0.4, 1e-9
+"""m: an arm that is longer is looked at: excavators reach 15; natural logarithm within which measured and predicted
+extents tell the unit of the URDF: cm and inches are 0.93 apart, a target beside the tool changes them by less; and m,
+an extent that is none."""
+URDF_UNITS = {"mm": "a thousand", "cm": "a hundred", "inch": "39"}
+"""Units in which URDFs were exported, and how many times too long their links then are."""
 LONG_TOOL, WORST_ARM, PAIRED = 0.5, 0.05, 200
 """m: as far as a target whose place is to be fitted may sit from the tool frame: a welding gun, a long pointer; share
 of the reach by which no arm errs; and rows, spread evenly, whose distances from each other are looked at."""
@@ -132,9 +139,30 @@ def another_unit(campaign: Campaign) -> float | None:
     True
     """
     length = sum(segment.length for segment in campaign.robot.segments)
-    if length > LONGEST_ARM:
-        return 1.0 / THOUSAND
-    return THOUSAND if 0.0 < length < SHORTEST_ARM else None
+    if length <= LONG_ARM:
+        return THOUSAND if 0.0 < length < SHORTEST_ARM else None
+    if campaign.position is not None:
+        led = tool_poses(campaign.robot, campaign.q)[:, :3, 3]
+        wide, seen = (float(np.linalg.norm(np.ptp(own, axis=0))) for own in (led, campaign.position))
+        times = max(wide, TINY) / max(seen, TINY)
+        for unit in URDF_UNITS:
+            if abs(np.log(times * LENGTH_UNITS[unit])) < APART:
+                return LENGTH_UNITS[unit]
+    return LENGTH_UNITS["mm"] if length > LONGEST_ARM else None
+
+
+def in_another_unit(factor: float) -> str:
+    """Say in which unit a URDF stands whose lengths have to be multiplied by a factor to be m.
+
+    Examples
+    --------
+    >>> in_another_unit(0.01)
+    'the URDF stands in cm: its links are a hundred times too long'
+    """
+    if factor > 1.0:
+        return "the links of the URDF are a thousand times too short"
+    unit = min(URDF_UNITS, key=lambda own: abs(np.log(factor / LENGTH_UNITS[own])))
+    return f"the URDF stands in {unit}: its links are {URDF_UNITS[unit]} times too long"
 
 
 def _length_unit(campaign: Campaign) -> Iterator[str]:
@@ -143,9 +171,7 @@ def _length_unit(campaign: Campaign) -> Iterator[str]:
     reach = _reach(campaign)
     factor = another_unit(campaign)
     if factor is not None:
-        short = "the links of the URDF are a thousand times too short"
-        wrong = short if factor > 1.0 else "the URDF stands in mm: its links are a thousand times too long"
-        yield f"{wrong}, {reach:.3g} m together"
+        yield f"{in_another_unit(factor)}, {reach:.3g} m together"
         return
     if not np.isfinite(reach):
         return

@@ -4,8 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-UNIT = 200.0
-"""Times too long or too short that all links are where a unit is wrong, not the model: mm read as m are a thousand."""
+from thermal_robot.campaign.plausible import in_another_unit
+
+UNIT = 30.0
+"""Times too long or too short that all links are where a unit is wrong, not the model: inches read as m are 39, cm a
+hundred, mm a thousand; sisters differ by three."""
 
 
 @dataclass(frozen=True)
@@ -33,3 +36,8 @@ class AnotherModel:
     def in_another_unit(self) -> bool:
         """Whether the URDF's lengths stand in another unit than m."""
         return self.factor is not None and not 1.0 / UNIT < self.factor < UNIT
+
+    @property
+    def unit(self) -> str:
+        """In which unit the URDF's lengths stand, in words; empty where it is m."""
+        return in_another_unit(self.factor) if self.factor is not None and self.in_another_unit else ""

@@ -24,6 +24,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.names import CLOCK
+from thermal_robot.campaign.settings import ABSOLUTE_ZERO
 from thermal_robot.diagnosis import settings
 from thermal_robot.diagnosis.optimal_design import most_informative
 from thermal_robot.effects import gate
@@ -186,7 +187,9 @@ def candidates(fit: Fit, pool: int = 400, seed: int = 0, loads: Sequence[float] 
     for name, values in campaign.covariates.items():
         kind, first, last = name.partition(".")[0], float(values.min()), float(values.max())
         if kind == "temperature":
-            covariates[name] = np.array([first - settings.BEYOND, first, last, last + settings.BEYOND])[level]
+            covariates[name] = np.maximum(
+                [first - settings.BEYOND, first, last, last + settings.BEYOND], ABSOLUTE_ZERO
+            )[level]
         elif kind == "payload":
             covariates[name] = rng.choice(
                 np.unique(values) if len(np.unique(values)) < settings.FEW_PAYLOADS else [first, last], pool

@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
 from thermal_robot.report import units
-from thermal_robot.report.sentence import listed
+from thermal_robot.report.sentence import headline, listed
 
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.parts import Wanted
@@ -21,6 +21,8 @@ def advice(diagnosis: Diagnosis) -> str:
     if diagnosis.misfit is not None:
         fault, model = diagnosis.misfit.fault, diagnosis.misfit.model
         first = f"{fault.remedy[:1].upper()}{fault.remedy[1:]}" if fault else "Mend the table"
+        if fault and fault.what not in headline(diagnosis):
+            first = f"All of these do the same: {fault.what}. {first}"
         if model is not None and model.in_another_unit:
             first = "Write the lengths of the URDF in m"
         elif model is not None:

@@ -29,6 +29,7 @@ from thermal_robot.report.words import (
     sentences,
     set_aside,
     struck,
+    turned,
     verdict,
     with_aside,
 )
@@ -74,6 +75,7 @@ def fragment(diagnosis: Diagnosis) -> str:
     """
     body = "\n".join(
         (
+            *map(paragraph, turned(diagnosis)),
             paragraph(diagnosis.summary, strong=True),
             *(_in_short(diagnosis) if diagnosis.usable else (paragraph(diagnosis.advice), _facts(diagnosis))),
             *(['<p class="tr-kicker">Warnings</p>', bullets(diagnosis.warnings)] if diagnosis.warnings else []),
@@ -94,6 +96,7 @@ def _in_short(diagnosis: Diagnosis) -> Iterator[str]:
 
 def _whole(diagnosis: Diagnosis, arm: str, footer: str) -> Iterator[str]:
     yield '<header><div class="tr-kicker">Where the gap lies, what causes it, how far it shrinks</div>'
+    yield from map(paragraph, turned(diagnosis))
     yield f"<h1>{escape(diagnosis.summary)}</h1>"
     yield from map(paragraph, details(diagnosis))
     yield _facts(diagnosis)

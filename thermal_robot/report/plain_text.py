@@ -17,6 +17,7 @@ from thermal_robot.report.words import (
     in_joints,
     law,
     left_out,
+    more,
     needs,
     noise,
     one_sigma,
@@ -28,6 +29,7 @@ from thermal_robot.report.words import (
     set_aside,
     struck,
     told_as,
+    turned,
     verdict,
     with_aside,
 )
@@ -58,7 +60,7 @@ def text(diagnosis: Diagnosis) -> str:
     if not diagnosis.usable:
         return "\n\n".join("\n".join(block) for block in _unusable(diagnosis))
     blocks = [
-        [_wrap(diagnosis.summary, ""), *(_wrap(s, "") for s in details(diagnosis))],
+        [_wrap(s, "") for s in (*turned(diagnosis), diagnosis.summary, *details(diagnosis))],
         list(_facts(diagnosis)),
         ["HOW FAR", *_how_far(diagnosis)],
         ["WHICH", *_which(diagnosis)],
@@ -215,7 +217,7 @@ def _bars(heading: str, shares: Mapping[str, float], ranked: bool = True, most: 
     if not shown:
         yield "    none above 0.5 %"
     elif rest := ordered[len(shown) :]:
-        yield f"    {len(rest)} more, at most {units.percent(max(0.0, rest[0][1]))}"
+        yield f"    {more(len(rest), rest[0][1])}"
 
 
 def bar(share: float, width: int = _BAR) -> str:

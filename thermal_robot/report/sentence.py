@@ -20,6 +20,7 @@ _WEIGHTY = 0.01  # of the gap on held-out rows: an effect with less is counted a
 _CARRIES = 1.5  # times what is left of the fitted rows: more on held-out rows is not called noise
 _UNKNOWN = ", which may or may not be noise: the campaign states none"
 _SURE = 0.995  # a probability above it would be rounded to 100 %, which is never claimed
+_OR = ", or "  # between what is wrong with a table and what may be instead
 _NOTHING = 0.9995e-9  # m: what is less rounds to no nanometre
 # m: from which length on it is read times so much in which unit; what rounds to 1 mm is never written as 1e+03 µm
 _LENGTHS = ((0.9995, 1.0, "m"), (0.9995e-3, 1e3, "mm"), (0.0, 1e6, "µm"))
@@ -110,36 +111,30 @@ def _worse(diagnosis: Diagnosis) -> str:
 
 
 def _misfit(misfit: Misfit, reach: float) -> Iterator[str]:
-    """Yield what does not belong together; of faults that data cannot tell apart the usual ones are kept longest."""
     fault, model = misfit.fault, misfit.model
     if model is not None:
         yield _another_model(model)
-        return
-    if fault is None:
+    elif fault is None:
         left = f"{misfit.turned:.2g} rad" if misfit.away is None else f"{length(misfit.away)} of {length(reach)}"
         yield (
             f"Robot and table do not describe the same motion ({left} remain): check units, signs and order of the "
             "joints, axes of the instrument, order of the quaternion, and that all rows belong to one set-up and the "
             "URDF to this robot."
         )
-        return
-    struck = f" in {len(fault.rows)} rows" if fault.rows else ""
-    fall = f"{length(fault.rms_before)} to {length(fault.rms_after)}"
-    faults = fault.what.split(", or ")
-    for count in range(len(faults), 0, -1):
-        what = ", or ".join(faults[:count])
-        said = f"The table is at fault{struck}, not the robot: {what}."
-        yield f"{said} Mended, the gap falls from {fall}."
-        yield said
+    else:
+        struck = f" in {len(fault.rows)} rows" if fault.rows else ""
+        fall = f"Mended, the gap falls from {length(fault.rms_before)} to {length(fault.rms_after)}."
+        ways = fault.what.split(_OR)
+        others = "", ", or another fault alike", f", or {len(ways) - 1} other faults alike"
+        for what, rest in product((fault.what, ways[0] + others[min(len(ways), 3) - 1]), (f" {fall}", "")):
+            yield f"The table is at fault{struck}, not the robot: {what}{'' if what.endswith('?') else '.'}{rest}"
 
 
 def _another_model(model: AnotherModel) -> str:
     """Say in what the robot that was measured differs from the URDF, and which one it may be."""
     factor, known = model.factor, ""
-    if factor is not None and model.in_another_unit:
-        unit = "the URDF stands in mm: its links are a thousand times too long"
-        unit = unit if factor < 1.0 else "the links of the URDF are a thousand times too short"
-        return f"Robot and table do not describe the same motion: {unit}."
+    if model.in_another_unit:
+        return f"Robot and table do not describe the same motion: {model.unit}."
     if factor is not None:
         what = f"the links are about {factor:.2g} times as long as in the URDF"
     elif model.joint:

@@ -23,6 +23,7 @@ STATUS = {
 }
 _ALL_UP_TO = 7
 _MOST = 6
+_NO_TENTH = 0.0005  # a share that rounds to 0.0 %
 _NEGLIGIBLE = 0.005  # share of the gap that is not worth a line
 _MORE_LIKELY = 0.5
 _UNLIKELY = 0.02  # probability of a place that is not worth naming
@@ -155,7 +156,18 @@ def places(finding: Finding, most: int = 4) -> str:
     rest = finding.locations[len(shown) :]
     if not rest:
         return said
-    return f"{said} and {len(rest)} more, at most {units.percent(max(0.0, rest[0].share))}"
+    return f"{said} and {more(len(rest), rest[0].share)}"
+
+
+def more(count: int, largest: float) -> str:
+    """Count the places that are not listed, and say the largest share of them."""
+    said = "less than 0.1 %" if largest < _NO_TENTH else f"at most {units.percent(largest)}"
+    return f"{count} more, {said}"
+
+
+def turned(diagnosis: Diagnosis) -> list[str]:
+    """Say first which quantities are read with the other sign: all else rests on it."""
+    return [f"Note: {said}." for said in diagnosis.warnings if "read with the other sign" in said]
 
 
 def verdict(diagnosis: Diagnosis) -> str:

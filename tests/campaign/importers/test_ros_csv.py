@@ -44,6 +44,11 @@ def test_lines_without_a_header(tmp_path):
         read(tmp_path, "1,0,map,1,2\n2,0,map,1,2\n")
 
 
+def test_a_comma_at_the_end_of_a_line_is_no_field(tmp_path):
+    _, target = read(tmp_path, "1,0,map,1,2,3,\n2,0,map,4,5,6,\n")
+    np.testing.assert_allclose(target.values, [[1, 2, 3], [4, 5, 6]])
+
+
 @pytest.mark.parametrize("suffix", ["", "/position"])
 @pytest.mark.parametrize("behind", ["", ",0,0,nan,nan", ",nan,nan,nan,nan", ",0,0,,", ",0,0,inf,inf"])
 @pytest.mark.parametrize("frame", ["", "base"])

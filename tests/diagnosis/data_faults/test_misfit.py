@@ -10,7 +10,7 @@ from other_robots import lengthened, measured, read_with
 from simulate import simulate
 from spoilt_tables import SPOILT, measured_at
 
-from thermal_robot import diagnose
+from thermal_robot import diagnose, load_robot
 from thermal_robot.diagnosis.data_faults.misfit import unfit
 from thermal_robot.effects import RANDOM
 from thermal_robot.report import schema
@@ -62,8 +62,18 @@ def test_the_urdfs_unit_comes_before_faults_of_the_table(rv_m2):
 
 
 def test_a_fault_that_mends_the_table_comes_before_another_robot(sound):
-    assert unfit(SPOILT["reversed joint"](sound)).fault.kinds == ("reversed joint",)
+    fault = unfit(SPOILT["reversed joint"](sound)).fault
+    # turned half round about its column this arm is its own image, so that the joints in turn do the same
+    assert fault.kinds == ("reversed joint", "reversed joints")
+    assert fault.what.startswith("joint_3 is reversed")
     assert unfit(sound) is None
+
+
+def test_another_robot_that_leaves_less_comes_before_a_unit_that_is_nearly_the_ratio_of_the_arms():
+    large, small = (load_robot(f"example-robot-data:{name}", "tool0") for name in ("ur10", "ur3"))
+    found = unfit(read_with(measured(large, 1, measures="pose"), small))
+    assert found.fault is None
+    assert found.model.fits == "example-robot-data:ur10"
 
 
 def test_a_sound_table_is_usable(sound):

@@ -128,7 +128,7 @@ def _without_header(table: Table, joints: Sequence[str]) -> tuple[Stream | None,
         lacking = next(joint for joint in joints if joint not in columns)
         raise CampaignError(table.file, "a joint of the chain is not among the names", column=lacking,
                             found=listed(recorded), expected=f"all of {listed(joints)}")  # fmt: skip
-    rest = fields[first:]
+    rest = [name for name in fields[first:] if any(table.columns[name])]  # a comma at the end is no field
     if len(rest) in (len(names.POSITION), len(names.MEASURED)):
         order = ("x", "y", "z", "qx", "qy", "qz", "qw")[: len(rest)]
         by_name = dict(zip(order, rest, strict=True))

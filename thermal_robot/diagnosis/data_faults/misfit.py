@@ -38,9 +38,16 @@ def unfit(campaign: Campaign, progress: Callable[[str], None] = lambda _: None) 
     if fault is not None and fault.rms_after < misfit(Readings.of(campaign)):
         return Misfit(fault)
     other = another_robot(campaign, progress)
-    if fault is None or (other is not None and other.model and settings.FALL * (other.away or 0.0) < fault.rms_after):
+    if fault is None or (other is not None and settings.FALL * _leaves(other) < fault.rms_after):
         return other
     return Misfit(fault)
+
+
+def _leaves(other: Misfit) -> float:
+    """Return what another robot leaves, m: the one at hand that fits, else one of such lengths."""
+    if other.model is None:
+        return np.inf
+    return other.model.remains if other.model.fits else other.away or 0.0
 
 
 def another_motion(fitted: Fit) -> Misfit | None:

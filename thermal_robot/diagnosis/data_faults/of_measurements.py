@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from thermal_robot.campaign.units import LENGTH_UNITS
 from thermal_robot.diagnosis.data_faults.kind import Kind, Repair
 from thermal_robot.diagnosis.data_faults.readings import Readings, Rows
-from thermal_robot.diagnosis.data_faults.settings import ALIKE, INCHES, LARGEST_VOLUME, METRIC
+from thermal_robot.diagnosis.data_faults.settings import ALIKE, FEET, INCHES, LARGEST_VOLUME, METRIC
 
 Array = NDArray[np.float64]
 
@@ -37,7 +37,7 @@ def _turned(change: Callable[[Array], Array]) -> Repair:
     return repair
 
 
-def _sizes(steps: tuple[float, ...]) -> Callable[[Readings], Iterator[tuple[str, Repair]]]:
+def _sizes(steps: tuple[float, ...], ask: str = "") -> Callable[[Readings], Iterator[tuple[str, Repair]]]:
     """Propose factors; one that is no unit beside the declared one was applied twice, or where none was due."""
 
     def proposals(readings: Readings) -> Iterator[tuple[str, Repair]]:
@@ -47,8 +47,7 @@ def _sizes(steps: tuple[float, ...]) -> Callable[[Readings], Iterator[tuple[str,
         for by in (sign for step in steps for sign in (step, 1.0 / step)):
             size = f"lengths are {by if by > 1.0 else 1.0 / by:.4g} times too {'small' if by > 1.0 else 'large'}"
             unit = next((own for own, one in LENGTH_UNITS.items() if abs(one / read / by - 1.0) < ALIKE), "")
-            inch = "" if unit or steps is METRIC else " (inches?)"
-            said = f"positions stand in {unit}, not in {readings.length_unit}: {size}" if unit else f"{size}{inch}"
+            said = f"positions stand in {unit}, not in {readings.length_unit}: {size}" if unit else f"{size}{ask}"
             yield said, _at_places(lambda p, by=by: p * by)  # type: ignore[misc]
 
     return proposals
@@ -118,7 +117,8 @@ def _angles_in_degrees(readings: Readings) -> Iterator[tuple[str, Repair]]:
 
 UNITS = (
     Kind("metric unit", "{}", "correct length_unit", _sizes(METRIC)),
-    Kind("inch", "{}", "convert them, or correct length_unit", _sizes(INCHES)),
+    Kind("inch", "{}", "convert them, or correct length_unit", _sizes(INCHES, " (inches?)")),
+    Kind("foot", "{}", "convert them, or correct length_unit", _sizes(FEET, " (feet?)")),
 )
 AXES = (
     Kind("exchanged axes", "columns {} are exchanged", "exchange their headers", _axes_exchanged),

@@ -62,8 +62,8 @@ AGAIN = 0.25
 EXTENT = 2.0
 """Times that the extent of the measured points may differ from that of the predicted ones, for their unit to be right:
 a target beside the tool frame changes it by less, and units differ by 2.54 and more."""
-METRIC, INCHES = (10.0, 100.0, 1e3, 1e6), (25.4, 2.54, 1.0 / 0.0254)
-"""Times that lengths may be too small or too large: units of metres by each other, and inches by mm, cm and m."""
+METRIC, INCHES, FEET = (10.0, 100.0, 1e3, 1e6), (25.4, 2.54, 1.0 / 0.0254), (304.8, 30.48, 1.0 / 0.3048)
+"""Times that lengths may be too small or too large: units of metres by each other, inches and feet by mm, cm and m."""
 ALIKE = 1e-9
 """Relative difference up to which two factors are one."""
 LARGEST_VOLUME = 100.0
