@@ -164,7 +164,7 @@ def test_a_possible_value_that_nobody_wrote_is_refused(settled, tmp_path):
         (["robot", "urdf"], "builtin:rv_m2", "robot.urdf: is 'builtin:rv_m2', expected the text of a URDF"),
         (["robot", "tool_frame"], "nose", "robot: "),
         (["settings", "noise_position"], -1e-5, "settings.noise_position: a standard deviation cannot be negative"),
-        (["settings", "units", "length"], "inch", "settings.units.length: unknown unit, expected"),
+        (["settings", "units", "length"], "yard", "settings.units.length: unknown unit, expected"),
         (["settings", "gears"], {"knee": 100}, "settings.gears.knee: the chain has no such joint"),
         (["measures"], "place", 'measures: is \'place\', expected "position" or "pose"'),
         (["needs"], ["time", 3], "needs[1]: is 3, expected the name of a column"),

@@ -88,7 +88,9 @@ def test_targets_that_do_not_keep_their_places_are_told(tmp_path: Path) -> None:
     said = " ".join(read(tmp_path, table=text(table(4, rows=12, noise=0.2)), toml=UNKNOWN).warnings)
     assert "move against each other by 0.2" in said
     assert "stated noise of 0.02 mm" in said
-    assert not read(tmp_path, table=text(table(4, rows=12)), toml=UNKNOWN).warnings
+    # places drawn at random follow no command, which is told of two rows; the targets keep theirs
+    sound = read(tmp_path, table=text(table(4, rows=12)), toml=UNKNOWN)
+    assert not [told for told in sound.warnings if "target" in told and not told.startswith("rows")]
 
 
 def test_a_tool_that_is_declared_known_counts_as_unknown(tmp_path: Path) -> None:

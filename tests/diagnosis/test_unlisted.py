@@ -69,7 +69,8 @@ def test_place_and_quantity_are_named_and_nobody_is_blamed(found, name):
         law.quantity,
     )
     assert all(name.startswith("discovered.") for name in diagnosis.verdict)
-    assert law.quantity in diagnosis.summary
+    # a step of the clock is an event: its headline names the rows, its description the time, too
+    assert ("in rows" if name == "step" else law.quantity) in diagnosis.summary
 
 
 @pytest.mark.parametrize("name", CASES)
@@ -178,7 +179,10 @@ def test_a_wheel_on_the_motor_is_found_where_its_effect_is_not_in_the_library(rv
     assert f"of order {ratio:g}" in own.describes
     amplitude = np.hypot(*[p.value for p in own.parameters if p.name.startswith(("sine", "cosine"))])
     assert amplitude == pytest.approx(np.hypot(3e-4, 2e-4), rel=0.1)
-    assert np.abs(found.model.predict(fresh)[0] - true).max() < 25e-6
+    # beyond the range that was measured a wave is no longer claimed
+    inside = (fresh.q[:, 1] > data.q[:, 1].min()) & (fresh.q[:, 1] < data.q[:, 1].max())
+    assert 0.9 < inside.mean() < 1.0
+    assert np.abs(found.model.predict(fresh)[0] - true)[inside].max() < 25e-6
 
 
 def test_what_a_law_follows_does_not_depend_on_the_law(rv_m2):

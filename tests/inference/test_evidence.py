@@ -166,7 +166,7 @@ def test_a_block_grows_no_further_than_it_may():
     linear, whitening = small_problem(3, present=(1,), held=1e6)
     large = replace(linear, gap=linear.gap + 1e3 * linear.blocks[1].columns.sum(axis=2))
     free = evidence(gram(large, whitening), (1,), 0.0, None)
-    blocks = tuple(replace(item, most=30.0) for item in linear.blocks)
+    blocks = tuple(replace(item, largest_scale=30.0) for item in linear.blocks)
     bounded = evidence(gram(replace(large, blocks=blocks), whitening), (1,), 0.0, None)
     assert free.scales[1] > 100.0
     assert bounded.scales[1] == pytest.approx(30.0)

@@ -52,7 +52,9 @@ def outsized(fit: Fit) -> tuple[Doubt, ...]:
             impossible = bool(sure[k] * item.sizes[k] > item.most[k])
             never = "is physically possible" if impossible else "any robot is known to reach"
             words = f"{effect.title}: {own.name} is {times:.0f} times its expected size, more than {never}"
-            found.append(Doubt((_part(effect.name, own.kind, own.place),), words, times, impossible))
+            # what cannot be stands in for something else as a whole: without a part of it the rest would go on to
+            part = (effect.name, "") if impossible else _part(effect.name, own.kind, own.place)
+            found.append(Doubt((part,), words, times, impossible))
     return tuple(sorted(found, key=lambda doubt: (not doubt.impossible, -doubt.times)))
 
 

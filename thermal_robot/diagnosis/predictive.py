@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis.one_walk import Model, Walk
-from thermal_robot.diagnosis.settings import LEAST_SEEN, LOOSE
+from thermal_robot.diagnosis import settings as diagnosis_settings
 from thermal_robot.effects import Effect, gate
 from thermal_robot.effects.fading import Fading
 from thermal_robot.inference import settings
@@ -93,7 +93,7 @@ def registered(fit: Fit, held: Sequence[tuple[Effect, Array]]) -> tuple[tuple[Ef
     gram, flat = model.whole[0], model.flat
     places = [k if name == "base" else 6 + k - names.index("tool") for k, name in enumerate(names)]
     twists = np.zeros((12, gram.shape[1] - 1 - flat))
-    known = whitener(gram[:flat, :flat], LEAST_SEEN)
+    known = whitener(gram[:flat, :flat], diagnosis_settings.LEAST_SEEN)
     twists[places] = known @ (known.T @ gram[:flat, flat:-1])
     found: list[tuple[Effect, Array]] = []
     for (effect, values), own in zip(fading, model.spans, strict=True):
@@ -122,7 +122,7 @@ def _covariances(fit: Fit, model: Model) -> tuple[Array, Array | None]:
     The second is what a smooth discrepancy in the rows makes of it; ``None`` where there is none.
     """
     e, flat, variance = fit.explanation, model.flat, fit.explanation.best.noise**2
-    tight = np.concatenate([np.full(flat, LOOSE**-2.0), model.tight])
+    tight = np.concatenate([np.full(flat, diagnosis_settings.LOOSE**-2.0), model.tight])
     gram = model.whole[0][:-1, :-1] / variance
     unit = (gram.diagonal() + tight) ** -0.5
     prior, size = np.diag(tight * unit**2), np.outer(unit, unit)

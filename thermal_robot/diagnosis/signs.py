@@ -26,7 +26,7 @@ from thermal_robot.inference.problem import Linear, contained, gram
 from thermal_robot.inference.refine import heard
 from thermal_robot.inference.robust import Noise
 from thermal_robot.inference.search import Search
-from thermal_robot.inference.settings import AGAINST_GRAVITY, TINY
+from thermal_robot.inference import settings as inference_settings
 from thermal_robot.kinematics import gravity_torques
 from thermal_robot.observations import observe
 
@@ -78,8 +78,8 @@ def _against_gravity(campaign: Campaign) -> Iterator[str]:
     holding = gravity_torques(robot, campaign.q, payload=payload, payload_com=campaign.payload_com)[:, joints]
     read = np.column_stack([campaign.covariates[columns[j]] for j in joints])
     one, other = (values - values.mean(axis=0) for values in (holding, read))
-    alike = float((one * other).sum() / max(np.linalg.norm(one) * np.linalg.norm(other), TINY))
-    if alike < AGAINST_GRAVITY:
+    alike = float((one * other).sum() / max(np.linalg.norm(one) * np.linalg.norm(other), inference_settings.TINY))
+    if alike < inference_settings.AGAINST_GRAVITY:
         yield (
             f"torque.* goes against the torques that hold the URDF's masses (correlation {alike:.2f}): the sign of "
             "torque.* is reversed, or gravity points up"
@@ -151,7 +151,7 @@ def _votes(free: Explanation, sides: Sides) -> dict[str, Array]:
     """Return by quantity how many standard deviations each parameter that has its side by it is away from zero."""
     votes: dict[str, list[float]] = {}
     for b, (values, covariance) in free.values.items():
-        deviation = np.sqrt(np.maximum(np.diag(covariance), TINY))
+        deviation = np.sqrt(np.maximum(np.diag(covariance), inference_settings.TINY))
         for quantity, z in zip(sides[b].tolist(), (values / deviation).tolist(), strict=True):
             if quantity:
                 votes.setdefault(quantity, []).append(z)

@@ -91,8 +91,11 @@ def weighty(causes: Sequence[Finding], most: int = _MOST_CAUSES) -> list[Finding
 
 
 def sized(finding: Finding) -> bool:
-    """Whether the data determine any parameter of an effect: one without is not named first."""
-    return not finding.parameters or any(p.identified for p in finding.parameters)
+    """Whether the data determine any parameter of an effect: one without is not named first.
+
+    Of a law values before and after may be free while their difference is not.
+    """
+    return bool(finding.quantity) or not finding.parameters or any(p.identified for p in finding.parameters)
 
 
 def unnamed(diagnosis: Diagnosis) -> list[Finding]:

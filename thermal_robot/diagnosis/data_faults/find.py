@@ -117,7 +117,9 @@ def _told(campaign: Campaign, struck: Struck, found: Sequence[Tried]) -> DataFau
     return DataFault(
         kinds=tuple(dict.fromkeys(kind.name for kinds in alike for kind in kinds)),
         what=", or ".join(_words(own) for own in alike.values()),
-        remedy=", or ".join(dict.fromkeys(" and ".join(kind.remedy for kind in kinds) for kinds in alike)),
+        remedy=", or ".join(
+            dict.fromkeys(" and ".join(dict.fromkeys(kind.remedy for kind in kinds)) for kinds in alike)
+        ),
         rms_before=rms(struck.distance[struck.rows]),
         rms_after=rms(best.distance[best.distance <= settings.STRAY * best.median]),
         rows=() if hit.all() else tuple(int(r) for r in campaign.rows[hit]),
