@@ -46,7 +46,7 @@ def test_more_rows_than_an_instrument_spoils_are_unexplained(rv_m2):
     assert known.explanation.outliers.sum() == 15
     left = examine(known).unexplained
     assert left.flagged
-    assert any("15 of 100 rows were set aside (15%)" in reason for reason in left.reasons)
+    assert any("15 of 100 rows were set aside (15 %)" in reason for reason in left.reasons)
     # the rest is noise: it follows nothing, and what is unexplained is in the rows set aside
     assert left.locations == left.depends_on == ()
     assert left.rms == pytest.approx(np.sqrt(0.15) * 40.0 * NOISE, rel=0.1)

@@ -19,8 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign
-from thermal_robot.diagnosis.one_walk import Model, Walk
 from thermal_robot.diagnosis import settings as diagnosis_settings
+from thermal_robot.diagnosis.one_walk import Model, Walk
 from thermal_robot.effects import Effect, gate
 from thermal_robot.effects.fading import Fading
 from thermal_robot.inference import settings

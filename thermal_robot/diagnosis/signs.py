@@ -18,6 +18,7 @@ from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.turned import GRAVITY, turned_round
 from thermal_robot.diagnosis import settings
 from thermal_robot.effects import Effect, Parameter, choose, gate
+from thermal_robot.inference import settings as inference_settings
 from thermal_robot.inference.columns import Block, block, frame_columns
 from thermal_robot.inference.evidence import Combination
 from thermal_robot.inference.explain import Explanation, explain, log_priors, settings_of_one
@@ -26,7 +27,6 @@ from thermal_robot.inference.problem import Linear, contained, gram
 from thermal_robot.inference.refine import heard
 from thermal_robot.inference.robust import Noise
 from thermal_robot.inference.search import Search
-from thermal_robot.inference import settings as inference_settings
 from thermal_robot.kinematics import gravity_torques
 from thermal_robot.observations import observe
 
