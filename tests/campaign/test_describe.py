@@ -87,8 +87,8 @@ def test_every_condition_has_its_unit(tmp_path: Path) -> None:
 def test_ranges_are_those_of_the_file_in_any_unit(tmp_path: Path) -> None:
     campaign = full(tmp_path / "c")
     text = _squeezed(describe(dataclasses.replace(campaign, units=Units("rad", "um"))))
-    assert "slide prismatic 30000 .. 90000 0 .. 500000 um 12%" in text
-    assert "lift revolute -0.785398 .. 0.349066 -2 .. 2 rad 28%" in text
+    assert "slide prismatic 30000 .. 90000 0 .. 500000 um 12 %" in text
+    assert "lift revolute -0.785398 .. 0.349066 -2 .. 2 rad 28 %" in text
 
 
 def test_many_sessions_are_counted(tmp_path: Path) -> None:
