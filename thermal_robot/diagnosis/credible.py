@@ -33,7 +33,7 @@ class Doubt:
     times
         By how much they are in doubt, as a ratio.
     impossible
-        Whether it cannot be, whatever rows held out say.
+        Whether it is told, and nothing more: beyond what is physically possible.
     """
 
     parts: tuple[tuple[str, str], ...]
@@ -49,12 +49,10 @@ def outsized(fit: Fit) -> tuple[Doubt, ...]:
         known = settings.OUTSIDE if effect.size_spread < UNSOURCED else np.inf
         for k in np.flatnonzero((sure > known) | (sure * item.sizes > item.most)):
             own, times = item.parameters[k], float(np.abs(values[k]) / item.sizes[k])
-            impossible = bool(sure[k] * item.sizes[k] > item.most[k])
+            impossible = bool(sure[k] <= known and sure[k] * item.sizes[k] > item.most[k])
             never = "is physically possible" if impossible else "any robot is known to reach"
             words = f"{effect.title}: {own.name} is {times:.0f} times its expected size, more than {never}"
-            # what cannot be stands in for something else as a whole: without a part of it the rest would go on to
-            part = (effect.name, "") if impossible else _part(effect.name, own.kind, own.place)
-            found.append(Doubt((part,), words, times, impossible))
+            found.append(Doubt((_part(effect.name, own.kind, own.place),), words, times, impossible))
     return tuple(sorted(found, key=lambda doubt: (not doubt.impossible, -doubt.times)))
 
 
@@ -72,21 +70,19 @@ def _part(name: str, kind: str, place: str) -> tuple[str, str]:
 
 def _doubts(fit: Fit) -> Iterator[Doubt]:
     large = outsized(fit)
-    yield from (doubt for doubt in large if doubt.impossible)
     for pair in cancelling(fit):
         parts = (_part(name, *site) for name, site in zip(pair.effects, pair.sites, strict=True))
         yield Doubt(tuple(parts), pair.words, pair.times)
-    yield from large
+    yield from (doubt for doubt in large if not doubt.impossible)
 
 
-def credible(fit: Fit, progress: Callable[[str], None], *, all_doubts: bool = True) -> tuple[Fit, dict[str, Refused]]:
+def credible(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, Refused]]:
     """Leave out one of two parts of effects that cancel, and parts of a size that no robot reaches, the worst first.
 
     A part is what an effect does in one joint or link. The explanation is chosen again without each part in doubt, and
     that one is left out without which rows held out are predicted best; none is where they are then predicted clearly
-    worse. A size that is physically impossible must bring more to stay. Where rows are very many, only the worst of the
-    others is weighed; of more still, the whole effect, which takes less time. Without ``all_doubts`` only what cannot
-    be is left out.
+    worse. Where rows are very many, only the worst doubt is weighed; of more still, the whole effect, which takes less
+    time.
 
     Returns
     -------
@@ -99,16 +95,15 @@ def credible(fit: Fit, progress: Callable[[str], None], *, all_doubts: bool = Tr
     refused: dict[str, Refused] = {}
     weighed: set[tuple[tuple[str, str], ...]] = set()
     whole = fit.campaign.samples > settings.RIPPLE_ROWS
-    most = all_doubts * (settings.MOST_DOUBTS if fit.campaign.samples <= settings.ENOUGH_ROWS else 1)
-    while doubt := next((d for d in _doubts(fit) if d.parts not in weighed and (most or d.impossible)), None):
+    most = settings.MOST_DOUBTS if fit.campaign.samples <= settings.ENOUGH_ROWS else 1
+    while doubt := next((d for d in _doubts(fit) if d.parts not in weighed and most), None):
         weighed.add(doubt.parts)
-        most -= not doubt.impossible
+        most -= 1
         progress(doubt.words)
         others = {part: less(fit, part[0], progress, "" if whole else part[1]) for part in doubt.parts}
         left = {part: goes_astray(other) for part, other in others.items()}
         out = min(left, key=lambda part: left[part])
-        dear = settings.IMPOSSIBLE_COST if doubt.impossible else settings.WORSE_ELSEWHERE
-        if left[out] > dear * goes_astray(fit):
+        if left[out] > settings.WORSE_ELSEWHERE * goes_astray(fit):
             continue
         best = {part: other.explanation.best.log_evidence for part, other in others.items()}
         chance = max((float(expit(best[instead] - best[out])) for instead in best if instead != out), default=0.0)

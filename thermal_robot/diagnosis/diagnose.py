@@ -195,8 +195,6 @@ def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
     again = len(stages) > 1 and known.campaign.samples <= settings.ENOUGH_ROWS
     fit, more = credible(stages[-1], progress) if again else (stages[-1], {})
     fit, refused = worth_their_word(fit, progress)
-    fit, beyond = credible(fit, progress, all_doubts=False)
-    refused |= beyond
     fit, chance, refused = beside_steps(fit, random_gap(fit), {**cancelled, **more, **refused}, progress)
     if chance.explains_size:
         return beside_scatter(fit, chance, refused, progress)

@@ -244,8 +244,6 @@ NAMED, LIKELY_PLACE = 5, 0.01
 """Places, and quantities, that are listed of a remainder; and the probability of a place below which it is not."""
 WORSE_ELSEWHERE = 1.05
 """Times the rms in regions held out: an explanation that leaves more goes astray between the poses measured."""
-IMPOSSIBLE_COST = 1.25
-"""The same of an effect beyond what is physically possible: with a third of the rest it is no stand-in, and is told."""
 
 # --- what remains ---
 
