@@ -10,6 +10,7 @@ import numpy as np
 
 from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.marks import copies, marks
+from thermal_robot.campaign.table import told_rows
 from thermal_robot.diagnosis.cancelling import cancelling, cancelling_within
 from thermal_robot.diagnosis.credible import outsized
 from thermal_robot.diagnosis.parts import Refused, Sensitivity
@@ -33,9 +34,12 @@ def usable(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
     notes += contradicted(campaign)
     again, (lost, _) = copies(campaign), marks(campaign)
     if again.any():
-        notes.append(f"{again.sum()} rows repeat another one to the last digit: these copies are left out")
+        rows = told_rows(campaign.rows[again])
+        notes.append(f"{rows} repeat another one to the last digit: these copies are left out")
     if lost.any():
-        notes.append(f"{lost.sum()} rows hold a mark of a missing value in place of a position: they are left out")
+        rows = told_rows(campaign.rows[lost])
+        what = "a mark of a missing value, or a robot that stood still"
+        notes.append(f"{rows} measured one place or figure to the last digit, {what}: they are left out")
     if (again | lost).any():
         campaign = campaign.take(~(again | lost))
     return campaign, tuple(notes)

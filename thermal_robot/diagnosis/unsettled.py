@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.diagnosis import settings
+from thermal_robot.inference import settings as inference_settings
 from thermal_robot.inference.fit import Fit
 
 Array = NDArray[np.float64]
@@ -19,7 +20,7 @@ def unsettled(fit: Fit) -> str:
     """
     kept = ~fit.explanation.outliers
     exact, linear = _left(fit.corrected.gap[kept]), _left(fit.explanation.remainder[kept])
-    if not fit.effects or exact <= settings.UNSETTLED * linear:
+    if not fit.effects or exact <= settings.UNSETTLED * max(linear, inference_settings.ROUNDING):
         return ""
     names = ", ".join(effect.name for effect, _ in fit.effects)
     return (
