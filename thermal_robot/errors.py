@@ -160,8 +160,9 @@ def ours(what: str) -> str:
     """Return what is told of a fault of the program: whose it is, and what helps to mend it."""
     from importlib.metadata import version
 
+    program = f"thermal_robot {version('thermal-robot')}"
     return (
-        f"{what}; this is an error of thermal_robot {version('thermal-robot')}, not of your campaign: please send this line to its "
+        f"{what}; this is an error of {program}, not of your campaign: please send this line to its "
         "authors, with the command, campaign.toml, the table and the URDF, or as few rows of it as bring the line back"
     )
 
