@@ -96,7 +96,7 @@ def credible(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, 
     weighed: set[tuple[tuple[str, str], ...]] = set()
     whole = fit.campaign.samples > settings.RIPPLE_ROWS
     most = settings.MOST_DOUBTS if fit.campaign.samples <= settings.ENOUGH_ROWS else 1
-    while doubt := next((d for d in _doubts(fit) if d.parts not in weighed and most), None):
+    while most and (doubt := next((d for d in _doubts(fit) if d.parts not in weighed), None)):
         weighed.add(doubt.parts)
         most -= 1
         progress(doubt.words)
