@@ -15,7 +15,7 @@ from fuzz.corpus import Files, as_frame, as_parquet
 
 from thermal_robot.campaign.document import tomllib
 
-LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "inch": 0.0254}
+LENGTHS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "inch": 0.0254, "ft": 0.3048, "cm": 0.01}
 OF_LENGTH = ("x", "y", "z", "sim.x", "sim.y", "sim.z", "noise", *(f"{axis}.{k}" for axis in "xyz" for k in range(1, 5)))
 OF_ANGLE = ("approach", "torque", "temperature")  # prefixes of joints' and links' columns that are no angles
 WITH_JOINT = ("velocity", "acceleration", "encoder")
