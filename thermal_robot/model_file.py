@@ -15,8 +15,8 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign, Settings
 from thermal_robot.campaign.names import LABELS, split_name
 from thermal_robot.campaign.settings import GRAVITY, settings_kind
@@ -44,8 +44,6 @@ from thermal_robot.schema import (
     text,
     word,
 )
-
-Array = NDArray[np.float64]
 
 SCHEMA = "thermal-robot/model/"
 VERSION = 2

@@ -13,8 +13,8 @@ from typing import Any
 from weakref import ref
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.errors import CampaignError, require
 from thermal_robot.kinematics import (
@@ -29,8 +29,6 @@ from thermal_robot.kinematics import (
     segment_loads,
 )
 from thermal_robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 HELD_ROWS = 60_000
 """Rows of all observations together that hold frames and sensitivities: 3 kB each. A diagnosis has ten observations of

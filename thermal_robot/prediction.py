@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.settings import STILL
 from thermal_robot.effects import Effect, gate, settings
@@ -16,8 +17,6 @@ from thermal_robot.effects.law import Discovered
 from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.stack import chunks
 from thermal_robot.observations import Observations
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,8 +7,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics.model import SHORTEST_SEGMENT, Chain, build_chain_model, leaf_links
 from thermal_robot.kinematics.numbers import require_numbers
@@ -18,7 +19,6 @@ from thermal_robot.urdf_text import DESCRIPTION, WritesUrdf, urdf_text
 if TYPE_CHECKING:
     from collections.abc import Callable
 
-Array = NDArray[np.float64]
 
 _MOST_SHOWN = 12
 """Names in one message; a humanoid has dozens of fingers."""

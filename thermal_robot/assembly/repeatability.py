@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from thermal_robot.arrays import Array
 from thermal_robot.errors import EstimationError, RobotError
 from thermal_robot.kinematics import frame_jacobians
 from thermal_robot.kinematics.scratch import chunks, result, rows_last
 from thermal_robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 _EXACT = 1e-6
 # Share of the largest variance within which a value must be met when neither rounding nor a sample size loosens it:

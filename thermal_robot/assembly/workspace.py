@@ -9,13 +9,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.assembly.repeatability import tool_covariance
 from thermal_robot.assembly.thermal.elongation import PerSegment, displacement, elongation
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics import chain_frames, frame_jacobians
 from thermal_robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 _CLOSE = 1e-11  # m and rad: a pose is reached
 _STEPS = 60

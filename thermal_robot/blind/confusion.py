@@ -11,11 +11,9 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize
 from scipy.special import expit
 
+from thermal_robot.arrays import Array
 from thermal_robot.blind.coverage import Rate
 from thermal_robot.blind.judged import LAW, Record, at_work, failed, first_named, found, ratio, unexplained
-
-Array = NDArray[np.float64]
-
 
 NOTHING, UNLISTED, UNEXPLAINED, FAILED = "nothing", "unlisted", "unexplained", "failed"
 

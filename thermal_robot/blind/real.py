@@ -42,7 +42,6 @@ from thermal_robot.inference.rows import in_order
 from thermal_robot.observations import Observations, observe
 from thermal_robot.percents import percent
 
-Array = NDArray[np.float64]
 Fault = Literal["nothing", "offset", "scale", "backlash", "slip", "temperature", "hidden", "later"]
 Answers = dict[str, Any]
 

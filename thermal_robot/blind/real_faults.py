@@ -10,14 +10,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.kinematics import Displacement, exp6, tool_poses
 from thermal_robot.observations import Frames, Observations, observe
-
-Array = NDArray[np.float64]
-
 
 _STILL = 1e-4  # rad: a joint that is told to move less does not arrive from any side
 _SHORTEST = 1e-9  # m: a shorter segment has no direction along which it grows

@@ -6,16 +6,14 @@ from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.diagnosis import Diagnosis
 from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.frames import register
 from thermal_robot.observations import Observations, observe
-
-Array = NDArray[np.float64]
 
 MOST = 6
 """Effects of which every subset is fitted: 64 fits."""

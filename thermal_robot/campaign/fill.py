@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import split_name
-
-Array = NDArray[np.float64]
 
 _ZERO = ("approach", "velocity", "acceleration")
 _HELD = ("payload", "speed")

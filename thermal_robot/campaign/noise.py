@@ -3,11 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign.targets import Targets
-
-Array = NDArray[np.float64]
 
 
 def of_all(sigmas: Array, targets: Targets | None) -> tuple[float, float | None]:

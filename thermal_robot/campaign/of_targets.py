@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import names
 from thermal_robot.campaign.recognise import Columns
 from thermal_robot.campaign.settings import Settings
 from thermal_robot.campaign.table import Table
-from thermal_robot.campaign.targets import FEWEST, Array, Posed, posed, telling
+from thermal_robot.campaign.targets import FEWEST, Posed, posed, telling
 from thermal_robot.errors import CampaignError
 
 ASTRAY = 10.0

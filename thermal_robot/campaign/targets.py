@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
+from thermal_robot.arrays import Array
 from thermal_robot.kinematics import rotation_to_quaternion
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 FEWEST = 3

@@ -7,10 +7,10 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import CLOCK
 from thermal_robot.campaign.settings import STILL
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 SLIPS = tuple(2.0 ** (k / 4) for k in range(-28, 9))

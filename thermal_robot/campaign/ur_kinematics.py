@@ -14,14 +14,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign.importers.given import read_yaml
 from thermal_robot.errors import CampaignError
 from thermal_robot.kinematics.rewritten import rewritten
 from thermal_robot.robot import Robot, load_robot
-
-Array = NDArray[np.float64]
 
 LINKS = {
     "shoulder": "shoulder_pan_joint",

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import PER_LINK, split_name
 from thermal_robot.correction.constant import Told, constant
 from thermal_robot.correction.determined import determined
@@ -18,8 +18,6 @@ from thermal_robot.kinematics import Displacement, exp6
 from thermal_robot.kinematics.model import PRISMATIC
 from thermal_robot.kinematics.rewritten import xyz_rpy
 from thermal_robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,8 +10,8 @@ from xml.parsers.expat import ExpatError
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.correction.calibrated import Calibrated, target_link
 from thermal_robot.correction.calibrated_urdf import calibrated_urdf
 from thermal_robot.correction.mujoco_models import Bodies, compiled, digits, known, mjcf_of_urdf
@@ -19,8 +19,6 @@ from thermal_robot.errors import CampaignError
 from thermal_robot.kinematics import quaternion_to_rotation, rotation_to_quaternion
 from thermal_robot.kinematics.markup import Edit, Tag, changed, comment, encoded, indent, tags, with_values
 from thermal_robot.kinematics.model import PRISMATIC
-
-Array = NDArray[np.float64]
 
 _BESIDE, _ASKEW = 0.02, 0.05
 """m and rad by which the axes of the two nominal robots may differ: more than any two models of one robot do, less than

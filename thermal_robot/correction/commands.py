@@ -16,8 +16,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.units import SI
 from thermal_robot.effects import Effect
@@ -27,8 +28,6 @@ from thermal_robot.kinematics import Displacement, inverse_kinematics, nearest_p
 from thermal_robot.observations import Frames, observe
 from thermal_robot.prediction import Spread
 from thermal_robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 MISSED = 1e-7
 """m; a command that brings the target no nearer does not reach the pose: a hundredth of what any tracker sees."""

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import CLOCK, LABELS, PER_LINK, split_name
 from thermal_robot.campaign.settings import ABSOLUTE_ZERO
 from thermal_robot.correction.model import CorrectedModel
@@ -20,8 +21,6 @@ from thermal_robot.errors import CampaignError
 from thermal_robot.kinematics import Displacement
 from thermal_robot.observations import Observations, observe
 from thermal_robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 ROWS = 12
 """Of configurations and conditions: what is the same in so many that were drawn at random is constant."""

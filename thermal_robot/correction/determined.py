@@ -12,8 +12,8 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.correction.constant import Told, constant, rows_of_every_kind
 from thermal_robot.correction.model import CorrectedModel
 from thermal_robot.errors import CampaignError
@@ -21,8 +21,6 @@ from thermal_robot.inference import settings
 from thermal_robot.inference.columns import frame_columns
 from thermal_robot.inference.frames import moved
 from thermal_robot.prediction import moves
-
-Array = NDArray[np.float64]
 
 
 def determined(

@@ -17,8 +17,8 @@ from dataclasses import replace
 from typing import TYPE_CHECKING, Literal, TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Units
 from thermal_robot.correction.calibrated import Calibrated
 from thermal_robot.errors import CampaignError
@@ -28,7 +28,6 @@ from thermal_robot.kinematics.model import PRISMATIC
 if TYPE_CHECKING:
     import pandas as pd
 
-Array = NDArray[np.float64]
 Convention: TypeAlias = Literal["standard", "modified"]
 
 CONVENTIONS = ("standard", "modified")

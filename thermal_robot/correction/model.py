@@ -10,8 +10,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign, Settings, read_samples, read_table, with_commands, with_prediction
 from thermal_robot.campaign.table import Table
 from thermal_robot.campaign.turned import read_alike
@@ -30,8 +31,6 @@ from thermal_robot.robot import Robot
 
 if TYPE_CHECKING:
     import pandas as pd
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False, repr=False)

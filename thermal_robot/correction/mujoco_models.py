@@ -10,13 +10,11 @@ from typing import Any
 from xml.sax.saxutils import quoteattr
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.errors import CampaignError
 from thermal_robot.kinematics.markup import Edit, changed, encoded, tags, with_values
 from thermal_robot.kinematics.mimic import Mimic, mimics
-
-Array = NDArray[np.float64]
 
 _NO_MASS = {"boundmass": 1e-9, "boundinertia": 1e-12, "balanceinertia": True, "fusestatic": False}
 """Of the compiler: links without masses are let be, and links that do not move stay bodies of their own."""

@@ -6,15 +6,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.effects import Effect
 from thermal_robot.effects.dependence import depends_on
 from thermal_robot.errors import CampaignError, EffectError
 from thermal_robot.observations import Observations, observe
-
-Array = NDArray[np.float64]
 
 
 def require_needed(samples: Campaign, needs: Sequence[str], effects: Sequence[Effect], simulated: bool) -> None:

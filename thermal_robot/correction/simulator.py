@@ -7,15 +7,13 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.correction.calibrated import target_link
 from thermal_robot.correction.mujoco_models import Bodies, compiled, known
 from thermal_robot.errors import CampaignError
 from thermal_robot.kinematics import rotation_to_quaternion
-
-Array = NDArray[np.float64]
 
 
 def with_simulator(campaign: Campaign, mjcf: str | Path) -> Campaign:

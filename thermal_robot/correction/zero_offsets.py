@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.correction.constant import Constant, constant, rows_of_every_kind
 from thermal_robot.correction.determined import determined
 from thermal_robot.correction.model import CorrectedModel
@@ -25,7 +26,6 @@ from thermal_robot.robot import Robot
 if TYPE_CHECKING:
     import pandas as pd
 
-Array = NDArray[np.float64]
 
 _ROWS = 100
 """Of poses in which zeros are told from the rest of the geometry: as many as a good campaign has."""

@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from thermal_robot.diagnosis.explained import Arm
 from thermal_robot.kinematics import link_poses
@@ -14,8 +14,6 @@ from thermal_robot.shapes.visuals import hulls
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.parts import Where
     from thermal_robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 def arm(robot: Robot, q: ArrayLike, where: Where) -> Arm:

@@ -7,14 +7,12 @@ from dataclasses import dataclass
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.effects.effect import in_words
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of, orthonormal, without
 from thermal_robot.inference.fit import Fit
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

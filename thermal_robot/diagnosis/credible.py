@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.special import expit
 
+from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.cancelling import cancelling
 from thermal_robot.diagnosis.one_walk import Model, Walk
 from thermal_robot.diagnosis.parts import Refused
 from thermal_robot.diagnosis.schemes import schemes
-from thermal_robot.effects.effect import UNSOURCED, Array, Effect
+from thermal_robot.effects.effect import UNSOURCED, Effect
 from thermal_robot.effects.law import PREFIX
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import Block

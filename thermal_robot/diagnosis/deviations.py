@@ -29,6 +29,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.one_walk import Model
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import orthonormal, without
@@ -37,7 +38,6 @@ from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.problem import Linear, whitened
 from thermal_robot.inference.rows import blocks, each, neighbourhoods
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
 
 

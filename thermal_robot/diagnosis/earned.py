@@ -8,14 +8,13 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.one_walk import Model, Walk
 from thermal_robot.diagnosis.schemes import schemes
 from thermal_robot.effects.law_words import is_event
 from thermal_robot.inference import settings
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.rows import blocks
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

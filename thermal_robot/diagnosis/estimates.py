@@ -6,14 +6,12 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.parts import Estimate
 from thermal_robot.effects import Parameter
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.inside import divided, identified
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

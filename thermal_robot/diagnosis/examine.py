@@ -6,9 +6,9 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc, fdtrc, ndtr, pdtr
 
+from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.parts import Dependence, Location, Unexplained
 from thermal_robot.diagnosis.remainder import Remainder, Repeats, nearest, remainder, repeats
 from thermal_robot.diagnosis.set_aside import alike, too_many
@@ -21,8 +21,6 @@ from thermal_robot.inference.rows import in_a_row, in_order
 from thermal_robot.inference.target import Worth
 from thermal_robot.observations import Observations
 from thermal_robot.percents import percent
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.effects.effect import in_words
 from thermal_robot.shapes.visuals import Hull
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -10,6 +10,7 @@ from math import factorial
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.one_walk import Model, Squares, Walk, share
 from thermal_robot.diagnosis.parts import HeldOut
 from thermal_robot.errors import EstimationError
@@ -19,7 +20,6 @@ from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.problem import Linear
 from thermal_robot.inference.rows import blocks, each
 
-Array = NDArray[np.float64]
 Labels = NDArray[np.int64]
 Share = tuple[float, tuple[float, float]]
 

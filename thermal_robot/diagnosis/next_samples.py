@@ -20,8 +20,8 @@ from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.names import CLOCK
 from thermal_robot.campaign.settings import ABSOLUTE_ZERO
@@ -40,7 +40,6 @@ from thermal_robot.robot import joint_range
 if TYPE_CHECKING:
     import pandas as pd
 
-Array = NDArray[np.float64]
 Effects = tuple[str, ...]
 
 _GIVEN = ("torque", "encoder")  # columns that answer a sample, and cannot be asked for

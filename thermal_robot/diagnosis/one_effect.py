@@ -15,6 +15,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.diagnosis import settings
 from thermal_robot.diagnosis.explained import Explained, Place
 from thermal_robot.diagnosis.where import locate
@@ -29,8 +30,6 @@ from thermal_robot.inference.columns import block
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.settings import FEW_LEVELS, TINY
 from thermal_robot.observations import Observations
-
-Array = NDArray[np.float64]
 
 
 def explained(fit: Fit, effect: str) -> Explained:

@@ -19,6 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import stdtrit
 
+from thermal_robot.arrays import Array
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of, ridge
 from thermal_robot.inference.explain import Explanation
@@ -26,7 +27,6 @@ from thermal_robot.inference.problem import Linear, Whitening
 from thermal_robot.inference.rows import each
 from thermal_robot.inference.stack import chunks
 
-Array = NDArray[np.float64]
 Labels = NDArray[np.int64]
 Rows = NDArray[np.bool_]
 

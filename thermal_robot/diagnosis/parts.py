@@ -9,11 +9,11 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.another_model import AnotherModel as AnotherModel
 from thermal_robot.effects.effect import in_words
 from thermal_robot.effects.law_size import Size
 
-Array = NDArray[np.float64]
 Status = Literal["found", "not_found", "not_testable", "confounded", "contained"]
 
 

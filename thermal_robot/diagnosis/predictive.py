@@ -18,6 +18,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis import settings as diagnosis_settings
 from thermal_robot.diagnosis.one_walk import Model, Walk
@@ -31,8 +32,6 @@ from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.problem import whitened
 from thermal_robot.inference.rows import blocks, each
 from thermal_robot.prediction import Spread, by_parameters, moves, sensitivity
-
-Array = NDArray[np.float64]
 
 
 def uncertainty(fit: Fit, needs: tuple[str, ...], floor: float) -> Spread:

@@ -7,12 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import orthonormal, without
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.target import Target
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

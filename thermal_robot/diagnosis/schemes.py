@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis.one_walk import Model, Walk, deviation
 from thermal_robot.diagnosis.parts import FoldScheme, HeldOut
@@ -23,7 +24,6 @@ from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.problem import Linear
 from thermal_robot.inference.rows import blocks, each, neighbourhoods
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
 
 

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import bdtrc, chdtri, fdtrc, fdtri, gammaln
 
+from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.remainder import Remainder
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference import settings
@@ -13,8 +14,6 @@ from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.robust import distance_limit
 from thermal_robot.observations import Observations
 from thermal_robot.percents import percent
-
-Array = NDArray[np.float64]
 
 
 def too_many(fit: Fit, left: Remainder) -> tuple[float, str]:

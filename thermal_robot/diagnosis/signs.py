@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.turned import GRAVITY, turned_round
 from thermal_robot.diagnosis import settings
@@ -30,7 +31,6 @@ from thermal_robot.inference.search import Search
 from thermal_robot.kinematics import gravity_torques
 from thermal_robot.observations import observe
 
-Array = NDArray[np.float64]
 Sides = tuple[NDArray[np.str_], ...]
 SAID = {
     "torque": "torque.* counts the load, not the motor: it is read with the other sign",

@@ -6,12 +6,10 @@ from collections.abc import Iterable
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.inference import settings
 from thermal_robot.kinematics import rotation_to_rpy
-
-Array = NDArray[np.float64]
 
 if TYPE_CHECKING:
     import pandas as pd

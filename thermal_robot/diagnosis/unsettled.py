@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.diagnosis import settings
 from thermal_robot.inference import settings as inference_settings
 from thermal_robot.inference.fit import Fit
-
-Array = NDArray[np.float64]
 
 
 def unsettled(fit: Fit) -> str:

@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.parts import Location, Unexplained, Where
 from thermal_robot.effects.channel import by_place, column
 from thermal_robot.effects.law import PREFIX
@@ -19,8 +20,6 @@ from thermal_robot.inference.laws import smooth_columns
 from thermal_robot.inference.settings import TINY
 from thermal_robot.observations import Observations
 from thermal_robot.percents import percent
-
-Array = NDArray[np.float64]
 
 _BEYOND = ("base", "tool", "instrument")
 

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thermal_robot.effects.effect import Array, Effect, Parameter
+from thermal_robot.arrays import Array
+from thermal_robot.effects.effect import Effect, Parameter
 from thermal_robot.effects.gate import checked, missing
 from thermal_robot.errors import EffectError
 from thermal_robot.kinematics import Displacement

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from thermal_robot.arrays import Array
 from thermal_robot.effects import inclinometer
-from thermal_robot.effects.effect import UNSOURCED, Array, Driver, Effect, Parameter, at_base
+from thermal_robot.effects.effect import UNSOURCED, Driver, Effect, Parameter, at_base
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations

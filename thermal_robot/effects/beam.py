@@ -5,12 +5,12 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+
+from thermal_robot.arrays import Array
 
 if TYPE_CHECKING:
     from thermal_robot.robot import Robot
 
-Array = NDArray[np.float64]
 
 SHORTEST = 1e-6
 """m; a shorter segment does not bend."""

@@ -7,7 +7,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thermal_robot.effects.effect import Array, Channel, Parameter, Response
+from thermal_robot.arrays import Array
+from thermal_robot.effects.effect import Channel, Parameter, Response
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations

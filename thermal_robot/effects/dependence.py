@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from thermal_robot.arrays import Array
 from thermal_robot.effects import gate
-from thermal_robot.effects.effect import Array, Effect, Parameter
+from thermal_robot.effects.effect import Effect, Parameter
 from thermal_robot.errors import ThermalRobotError
 
 if TYPE_CHECKING:

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from thermal_robot.arrays import Array
 from thermal_robot.effects.arguments import NotNegative, Positive
-from thermal_robot.effects.effect import TWIST, UNSOURCED, Array, Driver, Effect, Parameter, at_base
+from thermal_robot.effects.effect import TWIST, UNSOURCED, Driver, Effect, Parameter, at_base
 from thermal_robot.effects.fading import Fading, ends
 from thermal_robot.effects.quantities import driving
 

@@ -43,12 +43,12 @@ from functools import cached_property
 from typing import TYPE_CHECKING, Any, ClassVar, Literal
 
 import numpy as np
-from numpy.typing import NDArray
+
+from thermal_robot.arrays import Array
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
 
-Array = NDArray[np.float64]
 Channel = Literal["joint", "segment", "base", "tool", "instrument"]
 Driver = tuple[str, str, Array]
 """What drives an effect at a place: name, unit and (N,) values of a quantity."""

@@ -9,7 +9,7 @@ from typing import ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.effects.effect import Array
+from thermal_robot.arrays import Array
 from thermal_robot.effects.random_effect import RandomEffect
 
 

@@ -15,8 +15,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from thermal_robot.arrays import Array
 from thermal_robot.effects import settings
-from thermal_robot.effects.effect import Array, Effect, Parameter, at_base, at_joint, at_tool
+from thermal_robot.effects.effect import Effect, Parameter, at_base, at_joint, at_tool
 from thermal_robot.effects.quantities import unit
 
 if TYPE_CHECKING:

@@ -16,7 +16,8 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from thermal_robot.effects.effect import Array, Channel, Driver, Effect, Parameter, Response
+from thermal_robot.arrays import Array
+from thermal_robot.effects.effect import Channel, Driver, Effect, Parameter, Response
 from thermal_robot.effects.settings import KEPT
 from thermal_robot.errors import EffectError, OwnEffectError
 

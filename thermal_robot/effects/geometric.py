@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from thermal_robot.effects.effect import TWIST, Array, Driver, Effect, Parameter, at_segment
+from thermal_robot.arrays import Array
+from thermal_robot.effects.effect import TWIST, Driver, Effect, Parameter, at_segment
 from thermal_robot.effects.quantities import position_of, unit
 
 if TYPE_CHECKING:

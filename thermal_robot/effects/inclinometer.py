@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thermal_robot.effects.effect import Array, Driver
+from thermal_robot.arrays import Array
+from thermal_robot.effects.effect import Driver
 from thermal_robot.effects.quantities import driving
 
 if TYPE_CHECKING:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from thermal_robot.effects.effect import UNSOURCED, Array, Driver, Effect, Parameter, at_instrument
+from thermal_robot.arrays import Array
+from thermal_robot.effects.effect import UNSOURCED, Driver, Effect, Parameter, at_instrument
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations

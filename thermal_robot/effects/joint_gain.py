@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
-from thermal_robot.effects.effect import Array, Driver, Parameter, at_joint
+from thermal_robot.arrays import Array
+from thermal_robot.effects.effect import Driver, Parameter, at_joint
 from thermal_robot.effects.fading import OfPosition
 from thermal_robot.effects.quantities import position_of
 

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, ClassVar
 
-from thermal_robot.effects.effect import UNSOURCED, Array, Driver, Effect, Parameter, at_joint
+from thermal_robot.arrays import Array
+from thermal_robot.effects.effect import UNSOURCED, Driver, Effect, Parameter, at_joint
 from thermal_robot.effects.quantities import position_of, unit
 
 if TYPE_CHECKING:

@@ -7,8 +7,9 @@ from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, ClassVar
 
+from thermal_robot.arrays import Array
 from thermal_robot.effects.arguments import Count, Positive
-from thermal_robot.effects.effect import Array, Driver, Effect, Parameter
+from thermal_robot.effects.effect import Driver, Effect, Parameter
 from thermal_robot.effects.fading import OfPosition
 from thermal_robot.effects.quantities import position_of
 

@@ -6,9 +6,8 @@ from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from thermal_robot.arrays import Array
 
 _MOST = 500  # points of a history that are kept
 _FOLLOWED = 64  # histories and lags of which it is kept how far a body is behind: all settings ask for each

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import CLOCK
 from thermal_robot.campaign.units import SI
 from thermal_robot.effects import gate, settings
@@ -18,7 +19,6 @@ from thermal_robot.effects.catalogue import restored
 from thermal_robot.effects.effect import (
     TWIST,
     UNSOURCED,
-    Array,
     Driver,
     Effect,
     Parameter,

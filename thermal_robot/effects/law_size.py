@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thermal_robot.effects.effect import Array
+from thermal_robot.arrays import Array
 from thermal_robot.effects.shapes import SHAPES
 
 if TYPE_CHECKING:

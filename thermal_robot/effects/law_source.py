@@ -7,7 +7,7 @@ from pprint import pformat
 from textwrap import fill
 from typing import Any
 
-from thermal_robot.effects.effect import Array
+from thermal_robot.arrays import Array
 
 
 def source(arguments: Mapping[str, Any], what: str, values: Array, name: str) -> str:

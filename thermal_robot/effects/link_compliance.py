@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from thermal_robot.arrays import Array
 from thermal_robot.effects import inclinometer
 from thermal_robot.effects.beam import beams, cross_axes, shafts
-from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, at_segment
+from thermal_robot.effects.effect import Driver, Effect, Parameter, at_segment
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations

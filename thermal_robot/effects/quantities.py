@@ -7,11 +7,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import CLOCK
 from thermal_robot.campaign.turning import strained
 from thermal_robot.campaign.units import SI, unit_of
 from thermal_robot.effects import settings
-from thermal_robot.effects.effect import Array, Driver
+from thermal_robot.effects.effect import Driver
 from thermal_robot.effects.resolution import resolution, varies, without_twins
 
 if TYPE_CHECKING:

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, ClassVar, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.effects.effect import Array, Effect, Parameter
+from thermal_robot.arrays import Array
+from thermal_robot.effects.effect import Effect, Parameter
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations

@@ -6,8 +6,8 @@ from collections.abc import Mapping
 
 import numpy as np
 
+from thermal_robot.arrays import Array
 from thermal_robot.effects import settings
-from thermal_robot.effects.effect import Array
 
 _ROUNDING = 1e-9  # relative: how far sums of floats are off
 

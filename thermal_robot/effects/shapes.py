@@ -36,7 +36,7 @@ from typing import Literal
 
 import numpy as np
 
-from thermal_robot.effects.effect import Array
+from thermal_robot.arrays import Array
 
 _SHORTEST = 1e-6  # of the range: what settles within less is settled at once
 

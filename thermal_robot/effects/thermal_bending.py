@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from thermal_robot.arrays import Array
 from thermal_robot.effects.beam import beams, cross_axes
-from thermal_robot.effects.effect import UNSOURCED, Array, Driver, Effect, Parameter, at_segment
+from thermal_robot.effects.effect import UNSOURCED, Driver, Effect, Parameter, at_segment
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations

@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
+from thermal_robot.arrays import Array
 from thermal_robot.effects.arguments import Celsius, Instants, NotNegative
-from thermal_robot.effects.effect import Array, Driver, Effect, Parameter, Response, at_segment
+from thermal_robot.effects.effect import Driver, Effect, Parameter, Response, at_segment
 from thermal_robot.effects.lagging import History
 from thermal_robot.effects.quantities import began, driving
 

@@ -8,7 +8,8 @@ from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
 
-from thermal_robot.effects.effect import UNSOURCED, Array, Driver, Effect, Parameter, at_joint
+from thermal_robot.arrays import Array
+from thermal_robot.effects.effect import UNSOURCED, Driver, Effect, Parameter, at_joint
 from thermal_robot.effects.quantities import driving, unit
 
 if TYPE_CHECKING:

@@ -9,8 +9,9 @@ from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 
+from thermal_robot.arrays import Array
 from thermal_robot.effects.arguments import Order
-from thermal_robot.effects.effect import SOURCED, Array, Driver, Effect, Parameter
+from thermal_robot.effects.effect import SOURCED, Driver, Effect, Parameter
 from thermal_robot.effects.fading import OfPosition
 from thermal_robot.effects.quantities import position_of
 from thermal_robot.schema import word

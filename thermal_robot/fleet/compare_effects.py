@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.result import Diagnosis
 from thermal_robot.effects import Effect, Parameter, gate
 from thermal_robot.effects.fading import OfPosition
@@ -18,8 +18,6 @@ from thermal_robot.fleet import compare_settings
 from thermal_robot.fleet.compare_model import Known
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.fit import Fit
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,9 +13,9 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from thermal_robot.arrays import Array
 from thermal_robot.fleet import compare_settings
 from thermal_robot.fleet.compare_effects import Candidate
 from thermal_robot.fleet.compare_problem import Part, Problem
@@ -23,8 +23,6 @@ from thermal_robot.fleet.compare_sums import Sums
 from thermal_robot.inference.evidence import Combination
 from thermal_robot.inference.gram import Gram
 from thermal_robot.inference.search import Search
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,8 +16,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import LABELS
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.effects import Effect
@@ -29,7 +29,6 @@ from thermal_robot.observations import Observations, observe
 from thermal_robot.prediction import Spread
 from thermal_robot.robot import Robot
 
-Array = NDArray[np.float64]
 Ranges = Mapping[str, tuple[float, float]]
 
 _SUFFIX = ".json"

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.effects import Effect
 from thermal_robot.effects.law import Discovered
 from thermal_robot.fleet import compare_settings
@@ -21,8 +22,6 @@ from thermal_robot.fleet.compare_sums import Sums
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of
 from thermal_robot.inference.columns import block, frame_columns, moved_by
-
-Array = NDArray[np.float64]
 
 
 def sums_of_model(known: Known, listed: Sequence[Candidate], number: int) -> Sums:

@@ -10,16 +10,14 @@ from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.fleet import compare_settings
 from thermal_robot.fleet.compare_effects import Candidate
 from thermal_robot.fleet.compare_joint import Joint
 from thermal_robot.fleet.compare_sums import Sums
 from thermal_robot.fleet.comparison import Status
 from thermal_robot.inference import settings
-
-Array = NDArray[np.float64]
 
 
 def judged(

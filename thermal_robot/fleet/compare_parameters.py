@@ -15,16 +15,14 @@ from collections.abc import Sequence
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from thermal_robot.arrays import Array
 from thermal_robot.effects import Parameter as Told
 from thermal_robot.fleet import compare_settings
 from thermal_robot.fleet.compare_sums import Sums
 from thermal_robot.fleet.comparison import Parameter
 from thermal_robot.inference import settings
-
-Array = NDArray[np.float64]
 
 
 def parameters(

@@ -13,8 +13,8 @@ from dataclasses import replace
 from itertools import combinations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign.settings import STILL
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.diagnosis.result import Diagnosis
@@ -25,8 +25,6 @@ from thermal_robot.fleet.comparison import Predicted
 from thermal_robot.inference.algebra import equations_of, orthonormal
 from thermal_robot.observations import Observations
 from thermal_robot.prediction import sensitivity
-
-Array = NDArray[np.float64]
 
 
 def predicted(found: Sequence[Diagnosis | Known], names: Sequence[str]) -> tuple[Predicted, ...]:

@@ -13,6 +13,7 @@ from itertools import combinations, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.errors import EstimationError
 from thermal_robot.fleet import compare_settings
 from thermal_robot.fleet.compare_effects import Candidate
@@ -23,7 +24,6 @@ from thermal_robot.inference.explain import log_odds, share_of_places
 from thermal_robot.inference.gains import gains
 from thermal_robot.inference.gram import Gram
 
-Array = NDArray[np.float64]
 Places = Mapping[tuple[str, str], Sequence[int]]
 
 

@@ -15,8 +15,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.deviations import exceeding
 from thermal_robot.diagnosis.result import Diagnosis
 from thermal_robot.fleet import compare_settings
@@ -27,8 +27,6 @@ from thermal_robot.inference.columns import Block, block, frame_columns, moved_b
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.inside import distinct
 from thermal_robot.inference.problem import Linear, whitened
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,7 +18,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermal_robot.effects import choose, gate
 from thermal_robot.fleet import settings
@@ -27,8 +26,6 @@ from thermal_robot.inference.explain import Explanation
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.gram import Gram
 from thermal_robot.inference.problem import Linear, contained, gram
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -19,9 +19,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit, fdtrc, logsumexp, ndtr
 
+from thermal_robot.arrays import Array
 from thermal_robot.fleet import settings
 
-Array = NDArray[np.float64]
 Codes = NDArray[np.int64]
 
 

@@ -13,11 +13,11 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.fleet import settings
 from thermal_robot.fleet.population import Population, combined, population
 from thermal_robot.fleet.table import Overview, Told, told
 
-Array = NDArray[np.float64]
 Codes = NDArray[np.int64]
 
 

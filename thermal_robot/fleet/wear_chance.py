@@ -12,13 +12,11 @@ much less.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import fdtrc
 
+from thermal_robot.arrays import Array
 from thermal_robot.fleet import wear_settings as settings
 from thermal_robot.fleet.wear_moves import Beside, Grid, Move, Series
-
-Array = NDArray[np.float64]
 
 
 def chances(series: Series, grid: Grid, moves: tuple[Move, ...]) -> Array:

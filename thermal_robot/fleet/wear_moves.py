@@ -26,10 +26,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from thermal_robot.arrays import Array
 from thermal_robot.fleet import wear_settings as settings
 from thermal_robot.inference.algebra import equations_of, whitener
-
-Array = NDArray[np.float64]
 
 
 class Move(NamedTuple):

@@ -19,6 +19,7 @@ from typing import ClassVar
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import CLOCK
 from thermal_robot.effects import Effect, Parameter, gate, library
 from thermal_robot.effects.apply import displacement
@@ -33,7 +34,6 @@ from thermal_robot.inference.frames import moved
 from thermal_robot.inference.problem import Linear, Whitening, frame_step, whitened
 from thermal_robot.observations import Frames, Observations, observe
 
-Array = NDArray[np.float64]
 Key = tuple[str, str]
 """Names of an effect and of its parameter."""
 

@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import logsumexp
 
+from thermal_robot.arrays import Array
 from thermal_robot.fleet import wear_settings as settings
 from thermal_robot.fleet.wear_moves import Beside, Grid, Move, Series, log_prior
 
-Array = NDArray[np.float64]
 Moves = tuple[Move, ...]
 
 

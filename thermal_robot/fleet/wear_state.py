@@ -6,12 +6,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.fleet import wear_settings as settings
 from thermal_robot.fleet.wear_moves import Beside, Grid, Move, Series
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

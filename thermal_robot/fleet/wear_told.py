@@ -9,6 +9,7 @@ from datetime import datetime
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.fleet import wear_settings as settings
 from thermal_robot.fleet.wear_chance import chances
 from thermal_robot.fleet.wear_dates import in_words
@@ -18,7 +19,6 @@ from thermal_robot.fleet.wear_result import Crossing, Jump, Rate, Worn
 from thermal_robot.fleet.wear_search import Explanations, Moves
 from thermal_robot.fleet.wear_state import State, fieller
 
-Array = NDArray[np.float64]
 HIDDEN = "unknown frames, or the poses, hide its changes"
 ABSENT = "fewer than two campaigns have the columns that it needs"
 

@@ -6,12 +6,10 @@ Every function scales its columns to unit length first, so that one floor serves
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.linalg import qr
 
+from thermal_robot.arrays import Array
 from thermal_robot.inference import settings
-
-Array = NDArray[np.float64]
 
 
 def equations_of(columns: Array) -> Array:

@@ -11,12 +11,11 @@ from typing import NamedTuple, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.inference import settings
 from thermal_robot.kinematics import align, quaternion_to_rotation, tool_poses
 from thermal_robot.observations import Frames
 from thermal_robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 class Placed(NamedTuple):

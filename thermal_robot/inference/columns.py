@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.effects import Effect, Parameter
 from thermal_robot.effects.channel import column
@@ -15,8 +16,6 @@ from thermal_robot.effects.effect import UNSOURCED
 from thermal_robot.effects.gate import checked
 from thermal_robot.inference import settings
 from thermal_robot.observations import Observations
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 from itertools import islice
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermal_robot.effects import Effect
 from thermal_robot.effects.law import PREFIX, Discovered
@@ -24,8 +23,6 @@ from thermal_robot.inference.scan import Scanned, Seats, scan, shaped
 from thermal_robot.inference.settle import constant
 from thermal_robot.inference.target import Target
 from thermal_robot.inference.thin import Thin
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dpotrf, dpotri, dpotrs, dtrtrs
 from scipy.spatial.distance import cdist
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign.turning import moves as moving
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference import settings
@@ -33,7 +34,6 @@ from thermal_robot.inference.rows import repeated_poses
 from thermal_robot.inference.stack import Stack, chunks
 from thermal_robot.observations import Observations
 
-Array = NDArray[np.float64]
 Numbers = NDArray[np.int64]
 
 

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import CLOCK
 from thermal_robot.effects.law import Discovered
 from thermal_robot.effects.quantities import quantity, unit
@@ -24,7 +25,6 @@ from thermal_robot.inference.rows import in_order
 from thermal_robot.inference.target import Target, explained_by
 from thermal_robot.observations import Observations
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
 Runs = NDArray[np.int64]
 """(C, 2) first row of each run in the order of measurement, and the first behind it."""

@@ -17,14 +17,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
 from thermal_robot.inference.gram import Gram
 from thermal_robot.inference.posterior import UNDETERMINED, Columns, Posterior
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

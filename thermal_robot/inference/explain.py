@@ -10,6 +10,7 @@ from math import comb
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.effects import Effect
 from thermal_robot.inference import settings
 from thermal_robot.inference.discrepancy import Form
@@ -20,7 +21,6 @@ from thermal_robot.inference.problem import Linear, Whitening, discrepancy_mean,
 from thermal_robot.inference.robust import Noise, distance_limit, first_whitening, reweigh
 from thermal_robot.inference.stack import Stack
 
-Array = NDArray[np.float64]
 NOTHING = np.zeros(0)
 
 

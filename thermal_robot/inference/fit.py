@@ -6,8 +6,8 @@ from collections.abc import Callable, Mapping, Sequence, Set
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.settings import STILL
 from thermal_robot.effects import Effect, gate
@@ -20,8 +20,6 @@ from thermal_robot.inference.frames import register
 from thermal_robot.inference.problem import Linear
 from thermal_robot.inference.settle import Settled, settle
 from thermal_robot.observations import Observations, observe
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,9 +7,9 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.inference.algebra import equations_of, ridge
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
@@ -13,8 +14,6 @@ from thermal_robot.inference.alternation import alternate, middle, soft, starts
 from thermal_robot.inference.columns import frame_columns
 from thermal_robot.kinematics import exp6
 from thermal_robot.observations import Frames, observe
-
-Array = NDArray[np.float64]
 
 
 def register(campaign: Campaign, keep: NDArray[np.bool_] | None = None) -> Frames:

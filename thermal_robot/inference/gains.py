@@ -23,11 +23,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import erfcx, log_ndtr
 
+from thermal_robot.arrays import Array
 from thermal_robot.inference import settings
 from thermal_robot.inference.evidence import Combination
 from thermal_robot.inference.gram import Gram
 
-Array = NDArray[np.float64]
 _Sides = tuple[NDArray[np.int64], Array, Array]
 _NO_SIDES: _Sides = np.zeros(0, dtype=int), np.zeros(0), np.zeros(0)
 _LOG_2, _ROOT_2 = np.log(2.0), np.sqrt(2.0)

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.effects import Effect
 from thermal_robot.effects.apply import displacement
@@ -18,8 +18,6 @@ from thermal_robot.inference.explain import Explanation
 from thermal_robot.inference.frames import moved
 from thermal_robot.inference.problem import Linear, whitened
 from thermal_robot.observations import Frames, Observations, observe
-
-Array = NDArray[np.float64]
 
 
 def gauss_newton(

@@ -5,11 +5,9 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.inference.problem import Linear
-
-Array = NDArray[np.float64]
 
 
 def generalised(linear: Linear, covariance: Array, noise: Array) -> Linear:

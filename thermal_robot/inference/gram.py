@@ -9,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from thermal_robot.arrays import Array
 
 
 @dataclass(frozen=True, eq=False)

@@ -8,11 +8,11 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of
 from thermal_robot.inference.stack import Stack, chunks
 
-Array = NDArray[np.float64]
 Labels = NDArray[np.int64]
 
 

@@ -15,13 +15,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.effects import Effect, Parameter, gate
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import Block, moved_by
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.problem import Linear, gram
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,6 +9,7 @@ from itertools import combinations, pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
 from thermal_robot.inference.discrepancy import Form, Smooth, Spectrum, decomposed
@@ -19,7 +20,6 @@ from thermal_robot.inference.problem import Linear, Whitening, contained, normal
 from thermal_robot.inference.search import Search
 from thermal_robot.inference.stack import Stack
 
-Array = NDArray[np.float64]
 Rung = tuple[int, float]
 """Number of the form and τ; (−1, 0) where there is no discrepancy."""
 PLAIN: Rung = (-1, 0.0)

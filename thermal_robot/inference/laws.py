@@ -6,16 +6,14 @@ from collections.abc import Iterable, Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import CLOCK
 from thermal_robot.campaign.turning import SLIPS
 from thermal_robot.effects.law import Discovered
 from thermal_robot.effects.quantities import TURN, began, quantities, unit
 from thermal_robot.inference import settings
 from thermal_robot.observations import Observations
-
-Array = NDArray[np.float64]
 
 __all__ = [
     "CLOCK",

@@ -13,6 +13,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.effects import Effect, gate
 from thermal_robot.errors import EffectError
@@ -30,7 +31,6 @@ from thermal_robot.inference.search import Search
 from thermal_robot.inference.settle import at_exact_model
 from thermal_robot.observations import Frames, Observations, observe
 
-Array = NDArray[np.float64]
 Held = list[tuple[Effect, Array]]
 
 

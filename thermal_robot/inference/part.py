@@ -7,10 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.inference.algebra import equations_of
 from thermal_robot.inference.stack import chunks
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

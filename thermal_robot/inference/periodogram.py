@@ -5,12 +5,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign.settings import STILL
 from thermal_robot.campaign.turning import moves
 from thermal_robot.inference import settings
 from thermal_robot.inference.target import Seat
-
-Array = NDArray[np.float64]
 
 
 def orders(q: Array, slides: bool = False) -> Array:

@@ -18,10 +18,10 @@ from numpy.typing import NDArray
 from scipy.linalg.lapack import dposv, dpotrf, dpotri
 from scipy.special import erfcx, log_ndtr
 
+from thermal_robot.arrays import Array
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 _ROOT_2, _ROOT_2_OVER_PI, _LOG_2 = np.sqrt(2.0), np.sqrt(2.0 / np.pi), np.log(2.0)
 UNDETERMINED = "the measurements do not determine anything: too few, or all alike"

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of, solve, whitener
 from thermal_robot.inference.columns import Block
@@ -18,8 +19,6 @@ from thermal_robot.inference.discrepancy import Smooth
 from thermal_robot.inference.evidence import Combination
 from thermal_robot.inference.gram import Gram
 from thermal_robot.inference.stack import Stack
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

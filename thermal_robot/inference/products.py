@@ -7,13 +7,11 @@ from itertools import pairwise
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.inference.columns import Block
 from thermal_robot.inference.gram import Gram
 from thermal_robot.inference.problem import Linear, Whitening, normal_equations, whitened_columns
-
-Array = NDArray[np.float64]
 
 
 class Products:

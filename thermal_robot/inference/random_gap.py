@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtrc
 
+from thermal_robot.arrays import Array
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of, solve
@@ -19,8 +20,6 @@ from thermal_robot.inference.robust import distance_limit
 from thermal_robot.inference.rows import repeated_poses
 from thermal_robot.inference.scatter import JointScatter, Scatter, enough_rows, joint_errors, variance_components
 from thermal_robot.inference.steps import followed, period, seen, stepped
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.effects import Effect, gate
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import Block, block
@@ -19,8 +19,6 @@ from thermal_robot.inference.products import Products
 from thermal_robot.inference.robust import tail_weight
 from thermal_robot.inference.search import Search
 from thermal_robot.observations import Observations
-
-Array = NDArray[np.float64]
 
 
 def refined(explanation: Explanation, observations: Observations, factor: float) -> list[tuple[Effect, Array]]:

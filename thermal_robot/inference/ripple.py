@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.effects.joint_ripple import JointRipple
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import orthonormal, without
@@ -24,7 +25,6 @@ from thermal_robot.inference.target import Target
 from thermal_robot.inference.thin import Thin
 from thermal_robot.observations import Observations
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
 
 

@@ -8,11 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.inference import settings
 from thermal_robot.inference.problem import Linear, Whitening
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,6 @@ from numpy.typing import NDArray
 from thermal_robot.campaign import Campaign
 from thermal_robot.inference import settings
 
-Array = NDArray[np.float64]
 Labels = NDArray[np.int64]
 
 

@@ -6,8 +6,8 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import CLOCK
 from thermal_robot.effects import Effect
 from thermal_robot.effects.law import Discovered
@@ -21,7 +21,6 @@ from thermal_robot.inference.periodogram import independent, orders, peak
 from thermal_robot.inference.target import Alike, Seat, Target
 from thermal_robot.observations import Observations
 
-Array = NDArray[np.float64]
 Site = tuple[str, str, str]
 """Kind and name of a place, and a quantity."""
 

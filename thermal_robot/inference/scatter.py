@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 from scipy.special import logsumexp
 
+from thermal_robot.arrays import Array
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
 from thermal_robot.inference.explain import share_of_places
 from thermal_robot.inference.scatter_likelihood import Component, Fitted, IndependentRows, Likelihood, independent_rows
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import gammaln, logsumexp
 
+from thermal_robot.arrays import Array
 from thermal_robot.inference import settings
 
-Array = NDArray[np.float64]
 Component = tuple[str, int]  # "visit" or "pose", and the number of a joint
 
 _LOWEST, _HIGHEST = settings.LOG_VARIANCE

@@ -11,15 +11,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
 from thermal_robot.inference.evidence import Combination, evidence
 from thermal_robot.inference.gains import gains
 from thermal_robot.inference.gram import Gram
-
-Array = NDArray[np.float64]
 
 
 @dataclass(eq=False)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.effects import Effect, gate
 from thermal_robot.effects.apply import displacement
 from thermal_robot.inference import settings
@@ -20,8 +21,6 @@ from thermal_robot.inference.problem import Linear, contained
 from thermal_robot.inference.refine import refined
 from thermal_robot.inference.robust import Noise
 from thermal_robot.observations import Observations
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

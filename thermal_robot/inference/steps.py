@@ -10,12 +10,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import expit, log_ndtr, logsumexp
 
+from thermal_robot.arrays import Array
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import without
 from thermal_robot.inference.laws import smooth_columns
 from thermal_robot.inference.target import Target
-
-Array = NDArray[np.float64]
 
 
 def followed(errors: Array, weight: Array, recorded: Mapping[str, Array], pose: NDArray[np.int64] | None = None) -> str:

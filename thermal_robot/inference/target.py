@@ -9,11 +9,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import fdtrc
 
+from thermal_robot.arrays import Array
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of, orthonormal, whitener, without
 from thermal_robot.inference.robust import robust_noise
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

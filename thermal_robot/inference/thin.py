@@ -16,8 +16,6 @@ from thermal_robot.inference.rows import in_a_row
 from thermal_robot.inference.target import Target
 from thermal_robot.observations import Observations
 
-Array = NDArray[np.float64]
-
 
 @dataclass(frozen=True, eq=False)
 class Thin:

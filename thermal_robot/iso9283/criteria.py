@@ -14,9 +14,9 @@ from itertools import combinations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.kinematics import log3
 
-Array = NDArray[np.float64]
 Three = tuple[float, float, float]
 SPREADS = 3.0
 """Standard deviations that the standard adds to the mean distance."""

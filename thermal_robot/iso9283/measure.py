@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-import numpy as np
-from numpy.typing import NDArray
-
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.errors import CampaignError, require
 from thermal_robot.iso9283.criteria import along_path, drift_of, of_noise, repeatability, variation
@@ -16,8 +14,6 @@ from thermal_robot.iso9283.parts import PathCriteria, PoseCriteria
 from thermal_robot.iso9283.performance import Performance
 from thermal_robot.iso9283.seen import Seen
 from thermal_robot.observations import Frames
-
-Array = NDArray[np.float64]
 
 
 def performance(

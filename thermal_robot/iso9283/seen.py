@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.marks import SAME_COMMAND
 from thermal_robot.errors import CampaignError, require
@@ -15,7 +16,6 @@ from thermal_robot.iso9283.criteria import Accuracy, Attained, accuracy
 from thermal_robot.kinematics import quaternion_to_rotation
 from thermal_robot.observations import Frames, observe
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 

@@ -7,10 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.kinematics.model import PRISMATIC, Chain
 from thermal_robot.kinematics.walk import steps
-
-Array = NDArray[np.float64]
 
 FIXED, TURNS, TURNS_ALIGNED, SLIDES = 0, 1, 2, 3
 """What happens behind a placement: nothing, a turn about an axis of the frame, or about any other, a slide."""

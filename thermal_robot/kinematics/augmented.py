@@ -10,6 +10,7 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics.frames import ChainFrames, as_rows, chain_frames
 from thermal_robot.kinematics.model import unit_motion
@@ -17,7 +18,6 @@ from thermal_robot.kinematics.model import unit_motion
 if TYPE_CHECKING:
     from thermal_robot.robot import Robot
 
-Array = NDArray[np.float64]
 
 ELONGATION = "elongation of "
 """What the name of a virtual joint begins with; the name of its segment follows."""

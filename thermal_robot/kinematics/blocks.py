@@ -5,13 +5,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.kinematics.model import REVOLUTE, Chain
 from thermal_robot.kinematics.scratch import scratch
 from thermal_robot.kinematics.walk import steps
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,8 +7,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.compiling import in_pieces, loads, rows_at_once
 from thermal_robot.kinematics import lanes, settings
 from thermal_robot.kinematics.arm import arm_of
@@ -16,8 +16,6 @@ from thermal_robot.kinematics.scratch import rows_last, scratch
 
 if TYPE_CHECKING:
     from thermal_robot.kinematics.displaced import Chained, Weighted
-
-Array = NDArray[np.float64]
 
 
 def installed() -> bool:

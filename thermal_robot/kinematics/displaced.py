@@ -9,11 +9,10 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics.lie import exp6
 from thermal_robot.kinematics.model import Chain
-
-Array = NDArray[np.float64]
 
 
 class Chained(Protocol):

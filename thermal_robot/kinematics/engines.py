@@ -4,15 +4,11 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
+from thermal_robot.arrays import Array
 from thermal_robot.kinematics import compiled, lanes, settings, thin
 
 if TYPE_CHECKING:
     from thermal_robot.kinematics.displaced import Chained, Weighted
-
-Array = NDArray[np.float64]
 
 
 class Engine(Protocol):

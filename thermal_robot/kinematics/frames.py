@@ -6,8 +6,9 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics import lanes
 from thermal_robot.kinematics.blocks import Places
@@ -19,7 +20,6 @@ from thermal_robot.kinematics.walk import walk
 if TYPE_CHECKING:
     from thermal_robot.kinematics.displaced import Chained
 
-Array = NDArray[np.float64]
 
 __all__ = ["ChainFrames", "Displacement", "as_rows", "chain_frames", "tool_poses"]
 

@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics import lanes
 from thermal_robot.kinematics.engines import engine_for
@@ -17,7 +18,6 @@ from thermal_robot.kinematics.scratch import result
 if TYPE_CHECKING:
     from thermal_robot.robot import Robot
 
-Array = NDArray[np.float64]
 _AT_TOOL = (0.0, 0.0, 0.0)
 _NO_PAYLOAD = np.asarray(0.0), np.zeros(3)
 for _constant in _NO_PAYLOAD:

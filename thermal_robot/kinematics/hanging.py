@@ -6,9 +6,8 @@ from collections.abc import Sequence
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from thermal_robot.arrays import Array
 
 _NO_MASS = 1e-12
 """kg; less is what rounding leaves of a body's mass once the links that are fixed to it are taken off."""

@@ -6,12 +6,10 @@ from collections.abc import Mapping
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics.mimic import Mimic
-
-Array = NDArray[np.float64]
 
 
 def held_configuration(model: pin.Model, ends: Mapping[str, Mimic]) -> Array:

@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics.frames import ChainFrames, Displacement, as_rows, chain_frames
 from thermal_robot.kinematics.jacobians import frame_jacobians
@@ -28,7 +29,6 @@ from thermal_robot.kinematics.lie import log3
 if TYPE_CHECKING:
     from thermal_robot.robot import Robot
 
-Array = NDArray[np.float64]
 
 ARM = 0.05
 """m; an error of direction counts as what it does at this distance: so short that the point goes first already."""

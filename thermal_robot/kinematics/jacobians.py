@@ -5,8 +5,9 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics import lanes
 from thermal_robot.kinematics.engines import engine_for
@@ -15,8 +16,6 @@ from thermal_robot.kinematics.scratch import result
 
 if TYPE_CHECKING:
     from thermal_robot.kinematics.displaced import Chained
-
-Array = NDArray[np.float64]
 
 
 def frame_jacobians(

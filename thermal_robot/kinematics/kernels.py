@@ -13,13 +13,11 @@ from __future__ import annotations
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.compiling import compiled
 from thermal_robot.kinematics.arm import SLIDES, TURNS, TURNS_ALIGNED, Arm
 from thermal_robot.kinematics.settings import LANES, LARGEST_REDUCED
-
-Array = NDArray[np.float64]
 
 WIDE = np.uint64(LANES)
 _QUARTERS = 2.0 / math.pi

@@ -7,8 +7,8 @@ from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.kinematics import blocks
 from thermal_robot.kinematics.blocks import Places
 from thermal_robot.kinematics.displaced import NOWHERE, Displaced
@@ -17,8 +17,6 @@ from thermal_robot.kinematics.walk import walk
 
 if TYPE_CHECKING:
     from thermal_robot.kinematics.displaced import Chained, Weighted
-
-Array = NDArray[np.float64]
 
 
 def visit(robot: Chained, q: Array, given: Places | None, do: Callable[[Places, slice], None]) -> None:

@@ -7,9 +7,9 @@ identity and near a half turn. Twists are ordered (linear, angular), quaternions
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
-Array = NDArray[np.float64]
+from thermal_robot.arrays import Array
 
 # (θ − sin θ)/θ³ cancels below half a radian; there its series, whose eighth term is below 1e-17, takes over.
 _CUBIC_SERIES = (1 / 6, -1 / 120, 1 / 5040, -1 / 362880, 1 / 39916800, -1 / 6227020800, 1 / 1307674368000)

@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
+
+from thermal_robot.arrays import Array
 
 if TYPE_CHECKING:
     from thermal_robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 def link_poses(robot: Robot, q: ArrayLike) -> Array:

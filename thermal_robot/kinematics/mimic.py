@@ -12,11 +12,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics.markup import bare, encoded, tags
 from thermal_robot.kinematics.urdf import nearest
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

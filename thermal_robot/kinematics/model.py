@@ -9,13 +9,12 @@ import numpy as np
 import pinocchio as pin
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics.hanging import hanging_masses
 from thermal_robot.kinematics.held import held_configuration
 from thermal_robot.kinematics.mimic import Coupling, common_limits, couple, followed, mimics
 from thermal_robot.kinematics.urdf import nearest, parse_urdf
-
-Array = NDArray[np.float64]
 
 STANDARD_GRAVITY = 9.81
 """m/s²; the value Pinocchio uses."""

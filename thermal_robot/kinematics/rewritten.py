@@ -5,14 +5,10 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 from xml.sax.saxutils import quoteattr
 
-import numpy as np
-from numpy.typing import NDArray
-
+from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics.lie import rotation_to_rpy
 from thermal_robot.kinematics.markup import Edit, Tag, changed, comment, encoded, indent, tags, with_values
-
-Array = NDArray[np.float64]
 
 
 def rewritten(

@@ -7,12 +7,10 @@ import threading
 from collections.abc import Iterator
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics import settings
-
-Array = NDArray[np.float64]
 
 _FRAME = 12 * 8
 """Bytes of one frame of one configuration."""

@@ -8,8 +8,8 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 import pinocchio as pin
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.kinematics import settings
 from thermal_robot.kinematics.model import FIXED, REVOLUTE, Chain
 from thermal_robot.kinematics.walk import steps
@@ -17,7 +17,6 @@ from thermal_robot.kinematics.walk import steps
 if TYPE_CHECKING:
     from thermal_robot.kinematics.displaced import Chained, Weighted
 
-Array = NDArray[np.float64]
 
 _ALONG = {
     (True, 0): pin.JointModelRX,

@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
-Array = NDArray[np.float64]
+from thermal_robot.arrays import Array
 
 
 def sines_and_cosines(angles: Array, sines: Array, cosines: Array) -> None:

@@ -11,14 +11,12 @@ from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.kinematics.displaced import Displaced
 from thermal_robot.kinematics.model import FIXED, PRISMATIC, Chain
 from thermal_robot.kinematics.scratch import scratch
 from thermal_robot.kinematics.turns import sines_and_cosines
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

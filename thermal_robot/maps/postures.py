@@ -12,11 +12,11 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.kinematics import chain_frames, frame_jacobians
 from thermal_robot.maps import settings
 from thermal_robot.robot import Robot
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.intp]
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.assembly.thermal.elongation import elongation
 from thermal_robot.assembly.workspace import assembly_map
 from thermal_robot.errors import RobotError
@@ -16,7 +17,6 @@ from thermal_robot.maps import settings
 from thermal_robot.maps.postures import Task, all_postures
 from thermal_robot.maps.question import Joints, Spec, within
 
-Array = NDArray[np.float64]
 Columns = dict[str, NDArray[Any]]
 
 UNITS = {

@@ -11,11 +11,11 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
 from thermal_robot.maps import settings
 from thermal_robot.robot import ENDS, Robot
 
-Array = NDArray[np.float64]
 Span = tuple[float, float, int]
 """First and last value of an axis, and how many."""
 

@@ -7,12 +7,12 @@ from functools import lru_cache
 from xml.etree import ElementTree
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
 from thermal_robot.robot import Robot, load_robot
 
-Array = NDArray[np.float64]
 Three = tuple[float, float, float]
 Four = tuple[float, float, float, float]
 Five = tuple[float, float, float, float, float]

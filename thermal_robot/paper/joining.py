@@ -8,14 +8,14 @@ from itertools import product
 from typing import Literal
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from thermal_robot.arrays import Array
 from thermal_robot.assembly.probability import UniformSpread, capability, failing_probability, required_clearance
 from thermal_robot.paper import printed
 from thermal_robot.paper.entry import ERRATUM, NOT_REPRODUCIBLE, Entry, floats, judge, numbers, rounds_to
 from thermal_robot.paper.inputs import PaperInputs
 
-Array = NDArray[np.float64]
 Model = Literal["covariance", "uniform", "mean shift"]
 
 _HALF = 0.5e-6

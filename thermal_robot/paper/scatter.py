@@ -5,9 +5,9 @@ from __future__ import annotations
 from functools import lru_cache
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import ndtr, ndtri
 
+from thermal_robot.arrays import Array
 from thermal_robot.assembly.repeatability import joint_sigmas, tool_covariance
 from thermal_robot.paper import printed
 from thermal_robot.paper.entry import (
@@ -21,8 +21,6 @@ from thermal_robot.paper.entry import (
     numbers,
 )
 from thermal_robot.paper.inputs import PaperInputs, joints, rv_m2_with_hand
-
-Array = NDArray[np.float64]
 
 _ROUNDING = 0.5e-6
 # m, half of the last digit of Table 1.

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.assembly.probability import required_clearance
 from thermal_robot.assembly.repeatability import tool_covariance
 from thermal_robot.assembly.thermal import displacement, mean_shift_test
@@ -14,8 +14,6 @@ from thermal_robot.paper.entry import AGREES, ERRATUM, NEGLECTED, Entry, floats,
 from thermal_robot.paper.inputs import PaperInputs, joints, rv_m2_with_hand
 from thermal_robot.paper.joining import capability_at
 from thermal_robot.paper.warming import critical, median_error, random_systems
-
-Array = NDArray[np.float64]
 
 
 def q3_of_row_1(inputs: PaperInputs) -> Entry:

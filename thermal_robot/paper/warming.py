@@ -5,10 +5,10 @@ from __future__ import annotations
 from functools import lru_cache, partial
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import linprog
 from scipy.special import ndtri
 
+from thermal_robot.arrays import Array
 from thermal_robot.assembly.probability.tolerance import polygon_in_plane
 from thermal_robot.assembly.thermal import (
     displacement,
@@ -32,8 +32,6 @@ from thermal_robot.paper.entry import (
     numbers,
 )
 from thermal_robot.paper.inputs import PaperInputs, joints, rv_m2_with_hand
-
-Array = NDArray[np.float64]
 
 _DIGIT = 1e-6
 # m, the last printed digit of Δl and of Table 2.

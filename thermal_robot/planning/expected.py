@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.diagnosis import settings as design
 from thermal_robot.effects import Effect, Parameter
 from thermal_robot.inference import settings
@@ -22,7 +23,6 @@ from thermal_robot.inference.columns import Block, block, frame_columns
 from thermal_robot.inference.problem import Linear, Whitening, whitened
 from thermal_robot.observations import Observations
 
-Array = NDArray[np.float64]
 FRAMES = "unknown frames"
 
 

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign, Units
 from thermal_robot.diagnosis.optimal_design import most_informative
 from thermal_robot.effects import Effect, choose, gate
@@ -25,8 +26,6 @@ from thermal_robot.planning.expected import Columns, Expected, expectations
 from thermal_robot.robot import Robot, joint_range
 from thermal_robot.simulation import schedule
 from thermal_robot.simulation.settings import RISE
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,7 +17,6 @@ from thermal_robot.files import whole
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
 
-Array = NDArray[np.float64]
 
 # Okabe and Ito's colours where they differ in brightness, too: orange is light and blue dark on a grey print.
 INK, MUTED, FAINT, PAPER = "#22282e", "#6b7681", "#dde2e7", "#fffffe"

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.report import units
 from thermal_robot.report.drawing import thinned
 from thermal_robot.report.plots_map import exaggeration, mapped
@@ -18,7 +19,6 @@ if TYPE_CHECKING:
     from thermal_robot.diagnosis.explained import Arm
     from thermal_robot.diagnosis.result import Diagnosis
 
-Array = NDArray[np.float64]
 
 _ROWS = 150  # of a long campaign that are drawn: their postures are most of what the drawing weighs
 _WORTH = 0.005  # share of the gap from which on a place is named in the drawing

@@ -7,8 +7,8 @@ from html import escape
 from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.report import units
 from thermal_robot.report.html_parts import row, table, wide
 from thermal_robot.report.words import STATUS, by_status, in_joints, law, needs, parameters, places, rivals, told_as
@@ -17,7 +17,6 @@ if TYPE_CHECKING:
     from thermal_robot.diagnosis.parts import Finding
     from thermal_robot.diagnosis.result import Diagnosis
 
-Array = NDArray[np.float64]
 
 _MOST_OUTLIERS = 40
 _MOST_ROWS = 0.95  # share of the rows below which a quantile tells their distance, as metrology asks for it

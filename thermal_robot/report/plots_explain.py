@@ -7,21 +7,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 from matplotlib.ticker import FixedLocator, MaxNLocator
 
+from thermal_robot.arrays import Array
 from thermal_robot.report import units
-from thermal_robot.report.drawing import (
-    AFTER,
-    BEFORE,
-    INK,
-    MUTED,
-    NORMAL,
-    PAPER,
-    SMALL,
-    Array,
-    Drawing,
-    plain,
-    thinned,
-    tidy,
-)
+from thermal_robot.report.drawing import AFTER, BEFORE, INK, MUTED, NORMAL, PAPER, SMALL, Drawing, plain, thinned, tidy
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

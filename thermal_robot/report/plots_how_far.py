@@ -6,21 +6,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from thermal_robot.arrays import Array
 from thermal_robot.report import units
-from thermal_robot.report.drawing import (
-    AFTER,
-    BEFORE,
-    INK,
-    PAPER,
-    SMALL,
-    THIRD,
-    Array,
-    Drawing,
-    log_axis,
-    note,
-    tidy,
-    title,
-)
+from thermal_robot.report.drawing import AFTER, BEFORE, INK, PAPER, SMALL, THIRD, Drawing, log_axis, note, tidy, title
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -9,19 +9,9 @@ import numpy as np
 from matplotlib.transforms import ScaledTranslation, blended_transform_factory
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.report import units
-from thermal_robot.report.drawing import (
-    AFTER,
-    BEFORE,
-    INK,
-    SMALL,
-    Array,
-    Drawing,
-    note,
-    thinned,
-    tidy,
-    title,
-)
+from thermal_robot.report.drawing import AFTER, BEFORE, INK, SMALL, Drawing, note, thinned, tidy, title
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.report import units
 from thermal_robot.report.drawing import (
     AFTER,
@@ -16,7 +17,6 @@ from thermal_robot.report.drawing import (
     MUTED,
     RASTER_ABOVE,
     SMALL,
-    Array,
     Drawing,
     plain,
     thinned,

@@ -16,11 +16,9 @@ from urllib.parse import unquote
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
 from thermal_robot.robot import Robot
-
-Array = NDArray[np.float64]
-
 
 PACKAGE, FILE = "package://", "file://"
 SEARCHED = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")

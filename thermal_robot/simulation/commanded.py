@@ -9,6 +9,7 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.campaign import names as columns
 from thermal_robot.campaign.checked import checked_mapping
@@ -22,9 +23,6 @@ from thermal_robot.observations import Observations
 from thermal_robot.robot import Robot, joint_range
 from thermal_robot.schema import LARGEST, MisfitError, fitted, matrix, number, shown, whole
 from thermal_robot.simulation import schedule, settings
-
-Array = NDArray[np.float64]
-
 
 CALL = "simulate()"
 """What messages call the file that there is none of."""

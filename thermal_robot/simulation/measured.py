@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.plausible import doubts
 from thermal_robot.effects import Effect, RandomEffect
@@ -19,9 +19,6 @@ from thermal_robot.kinematics import exp3, rotation_to_quaternion
 from thermal_robot.observations import Frames, observe
 from thermal_robot.schema import boolean, fitted, number, optional, shown, word
 from thermal_robot.simulation.commanded import CALL
-
-Array = NDArray[np.float64]
-
 
 _MEASURES = ("position", "pose")
 

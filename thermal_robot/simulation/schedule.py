@@ -7,10 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign.turning import arrivals
 from thermal_robot.simulation import settings
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 

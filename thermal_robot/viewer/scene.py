@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis import Diagnosis
 from thermal_robot.errors import CampaignError
@@ -35,8 +36,6 @@ from thermal_robot.viewer.settings import (
     Colour,
     linear,
 )
-
-Array = NDArray[np.float64]
 
 
 class Cloud:

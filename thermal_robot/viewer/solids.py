@@ -11,15 +11,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.errors import Note
 from thermal_robot.kinematics import rotation_to_quaternion
 from thermal_robot.shapes.visuals import parsed, placement, visuals
 from thermal_robot.viewer import panel
 from thermal_robot.viewer.scene import Scene, turned_along
 from thermal_robot.viewer.settings import KNOT, NO_SHARE, POINTER, RING, RING_TUBE, STICK, Colour, colours
-
-Array = NDArray[np.float64]
-
 
 _SHORTEST = 1e-6
 """m: what is shorter has no direction."""

@@ -9,8 +9,8 @@ from contextlib import redirect_stdout
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.kinematics import rotation_to_quaternion
 from thermal_robot.viewer import panel
 from thermal_robot.viewer.scene import Cloud, Scene, readable, turned_along
@@ -29,8 +29,6 @@ from thermal_robot.viewer.settings import (
     Colour,
 )
 from thermal_robot.viewer.solids import Puppet, Solid
-
-Array = NDArray[np.float64]
 
 BACK, ON, WORST = "previous", "next", "largest gap"
 

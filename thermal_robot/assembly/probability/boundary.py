@@ -20,10 +20,9 @@ roots in ``exp(it)``) change the sum by a known amount, which is taken out. With
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import ndtr
 
-Array = npt.NDArray[np.float64]
+from thermal_robot.arrays import Array
 
 NODES = np.array([32, 48, 64, 96, 128, 192, 256, 384, 512, 768, 1024])
 """Numbers of angles that are used; multiples of four."""

@@ -10,12 +10,12 @@ import numpy.typing as npt
 from scipy.optimize import brentq
 from scipy.special import log_ndtr, ndtri, ndtri_exp
 
+from thermal_robot.arrays import Array
 from thermal_robot.assembly.probability.clearances import disc_clearances
 from thermal_robot.assembly.probability.joining import Shape, failing_probability
 from thermal_robot.assembly.probability.law import Law, Randomised, Thermal, check_covariance
 from thermal_robot.assembly.probability.spread import UniformSpread
 
-Array = npt.NDArray[np.float64]
 Convention = Literal["two_sided", "one_sided"]
 
 _SMALLEST = 700.0  # factors of e below the size of the errors at which a clearance is taken for zero

@@ -15,7 +15,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import ndtr
 
-Array = npt.NDArray[np.float64]
+from thermal_robot.arrays import Array
 
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(64)
 _ROOT_2PI = np.sqrt(2.0 * np.pi)

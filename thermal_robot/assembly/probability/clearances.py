@@ -12,13 +12,11 @@ way, hence ``R <= |mean| + |segment| + s1 sqrt(-2 log(1 - P))``, where the searc
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from scipy.special import ndtri_exp
 
+from thermal_robot.arrays import Array
 from thermal_robot.assembly.probability.discs import TOLD, disc_chances
 from thermal_robot.assembly.probability.principal import Principal
-
-Array = npt.NDArray[np.float64]
 
 _STEPS = 80  # halvings alone would take fifty
 _CLOSE = 1e-14  # relative: less than the rounding of the failing probability moves it

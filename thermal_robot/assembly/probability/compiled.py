@@ -8,10 +8,9 @@ from functools import cache
 import numpy as np
 import numpy.typing as npt
 
+from thermal_robot.arrays import Array
 from thermal_robot.assembly.probability.boundary import NODES
 from thermal_robot.compiling import in_pieces, loads
-
-Array = npt.NDArray[np.float64]
 
 MANY = 20_000
 """Cases from which it is worth while: the first call loads numba, which takes a second, and compiles."""

@@ -13,11 +13,11 @@ from functools import partial
 import numpy as np
 import numpy.typing as npt
 
+from thermal_robot.arrays import Array
 from thermal_robot.assembly.probability.boundary import NODES, angles_needed, disc_by_edge, segment_by_edge
 from thermal_robot.assembly.probability.chords import chords_resolve, disc_by_chords
 from thermal_robot.assembly.probability.principal import Principal
 
-Array = npt.NDArray[np.float64]
 Found = tuple[Array, Array, Array]
 
 _CELLS = 1 << 17  # numbers of an array that stays in cache, eight bytes each

@@ -22,10 +22,9 @@ import numpy.typing as npt
 from scipy import stats
 from scipy.special import comb, ndtri
 
+from thermal_robot.arrays import Array
 from thermal_robot.assembly.probability.flat_normal_fit import fit_maximum_likelihood, fit_moments
 from thermal_robot.assembly.probability.kernels import density, log_density, log_tail, tail
-
-Array = npt.NDArray[np.float64]
 
 _ROOT_3 = np.sqrt(3.0)
 

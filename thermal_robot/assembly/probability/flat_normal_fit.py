@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import numpy as np
-import numpy.typing as npt
 from scipy.optimize import minimize
 
+from thermal_robot.arrays import Array
 from thermal_robot.assembly.probability.kernels import log_density
 from thermal_robot.errors import EstimationError
 
-Array = npt.NDArray[np.float64]
 Estimate = tuple[float, float, float]
 Held = tuple[float | None, float | None, float | None]
 

@@ -8,12 +8,11 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import logsumexp
 
+from thermal_robot.arrays import Array
 from thermal_robot.assembly.probability.joining import joining_probability
 from thermal_robot.assembly.probability.kernels import log_density
 from thermal_robot.assembly.probability.links import link_nodes
 from thermal_robot.assembly.probability.spread import Parallelotope, UniformSpread
-
-Array = npt.NDArray[np.float64]
 
 _LOG_2PI = np.log(2.0 * np.pi)
 _CHUNK = 2_000_000  # numbers held at once

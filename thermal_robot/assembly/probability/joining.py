@@ -7,6 +7,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from thermal_robot.arrays import Array
 from thermal_robot.assembly.probability.compiled import circle_chances
 from thermal_robot.assembly.probability.law import Law, Randomised, Thermal
 from thermal_robot.assembly.probability.links import generator_lengths, planar_link_nodes
@@ -14,7 +15,6 @@ from thermal_robot.assembly.probability.planar import planar_probability
 from thermal_robot.assembly.probability.quadrature import integrate_panels
 from thermal_robot.assembly.probability.spread import Parallelotope
 
-Array = npt.NDArray[np.float64]
 Shape = Literal["circle", "rectangle"]
 
 # Beyond this many standard deviations the normal part is zero in double precision; stands for an infinite clearance.

@@ -18,7 +18,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.special import erfcx, log_ndtr, ndtr
 
-Array = npt.NDArray[np.float64]
+from thermal_robot.arrays import Array
 
 NODES, WEIGHTS = np.polynomial.legendre.leggauss(16)
 _HALF_WEIGHTS = WEIGHTS / 2.0

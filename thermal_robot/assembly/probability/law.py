@@ -8,9 +8,9 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
+from thermal_robot.arrays import Array
 from thermal_robot.assembly.probability.spread import UniformSpread
 
-Array = npt.NDArray[np.float64]
 Randomised = Literal["uniform", "normal"]
 Thermal = UniformSpread | npt.ArrayLike | None
 

@@ -5,9 +5,8 @@ from __future__ import annotations
 from itertools import product
 
 import numpy as np
-import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from thermal_robot.arrays import Array
 
 _LARGEST, _LARGEST_GRID = 400_000, 10_000  # nodes
 # Standard deviations of the normal part within which the sums are exact to rounding: all of double precision for one

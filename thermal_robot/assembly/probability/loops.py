@@ -13,11 +13,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
+from thermal_robot.arrays import Array
 from thermal_robot.assembly.probability.boundary import BESIDES, FRACTION, NEAR, PER_DEVIATION, SERIES
 from thermal_robot.assembly.probability.discs import MOST
 from thermal_robot.compiling import compiled
-
-Array = npt.NDArray[np.float64]
 
 _LOG2E, _LN2 = 1.4426950408889634, (6.93147180369123816490e-01, 1.90821492927058770002e-10)
 """log₂ e, and ln 2 in two parts: the product of the first with a whole number below 2¹⁰ is exact (fdlibm, e_exp.c)."""

@@ -12,8 +12,6 @@ from scipy.special import ndtri
 from thermal_robot.assembly.probability.flat_normal import flat_normal
 from thermal_robot.errors import EstimationError
 
-Array = npt.NDArray[np.float64]
-
 _SMALLEST, _LARGEST = 12, 5000  # Royston's approximation has this form from 12 on, and was made for n <= 5000
 _SEED = 20180622
 

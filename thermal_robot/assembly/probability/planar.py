@@ -14,13 +14,12 @@ from dataclasses import dataclass, fields
 import numpy as np
 import numpy.typing as npt
 
+from thermal_robot.arrays import Array
 from thermal_robot.assembly.probability.discs import disc_chances
 from thermal_robot.assembly.probability.kernels import inside_probability, outside_probability
 from thermal_robot.assembly.probability.principal import Principal
 from thermal_robot.assembly.probability.quadrature import integrate_panels
 from thermal_robot.assembly.probability.regions import Disc, Rectangle, Region
-
-Array = npt.NDArray[np.float64]
 
 _GRADING = 4.0  # neighbouring panels at a critical point differ by this factor; adaptation halves what needs it
 _MILD = 0.02  # shortest scale over the region's width from which even panels resolve everything

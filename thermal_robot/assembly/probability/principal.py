@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from thermal_robot.arrays import Array
 
 
 def _difference_of_products(a: Array, b: Array, c: Array, d: Array) -> Array:

@@ -7,9 +7,9 @@ from collections.abc import Callable
 import numpy as np
 import numpy.typing as npt
 
+from thermal_robot.arrays import Array
 from thermal_robot.assembly.probability.kernels import NODES, WEIGHTS
 
-Array = npt.NDArray[np.float64]
 Owners = npt.NDArray[np.intp]
 Integrand = Callable[[Owners, Array], Array]
 

@@ -9,7 +9,7 @@ from typing import Literal
 import numpy as np
 import numpy.typing as npt
 
-Array = npt.NDArray[np.float64]
+from thermal_robot.arrays import Array
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,8 @@ from itertools import combinations
 import numpy as np
 import numpy.typing as npt
 
+from thermal_robot.arrays import Array
 from thermal_robot.assembly.probability.spread import generator_bounds
-
-Array = npt.NDArray[np.float64]
 
 # Two generators whose directions differ by less than this are one direction; rounding of sines and cosines is a tenth
 # of it.

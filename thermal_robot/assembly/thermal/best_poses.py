@@ -9,13 +9,11 @@ from typing import Any, Literal, TypeAlias
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.assembly.thermal.elongation import segment_names
 from thermal_robot.errors import EstimationError
 from thermal_robot.kinematics import elongation_jacobian
 from thermal_robot.robot import Robot
-
-Array = NDArray[np.float64]
-
 
 Axes: TypeAlias = "str | Sequence[str]"
 """Letters among x, y and z that are measured at every pose, or a word of them for each pose."""

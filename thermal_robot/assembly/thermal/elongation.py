@@ -6,13 +6,12 @@ from collections.abc import Iterable, Mapping
 from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics import Displacement, elongation_jacobian, growing, tool_poses
 from thermal_robot.robot import Robot, Segment
-
-Array = NDArray[np.float64]
 
 
 def displacement(robot: Robot, q: ArrayLike, elongations: PerSegment, *, exact: bool = False) -> Array:

@@ -7,13 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.assembly.thermal.best_poses import Axes, axes_of, measured, rank_of, visible
 from thermal_robot.assembly.thermal.elongation import segment_names
 from thermal_robot.errors import EstimationError
 from thermal_robot.kinematics import elongation_jacobian
 from thermal_robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.errors import EstimationError
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,8 +6,9 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
+from thermal_robot.arrays import Array
 from thermal_robot.assembly.thermal.elongation import (
     STANDARD_TEMPERATURE,
     PerSegment,
@@ -17,8 +18,6 @@ from thermal_robot.assembly.thermal.elongation import (
 )
 from thermal_robot.errors import RobotError
 from thermal_robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

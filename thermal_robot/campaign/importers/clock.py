@@ -11,7 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from thermal_robot.campaign.importers.standstill import Array, Stream
+from thermal_robot.arrays import Array
+from thermal_robot.campaign.importers.standstill import Stream
 from thermal_robot.errors import CampaignError
 from thermal_robot.kinematics import align, exp3, tool_poses
 from thermal_robot.robot import Robot

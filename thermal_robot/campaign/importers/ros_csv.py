@@ -17,9 +17,10 @@ from pathlib import Path
 
 import numpy as np
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import names
 from thermal_robot.campaign.headings import joint_columns
-from thermal_robot.campaign.importers.standstill import Array, Stream, stream
+from thermal_robot.campaign.importers.standstill import Stream, stream
 from thermal_robot.campaign.names import listed
 from thermal_robot.campaign.table import Table
 from thermal_robot.campaign.tabular import Layout, read_table

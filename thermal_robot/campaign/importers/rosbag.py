@@ -11,13 +11,14 @@ from pathlib import Path
 
 import numpy as np
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import names
 from thermal_robot.campaign.importers.clock import lag
 from thermal_robot.campaign.importers.mapped import Format, Source
 from thermal_robot.campaign.importers.plan import Plan, planned
 from thermal_robot.campaign.importers.ros_bag import ENDINGS, read_bag
 from thermal_robot.campaign.importers.ros_csv import read_streams
-from thermal_robot.campaign.importers.standstill import Array, Pairs, Stream, paired
+from thermal_robot.campaign.importers.standstill import Pairs, Stream, paired
 from thermal_robot.campaign.table import Cells, Table
 from thermal_robot.campaign.units import Units
 from thermal_robot.errors import CampaignError

@@ -8,9 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.errors import CampaignError
-
-Array = NDArray[np.float64]
 
 WINDOW = 0.2
 """s over which the velocity of a joint is taken: it averages the steps of an encoder, 1e-5 rad of which are then

@@ -18,8 +18,6 @@ from thermal_robot.diagnosis.data_faults.recalibrated import Recalibrated, arm_l
 from thermal_robot.diagnosis.parts import Misfit
 from thermal_robot.robot import Robot
 
-Array = NDArray[np.float64]
-
 
 def another_robot(campaign: Campaign, progress: Callable[[str], None] = lambda _: None) -> Misfit | None:
     """Tell whether it takes another robot, or another motion, to bring commands and measurements together.

@@ -6,7 +6,6 @@ from collections.abc import Callable, Sequence
 from operator import attrgetter
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis.data_faults import of_joints, of_measurements, of_pairing, settings
@@ -15,8 +14,6 @@ from thermal_robot.diagnosis.data_faults.readings import Readings, rms
 from thermal_robot.diagnosis.data_faults.screen import Screen
 from thermal_robot.diagnosis.data_faults.struck import Struck, Tried, consensus, misfit, mixture, part_of
 from thermal_robot.diagnosis.parts import DataFault
-
-Array = NDArray[np.float64]
 
 KINDS: tuple[Kind, ...] = (*of_joints.KINDS, *of_measurements.KINDS, *of_pairing.KINDS)
 

@@ -9,6 +9,7 @@ from itertools import combinations, permutations
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.data_faults.kind import Kind, Repair
 from thermal_robot.diagnosis.data_faults.readings import Readings, Rows
 from thermal_robot.diagnosis.data_faults.settings import (
@@ -18,8 +19,6 @@ from thermal_robot.diagnosis.data_faults.settings import (
     MOST_PATTERNS,
     TURN,
 )
-
-Array = NDArray[np.float64]
 
 
 def _changed(joints: list[int], change: Callable[[Array], Array]) -> Repair:

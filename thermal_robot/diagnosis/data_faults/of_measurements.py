@@ -7,15 +7,13 @@ from dataclasses import replace
 from itertools import combinations, permutations
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign.units import LENGTH_UNITS
 from thermal_robot.diagnosis.data_faults.kind import Kind, Repair
 from thermal_robot.diagnosis.data_faults.readings import Readings, Rows
 from thermal_robot.diagnosis.data_faults.settings import ALIKE, FEET, INCHES, LARGEST_VOLUME, METRIC
-
-Array = NDArray[np.float64]
 
 
 def _at_places(change: Callable[[Array], Array]) -> Repair:

@@ -12,11 +12,11 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.data_faults import settings
 from thermal_robot.diagnosis.data_faults.kind import Kind, Repair
 from thermal_robot.diagnosis.data_faults.readings import Readings, Rows
 
-Array = NDArray[np.float64]
 _JOINTS, _MEASURED = ("q", "simulated_position"), ("position",)
 
 

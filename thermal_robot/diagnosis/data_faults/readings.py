@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis.data_faults.settings import COARSE_ROUNDS, FEWEST_RELAXED, LEAST_GAP, RIDGE, STRAY
 from thermal_robot.inference import settings
@@ -18,7 +19,6 @@ from thermal_robot.kinematics import log3, quaternion_to_rotation, tool_poses
 from thermal_robot.observations import Frames
 from thermal_robot.robot import Robot
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.bool_]
 COLUMNS = ("q", "position", "orientation", "simulated_position")
 """Those that have a row a measurement and may be repaired."""

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import block_diag
 
+from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.data_faults import settings
 from thermal_robot.diagnosis.data_faults.readings import Readings
 from thermal_robot.inference import settings as inference
@@ -24,8 +25,6 @@ from thermal_robot.kinematics import (
 from thermal_robot.kinematics.lie import exp3, skew
 from thermal_robot.kinematics.model import PRISMATIC
 from thermal_robot.robot import Robot
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,16 +12,15 @@ from functools import cached_property
 from operator import attrgetter
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
+from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.data_faults import of_joints, of_measurements, of_pairing, settings
 from thermal_robot.diagnosis.data_faults.kind import Fault, Kind, Offsets, Proposal
 from thermal_robot.diagnosis.data_faults.readings import Readings, stacked
 from thermal_robot.diagnosis.data_faults.struck import Struck, Tried, window
 from thermal_robot.inference.alternation import middle, soft
 
-Array = NDArray[np.float64]
 Chosen = list[tuple[Fault, Array, float]]
 """Faults, (3,) where the target then sits on the tool, m, and what is left at least, of what a robot at rest leaves."""
 

@@ -12,12 +12,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.data_faults import settings
 from thermal_robot.diagnosis.data_faults.kind import Fault, Kind, Proposal, repaired
 from thermal_robot.diagnosis.data_faults.readings import Readings, Rows, stacked
 from thermal_robot.inference.alternation import Placed, middle
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

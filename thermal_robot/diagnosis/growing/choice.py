@@ -7,15 +7,13 @@ from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.effects import Effect
 from thermal_robot.inference.columns import Block
 from thermal_robot.inference.robust import Noise
 from thermal_robot.observations import Frames
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

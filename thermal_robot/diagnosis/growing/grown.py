@@ -16,7 +16,6 @@ from thermal_robot.diagnosis.growing.sums import Sums
 from thermal_robot.inference import settings as chosen
 from thermal_robot.inference.algebra import whitener
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis.growing.choice import Choice, Point
 from thermal_robot.effects.gate import checked
@@ -14,8 +14,6 @@ from thermal_robot.inference.algebra import equations_of
 from thermal_robot.inference.columns import Block, frame_columns, moved_by
 from thermal_robot.inference.gauss_newton import corrected_observations
 from thermal_robot.observations import Observations
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

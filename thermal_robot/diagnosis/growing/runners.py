@@ -6,8 +6,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.growing.begun import rivals
 from thermal_robot.diagnosis.growing.grown import Grown
 from thermal_robot.diagnosis.growing.linearised import Seen, carried, products
@@ -15,8 +15,6 @@ from thermal_robot.inference.evidence import evidence
 from thermal_robot.inference.explain import log_priors
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.problem import Linear, Whitening, normal_equations
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

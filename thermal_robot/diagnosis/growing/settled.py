@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis.growing import settings
 from thermal_robot.diagnosis.growing.choice import Choice, Point, together
@@ -26,7 +27,6 @@ from thermal_robot.inference.gram import Gram
 from thermal_robot.inference.problem import Linear, Whitening, normal_equations, parameter_values
 from thermal_robot.inference.robust import distance_limit, far_scale, judged, tail_weight
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 

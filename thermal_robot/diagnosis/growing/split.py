@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign.appended import appended
 from thermal_robot.diagnosis.growing import settings
 from thermal_robot.diagnosis.growing.choice import Choice, Point, together
@@ -18,7 +19,6 @@ from thermal_robot.diagnosis.growing.sums import Guard, Sums
 from thermal_robot.inference import settings as chosen
 from thermal_robot.inference.gauss_newton import corrected_observations
 
-Array = NDArray[np.float64]
 Rows = NDArray[np.int64]
 
 

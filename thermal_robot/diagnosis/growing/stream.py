@@ -6,9 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.special import gammaln
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.names import CLOCK
 from thermal_robot.diagnosis.growing import settings
@@ -25,8 +25,6 @@ from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.rows import blocks, each
 from thermal_robot.observations import observe
 from thermal_robot.prediction import Spread
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,11 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import chdtri
 
+from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.growing import settings
 from thermal_robot.diagnosis.growing.linearised import products
 from thermal_robot.inference import settings as chosen
 
-Array = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 

@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any, Protocol
 from weakref import WeakKeyDictionary
 
 import numpy as np
-from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.diagnosis.growing.choice import together
@@ -27,8 +27,6 @@ from thermal_robot.prediction import Spread, moves
 
 if TYPE_CHECKING:
     import pandas as pd
-
-Array = NDArray[np.float64]
 
 
 class Diagnosed(Protocol):

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.special import betainc, fdtrc
 
+from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.growing.choice import together
 from thermal_robot.diagnosis.growing.grown import Grown
 from thermal_robot.diagnosis.growing.linearised import Seen
@@ -30,8 +31,6 @@ from thermal_robot.inference import settings as chosen
 from thermal_robot.inference.algebra import equations_of, whitener
 from thermal_robot.inference.columns import Block
 from thermal_robot.inference.robust import distance_limit
-
-Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)

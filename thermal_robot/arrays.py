@@ -1,0 +1,9 @@
+"""Type of an array of floating-point numbers, which every module writes in its signatures."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+"""Real numbers in double precision, of any shape; the docstring of a function tells the shape and the unit."""
