@@ -2,7 +2,7 @@
 
 import pytest
 
-from thermal_robot.diagnosis.another_model import AnotherModel
+from thermal_robot.diagnosis.parts import AnotherModel
 
 
 @pytest.mark.parametrize(

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from thermal_robot.diagnosis import arm as drawn
+from thermal_robot.diagnosis import explained as drawn
 from thermal_robot.diagnosis.parts import Where
 
 

@@ -7,7 +7,7 @@ import pytest
 from simulate import simulate
 
 from thermal_robot import diagnose
-from thermal_robot.diagnosis.beside_scatter import beside_scatter
+from thermal_robot.diagnosis.beside import beside_scatter
 from thermal_robot.diagnosis.parts import Refused
 from thermal_robot.effects import choose
 from thermal_robot.inference import settings

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from simulate import simulate
 
-from thermal_robot.diagnosis import beside_steps as module
-from thermal_robot.diagnosis.beside_steps import beside_steps
+from thermal_robot.diagnosis import beside as module
+from thermal_robot.diagnosis.beside import beside_steps
 from thermal_robot.effects import choose
 from thermal_robot.inference import settings
 from thermal_robot.inference.fit import fit

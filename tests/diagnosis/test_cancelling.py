@@ -7,8 +7,7 @@ import pytest
 from helpers import NOISE
 from simulate import simulate
 
-from thermal_robot.diagnosis.cancelling import cancelling, cancelling_within
-from thermal_robot.diagnosis.credible import credible
+from thermal_robot.diagnosis.credible import cancelling, cancelling_within, credible
 from thermal_robot.effects import JointGain, TransmissionError, choose
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.fit import fit

@@ -9,9 +9,8 @@ from simulate import simulate
 
 from thermal_robot.diagnosis import credible as room
 from thermal_robot.diagnosis import diagnose
-from thermal_robot.diagnosis.cancelling import Cancelling
 from thermal_robot.diagnosis.cautions import cautions
-from thermal_robot.diagnosis.credible import credible, goes_astray, outsized
+from thermal_robot.diagnosis.credible import Cancelling, credible, goes_astray, outsized
 from thermal_robot.effects import LinkCompliance, choose, gate
 from thermal_robot.inference.fit import fit, less
 from thermal_robot.inference.frames import register

@@ -7,9 +7,8 @@ import pytest
 from helpers import NOISE
 from simulate import simulate
 
-from thermal_robot.diagnosis import in_full as room
-from thermal_robot.diagnosis.credible import goes_astray
-from thermal_robot.diagnosis.in_full import in_full
+from thermal_robot.diagnosis import credible as room
+from thermal_robot.diagnosis.credible import goes_astray, in_full
 from thermal_robot.effects import TransmissionError
 from thermal_robot.inference.fit import fit
 from thermal_robot.kinematics import Displacement

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from thermal_robot.diagnosis.optimal_design import most_informative
+from thermal_robot.diagnosis.next_samples import most_informative
 
 
 @pytest.fixture

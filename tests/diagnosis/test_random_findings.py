@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from simulate import simulate
 
-from thermal_robot.diagnosis.random_findings import random_findings
+from thermal_robot.diagnosis.findings import random_findings
 from thermal_robot.effects import choose, random_effects
 from thermal_robot.inference import settings
 from thermal_robot.inference.fit import fit

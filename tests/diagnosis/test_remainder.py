@@ -7,7 +7,7 @@ import pytest
 from simulate import simulate
 
 from thermal_robot import EstimationError, diagnose
-from thermal_robot.diagnosis.remainder import nearest, remainder, repeats
+from thermal_robot.diagnosis.examine import nearest, remainder, repeats
 from thermal_robot.effects import choose
 from thermal_robot.inference.fit import fit
 from thermal_robot.inference.frames import register

@@ -6,7 +6,7 @@ from helpers import NOISE, with_law
 from inference.test_ripple import rippling
 
 from thermal_robot import diagnose
-from thermal_robot.diagnosis.rippled import rippled
+from thermal_robot.diagnosis.beside import rippled
 from thermal_robot.effects import choose
 from thermal_robot.effects.joint_ripple import JointRipple
 from thermal_robot.effects.law import Discovered

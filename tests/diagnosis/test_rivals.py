@@ -7,7 +7,7 @@ import pytest
 from simulate import simulate
 
 from thermal_robot.diagnosis import diagnose
-from thermal_robot.diagnosis.rivals import rivals, unknown_frames, within_frames
+from thermal_robot.diagnosis.findings import rivals, unknown_frames, within_frames
 from thermal_robot.effects import choose
 from thermal_robot.inference.evidence import Combination
 from thermal_robot.inference.fit import fit

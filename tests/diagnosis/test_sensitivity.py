@@ -5,7 +5,7 @@ import pytest
 from simulate import simulate
 
 from thermal_robot.diagnosis import settings
-from thermal_robot.diagnosis.sensitivity import prior_sensitivity
+from thermal_robot.diagnosis.answer import prior_sensitivity
 from thermal_robot.effects import choose
 from thermal_robot.inference.fit import fit
 

@@ -7,9 +7,7 @@ import pytest
 from scipy.stats import hypergeom
 from simulate import simulate
 
-from thermal_robot.diagnosis.examine import examine
-from thermal_robot.diagnosis.remainder import remainder
-from thermal_robot.diagnosis.set_aside import alike, together, too_many
+from thermal_robot.diagnosis.examine import alike, examine, remainder, together, too_many
 from thermal_robot.inference import settings
 from thermal_robot.inference.fit import fit
 from thermal_robot.observations import Frames, observe

@@ -11,9 +11,9 @@ from helpers import NOISE, with_law
 from simulate import simulate
 
 from thermal_robot import CorrectedModel, diagnose
+from thermal_robot.diagnosis.beside import as_laws_say, one_more_law
 from thermal_robot.diagnosis.examine import examine
 from thermal_robot.diagnosis.parts import Dependence, Location, Unexplained
-from thermal_robot.diagnosis.unlisted import as_laws_say, one_more_law
 from thermal_robot.effects import choose
 from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.law import Discovered

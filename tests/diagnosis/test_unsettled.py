@@ -7,7 +7,7 @@ import pytest
 from simulate import simulate
 
 from thermal_robot import diagnose
-from thermal_robot.diagnosis.unsettled import unsettled
+from thermal_robot.diagnosis.data_faults.misfit import unsettled
 from thermal_robot.inference import settle
 from thermal_robot.observations import Frames, observe
 

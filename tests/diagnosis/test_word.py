@@ -9,9 +9,8 @@ from diagnosis.simulated import forced
 from helpers import NOISE, with_law
 from simulate import simulate
 
-from thermal_robot.diagnosis import word
-from thermal_robot.diagnosis.earned import Earned, Gained, earned
-from thermal_robot.diagnosis.word import in_question, worth_their_word
+from thermal_robot.diagnosis import earned as word
+from thermal_robot.diagnosis.earned import Earned, Gained, earned, in_question, worth_their_word
 from thermal_robot.effects import choose
 from thermal_robot.effects.law import Discovered
 from thermal_robot.inference import settings

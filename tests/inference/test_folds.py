@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from thermal_robot.inference.folds import left_out
+from thermal_robot.inference.ripple import left_out
 from thermal_robot.inference.rows import each
 
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from inference.problems import small_problem
 
-from thermal_robot.inference.generalised import generalised
+from thermal_robot.inference.problem import generalised
 
 NOISE = np.array([2e-5, 3e-5, 5e-5])
 

@@ -8,7 +8,7 @@ from conftest import load_arm
 from simulate import simulate
 
 from thermal_robot import diagnose
-from thermal_robot.diagnosis.random_findings import random_findings
+from thermal_robot.diagnosis.findings import random_findings
 from thermal_robot.effects import choose
 from thermal_robot.inference.fit import fit
 from thermal_robot.inference.random_gap import _Mean, _pose_errors, random_gap

@@ -205,7 +205,7 @@ def test_robots_with_hidden_scatter(tmp_path):
     from thermal_robot.blind.plan import plan, robots
     from thermal_robot.blind.reality import make
     from thermal_robot.campaign import read_campaign
-    from thermal_robot.diagnosis.random_findings import random_findings
+    from thermal_robot.diagnosis.findings import random_findings
     from thermal_robot.effects import RANDOM, choose
     from thermal_robot.inference.fit import fit
     from thermal_robot.inference.random_gap import random_gap

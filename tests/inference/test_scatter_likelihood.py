@@ -6,7 +6,7 @@ from scipy.integrate import quad
 from scipy.optimize import minimize_scalar
 from scipy.stats import multivariate_normal, multivariate_t
 
-from thermal_robot.inference.scatter_likelihood import Likelihood, independent_rows
+from thermal_robot.inference.scatter import Likelihood, independent_rows
 from thermal_robot.inference.settings import VARIANCE_GRID
 
 JOINTS = 4

@@ -4,8 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from thermal_robot.diagnosis.another_model import AnotherModel
-from thermal_robot.diagnosis.parts import DataFault, Misfit, Wanted
+from thermal_robot.diagnosis.parts import AnotherModel, DataFault, Misfit, Wanted
 from thermal_robot.report.next_step import advice
 from thermal_robot.report.plain_text import text
 

@@ -11,25 +11,111 @@ from numpy.typing import NDArray
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.diagnosis import settings
 from thermal_robot.diagnosis.cautions import cautions
-from thermal_robot.diagnosis.criteria import criteria
 from thermal_robot.diagnosis.examine import Examined
-from thermal_robot.diagnosis.findings import by_share, findings, separates, titled
+from thermal_robot.diagnosis.findings import by_share, findings, random_findings, separates, titled
 from thermal_robot.diagnosis.held_out import Shrinkage
-from thermal_robot.diagnosis.numbered import numbered
-from thermal_robot.diagnosis.parts import Finding, Gap, Misfit, Refused, Rows, Unexplained
+from thermal_robot.diagnosis.parts import Finding, Gap, Misfit, Refused, Rows, Sensitivity, Unexplained
 from thermal_robot.diagnosis.predictive import registered, uncertainty
-from thermal_robot.diagnosis.random_findings import random_findings
 from thermal_robot.diagnosis.result import Diagnosis
 from thermal_robot.diagnosis.schemes import hardest, harmed, worst_folds
-from thermal_robot.diagnosis.sensitivity import prior_sensitivity
 from thermal_robot.diagnosis.wanted import wanted
 from thermal_robot.diagnosis.where import locate
 from thermal_robot.effects import Effect, gate, random_effects
 from thermal_robot.effects.dependence import depends_on
+from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.effects.quantities import unit
 from thermal_robot.inference.discover import Discovery
+from thermal_robot.inference.explain import log_priors
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.random_gap import RandomGap
+from thermal_robot.inference.search import Search
+from thermal_robot.iso9283 import Performance, performance
+from thermal_robot.iso9283.groups import repeats
+from thermal_robot.kinematics import exp3, quaternion_to_rotation, rotation_to_quaternion
+
+_HELD_OUT = "Corrected figures are of rows held out: the model was fitted without the poses that they are told of."
+
+
+def criteria(fit: Fit, shrinkage: Shrinkage) -> Performance | None:
+    """Compute the criteria of a campaign with repeats.
+
+    The frames are those that the gap is told in. AP after the correction is told of rows while they were held out: all
+    repeats of a pose are held out together, so that no figure is of a pose that the model was fitted to. Every cycle
+    counts, those set aside as outliers, too, as the standard has it.
+
+    Returns
+    -------
+    Performance
+        ``None`` where nothing is repeated.
+    """
+    campaign = fit.campaign
+    if not repeats(campaign)[0]:
+        return None
+    frames, left = fit.nominal.frames, shrinkage.left
+    base = frames.base[:3, :3]
+    position = np.asarray(campaign.position) - left[:, :3] @ base.T
+    orientation = None
+    if campaign.orientation is not None:
+        back = base @ exp3(-fit.corrected.in_root_axes(np.nan_to_num(left[:, 3:]))) @ base.T
+        orientation = rotation_to_quaternion(back @ quaternion_to_rotation(campaign.orientation))
+    found = performance(campaign, frames=frames, predicted=(position, orientation))
+    return replace(found, notes=(*found.notes, _HELD_OUT))
+
+
+def numbered(fit: Fit, shrinkage: Shrinkage, laws: Sequence[Discovery]) -> tuple[Fit, Shrinkage, tuple[Discovery, ...]]:
+    """Name the laws of a fit anew wherever their names stand, those that did not last after the others.
+
+    Parameters
+    ----------
+    fit, laws
+        The fit and its laws.
+    shrinkage
+        Its held-out shares: the largest is of ``discovered.1``.
+    """
+    held = {effect.name for effect, _ in fit.effects}
+    names = [name for name in dict.fromkeys(fit.families) if name.startswith(PREFIX)]
+    names.sort(key=lambda name: (name not in held, -shrinkage.shares.get(name, (0.0,))[0]))
+    new = {name: f"{PREFIX}{number}" for number, name in enumerate(names, 1)}
+
+    def named(effect: Effect) -> Effect:
+        return replace(effect, name=new[effect.name]) if isinstance(effect, Discovered) else effect
+
+    linear = fit.explanation.linear
+    blocks = tuple(replace(block, effect=named(block.effect)) for block in linear.blocks)
+    fit = replace(
+        fit,
+        explanation=replace(fit.explanation, linear=replace(linear, blocks=blocks)),
+        effects=tuple((named(effect), values) for effect, values in fit.effects),
+        families=tuple(new.get(name, name) for name in fit.families),
+        variants={new.get(name, name): tuple(map(named, own)) for name, own in fit.variants.items()},
+    )
+    shares = {new.get(name, name): share for name, share in shrinkage.shares.items()}
+    again = tuple(replace(found, law=replace(found.law, name=new[found.law.name])) for found in laws)
+    return fit, replace(shrinkage, shares=shares), again
+
+
+def prior_sensitivity(fit: Fit) -> Sensitivity:
+    """Recompute the probability of the verdict with all prior sizes divided and multiplied by ``PRIOR_FACTOR``.
+
+    The scale of each effect is learnt from the data, with a prior about the stated size that is as wide as its size is
+    unknown (:attr:`~thermal_robot.effects.Effect.size_spread`). The verdict should therefore depend little on the
+    stated sizes; where it does, the data do not decide. The leading combinations alone are compared.
+    """
+    e = fit.explanation
+    problem = e.problem
+    prior = log_priors([b.effect for b in e.linear.blocks])
+    chosen = {effect.name for effect, _ in fit.effects}
+    found = []
+    for factor in (1.0 / settings.PRIOR_FACTOR, settings.PRIOR_FACTOR):
+        scaled = replace(problem, matrix=problem.matrix * factor**2, vector=problem.vector * factor)
+        search = Search(scaled, prior)
+        log, same = [], []
+        for combination in e.combinations[: settings.COMPARED]:
+            log.append(search.evaluate(combination.blocks).log_evidence)
+            same.append(fit.names_of(combination) == chosen)
+        weight = np.exp(np.array(log) - max(log))
+        found.append(float(weight[np.array(same)].sum() / weight.sum()))
+    return Sensitivity(*found)
 
 
 @dataclass(frozen=True, eq=False)

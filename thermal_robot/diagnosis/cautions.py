@@ -11,8 +11,7 @@ import numpy as np
 from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.marks import copies, marks
 from thermal_robot.campaign.table import told_rows
-from thermal_robot.diagnosis.cancelling import cancelling, cancelling_within
-from thermal_robot.diagnosis.credible import outsized
+from thermal_robot.diagnosis.credible import cancelling, cancelling_within, outsized
 from thermal_robot.diagnosis.parts import Refused, Sensitivity
 from thermal_robot.effects import gate
 from thermal_robot.inference import settings

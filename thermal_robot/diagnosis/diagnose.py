@@ -14,26 +14,29 @@ from threadpoolctl import threadpool_limits
 from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.campaign.names import did_you_mean
 from thermal_robot.diagnosis.answer import Conclusion, answer
-from thermal_robot.diagnosis.beside_scatter import beside_scatter
-from thermal_robot.diagnosis.beside_steps import beside_steps
+from thermal_robot.diagnosis.beside import (
+    as_laws_say,
+    beside_scatter,
+    beside_steps,
+    eventful,
+    one_more_law,
+    rippled,
+)
 from thermal_robot.diagnosis.cautions import usable
-from thermal_robot.diagnosis.credible import credible
+from thermal_robot.diagnosis.credible import credible, in_full
 from thermal_robot.diagnosis.data_faults.misfit import another_motion, delivered, frames_alone, unfit
 from thermal_robot.diagnosis.deviations import as_remainder_says
+from thermal_robot.diagnosis.earned import worth_their_word
 from thermal_robot.diagnosis.examine import examine
 from thermal_robot.diagnosis.growing.begun import can_grow
 from thermal_robot.diagnosis.growing.settings import KEPT
 from thermal_robot.diagnosis.growing.updated import ready
 from thermal_robot.diagnosis.held_out import held_out
-from thermal_robot.diagnosis.in_full import in_full
 from thermal_robot.diagnosis.not_executed import not_executed
 from thermal_robot.diagnosis.result import Diagnosis, told
-from thermal_robot.diagnosis.rippled import rippled
 from thermal_robot.diagnosis.schemes import worse_elsewhere
 from thermal_robot.diagnosis.signs import as_counted
-from thermal_robot.diagnosis.unlisted import as_laws_say, eventful, one_more_law
 from thermal_robot.diagnosis.where import without_laws
-from thermal_robot.diagnosis.word import worth_their_word
 from thermal_robot.effects import RANDOM, Effect, choose, library
 from thermal_robot.effects.law import PREFIX
 from thermal_robot.errors import CampaignError, EstimationError, require

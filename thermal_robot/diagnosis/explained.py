@@ -3,13 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.effects.effect import in_words
-from thermal_robot.shapes.visuals import Hull
+from thermal_robot.kinematics import link_poses
+from thermal_robot.shapes.visuals import Hull, hulls
+
+if TYPE_CHECKING:
+    from thermal_robot.diagnosis.parts import Where
+    from thermal_robot.robot import Robot
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,3 +117,24 @@ class Arm:
     base_share: float = 0.0
     tool_share: float = 0.0
     instrument_share: float = 0.0
+
+
+def arm(robot: Robot, q: ArrayLike, where: Where) -> Arm:
+    """Return the arm in (R, n) joint positions, rad or m, with the shares of its places."""
+    chain = robot.chain
+    links = (*chain.parent_links, robot.tool_frame)
+    joints = [chain.names[k] for k in chain.movable]
+    for j, name in zip(chain.coupling.driving.tolist(), robot.joint_names, strict=True):
+        joints[j] = name  # one beside the chain is seen at the first that follows it
+    return Arm(
+        links=links,
+        link_shares=np.array([where.links.get(name, 0.0) for name in links]),
+        poses=link_poses(robot, q)[:, [robot.urdf_links.index(name) for name in links]],
+        joints=tuple(joints),
+        joint_shares=np.array([where.joints.get(name, 0.0) for name in joints]),
+        moves=np.asarray(chain.movable) + 1,
+        hulls=hulls(robot),
+        base_share=where.beyond.get("base", 0.0),
+        tool_share=where.beyond.get("tool", 0.0),
+        instrument_share=where.beyond.get("instrument", 0.0),
+    )

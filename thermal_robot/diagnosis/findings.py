@@ -4,16 +4,120 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
+import numpy as np
+
 from thermal_robot.diagnosis.estimates import estimates, fitted_values, told_inside
-from thermal_robot.diagnosis.parts import Finding, Location, Refused, is_frame
-from thermal_robot.diagnosis.rivals import rivals, unknown_frames, within_frames
-from thermal_robot.effects import Effect
+from thermal_robot.diagnosis.parts import Estimate, Finding, Location, Refused, is_frame
+from thermal_robot.effects import Effect, gate, library, random_effects
 from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.effects.law_size import Size, in_joints, sizes
 from thermal_robot.effects.law_words import called, event, usually
+from thermal_robot.effects.quantities import unit
+from thermal_robot.effects.random_effect import RandomEffect
+from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import equations_of, orthonormal, without
 from thermal_robot.inference.fit import Fit
+from thermal_robot.inference.random_gap import Kept, RandomGap
+
+
+def random_findings(fit: Fit, chance: RandomGap) -> tuple[Finding, ...]:
+    """Return a finding for every random effect.
+
+    None shrinks the gap, as a correction predicts a mean and leaves scatter. Scatter between poses (encoder steps) and
+    scatter between visits (repeatability) are told apart by repeated poses. Without repeats, scatter between visits is
+    not testable, and scatter between poses is confounded with it unless the steps of the encoder are seen.
+
+    Parameters
+    ----------
+    fit
+        Fit of frames and systematic effects.
+    chance
+        The random part of its residual.
+    """
+    return tuple(_finding(fit, chance, effect) for effect in random_effects())
+
+
+def _finding(fit: Fit, chance: RandomGap, effect: RandomEffect) -> Finding:
+    scatter, kind, own = chance.scatter, effect.component, chance.kept_of(effect.component)
+    if effect.needs and kind not in scatter.kinds:
+        return Finding(effect.name, "not_testable", needs=effect.needs)
+    probability = scatter.probability.get(kind, 0.0)
+    if probability < settings.SCATTER_SURE or not own:
+        # what follows a law is not this effect
+        refuted = probability >= settings.SCATTER_SURE and scatter.chosen(kind)
+        return Finding(effect.name, "not_found", 0.0 if refuted else probability, 0.0, (0.0, 0.0))
+    probability *= chance.stepped if kind == "pose" else 1.0
+    others = tuple(e.name for e in random_effects() if e.component not in scatter.kinds)
+    likely = probability >= settings.SCATTER_SURE
+    if not likely and not (others and probability >= settings.PRIOR_PROBABILITY):
+        return Finding(effect.name, "not_found", probability, 0.0, (0.0, 0.0))
+    names, lever = fit.campaign.robot.joint_names, fit.corrected.joint_sensitivity[:, :3]
+    moved = np.array([k.component.sigma**2 * (lever[:, :, k.component.joint] ** 2).mean() for k in own])
+    order = np.argsort(-moved)
+    return Finding(
+        effect.name,
+        "found" if likely else "confounded",
+        probability,
+        0.0,
+        (0.0, 0.0),
+        confounded_with=() if likely else others,
+        locations=tuple(Location("joint", names[own[k].component.joint], float(moved[k] / moved.sum())) for k in order),
+        parameters=tuple(_estimate(fit, own[k], effect) for k in order),
+    )
+
+
+def _estimate(fit: Fit, kept: Kept, effect: RandomEffect) -> Estimate:
+    c, joint = kept.component, fit.campaign.robot.joint_names[kept.component.joint]
+    width = effect.factor * (c.upper - c.lower) / (2.0 * settings.SIGMAS_95)
+    value = kept.step if c.kind == "pose" else effect.factor * c.sigma
+    return Estimate(f"{effect.label}, {joint}", value, width, unit(fit.campaign.robot, joint), True)
+
+
+def unknown_frames(fit: Fit) -> tuple[str, ...]:
+    """Return the names of the frame effects whose frame is unknown and therefore fitted."""
+    frames = [effect for effect in library().values() if effect.frame]
+    return tuple(effect.name for effect in frames if gate.missing(effect, fit.nominal))
+
+
+def within_frames(fit: Fit, block: int) -> bool:
+    """Whether the columns of an effect lie in the span of those of the unknown frames."""
+    item, linear = fit.explanation.linear.blocks[block], fit.explanation.linear
+    if not linear.frames.size or not item.parameters:
+        return False
+    columns = equations_of(item.columns) * item.sizes
+    left = without(columns, orthonormal(equations_of(linear.frames)))
+    return bool(np.linalg.norm(left) < settings.ALIAS * np.linalg.norm(columns))
+
+
+def rivals(fit: Fit, explained: Mapping[str, int]) -> dict[str, tuple[str, ...]]:
+    """Return by effect the effects that it is confounded with.
+
+    An effect of the fit is confounded with a known one outside it where that one, fitted anew in its place, is nearly
+    as probable: by more than ``IN_ITS_PLACE`` it is at work and the effect is not, and nothing else joins it.
+
+    Parameters
+    ----------
+    fit
+        The fit.
+    explained
+        By effect of the fit: its block.
+    """
+    best, found = frozenset(explained), dict[tuple[str, str], float]()
+    for combination, p in zip(fit.explanation.combinations, fit.explanation.probabilities, strict=True):
+        names = fit.names_of(combination)
+        if len(new := names - best) == 1:
+            for pair in product(best - names, new):
+                found[pair] = found.get(pair, 0.0) + float(p)
+    told: dict[str, set[str]] = {}
+    for (name, other), p in found.items():
+        if p > settings.IN_ITS_PLACE and not other.startswith(PREFIX):
+            told.setdefault(name, set()).add(other)
+            told.setdefault(other, set()).add(name)
+    return {name: tuple(sorted(others)) for name, others in told.items()}
+
 
 Shares = dict[str, tuple[float, tuple[float, float]]]
 

@@ -240,7 +240,7 @@ class Diagnosis:
         >>> arm.poses.shape
         (2, 8, 4, 4)
         """
-        from thermal_robot.diagnosis.arm import arm
+        from thermal_robot.diagnosis.explained import arm
 
         if not self.usable or self.fit is None:
             return None

@@ -28,10 +28,8 @@ from thermal_robot.campaign.turning import moves as moving
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of
-from thermal_robot.inference.grouped import Grouped
-from thermal_robot.inference.part import Part
 from thermal_robot.inference.rows import repeated_poses
-from thermal_robot.inference.stack import Stack, chunks
+from thermal_robot.inference.stack import Grouped, Part, Stack, chunks
 from thermal_robot.observations import Observations
 
 Numbers = NDArray[np.int64]

@@ -15,10 +15,9 @@ from thermal_robot.inference import settings
 from thermal_robot.inference.discrepancy import Form, Smooth, Spectrum, decomposed
 from thermal_robot.inference.evidence import Combination, evidence
 from thermal_robot.inference.gram import Gram
-from thermal_robot.inference.grouped import Grouped
 from thermal_robot.inference.problem import Linear, Whitening, contained, normal_equations, white_stack
 from thermal_robot.inference.search import Search
-from thermal_robot.inference.stack import Stack
+from thermal_robot.inference.stack import Grouped, Stack
 
 Rung = tuple[int, float]
 """Number of the form and τ; (−1, 0) where there is no discrepancy."""

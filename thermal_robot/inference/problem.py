@@ -279,3 +279,29 @@ def discrepancy_mean(whitening: Whitening, remainder: Array) -> Array:
     root = np.sqrt(whitening.weights[used])
     left = (remainder[used] / whitening.sigma(used) * root[:, None]).ravel()
     return np.asarray(whitening.smooth.mean(left) * whitening.sigma())
+
+
+def generalised(linear: Linear, covariance: Array, noise: Array) -> Linear:
+    """Return the problem with each row multiplied by diag(noise) L⁻¹, where L Lᵀ is its covariance (Aitken 1935).
+
+    All rows then have the covariance diag(noise²).
+
+    Parameters
+    ----------
+    linear
+        The problem, N rows of m components.
+    covariance
+        (N, m, m) of the residual of each row: m², m rad, rad².
+    noise
+        (m,) one sigma of each component of the result: m, rad.
+    """
+    root = np.linalg.cholesky(covariance)
+
+    def white(columns: Array) -> Array:
+        return np.asarray(noise[:, None] * np.linalg.solve(root, columns))
+
+    return Linear(
+        white(linear.gap[:, :, None])[:, :, 0],
+        white(linear.frames),
+        tuple(replace(block, source=white(block.columns)) for block in linear.blocks),
+    )

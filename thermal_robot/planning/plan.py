@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign, Units
-from thermal_robot.diagnosis.optimal_design import most_informative
+from thermal_robot.diagnosis.next_samples import most_informative
 from thermal_robot.effects import Effect, choose, gate
 from thermal_robot.effects.catalogue import of_effect
 from thermal_robot.errors import CampaignError, require

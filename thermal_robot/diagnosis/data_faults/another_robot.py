@@ -10,12 +10,11 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 
 from thermal_robot.campaign import Campaign
-from thermal_robot.diagnosis.another_model import AnotherModel
 from thermal_robot.diagnosis.data_faults import settings
 from thermal_robot.diagnosis.data_faults.known_robots import fitting
 from thermal_robot.diagnosis.data_faults.readings import Readings
 from thermal_robot.diagnosis.data_faults.recalibrated import Recalibrated, arm_length
-from thermal_robot.diagnosis.parts import Misfit
+from thermal_robot.diagnosis.parts import AnotherModel, Misfit
 from thermal_robot.robot import Robot
 
 

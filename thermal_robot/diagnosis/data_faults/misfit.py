@@ -7,18 +7,19 @@ from dataclasses import replace
 
 import numpy as np
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.plausible import another_unit
-from thermal_robot.diagnosis.another_model import AnotherModel
+from thermal_robot.diagnosis import settings as diagnosis_settings
 from thermal_robot.diagnosis.answer import Conclusion
 from thermal_robot.diagnosis.data_faults import data_fault, settings
 from thermal_robot.diagnosis.data_faults.another_robot import another_robot
 from thermal_robot.diagnosis.data_faults.readings import Readings
 from thermal_robot.diagnosis.data_faults.struck import misfit
 from thermal_robot.diagnosis.examine import examine
-from thermal_robot.diagnosis.parts import Misfit
-from thermal_robot.diagnosis.unsettled import unsettled
+from thermal_robot.diagnosis.parts import AnotherModel, Misfit
 from thermal_robot.effects import Effect
+from thermal_robot.inference import settings as inference_settings
 from thermal_robot.inference.fit import Fit, fit
 from thermal_robot.inference.random_gap import nothing_random
 
@@ -81,3 +82,24 @@ def frames_alone(campaign: Campaign, candidates: Sequence[Effect], needed: str =
     bare = replace(fit(campaign, ()), needs={effect.name: (needed,) for effect in candidates})
     left = examine(bare)
     return Conclusion(bare, (), left.unexplained, left, nothing_random(bare), {})
+
+
+def unsettled(fit: Fit) -> str:
+    """Say in a sentence that the exact model of a fit is not the one that was compared and held out; empty if it is.
+
+    Combinations are compared, and rows held out, with the model linearised at the exact one. Where Gauss-Newton ends
+    elsewhere, as with errors so large that nothing is linear, their figures are not those of the model that is saved.
+    """
+    kept = ~fit.explanation.outliers
+    exact, linear = _left(fit.corrected.gap[kept]), _left(fit.explanation.remainder[kept])
+    if not fit.effects or exact <= diagnosis_settings.UNSETTLED * max(linear, inference_settings.ROUNDING):
+        return ""
+    names = ", ".join(effect.name for effect, _ in fit.effects)
+    return (
+        f"the fit of {names} did not settle: its exact model leaves {exact:.3g} m where {linear:.3g} m were expected; "
+        "nothing of it is told, and the model holds the frames alone"
+    )
+
+
+def _left(gap: Array) -> float:
+    return float(np.sqrt((gap[:, :3] ** 2).sum(axis=1).mean()))
