@@ -165,7 +165,7 @@ def _with_faults(
     """Add cases with faults of the user's own: named by the library where it has an effect of that name."""
     if not faults:
         return cases
-    from thermal_robot.blind.reality.own import load
+    from thermal_robot.blind.reality.unlisted import load
     from thermal_robot.effects import library
 
     rng = np.random.default_rng([seed, 5])

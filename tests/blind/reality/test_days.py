@@ -7,7 +7,7 @@ pytest.importorskip("mujoco", reason='the blind trial needs "thermal-robot[blind
 
 from thermal_robot.blind.cases import Case
 from thermal_robot.blind.plan import robots
-from thermal_robot.blind.reality.days import draw_day, draw_habits, write_day
+from thermal_robot.blind.reality.campaign import draw_day, draw_habits, write_day
 from thermal_robot.blind.reality.world import World
 from thermal_robot.campaign import read_campaign
 

@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import kurtosis
 
 from thermal_robot.blind.reality.instrument import Instrument, Measured, measure, registered
-from thermal_robot.blind.reality.rigid import anywhere, from_vector
 from thermal_robot.blind.reality.sizes import place
+from thermal_robot.blind.reality.world import anywhere, from_vector
 
 NOISE = 2e-5
 

@@ -6,8 +6,7 @@ import pytest
 pytest.importorskip("mujoco", reason='the blind trial needs "thermal-robot[blind]"')
 
 from thermal_robot.blind.reality import FAULTS
-from thermal_robot.blind.reality.moved import GROWS_ONLY, Spot, deviation, draw_spot
-from thermal_robot.blind.reality.sizes import Unseen
+from thermal_robot.blind.reality.sizes import GROWS_ONLY, Spot, Unseen, deviation, draw_spot
 
 OFFSET, GAIN, PLAY = FAULTS["joint_offset"], FAULTS["joint_gain"], FAULTS["backlash"]
 NOISE = 2e-5

@@ -7,9 +7,9 @@ pytest.importorskip("mujoco", reason='the blind trial needs "thermal-robot[blind
 
 from thermal_robot.blind.reality import FAULTS, UNLISTED, sizes
 from thermal_robot.blind.reality.fault import Fault, joints
-from thermal_robot.blind.reality.rigid import from_vector
 from thermal_robot.blind.reality.setting import draw_setting
 from thermal_robot.blind.reality.sizes import Gauge, Unseen, place, shares, sized
+from thermal_robot.blind.reality.world import from_vector
 
 
 @pytest.mark.parametrize("name", [*FAULTS, *UNLISTED])

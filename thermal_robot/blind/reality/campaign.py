@@ -2,27 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from datetime import date, timedelta
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.blind.cases import Case
+from thermal_robot.blind.cases import LISTED, Case, Several
 from thermal_robot.blind.reality.fault import Fault
 from thermal_robot.blind.reality.faults import FAULTS
-from thermal_robot.blind.reality.instrument import Instrument, measure, registered
-from thermal_robot.blind.reality.lots import make_several
-from thermal_robot.blind.reality.own import known
-from thermal_robot.blind.reality.rigid import anywhere
+from thermal_robot.blind.reality.instrument import Instrument, measure, registered, write_folder
 from thermal_robot.blind.reality.setting import Setting, draw_setting, humidity
-from thermal_robot.blind.reality.sizes import Gauge, Unseen, place, sized
-from thermal_robot.blind.reality.tables import write_folder
-from thermal_robot.blind.reality.truth import truth
-from thermal_robot.blind.reality.world import World
+from thermal_robot.blind.reality.sizes import (
+    GROWS_ONLY,
+    SIZE,
+    Gauge,
+    Spot,
+    Unseen,
+    deviation,
+    draw_spot,
+    place,
+    sized,
+    truth,
+)
+from thermal_robot.blind.reality.unlisted import known
+from thermal_robot.blind.reality.world import World, anywhere
+from thermal_robot.files import write_text
 
 Array = NDArray[np.float64]
+
 
 FRESH = 1000
 """Rows to be predicted, ten times what is given: else their own scatter would count against intervals that hold."""
@@ -49,7 +60,7 @@ def make(case: Case, folder: Path) -> dict[str, Any]:
         ``withdrawn`` with the reason where what is asked cannot be seen in any draw; else ``truth`` as in
         :mod:`thermal_robot.blind.cases`, ``noise`` (m), ``samples``, ``measures``, ``fresh_position`` (M, 3)
         where the target really is, ``fresh_before`` (M, 3) where frames alone put it. Of several campaigns nothing is
-        predicted: see :mod:`thermal_robot.blind.reality.lots`.
+        predicted: see :mod:`thermal_robot.blind.reality.campaign`.
     """
     rng = np.random.default_rng(case.seed)
     world = World(case.robot.urdf, case.robot.tool_frame)
@@ -184,3 +195,256 @@ def _background(
             continue  # it cannot be seen here, so there is no size to give it
         quiet.append((fault, values))
     return quiet
+
+
+_SENSORS = ("robot", "links")
+"""What may be recorded of the links: where only the air is, their lag would be another wall's each day."""
+_NOISE = (10e-6, 30e-6)  # m, one sigma per axis: as in campaigns of one day
+_STATED = 0.85  # of cases: as there
+_SPOILT = (0.0, 0.03)  # share of rows: as there
+
+
+@dataclass(frozen=True)
+class Habits:
+    """What is alike in all campaigns of a case: the instrument's noise (m, per axis), what is recorded of the links."""
+
+    noise: float
+    stated: bool
+    sensor: str
+
+
+@dataclass(frozen=True, eq=False)
+class Day:
+    """One campaign: its day, its instrument, and the measure of displacements on its rows."""
+
+    setting: Setting
+    instrument: Instrument
+    gauge: Gauge
+
+
+def draw_habits(rng: np.random.Generator) -> Habits:
+    """Draw what stays."""
+    return Habits(float(rng.uniform(*_NOISE)), bool(rng.random() < _STATED), str(rng.choice(_SENSORS)))
+
+
+def draw_day(case: Case, world: World, habits: Habits, rng: np.random.Generator) -> Day:
+    """Draw a campaign of positions; where base and target are nobody knows."""
+    samples = int(rng.integers(case.samples[0], case.samples[1] + 1))
+    setting = draw_setting(world, samples, rng, sensor=habits.sensor)
+    target = rng.uniform([-0.03, -0.03, 0.04], [0.03, 0.03, 0.16])
+    instrument = Instrument(
+        pose=anywhere(rng, 3.0),
+        target=target,
+        declared=target + rng.uniform(-0.01, 0.01, 3),
+        base_known=False,
+        tool_known=False,
+        noise=habits.noise,
+        turning=None,
+        stated=habits.stated,
+        tails=np.inf,
+        spoilt=float(rng.choice(_SPOILT)),
+    )
+    return Day(setting, instrument, Gauge(setting, np.arange(samples), target, base=True, tool=True))
+
+
+def write_day(
+    folder: Path, case: Case, day: Day, faults: Sequence[tuple[Fault, Array]], rng: np.random.Generator
+) -> int:
+    """Measure a robot with these faults on that day, write its campaign, and return the number of rows."""
+    rows = np.arange(day.setting.samples)
+    seen, turned = place(day.setting, faults, day.instrument.target, day.instrument.pose)
+    measured = measure(day.setting, seen, turned, rows, day.instrument, rng)
+    write_folder(folder, case, day.setting, measured, rows, rows[:0], day.instrument)
+    return len(rows)
+
+
+_HALLS = ("hall 1", "hall 2")
+_ALIKE = 0.1
+"""Scatter of a shared fault among robots, of its size: what one jig, one batch or one floor does to all is alike."""
+_DRAWS = 20
+
+
+def draw_fleet(
+    case: Case, several: Several, days: Sequence[Day], rng: np.random.Generator
+) -> tuple[dict[str, list[str]], list[AtWork], dict[str, Any]]:
+    """Draw which robot has what.
+
+    Parameters
+    ----------
+    case, several
+        What is asked.
+    days
+        A campaign of each robot.
+    rng
+        Everything follows from it.
+
+    Returns
+    -------
+    tuple
+        Labels by name, a value for each robot; what is at work in each; the truth.
+
+    Raises
+    ------
+    Unseen
+        If this draw hides a fault.
+    """
+    count = len(days)
+    robots = [f"r{number + 1:02d}" for number in range(count)]
+    # halls of equal size, but for one
+    halls = [_HALLS[k % 2] for k in rng.permutation(count)]
+    at_work: list[AtWork] = [[] for _ in days]
+    taken: list[Spot] = []
+    shared, own = [], []
+    if several.moves:
+        group = str(rng.choice(_HALLS)) if several.how == "hall" else None
+        members = [k for k in range(count) if group in (None, halls[k])]
+        spot, values = _drawn(case, days[members[0]], several.moves, taken, rng)
+        for k in members:
+            at_work[k].append((spot.fault, _resized(values, float(np.exp(_ALIKE * rng.normal())))))
+        shared.append({**_named(spot, days[0], values), "group": group})
+    # one robot each, whichever hall it stands in
+    for name, k in zip(several.apart, rng.permutation(count).tolist(), strict=False):
+        spot, values = _drawn(case, days[k], name, taken, rng)
+        at_work[k].append((spot.fault, values))
+        own.append({"robot": robots[k], **_named(spot, days[k], values)})
+    told: dict[str, Any] = {
+        "effects": list(dict.fromkeys((*case.effects, *several.apart))),
+        "unlisted": None,
+        "parts": {},
+    }
+    return {"robot": robots, "hall": halls}, at_work, {**told, "shared": shared, "own": own}
+
+
+def _drawn(case: Case, day: Day, name: str, taken: list[Spot], rng: np.random.Generator) -> tuple[Spot, Array]:
+    """Draw a fault at one place where no fault of its kind is yet, as large as the case asks."""
+    fault, gauge = FAULTS[name], day.gauge
+    for _ in range(_DRAWS):
+        values = fault.draw(gauge.setting, rng)
+        spot = draw_spot(fault, np.zeros_like(values), rng)
+        if all((spot.fault.name, spot.number) != (other.fault.name, other.number) for other in taken):
+            break
+    else:
+        raise Unseen(f"{name} has no place left")
+    taken.append(spot)
+    size = float(np.abs(values[:, SIZE]).max()) * (np.sign(values[:, SIZE].sum()) or 1.0)
+    values[:, SIZE] = 0.0
+    wanted = day.instrument.noise * np.exp(rng.uniform(*np.log(case.ratio)))
+    return spot, sized(gauge, fault, spot.moved(values, size), wanted, lambda moved: gauge.rms(gauge.left(moved)))
+
+
+def _resized(values: Array, factor: float) -> Array:
+    result = values.copy()
+    result[:, SIZE] *= factor
+    return result
+
+
+def _named(spot: Spot, day: Day, values: Array) -> dict[str, Any]:
+    kind, where = spot.place(day.setting)
+    name, _ = spot.told(day.setting, np.where(np.arange(values.shape[1]) == SIZE, 0.0, values), 1.0)
+    return {"effect": spot.fault.name, "place": {"kind": kind, "name": where}, "parameter": name}
+
+
+AtWork = list[tuple[Fault, Array]]
+
+_FIRST = date(2026, 1, 5)
+_EVERY, _LATE = 30, 10  # days from one campaign to the next, and by how much one is early or late
+_LARGEST = 10.0  # × noise: a change that must leave more to be told is not asked for
+
+
+def make_several(case: Case, world: World, rng: np.random.Generator, folder: Path) -> dict[str, Any]:
+    """Write the campaigns of a case into a folder, and return its answers.
+
+    Raises
+    ------
+    Unseen
+        If this draw hides what is asked.
+    """
+    several = _asked(case)
+    count = int(rng.integers(several.campaigns[0], several.campaigns[1] + 1))
+    habits = draw_habits(rng)
+    days = [draw_day(case, world, habits, rng) for _ in range(count)]
+    if case.kind == "fleet":
+        labels, at_work, told = draw_fleet(case, several, days, rng)
+    else:
+        labels, at_work, told = _followed(case, several, days, rng)
+    names = [f"{number + 1:02d}" for number in range(count)]
+    samples = 0
+    for name, day, faults in zip(names, days, at_work, strict=True):
+        samples += write_day(folder / name, case, day, faults, rng)
+    write_text(folder / LISTED, _list(names, labels))
+    whole = {**told, "campaigns": count, "outliers": []}
+    return {"truth": whole, "noise": habits.noise, "samples": samples, "measures": "position"}
+
+
+def _asked(case: Case) -> Several:
+    if case.several is None:
+        raise ValueError(f"case {case.id} is one of a single campaign")
+    return case.several
+
+
+def _list(names: Sequence[str], labels: Mapping[str, Sequence[str]]) -> str:
+    rows = zip(names, *labels.values(), strict=True)
+    return "".join(",".join(row) + "\n" for row in (("campaign", *labels), *rows))
+
+
+def _followed(
+    case: Case, several: Several, days: Sequence[Day], rng: np.random.Generator
+) -> tuple[dict[str, list[str]], list[AtWork], dict[str, Any]]:
+    """Return dates, what is at work on each day, and the truth."""
+    first, noise = days[0].gauge, days[0].instrument.noise
+    done: AtWork = []
+    for name in case.effects:
+        fault = FAULTS[name]
+        values = fault.draw(first.setting, rng)
+        if several.how == "begins" and name == several.moves:
+            values[:, 0] = 0.0
+        else:
+            wanted = noise * np.exp(rng.uniform(*np.log(case.ratio)))
+            values = sized(first, fault, values, wanted, lambda moved: first.rms(first.left(moved)))
+        done.append((fault, values))
+    passed = np.cumsum([0, *rng.integers(_EVERY - _LATE, _EVERY + _LATE + 1, len(days) - 1)])
+    dates = [(_FIRST + timedelta(days=int(day))).isoformat() for day in passed]
+    at_work, changes = [done] * len(days), []
+    if several.moves:
+        at_work, change = _moving(several, days, done, passed / passed[-1], rng)
+        changes.append(change)
+    last = truth(case, days[-1].gauge, at_work[-1], [], noise)
+    return {"date": dates}, at_work, {**last, "changes": changes}
+
+
+def _moving(
+    several: Several, days: Sequence[Day], done: AtWork, time: Array, rng: np.random.Generator
+) -> tuple[list[AtWork], dict[str, Any]]:
+    """Let one number of a fault change; return what is at work on each day, and what changed."""
+    own = next(k for k, (fault, _) in enumerate(done) if fault.name == several.moves)
+    fault, values = done[own]
+    others = [item for k, item in enumerate(done) if k != own]
+    spot, setting = draw_spot(fault, values, rng), days[0].setting
+    after = None if several.how == "grows" else int(rng.integers(len(days) - 1))
+    shape = time if after is None else (np.arange(len(days)) > after).astype(float)
+    times = float(np.exp(rng.uniform(*np.log(several.change))))
+    by = times * _tells(several, days, spot, values, others)
+    by *= 1.0 if fault.name in GROWS_ONLY else float(rng.choice([-1.0, 1.0]))
+    at_work = [[*done[:own], (fault, spot.moved(values, by * share)), *done[own + 1 :]] for share in shape.tolist()]
+    name, amount = spot.told(setting, values, by)
+    kind, where = spot.place(setting)
+    return at_work, {
+        "effect": fault.name,
+        "place": {"kind": kind, "name": where},
+        "parameter": name,
+        "how": several.how,
+        "after": after,
+        "amount": amount,
+        "deviations": times,
+    }
+
+
+def _tells(several: Several, days: Sequence[Day], spot: Spot, values: Array, others: AtWork) -> float:
+    """Return the deviation in which a change is counted: of a difference, or of the first campaign."""
+    noise = days[0].instrument.noise
+    told = days[:2] if several.how == "changes" else days[:1]
+    found = [deviation(day.gauge, spot, values, others, noise) for day in told]
+    one = float(np.sqrt(sum(std**2 for std, _ in found)))
+    if several.change[1] * one * max(leaves for _, leaves in found) > _LARGEST * noise:
+        raise Unseen(f"a change of {spot.fault.name} would have to be large to be told from what else is at work")
+    return one

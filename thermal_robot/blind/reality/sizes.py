@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations, product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.blind.cases import Case
 from thermal_robot.blind.reality.fault import Fault, Place
 from thermal_robot.blind.reality.faults import FAULTS
-from thermal_robot.blind.reality.rigid import free_columns
 from thermal_robot.blind.reality.setting import Setting
-from thermal_robot.blind.reality.unlisted import Slopes, slopes
+from thermal_robot.blind.reality.world import Slopes, World, free_columns, slopes
 
 Array = NDArray[np.float64]
 
@@ -190,3 +191,204 @@ def place(
     poses = (np.eye(4) if instrument is None else instrument) @ body.base @ poses @ body.tool
     seen = (poses[:, :3, :3] @ target + poses[:, :3, 3]) * (1.0 + body.scale)
     return seen, poses[:, :3, :3]
+
+
+_CLEAR = 0.25  # of what the largest place leaves: places that leave less are not asked for
+_NEEDS = {"thermal_elongation": "temperature", "drift": "time", "backlash": "approach", "tracking_lag": "velocity"}
+
+
+def truth(
+    case: Case,
+    gauge: Gauge,
+    done: Sequence[tuple[Fault, Array]],
+    background: Sequence[tuple[Fault, Array]],
+    noise: float,
+) -> dict[str, Any]:
+    """Return the truth of :mod:`thermal_robot.blind.cases`, without the rows that are spoilt.
+
+    Parameters
+    ----------
+    case
+        What is asked.
+    gauge
+        Of the rows that are given.
+    done, background
+        Faults with their values: those that are asked for, and those that are always there.
+    noise
+        One sigma per axis, m.
+    """
+    parts: dict[str, Any] = {}
+    answers: list[Place] = []
+    quantities: list[str] = []
+    parameters: dict[str, dict[str, float]] = {}
+    for fault, values in [*done, *background]:
+        sites = shares(gauge, fault, values)
+        clear = [item for item in sites if item[2] > _CLEAR * sites[0][2]]
+        where = [item[0] for item in clear]
+        main = any(fault is other for other, _ in done)
+        listed = _named(where if fault.few else [])
+        parts[fault.name] = {"ratio": _ratio(gauge, fault, values, noise), "main": main, "places": listed}
+        for other, columns in fault.also:
+            part = np.zeros_like(values)
+            part[:, list(columns)] = values[:, list(columns)]
+            parts.setdefault(other, {"ratio": _ratio(gauge, fault, part, noise), "main": False, "places": listed})
+        if main and (fault.name == case.unlisted or case.kind in ("removed", "hidden")):
+            answers += [*where, *_joints_of(gauge.setting, fault, [item[1] for item in clear])]
+            quantities += fault.quantities(gauge.setting, where)
+        if fault.name in case.effects:
+            parameters[fault.name] = dict(fault.known_as(gauge.setting, values))
+    return {
+        "effects": list(case.effects),
+        "unlisted": case.unlisted,
+        "parts": parts,
+        "parameters": parameters,
+        "places": _named(answers),
+        "near": _named(near(gauge.setting.world, answers)),
+        "quantities": list(dict.fromkeys(quantities)),
+        "needs": [_NEEDS[name] for name in case.effects if case.hidden and name in _NEEDS],
+    }
+
+
+def near(world: World, places: Sequence[Place]) -> list[Place]:
+    """Return places and those beside them: along the chain, base, link, joint, link, joint, ... link, tool.
+
+    A joint's are the two links that it connects and the joint before and after; those of a link the joints at its ends
+    and the links beyond them. Links that no joint moves against each other are one.
+    """
+    at: dict[Place, float] = {("base", "base"): 0.0, ("link", world.tree.root): 0.5}
+    moved = 0
+    for joint in world.chain:
+        moved += joint.movable
+        at[("joint", joint.name)] = float(moved) if joint.movable else moved + 0.5
+        at[("link", joint.child)] = moved + 0.5
+    at[("tool", "tool")] = moved + 1.0
+    steps = [at[place] for place in places]
+    return [place for place, here in at.items() if any(abs(here - step) <= 1.0 for step in steps)]
+
+
+def _ratio(gauge: Gauge, fault: Fault, values: Array, noise: float) -> float:
+    return gauge.rms(gauge.left(gauge.moved(fault, values))) / noise
+
+
+def _joints_of(setting: Setting, fault: Fault, numbers: Sequence[int]) -> list[Place]:
+    """Name the joints too: a displaced joint placement is as much the joint's as it is the link's that carries it."""
+    chain = setting.world.chain
+    if len(fault.places(setting)) != len(chain) or fault.places(setting)[0][0] != "link":
+        return []
+    return [("joint", chain[p].name) for p in numbers if chain[p].movable]
+
+
+def _named(places: Sequence[Place]) -> list[dict[str, str]]:
+    return [{"kind": kind, "name": name} for kind, name in dict.fromkeys(places)]
+
+
+SIZE = 0
+"""The column of a fault's values that is its size."""
+GROWS_ONLY = ("backlash", "joint_compliance")
+"""What wear makes larger, and nothing smaller."""
+_ZEROS = "joint_offset"
+_STEP = 1e-4  # rad, rad/(N·m) ...: where a fault has no size yet, of which a derivative could be a share
+_PRESENT = 0.1  # × noise: a number that leaves less is not at work
+_SEEN = 1e-6  # of a column: what less is left of is rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Spot:
+    """One number of a fault, by its place, with its name and value in the words and units of formats.md."""
+
+    fault: Fault
+    number: int
+
+    def moved(self, values: Array, by: float) -> Array:
+        """Return values with this number larger."""
+        result = values.copy()
+        result[self.number, SIZE] += by
+        return result
+
+    def place(self, setting: Setting) -> Place:
+        """Return where it is."""
+        return self.fault.places(setting)[self.number]
+
+    def told(self, setting: Setting, values: Array, by: float) -> tuple[str, float]:
+        """Return the name of the parameter that this is, and by how much that changes."""
+        before, after = (dict(self.fault.known_as(setting, v)) for v in (values, self.moved(values, by)))
+        [name] = [key for key in after if after[key] != before[key]]
+        return name, after[name] - before[name]
+
+
+def draw_spot(fault: Fault, values: Array, rng: np.random.Generator) -> Spot:
+    """Draw a place where a fault is at work, or, of joints' zeros and of what is not, any but the first and the last.
+
+    Frames take up what the first and the last joint's zero do.
+    """
+    size = values[:, SIZE]
+    inner = np.arange(1, len(size) - 1)
+    places = inner if fault.name == _ZEROS or not size.any() else np.flatnonzero(size)
+    return Spot(fault, int(rng.choice(places)))
+
+
+def deviation(
+    gauge: Gauge, spot: Spot, values: Array, others: Sequence[tuple[Fault, Array]], noise: float
+) -> tuple[float, float]:
+    """Return how well a campaign tells one number of a fault, and what a unit of it leaves after alignment.
+
+    Parameters
+    ----------
+    gauge
+        Of the campaign's rows.
+    spot, values
+        Which number, and the fault as it is.
+    others
+        All other faults at work.
+    noise
+        One sigma per axis, m.
+
+    Returns
+    -------
+    tuple
+        Standard deviation in the unit of the values, and rms per axis in m of one unit.
+
+    Raises
+    ------
+    Unseen
+        If frames or other numbers do the same.
+    """
+    known = {fault.name: values for fault, values in [*others, (spot.fault, values)]}
+    known.setdefault(_ZEROS, np.zeros((gauge.setting.world.n, 1)))
+    beside = []
+    for name, now in known.items():
+        for number, column in _columns(gauge, FAULTS[name], now):
+            if (name, number) == (spot.fault.name, (spot.number, SIZE)):
+                own = column
+            elif name == _ZEROS or gauge.rms(gauge.left(column * now[number])) > _PRESENT * noise:
+                beside.append(column)
+    aligned = gauge.left(own)
+    span = _span(gauge, np.column_stack(beside))
+    left = aligned - span @ (span.T @ aligned)
+    length = float(np.linalg.norm(left))
+    if length <= _SEEN * float(np.linalg.norm(own)) or length == 0.0:
+        raise Unseen(f"{spot.fault.name} is hidden there by what else is at work")
+    return noise / length, gauge.rms(aligned)
+
+
+def _columns(gauge: Gauge, fault: Fault, values: Array) -> Iterator[tuple[tuple[int, int], Array]]:
+    """Yield each number of a fault that is a size, and (3M,) how its unit displaces the target."""
+    fixed = {column for column, _ in fault.fixed}
+    now = gauge.slope(fault, values)
+    for p, d in np.ndindex(*values.shape):
+        if d not in fixed:
+            step = float(np.abs(values[:, d]).max()) or _STEP
+            more = values.copy()
+            more[p, d] += step
+            yield (p, d), (gauge.slope(fault, more) - now) / step
+
+
+def _span(gauge: Gauge, every: Array) -> Array:
+    """(3M, R) orthonormal: all that these columns can do beside the frames."""
+    aligned = every - gauge.frames @ (gauge.frames.T @ every)
+    length = np.linalg.norm(every, axis=0)
+    kept = np.linalg.norm(aligned, axis=0) > _SEEN * length
+    if not kept.any():
+        return np.zeros((len(every), 0))
+    left, size, _ = np.linalg.svd(aligned[:, kept] / length[kept], full_matrices=False)
+    return np.asarray(left[:, size > _SEEN * size[0]])
