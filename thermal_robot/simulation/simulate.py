@@ -18,7 +18,7 @@ from thermal_robot.campaign.names import did_you_mean, listed, split_name, tilte
 from thermal_robot.campaign.plausible import doubts
 from thermal_robot.campaign.recognise import TYPING_ERROR
 from thermal_robot.campaign.validate import arrived
-from thermal_robot.effects import Effect, RandomEffect, gate, named
+from thermal_robot.effects import Effect, Parameter, RandomEffect, gate, named
 from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.quantities import unit
 from thermal_robot.errors import CampaignError, EffectError
@@ -40,20 +40,7 @@ CALL = "simulate()"
 def commanded(
     robot: Robot, rows: Any, repeats: Any, commands: Any, conditions: Any, rng: np.random.Generator
 ) -> Campaign:
-    """Return the rows that are simulated, with their conditions and nothing measured.
-
-    Parameters
-    ----------
-    robot, rows, repeats, commands, conditions
-        As for :func:`thermal_robot.simulate`.
-    rng
-        Source of the poses, where they are drawn.
-
-    Raises
-    ------
-    CampaignError
-        Rows, positions or conditions that no campaign has.
-    """
+    """Return the rows that are simulated, with their conditions and nothing measured."""
     if isinstance(commands, Campaign):
         plan = _of_campaign(robot, rows, repeats, commands)
     else:
@@ -179,44 +166,6 @@ AtWork: TypeAlias = "Mapping[str | Effect, Values] | Mapping[str, Values] | Iter
 _EACH = "values by name of an effect, such as {'joint_gain': {'joint_2': 1e-3}}"
 
 
-@dataclass(frozen=True)
-class Place:
-    """A parameter of which a value is asked.
-
-    Attributes
-    ----------
-    name, label, joint, unit
-        In full; without its place; the place alone; its unit.
-    positive
-        Whether it cannot be negative.
-    """
-
-    name: str
-    label: str
-    joint: str
-    unit: str
-    positive: bool
-
-
-def at_work(effects: AtWork | None, seen: Observations) -> list[tuple[Effect, Array]]:
-    """Return effects with the (P,) values of their parameters; one that scatters has one a joint.
-
-    Parameters
-    ----------
-    effects
-        As the user gave them; ``None`` for none.
-    seen
-        The commands and conditions at which they are to be at work.
-
-    Raises
-    ------
-    EffectError
-        A name that no effect or no parameter has, a value that is no number or has the wrong sign, an effect that these
-        rows give nothing to follow.
-    """
-    return [_asked(kind, values, seen) for kind, values in _pairs(effects)]
-
-
 def _pairs(effects: Any) -> list[tuple[Any, Any]]:
     if effects is None:
         return []
@@ -232,18 +181,20 @@ def _asked(kind: Any, values: Any, seen: Observations) -> tuple[Effect, Array]:
         raise EffectError(f"{shown(kind)} is neither the name of an effect nor an effect; expected {_EACH}")
     effect = named(kind) if isinstance(kind, str) else kind
     if isinstance(effect, RandomEffect):
-        return effect, _values(effect, _scattering(effect, seen), values)
+        joints = effect.joints(seen.robot.joint_names)
+        sizes = [Parameter(effect.label, unit(seen.robot, j), 1.0, "joint", j, (), positive=True) for j in joints]
+        return effect, _values(effect, sizes, values)
     _require_conditions(effect, seen)
     if isinstance(kind, str):
         effect = gate.variants(effect, seen)[0]
-    places = [Place(p.name, p.label, p.place, p.unit, p.positive) for p in gate.checked(effect, seen)]
-    if not places:
+    parameters = gate.checked(effect, seen)
+    if not parameters:
         settings = ", ".join(f"{argument}=…" for argument in gate.arguments(effect))
         raise EffectError(
             f"effect {effect.name!r} has no parameters here, so that nothing can be simulated; give it with the "
             f"settings that bring some, as {type(effect).__name__}({settings})"
         )
-    return effect, _values(effect, places, values)
+    return effect, _values(effect, parameters, values)
 
 
 def _require_conditions(effect: Effect, seen: Observations) -> None:
@@ -257,14 +208,7 @@ def _require_conditions(effect: Effect, seen: Observations) -> None:
     raise EffectError(f"effect {effect.name!r} has nothing to follow: it needs {', '.join(lacks)}{how}")
 
 
-def _scattering(effect: RandomEffect, seen: Observations) -> list[Place]:
-    """Return the parameters of an effect that scatters, one a joint."""
-    robot = seen.robot
-    own = effect.joints(robot.joint_names)
-    return [Place(f"{effect.label}, {j}", effect.label, j, unit(robot, j), True) for j in own]
-
-
-def _values(effect: Effect, places: Sequence[Place], given: Any) -> Array:
+def _values(effect: Effect, places: Sequence[Parameter], given: Any) -> Array:
     """Return (P,) the values of an effect's parameters."""
     found = np.zeros(len(places))
     if isinstance(given, Mapping):
@@ -287,9 +231,9 @@ def _values(effect: Effect, places: Sequence[Place], given: Any) -> Array:
     return np.array([_number(effect, place, given) for place in places])
 
 
-def _which(effect: Effect, places: Sequence[Place], name: Any) -> int:
+def _which(effect: Effect, places: Sequence[Parameter], name: Any) -> int:
     """Return the index of the one parameter of a name, of a place, or of a label."""
-    for candidates in ([p.name for p in places], [p.joint for p in places], [p.label for p in places]):
+    for candidates in ([p.name for p in places], [p.place for p in places], [p.label for p in places]):
         found = [k for k, candidate in enumerate(candidates) if candidate == name]
         if len(found) == 1:
             return found[0]
@@ -297,11 +241,11 @@ def _which(effect: Effect, places: Sequence[Place], name: Any) -> int:
             meant = listed([places[k].name for k in found])
             raise EffectError(f"effect {effect.name!r}: {name!r} is {len(found)} parameters; name one of {meant}")
     names = [place.name for place in places]
-    near = did_you_mean(str(name), dict.fromkeys((*names, *(place.joint for place in places))))
+    near = did_you_mean(str(name), dict.fromkeys((*names, *(place.place for place in places))))
     raise EffectError(f"effect {effect.name!r} has no parameter {name!r} here{near}; there are {listed(names)}")
 
 
-def _number(effect: Effect, place: Place, value: Any) -> float:
+def _number(effect: Effect, place: Parameter, value: Any) -> float:
     """Return a value of a parameter, seen to be one."""
     least = 0.0 if place.positive else -LARGEST
     what = f"a number{', not negative,' if place.positive else ''} in {place.unit}"
@@ -337,22 +281,7 @@ class Instrument:
         return replace(plan, orientation=turned)
 
     def reading(self, position: Array, rotation: Array, rng: np.random.Generator) -> tuple[Array, Array | None]:
-        """Return one reading of poses in the measurement frame.
-
-        Parameters
-        ----------
-        position, rotation
-            (N, 3) m and (N, 3, 3).
-        rng
-            Source of the noise.
-
-        Returns
-        -------
-        position
-            (N, 3) m.
-        orientation
-            (N, 4) quaternions wxyz; ``None`` where it does not measure them.
-        """
+        """Return a reading of (N, 3) positions, m, and of (N, 3, 3) rotations, (N, 4) quaternions wxyz or ``None``."""
         read = position + self.noise * rng.normal(size=position.shape)
         if not self.turns:
             return read, None
@@ -361,13 +290,7 @@ class Instrument:
 
 
 def instrument(measures: Any, noise: Any, noise_orientation: Any) -> Instrument:
-    """Return the instrument that a user asks for; see :func:`thermal_robot.simulate`.
-
-    Raises
-    ------
-    CampaignError
-        A word that it does not know, a noise that is none, or one of what is not measured.
-    """
+    """Return the instrument that a user asks for; see :func:`thermal_robot.simulate`."""
     sigma = number(least=0.0, expected="one sigma per axis, 0 for none", problem="a noise cannot be negative")
     shift, turn = fitted(sigma, noise, CALL, "noise"), fitted(sigma, noise_orientation, CALL, "noise_orientation")
     what = fitted(word(_MEASURES), _MEASURES[0] if measures is None else measures, CALL, "measures")
@@ -382,20 +305,7 @@ _RIGID = 1e-6
 
 
 def placed(plan: Campaign, base: Any, tool: Any, base_known: Any, tool_known: Any) -> tuple[Campaign, Frames]:
-    """Return the rows with what they declare of their frames, and the true ones.
-
-    Parameters
-    ----------
-    plan
-        Commands and conditions; a campaign that was taken over has frames of its own.
-    base, tool, base_known, tool_known
-        As for :func:`thermal_robot.simulate`.
-
-    Raises
-    ------
-    CampaignError
-        Something that is no pose; a frame that is said to be known and is not where it is declared.
-    """
+    """Return the rows with what they declare of their frames, and the true ones; see :func:`thermal_robot.simulate`."""
     declared = Frames.declared(plan)
     told = {"base_known": base_known, "tool_known": tool_known}
     known = {key: fitted(optional(boolean), value, CALL, key) for key, value in told.items()}
@@ -456,25 +366,10 @@ def measured(
     joints: np.random.Generator,
     readings: np.random.Generator,
 ) -> Campaign:
-    """Return the campaign that an instrument measures of a robot with effects at work.
+    """Return the campaign that an instrument measures of a robot with effects at work, at its true frames.
 
-    Parameters
-    ----------
-    plan
-        Commands and conditions.
-    frames
-        Where the robot stands and where the target sits, truly.
-    effects
-        Each with the (P,) values of its parameters; of one that scatters, one a joint.
-    instrument
-        Who measures.
-    joints, readings
-        Chance of what scatters, and of the instrument.
-
-    Raises
-    ------
-    CampaignError
-        If values are so large that no finite position follows.
+    Each effect has the (P,) values of its parameters; ``joints`` and ``readings`` are the chance of what scatters, and
+    of the instrument.
     """
     systematic = [(effect, values) for effect, values in effects if not isinstance(effect, RandomEffect)]
     moved, shift = displacement(observe(plan, frames), systematic)
@@ -608,7 +503,8 @@ def simulate(
     used = instrument(given, noise, noise_orientation)
     plan = used.awaiting(commanded(robot, rows, repeats, commands, conditions, poses))
     plan, frames = placed(plan, base, tool, base_known, tool_known)
-    effects_at_work = at_work(effects, observe(plan, frames))
+    seen = observe(plan, frames)
+    effects_at_work = [_asked(kind, values, seen) for kind, values in _pairs(effects)]
     return measured(plan, frames, effects_at_work, used, joints, readings)
 
 
