@@ -43,13 +43,13 @@ class Instrument:
     pose: Array
     target: Array
     declared: Array
-    base_known: bool
-    tool_known: bool
     noise: float
-    turning: float | None
-    stated: bool
-    tails: float
-    spoilt: float
+    base_known: bool = False
+    tool_known: bool = False
+    turning: float | None = None
+    stated: bool = True
+    tails: float = np.inf
+    spoilt: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -62,14 +62,9 @@ class Measured:
 
 
 def measure(
-    setting: Setting,
-    seen: Array,
-    turned: Array,
-    rows: NDArray[np.int64],
-    instrument: Instrument,
-    rng: np.random.Generator,
+    seen: Array, turned: Array, rows: NDArray[np.int64], instrument: Instrument, rng: np.random.Generator
 ) -> Measured:
-    """Measure the rows that are given away."""
+    """Measure the rows that are given away, of (N, 3) positions and (N, 3, 3) orientations in its frame."""
     count = len(rows)
     unit = rng.normal(size=(count, 3))
     if np.isfinite(instrument.tails):  # of the same variance
@@ -124,18 +119,7 @@ def write_folder(
 ) -> None:
     """Write campaign.toml, robot.urdf, measurements.csv and, where something is to be predicted, fresh.csv.
 
-    Parameters
-    ----------
-    folder
-        Where to.
-    case
-        Which columns to hide.
-    setting, measured, instrument
-        The day, what was measured on it, and by what.
-    rows, others
-        Row numbers that are given with their measurements, and those to be predicted.
-    gears
-        Transmission ratio by joint.
+    Rows are given with their measurements, others are to be predicted; gears are the transmission ratios by joint.
     """
     folder.mkdir(parents=True, exist_ok=True)
     write_text(folder / "robot.urdf", case.robot.urdf)
@@ -183,9 +167,6 @@ def conditions(setting: Setting) -> pd.DataFrame:
 
 
 def _document(case: Case, instrument: Instrument, gears: dict[str, float]) -> str:
-    def word(known: bool) -> str:
-        return '"known"' if known else '"unknown"'
-
     target = ", ".join(f"{1e3 * value:.6f}" for value in instrument.declared)
     lines = [
         "[robot]",
@@ -198,8 +179,8 @@ def _document(case: Case, instrument: Instrument, gears: dict[str, float]) -> st
         'length_unit = "mm"',
         "",
         "[frames]",
-        f"base = {word(instrument.base_known)}",
-        f"tool = {word(instrument.tool_known)}",
+        f'base = "{"" if instrument.base_known else "un"}known"',
+        f'tool = "{"" if instrument.tool_known else "un"}known"',
         f"target = [{target}]",
         "",
         "[payload]",

@@ -47,21 +47,9 @@ def warmed(world: World, time: Array, air: Array, session: NDArray[np.int64] | N
 
 
 def followed(time: Array, drive: Array, constant: float, start: float | None = None) -> Array:
-    """Integrate T' = (drive − T) / constant, between rows in steps of a second on a drive that runs straight.
+    """Integrate T' = (drive − T) / constant, (N,) °C, between rows in steps of a second on a drive that runs straight.
 
-    Parameters
-    ----------
-    time, drive
-        (N,) s, increasing, and °C.
-    constant
-        s.
-    start
-        °C at the first row; that of the drive where absent.
-
-    Returns
-    -------
-    ndarray
-        (N,) °C.
+    Time, increasing, and constant are in s; ``start`` is the temperature at the first row, the drive's where absent.
     """
     fine = np.arange(time[0], time[-1] + _PAUSE, _PAUSE)
     # the mean of the drive over each step, so that a ramp is followed to second order
@@ -167,31 +155,15 @@ def draw_setting(
     sensor: str | None = None,
     sessions: bool = False,
 ) -> Setting:
-    """Draw one campaign's commands and conditions.
+    """Draw one campaign's commands and conditions, of rows that are measured and ``fresh`` ones scattered among them.
 
-    Parameters
-    ----------
-    world
-        The robot.
-    samples
-        Number of rows that are measured.
-    rng
-        Everything follows from it.
-    fresh
-        Number of rows to be predicted, scattered among them.
-    moving
-        Whether poses are measured in passing.
-    visits
-        How often each pose is measured, drawn between the two for each, in mixed order.
-    sensor
-        See :class:`Setting`; drawn where absent.
-    sessions
-        Whether the robot is switched off for a while, once or twice.
+    Each pose is measured so many ``visits``, drawn between the two, in mixed order; in ``sessions`` the robot is
+    switched off once or twice. The sensor, as in :class:`Setting`, is drawn where absent.
     """
     given, q, label = _visits(world, samples, fresh, visits, rng)
     samples += fresh
     time, session = _clock(samples, sessions, rng)
-    heaviest = _heaviest(world)
+    heaviest = float(np.clip(0.15 * sum(world.tree.mass.values()), 0.5, 8.0))  # kg: what suits a robot of its weight
     payload = rng.choice([0.0, heaviest / 2, heaviest], samples).round(2)
     speed = rng.choice([0.1, 0.3, 0.6, 1.0], samples)
     velocity, acceleration = np.zeros_like(q), np.zeros_like(q)
@@ -283,8 +255,3 @@ def _commands(world: World, count: int, rng: np.random.Generator) -> Array:
     reach = np.linalg.norm(place, axis=1)
     usable = drawn[reach >= np.quantile(reach, 0.3)]
     return np.asarray(usable[:count])
-
-
-def _heaviest(world: World) -> float:
-    """Return a payload that suits the robot: 0.15 of what it weighs, between 0.5 and 8 kg."""
-    return float(np.clip(0.15 * sum(world.tree.mass.values()), 0.5, 8.0))

@@ -1,8 +1,8 @@
-"""How large a fault is: what it leaves after alignment, and what no other single fault can imitate."""
+"""How large a fault is, what no other fault can imitate, and how well a campaign tells a change of one number of it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations, product
@@ -12,8 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.blind.cases import Case
-from thermal_robot.blind.reality.fault import Fault, Place
-from thermal_robot.blind.reality.faults import FAULTS
+from thermal_robot.blind.reality.fault import FAULTS, Fault, Place
 from thermal_robot.blind.reality.setting import Setting
 from thermal_robot.blind.reality.world import Slopes, World, free_columns, slopes
 
@@ -72,24 +71,22 @@ class Gauge:
         fault.act(body, self.setting, values)
         return (self.slopes.place(body.take(self.rows)) - self.sound).ravel()
 
-    def left(self, moved: Array, others: Iterable[Array] = ()) -> Array:
-        """Return what remains of a displacement after alignment, and after the best of other columns."""
-        rest = moved - self.frames @ (self.frames.T @ moved)
-        for basis in others:
-            rest = rest - basis @ (basis.T @ rest)
-        return np.asarray(rest)
+    def left(self, moved: Array) -> Array:
+        """(3M,) or (3M, K) what remains of displacements after alignment."""
+        return np.asarray(moved - self.frames @ (self.frames.T @ moved))
 
     def rms(self, moved: Array) -> float:
         """Root mean square per axis of a displacement (3M,)."""
         return float(np.sqrt((moved**2).mean()))
 
+    def leaves(self, fault: Fault, values: Array) -> float:
+        """Rms per axis, m, that one fault alone leaves after alignment."""
+        return self.rms(self.left(self.moved(fault, values)))
+
     def basis(self, fault: Fault) -> Array:
         """(3M, K) orthonormal: all that this kind of fault can do beyond the frames, to first order."""
-        if fault.name not in self.bases:
-            self.bases[fault.name] = self._basis(fault)
-        return self.bases[fault.name]
-
-    def _basis(self, fault: Fault) -> Array:
+        if fault.name in self.bases:
+            return self.bases[fault.name]
         draw = fault.draw(self.setting, np.random.default_rng(0))
         fixed = dict(fault.fixed)
         columns = []
@@ -103,10 +100,12 @@ class Gauge:
                 column = self.left(self.slope(fault, unit))
                 if self.rms(column) > 1e-12:
                     columns.append(column / np.linalg.norm(column))
-        if not columns:
-            return np.zeros((len(self.frames), 0))
-        left, size, _ = np.linalg.svd(np.column_stack(columns), full_matrices=False)
-        return np.asarray(left[:, size > 1e-3 * size[0]])
+        found = np.zeros((len(self.frames), 0))
+        if columns:
+            left, size, _ = np.linalg.svd(np.column_stack(columns), full_matrices=False)
+            found = np.asarray(left[:, size > 1e-3 * size[0]])
+        self.bases[fault.name] = found
+        return found
 
     def beyond(self, fault: Fault, moved: Array, others: Iterable[str], together: int = 1) -> dict[str, float]:
         """Rms per axis that other kinds of fault leave of a displacement at their best, one or several ``together``."""
@@ -136,14 +135,14 @@ def testable(fault: Fault, gauge: Gauge) -> bool:
     return all(known.get(want, True) for want in fault.wants)
 
 
-def sized(gauge: Gauge, fault: Fault, values: Array, wanted: float, measure: Callable[[Array], float]) -> Array:
-    """Scale values until a measure of their displacement is as wanted; a few rounds, as faults are nearly linear.
+def sized(gauge: Gauge, fault: Fault, values: Array, wanted: float) -> Array:
+    """Scale values until what they leave after alignment is as wanted; a few rounds, as faults are nearly linear.
 
     An encoder's steps are not: of the rounds the one that comes nearest counts.
     """
     nearest = np.inf, values
     for _ in range(_ROUNDS):
-        reached = measure(gauge.moved(fault, values))
+        reached = gauge.leaves(fault, values)
         if reached <= 1e-12:
             raise Unseen(f"{fault.name} cannot be seen in this campaign")
         nearest = min(nearest, (abs(float(np.log(wanted / reached))), values), key=lambda found: found[0])
@@ -206,16 +205,7 @@ def truth(
 ) -> dict[str, Any]:
     """Return the truth of :mod:`thermal_robot.blind.cases`, without the rows that are spoilt.
 
-    Parameters
-    ----------
-    case
-        What is asked.
-    gauge
-        Of the rows that are given.
-    done, background
-        Faults with their values: those that are asked for, and those that are always there.
-    noise
-        One sigma per axis, m.
+    Of faults that are asked for, and of those that are always there; ``noise`` is one sigma per axis, m.
     """
     parts: dict[str, Any] = {}
     answers: list[Place] = []
@@ -227,11 +217,11 @@ def truth(
         where = [item[0] for item in clear]
         main = any(fault is other for other, _ in done)
         listed = _named(where if fault.few else [])
-        parts[fault.name] = {"ratio": _ratio(gauge, fault, values, noise), "main": main, "places": listed}
+        parts[fault.name] = {"ratio": gauge.leaves(fault, values) / noise, "main": main, "places": listed}
         for other, columns in fault.also:
             part = np.zeros_like(values)
             part[:, list(columns)] = values[:, list(columns)]
-            parts.setdefault(other, {"ratio": _ratio(gauge, fault, part, noise), "main": False, "places": listed})
+            parts.setdefault(other, {"ratio": gauge.leaves(fault, part) / noise, "main": False, "places": listed})
         if main and (fault.name == case.unlisted or case.kind in ("removed", "hidden")):
             answers += [*where, *_joints_of(gauge.setting, fault, [item[1] for item in clear])]
             quantities += fault.quantities(gauge.setting, where)
@@ -264,10 +254,6 @@ def near(world: World, places: Sequence[Place]) -> list[Place]:
     at[("tool", "tool")] = moved + 1.0
     steps = [at[place] for place in places]
     return [place for place, here in at.items() if any(abs(here - step) <= 1.0 for step in steps)]
-
-
-def _ratio(gauge: Gauge, fault: Fault, values: Array, noise: float) -> float:
-    return gauge.rms(gauge.left(gauge.moved(fault, values))) / noise
 
 
 def _joints_of(setting: Setting, fault: Fault, numbers: Sequence[int]) -> list[Place]:
@@ -305,9 +291,10 @@ class Spot:
         result[self.number, SIZE] += by
         return result
 
-    def place(self, setting: Setting) -> Place:
-        """Return where it is."""
-        return self.fault.places(setting)[self.number]
+    def named(self, setting: Setting) -> dict[str, Any]:
+        """Return the effect, and where it is."""
+        [place] = _named([self.fault.places(setting)[self.number]])
+        return {"effect": self.fault.name, "place": place}
 
     def told(self, setting: Setting, values: Array, by: float) -> tuple[str, float]:
         """Return the name of the parameter that this is, and by how much that changes."""
@@ -330,28 +317,11 @@ def draw_spot(fault: Fault, values: Array, rng: np.random.Generator) -> Spot:
 def deviation(
     gauge: Gauge, spot: Spot, values: Array, others: Sequence[tuple[Fault, Array]], noise: float
 ) -> tuple[float, float]:
-    """Return how well a campaign tells one number of a fault, and what a unit of it leaves after alignment.
+    """Return the standard deviation σ / |x − P x| of one number of a fault, whose unit moves the target by x, (3M,).
 
-    Parameters
-    ----------
-    gauge
-        Of the campaign's rows.
-    spot, values
-        Which number, and the fault as it is.
-    others
-        All other faults at work.
-    noise
-        One sigma per axis, m.
-
-    Returns
-    -------
-    tuple
-        Standard deviation in the unit of the values, and rms per axis in m of one unit.
-
-    Raises
-    ------
-    Unseen
-        If frames or other numbers do the same.
+    P projects on the columns of unknown frames, of every joint's zero, and of all other numbers at work; σ is the noise
+    per axis, m. The program that is put to the test takes no part in that. Also the rms per axis, m, of what a unit of
+    the number leaves after alignment.
     """
     known = {fault.name: values for fault, values in [*others, (spot.fault, values)]}
     known.setdefault(_ZEROS, np.zeros((gauge.setting.world.n, 1)))
@@ -385,8 +355,7 @@ def _columns(gauge: Gauge, fault: Fault, values: Array) -> Iterator[tuple[tuple[
 
 def _span(gauge: Gauge, every: Array) -> Array:
     """(3M, R) orthonormal: all that these columns can do beside the frames."""
-    aligned = every - gauge.frames @ (gauge.frames.T @ every)
-    length = np.linalg.norm(every, axis=0)
+    aligned, length = gauge.left(every), np.linalg.norm(every, axis=0)
     kept = np.linalg.norm(aligned, axis=0) > _SEEN * length
     if not kept.any():
         return np.zeros((len(every), 0))

@@ -10,8 +10,25 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.blind.reality.fault import Fault, Place, clock, joints, milli, one, own_position, part, within
-from thermal_robot.blind.reality.faults import FAULTS, waves
+from thermal_robot.blind.reality.fault import (
+    FAULTS,
+    Fault,
+    Place,
+    Quantities,
+    base,
+    clock,
+    follows,
+    in_joints,
+    milli,
+    one,
+    own_position,
+    parents,
+    part,
+    tool,
+    warmths,
+    waves,
+    within,
+)
 from thermal_robot.blind.reality.setting import Setting
 from thermal_robot.blind.reality.world import Body
 from thermal_robot.errors import EffectError
@@ -99,53 +116,32 @@ def _draw_crane(setting: Setting, rng: np.random.Generator) -> Array:
     return np.append(twist, [rng.uniform(*_LASTS), rng.integers(_SEEDS)])[None]
 
 
-def _nothing(setting: Setting, places: object) -> tuple[str, ...]:
-    """Nothing that was recorded: that is the right answer."""
-    return ("none",)
-
-
+_SESSION = follows("session", "time", "order")
+_NOTHING = follows("none")
+"""Nothing that was recorded: that is the right answer."""
 ELUSIVE = (
     waves("slow_wave", SLOW),
-    Fault(
+    in_joints(
         "winding",
         one(milli, *[part(*_SLIPS)] * ELEMENTS, *[part(0.3, 1.0)] * ELEMENTS),
         _winding,
-        joints,
-        few=True,
         quantities=lambda s, places: [q for _, joint in places for q in (f"since_turn.{joint}", joint)],
         fixed=tuple((column, (1.0,)) for column in range(1, 1 + 2 * ELEMENTS)),
     ),
-    Fault(
+    in_joints(
         "rehomed",
         one(*[_zero] * _SESSIONS),
         _rehomed,
-        joints,
-        few=True,
         wants=("sessions",),
-        quantities=lambda s, places: ["session", "time", "order"],
+        quantities=_SESSION,
     ),
-    Fault(
-        "coolant",
-        one(milli, part(*_LASTS), _seed),
-        _coolant,
-        joints,
-        few=True,
-        quantities=_nothing,
-        fixed=((1, (1.0,)), (2, (0.0,))),
+    in_joints(
+        "coolant", one(milli, part(*_LASTS), _seed), _coolant, quantities=_NOTHING, fixed=((1, (1.0,)), (2, (0.0,)))
     ),
-    Fault(
-        "crane",
-        _draw_crane,
-        _crane,
-        lambda s: [("base", "base")],
-        quantities=_nothing,
-        fixed=((6, (1.0,)), (7, (0.0,))),
-    ),
+    Fault("crane", _draw_crane, _crane, base, quantities=_NOTHING, fixed=((6, (1.0,)), (7, (0.0,)))),
 )
 """Free periods, memory, new zeros, and what nobody records."""
 
-
-Quantities = Callable[[Setting, Sequence[Place]], Sequence[str]]
 
 _MIDDLE = (1.0, 1.5)  # of its change: what an effect is at the middle
 
@@ -216,90 +212,70 @@ def _draw_tilt(setting: Setting, rng: np.random.Generator) -> Array:
     return np.concatenate([np.zeros(3), rng.normal(size=2), [0.0]])[None] * 1e-3
 
 
-def _warmths(setting: Setting) -> list[str]:
-    return ["temperature", *(f"temperature.{link}" for link in dict.fromkeys(setting.world.links))]
-
-
-def _payload(setting: Setting) -> list[str]:
-    return ["payload"]
-
-
 def _products(first: Sequence[str], second: Sequence[str]) -> list[str]:
     """Name products in either order."""
     return [name for a in first for b in second for name in (f"{a} * {b}", f"{b} * {a}")]
 
 
-def _changing(of: Callable[[str], Sequence[str]], conditions: Callable[[Setting], Sequence[str]]) -> Quantities:
+def _changing(of: Callable[[str], Sequence[str]], conditions: Quantities) -> Quantities:
     """Name the condition, or its product with what drives the effect itself."""
 
     def quantities(setting: Setting, places: Sequence[Place]) -> list[str]:
-        known = conditions(setting)
+        known = conditions(setting, places)
         return [*known, *(name for _, joint in places for name in _products(of(joint), known))]
 
     return quantities
 
 
 def _late(setting: Setting, places: Sequence[Place]) -> list[str]:
-    names = setting.world.names
-    before = [names[names.index(joint) - 1] for _, joint in places]
-    return _products(("time", "order"), before)
+    return _products(("time", "order"), _before(setting, places))
 
 
 INTERPLAY = (
-    Fault(
+    in_joints(
         "loaded_play",
         _at_and_around(4e-4),
         _loaded_play,
-        joints,
-        few=True,
-        quantities=_changing(lambda joint: [f"approach.{joint}"], _payload),
+        quantities=_changing(lambda joint: [f"approach.{joint}"], follows("payload")),
         also=(("backlash", (0,)),),
     ),
-    Fault(
+    in_joints(
         "warm_spring",
         _at_and_around(1e-5),
         _warm_spring,
-        joints,
-        few=True,
         wants=("sensor:links",),
-        quantities=_changing(lambda joint: [joint, f"torque.{joint}"], _warmths),
+        quantities=_changing(lambda joint: [joint, f"torque.{joint}"], warmths),
         also=(("joint_compliance", (0,)),),
     ),
-    Fault(
+    in_joints(
         "warm_gain",
         _at_and_around(1e-3),
         _warm_gain,
-        joints,
-        few=True,
         wants=("sensor:links",),
-        quantities=_changing(lambda joint: [joint], _warmths),
+        quantities=_changing(lambda joint: [joint], warmths),
         also=(("joint_gain", (0,)),),
     ),
-    Fault(
+    in_joints(
         "hot_under_load",
         one(milli),
         _hot_under_load,
-        joints,
-        few=True,
         wants=("motor_temperature",),
-        quantities=lambda s, places: _products(["motor_temperature"], ["payload"]),
+        quantities=follows(*_products(["motor_temperature"], ["payload"])),
     ),
-    Fault(
+    in_joints(
         "fast_under_load",
         one(milli),
         _fast_under_load,
-        joints,
-        few=True,
         wants=("speed",),
-        quantities=lambda s, places: _products(["speed"], ["payload"]),
+        quantities=follows(*_products(["speed"], ["payload"])),
     ),
-    Fault("late_hose", one(milli), _late_hose, joints, few=True, quantities=_late),
+    in_joints("late_hose", one(milli), _late_hose, quantities=_late),
     Fault(
         "sinking_floor",
         _draw_tilt,
         _sinking_floor,
-        lambda s: [("base", "base")],
-        quantities=lambda s, places: _products(("time", "order"), ["payload"]),
+        base,
+        quantities=follows(*_products(("time", "order"), ["payload"])),
     ),
 )
 """Effects that change with a condition, and products of two quantities."""
@@ -390,12 +366,8 @@ def _brake(body: Body, setting: Setting, values: Array) -> None:
     body.joints += values[:, 0] * np.exp(-run / (values[:, 1].max() * setting.time[-1]))[:, None]
 
 
-def _base(setting: Setting) -> list[Place]:
-    return [("base", "base")]
-
-
-def _tool(setting: Setting) -> list[Place]:
-    return [("tool", "tool")]
+def _draw_nest(setting: Setting, rng: np.random.Generator) -> Array:
+    return np.array([[1e-4, float(rng.integers(3))]])
 
 
 def _before(setting: Setting, places: Sequence[Place]) -> list[str]:
@@ -407,95 +379,43 @@ def _tilt(setting: Setting, rng: np.random.Generator) -> Array:
     return np.concatenate([np.zeros(3), rng.normal(size=2), [0.2 * rng.normal()]])[None] * 1e-3
 
 
-UNLISTED: dict[str, Fault] = {
-    fault.name: fault
-    for fault in (
-        Fault("slip", one(milli, part(0.35, 0.65)), _slip, joints, few=True, quantities=clock, fixed=((1, (0.5,)),)),
-        Fault(
-            "cable_pull",
-            one(milli, within(0.35, 0.75)),
-            _cable,
-            joints,
-            few=True,
-            quantities=own_position,
-            fixed=((1, (0.0,)),),
-        ),
-        Fault("hose", one(milli, within(0.3, 0.7)), _hose, joints, few=True, quantities=_before, fixed=((1, (0.0,)),)),
-        Fault(
-            "hot_motor",
-            one(milli),
-            _hot_motor,
-            joints,
-            few=True,
-            wants=("motor_temperature",),
-            quantities=lambda s, places: ["motor_temperature"],
-        ),
-        Fault(
-            "loose_nest",
-            lambda s, rng: np.array([[1e-4, float(rng.integers(3))]]),
-            _nest,
-            _tool,
-            quantities=lambda s, places: GRAVITY,
-            fixed=((1, (0.0,)),),
-        ),
-        Fault(
-            "remounted_target",
-            lambda s, rng: rng.normal(size=(4, 3)) * 1e-4,
-            _remounted,
-            lambda s: [("tool", "tool")] * 4,
-            wants=("sessions",),
-            quantities=lambda s, places: ["session", "time", "order"],
-        ),
-        Fault(
-            "yielding_bolt",
-            _draw_bolt,
-            _bolt,
-            lambda s: [("link", j.parent) for j in s.world.chain],
-            few=True,
-            quantities=clock,
-            fixed=((6, (0.5,)),),
-        ),
-        Fault(
-            "damaged_teeth",
-            one(milli, within(0.25, 0.75), part(0.2, 0.4)),
-            _tooth,
-            joints,
-            few=True,
-            quantities=own_position,
-            fixed=((1, (0.0,)), (2, (0.3,))),
-        ),
-        Fault(
-            "speed_droop",
-            one(milli),
-            _droop,
-            joints,
-            few=True,
-            wants=("speed",),
-            quantities=lambda s, places: ["speed"],
-        ),
-        Fault(
-            "damp_platform",
-            _tilt,
-            _platform,
-            _base,
-            wants=("humidity",),
-            quantities=lambda s, places: ["humidity"],
-        ),
-        Fault(
-            "relaxing_joint",
-            one(milli, part(0.03, 0.1)),
-            _brake,
-            joints,
-            few=True,
-            wants=("sessions",),
-            quantities=lambda s, places: ["time", "order", "session"],
-            fixed=((1, (0.05,)),),
-        ),
-        *INTERPLAY,
-        *ELUSIVE,
-    )
-}
-"""Eleven kinds of one quantity at one place, and those of the two other modules, by name."""
+_ALL = (
+    in_joints("slip", one(milli, part(0.35, 0.65)), _slip, quantities=clock, fixed=((1, (0.5,)),)),
+    in_joints("cable_pull", one(milli, within(0.35, 0.75)), _cable, quantities=own_position, fixed=((1, (0.0,)),)),
+    in_joints("hose", one(milli, within(0.3, 0.7)), _hose, quantities=_before, fixed=((1, (0.0,)),)),
+    in_joints(
+        "hot_motor", one(milli), _hot_motor, wants=("motor_temperature",), quantities=follows("motor_temperature")
+    ),
+    Fault("loose_nest", _draw_nest, _nest, tool, quantities=follows(*GRAVITY), fixed=((1, (0.0,)),)),
+    Fault(
+        "remounted_target",
+        lambda s, rng: rng.normal(size=(4, 3)) * 1e-4,
+        _remounted,
+        lambda s: tool(s) * 4,
+        wants=("sessions",),
+        quantities=_SESSION,
+    ),
+    Fault("yielding_bolt", _draw_bolt, _bolt, parents, few=True, quantities=clock, fixed=((6, (0.5,)),)),
+    in_joints(
+        "damaged_teeth",
+        one(milli, within(0.25, 0.75), part(0.2, 0.4)),
+        _tooth,
+        quantities=own_position,
+        fixed=((1, (0.0,)), (2, (0.3,))),
+    ),
+    in_joints("speed_droop", one(milli), _droop, wants=("speed",), quantities=follows("speed")),
+    Fault("damp_platform", _tilt, _platform, base, wants=("humidity",), quantities=follows("humidity")),
+    in_joints(
+        "relaxing_joint",
+        one(milli, part(0.03, 0.1)),
+        _brake,
+        wants=("sessions",),
+        quantities=follows("time", "order", "session"),
+        fixed=((1, (0.05,)),),
+    ),
+)
+UNLISTED: dict[str, Fault] = {fault.name: fault for fault in (*_ALL, *INTERPLAY, *ELUSIVE)}
+"""Eleven kinds of one quantity at one place, those that interplay and those that elude, by name."""
 
 
 def load(where: str) -> Fault:

@@ -152,12 +152,10 @@ def _joint(node: ElementTree.Element) -> Joint:
         axis=axis / max(float(np.linalg.norm(axis)), 1e-12),
         lower=float(limit.get("lower", 0.0)) if bounded and limit is not None else -np.inf,
         upper=float(limit.get("upper", 0.0)) if bounded and limit is not None else np.inf,
-        mimic=None if mimic is None else _coupling(mimic),
+        mimic=None
+        if mimic is None
+        else (mimic.attrib["joint"], float(mimic.get("multiplier", 1.0)), float(mimic.get("offset", 0.0))),
     )
-
-
-def _coupling(node: ElementTree.Element) -> tuple[str, float, float]:
-    return node.attrib["joint"], float(node.get("multiplier", 1.0)), float(node.get("offset", 0.0))
 
 
 def _numbers(node: ElementTree.Element | None, name: str) -> Array:
@@ -250,8 +248,8 @@ class World:
     coupling, rest
         (m, n) and (m,) where the m movable joints of the chain stand, those that follow another one among them:
         coupling · q + rest.
-    segments
-        Indices into ``chain`` of placements with a length, S of them.
+    segments, pieces
+        Indices into ``chain`` of placements with a length, S of them, and length of the pieces of each one's beam, m.
     slides
         (n,) whether a joint slides, so that its position is in m, instead of turning.
     """
@@ -268,14 +266,11 @@ class World:
         self.links = tuple(self.chain[k].parent for k in self.segments)
         self.lower = np.array([j.lower for j in self.joints])
         self.upper = np.array([j.upper for j in self.joints])
+        self.n = len(self.joints)
+        self.pieces = np.array([np.linalg.norm(self.chain[k].xyz) for k in self.segments]) / NODES
         self.coupling, self.rest = self._coupling()
         self._com = payload_com
         self._sound: dict[bool, mujoco.MjModel] = {}
-
-    @property
-    def n(self) -> int:
-        """Number of joints that are commanded."""
-        return len(self.joints)
 
     def _coupling(self) -> tuple[Array, Array]:
         joints = {j.name: j for j in self.tree.joints}
@@ -342,8 +337,7 @@ class World:
             free[address] = self.coupling @ (q[i] + body.joints[i]) + self.rest
             free[nodes] = (body.bow[i, : len(nodes)] * pieces[:, None])[:, :, None]
             torque[i] = _settle(model, data, free, compliance)[address] @ self.coupling
-            poses[i, :3, :3] = data.xmat[tool].reshape(3, 3)
-            poses[i, :3, 3] = data.xpos[tool]
+            poses[i] = _pose(data, tool)
         return poses, torque
 
     def overturning(self, q: Array, payload: Array) -> Array:
@@ -358,11 +352,6 @@ class World:
             mujoco.mj_kinematics(model, data)
             moments[i] = np.cross(model.body_mass @ data.xipos, model.opt.gravity)
         return moments
-
-    @property
-    def pieces(self) -> Array:
-        """(S,) length of the pieces of each segment's beam, m."""
-        return np.array([np.linalg.norm(self.chain[k].xyz) for k in self.segments]) / NODES
 
     def address(self, model: mujoco.MjModel) -> list[int]:
         """Return where the m movable joints of the chain stand among the coordinates."""
@@ -463,14 +452,21 @@ class World:
             model.body_quat[body] = quaternion(rotation @ error[:3, :3])
 
 
+def _held(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
+    """Return what holds every coordinate against gravity."""
+    held = np.zeros(model.nv)
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    mujoco.mj_rne(model, data, 0, held)
+    return held
+
+
 def _settle(model: mujoco.MjModel, data: mujoco.MjData, free: Array, compliance: Array) -> Array:
     """Let joints yield from where they are free until springs balance gravity; return what holds them, N·m."""
-    held, yields = np.zeros(model.nv), bool(compliance.any())
+    yields = bool(compliance.any())
     data.qpos[:] = free
     for _ in range(_ROUNDS):
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
-        mujoco.mj_rne(model, data, 0, held)
+        held = _held(model, data)
         settled = free - compliance @ held
         change = float(np.abs(settled - data.qpos).max())
         data.qpos[:] = settled
@@ -565,15 +561,6 @@ def slopes(world: World, q: Array, payload: Array, target: Array) -> Slopes:
         )
     poses, joints, torque, placements, growth, bow, sag = (np.stack(part) for part in zip(*rows, strict=True))
     return Slopes(poses, target, joints, torque, placements, growth, bow, sag)
-
-
-def _held(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
-    """Return what holds every coordinate against gravity."""
-    held = np.zeros(model.nv)
-    mujoco.mj_kinematics(model, data)
-    mujoco.mj_comPos(model, data)
-    mujoco.mj_rne(model, data, 0, held)
-    return held
 
 
 def _pose(data: mujoco.MjData, body: int) -> Array:
