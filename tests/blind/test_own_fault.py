@@ -13,7 +13,7 @@ from thermal_robot.errors import EffectError
 FAULT = """
 import numpy as np
 from thermal_robot.blind.reality import Fault
-from thermal_robot.blind.reality.faults import joints
+from thermal_robot.blind.reality.fault import joints
 
 def draw(setting, rng):
     values = np.zeros((setting.world.n, 1))

@@ -57,20 +57,8 @@ def refitted(found: Diagnosis, campaign: Campaign, samples: Campaign) -> dict[st
     size that they have in it, the more so the more a subset leaves: what it leaves counts as noise, of positions and of
     orientations apart. So the held-out shares of a diagnosis are defined, too. All effects together are the model.
 
-    Parameters
-    ----------
-    found
-        The diagnosis.
-    campaign
-        What it was made from.
-    samples
-        Commands and conditions.
-
-    Returns
-    -------
-    dict
-        By names joined with ``+``: (M, 3) positions in the measurement frame, m. Empty where there are more than
-        :data:`MOST` effects, or none.
+    Returns (M, 3) positions in the measurement frame, m, by names joined with ``+``; nothing where there are more than
+    :data:`MOST` effects, or none.
     """
     model = found.model
     if not 0 < len(model.effects) <= MOST:
@@ -146,15 +134,10 @@ CAMPAIGN, FRESH, MODEL = "campaign.toml", "fresh.csv", "model.json"
 
 
 class Fence:
-    """An audit hook that refuses every file of the trial except those of the folder in question.
+    """An audit hook that refuses every file of the trial's directory except those of the folder in question.
 
     It keeps honest code honest: a compiled library that opens files past Python is not seen. The seal does not depend
     on it.
-
-    Parameters
-    ----------
-    directory
-        Of the trial.
     """
 
     def __init__(self, directory: Path) -> None:
@@ -229,16 +212,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.addaudithook(fence)
         # the first diagnosis of a process also pays for imports; none of the trial's is to be the first
         diagnose(demo_directory())
-        _say(replies, {"ready": True})
+        print(json.dumps({"ready": True}), file=replies, flush=True)
         for line in sys.stdin:
             request = json.loads(line)
             fence.allow(Path(request["folder"]))
-            _say(replies, answer(request))
+            print(json.dumps(answer(request)), file=replies, flush=True)
     return 0
-
-
-def _say(replies: Any, reply: dict[str, Any]) -> None:
-    print(json.dumps(reply), file=replies, flush=True)
 
 
 def _within(path: str, folder: str) -> bool:
@@ -246,54 +225,28 @@ def _within(path: str, folder: str) -> bool:
 
 
 Plain = dict[str, Any]
-_DATE = "date"
 
 
 def comparison(folder: Path, only: Sequence[str]) -> Plain:
-    """Compare the campaigns that are listed in a folder.
-
-    Parameters
-    ----------
-    folder
-        With the list and the campaigns.
-    only
-        Names of effects; all where empty.
-
-    Returns
-    -------
-    dict
-        Of the format ``thermal-robot/comparison/1``.
-    """
+    """Compare the campaigns that are listed in a folder: ``thermal-robot/comparison/1``."""
     listed = campaigns(folder / LISTED)
     names = [name for name, _ in listed.campaigns]
     return compare(*(listed.folder(name) for name in names), names=names, only=only or None).to_dict()
 
 
 def followed(folder: Path, only: Sequence[str]) -> Plain:
-    """Follow the robot of dated campaigns; ``folder`` and ``only`` as for :func:`comparison`.
-
-    Returns
-    -------
-    dict
-        Of the format ``thermal-robot/wear/1``.
-    """
+    """Follow the robot of dated campaigns: ``thermal-robot/wear/1``."""
     listed = campaigns(folder / LISTED)
-    date = listed.names.index(_DATE)
-    return wear(
-        [(labels[date], listed.folder(name)) for name, labels in listed.campaigns], effects=only or None
-    ).to_dict()
+    date = listed.names.index("date")
+    dated = [(labels[date], listed.folder(name)) for name, labels in listed.campaigns]
+    return wear(dated, effects=only or None).to_dict()
 
 
 def fleet(folder: Path, only: Sequence[str]) -> Plain:
-    """Diagnose the robots of a fleet and summarise; ``folder`` and ``only`` as for :func:`comparison`.
+    """Diagnose the robots of a fleet and summarise: ``thermal-robot/fleet/1``.
 
     It is what :func:`~thermal_robot.diagnose_many` does, but within this process: those of Dask would stand outside
     the fence, and outlive an examinee that is ended.
-
-    Returns
-    -------
-    dict
-        Of the format ``thermal-robot/fleet/1``.
     """
     listed = campaigns(folder / LISTED)
     write_rows(folder / TABLE, listed.names, _rows(listed, only))

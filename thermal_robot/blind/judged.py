@@ -22,31 +22,40 @@ right         removed, unlisted: flagged and nothing blamed; both: that, and lis
 ============= =====================================================================================================
 
 An effect that is not among the truth's but leaves 0.1 noise or more is no false alarm: it is at work. Below 0.5 it is
-not asked for either. Of several campaigns: :mod:`thermal_robot.blind.judged`.
+not asked for either. Of several campaigns:
+
+============= =====================================================================================================
+exact         same, steady: nothing is told to have changed; changed, series: that is told which did change, rightly in
+              all that is asked of it, and nothing else; fleet: all that is shared and nothing else is called shared
+found         the effect and the place of what changed are told
+false_alarm   something else is told to have changed; something is called shared that is not
+listed        same, changed: all effects at work keep their name
+way           series: it is told as a jump or as a trend, rightly; what began is a jump from nothing
+day           the two campaigns between which it began or jumped
+day_within    ... lie within the 95 % interval that is told, where it is told as a jump
+place         the joint rings, whatever effect is blamed
+amount        the 95 % interval of its size holds the true one, where it is found and its way is right
+shared_found  what robots share is called shared: of one hall, by these robots' hall
+own_kept      what one robot has alone is not called shared
+own_named     ... is told of that robot: it stands out, or its diagnosis has it
+============= =====================================================================================================
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from typing import Any
+from typing import Any, get_args
 
-from thermal_robot.blind.cases import SEVERAL
+from thermal_robot.blind.cases import SEVERAL, Known
 
-_SIGMAS = 1.959963984540054
+SIGMAS = 1.959963984540054
+"""Half the width of a normal law's central 95 %, in standard deviations."""
 _WAYS = {"begins": "jump", "jumps": "jump", "grows": "trend"}
 _HALL = "hall"
 
 
 def compared(truth: Plain, said: Plain) -> Marks:
-    """Judge a comparison of two campaigns.
-
-    Parameters
-    ----------
-    truth
-        As in :mod:`thermal_robot.blind.cases`.
-    said
-        Of the format ``thermal-robot/comparison/1``.
-    """
+    """Judge a comparison of two campaigns, of the format ``thermal-robot/comparison/1``."""
     kept = set(truth["effects"]) <= set(said["verdict"]["effects"])
     right, others = _parted(truth, said["changes"])
     if not truth["changes"]:
@@ -56,15 +65,7 @@ def compared(truth: Plain, said: Plain) -> Marks:
 
 
 def followed(truth: Plain, said: Plain) -> Marks:
-    """Judge what is said of a robot over time.
-
-    Parameters
-    ----------
-    truth
-        As in :mod:`thermal_robot.blind.cases`.
-    said
-        Of the format ``thermal-robot/wear/1``.
-    """
+    """Judge what is said of a robot over time, of the format ``thermal-robot/wear/1``."""
     rings = [p for p in said["parameters"] if p["alarm"]]
     right, others = _parted(truth, rings)
     if not truth["changes"]:
@@ -84,15 +85,7 @@ def followed(truth: Plain, said: Plain) -> Marks:
 
 
 def shared(truth: Plain, said: Plain) -> Marks:
-    """Judge the summary of a fleet.
-
-    Parameters
-    ----------
-    truth
-        As in :mod:`thermal_robot.blind.cases`.
-    said
-        Of the format ``thermal-robot/fleet/1``.
-    """
+    """Judge the summary of a fleet, of the format ``thermal-robot/fleet/1``."""
     called = [s for s in said["shared"] if not any(_same(s, true) for true in truth["shared"])]
     true_ones = {true["effect"] for true in truth["shared"]}
     gathered = [g for g in said["gathered"] if g["effect"] not in true_ones]
@@ -142,7 +135,7 @@ def _parted(truth: Plain, told: list[Plain]) -> tuple[list[Plain], list[Plain]]:
 
 
 def _holds(told: Plain, amount: float) -> bool:
-    return bool(abs(told["change"] - amount) <= _SIGMAS * told["change_std"])
+    return bool(abs(told["change"] - amount) <= SIGMAS * told["change_std"])
 
 
 def _same(told: Plain, true: Plain) -> bool:
@@ -173,8 +166,7 @@ ABSENT, PRESENT = 0.1, 0.5  # × noise: what leaves less is not there, what leav
 BLAME = 0.9
 BAD = frozenset({"false_alarm"})
 """Questions to which yes is wrong."""
-KNOWN = ("single", "large", "visits", "lags", "pair", "many", "null", "hard")
-"""Kinds of which all causes are in the library."""
+KNOWN: tuple[str, ...] = get_args(Known)
 HEADLINE = {
     **dict.fromkeys((*KNOWN, *SEVERAL), "exact"),
     "mixed": "sound",
@@ -241,18 +233,7 @@ def is_absent(record: Record, effect: str) -> bool:
 
 
 def marks(record: Record) -> Marks:
-    """Judge one record.
-
-    Parameters
-    ----------
-    record
-        As in :mod:`thermal_robot.blind.cases`.
-
-    Returns
-    -------
-    dict
-        Answers by question: one, or one for each effect found; a question that cannot be asked is missing.
-    """
+    """Judge one record: answers by question, one or one for each effect found; what cannot be asked is missing."""
     answers = _ASKED[record["kind"]](record)
     if failed(record):
         return {name: (name in BAD,) * len(given) for name, given in answers.items()}
@@ -380,17 +361,13 @@ def _several(judge: Callable[[Plain, Plain], Marks]) -> Callable[[Record], Marks
     return lambda record: judge(record["truth"], said(record))
 
 
-def _real(record: Record) -> Marks:
-    return {"right": (bool(record.get("right", False)),)}
-
-
 _ASKED: dict[str, Callable[[Record], Marks]] = {
     **dict.fromkeys(KNOWN, _known),
     "mixed": _mixed,
     **dict.fromkeys(("removed", "unlisted"), _unknown),
     "both": _both,
     "hidden": _hidden,
-    "real": _real,
+    "real": lambda record: {"right": (bool(record.get("right", False)),)},
     **dict.fromkeys(("same", "changed"), _several(compared)),
     **dict.fromkeys(("steady", "series"), _several(followed)),
     "fleet": _several(shared),

@@ -54,16 +54,7 @@ _FRAMES = ("base_frame", "tool_frame")
 
 
 def turns(kind: str, effects: Sequence[str], causes: Sequence[str], rng: np.random.Generator) -> Iterator[Asked]:
-    """Yield what is asked in cases of one kind, without end.
-
-    Parameters
-    ----------
-    kind
-        As in :mod:`thermal_robot.blind.cases`, without ``real``.
-    effects, causes
-        Listed and unlisted ones that may be asked for.
-    rng
-        For the order, and for what is left to chance.
+    """Yield what is asked in cases of one kind of a single campaign, without end, of these effects and unlisted causes.
 
     Raises
     ------
@@ -173,16 +164,7 @@ _FLEETS: tuple[How, ...] = ("all", "hall", "")
 
 
 def turns_of_several(kind: str, effects: Sequence[str], rng: np.random.Generator) -> Iterator[Asked]:
-    """Yield what is asked in cases of one kind, without end.
-
-    Parameters
-    ----------
-    kind
-        ``same``, ``changed``, ``steady``, ``series`` or ``fleet``.
-    effects
-        That may be asked for.
-    rng
-        For the order, and for what is left to chance.
+    """Yield what is asked in cases of one kind of several campaigns, without end, of these effects.
 
     Raises
     ------
@@ -254,46 +236,28 @@ ROBOTS = (
 )
 """Name, URDF and tool frame of the trial's robots."""
 
-SHORT = {
-    "single": 12,
-    "large": 6,
-    "visits": 2,
-    "lags": 3,
-    "pair": 6,
-    "many": 4,
-    "null": 6,
-    "hard": 6,
-    "mixed": 8,
-    "removed": 4,
-    "hidden": 2,
-    "unlisted": 8,
-    "both": 2,
-    "same": 1,
-    "changed": 2,
-    "steady": 1,
-    "series": 2,
-    "fleet": 1,
+_SIZES = {
+    "single": (12, 200),
+    "large": (6, 100),
+    "visits": (2, 60),
+    "lags": (3, 99),
+    "pair": (6, 100),
+    "many": (4, 60),
+    "null": (6, 100),
+    "hard": (6, 100),
+    "mixed": (8, 700),
+    "removed": (4, 40),
+    "hidden": (2, 24),
+    "unlisted": (8, 216),
+    "both": (2, 48),
+    "same": (1, 60),
+    "changed": (2, 100),
+    "steady": (1, 60),
+    "series": (2, 96),
+    "fleet": (1, 30),
 }
-FULL = {
-    "single": 200,
-    "large": 100,
-    "visits": 60,
-    "lags": 99,
-    "pair": 100,
-    "many": 60,
-    "null": 100,
-    "hard": 100,
-    "mixed": 700,
-    "removed": 40,
-    "hidden": 24,
-    "unlisted": 216,
-    "both": 48,
-    "same": 60,
-    "changed": 100,
-    "steady": 60,
-    "series": 96,
-    "fleet": 30,
-}
+"""How many cases of each kind a short trial has, and a full one."""
+SHORT, FULL = ({kind: counts[k] for kind, counts in _SIZES.items()} for k in (0, 1))
 
 
 def robots(chosen: Sequence[tuple[str, str, str]] = ROBOTS) -> tuple[RobotChoice, ...]:
@@ -353,10 +317,9 @@ def plan(
     from thermal_robot.blind.reality import FAULTS, UNLISTED
 
     for kind in counts:
-        if kind not in get_args(Kind) or kind == "real":
-            raise EffectError(
-                f"there is no kind of case {kind!r}; known: {', '.join(k for k in get_args(Kind) if k != 'real')}"
-            )
+        known = [k for k in get_args(Kind) if k != "real"]
+        if kind not in known:
+            raise EffectError(f"there is no kind of case {kind!r}; known: {', '.join(known)}")
     for name in (*only_effects, *unlisted):
         if name not in FAULTS and name not in UNLISTED:
             raise EffectError(f"the trial cannot make {name!r}; it can make {', '.join((*FAULTS, *UNLISTED))}")

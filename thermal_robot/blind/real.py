@@ -21,7 +21,9 @@ later                     the first 70 % by time are diagnosed: on the rest the 
                           the held-out rms that the diagnosis claims
 ========================= ==================================================================================
 
-A slip, an offset or lost motion sits in one of the joints 2 .. n−2: the frames would take in that of the others.
+Commands are changed, never the robot: where the robot stood when it was measured, it still stands, and the table says
+something else. Only a scale and the growth of links change what was measured, orientations nothing. A slip, an offset
+or lost motion sits in one of the joints 2 .. n−2: the frames would take in that of the others.
 """
 
 from __future__ import annotations
@@ -38,7 +40,7 @@ from numpy.typing import NDArray
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign, read_campaign, write_campaign, write_table
 from thermal_robot.inference.rows import in_order
-from thermal_robot.kinematics import Displacement, exp6, tool_poses
+from thermal_robot.kinematics import Displacement, align, exp6, tool_poses
 from thermal_robot.observations import Frames, Observations, observe
 from thermal_robot.percents import percent
 
@@ -49,14 +51,7 @@ _SHORTEST = 1e-9  # m: a shorter segment has no direction along which it grows
 def with_joint_error(campaign: Campaign, joint: int, error: Array | float) -> Campaign:
     """Return the campaign with commands as if the joint were off: actual = command in the table + error.
 
-    Parameters
-    ----------
-    campaign
-        N rows.
-    joint
-        Number of the joint in the chain.
-    error
-        Scalar or (N,), rad: a constant is a zero offset, a step a slip, −½ b·approach lost motion.
+    A scalar or (N,), rad: a constant is a zero offset, a step a slip, −½ b·approach lost motion.
     """
     q = campaign.q.copy()
     q[:, joint] -= error
@@ -81,16 +76,9 @@ def with_approaches(campaign: Campaign) -> Campaign:
 
 
 def with_growth(campaign: Campaign, strains: Array, warmer: Array) -> Campaign:
-    """Return the campaign with links that grew along their nominal segments; the table tells no temperature.
+    """Return the campaign with links that grew along their S nominal segments; the table tells no temperature.
 
-    Parameters
-    ----------
-    campaign
-        N rows of a robot with S segments.
-    strains
-        (S,) 1/K.
-    warmer
-        (N,) kelvin above the temperature at which the URDF's lengths hold.
+    Of (S,) strains, 1/K, and (N,) kelvin above the temperature at which the URDF's lengths hold.
     """
     robot, frames = campaign.robot, registered(campaign)
     along = np.array([np.append(s.direction * s.length * (s.length > _SHORTEST), np.zeros(3)) for s in robot.segments])
@@ -125,7 +113,7 @@ def registered(campaign: Campaign) -> Frames:
     """Fit base and target point to the nominal robot by least squares, and nothing else."""
     frames = Frames.declared(campaign)
     predicted = observe(campaign, frames).position
-    frames = Frames(_aligned(predicted, measured(campaign)), frames.tool)
+    frames = Frames(align(predicted, measured(campaign), np.ones(campaign.samples)), frames.tool)
     for _ in range(30):
         seen = observe(campaign, frames)
         columns = frame_columns(seen).reshape(-1, 9)
@@ -157,15 +145,6 @@ def measured(campaign: Campaign) -> Array:
     return np.asarray(campaign.position)
 
 
-def _aligned(source: Array, target: Array) -> Array:
-    """Return the rigid motion (4, 4) that brings points onto others (Umeyama 1991, without scale)."""
-    u, _, vt = np.linalg.svd((target - target.mean(axis=0)).T @ (source - source.mean(axis=0)))
-    motion = np.eye(4)
-    motion[:3, :3] = u @ np.diag([1.0, 1.0, np.linalg.det(u @ vt)]) @ vt
-    motion[:3, 3] = target.mean(axis=0) - motion[:3, :3] @ source.mean(axis=0)
-    return motion
-
-
 Record = dict[str, Any]
 
 WORSE = 1.1  # an absorbed cause may leave so many times what the control leaves
@@ -174,16 +153,9 @@ CLAIM = (0.5, 1.25)  # rms reached over rms claimed
 
 
 def judged(fault: str, record: Record, control: Record | None, remainder: float) -> tuple[bool, str]:
-    """Return whether the answer is right, and the answer in short words.
+    """Return whether the answer is right, and the answer in short words; see :meth:`RealCase.judge`.
 
-    Parameters
-    ----------
-    fault
-        What was asked.
-    record, control
-        As for :meth:`thermal_robot.blind.real.RealCase.judge`.
-    remainder
-        What a full geometry leaves of the campaign, rms distance, m.
+    The remainder is what a full geometry leaves of the campaign, rms distance, m.
     """
     said = record.get("said")
     if said is None:
@@ -322,24 +294,19 @@ class RealCase:
     def make(self, folder: Path) -> Answers:
         """Write what the diagnosis sees, and return the answers.
 
-        Parameters
-        ----------
-        folder
-            Gets campaign.toml, measurements.csv, robot.urdf and, where something is to be predicted, fresh.csv.
-
-        Returns
-        -------
-        dict
-            What of the record (:mod:`thermal_robot.blind.cases`) is known before the diagnosis: ``truth`` with a
-            ``size`` (SI) in its parts, ``noise`` (what a full geometry leaves, per axis), and beside it, both (N, 3) m
-            in the measurement frame or ``None``, ``fresh_position``, measured, and ``fresh_before``, predicted by the
-            nominal robot in the frames that fit the diagnosed rows best.
+        The folder gets campaign.toml, measurements.csv, robot.urdf and, where something is to be predicted, fresh.csv.
+        Returned is what of the record (:mod:`thermal_robot.blind.cases`) is known before the diagnosis: ``truth`` with
+        a ``size`` (SI) in its parts, ``noise`` (what a full geometry leaves, per axis), and beside it, both (N, 3) m in
+        the measurement frame or ``None``, ``fresh_position``, measured, and ``fresh_before``, predicted by the nominal
+        robot in the frames that fit the diagnosed rows best.
         """
         # in the order of measurement, from here on
         whole = _drawn_rows(read_campaign(self.data / self.campaign), self.seed, self.campaign)
         rng = np.random.default_rng([self.seed, self.draw, 2])
         changed, truth, asked = _FAULTS[self.fault](whole, rng, REMAINDERS[self.campaign])
-        fresh_rows = _late(whole.samples) if self.fault == "later" else _kept(whole.samples, self.seed, self.campaign)
+        fresh_rows = _kept(whole.samples, self.seed, self.campaign)
+        if self.fault == "later":
+            fresh_rows = np.arange(whole.samples) >= _EARLY * whole.samples
         if self.fault in ("slip", "hidden"):
             fresh_rows[:] = False  # what nobody can know need not be predicted
         given, fresh = changed.take(~fresh_rows), changed.take(fresh_rows)
@@ -363,35 +330,15 @@ class RealCase:
         return answers
 
     def judge(self, record: dict[str, Any], control: dict[str, Any] | None) -> dict[str, Any]:
-        """Return the record with ``right``, and in short words ``asked`` and ``answer``.
-
-        Parameters
-        ----------
-        record
-            Of this case, with ``truth``, ``asked``, ``said`` and ``fresh``.
-        control
-            The record of the case that ``control`` names.
-        """
+        """Return this case's record with ``right`` and, in short words, ``answer``; ``control`` is that it names."""
         right, answer = judged(self.fault, record, control, REMAINDERS[self.campaign])
         return {**record, "right": right, "answer": answer}
 
 
 def real_cases(data: Path, seed: int, count: int | None = None) -> tuple[RealCase, ...]:
-    """Return the cases of one trial.
+    """Return the cases of one trial, each after its control; a campaign that the folder lacks is left out.
 
-    Parameters
-    ----------
-    data
-        Folder of measured campaigns; those that it lacks are left out.
-    seed
-        Settles everything.
-    count
-        At most so many, controls included; about sixteen where absent.
-
-    Returns
-    -------
-    tuple of RealCase
-        Each after its control.
+    At most ``count``, controls included; about sixteen where absent.
     """
     present = [name for name in REMAINDERS if (data / name / "campaign.toml").is_file()]
     rng = np.random.default_rng([seed, 0])
@@ -433,10 +380,6 @@ def _kept(samples: int, seed: int, name: str) -> NDArray[np.bool_]:
     rng = np.random.default_rng([seed, list(REMAINDERS).index(name), 3])
     spell = np.arange(samples) * _SPELLS // samples
     return np.isin(spell, rng.choice(_SPELLS, _SPELLS // 5, replace=False))
-
-
-def _late(samples: int) -> NDArray[np.bool_]:
-    return np.arange(samples) >= _EARLY * samples
 
 
 Made = tuple[Campaign, Answers, str]

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import asdict, dataclass, fields, is_dataclass
 from itertools import combinations
 from math import factorial
 from typing import Any, get_args
@@ -24,6 +24,7 @@ from thermal_robot.blind.judged import (
     KNOWN,
     LAW,
     PRESENT,
+    SIGMAS,
     Plain,
     Record,
     answer,
@@ -69,10 +70,6 @@ def rate(outcomes: Iterable[bool]) -> Rate:
     """Count outcomes."""
     counted = list(outcomes)
     return Rate(sum(counted), len(counted))
-
-
-SIGMAS = 1.959963984540054
-"""Half the width of a normal law's central 95 %, in standard deviations."""
 
 
 @dataclass(frozen=True)
@@ -274,17 +271,9 @@ def _pairs(record: Record) -> Iterator[tuple[float, bool]]:
 
 
 def reliability(p: NDArray[np.float64], present: NDArray[np.bool_]) -> Reliability:
-    """Sort probabilities into bins.
+    """Return the expected calibration error Σ n_b/N |mean p_b − frequency_b| of (N,) probabilities, and its bins.
 
-    Parameters
-    ----------
-    p, present
-        (N,) each.
-
-    Returns
-    -------
-    Reliability
-        With error = Σ n_b/N |mean p_b − frequency_b| (Naeini et al. 2015; Guo et al. 2017).
+    Naeini et al. 2015; Guo et al. 2017.
     """
     number = np.minimum((p * BINS).astype(int), BINS - 1)  # certainty belongs to the last bin
     bins, error = [], 0.0
@@ -303,24 +292,12 @@ def shares(
 ) -> dict[str, float]:
     """Return each effect's share of the gap's mean square: the Shapley value of what it takes away.
 
-    Parameters
-    ----------
-    predicted
-        By names joined with ``+``, every subset: (M, 3) m, with the frames and this subset fitted to the given rows.
-    true
-        (M, 3) where the target really is, m.
-    noise
-        One sigma per axis, m: the gap that is shared has it in it, as in the claim.
-
-    Returns
-    -------
-    dict
-        By effect; the sum is what all of them together take away. Empty without subsets.
+    Predicted are, for every subset by its names joined with ``+``, (M, 3) positions, m, with the frames and this subset
+    fitted to the given rows; true is where the target really is; the noise, one sigma per axis, m, is in the gap that
+    is shared, as in the claim. The sum is what all effects together take away; empty without subsets.
     """
     left = {
-        frozenset(name.split("+")) if name else frozenset(): float(
-            ((np.asarray(rows) - np.asarray(true)) ** 2).sum(axis=1).mean()
-        )
+        frozenset(filter(None, name.split("+"))): float(((np.asarray(rows) - true) ** 2).sum(axis=1).mean())
         for name, rows in predicted.items()
     }
     players = sorted(frozenset[str]().union(*left))
@@ -496,19 +473,9 @@ def _bounds(edges: Sequence[float]) -> list[tuple[float, float | None]]:
 
 
 def logistic(size: Array, rows: Array, hit: NDArray[np.bool_]) -> Curve:
-    """Fit the curve of detection by penalised maximum likelihood.
+    """Fit the curve of detection by ridge logistic regression (le Cessie & van Houwelingen 1992, Appl. Stat. 41, 191).
 
-    Parameters
-    ----------
-    size, rows
-        (N,) ratio to the noise, and number of rows of the campaign.
-    hit
-        (N,) whether the effect was found.
-
-    Returns
-    -------
-    Curve
-        Ridge as in le Cessie & van Houwelingen 1992 (Appl. Stat. 41, 191), on centred logarithms.
+    On centred logarithms of the (N,) ratios to the noise and numbers of rows; ``hit`` says where the effect was found.
     """
     logs = np.column_stack([np.log(size), np.log(rows)])
     centre = logs.mean(axis=0)
@@ -701,18 +668,7 @@ class Score:
 
 
 def score(records: Sequence[Record]) -> Score:
-    """Score a trial.
-
-    Parameters
-    ----------
-    records
-        As in :mod:`thermal_robot.blind.cases`.
-
-    Returns
-    -------
-    Score
-        A failed diagnosis counts as wrong everywhere.
-    """
+    """Score records as in :mod:`thermal_robot.blind.cases`; a failed diagnosis counts as wrong everywhere."""
     of_kind = {kind: [r for r in records if r["kind"] == kind] for kind in get_args(Kind)}
     known = [r for kind in KNOWN for r in of_kind[kind] if at_work(r)]
     alone = [r for r in records if r["kind"] not in SEVERAL]
@@ -755,24 +711,24 @@ def _rates(records: Iterable[Record]) -> dict[str, Rate]:
     return {question: rate(given) for question, given in answers.items()}
 
 
-def _grouped(named: Iterable[tuple[str, Record]]) -> dict[str, dict[str, Rate]]:
+def _groups(named: Iterable[tuple[str, Record]]) -> list[tuple[str, list[Record]]]:
     groups: dict[str, list[Record]] = defaultdict(list)
     for name, record in named:
         groups[name].append(record)
-    return {name: _rates(groups[name]) for name in sorted(groups)}
+    return sorted(groups.items())
+
+
+def _grouped(named: Iterable[tuple[str, Record]]) -> dict[str, dict[str, Rate]]:
+    return {name: _rates(chosen) for name, chosen in _groups(named)}
 
 
 def _by_effect(records: Sequence[Record]) -> dict[str, dict[str, Rate]]:
-    groups: dict[str, list[Record]] = defaultdict(list)
-    for record in records:
-        for name in at_work(record):
-            groups[name].append(record)
     return {
         name: {
-            "first_named": rate(all(marks(r)["first_named"]) for r in groups[name]),
-            "found": rate(name in found(r) for r in groups[name]),
+            "first_named": rate(all(marks(r)["first_named"]) for r in chosen),
+            "found": rate(name in found(r) for r in chosen),
         }
-        for name in sorted(groups)
+        for name, chosen in _groups((name, r) for r in records for name in at_work(r))
     }
 
 
@@ -783,43 +739,32 @@ def _seconds(values: Sequence[float]) -> Seconds:
 
 
 def _miss(record: Record) -> Miss:
-    true, told = _told_of_several(record) if record["kind"] in SEVERAL else _told(record)
     return Miss(
-        id=record["id"],
-        kind=record["kind"],
-        robot=record["robot"],
-        truth=true,
-        **told,
+        **{name: record[name] for name in ("id", "kind", "robot")},
+        **_told(record),
         wrong=tuple(q for q, given in marks(record).items() if any(a == (q in BAD) for a in given)),
         error=(record.get("error") or "no diagnosis") if failed(record) else None,
     )
 
 
-def _told(record: Record) -> tuple[tuple[str, ...], dict[str, Any]]:
+def _told(record: Record) -> dict[str, Any]:
+    if record["kind"] in SEVERAL:
+        words = said_words(record["kind"], said(record))
+        return {"truth": true_words(record["truth"]), "said": words, "unexplained": None, "probability": None}
     truth, verdict = record["truth"], said(record)["verdict"]
     place, quantity = answer(record)
     where = f"{place[1] or place[0]}, {quantity}" if place else str(quantity or "somewhere")
-    true = (*at_work(record), *([truth["unlisted"]] if truth.get("unlisted") else []))
-    return true, {
+    return {
+        "truth": (*at_work(record), *([truth["unlisted"]] if truth.get("unlisted") else [])),
         "said": tuple(verdict["effects"]),
         "unexplained": where if verdict["unexplained"] else None,
         "probability": None if failed(record) else verdict["probability"],
     }
 
 
-def _told_of_several(record: Record) -> tuple[tuple[str, ...], dict[str, Any]]:
-    told = said_words(record["kind"], said(record))
-    return true_words(record["truth"]), {"said": told, "unexplained": None, "probability": None}
-
-
 def _plain(value: Any) -> Any:
     if isinstance(value, Rate):
-        return {
-            "successes": value.successes,
-            "trials": value.trials,
-            "value": value.value,
-            "interval": _plain(value.interval),
-        }
+        return {**asdict(value), "value": value.value, "interval": _plain(value.interval)}
     if is_dataclass(value):
         return {f.name: _plain(getattr(value, f.name)) for f in fields(value)}
     if isinstance(value, Mapping):

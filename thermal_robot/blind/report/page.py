@@ -12,6 +12,7 @@ from matplotlib.ticker import FuncFormatter
 
 from thermal_robot.blind.judged import KNOWN
 from thermal_robot.blind.report.text import (
+    ASKED,
     coefficients,
     count,
     effect,
@@ -21,7 +22,6 @@ from thermal_robot.blind.report.text import (
     miss,
     needed,
     question,
-    section,
 )
 from thermal_robot.report import units
 from thermal_robot.report.drawing import (
@@ -296,7 +296,6 @@ Plain = Mapping[str, Any]
 
 _CARDS = ("single", "null", "removed", "unlisted")
 _CHANGES = ("exact", "found", "way", "day", "false_alarm")
-_ASKED = ("exact", "right", "first_named", "found", "false_alarm", "place", "near_place", "quantity")
 
 
 def html(score: Plain, generated: str) -> str:
@@ -315,6 +314,11 @@ def html(score: Plain, generated: str) -> str:
         A complete HTML document.
     """
     return document("Blind trial", "\n".join(_whole(score, generated)))
+
+
+def section(heading: str, *content: str) -> str:
+    """Return a section; its content is HTML."""
+    return f"<section><h2>{escape(heading)}</h2>{''.join(content)}</section>"
 
 
 def _whole(score: Plain, generated: str) -> Iterator[str]:
@@ -400,7 +404,7 @@ def _kinds(kinds: Iterable[Plain]) -> str:
     return table(("", "cases", "share", "95 % interval"), rows)
 
 
-def _groups(heading: str, groups: Mapping[str, Plain], questions: Sequence[str] = _ASKED) -> str:
+def _groups(heading: str, groups: Mapping[str, Plain], questions: Sequence[str] = ASKED) -> str:
     asked = [q for q in questions if any(q in rates for rates in groups.values())]
     rows = (row((escape(name), *(_share(rates.get(q)) for q in asked))) for name, rates in groups.items())
     return f'<p class="tr-kicker">{escape(heading)}</p>{table(("", *map(question, asked)), rows)}'

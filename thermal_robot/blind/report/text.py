@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from html import escape
 from textwrap import wrap
 from typing import Any
 
@@ -137,29 +136,20 @@ def coefficients(curve: Mapping[str, Any]) -> str:
 
 def facts(score: Mapping[str, Any]) -> tuple[tuple[str, str], ...]:
     """Return the figures that stand alone: what they are, and their values."""
-    sure, all_, gap, time = (
-        score["calibration"]["doubtful"],
-        score["calibration"]["all"],
-        score["shrinkage"],
-        score["seconds"],
-    )
-    said = []
+    all_, sure = score["calibration"]["all"], score["calibration"]["doubtful"]
+    gap, time, said = score["shrinkage"], score["seconds"], []
     if all_["trials"]:
         said.append(("calibration error", f"{units.percent(all_['error'])} over {all_['trials']} effects and laws"))
     if sure["trials"]:
         between = f"{units.percent(sure['error'])} over the {sure['trials']} that are 5 to 95 % probable"
         said.append(("calibration error where in doubt", between))
     if gap["pairs"]:
-        apart = (
-            f"{units.percent(gap['median_absolute_difference'])} of the gap in the median, {len(gap['pairs'])} cases"
-        )
-        said.append(("shrinkage claimed against reached", f"apart by {apart}"))
+        apart = f"apart by {units.percent(gap['median_absolute_difference'])} of the gap in the median"
+        said.append(("shrinkage claimed against reached", f"{apart}, {len(gap['pairs'])} cases"))
     said += _rates(score)
     if time["median"] is not None:
-        spent = (
-            f"{time['median']:.2f} s in the median, 95 % within {time['q95']:.2f} s, longest {time['longest']:.2f} s"
-        )
-        said.append(("time of a diagnosis", spent))
+        most = f"95 % within {time['q95']:.2f} s, longest {time['longest']:.2f} s"
+        said.append(("time of a diagnosis", f"{time['median']:.2f} s in the median, {most}"))
     return tuple(said)
 
 
@@ -216,15 +206,10 @@ def markdown(score: Mapping[str, Any]) -> str:
     return "\n".join((*lines, "", *rest) if rest else lines)
 
 
-def section(heading: str, *content: str) -> str:
-    """Return a section; its content is HTML."""
-    return f"<section><h2>{escape(heading)}</h2>{''.join(content)}</section>"
-
-
 WIDTH = 100
 _ANSWERS = ("nothing", "unexplained", "failed")
 _SHORT = {"nothing": "n", "unexplained": "u", "failed": "f"}
-_ASKED = ("exact", "right", "first_named", "found", "false_alarm", "place", "near_place", "quantity")
+ASKED = ("exact", "right", "first_named", "found", "false_alarm", "place", "near_place", "quantity")
 _CHANGES = ("exact", "found", "way", "day")
 _HEADS = {
     "exact": "exact",
@@ -265,10 +250,7 @@ def text(score: Plain) -> str:
         ["EFFECT TAKEN OUT OF THE LIBRARY, by effect", *_groups(score["removed"])],
         ["CAUSE THAT NO LIBRARY KNOWS, by cause", *_groups(score["unlisted"])],
         ["CAMPAIGNS OF ONE ROBOT, by what changes", *_groups(score["changes"], _CHANGES)],
-        *(
-            [f"NAMED FIRST: {_TABLES.get(name, name)}", *_confusion(table)]
-            for name, table in score["confusion"].items()
-        ),
+        *([f"NAMED FIRST: {_TABLES.get(k, k)}", *_confusion(table)] for k, table in score["confusion"].items()),
         ["PROBABILITIES", *_calibration(score["calibration"]["all"])],
         ["WHAT IT TAKES TO BE FOUND, one effect at work", *_detection(score["detection"])],
         ["FIGURES", *(f"  {name:36}{value}" for name, value in facts(score))],
@@ -297,7 +279,7 @@ def _kinds(kinds: list[Plain]) -> Iterator[str]:
             yield f"    left on fresh samples, over the noise: {spread}"
 
 
-def _groups(groups: Mapping[str, Plain], questions: Sequence[str] = _ASKED) -> Iterator[str]:
+def _groups(groups: Mapping[str, Plain], questions: Sequence[str] = ASKED) -> Iterator[str]:
     if not groups:
         return
     asked = [q for q in questions if any(q in rates for rates in groups.values())]
@@ -338,11 +320,7 @@ def _calibration(all_: Plain) -> Iterator[str]:
 
 
 def _detection(detection: Plain) -> Iterator[str]:
-    steps = {
-        "size over the noise": detection["ratio"],
-        "rows": detection["samples"],
-    }
-    for name, bins in steps.items():
+    for name, bins in (("size over the noise", detection["ratio"]), ("rows", detection["samples"])):
         told = [b for b in bins if b["found"]["trials"]]
         if told:
             yield f"  {name:24}{'found':>10}{'share':>10}   95 % interval"
