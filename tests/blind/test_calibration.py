@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from blind_records import J1, L2, crash, effect, record, said
 
-from thermal_robot.blind.coverage import calibration, reliability
+from thermal_robot.blind.score import calibration, reliability
 
 
 def test_calibration_is_as_computed_by_hand():

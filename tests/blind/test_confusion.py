@@ -2,7 +2,7 @@
 
 from blind_records import effect, record, said, trial
 
-from thermal_robot.blind.confusion import confusion
+from thermal_robot.blind.score import confusion
 
 
 def test_confusion_counts_every_case_once():

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from blind_records import NOISE, crash, effect, record, said
 
-from thermal_robot.blind.coverage import coverage
+from thermal_robot.blind.score import coverage
 
 
 def estimate(value, std, name="scale error, instrument", identified=True):

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from blind_records import effect, record, said, trial
 
-from thermal_robot.blind.confusion import detection, logistic
-from thermal_robot.blind.coverage import Rate
+from thermal_robot.blind.score import Rate, detection, logistic
 
 
 def test_the_curve_of_detection_is_recovered():

@@ -11,7 +11,7 @@ from blind.record import COUNTS, GOLDEN, SEED, answers
 
 from thermal_robot import cli
 from thermal_robot.blind.plan import plan, robots
-from thermal_robot.blind.sealed import canonical
+from thermal_robot.blind.trial import canonical
 
 
 def test_two_robots_that_nobody_has_seen_are_examined(tmp_path, capsys):

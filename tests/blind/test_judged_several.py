@@ -3,8 +3,7 @@
 import pytest
 from blind_records import alarm, change, compared, failed_together, fleet, series, told_shared
 
-from thermal_robot.blind.judged import BAD, HEADLINE, is_miss, marks
-from thermal_robot.blind.judged_several import said_words, true_words
+from thermal_robot.blind.judged import BAD, HEADLINE, is_miss, marks, said_words, true_words
 
 SHARED = {"effect": "backlash", "parameter": "lost motion, j1", "place": {"kind": "joint", "name": "j1"}}
 OWN = {"robot": "r02", "effect": "joint_gain", "parameter": "gain error, j2", "place": {"kind": "joint", "name": "j2"}}

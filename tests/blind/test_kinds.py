@@ -11,8 +11,7 @@ pytest.importorskip("mujoco", reason='the blind trial needs "thermal-robot[blind
 from scipy.stats import binom
 
 from thermal_robot.blind.cases import Case
-from thermal_robot.blind.kinds import STRANGE, turns
-from thermal_robot.blind.plan import robots
+from thermal_robot.blind.plan import STRANGE, robots, turns
 from thermal_robot.blind.reality import FAULTS, UNLISTED, make
 from thermal_robot.campaign import read_campaign
 from thermal_robot.errors import EffectError

@@ -9,7 +9,7 @@ import pytest
 pytest.importorskip("mujoco", reason='the blind trial needs "thermal-robot[blind]"')
 
 from thermal_robot.blind.cases import SEVERAL
-from thermal_robot.blind.kinds import BESIDE, CONTAINS, IMITATES, LOCAL, turns_of_several
+from thermal_robot.blind.plan import BESIDE, CONTAINS, IMITATES, LOCAL, turns_of_several
 from thermal_robot.blind.reality import FAULTS
 from thermal_robot.errors import EffectError
 

@@ -7,13 +7,13 @@ pytest.importorskip("mujoco", reason='the blind trial needs "thermal-robot[blind
 from thermal_robot.blind.command import OWN_CASES, _with_faults
 from thermal_robot.blind.plan import ROBOTS, plan, robots
 from thermal_robot.blind.reality import make
-from thermal_robot.blind.reality.own import load
+from thermal_robot.blind.reality.unlisted import load
 from thermal_robot.errors import EffectError
 
 FAULT = """
 import numpy as np
 from thermal_robot.blind.reality import Fault
-from thermal_robot.blind.reality.faults import joints
+from thermal_robot.blind.reality.fault import joints
 
 def draw(setting, rng):
     values = np.zeros((setting.world.n, 1))

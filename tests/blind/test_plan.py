@@ -10,8 +10,7 @@ pytest.importorskip("mujoco", reason='the blind trial needs "thermal-robot[blind
 from scipy.stats import binom
 
 from thermal_robot.blind.cases import SEVERAL
-from thermal_robot.blind.kinds import CONDITION, RANDOM
-from thermal_robot.blind.plan import FULL, SHORT, plan, robots
+from thermal_robot.blind.plan import CONDITION, FULL, RANDOM, SHORT, plan, robots
 from thermal_robot.blind.reality import FAULTS, UNLISTED
 from thermal_robot.errors import EffectError, RobotError
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from thermal_robot.blind.coverage import Rate, rate
+from thermal_robot.blind.score import Rate, rate
 
 
 @pytest.mark.parametrize(

@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 
 from thermal_robot import diagnose
-from thermal_robot.blind import real_faults as faults
-from thermal_robot.blind.real import REMAINDERS, RealCase, real_cases
-from thermal_robot.blind.real_faults import judged
+from thermal_robot.blind import real as faults
+from thermal_robot.blind.real import REMAINDERS, RealCase, judged, real_cases
 from thermal_robot.campaign import read_campaign, read_samples
 from thermal_robot.observations import observe
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from simulate import simulate
 
-from thermal_robot.blind import real_faults as faults
+from thermal_robot.blind import real as faults
 from thermal_robot.kinematics import exp6, placement_sensitivities
 from thermal_robot.observations import Frames, observe
 

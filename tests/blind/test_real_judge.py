@@ -1,6 +1,6 @@
 """Whether answers to changed real campaigns are judged as the rules say."""
 
-from thermal_robot.blind.real_faults import judged
+from thermal_robot.blind.real import judged
 
 ELBOW = {"kind": "joint", "name": "elbow_joint"}
 

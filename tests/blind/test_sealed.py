@@ -5,7 +5,7 @@ import secrets
 
 import pytest
 
-from thermal_robot.blind.sealed import KEY_BYTES, canonical, open_seal, seal
+from thermal_robot.blind.trial import KEY_BYTES, canonical, open_seal, seal
 from thermal_robot.errors import SealError, ThermalRobotError
 
 ANSWERS = {"c002": {"truth": {"effects": ["backlash"], "unlisted": None}, "noise": 2.5e-5}, "c001": {"Größe": [1, 2.5]}}

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from thermal_robot.blind.coverage import shares
+from thermal_robot.blind.score import shares
 
 TRUE = np.zeros((50, 3))
 

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from blind_records import NOISE, crash, effect, record, said
 
-from thermal_robot.blind.coverage import fresh_ratio, shrinkage, spread, worse
+from thermal_robot.blind.score import fresh_ratio, shrinkage, spread, worse
 
 
 def test_claims_are_compared_with_the_noise_taken_off():

@@ -13,8 +13,7 @@ from blind_fakes import AtOnce, Real, alive, case, light, put_examinee, rms, sim
 
 from thermal_robot.blind import supervise, trial
 from thermal_robot.blind.cases import Several
-from thermal_robot.blind.sealed import canonical
-from thermal_robot.blind.trial import run_trial
+from thermal_robot.blind.trial import canonical, run_trial
 from thermal_robot.errors import SealError, ThermalRobotError
 
 

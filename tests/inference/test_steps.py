@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from thermal_robot.blind.coverage import reliability
+from thermal_robot.blind.score import reliability
 from thermal_robot.inference.random_gap import followed, period, seen, stepped
 
 STEP = 1e-3  # rad

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from thermal_robot.simulation import settings
+from thermal_robot.simulation import schedule as settings
 from thermal_robot.simulation.schedule import balanced, conditions, in_turn, visits
 
 

@@ -39,27 +39,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
-Kind = Literal[
-    "single",
-    "large",
-    "visits",
-    "lags",
-    "pair",
-    "many",
-    "null",
-    "hard",
-    "mixed",
-    "removed",
-    "hidden",
-    "unlisted",
-    "both",
-    "real",
-    "same",
-    "changed",
-    "steady",
-    "series",
-    "fleet",
-]
+Known = Literal["single", "large", "visits", "lags", "pair", "many", "null", "hard"]
+"""Kinds of which all causes are in the library."""
+Together = Literal["same", "changed", "steady", "series", "fleet"]
+"""Kinds of several campaigns."""
+Kind = Literal[Known, "mixed", "removed", "hidden", "unlisted", "both", "real", Together]
 How = Literal["", "changes", "begins", "jumps", "grows", "all", "hall"]
 """What changes between campaigns of one robot, and how; which robots of a fleet share a fault."""
 

@@ -8,6 +8,7 @@ import os
 import sys
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, get_args
 
@@ -41,22 +42,10 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
     )
     parser.add_argument("--robot", metavar="URDF", action="append", default=[], help="your robot; may be repeated")
     parser.add_argument("--tool", metavar="LINK", action="append", default=[], help="link with the target, per --robot")
-    parser.add_argument(
-        "--effect",
-        metavar="NAME",
-        nargs="+",
-        action="extend",
-        default=[],
-        help="these faults only; without --count " + " and ".join(ALWAYS) + " cases",
-    )
-    parser.add_argument(
-        "--fault",
-        metavar="F.py:NAME",
-        nargs="+",
-        action="extend",
-        default=[],
-        help="faults of your own (docs/blind.md)",
-    )
+    several: dict[str, Any] = {"nargs": "+", "action": "extend", "default": []}
+    these = "these faults only; without --count " + " and ".join(ALWAYS) + " cases"
+    parser.add_argument("--effect", metavar="NAME", help=these, **several)
+    parser.add_argument("--fault", metavar="F.py:NAME", help="faults of your own (docs/blind.md)", **several)
     parser.add_argument("--data", metavar="DIR", help=f"folder of real campaigns (default: what {DATA} names)")
     parser.add_argument("--directory", metavar="DIR", help="the trial's folder, to continue it too (default: blind-N)")
     parser.add_argument("--workers", metavar="N", type=int, default=os.cpu_count() or 1, help="(default: %(default)s)")
@@ -74,7 +63,7 @@ def run(options: argparse.Namespace) -> None:
     ThermalRobotError
         If the options make no sense, or MuJoCo is missing.
     """
-    _require_mujoco()
+    _require("MuJoCo", "the blind trial needs")
     require_free((options.json, options.report))
     if options.workers < 1:
         raise ThermalRobotError("--workers must be at least 1")
@@ -88,7 +77,8 @@ def run(options: argparse.Namespace) -> None:
             print(text, file=notes, flush=True)
 
     cases = _cases(options, seed, tell)
-    _require_tables(cases)
+    if any(getattr(case, "kind", "") == "fleet" for case in cases):  # it would fail after the last campaign
+        _require("pyarrow", "fleets in the trial need")
     tell(f"Seed {seed}: {len(cases)} cases in {directory}")
     records = _records(cases, directory, seed, options, tell)
     _tell(records, options)
@@ -123,8 +113,7 @@ def _tell(records: list[dict[str, Any]], options: argparse.Namespace) -> None:
 
     withdrawn = [record for record in records if "withdrawn" in record]
     for record in withdrawn:
-        reason = f"{record['id']} ({record['kind']}) was not asked: {record['withdrawn']}"
-        note(reason, options.loudness)
+        note(f"{record['id']} ({record['kind']}) was not asked: {record['withdrawn']}", options.loudness)
     found = score([record for record in records if record not in withdrawn]).to_dict()
     written = json.dumps(found, indent=2, ensure_ascii=False)
     if not options.printed:
@@ -165,26 +154,19 @@ def _with_faults(
     """Add cases with faults of the user's own: named by the library where it has an effect of that name."""
     if not faults:
         return cases
-    from thermal_robot.blind.reality.own import load
+    from thermal_robot.blind.reality.unlisted import load
     from thermal_robot.effects import library
 
     rng = np.random.default_rng([seed, 5])
     added: list[Case] = []
     for where in faults:
         name = load(where).name
-        listed = name in library()
+        listed, (file, _, inside) = name in library(), where.rpartition(":")
+        own = f"{Path(file).resolve()}:{inside}"
         for robot in (robots * OWN_CASES)[:OWN_CASES]:
-            added.append(
-                Case(
-                    f"o{len(added):04d}",
-                    int(rng.integers(2**62)),
-                    "single" if listed else "unlisted",
-                    robot,
-                    effects=(name,) if listed else (),
-                    unlisted=None if listed else name,
-                    own=str(Path(where.rpartition(":")[0]).resolve()) + ":" + where.rpartition(":")[2],
-                )
-            )
+            number, chance = f"o{len(added):04d}", int(rng.integers(2**62))
+            case = Case(number, chance, "unlisted", robot, unlisted=name, own=own)
+            added.append(replace(case, kind="single", effects=(name,), unlisted=None) if listed else case)
     return (*cases, *added)
 
 
@@ -213,16 +195,8 @@ def _robots(urdfs: Sequence[str], tools: Sequence[str]) -> tuple[RobotChoice, ..
     return robots(own or ROBOTS)
 
 
-def _require_tables(cases: Sequence[Case | RealCase]) -> None:
-    """Refuse before the first campaign is made what would fail after the last."""
+def _require(module: str, who: str) -> None:
     from importlib.util import find_spec
 
-    if any(getattr(case, "kind", "") == "fleet" for case in cases) and find_spec("pyarrow") is None:
-        raise ThermalRobotError('fleets in the trial need pyarrow: pip install "thermal-robot[blind]"')
-
-
-def _require_mujoco() -> None:
-    from importlib.util import find_spec
-
-    if find_spec("mujoco") is None:
-        raise ThermalRobotError('the blind trial needs MuJoCo: pip install "thermal-robot[blind]"')
+    if find_spec(module.lower()) is None:
+        raise ThermalRobotError(f'{who} {module}: pip install "thermal-robot[blind]"')

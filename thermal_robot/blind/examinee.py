@@ -19,15 +19,17 @@ import os
 import sys
 import time
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.blind.cases import LISTED
-from thermal_robot.blind.refitted import refitted
-from thermal_robot.campaign import read_campaign
+from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.datasets import demo_directory
 from thermal_robot.diagnosis import Diagnosis, diagnose
@@ -38,20 +40,104 @@ from thermal_robot.fleet.many import TABLE, diagnosed
 from thermal_robot.fleet.rows import write_rows
 from thermal_robot.fleet.summary import summarise
 from thermal_robot.fleet.wear import wear
+from thermal_robot.inference.columns import block, frame_columns
+from thermal_robot.inference.frames import register
+from thermal_robot.observations import Observations, observe
+
+MOST = 6
+"""Effects of which every subset is fitted: 64 fits."""
+_ROUNDS = 3  # after which noise and fit agree to a per cent
+
+
+def refitted(found: Diagnosis, campaign: Campaign, samples: Campaign) -> dict[str, Array]:
+    """Predict samples with every subset of the effects of a model, frames and effects fitted anew for each.
+
+    Of a part of the effects linear about the nominal robot, by least squares on the rows that were not set aside, with
+    the settings of the whole diagnosis (time constants, places, quantities) and each effect's parameters held to the
+    size that they have in it, the more so the more a subset leaves: what it leaves counts as noise, of positions and of
+    orientations apart. So the held-out shares of a diagnosis are defined, too. All effects together are the model.
+
+    Returns (M, 3) positions in the measurement frame, m, by names joined with ``+``; nothing where there are more than
+    :data:`MOST` effects, or none.
+    """
+    model = found.model
+    if not 0 < len(model.effects) <= MOST:
+        return {}
+    kept = ~np.isin(campaign.rows, found.rows.rows[found.rows.outliers])
+    frames = register(campaign, kept)
+    given = observe(campaign, frames)
+    asked = observe(_measured(samples, model), frames)
+    columns, fresh, tight, slices = _design(model, given, asked)
+    columns, gap, left = columns[kept], given.gap[kept], found.rows.remainder[kept]
+    noise = np.maximum(np.sqrt((left.reshape(len(left), -1, 3) ** 2).mean(axis=(0, 2))), 1e-9)
+    nominal, base = asked.predicted_position, frames.base[:3, :3]
+    predicted = {"+".join(effect.name for effect, _ in model.effects): model.predict(samples)[0]}
+    for size in range(len(slices)):
+        for chosen in combinations(range(len(slices)), size):
+            used = np.concatenate([np.arange(slices[0].start), *(np.r_[slices[k]] for k in chosen)]).astype(int)
+            fitted = _ridge(columns[:, :, used], gap, noise, tight[used])
+            names = "+".join(model.effects[k][0].name for k in chosen)
+            predicted[names] = nominal + fresh[:, :, used] @ fitted @ base.T
+    return predicted
+
+
+def _measured(samples: Campaign, model: CorrectedModel) -> Campaign:
+    """Pretend that samples were measured, so that their columns are those of the campaign."""
+    count = samples.samples
+    turned = np.tile([1.0, 0.0, 0.0, 0.0], (count, 1)) if model.measures == "pose" else None
+    read = {name: values for name, values in samples.covariates.items() if name in model.needs}
+    return replace(samples, covariates=read, position=np.zeros((count, 3)), orientation=turned)
+
+
+def _design(
+    model: CorrectedModel, given: Observations, asked: Observations
+) -> tuple[Array, Array, Array, tuple[slice, ...]]:
+    """(N, m, K) and (M, 3, K) columns of frames and effects, (K,) one over what holds each, and each effect's columns.
+
+    A parameter is held to the rms of its effect's parameters, in units of their expected sizes.
+    """
+    frames = frame_columns(given)[0]
+    here, there, tight, slices = [frames], [frame_columns(asked)[0]], [np.zeros(frames.shape[2])], []
+    start = frames.shape[2]
+    for effect, values in model.effects:
+        own = block(given, effect)
+        here.append(own.columns)
+        there.append(block(asked, effect).columns)
+        scale = np.sqrt(np.mean((values / own.sizes) ** 2)) if len(values) else 1.0
+        tight.append(1.0 / (own.sizes * max(scale, 1e-6)))
+        slices.append(slice(start, start + len(values)))
+        start += len(values)
+    columns, fresh = np.concatenate(here, axis=2), np.concatenate(there, axis=2)[:, :3]
+    return columns, fresh, np.concatenate(tight), tuple(slices)
+
+
+def _ridge(columns: Array, gap: Array, noise: Array, tight: Array) -> Array:
+    """Least squares with a row for each parameter that is held; noise and remainder of each kind found together.
+
+    (N, m, K) columns and (N, m) gap; (m/3,) noise of positions and orientations, m and rad.
+    """
+    rows = np.diag(tight)[tight > 0]
+    level = np.maximum(np.sqrt((gap.reshape(len(gap), -1, 3) ** 2).mean(axis=(0, 2))), noise)
+    for _ in range(_ROUNDS):
+        each = np.repeat(level, 3)
+        both = np.vstack([(columns / each[:, None]).reshape(gap.size, columns.shape[2]), rows])
+        size = np.linalg.norm(both, axis=0)
+        size[size == 0.0] = 1.0
+        padded = np.concatenate([(gap / each).ravel(), np.zeros(len(rows))])
+        fitted = np.linalg.lstsq(both / size, padded, rcond=1e-10)[0] / size
+        left = (gap - columns @ fitted).reshape(len(gap), -1, 3)
+        level = np.maximum(np.sqrt((left**2).mean(axis=(0, 2))), noise)
+    return np.asarray(fitted)
+
 
 CAMPAIGN, FRESH, MODEL = "campaign.toml", "fresh.csv", "model.json"
 
 
 class Fence:
-    """An audit hook that refuses every file of the trial except those of the folder in question.
+    """An audit hook that refuses every file of the trial's directory except those of the folder in question.
 
     It keeps honest code honest: a compiled library that opens files past Python is not seen. The seal does not depend
     on it.
-
-    Parameters
-    ----------
-    directory
-        Of the trial.
     """
 
     def __init__(self, directory: Path) -> None:
@@ -126,16 +212,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
         sys.addaudithook(fence)
         # the first diagnosis of a process also pays for imports; none of the trial's is to be the first
         diagnose(demo_directory())
-        _say(replies, {"ready": True})
+        print(json.dumps({"ready": True}), file=replies, flush=True)
         for line in sys.stdin:
             request = json.loads(line)
             fence.allow(Path(request["folder"]))
-            _say(replies, answer(request))
+            print(json.dumps(answer(request)), file=replies, flush=True)
     return 0
-
-
-def _say(replies: Any, reply: dict[str, Any]) -> None:
-    print(json.dumps(reply), file=replies, flush=True)
 
 
 def _within(path: str, folder: str) -> bool:
@@ -143,54 +225,28 @@ def _within(path: str, folder: str) -> bool:
 
 
 Plain = dict[str, Any]
-_DATE = "date"
 
 
 def comparison(folder: Path, only: Sequence[str]) -> Plain:
-    """Compare the campaigns that are listed in a folder.
-
-    Parameters
-    ----------
-    folder
-        With the list and the campaigns.
-    only
-        Names of effects; all where empty.
-
-    Returns
-    -------
-    dict
-        Of the format ``thermal-robot/comparison/1``.
-    """
+    """Compare the campaigns that are listed in a folder: ``thermal-robot/comparison/1``."""
     listed = campaigns(folder / LISTED)
     names = [name for name, _ in listed.campaigns]
     return compare(*(listed.folder(name) for name in names), names=names, only=only or None).to_dict()
 
 
 def followed(folder: Path, only: Sequence[str]) -> Plain:
-    """Follow the robot of dated campaigns; ``folder`` and ``only`` as for :func:`comparison`.
-
-    Returns
-    -------
-    dict
-        Of the format ``thermal-robot/wear/1``.
-    """
+    """Follow the robot of dated campaigns: ``thermal-robot/wear/1``."""
     listed = campaigns(folder / LISTED)
-    date = listed.names.index(_DATE)
-    return wear(
-        [(labels[date], listed.folder(name)) for name, labels in listed.campaigns], effects=only or None
-    ).to_dict()
+    date = listed.names.index("date")
+    dated = [(labels[date], listed.folder(name)) for name, labels in listed.campaigns]
+    return wear(dated, effects=only or None).to_dict()
 
 
 def fleet(folder: Path, only: Sequence[str]) -> Plain:
-    """Diagnose the robots of a fleet and summarise; ``folder`` and ``only`` as for :func:`comparison`.
+    """Diagnose the robots of a fleet and summarise: ``thermal-robot/fleet/1``.
 
     It is what :func:`~thermal_robot.diagnose_many` does, but within this process: those of Dask would stand outside
     the fence, and outlive an examinee that is ended.
-
-    Returns
-    -------
-    dict
-        Of the format ``thermal-robot/fleet/1``.
     """
     listed = campaigns(folder / LISTED)
     write_rows(folder / TABLE, listed.names, _rows(listed, only))

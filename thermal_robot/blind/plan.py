@@ -3,15 +3,222 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from itertools import combinations, product
 from pathlib import Path
-from typing import get_args
+from typing import Any, get_args
 
 import numpy as np
 
-from thermal_robot.blind.cases import SEVERAL, Case, Kind, RobotChoice
-from thermal_robot.blind.kinds import Asked, turns, turns_of_several
+from thermal_robot.blind.cases import SEVERAL, Case, How, Kind, RobotChoice, Several
+from thermal_robot.effects import library
 from thermal_robot.errors import EffectError, RobotError
 from thermal_robot.robot import load_robot
+
+Asked = dict[str, Any]
+"""Fields of a :class:`~thermal_robot.blind.cases.Case`."""
+
+LARGE, LAGGING = (10.0, 60.0), (10.0, 40.0)
+"""× noise: effects as large as on real robots, and those with a lag or a time constant."""
+LAGS: tuple[Asked, ...] = (
+    {"effects": ("tracking_lag",)},
+    {"effects": ("drift",)},
+    {"effects": ("thermal_elongation",), "wants": ("sensor:air",)},
+)
+"""Effects with a lag or a time constant; of elongation, links follow the air that is recorded."""
+HARD: Asked = {"ratio": (0.7, 1.5), "samples": (30, 60), "background": 0.15, "heavy": True}
+MANY = (3, 5)
+"""Fewest and most effects of many together."""
+CHANCE, STRANGE = 0.3, 0.3
+"""Of a mixture: the largest chance of an effect, as each draws its own in each case, and that of an unlisted cause."""
+MIXED: Asked = {"ratio": (0.3, 10.0), "samples": (40, 140)}
+EVERYTHING = ("moving", "temperature", "sensor:links", "sessions", "humidity", "motor_temperature", "speed")
+"""Recorded in every mixture: a column that is there for its cause alone would give it away."""
+REPEATED = 1.0 / 3.0
+"""Share of mixtures whose poses are visited several times, without which nobody tells scatter from steps."""
+
+CONTAINS = {"geometric": {"joint_offset", "instrument_scale"}}
+"""What a larger effect can do exactly as well (formats.md)."""
+IMITATES = {"transmission_error": {"joint_gain"}, "link_compliance": {"base_compliance"}}
+"""What a larger effect can do nearly as well: over less than a turn, two harmonics are a straight line; the upright
+link that stands on the base bends under the moment that tips it."""
+RANDOM = ("encoder_resolution", "excess_repeatability")
+"""Effects that scatter: they leave nothing for a mean to explain, and are asked alone."""
+CONDITION = {
+    "thermal_elongation": ("temperature",),
+    "drift": ("time",),
+    "backlash": ("approach",),
+    "tracking_lag": ("velocity", "acceleration", "approach"),
+}
+"""Columns that a cause cannot be seen without."""
+_FRAMES = ("base_frame", "tool_frame")
+
+
+def turns(kind: str, effects: Sequence[str], causes: Sequence[str], rng: np.random.Generator) -> Iterator[Asked]:
+    """Yield what is asked in cases of one kind of a single campaign, without end, of these effects and unlisted causes.
+
+    Raises
+    ------
+    EffectError
+        If no case of this kind can be made of them.
+    """
+    apart = [name for name in effects if name not in (*RANDOM, *_FRAMES)]
+    if kind == "mixed":
+        return _mixtures([name for name in effects if name not in _FRAMES], causes, rng)
+    if kind == "many":
+        return _together(apart, rng)
+    menu = _menu(kind, effects, apart, causes)
+    if not menu or (kind == "both" and not apart):
+        raise EffectError(f"no case of kind {kind!r} can be made of {', '.join(effects)}")
+    return _beside(menu, apart, rng) if kind == "both" else in_turn(menu, rng)
+
+
+def _menu(kind: str, effects: Sequence[str], apart: Sequence[str], causes: Sequence[str]) -> list[Asked]:
+    # contained effects are no loss where the library keeps the container
+    contained = {name for outer, inner in (*CONTAINS.items(), *IMITATES.items()) if outer in effects for name in inner}
+    menus: dict[str, list[Asked]] = {
+        "null": [{}],
+        "single": [{"effects": (name,)} for name in effects],
+        "large": [{"effects": (name,), "ratio": LARGE} for name in effects],
+        "visits": [{"effects": (n,), "wants": ("repeats",)} for n in effects if n == "encoder_resolution"],
+        "lags": [{**asked, "ratio": LAGGING} for asked in LAGS if asked["effects"][0] in effects],
+        "hard": [{"effects": (name,), **HARD} for name in apart],
+        "pair": [{"effects": chosen} for chosen in combinations(apart, 2) if not alike(chosen)],
+        # one that the library does not have yet needs not be taken out
+        "removed": [{"effects": (n,), "without": (n,) if n in library() else ()} for n in apart if n not in contained],
+        "hidden": [{"effects": (name,), "hidden": CONDITION[name]} for name in apart if name in CONDITION],
+        "unlisted": [{"unlisted": name} for name in causes],
+        "both": [{"unlisted": name} for name in causes],
+    }
+    return menus[kind]
+
+
+def in_turn(menu: Sequence[Asked], rng: np.random.Generator) -> Iterator[Asked]:
+    """Yield every item as often as any other."""
+    while True:
+        for k in rng.permutation(len(menu)):
+            yield menu[k]
+
+
+def _beside(menu: Sequence[Asked], apart: Sequence[str], rng: np.random.Generator) -> Iterator[Asked]:
+    """Yield causes in turn, each with one or two effects by chance."""
+    for asked in in_turn(menu, rng):
+        yield {**asked, "effects": _several(apart, int(rng.integers(1, 3)), rng)}
+
+
+def _together(apart: Sequence[str], rng: np.random.Generator) -> Iterator[Asked]:
+    """Yield sets of many effects, each number of them as often as any other."""
+    if len(apart) < MANY[1]:
+        raise EffectError(f"many effects together are up to {MANY[1]}, of {', '.join(apart) or 'none'}")
+    while True:
+        yield {"effects": _several(apart, int(rng.integers(MANY[0], MANY[1] + 1)), rng)}
+
+
+def _several(apart: Sequence[str], number: int, rng: np.random.Generator) -> tuple[str, ...]:
+    while True:
+        chosen = tuple(apart[k] for k in sorted(rng.permutation(len(apart))[:number]))
+        if not alike(chosen):
+            return chosen
+
+
+def _mixtures(effects: Sequence[str], causes: Sequence[str], rng: np.random.Generator) -> Iterator[Asked]:
+    """Yield cases in which every effect has a chance of its own: something to hold probabilities against.
+
+    Sets in which one contains another are drawn again.
+    """
+    while True:
+        repeated = bool(rng.random() < REPEATED)
+        asked = [n for n in effects if repeated or n != "excess_repeatability"]
+        drawn = tuple(name for name in asked if rng.random() < rng.uniform(0.0, CHANCE))
+        if not _containing(drawn):
+            strange = causes[int(rng.integers(len(causes)))] if causes and rng.random() < STRANGE else None
+            wants = (*EVERYTHING, *(("repeats",) if repeated else ()))
+            yield {"effects": drawn, "unlisted": strange, "wants": wants, **MIXED}
+
+
+def _containing(chosen: Sequence[str]) -> bool:
+    return any(inner in CONTAINS.get(outer, ()) for outer in chosen for inner in chosen)
+
+
+def alike(chosen: Sequence[str]) -> bool:
+    """Whether one of them contains another, or can do nearly the same."""
+    return _containing(chosen) or any(inner in IMITATES.get(outer, ()) for outer in chosen for inner in chosen)
+
+
+LOCAL = ("joint_offset", "joint_gain", "backlash", "joint_compliance")
+"""Effects with one number a joint that formats.md defines: of such a number it can be asked whether it changed, and of
+which joint. Of a bent link's six numbers some are a joint's zero as well."""
+BESIDE = (*LOCAL, "link_compliance", "thermal_elongation")
+"""Effects that a robot may have on all days: its own, and none that begins anew with a campaign."""
+SIZES = {"changes": (4.0, 4.0), "jumps": (4.0, 4.0), "begins": (16.0, 64.0), "grows": (8.0, 16.0)}
+"""Of a change, in deviations. Four are what the program is to find. What begins has to be named in campaigns that have
+it: with 90 rows 16 to 64 deviations leave one to four times the noise, as the effects of other kinds do. What grows by
+8 to 16 over all has passed four in the middle."""
+PAIR, DAYS, FLEET = (2, 2), (12, 12), (10, 14)
+"""Campaigns of a pair, of a series (a year of months), and robots of a fleet: few, in two halls of five or more, which
+is the least of which the program tells a mean."""
+APART = (2, 4)
+"""Fewest and most robots of a fleet with a fault of their own."""
+PLACES = 2
+"""Joints between the first and the last of the arm with the fewest: so many faults of one kind have room in a fleet."""
+_FLEETS: tuple[How, ...] = ("all", "hall", "")
+
+
+def turns_of_several(kind: str, effects: Sequence[str], rng: np.random.Generator) -> Iterator[Asked]:
+    """Yield what is asked in cases of one kind of several campaigns, without end, of these effects.
+
+    Raises
+    ------
+    EffectError
+        If no case of this kind can be made of them.
+    """
+    local = [name for name in LOCAL if name in effects]
+    always = [name for name in BESIDE if name in effects]
+    if not (always if kind in ("same", "steady") else local):
+        raise EffectError(f"no case of kind {kind!r} can be made of {', '.join(effects)}; it takes {', '.join(LOCAL)}")
+    if kind == "fleet":
+        return _fleets(local, rng)
+    if kind in ("same", "steady"):
+        return _unchanged(PAIR if kind == "same" else DAYS, always, rng)
+    ways: tuple[How, ...] = ("changes",) if kind == "changed" else ("begins", "jumps", "grows")
+    campaigns = PAIR if kind == "changed" else DAYS
+    menu = [{"several": Several(campaigns, how, name, SIZES[how])} for name, how in product(local, ways)]
+    return _changing(menu, always, rng)
+
+
+def _unchanged(campaigns: tuple[int, int], always: Sequence[str], rng: np.random.Generator) -> Iterator[Asked]:
+    """Yield robots with one or two effects that stay."""
+    for asked in in_turn([{"effects": (name,)} for name in always], rng):
+        yield {"effects": _with_another(asked["effects"], always, rng), "several": Several(campaigns)}
+
+
+def _changing(menu: Sequence[Asked], always: Sequence[str], rng: np.random.Generator) -> Iterator[Asked]:
+    """Yield changes in turn, every second robot with another effect that stays."""
+    for asked in in_turn(menu, rng):
+        yield {**asked, "effects": _with_another((asked["several"].moves,), always, rng)}
+
+
+def _with_another(first: tuple[str, ...], always: Sequence[str], rng: np.random.Generator) -> tuple[str, ...]:
+    """Add another effect in every second case, by chance, unless the two do the same."""
+    second = str(always[int(rng.integers(len(always)))])
+    wanted = bool(rng.random() < 0.5)
+    return first if not wanted or second in first or alike((*first, second)) else (*first, second)
+
+
+def _fleets(local: Sequence[str], rng: np.random.Generator) -> Iterator[Asked]:
+    """Yield fleets in which all robots, those of one hall or none share a fault, and some have one of their own."""
+    menu: list[Asked] = [{"how": how, "moves": name} for how, name in product(_FLEETS, local)]
+    for asked in in_turn(menu, rng):
+        how, moves = asked["how"], asked["moves"] if asked["how"] else ""
+        effects = (moves,) if moves else ()
+        yield {"effects": effects, "several": Several(FLEET, how, moves, apart=_apart(effects, local, rng))}
+
+
+def _apart(shared: tuple[str, ...], local: Sequence[str], rng: np.random.Generator) -> tuple[str, ...]:
+    """Draw faults of single robots, no more of one kind than every arm has places for."""
+    places = [name for name in local for _ in range(PLACES - shared.count(name))]
+    count = min(int(rng.integers(APART[0], APART[1] + 1)), len(places))
+    return tuple(places[k] for k in rng.permutation(len(places))[:count])
+
 
 ARMS = Path(__file__).parent / "reality" / "arms"
 """Arms of other builds: a rail, a SCARA, a gantry, parallelograms."""
@@ -29,46 +236,28 @@ ROBOTS = (
 )
 """Name, URDF and tool frame of the trial's robots."""
 
-SHORT = {
-    "single": 12,
-    "large": 6,
-    "visits": 2,
-    "lags": 3,
-    "pair": 6,
-    "many": 4,
-    "null": 6,
-    "hard": 6,
-    "mixed": 8,
-    "removed": 4,
-    "hidden": 2,
-    "unlisted": 8,
-    "both": 2,
-    "same": 1,
-    "changed": 2,
-    "steady": 1,
-    "series": 2,
-    "fleet": 1,
+_SIZES = {
+    "single": (12, 200),
+    "large": (6, 100),
+    "visits": (2, 60),
+    "lags": (3, 99),
+    "pair": (6, 100),
+    "many": (4, 60),
+    "null": (6, 100),
+    "hard": (6, 100),
+    "mixed": (8, 700),
+    "removed": (4, 40),
+    "hidden": (2, 24),
+    "unlisted": (8, 216),
+    "both": (2, 48),
+    "same": (1, 60),
+    "changed": (2, 100),
+    "steady": (1, 60),
+    "series": (2, 96),
+    "fleet": (1, 30),
 }
-FULL = {
-    "single": 200,
-    "large": 100,
-    "visits": 60,
-    "lags": 99,
-    "pair": 100,
-    "many": 60,
-    "null": 100,
-    "hard": 100,
-    "mixed": 700,
-    "removed": 40,
-    "hidden": 24,
-    "unlisted": 216,
-    "both": 48,
-    "same": 60,
-    "changed": 100,
-    "steady": 60,
-    "series": 96,
-    "fleet": 30,
-}
+"""How many cases of each kind a short trial has, and a full one."""
+SHORT, FULL = ({kind: counts[k] for kind, counts in _SIZES.items()} for k in (0, 1))
 
 
 def robots(chosen: Sequence[tuple[str, str, str]] = ROBOTS) -> tuple[RobotChoice, ...]:
@@ -128,10 +317,9 @@ def plan(
     from thermal_robot.blind.reality import FAULTS, UNLISTED
 
     for kind in counts:
-        if kind not in get_args(Kind) or kind == "real":
-            raise EffectError(
-                f"there is no kind of case {kind!r}; known: {', '.join(k for k in get_args(Kind) if k != 'real')}"
-            )
+        known = [k for k in get_args(Kind) if k != "real"]
+        if kind not in known:
+            raise EffectError(f"there is no kind of case {kind!r}; known: {', '.join(known)}")
     for name in (*only_effects, *unlisted):
         if name not in FAULTS and name not in UNLISTED:
             raise EffectError(f"the trial cannot make {name!r}; it can make {', '.join((*FAULTS, *UNLISTED))}")

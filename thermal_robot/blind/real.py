@@ -21,7 +21,9 @@ later                     the first 70 % by time are diagnosed: on the rest the 
                           the held-out rms that the diagnosis claims
 ========================= ==================================================================================
 
-A slip, an offset or lost motion sits in one of the joints 2 .. n−2: the frames would take in that of the others.
+Commands are changed, never the robot: where the robot stood when it was measured, it still stands, and the table says
+something else. Only a scale and the growth of links change what was measured, orientations nothing. A slip, an offset
+or lost motion sits in one of the joints 2 .. n−2: the frames would take in that of the others.
 """
 
 from __future__ import annotations
@@ -35,12 +37,198 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.blind import real_faults as faults
-from thermal_robot.blind.real_faults import judged
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign, read_campaign, write_campaign, write_table
 from thermal_robot.inference.rows import in_order
-from thermal_robot.observations import Observations, observe
+from thermal_robot.kinematics import Displacement, align, exp6, tool_poses
+from thermal_robot.observations import Frames, Observations, observe
 from thermal_robot.percents import percent
+
+_STILL = 1e-4  # rad: a joint that is told to move less does not arrive from any side
+_SHORTEST = 1e-9  # m: a shorter segment has no direction along which it grows
+
+
+def with_joint_error(campaign: Campaign, joint: int, error: Array | float) -> Campaign:
+    """Return the campaign with commands as if the joint were off: actual = command in the table + error.
+
+    A scalar or (N,), rad: a constant is a zero offset, a step a slip, −½ b·approach lost motion.
+    """
+    q = campaign.q.copy()
+    q[:, joint] -= error
+    return replace(campaign, q=q)
+
+
+def with_scale(campaign: Campaign, scale: float) -> Campaign:
+    """Return the campaign with measured = (1 + scale)·true about the instrument's origin."""
+    return replace(campaign, position=measured(campaign) * (1.0 + scale))
+
+
+def with_approaches(campaign: Campaign) -> Campaign:
+    """Return the campaign with the side from which each joint came, the rows being in the order of measurement.
+
+    The sign of the change of the command since the row before; 0 in the first row and where the joint stayed. Where
+    only some rows of a campaign are taken this is a side as good as any: what is put in follows it.
+    """
+    change = np.diff(campaign.q, axis=0, prepend=campaign.q[:1])
+    side = np.sign(change) * (np.abs(change) > _STILL)
+    columns = {f"approach.{joint}": side[:, j] for j, joint in enumerate(campaign.robot.joint_names)}
+    return replace(campaign, covariates={**campaign.covariates, **columns})
+
+
+def with_growth(campaign: Campaign, strains: Array, warmer: Array) -> Campaign:
+    """Return the campaign with links that grew along their S nominal segments; the table tells no temperature.
+
+    Of (S,) strains, 1/K, and (N,) kelvin above the temperature at which the URDF's lengths hold.
+    """
+    robot, frames = campaign.robot, registered(campaign)
+    along = np.array([np.append(s.direction * s.length * (s.length > _SHORTEST), np.zeros(3)) for s in robot.segments])
+    grown = Displacement(segment=warmer[:, None, None] * strains[:, None] * along)
+    # the growth of a segment turns nothing: the tool frame's origin and the target move alike
+    moved = tool_poses(robot, campaign.q, grown)[:, :3, 3] - tool_poses(robot, campaign.q)[:, :3, 3]
+    turned = moved @ frames.base[:3, :3].T
+    known = {name: v for name, v in campaign.covariates.items() if name.split(".")[0] != "temperature"}
+    return replace(campaign, position=measured(campaign) + turned, covariates=known)
+
+
+def with_temperature(campaign: Campaign, warmer: Array) -> Campaign:
+    """Return the campaign with the column ``temperature``: its reference temperature + ``warmer``."""
+    temperature = campaign.reference_temperature + warmer
+    return replace(campaign, covariates={**campaign.covariates, "temperature": temperature})
+
+
+def warm_up(rng: np.random.Generator, samples: int) -> Array:
+    """Return (N,) kelvin above the start over a campaign: the robot warms up, cools in a break, and warms up again."""
+    passed = np.linspace(0.0, 1.0, samples)
+    start, end = rng.uniform(0.35, 0.45), rng.uniform(0.55, 0.65)
+    slow = rng.uniform(0.1, 0.25)
+    step = 1.0 / (samples - 1)
+    warm = np.zeros(samples)
+    for k in range(1, samples):
+        goal = 0.0 if start < passed[k] < end else 1.0
+        warm[k] = warm[k - 1] + (goal - warm[k - 1]) * (1.0 - np.exp(-step / slow))
+    return np.asarray(rng.uniform(10.0, 20.0) * warm / warm.max())
+
+
+def registered(campaign: Campaign) -> Frames:
+    """Fit base and target point to the nominal robot by least squares, and nothing else."""
+    frames = Frames.declared(campaign)
+    predicted = observe(campaign, frames).position
+    frames = Frames(align(predicted, measured(campaign), np.ones(campaign.samples)), frames.tool)
+    for _ in range(30):
+        seen = observe(campaign, frames)
+        columns = frame_columns(seen).reshape(-1, 9)
+        length = np.linalg.norm(columns, axis=0)
+        step = np.linalg.lstsq(columns / length, seen.gap[:, :3].ravel(), rcond=1e-9)[0] / length
+        tool = frames.tool.copy()
+        tool[:3, 3] += step[6:]
+        frames = Frames(frames.base @ exp6(step[:6]), tool)
+        if np.abs(step).max() < 1e-10:
+            break
+    return frames
+
+
+def frame_columns(seen: Observations) -> Array:
+    """Return (N, 3, 9): what a unit twist of the base and a unit shift of the target do to the target, root frame."""
+    return np.concatenate([seen.base_sensitivity[:, :3], seen.tool_sensitivity[:, :3, :3]], axis=2)
+
+
+def leaves(seen: Observations, shift: Array) -> float:
+    """Return the rms distance, m, that (N, 3) shifts in the root frame leave after the best frames."""
+    columns = frame_columns(seen).reshape(-1, 9)
+    columns = columns / np.linalg.norm(columns, axis=0)
+    rest = shift.ravel() - columns @ np.linalg.lstsq(columns, shift.ravel(), rcond=1e-9)[0]
+    return float(np.sqrt((rest**2).sum() / len(shift)))
+
+
+def measured(campaign: Campaign) -> Array:
+    """Return the measured positions, which a campaign has that is no mere sample."""
+    return np.asarray(campaign.position)
+
+
+Record = dict[str, Any]
+
+WORSE = 1.1  # an absorbed cause may leave so many times what the control leaves
+SIZE = 0.3  # relative error of a lost motion
+CLAIM = (0.5, 1.25)  # rms reached over rms claimed
+
+
+def judged(fault: str, record: Record, control: Record | None, remainder: float) -> tuple[bool, str]:
+    """Return whether the answer is right, and the answer in short words; see :meth:`RealCase.judge`.
+
+    The remainder is what a full geometry leaves of the campaign, rms distance, m.
+    """
+    said = record.get("said")
+    if said is None:
+        return False, str(record.get("error") or "no diagnosis")
+    named = " ".join(said["verdict"]["effects"]) or "no effect"
+    after = (record.get("fresh") or {}).get("rms_after")
+    if fault == "backlash":
+        right, more = _backlash(said, record["truth"])
+    elif fault == "slip":
+        right, more = _unexplained(said, record["truth"], "joint")
+    elif fault == "hidden":
+        right, more = _unexplained(said, record["truth"], "")
+        asks = _finding(said, "thermal_elongation")
+        right = right and asks.get("status") == "not_testable" and "temperature" in asks.get("needs", ())
+        more += f"; thermal_elongation {asks.get('status', 'is no candidate')}"
+    elif fault == "temperature":
+        right, more = _names(said, "thermal_elongation"), ""
+    elif after is None:
+        right, more = False, "nothing predicted"
+    elif fault == "later":
+        claimed = said["gap"]["held_out"]["rms_after"]
+        right = CLAIM[0] <= after / claimed <= CLAIM[1]
+        more = f"claims {1e3 * claimed:.3f} mm, reaches {1e3 * after:.3f} mm"
+    elif fault == "nothing":
+        right = _names(said, "geometric") and after <= WORSE * remainder
+        more = f"leaves {1e3 * after:.3f} mm, README {1e3 * remainder:.3f} mm"
+    else:
+        before = ((control or {}).get("fresh") or {}).get("rms_after")
+        cause = {"offset": "joint_offset", "scale": "instrument_scale"}[fault]
+        covered = _names(said, "geometric") or _names(said, cause)
+        right = covered and before is not None and after < WORSE * before
+        than = "no control" if before is None else f"control {1e3 * before:.3f} mm"
+        more = f"leaves {1e3 * after:.3f} mm, {than}"
+    return bool(right), f"{named}; {more}" if more else named
+
+
+def _finding(said: Record, effect: str) -> Record:
+    found: list[Record] = [e for e in said["effects"] if e["name"] == effect]
+    return found[0] if found else {}
+
+
+def _names(said: Record, effect: str) -> bool:
+    return effect in said["verdict"]["effects"] and _finding(said, effect).get("status") == "found"
+
+
+def _backlash(said: Record, truth: Record) -> tuple[bool, str]:
+    part = truth["parts"]["backlash"]
+    joint, size = part["places"][0]["name"], part["size"]
+    found = _finding(said, "backlash")
+    first = found["locations"][0]["name"] if found.get("locations") else "nowhere"
+    values = [p["value"] for p in found.get("parameters", ()) if p["name"] == f"lost motion, {joint}"]
+    value = values[0] if values and values[0] is not None else 0.0
+    right = _names(said, "backlash") and first == joint and abs(value - size) <= SIZE * size
+    return right, f"backlash first at {first}, {1e3 * value:.2g} mrad at {joint}"
+
+
+def _unexplained(said: Record, truth: Record, kind: str) -> tuple[bool, str]:
+    """Tell whether it is flagged, with one of the truth's quantities and, where a kind of place is given, places."""
+    left = said["unexplained"]
+    places = {(p["kind"], p["name"]) for p in truth["places"]}
+    first = left["locations"][:1], [d["covariate"] for d in left["depends_on"][:1]]
+    laws = [(e["locations"][:1], [e.get("quantity")]) for e in said["effects"] if e["name"].startswith("discovered.")]
+
+    def holds(where: list[Record], quantity: list[Any]) -> bool:
+        there = not kind or any((p["kind"], p["name"]) in places for p in where)
+        return there and any(q in truth["quantities"] for q in quantity)
+
+    flagged = bool(said["verdict"]["unexplained"])
+    hit = [law for law in (*laws, first) if holds(*law)]
+    where, quantity = hit[0] if hit else first
+    shown = f"{where[0]['name'] if where else 'nowhere'}, {quantity[0] if quantity else 'nothing'}"
+    return flagged and bool(hit), f"{'unexplained' if flagged else 'not flagged'}: {shown}"
+
 
 Fault = Literal["nothing", "offset", "scale", "backlash", "slip", "temperature", "hidden", "later"]
 Answers = dict[str, Any]
@@ -106,24 +294,19 @@ class RealCase:
     def make(self, folder: Path) -> Answers:
         """Write what the diagnosis sees, and return the answers.
 
-        Parameters
-        ----------
-        folder
-            Gets campaign.toml, measurements.csv, robot.urdf and, where something is to be predicted, fresh.csv.
-
-        Returns
-        -------
-        dict
-            What of the record (:mod:`thermal_robot.blind.cases`) is known before the diagnosis: ``truth`` with a
-            ``size`` (SI) in its parts, ``noise`` (what a full geometry leaves, per axis), and beside it, both (N, 3) m
-            in the measurement frame or ``None``, ``fresh_position``, measured, and ``fresh_before``, predicted by the
-            nominal robot in the frames that fit the diagnosed rows best.
+        The folder gets campaign.toml, measurements.csv, robot.urdf and, where something is to be predicted, fresh.csv.
+        Returned is what of the record (:mod:`thermal_robot.blind.cases`) is known before the diagnosis: ``truth`` with
+        a ``size`` (SI) in its parts, ``noise`` (what a full geometry leaves, per axis), and beside it, both (N, 3) m in
+        the measurement frame or ``None``, ``fresh_position``, measured, and ``fresh_before``, predicted by the nominal
+        robot in the frames that fit the diagnosed rows best.
         """
         # in the order of measurement, from here on
         whole = _drawn_rows(read_campaign(self.data / self.campaign), self.seed, self.campaign)
         rng = np.random.default_rng([self.seed, self.draw, 2])
         changed, truth, asked = _FAULTS[self.fault](whole, rng, REMAINDERS[self.campaign])
-        fresh_rows = _late(whole.samples) if self.fault == "later" else _kept(whole.samples, self.seed, self.campaign)
+        fresh_rows = _kept(whole.samples, self.seed, self.campaign)
+        if self.fault == "later":
+            fresh_rows = np.arange(whole.samples) >= _EARLY * whole.samples
         if self.fault in ("slip", "hidden"):
             fresh_rows[:] = False  # what nobody can know need not be predicted
         given, fresh = changed.take(~fresh_rows), changed.take(fresh_rows)
@@ -142,40 +325,20 @@ class RealCase:
         }
         if fresh.samples:
             write_table(replace(fresh, position=None, orientation=None), folder / "fresh.csv")
-            alone = observe(fresh, faults.registered(given)).predicted_position
-            answers |= {"fresh_position": faults.measured(fresh).tolist(), "fresh_before": alone.tolist()}
+            alone = observe(fresh, registered(given)).predicted_position
+            answers |= {"fresh_position": measured(fresh).tolist(), "fresh_before": alone.tolist()}
         return answers
 
     def judge(self, record: dict[str, Any], control: dict[str, Any] | None) -> dict[str, Any]:
-        """Return the record with ``right``, and in short words ``asked`` and ``answer``.
-
-        Parameters
-        ----------
-        record
-            Of this case, with ``truth``, ``asked``, ``said`` and ``fresh``.
-        control
-            The record of the case that ``control`` names.
-        """
+        """Return this case's record with ``right`` and, in short words, ``answer``; ``control`` is that it names."""
         right, answer = judged(self.fault, record, control, REMAINDERS[self.campaign])
         return {**record, "right": right, "answer": answer}
 
 
 def real_cases(data: Path, seed: int, count: int | None = None) -> tuple[RealCase, ...]:
-    """Return the cases of one trial.
+    """Return the cases of one trial, each after its control; a campaign that the folder lacks is left out.
 
-    Parameters
-    ----------
-    data
-        Folder of measured campaigns; those that it lacks are left out.
-    seed
-        Settles everything.
-    count
-        At most so many, controls included; about sixteen where absent.
-
-    Returns
-    -------
-    tuple of RealCase
-        Each after its control.
+    At most ``count``, controls included; about sixteen where absent.
     """
     present = [name for name in REMAINDERS if (data / name / "campaign.toml").is_file()]
     rng = np.random.default_rng([seed, 0])
@@ -219,10 +382,6 @@ def _kept(samples: int, seed: int, name: str) -> NDArray[np.bool_]:
     return np.isin(spell, rng.choice(_SPELLS, _SPELLS // 5, replace=False))
 
 
-def _late(samples: int) -> NDArray[np.bool_]:
-    return np.arange(samples) >= _EARLY * samples
-
-
 Made = tuple[Campaign, Answers, str]
 
 
@@ -246,16 +405,16 @@ def _joint_fault(campaign: Campaign, rng: np.random.Generator, remainder: float,
     shape = np.ones(campaign.samples)
     share = float(rng.uniform(0.35, 0.65))
     if fault == "backlash":
-        campaign = faults.with_approaches(campaign)
+        campaign = with_approaches(campaign)
         shape = -0.5 * campaign.covariates[f"approach.{name}"]
     elif fault == "slip":
         shape = (np.arange(campaign.samples) >= share * campaign.samples).astype(float)
     seen = _seen(campaign)
     ratio = float(rng.uniform(*_RATIO[fault]))
-    size = ratio * remainder / faults.leaves(seen, seen.joint_sensitivity[:, :3, joint] * shape[:, None])
+    size = ratio * remainder / leaves(seen, seen.joint_sensitivity[:, :3, joint] * shape[:, None])
     if fault != "backlash":
         size *= rng.choice([-1.0, 1.0])
-    changed = faults.with_joint_error(campaign, joint, size * shape)
+    changed = with_joint_error(campaign, joint, size * shape)
     if fault == "slip":
         truth = _truth("slip", ratio, size, name)
         truth |= {"effects": ["geometric"], "unlisted": "slip", "quantities": ["time", "order"]}
@@ -268,21 +427,21 @@ def _joint_fault(campaign: Campaign, rng: np.random.Generator, remainder: float,
 
 def _scale(campaign: Campaign, rng: np.random.Generator, remainder: float) -> Made:
     seen, ratio = _seen(campaign), float(rng.uniform(*_RATIO["scale"]))
-    shift = faults.measured(campaign) @ seen.frames.base[:3, :3]
-    size = float(rng.choice([-1.0, 1.0])) * ratio * remainder / faults.leaves(seen, shift)
+    shift = measured(campaign) @ seen.frames.base[:3, :3]
+    size = float(rng.choice([-1.0, 1.0])) * ratio * remainder / leaves(seen, shift)
     asked = f"instrument off by {1e6 * size:.0f} µm/m"
-    return faults.with_scale(campaign, size), _truth("instrument_scale", ratio, size), asked
+    return with_scale(campaign, size), _truth("instrument_scale", ratio, size), asked
 
 
 def _growth(campaign: Campaign, rng: np.random.Generator, remainder: float, told: bool) -> Made:
     seen = _seen(campaign)
-    warmer = faults.warm_up(rng, campaign.samples)
+    warmer = warm_up(rng, campaign.samples)
     strains = rng.uniform(1.2e-5, 2.3e-5, len(campaign.robot.segments))
-    changed = faults.with_growth(campaign, strains, warmer)
-    shift = (faults.measured(changed) - faults.measured(campaign)) @ seen.frames.base[:3, :3]
-    ratio, highest = faults.leaves(seen, shift) / remainder, float(warmer.max())
+    changed = with_growth(campaign, strains, warmer)
+    shift = (measured(changed) - measured(campaign)) @ seen.frames.base[:3, :3]
+    ratio, highest = leaves(seen, shift) / remainder, float(warmer.max())
     if told:
-        changed = faults.with_temperature(changed, warmer)
+        changed = with_temperature(changed, warmer)
     truth = _truth("thermal_elongation", ratio, highest)
     if not told:
         # how the temperature goes with time is all that the table can show of it
@@ -291,7 +450,7 @@ def _growth(campaign: Campaign, rng: np.random.Generator, remainder: float, told
 
 
 def _seen(campaign: Campaign) -> Observations:
-    return observe(campaign, faults.registered(campaign))
+    return observe(campaign, registered(campaign))
 
 
 _FAULTS: dict[Fault, Callable[[Campaign, np.random.Generator, float], Made]] = {

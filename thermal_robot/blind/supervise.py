@@ -24,13 +24,7 @@ class Lost(Exception):
 
 
 class Examinee:
-    """One examinee's process.
-
-    Parameters
-    ----------
-    directory
-        Of the trial.
-    """
+    """One examinee's process, of the trial in a directory."""
 
     def __init__(self, directory: Path) -> None:
         self._complaints = tempfile.TemporaryFile()
@@ -47,26 +41,14 @@ class Examinee:
         )
 
     def start(self) -> None:
-        """Wait until it is ready.
-
-        Raises
-        ------
-        RuntimeError
-            If it does not start: then the fault is not a campaign's.
-        """
+        """Wait until it is ready; RuntimeError if it does not start: then the fault is not a campaign's."""
         try:
             self._line(START_TIMEOUT)
         except Lost as why:
             raise RuntimeError(f"the examinee does not start: {why}") from None
 
     def ask(self, request: Mapping[str, Any], timeout: float) -> dict[str, Any]:
-        """Return its reply.
-
-        Raises
-        ------
-        Lost
-            If it ends, or takes longer than the timeout (s), and is then ended.
-        """
+        """Return its reply; Lost if it ends, or takes longer than the timeout (s), and is then ended."""
         assert self._process.stdin
         try:
             self._process.stdin.write(json.dumps(request) + "\n")
@@ -140,24 +122,10 @@ def environment() -> dict[str, str]:
 def examine(
     requests: Mapping[str, Mapping[str, Any]], directory: Path, *, workers: int, timeout: float
 ) -> Generator[tuple[str, dict[str, Any]], None, None]:
-    """Have requests answered by several examinees at once.
+    """Have requests, by name of the case, answered by several examinees at once, each within the timeout, s.
 
-    Parameters
-    ----------
-    requests
-        By name of the case.
-    directory
-        Of the trial.
-    workers
-        How many examinees.
-    timeout
-        Seconds for one answer.
-
-    Yields
-    ------
-    tuple
-        Name and reply, as they come. An examinee that ends or is late is replaced, and the reply says so. Leaving the
-        loop early ends all of them.
+    Yields name and reply, as they come. An examinee that ends or is late is replaced, and the reply says so. Leaving
+    the loop early ends all of them.
     """
     shared = _Shared(requests, directory, timeout)
     for name in requests:

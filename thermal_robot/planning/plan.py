@@ -25,7 +25,7 @@ from thermal_robot.planning import settings
 from thermal_robot.planning.expected import Columns, Expected, expectations
 from thermal_robot.robot import Robot, joint_range
 from thermal_robot.simulation import schedule
-from thermal_robot.simulation.settings import RISE
+from thermal_robot.simulation.schedule import RISE
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,7 +9,22 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign.turning import arrivals
-from thermal_robot.simulation import settings
+
+ROWS = 60
+"""Rows of a campaign of which nobody says how long it is: an hour's work, as :data:`SECONDS_A_ROW` has it."""
+SECONDS_A_ROW = 60.0
+"""s: an arm moves, settles and is measured in less; slower, so that the arm warms while it is measured."""
+COLD, RISE = 20.0, 6.0
+"""°C at the start, the temperature to which lengths refer; and K by which an arm at work warms in an hour or two."""
+WARMING, CONSTANT = 0.6, 0.2
+"""Shares of the campaign: how long the arm warms, before it cools; and the time constant of either."""
+BLOCKS = 3
+"""How often each payload comes round: so it is not confounded with time, and nobody changes it at each pose."""
+SWAPS = 3000
+"""Exchanges of two poses that are tried to balance an order."""
+BALANCED = 0.1
+"""Share by which the approaches from one side may differ from half in an order that is taken as balanced."""
+
 
 Rows = NDArray[np.int64]
 
@@ -20,15 +35,15 @@ def conditions(rows: int, rise: float, loads: Sequence[float] = ()) -> dict[str,
     The arm warms by nearly ``rise``, K, then cools; payloads, none first, come round in blocks.
     """
     share = np.arange(rows) / max(rows - 1, 1)
-    warm = -np.expm1(-np.minimum(share, settings.WARMING) / settings.CONSTANT)
-    left = np.exp(-np.maximum(share - settings.WARMING, 0.0) / settings.CONSTANT)
+    warm = -np.expm1(-np.minimum(share, WARMING) / CONSTANT)
+    left = np.exp(-np.maximum(share - WARMING, 0.0) / CONSTANT)
     found: dict[str, Array] = {
-        "time": settings.SECONDS_A_ROW * np.arange(rows, dtype=np.float64),
-        "temperature": np.asarray(settings.COLD + rise * warm * left),
+        "time": SECONDS_A_ROW * np.arange(rows, dtype=np.float64),
+        "temperature": np.asarray(COLD + rise * warm * left),
     }
     if loads:
         levels = np.array([0.0, *loads])
-        blocks = min(settings.BLOCKS * len(levels), rows)
+        blocks = min(BLOCKS * len(levels), rows)
         found["payload"] = levels[(np.arange(rows) * blocks // rows) % len(levels)]
     return found
 
@@ -53,12 +68,12 @@ def balanced(poses: Array, places: Rows, rng: np.random.Generator) -> Rows:
     """(P,) an order of poses (P, n) in which each joint comes from either side about equally often.
 
     Two poses are exchanged wherever that brings the least balanced joint nearer to half; it stops once all are within
-    :data:`~thermal_robot.simulation.settings.BALANCED`.
+    :data:`~thermal_robot.simulation.schedule.BALANCED`.
     """
     order = np.arange(len(poses))
     worst = _unbalanced(poses, places, order)
-    for _ in range(settings.SWAPS):
-        if worst <= settings.BALANCED or len(poses) < 2:
+    for _ in range(SWAPS):
+        if worst <= BALANCED or len(poses) < 2:
             break
         one, other = rng.choice(len(poses), 2, replace=False)
         order[[one, other]] = order[[other, one]]

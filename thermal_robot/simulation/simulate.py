@@ -2,23 +2,403 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeAlias
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
-from thermal_robot.errors import CampaignError
-from thermal_robot.observations import observe
-from thermal_robot.robot import ENDS, Robot, load_robot
-from thermal_robot.schema import fitted, whole
-from thermal_robot.simulation.commanded import CALL, AtWork, at_work, commanded
-from thermal_robot.simulation.measured import instrument, measured, placed
+from thermal_robot.campaign import names as columns
+from thermal_robot.campaign.checked import checked_mapping
+from thermal_robot.campaign.names import did_you_mean, listed, split_name, tilted
+from thermal_robot.campaign.plausible import doubts
+from thermal_robot.campaign.recognise import TYPING_ERROR
+from thermal_robot.campaign.validate import arrived
+from thermal_robot.effects import Effect, Parameter, RandomEffect, gate, named
+from thermal_robot.effects.apply import displacement
+from thermal_robot.effects.quantities import unit
+from thermal_robot.errors import CampaignError, EffectError
+from thermal_robot.inference.rows import repeated_poses
+from thermal_robot.kinematics import exp3, rotation_to_quaternion
+from thermal_robot.observations import Frames, Observations, observe
+from thermal_robot.robot import ENDS, Robot, joint_range, load_robot
+from thermal_robot.schema import LARGEST, MisfitError, boolean, fitted, matrix, number, optional, shown, whole, word
+from thermal_robot.simulation import schedule
 
 if TYPE_CHECKING:
     from thermal_robot.urdf_text import WritesUrdf
+
+
+CALL = "simulate()"
+"""What messages call the file that there is none of."""
+
+
+def commanded(
+    robot: Robot, rows: Any, repeats: Any, commands: Any, conditions: Any, rng: np.random.Generator
+) -> Campaign:
+    """Return the rows that are simulated, with their conditions and nothing measured."""
+    if isinstance(commands, Campaign):
+        plan = _of_campaign(robot, rows, repeats, commands)
+    else:
+        poses, times = _poses(robot, rows, repeats, commands, rng)
+        q, which = schedule.in_turn(poses, schedule.visits(len(poses) * times, times))
+        labels = {"pose": np.array([str(k + 1) for k in which])} if times > 1 else {}
+        given = schedule.conditions(len(q), schedule.RISE)
+        plan = Campaign("simulated", robot, q, covariates=given, labels=labels, base_known=True, tool_known=True)
+    return arrived(_under(plan, conditions))
+
+
+def _of_campaign(robot: Robot, rows: Any, repeats: Any, commands: Campaign) -> Campaign:
+    """Return the rows of a campaign, without what was measured."""
+    if rows is not None or repeats != 1:
+        expected = "neither rows nor repeats beside a campaign, which has its own"
+        raise CampaignError(CALL, "too much is said of the rows", expected=expected)
+    if commands.robot.joint_names != robot.joint_names:
+        found, expected = listed(commands.robot.joint_names), f"the robot's {listed(robot.joint_names)}"
+        raise CampaignError(
+            CALL, "the campaign commands other joints", column="commands", found=found, expected=expected
+        )
+    return replace(
+        commands, robot=robot, position=None, orientation=None, targets=None, noise_of_rows=None, warnings=()
+    )
+
+
+def _poses(robot: Robot, rows: Any, repeats: Any, commands: Any, rng: np.random.Generator) -> tuple[Array, int]:
+    """Return (P, n) different poses, and how often each is measured."""
+    times = fitted(whole(1), repeats, CALL, "repeats")
+    if commands is not None:
+        if rows is not None:
+            raise CampaignError(CALL, "too much is said of the rows", expected="either rows or commands")
+        return _given(robot, commands), times
+    count = fitted(whole(1), schedule.ROWS if rows is None else rows, CALL, "rows")
+    if count % times:
+        expected = f"a number of rows of which {times} visit each pose"
+        raise CampaignError(CALL, "does not divide into poses", column="rows", found=str(count), expected=expected)
+    low, high = joint_range(robot)
+    for joint, width in zip(robot.joint_names, high - low, strict=True):
+        if not np.isfinite(width):
+            expected = "a <limit> in the URDF for a joint that slides, or commands of your own"
+            raise CampaignError(CALL, "no poses can be drawn", column=joint, found="no limits", expected=expected)
+    return rng.uniform(low, high, (count // times, robot.n)), times
+
+
+def _given(robot: Robot, commands: Any) -> Array:
+    """Return (P, n) positions that a user gave; (n,) counts as one row."""
+    rows = f"rows of {robot.n} joint positions, or a campaign, which read_samples makes of a table"
+    if not isinstance(commands, (list, tuple, np.ndarray)):
+        raise CampaignError(CALL, "no positions", column="commands", found=type(commands).__name__, expected=rows)
+    if len(commands) == robot.n and not any(isinstance(each, (list, tuple, np.ndarray)) for each in commands):
+        commands = [commands]
+    plain = [each.tolist() if isinstance(each, np.ndarray) else each for each in commands]
+    poses: Array = fitted(matrix((None, robot.n)), plain, CALL, "commands")
+    if not len(poses):
+        raise CampaignError(CALL, "there is no row", column="commands", expected=rows)
+    return poses
+
+
+def _under(plan: Campaign, conditions: Any) -> Campaign:
+    """Return the rows under conditions that are given, beside those that they had."""
+    given: Mapping[str, Any] = checked_mapping(CALL, "conditions", {} if conditions is None else conditions)
+    covariates, labels, extra = dict(plan.covariates), dict(plan.labels), list(plan.extra)
+    for name, values in given.items():
+        own = _known(name, plan.robot)
+        held: dict[str, Any] = labels if name in columns.LABELS else covariates
+        held.pop(name, None)
+        if values is not None:
+            held[name] = _of_rows(name, values, plan.samples)
+            extra += [name] if not own and name not in extra else []
+    kept = {name: gaps for name, gaps in plan.missing.items() if name not in given}
+    # what followed from an order follows anew from another
+    followed = tuple(name for name in plan.derived if name not in given)
+    if {*columns.CLOCK, "session"} & set(given):
+        covariates = {name: values for name, values in covariates.items() if name not in followed}
+    left = tuple(name for name in followed if name in covariates)
+    named = tuple(name for name in extra if name in covariates)
+    return replace(plan, covariates=covariates, labels=labels, extra=named, missing=kept, derived=left, travelled={})
+
+
+def _of_rows(name: str, values: Any, rows: int) -> NDArray[Any]:
+    """Return (N,) values of a condition; one stands for all rows."""
+    try:
+        found = np.asarray(values, dtype=np.str_ if name in columns.LABELS else np.float64)
+        return np.broadcast_to(found, rows).copy()
+    except (TypeError, ValueError):
+        expected = f"one value for all rows, or one for each of {rows}"
+        raise CampaignError(CALL, "no condition", column=name, found=shown(values), expected=expected) from None
+
+
+def _known(name: str, robot: Robot) -> bool:
+    """Tell whether the format defines a column; refuse one that is no condition, and typing errors."""
+    if name in robot.joint_names or name in (*columns.MEASURED, *columns.SIMULATED):
+        what = "is commanded, no condition" if name in robot.joint_names else "is no condition"
+        raise CampaignError(CALL, what, column=name, expected="positions in commands; poses are what is simulated")
+    places = {
+        **dict.fromkeys(columns.PER_JOINT, robot.joint_names),
+        **dict.fromkeys(columns.PER_LINK, robot.urdf_links),
+    }
+    known = columns.conditions(robot.joint_names, robot.urdf_links)
+    quantity, place = split_name(name)
+    if name in known or name in columns.LABELS:
+        return True
+    if place and quantity in places:
+        what = "the chain has no such joint" if quantity in columns.PER_JOINT else "the robot has no such link"
+        near = did_you_mean(place, places[quantity])
+        raise CampaignError(
+            CALL, f"{what}{near}", column=name, expected=f"{quantity}. and one of {listed(places[quantity])}"
+        )
+    # a tilt of what is no link is a column of the user's own
+    offered = [*(column for column in known if not tilted(column)), *columns.LABELS]
+    meant = did_you_mean(name, offered, cutoff=TYPING_ERROR)
+    if meant:
+        raise CampaignError(CALL, f"there is no such condition{meant}", column=name)
+    return False
+
+
+Values: TypeAlias = "float | Sequence[float] | Array | Mapping[str, float]"
+"""One number for all parameters, one for each in their order, or some by name: the others are 0. SI."""
+AtWork: TypeAlias = "Mapping[str | Effect, Values] | Mapping[str, Values] | Iterable[tuple[str | Effect, Values]]"
+"""Effects with their values: by name, in the setting in which they are first looked for, or as they are."""
+
+_EACH = "values by name of an effect, such as {'joint_gain': {'joint_2': 1e-3}}"
+
+
+def _pairs(effects: Any) -> list[tuple[Any, Any]]:
+    if effects is None:
+        return []
+    if isinstance(effects, Mapping):
+        return list(effects.items())
+    if isinstance(effects, (list, tuple)) and all(isinstance(e, (list, tuple)) and len(e) == 2 for e in effects):
+        return [(kind, values) for kind, values in effects]
+    raise EffectError(f"these are no effects with values: {shown(effects)}; expected {_EACH}")
+
+
+def _asked(kind: Any, values: Any, seen: Observations) -> tuple[Effect, Array]:
+    if not isinstance(kind, (str, Effect)):
+        raise EffectError(f"{shown(kind)} is neither the name of an effect nor an effect; expected {_EACH}")
+    effect = named(kind) if isinstance(kind, str) else kind
+    if isinstance(effect, RandomEffect):
+        joints = effect.joints(seen.robot.joint_names)
+        sizes = [Parameter(effect.label, unit(seen.robot, j), 1.0, "joint", j, (), positive=True) for j in joints]
+        return effect, _values(effect, sizes, values)
+    _require_conditions(effect, seen)
+    if isinstance(kind, str):
+        effect = gate.variants(effect, seen)[0]
+    parameters = gate.checked(effect, seen)
+    if not parameters:
+        settings = ", ".join(f"{argument}=…" for argument in gate.arguments(effect))
+        raise EffectError(
+            f"effect {effect.name!r} has no parameters here, so that nothing can be simulated; give it with the "
+            f"settings that bring some, as {type(effect).__name__}({settings})"
+        )
+    return effect, _values(effect, parameters, values)
+
+
+def _require_conditions(effect: Effect, seen: Observations) -> None:
+    """Refuse an effect that has nothing to follow, by what would be needed."""
+    # a condition may stand still, as on a robot that has warmed through
+    lacks = [column for column in gate.missing(effect, seen) if column not in seen.covariates]
+    if not lacks:
+        return
+    columns = [column for column in lacks if " " not in column and "<" not in column]
+    how = f"; give one value, or one a row, as conditions={{{columns[0]!r}: [...]}}" if columns else ""
+    raise EffectError(f"effect {effect.name!r} has nothing to follow: it needs {', '.join(lacks)}{how}")
+
+
+def _values(effect: Effect, places: Sequence[Parameter], given: Any) -> Array:
+    """Return (P,) the values of an effect's parameters."""
+    found = np.zeros(len(places))
+    if isinstance(given, Mapping):
+        for name, value in given.items():
+            k = _which(effect, places, name)
+            found[k] = _number(effect, places[k], value)
+        return found
+    if isinstance(given, (list, tuple, np.ndarray)):
+        each = list(given)
+        if len(each) != len(places):
+            names = listed([place.name for place in places])
+            raise EffectError(f"effect {effect.name!r} has {len(places)} parameters, {len(each)} values given: {names}")
+        return np.array([_number(effect, place, value) for place, value in zip(places, each, strict=True)])
+    units = dict.fromkeys(place.unit for place in places)
+    if len(units) > 1:
+        raise EffectError(
+            f"effect {effect.name!r}: one number cannot stand for parameters in {', '.join(units)}; "
+            f"give values by name: {listed([place.name for place in places])}"
+        )
+    return np.array([_number(effect, place, given) for place in places])
+
+
+def _which(effect: Effect, places: Sequence[Parameter], name: Any) -> int:
+    """Return the index of the one parameter of a name, of a place, or of a label."""
+    for candidates in ([p.name for p in places], [p.place for p in places], [p.label for p in places]):
+        found = [k for k, candidate in enumerate(candidates) if candidate == name]
+        if len(found) == 1:
+            return found[0]
+        if found:
+            meant = listed([places[k].name for k in found])
+            raise EffectError(f"effect {effect.name!r}: {name!r} is {len(found)} parameters; name one of {meant}")
+    names = [place.name for place in places]
+    near = did_you_mean(str(name), dict.fromkeys((*names, *(place.place for place in places))))
+    raise EffectError(f"effect {effect.name!r} has no parameter {name!r} here{near}; there are {listed(names)}")
+
+
+def _number(effect: Effect, place: Parameter, value: Any) -> float:
+    """Return a value of a parameter, seen to be one."""
+    least = 0.0 if place.positive else -LARGEST
+    what = f"a number{', not negative,' if place.positive else ''} in {place.unit}"
+    kind = number(least=least, expected=what)
+    try:
+        return float(kind(value, f"effect {effect.name!r}, parameter {place.name!r}"))
+    except MisfitError as error:
+        raise EffectError(str(error)) from None
+
+
+_MEASURES = ("position", "pose")
+
+
+@dataclass(frozen=True)
+class Instrument:
+    """An instrument with normal noise, the same along and about each axis.
+
+    Attributes
+    ----------
+    turns
+        Whether it measures orientations, too.
+    noise, noise_orientation
+        One sigma per axis, m and rad.
+    """
+
+    turns: bool
+    noise: float
+    noise_orientation: float
+
+    def awaiting(self, plan: Campaign) -> Campaign:
+        """Return rows that tell effects what will be measured: orientations, not yet turned, where they are."""
+        turned = np.tile([1.0, 0.0, 0.0, 0.0], (plan.samples, 1)) if self.turns else None
+        return replace(plan, orientation=turned)
+
+    def reading(self, position: Array, rotation: Array, rng: np.random.Generator) -> tuple[Array, Array | None]:
+        """Return a reading of (N, 3) positions, m, and of (N, 3, 3) rotations, (N, 4) quaternions wxyz or ``None``."""
+        read = position + self.noise * rng.normal(size=position.shape)
+        if not self.turns:
+            return read, None
+        turn = exp3(self.noise_orientation * rng.normal(size=position.shape))
+        return read, rotation_to_quaternion(turn @ rotation)
+
+
+def instrument(measures: Any, noise: Any, noise_orientation: Any) -> Instrument:
+    """Return the instrument that a user asks for; see :func:`thermal_robot.simulate`."""
+    sigma = number(least=0.0, expected="one sigma per axis, 0 for none", problem="a noise cannot be negative")
+    shift, turn = fitted(sigma, noise, CALL, "noise"), fitted(sigma, noise_orientation, CALL, "noise_orientation")
+    what = fitted(word(_MEASURES), _MEASURES[0] if measures is None else measures, CALL, "measures")
+    if turn > 0.0 and what != "pose":
+        expected = 'measures="pose", or no noise of orientations'
+        raise CampaignError(CALL, "only positions are measured", column="noise_orientation", expected=expected)
+    return Instrument(what == "pose", shift, turn)
+
+
+_RIGID = 1e-6
+"""Of a rotation: by how much its entries, written with few digits, may be off."""
+
+
+def placed(plan: Campaign, base: Any, tool: Any, base_known: Any, tool_known: Any) -> tuple[Campaign, Frames]:
+    """Return the rows with what they declare of their frames, and the true ones; see :func:`thermal_robot.simulate`."""
+    declared = Frames.declared(plan)
+    told = {"base_known": base_known, "tool_known": tool_known}
+    known = {key: fitted(optional(boolean), value, CALL, key) for key, value in told.items()}
+    ground = declared.base if base is None else _pose("base", base)
+    point = None if tool is None else _point(tool)
+    if point is not None:
+        plan = replace(plan, target=point)
+        target, sits = Frames.declared(plan).tool, True
+    elif tool is not None:
+        target, sits = _pose("tool", tool), False
+        plan = replace(plan, target=target[:3, 3])
+    else:
+        target, sits = declared.tool, plan.tool_known
+    stands = plan.base_known if base is None else False
+    stands, sits = (
+        own if key is None else key for own, key in ((stands, known["base_known"]), (sits, known["tool_known"]))
+    )
+    for key, claimed, true, where in (
+        ("base_known", stands, ground, declared.base),
+        ("tool_known", sits, target, Frames.declared(plan).tool),
+    ):
+        if claimed and not np.allclose(true, where, atol=_RIGID, rtol=0.0):
+            expected = "a frame where it is declared: its error is an effect of its own"
+            raise CampaignError(CALL, "the frame that is given is elsewhere", column=key, expected=expected)
+    return replace(plan, base_known=stands, tool_known=sits), Frames(ground, target)
+
+
+def _point(tool: Any) -> Array | None:
+    """Return three numbers; ``None`` for everything else."""
+    try:
+        point = np.array(tool, dtype=np.float64)
+    except (TypeError, ValueError):
+        return None
+    return point if point.shape == (3,) else None
+
+
+def _pose(key: str, given: Any) -> Array:
+    """Return a (4, 4) pose, seen to be rigid."""
+    also = ", or three numbers" if key == "tool" else ""
+    try:
+        pose = np.array(given, dtype=np.float64)
+    except (TypeError, ValueError):
+        pose = np.empty(0)
+    if pose.shape == (4, 4) and np.isfinite(pose).all():
+        turn = pose[:3, :3]
+        right = np.allclose(turn @ turn.T, np.eye(3), atol=_RIGID) and np.linalg.det(turn) > 0.0
+        if right and np.array_equal(pose[3], [0.0, 0.0, 0.0, 1.0]):
+            return pose
+    expected = f"a (4, 4) pose: a rotation, a shift in m, and the row 0 0 0 1{also}"
+    raise CampaignError(CALL, "no pose", column=key, found=shown(given), expected=expected)
+
+
+def measured(
+    plan: Campaign,
+    frames: Frames,
+    effects: Sequence[tuple[Effect, Array]],
+    instrument: Instrument,
+    joints: np.random.Generator,
+    readings: np.random.Generator,
+) -> Campaign:
+    """Return the campaign that an instrument measures of a robot with effects at work, at its true frames.
+
+    Each effect has the (P,) values of its parameters; ``joints`` and ``readings`` are the chance of what scatters, and
+    of the instrument.
+    """
+    systematic = [(effect, values) for effect, values in effects if not isinstance(effect, RandomEffect)]
+    moved, shift = displacement(observe(plan, frames), systematic)
+    moved = replace(moved, joint=np.asarray(moved.joint) + _scatter(plan, effects, joints))
+    real = observe(plan, frames, displacement=moved)
+    position = real.predicted_position + (0.0 if shift is None else shift)
+    if not np.isfinite(position).all():
+        raise CampaignError(CALL, "these values lead to no finite position", column="effects", expected="smaller ones")
+    read, orientation = instrument.reading(position, frames.base[:3, :3] @ real.rotation, readings)
+    found = replace(
+        plan,
+        position=read,
+        orientation=orientation,
+        noise_position=instrument.noise or None,
+        noise_orientation=instrument.noise_orientation or None,
+    )
+    return replace(found, warnings=tuple(doubts(found)))
+
+
+def _scatter(plan: Campaign, effects: Sequence[tuple[Effect, Array]], rng: np.random.Generator) -> Array:
+    """(N, n) by how much joints stand elsewhere than they were told to by chance, rad or m."""
+    away, pose, names = np.zeros_like(plan.q), repeated_poses(plan), plan.robot.joint_names
+    for effect, sizes in effects:
+        if isinstance(effect, RandomEffect):
+            for joint, size in zip(effect.joints(names), sizes.tolist(), strict=True):
+                j = names.index(joint)
+                away[:, j] += effect.drawn(plan.q[:, j], pose, size, rng)
+    return away
+
 
 _POSES, _JOINTS, _INSTRUMENT = range(3)
 """Chance of the poses, of joints that scatter and of the instrument: each is its own, so that none changes another."""
@@ -123,7 +503,8 @@ def simulate(
     used = instrument(given, noise, noise_orientation)
     plan = used.awaiting(commanded(robot, rows, repeats, commands, conditions, poses))
     plan, frames = placed(plan, base, tool, base_known, tool_known)
-    effects_at_work = at_work(effects, observe(plan, frames))
+    seen = observe(plan, frames)
+    effects_at_work = [_asked(kind, values, seen) for kind, values in _pairs(effects)]
     return measured(plan, frames, effects_at_work, used, joints, readings)
 
 

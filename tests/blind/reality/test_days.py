@@ -7,7 +7,7 @@ pytest.importorskip("mujoco", reason='the blind trial needs "thermal-robot[blind
 
 from thermal_robot.blind.cases import Case
 from thermal_robot.blind.plan import robots
-from thermal_robot.blind.reality.days import draw_day, draw_habits, write_day
+from thermal_robot.blind.reality.campaign import draw_day, draw_habits, write_day
 from thermal_robot.blind.reality.world import World
 from thermal_robot.campaign import read_campaign
 
@@ -37,9 +37,9 @@ def test_days_differ_in_all_but_the_habits(days):
 def test_a_sound_robot_leaves_noise_alone(days, tmp_path):
     """Distances between poses are those of the sound robot, wherever instrument and target are."""
     case, habits, drawn = days
-    count = write_day(tmp_path, case, drawn[0], [], np.random.default_rng(1))
+    _, measured = write_day(tmp_path, case, drawn[0], [], np.random.default_rng(1))
     campaign = read_campaign(tmp_path)
-    assert campaign.samples == count == drawn[0].setting.samples
+    assert campaign.samples == len(measured.position) == drawn[0].setting.samples
     assert not (tmp_path / "fresh.csv").exists()
     apart = np.linalg.norm(np.diff(campaign.position, axis=0), axis=1)
     true = np.linalg.norm(np.diff(drawn[0].gauge.sound, axis=0), axis=1)

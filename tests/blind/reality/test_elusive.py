@@ -7,9 +7,8 @@ import pytest
 
 pytest.importorskip("mujoco", reason='the blind trial needs "thermal-robot[blind]"')
 
-from thermal_robot.blind.reality.elusive import ELUSIVE, SLOW, slipped, wandered
-from thermal_robot.blind.reality.fault import Fault
-from thermal_robot.blind.reality.faults import FAULTS
+from thermal_robot.blind.reality.fault import FAULTS, Fault
+from thermal_robot.blind.reality.unlisted import ELUSIVE, SLOW, slipped, wandered
 
 BY_NAME: dict[str, Fault] = {**FAULTS, **{fault.name: fault for fault in ELUSIVE}}
 

@@ -6,8 +6,7 @@ import pytest
 pytest.importorskip("mujoco", reason='the blind trial needs "thermal-robot[blind]"')
 
 from thermal_robot.blind.reality import World
-from thermal_robot.blind.reality.fault import Fault, clock, joints, own_position, segments, some
-from thermal_robot.blind.reality.faults import FAULTS
+from thermal_robot.blind.reality.fault import FAULTS, Fault, clock, joints, own_position, segments, some
 from thermal_robot.blind.reality.setting import draw_setting
 
 SCARA = """<robot name="scara">
@@ -90,4 +89,4 @@ def test_places_and_their_quantities_are_named_by_the_robot(scara):
     assert joints(scara) == [("joint", name) for name in ("shoulder", "elbow", "lift", "turn")]
     assert segments(scara) == [("link", link) for link in ("ground", "inner", "outer", "quill")]
     assert own_position(scara, [("joint", "lift")]) == ["lift"]
-    assert clock(scara, []) == ["time", "order"]
+    assert list(clock(scara, [])) == ["time", "order"]

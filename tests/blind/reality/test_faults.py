@@ -8,8 +8,8 @@ import pytest
 pytest.importorskip("mujoco", reason='the blind trial needs "thermal-robot[blind]"')
 
 from thermal_robot.blind.reality import FAULTS
-from thermal_robot.blind.reality.rigid import from_vector, rpy_matrix
 from thermal_robot.blind.reality.sizes import place
+from thermal_robot.blind.reality.world import from_vector, rpy_matrix
 from thermal_robot.effects import library
 
 TWIST = np.array([3e-4, -2e-4, 1e-4, 2e-4, 1e-4, -3e-4])

@@ -10,8 +10,7 @@ pytest.importorskip("mujoco", reason='the blind trial needs "thermal-robot[blind
 from thermal_robot.blind.cases import LISTED, Case, Several
 from thermal_robot.blind.plan import robots
 from thermal_robot.blind.reality import make
-from thermal_robot.blind.reality.days import draw_day, draw_habits
-from thermal_robot.blind.reality.fleets import draw_fleet
+from thermal_robot.blind.reality.campaign import draw_day, draw_fleet, draw_habits
 from thermal_robot.blind.reality.world import World
 from thermal_robot.campaign import read_campaign
 

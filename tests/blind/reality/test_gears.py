@@ -8,7 +8,8 @@ import pytest
 pytest.importorskip("mujoco", reason='the blind trial needs "thermal-robot[blind]"')
 
 from thermal_robot.blind.plan import ROBOTS
-from thermal_robot.blind.reality import World, gears
+from thermal_robot.blind.reality import World
+from thermal_robot.blind.reality import fault as gears
 from thermal_robot.blind.reality.setting import draw_setting
 from thermal_robot.robot import load_robot
 

@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 from scipy.stats import kurtosis
 
 from thermal_robot.blind.reality.instrument import Instrument, Measured, measure, registered
-from thermal_robot.blind.reality.rigid import anywhere, from_vector
 from thermal_robot.blind.reality.sizes import place
+from thermal_robot.blind.reality.world import anywhere, from_vector
 
 NOISE = 2e-5
 
@@ -21,7 +21,7 @@ NOISE = 2e-5
 def instrument():
     target = np.array([0.01, -0.02, 0.1])
     pose = anywhere(np.random.default_rng(1), 3.0)
-    return Instrument(pose, target, target + 0.005, False, False, NOISE, 3e-5, True, np.inf, 0.0)
+    return Instrument(pose, target, target + 0.005, NOISE, turning=3e-5)
 
 
 @pytest.fixture(scope="module")
@@ -32,7 +32,7 @@ def seen(setting, instrument):
 def errors(setting, seen, instrument, days=120):
     """(days, N, 3) over the noise."""
     rows, rng = np.arange(setting.samples), np.random.default_rng(2)
-    return np.array([measure(setting, *seen, rows, instrument, rng).position - seen[0] for _ in range(days)]) / NOISE
+    return np.array([measure(*seen, rows, instrument, rng).position - seen[0] for _ in range(days)]) / NOISE
 
 
 @pytest.mark.parametrize("tails", [np.inf, 7.0, 5.0])
@@ -50,19 +50,19 @@ def test_tails_are_heavier_with_fewer_degrees_of_freedom(setting, seen, instrume
 
 def test_orientations_scatter_about_all_axes_alike(setting, seen, instrument):
     rows, rng = np.arange(setting.samples), np.random.default_rng(2)
-    found = [measure(setting, *seen, rows, instrument, rng).quaternion for _ in range(40)]
+    found = [measure(*seen, rows, instrument, rng).quaternion for _ in range(40)]
     turns = (
         Rotation.from_quat(np.roll(found, -1, axis=2).reshape(-1, 4))
         * Rotation.from_matrix(np.tile(seen[1], (40, 1, 1))).inv()
     )
     np.testing.assert_allclose(turns.as_rotvec().std(axis=0), 3e-5, rtol=0.06)
-    bare = measure(setting, *seen, rows, replace(instrument, turning=None), rng)
+    bare = measure(*seen, rows, replace(instrument, turning=None), rng)
     assert bare.quaternion is None
 
 
 def test_spoilt_rows_are_those_that_are_named_as_an_editor_counts_them(setting, seen, instrument):
     rows = np.arange(setting.samples)[::-1]
-    given = measure(setting, *seen, rows, replace(instrument, spoilt=0.3), np.random.default_rng(3))
+    given = measure(*seen, rows, replace(instrument, spoilt=0.3), np.random.default_rng(3))
     off = np.linalg.norm(given.position - seen[0][rows], axis=1) > 8.0 * NOISE
     named = np.array(given.spoilt) - 2
     assert set(np.flatnonzero(off)) <= set(named)

@@ -7,9 +7,9 @@ import pytest
 
 pytest.importorskip("mujoco", reason='the blind trial needs "thermal-robot[blind]"')
 
-from thermal_robot.blind.reality.elusive import INTERPLAY, deviation
 from thermal_robot.blind.reality.fault import Fault
 from thermal_robot.blind.reality.sizes import Gauge
+from thermal_robot.blind.reality.unlisted import INTERPLAY, deviation
 
 BY_NAME: dict[str, Fault] = {fault.name: fault for fault in INTERPLAY}
 

@@ -6,8 +6,7 @@ import pytest
 pytest.importorskip("mujoco", reason='the blind trial needs "thermal-robot[blind]"')
 
 from thermal_robot.blind.reality import FAULTS
-from thermal_robot.blind.reality.moved import GROWS_ONLY, Spot, deviation, draw_spot
-from thermal_robot.blind.reality.sizes import Unseen
+from thermal_robot.blind.reality.sizes import GROWS_ONLY, Spot, Unseen, deviation, draw_spot
 
 OFFSET, GAIN, PLAY = FAULTS["joint_offset"], FAULTS["joint_gain"], FAULTS["backlash"]
 NOISE = 2e-5
@@ -64,7 +63,7 @@ def test_a_change_has_the_name_and_the_size_of_what_formats_md_says(name, settin
     parameter, amount = spot.told(setting, values, by)
     joint = setting.world.names[2]
     assert parameter.endswith(f", {joint}")
-    assert spot.place(setting) == ("joint", joint)
+    assert spot.named(setting)["place"] == {"kind": "joint", "name": joint}
     # the displacement that the amount stands for, in the convention of formats.md
     body = setting.world.sound(setting.samples)
     fault.act(body, setting, spot.moved(values, by))

@@ -5,7 +5,7 @@ import pytest
 pytest.importorskip("mujoco", reason='the blind trial needs "thermal-robot[blind]"')
 
 from thermal_robot.blind.reality import FAULTS, UNLISTED, Fault
-from thermal_robot.blind.reality.own import known, load
+from thermal_robot.blind.reality.unlisted import known, load
 from thermal_robot.errors import EffectError
 
 FILE = """

@@ -5,7 +5,7 @@ import pytest
 
 pytest.importorskip("mujoco", reason='the blind trial needs "thermal-robot[blind]"')
 
-from thermal_robot.blind.reality.rigid import anywhere, free_columns, from_vector, quaternion, rpy_matrix
+from thermal_robot.blind.reality.world import anywhere, free_columns, from_vector, quaternion, rpy_matrix
 
 RNG = np.random.default_rng(8)
 TWISTS = RNG.normal(size=(20, 6))

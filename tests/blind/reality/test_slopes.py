@@ -7,8 +7,7 @@ import pytest
 
 pytest.importorskip("mujoco", reason='the blind trial needs "thermal-robot[blind]"')
 
-from thermal_robot.blind.reality.rigid import from_vector
-from thermal_robot.blind.reality.unlisted import slopes
+from thermal_robot.blind.reality.world import from_vector, slopes
 
 SMALL = 1e-6
 TARGET = np.array([0.03, -0.02, 0.11])

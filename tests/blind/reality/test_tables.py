@@ -13,11 +13,10 @@ from conftest import AWKWARD
 from thermal_robot.blind.cases import Case
 from thermal_robot.blind.plan import robots
 from thermal_robot.blind.reality import World
-from thermal_robot.blind.reality.instrument import Instrument, Measured
-from thermal_robot.blind.reality.rigid import quaternion
+from thermal_robot.blind.reality.instrument import Instrument, Measured, conditions, write_folder
 from thermal_robot.blind.reality.setting import draw_setting
 from thermal_robot.blind.reality.sizes import place
-from thermal_robot.blind.reality.tables import conditions, write_folder
+from thermal_robot.blind.reality.world import quaternion
 from thermal_robot.campaign import read_campaign
 from thermal_robot.kinematics import tool_poses
 

@@ -10,7 +10,7 @@ from thermal_robot.blind.plan import robots
 from thermal_robot.blind.reality import FAULTS, make
 from thermal_robot.blind.reality.fault import Fault
 from thermal_robot.blind.reality.setting import draw_setting
-from thermal_robot.blind.reality.truth import near
+from thermal_robot.blind.reality.sizes import near
 from thermal_robot.campaign import read_campaign
 from thermal_robot.effects import gate, library
 from thermal_robot.observations import observe

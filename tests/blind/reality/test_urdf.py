@@ -7,7 +7,7 @@ pytest.importorskip("mujoco", reason='the blind trial needs "thermal-robot[blind
 
 from conftest import AWKWARD
 
-from thermal_robot.blind.reality.urdf import read
+from thermal_robot.blind.reality.world import read
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ import pytest
 
 pytest.importorskip("mujoco", reason='the blind trial needs "thermal-robot[blind]"')
 
-from thermal_robot.blind.reality.warmth import followed, hall, time_constant, warmed
+from thermal_robot.blind.reality.setting import followed, hall, time_constant, warmed
 
 TIME = np.linspace(0.0, 9000.0, 181)
 

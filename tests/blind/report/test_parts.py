@@ -3,7 +3,7 @@
 import re
 from html import unescape
 
-from thermal_robot.blind.report.text import section
+from thermal_robot.blind.report.page import section
 
 HOSTILE = '<b>&"x"'
 

@@ -5,7 +5,7 @@ import pytest
 from blind_records import effect, record, said, trial
 from matplotlib.patches import Rectangle
 
-from thermal_robot.blind.report.plots import calibration_figure, confusion_figure, shrinkage_figure
+from thermal_robot.blind.report.page import calibration_figure, confusion_figure, shrinkage_figure
 from thermal_robot.blind.score import score
 
 

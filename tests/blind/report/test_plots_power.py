@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from blind_records import effect, record, said, trial
 
-from thermal_robot.blind.report.plots import power_figure
+from thermal_robot.blind.report.page import power_figure
 from thermal_robot.blind.score import score
 
 

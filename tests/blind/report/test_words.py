@@ -6,8 +6,8 @@ import pytest
 
 from thermal_robot.blind.cases import Kind
 from thermal_robot.blind.judged import HEADLINE
-from thermal_robot.blind.report import words
-from thermal_robot.blind.report.words import coefficients, count, effect, facts, interval, kind, miss, needed, question
+from thermal_robot.blind.report import text as words
+from thermal_robot.blind.report.text import coefficients, count, effect, facts, interval, kind, miss, needed, question
 from thermal_robot.blind.score import score
 
 CURVE = {"rows": (30.0, 140.0), "ratios": (0.7, 6.0)}

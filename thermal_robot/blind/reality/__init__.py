@@ -5,8 +5,7 @@ nevertheless (formats.md, Newton's law of cooling, Hooke's) is listed in docs/bl
 """
 
 from thermal_robot.blind.reality.campaign import make
-from thermal_robot.blind.reality.fault import Fault
-from thermal_robot.blind.reality.faults import FAULTS
+from thermal_robot.blind.reality.fault import FAULTS, Fault
 from thermal_robot.blind.reality.unlisted import UNLISTED
 from thermal_robot.blind.reality.world import Body, World
 

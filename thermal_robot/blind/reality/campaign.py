@@ -1,28 +1,46 @@
-"""One case becomes a folder with a campaign, and the answers that stay outside it."""
+"""One case becomes a folder with a campaign, or several and a list of them, and the answers that stay outside it.
+
+Of several campaigns of one robot: it errs alike on all days, but for one number that is another from a day on, or grows
+in a straight line of time. Of a fleet: a fault that all its robots share, or those of one hall, and faults of single
+robots. Other poses, another hall, the instrument elsewhere and the target mounted anew each time.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from datetime import date, timedelta
+from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.blind.cases import Case
-from thermal_robot.blind.reality.fault import Fault
-from thermal_robot.blind.reality.faults import FAULTS
-from thermal_robot.blind.reality.instrument import Instrument, measure, registered
-from thermal_robot.blind.reality.lots import make_several
-from thermal_robot.blind.reality.own import known
-from thermal_robot.blind.reality.rigid import anywhere
+from thermal_robot.blind.cases import LISTED, Case, Several
+from thermal_robot.blind.reality.fault import FAULTS, Fault
+from thermal_robot.blind.reality.instrument import Instrument, Measured, measure, registered, write_folder
 from thermal_robot.blind.reality.setting import Setting, draw_setting, humidity
-from thermal_robot.blind.reality.sizes import Gauge, Unseen, place, sized
-from thermal_robot.blind.reality.tables import write_folder
-from thermal_robot.blind.reality.truth import truth
-from thermal_robot.blind.reality.world import World
+from thermal_robot.blind.reality.sizes import (
+    GROWS_ONLY,
+    SIZE,
+    Gauge,
+    Spot,
+    Unseen,
+    deviation,
+    draw_spot,
+    place,
+    sized,
+    truth,
+)
+from thermal_robot.blind.reality.unlisted import known
+from thermal_robot.blind.reality.world import World, anywhere
+from thermal_robot.files import write_text
 
 Array = NDArray[np.float64]
+AtWork = list[tuple[Fault, Array]]
+
 
 FRESH = 1000
 """Rows to be predicted, ten times what is given: else their own scatter would count against intervals that hold."""
@@ -30,6 +48,9 @@ _PRESENT = 0.5  # × noise per axis: what leaves less, given the others, is not 
 _TRIES = 8
 _DIGITS = 9  # of answers in m: a ten-thousandth of the noise
 _VISITS = (2, 5)
+_NOISE = (10e-6, 30e-6)  # m, one sigma per axis
+_STATED = 0.85  # of cases: the file states the noise
+_SPOILT = (0.0, 0.03)  # share of rows
 _TAILS = (3.0, 8.0)  # degrees of freedom: from the fewest with a third moment to nearly Gauss' law
 
 
@@ -49,14 +70,14 @@ def make(case: Case, folder: Path) -> dict[str, Any]:
         ``withdrawn`` with the reason where what is asked cannot be seen in any draw; else ``truth`` as in
         :mod:`thermal_robot.blind.cases`, ``noise`` (m), ``samples``, ``measures``, ``fresh_position`` (M, 3)
         where the target really is, ``fresh_before`` (M, 3) where frames alone put it. Of several campaigns nothing is
-        predicted: see :mod:`thermal_robot.blind.reality.lots`.
+        predicted.
     """
     rng = np.random.default_rng(case.seed)
     world = World(case.robot.urdf, case.robot.tool_frame)
-    attempt = _attempt if case.several is None else make_several
+    several = case.several
     for _ in range(_TRIES):
         try:
-            return attempt(case, world, rng, folder)
+            return make_several(case, several, world, rng, folder) if several else _attempt(case, world, rng, folder)
         except Unseen as unseen:  # this draw hides its own fault: draw again
             reason = unseen
     return {"withdrawn": str(reason)}
@@ -77,18 +98,15 @@ def _attempt(case: Case, world: World, rng: np.random.Generator, folder: Path) -
         sessions="sessions" in wants or bool(rng.random() < 0.25),
     )
     _record(setting, wants, rng)
-    rows = np.flatnonzero(setting.given)
     instrument = _instrument(case, wants, rng)
-    gauge = Gauge(setting, rows, instrument.target, not instrument.base_known, not instrument.tool_known)
+    day = Day(setting, instrument)
+    gauge = day.gauge
     done = [(fault, _of_size(case, gauge, fault, instrument.noise, rng)) for fault in main]
     if case.ratio[0] > 1.0:  # of what is smaller than the noise nobody asks that it be told from the rest
         _require_apart(gauge, [(fault, values) for fault, values in done if fault.name in FAULTS], instrument.noise)
     background = _background(case, gauge, main, instrument.noise, rng)
-    seen, turned = place(setting, [*done, *background], instrument.target, instrument.pose)
-    measured = measure(setting, seen, turned, rows, instrument, rng)
-    others = np.flatnonzero(~setting.given)
-    write_folder(folder, case, setting, measured, rows, others, instrument, _gears(setting, done))
-    before = registered(setting, measured, rows, instrument)
+    seen, measured = write_day(folder, case, day, [*done, *background], rng, _gears(setting, done))
+    before, others = registered(setting, measured, gauge.rows, instrument), np.flatnonzero(~setting.given)
     return {
         "truth": {**truth(case, gauge, done, background, instrument.noise), "outliers": list(measured.spoilt)},
         "noise": instrument.noise,
@@ -112,7 +130,7 @@ def _record(setting: Setting, wants: set[str], rng: np.random.Generator) -> None
         setting.extra["speed"] = setting.speed
 
 
-def _gears(setting: Setting, done: Sequence[tuple[Fault, Array]]) -> dict[str, float]:
+def _gears(setting: Setting, done: AtWork) -> dict[str, float]:
     """Return the ratios that the file must state for wheels that turn with the motor to be seen."""
     ratios = {float(v) for fault, values in done if fault.name == "transmission_error" for v in values[:, 4]} - {1.0}
     return {name: ratio for ratio in sorted(ratios) for name in setting.world.names}
@@ -129,11 +147,11 @@ def _instrument(case: Case, wants: set[str], rng: np.random.Generator) -> Instru
         declared=target if tool_known else target + rng.uniform(-0.01, 0.01, 3),
         base_known=base_known,
         tool_known=tool_known,
-        noise=float(rng.uniform(10e-6, 30e-6)),
+        noise=float(rng.uniform(*_NOISE)),
         turning=3e-5 if pose else None,
-        stated=bool(rng.random() < 0.85),
+        stated=bool(rng.random() < _STATED),
         tails=float(rng.uniform(*_TAILS)) if case.heavy else np.inf,
-        spoilt=float(rng.choice([0.0, 0.03, 0.1] if case.heavy else [0.0, 0.03])),
+        spoilt=float(rng.choice([*_SPOILT, 0.1] if case.heavy else _SPOILT)),
     )
 
 
@@ -143,10 +161,9 @@ def _of_size(case: Case, gauge: Gauge, fault: Fault, noise: float, rng: np.rando
     Where the cause is not in the library, taken from it, or hidden, that counts which no two other effects imitate.
     """
     wanted = noise * np.exp(rng.uniform(*np.log(case.ratio)))
-    values = fault.draw(gauge.setting, rng)
+    rough = sized(gauge, fault, fault.draw(gauge.setting, rng), wanted)
     if case.kind not in ("removed", "hidden") and fault.name != case.unlisted:
-        return sized(gauge, fault, values, wanted, lambda moved: gauge.rms(gauge.left(moved)))
-    rough = sized(gauge, fault, values, wanted, lambda moved: gauge.rms(gauge.left(moved)))
+        return rough
     others = [name for name in FAULTS if name not in case.effects]
     beyond = gauge.beyond(fault, gauge.moved(fault, rough), others, together=2)
     share = min(beyond.values(), default=wanted) / wanted
@@ -155,7 +172,7 @@ def _of_size(case: Case, gauge: Gauge, fault: Fault, noise: float, rng: np.rando
     return fault.scaled(rough, 1.0 / share)
 
 
-def _require_apart(gauge: Gauge, done: Sequence[tuple[Fault, Array]], noise: float) -> None:
+def _require_apart(gauge: Gauge, done: AtWork, noise: float) -> None:
     """Draw several effects again where one of them leaves nothing that another could not have done as well."""
     if len(done) < 2:
         return
@@ -166,9 +183,7 @@ def _require_apart(gauge: Gauge, done: Sequence[tuple[Fault, Array]], noise: flo
             raise Unseen(f"{fault.name} is hidden by the other effect")
 
 
-def _background(
-    case: Case, gauge: Gauge, main: Sequence[Fault], noise: float, rng: np.random.Generator
-) -> list[tuple[Fault, Array]]:
+def _background(case: Case, gauge: Gauge, main: Sequence[Fault], noise: float, rng: np.random.Generator) -> AtWork:
     """All the other effects that are always there, each far below the noise."""
     if not case.background:
         return []
@@ -178,9 +193,201 @@ def _background(
         if name in named or name in skipped:
             continue
         values = fault.draw(gauge.setting, rng)
-        try:
-            values = sized(gauge, fault, values, case.background * noise, lambda moved: gauge.rms(gauge.left(moved)))
-        except Unseen:
-            continue  # it cannot be seen here, so there is no size to give it
-        quiet.append((fault, values))
+        with suppress(Unseen):  # what cannot be seen here has no size to give it
+            quiet.append((fault, sized(gauge, fault, values, case.background * noise)))
     return quiet
+
+
+_SENSORS = ("robot", "links")
+"""What may be recorded of the links: where only the air is, their lag would be another wall's each day."""
+
+
+@dataclass(frozen=True)
+class Habits:
+    """What is alike in all campaigns of a case: the instrument's noise (m, per axis), what is recorded of the links."""
+
+    noise: float
+    stated: bool
+    sensor: str
+
+
+@dataclass(frozen=True, eq=False)
+class Day:
+    """One campaign: its day, its instrument, and the measure of displacements on its rows."""
+
+    setting: Setting
+    instrument: Instrument
+
+    @cached_property
+    def gauge(self) -> Gauge:
+        """Of the rows that are given."""
+        rows, known = np.flatnonzero(self.setting.given), self.instrument
+        return Gauge(self.setting, rows, known.target, not known.base_known, not known.tool_known)
+
+
+def draw_habits(rng: np.random.Generator) -> Habits:
+    """Draw what stays."""
+    return Habits(float(rng.uniform(*_NOISE)), bool(rng.random() < _STATED), str(rng.choice(_SENSORS)))
+
+
+def draw_day(case: Case, world: World, habits: Habits, rng: np.random.Generator) -> Day:
+    """Draw a campaign of positions; where base and target are nobody knows."""
+    samples = int(rng.integers(case.samples[0], case.samples[1] + 1))
+    setting = draw_setting(world, samples, rng, sensor=habits.sensor)
+    target = rng.uniform([-0.03, -0.03, 0.04], [0.03, 0.03, 0.16])
+    pose, declared = anywhere(rng, 3.0), target + rng.uniform(-0.01, 0.01, 3)
+    spoilt = float(rng.choice(_SPOILT))
+    return Day(setting, Instrument(pose, target, declared, habits.noise, stated=habits.stated, spoilt=spoilt))
+
+
+def write_day(
+    folder: Path,
+    case: Case,
+    day: Day,
+    faults: AtWork,
+    rng: np.random.Generator,
+    gears: dict[str, float] | None = None,
+) -> tuple[Array, Measured]:
+    """Measure a robot with these faults on that day and write its campaign.
+
+    Returns where the target really is, (N, 3) m, and what was measured of the rows that are given.
+    """
+    seen, turned = place(day.setting, faults, day.instrument.target, day.instrument.pose)
+    rows, others = day.gauge.rows, np.flatnonzero(~day.setting.given)
+    measured = measure(seen, turned, rows, day.instrument, rng)
+    write_folder(folder, case, day.setting, measured, rows, others, day.instrument, gears)
+    return seen, measured
+
+
+_HALLS = ("hall 1", "hall 2")
+_ALIKE = 0.1
+"""Scatter of a shared fault among robots, of its size: what one jig, one batch or one floor does to all is alike."""
+_DRAWS = 20
+
+
+def draw_fleet(
+    case: Case, several: Several, days: Sequence[Day], rng: np.random.Generator
+) -> tuple[dict[str, list[str]], list[AtWork], dict[str, Any]]:
+    """Draw which robot has what: labels by name, what is at work in each robot, the truth; a day is one of each."""
+    count = len(days)
+    robots = [f"r{number + 1:02d}" for number in range(count)]
+    # halls of equal size, but for one
+    halls = [_HALLS[k % 2] for k in rng.permutation(count)]
+    at_work: list[AtWork] = [[] for _ in days]
+    taken: list[Spot] = []
+    shared, own = [], []
+    if several.moves:
+        group = str(rng.choice(_HALLS)) if several.how == "hall" else None
+        members = [k for k in range(count) if group in (None, halls[k])]
+        spot, values = _drawn(case, days[members[0]], several.moves, taken, rng)
+        for k in members:
+            at_work[k].append((spot.fault, spot.fault.scaled(values, float(np.exp(_ALIKE * rng.normal())))))
+        shared.append({**_named(spot, days[0], values), "group": group})
+    # one robot each, whichever hall it stands in
+    for name, k in zip(several.apart, rng.permutation(count).tolist(), strict=False):
+        spot, values = _drawn(case, days[k], name, taken, rng)
+        at_work[k].append((spot.fault, values))
+        own.append({"robot": robots[k], **_named(spot, days[k], values)})
+    effects = list(dict.fromkeys((*case.effects, *several.apart)))
+    told: dict[str, Any] = {"effects": effects, "unlisted": None, "parts": {}, "shared": shared, "own": own}
+    return {"robot": robots, "hall": halls}, at_work, told
+
+
+def _drawn(case: Case, day: Day, name: str, taken: list[Spot], rng: np.random.Generator) -> tuple[Spot, Array]:
+    """Draw a fault at one place where no fault of its kind is yet, as large as the case asks."""
+    fault, gauge = FAULTS[name], day.gauge
+    for _ in range(_DRAWS):
+        values = fault.draw(gauge.setting, rng)
+        spot = draw_spot(fault, np.zeros_like(values), rng)
+        if all((spot.fault.name, spot.number) != (other.fault.name, other.number) for other in taken):
+            break
+    else:
+        raise Unseen(f"{name} has no place left")
+    taken.append(spot)
+    size = float(np.abs(values[:, SIZE]).max()) * (np.sign(values[:, SIZE].sum()) or 1.0)
+    values[:, SIZE] = 0.0
+    wanted = day.instrument.noise * np.exp(rng.uniform(*np.log(case.ratio)))
+    return spot, sized(gauge, fault, spot.moved(values, size), wanted)
+
+
+def _named(spot: Spot, day: Day, values: Array) -> dict[str, Any]:
+    name, _ = spot.told(day.setting, np.where(np.arange(values.shape[1]) == SIZE, 0.0, values), 1.0)
+    return {**spot.named(day.setting), "parameter": name}
+
+
+_FIRST = date(2026, 1, 5)
+_EVERY, _LATE = 30, 10  # days from one campaign to the next, and by how much one is early or late
+_LARGEST = 10.0  # × noise: a change that must leave more to be told is not asked for
+
+
+def make_several(case: Case, several: Several, world: World, rng: np.random.Generator, folder: Path) -> dict[str, Any]:
+    """Write the campaigns of a case into a folder, and return its answers."""
+    count = int(rng.integers(several.campaigns[0], several.campaigns[1] + 1))
+    habits = draw_habits(rng)
+    days = [draw_day(case, world, habits, rng) for _ in range(count)]
+    if case.kind == "fleet":
+        labels, at_work, told = draw_fleet(case, several, days, rng)
+    else:
+        labels, at_work, told = _followed(case, several, days, rng)
+    names = [f"{number + 1:02d}" for number in range(count)]
+    for name, day, faults in zip(names, days, at_work, strict=True):
+        write_day(folder / name, case, day, faults, rng)
+    rows = [("campaign", *labels), *zip(names, *labels.values(), strict=True)]
+    write_text(folder / LISTED, "".join(",".join(row) + "\n" for row in rows))
+    whole, samples = {**told, "campaigns": count, "outliers": []}, sum(day.setting.samples for day in days)
+    return {"truth": whole, "noise": habits.noise, "samples": samples, "measures": "position"}
+
+
+def _followed(
+    case: Case, several: Several, days: Sequence[Day], rng: np.random.Generator
+) -> tuple[dict[str, list[str]], list[AtWork], dict[str, Any]]:
+    """Return dates, what is at work on each day, and the truth."""
+    first, noise = days[0].gauge, days[0].instrument.noise
+    done: AtWork = []
+    for name in case.effects:
+        fault = FAULTS[name]
+        values = fault.draw(first.setting, rng)
+        if several.how == "begins" and name == several.moves:
+            values[:, 0] = 0.0
+        else:
+            wanted = noise * np.exp(rng.uniform(*np.log(case.ratio)))
+            values = sized(first, fault, values, wanted)
+        done.append((fault, values))
+    passed = np.cumsum([0, *rng.integers(_EVERY - _LATE, _EVERY + _LATE + 1, len(days) - 1)])
+    dates = [(_FIRST + timedelta(days=int(day))).isoformat() for day in passed]
+    at_work, changes = [done] * len(days), []
+    if several.moves:
+        at_work, change = _moving(several, days, done, passed / passed[-1], rng)
+        changes.append(change)
+    last = truth(case, days[-1].gauge, at_work[-1], [], noise)
+    return {"date": dates}, at_work, {**last, "changes": changes}
+
+
+def _moving(
+    several: Several, days: Sequence[Day], done: AtWork, time: Array, rng: np.random.Generator
+) -> tuple[list[AtWork], dict[str, Any]]:
+    """Let one number of a fault change; return what is at work on each day, and what changed."""
+    own = next(k for k, (fault, _) in enumerate(done) if fault.name == several.moves)
+    fault, values = done[own]
+    others = [item for k, item in enumerate(done) if k != own]
+    spot, setting = draw_spot(fault, values, rng), days[0].setting
+    after = None if several.how == "grows" else int(rng.integers(len(days) - 1))
+    shape = time if after is None else (np.arange(len(days)) > after).astype(float)
+    times = float(np.exp(rng.uniform(*np.log(several.change))))
+    by = times * _tells(several, days, spot, values, others)
+    by *= 1.0 if fault.name in GROWS_ONLY else float(rng.choice([-1.0, 1.0]))
+    at_work = [[*done[:own], (fault, spot.moved(values, by * share)), *done[own + 1 :]] for share in shape.tolist()]
+    name, amount = spot.told(setting, values, by)
+    how = {"parameter": name, "how": several.how, "after": after, "amount": amount, "deviations": times}
+    return at_work, {**spot.named(setting), **how}
+
+
+def _tells(several: Several, days: Sequence[Day], spot: Spot, values: Array, others: AtWork) -> float:
+    """Return the deviation in which a change is counted: of a difference, or of the first campaign."""
+    noise = days[0].instrument.noise
+    told = days[:2] if several.how == "changes" else days[:1]
+    found = [deviation(day.gauge, spot, values, others, noise) for day in told]
+    one = float(np.sqrt(sum(std**2 for std, _ in found)))
+    if several.change[1] * one * max(leaves for _, leaves in found) > _LARGEST * noise:
+        raise Unseen(f"a change of {spot.fault.name} would have to be large to be told from what else is at work")
+    return one

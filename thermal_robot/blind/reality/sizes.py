@@ -1,20 +1,20 @@
-"""How large a fault is: what it leaves after alignment, and what no other single fault can imitate."""
+"""How large a fault is, what no other fault can imitate, and how well a campaign tells a change of one number of it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from itertools import combinations, product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.blind.reality.fault import Fault, Place
-from thermal_robot.blind.reality.faults import FAULTS
-from thermal_robot.blind.reality.rigid import free_columns
+from thermal_robot.blind.cases import Case
+from thermal_robot.blind.reality.fault import FAULTS, Fault, Place
 from thermal_robot.blind.reality.setting import Setting
-from thermal_robot.blind.reality.unlisted import Slopes, slopes
+from thermal_robot.blind.reality.world import Slopes, World, free_columns, slopes
 
 Array = NDArray[np.float64]
 
@@ -71,24 +71,22 @@ class Gauge:
         fault.act(body, self.setting, values)
         return (self.slopes.place(body.take(self.rows)) - self.sound).ravel()
 
-    def left(self, moved: Array, others: Iterable[Array] = ()) -> Array:
-        """Return what remains of a displacement after alignment, and after the best of other columns."""
-        rest = moved - self.frames @ (self.frames.T @ moved)
-        for basis in others:
-            rest = rest - basis @ (basis.T @ rest)
-        return np.asarray(rest)
+    def left(self, moved: Array) -> Array:
+        """(3M,) or (3M, K) what remains of displacements after alignment."""
+        return np.asarray(moved - self.frames @ (self.frames.T @ moved))
 
     def rms(self, moved: Array) -> float:
         """Root mean square per axis of a displacement (3M,)."""
         return float(np.sqrt((moved**2).mean()))
 
+    def leaves(self, fault: Fault, values: Array) -> float:
+        """Rms per axis, m, that one fault alone leaves after alignment."""
+        return self.rms(self.left(self.moved(fault, values)))
+
     def basis(self, fault: Fault) -> Array:
         """(3M, K) orthonormal: all that this kind of fault can do beyond the frames, to first order."""
-        if fault.name not in self.bases:
-            self.bases[fault.name] = self._basis(fault)
-        return self.bases[fault.name]
-
-    def _basis(self, fault: Fault) -> Array:
+        if fault.name in self.bases:
+            return self.bases[fault.name]
         draw = fault.draw(self.setting, np.random.default_rng(0))
         fixed = dict(fault.fixed)
         columns = []
@@ -102,10 +100,12 @@ class Gauge:
                 column = self.left(self.slope(fault, unit))
                 if self.rms(column) > 1e-12:
                     columns.append(column / np.linalg.norm(column))
-        if not columns:
-            return np.zeros((len(self.frames), 0))
-        left, size, _ = np.linalg.svd(np.column_stack(columns), full_matrices=False)
-        return np.asarray(left[:, size > 1e-3 * size[0]])
+        found = np.zeros((len(self.frames), 0))
+        if columns:
+            left, size, _ = np.linalg.svd(np.column_stack(columns), full_matrices=False)
+            found = np.asarray(left[:, size > 1e-3 * size[0]])
+        self.bases[fault.name] = found
+        return found
 
     def beyond(self, fault: Fault, moved: Array, others: Iterable[str], together: int = 1) -> dict[str, float]:
         """Rms per axis that other kinds of fault leave of a displacement at their best, one or several ``together``."""
@@ -135,14 +135,14 @@ def testable(fault: Fault, gauge: Gauge) -> bool:
     return all(known.get(want, True) for want in fault.wants)
 
 
-def sized(gauge: Gauge, fault: Fault, values: Array, wanted: float, measure: Callable[[Array], float]) -> Array:
-    """Scale values until a measure of their displacement is as wanted; a few rounds, as faults are nearly linear.
+def sized(gauge: Gauge, fault: Fault, values: Array, wanted: float) -> Array:
+    """Scale values until what they leave after alignment is as wanted; a few rounds, as faults are nearly linear.
 
     An encoder's steps are not: of the rounds the one that comes nearest counts.
     """
     nearest = np.inf, values
     for _ in range(_ROUNDS):
-        reached = measure(gauge.moved(fault, values))
+        reached = gauge.leaves(fault, values)
         if reached <= 1e-12:
             raise Unseen(f"{fault.name} cannot be seen in this campaign")
         nearest = min(nearest, (abs(float(np.log(wanted / reached))), values), key=lambda found: found[0])
@@ -190,3 +190,174 @@ def place(
     poses = (np.eye(4) if instrument is None else instrument) @ body.base @ poses @ body.tool
     seen = (poses[:, :3, :3] @ target + poses[:, :3, 3]) * (1.0 + body.scale)
     return seen, poses[:, :3, :3]
+
+
+_CLEAR = 0.25  # of what the largest place leaves: places that leave less are not asked for
+_NEEDS = {"thermal_elongation": "temperature", "drift": "time", "backlash": "approach", "tracking_lag": "velocity"}
+
+
+def truth(
+    case: Case,
+    gauge: Gauge,
+    done: Sequence[tuple[Fault, Array]],
+    background: Sequence[tuple[Fault, Array]],
+    noise: float,
+) -> dict[str, Any]:
+    """Return the truth of :mod:`thermal_robot.blind.cases`, without the rows that are spoilt.
+
+    Of faults that are asked for, and of those that are always there; ``noise`` is one sigma per axis, m.
+    """
+    parts: dict[str, Any] = {}
+    answers: list[Place] = []
+    quantities: list[str] = []
+    parameters: dict[str, dict[str, float]] = {}
+    for fault, values in [*done, *background]:
+        sites = shares(gauge, fault, values)
+        clear = [item for item in sites if item[2] > _CLEAR * sites[0][2]]
+        where = [item[0] for item in clear]
+        main = any(fault is other for other, _ in done)
+        listed = _named(where if fault.few else [])
+        parts[fault.name] = {"ratio": gauge.leaves(fault, values) / noise, "main": main, "places": listed}
+        for other, columns in fault.also:
+            part = np.zeros_like(values)
+            part[:, list(columns)] = values[:, list(columns)]
+            parts.setdefault(other, {"ratio": gauge.leaves(fault, part) / noise, "main": False, "places": listed})
+        if main and (fault.name == case.unlisted or case.kind in ("removed", "hidden")):
+            answers += [*where, *_joints_of(gauge.setting, fault, [item[1] for item in clear])]
+            quantities += fault.quantities(gauge.setting, where)
+        if fault.name in case.effects:
+            parameters[fault.name] = dict(fault.known_as(gauge.setting, values))
+    return {
+        "effects": list(case.effects),
+        "unlisted": case.unlisted,
+        "parts": parts,
+        "parameters": parameters,
+        "places": _named(answers),
+        "near": _named(near(gauge.setting.world, answers)),
+        "quantities": list(dict.fromkeys(quantities)),
+        "needs": [_NEEDS[name] for name in case.effects if case.hidden and name in _NEEDS],
+    }
+
+
+def near(world: World, places: Sequence[Place]) -> list[Place]:
+    """Return places and those beside them: along the chain, base, link, joint, link, joint, ... link, tool.
+
+    A joint's are the two links that it connects and the joint before and after; those of a link the joints at its ends
+    and the links beyond them. Links that no joint moves against each other are one.
+    """
+    at: dict[Place, float] = {("base", "base"): 0.0, ("link", world.tree.root): 0.5}
+    moved = 0
+    for joint in world.chain:
+        moved += joint.movable
+        at[("joint", joint.name)] = float(moved) if joint.movable else moved + 0.5
+        at[("link", joint.child)] = moved + 0.5
+    at[("tool", "tool")] = moved + 1.0
+    steps = [at[place] for place in places]
+    return [place for place, here in at.items() if any(abs(here - step) <= 1.0 for step in steps)]
+
+
+def _joints_of(setting: Setting, fault: Fault, numbers: Sequence[int]) -> list[Place]:
+    """Name the joints too: a displaced joint placement is as much the joint's as it is the link's that carries it."""
+    chain = setting.world.chain
+    if len(fault.places(setting)) != len(chain) or fault.places(setting)[0][0] != "link":
+        return []
+    return [("joint", chain[p].name) for p in numbers if chain[p].movable]
+
+
+def _named(places: Sequence[Place]) -> list[dict[str, str]]:
+    return [{"kind": kind, "name": name} for kind, name in dict.fromkeys(places)]
+
+
+SIZE = 0
+"""The column of a fault's values that is its size."""
+GROWS_ONLY = ("backlash", "joint_compliance")
+"""What wear makes larger, and nothing smaller."""
+_ZEROS = "joint_offset"
+_STEP = 1e-4  # rad, rad/(N·m) ...: where a fault has no size yet, of which a derivative could be a share
+_PRESENT = 0.1  # × noise: a number that leaves less is not at work
+_SEEN = 1e-6  # of a column: what less is left of is rounding
+
+
+@dataclass(frozen=True, eq=False)
+class Spot:
+    """One number of a fault, by its place, with its name and value in the words and units of formats.md."""
+
+    fault: Fault
+    number: int
+
+    def moved(self, values: Array, by: float) -> Array:
+        """Return values with this number larger."""
+        result = values.copy()
+        result[self.number, SIZE] += by
+        return result
+
+    def named(self, setting: Setting) -> dict[str, Any]:
+        """Return the effect, and where it is."""
+        [place] = _named([self.fault.places(setting)[self.number]])
+        return {"effect": self.fault.name, "place": place}
+
+    def told(self, setting: Setting, values: Array, by: float) -> tuple[str, float]:
+        """Return the name of the parameter that this is, and by how much that changes."""
+        before, after = (dict(self.fault.known_as(setting, v)) for v in (values, self.moved(values, by)))
+        [name] = [key for key in after if after[key] != before[key]]
+        return name, after[name] - before[name]
+
+
+def draw_spot(fault: Fault, values: Array, rng: np.random.Generator) -> Spot:
+    """Draw a place where a fault is at work, or, of joints' zeros and of what is not, any but the first and the last.
+
+    Frames take up what the first and the last joint's zero do.
+    """
+    size = values[:, SIZE]
+    inner = np.arange(1, len(size) - 1)
+    places = inner if fault.name == _ZEROS or not size.any() else np.flatnonzero(size)
+    return Spot(fault, int(rng.choice(places)))
+
+
+def deviation(
+    gauge: Gauge, spot: Spot, values: Array, others: Sequence[tuple[Fault, Array]], noise: float
+) -> tuple[float, float]:
+    """Return the standard deviation σ / |x − P x| of one number of a fault, whose unit moves the target by x, (3M,).
+
+    P projects on the columns of unknown frames, of every joint's zero, and of all other numbers at work; σ is the noise
+    per axis, m. The program that is put to the test takes no part in that. Also the rms per axis, m, of what a unit of
+    the number leaves after alignment.
+    """
+    known = {fault.name: values for fault, values in [*others, (spot.fault, values)]}
+    known.setdefault(_ZEROS, np.zeros((gauge.setting.world.n, 1)))
+    beside = []
+    for name, now in known.items():
+        for number, column in _columns(gauge, FAULTS[name], now):
+            if (name, number) == (spot.fault.name, (spot.number, SIZE)):
+                own = column
+            elif name == _ZEROS or gauge.rms(gauge.left(column * now[number])) > _PRESENT * noise:
+                beside.append(column)
+    aligned = gauge.left(own)
+    span = _span(gauge, np.column_stack(beside))
+    left = aligned - span @ (span.T @ aligned)
+    length = float(np.linalg.norm(left))
+    if length <= _SEEN * float(np.linalg.norm(own)) or length == 0.0:
+        raise Unseen(f"{spot.fault.name} is hidden there by what else is at work")
+    return noise / length, gauge.rms(aligned)
+
+
+def _columns(gauge: Gauge, fault: Fault, values: Array) -> Iterator[tuple[tuple[int, int], Array]]:
+    """Yield each number of a fault that is a size, and (3M,) how its unit displaces the target."""
+    fixed = {column for column, _ in fault.fixed}
+    now = gauge.slope(fault, values)
+    for p, d in np.ndindex(*values.shape):
+        if d not in fixed:
+            step = float(np.abs(values[:, d]).max()) or _STEP
+            more = values.copy()
+            more[p, d] += step
+            yield (p, d), (gauge.slope(fault, more) - now) / step
+
+
+def _span(gauge: Gauge, every: Array) -> Array:
+    """(3M, R) orthonormal: all that these columns can do beside the frames."""
+    aligned, length = gauge.left(every), np.linalg.norm(every, axis=0)
+    kept = np.linalg.norm(aligned, axis=0) > _SEEN * length
+    if not kept.any():
+        return np.zeros((len(every), 0))
+    left, size, _ = np.linalg.svd(aligned[:, kept] / length[kept], full_matrices=False)
+    return np.asarray(left[:, size > _SEEN * size[0]])

@@ -2,17 +2,166 @@
 
 from __future__ import annotations
 
+import re
 from copy import copy
 from dataclasses import dataclass, replace
+from xml.etree import ElementTree
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
-
-from thermal_robot.blind.reality.rigid import from_vector, quaternion, rpy_matrix
-from thermal_robot.blind.reality.urdf import Joint, read
+from scipy.spatial.transform import Rotation
 
 Array = NDArray[np.float64]
+
+
+def from_vector(twists: Array) -> Array:
+    """(N, 4, 4) motions from (N, 6) translations (m) and rotation vectors (rad)."""
+    motion = np.tile(np.eye(4), (len(twists), 1, 1))
+    motion[:, :3, :3] = Rotation.from_rotvec(twists[:, 3:]).as_matrix()
+    motion[:, :3, 3] = twists[:, :3]
+    return motion
+
+
+def rpy_matrix(rpy: Array) -> Array:
+    """Rotation of a URDF origin: about the fixed axes x, y, z."""
+    return np.asarray(Rotation.from_euler("xyz", rpy).as_matrix())
+
+
+def quaternion(rotation: Array) -> Array:
+    """Scalar first, (..., 4)."""
+    return np.roll(Rotation.from_matrix(rotation).as_quat(), 1, axis=-1)
+
+
+def anywhere(rng: np.random.Generator, reach: float) -> Array:
+    """(4, 4) a random direction, and a place up to ``reach`` along each axis."""
+    motion = np.eye(4)
+    motion[:3, :3] = Rotation.random(rng=rng).as_matrix()
+    motion[:3, 3] = rng.uniform(-reach, reach, 3)
+    return motion
+
+
+def free_columns(reference: Array, rotation: Array, base: bool, tool: bool) -> Array:
+    """(3N, 0..9) displacement per unit of each freedom of the frames."""
+    n, centred = len(reference), reference - reference.mean(axis=0)
+    parts = []
+    if base:
+        turn = np.zeros((n, 3, 3))
+        for axis in range(3):
+            turn[:, :, axis] = np.cross(np.eye(3)[axis], centred)
+        parts += [np.tile(np.eye(3), (n, 1, 1)), turn]
+    if tool:
+        parts.append(rotation)
+    return np.concatenate(parts, axis=2).reshape(3 * n, -1) if parts else np.zeros((3 * n, 0))
+
+
+@dataclass(frozen=True)
+class Joint:
+    """One joint of the tree: ``origin`` (xyz, rpy) in its parent link, unit ``axis`` in its own frame, limits, type.
+
+    ``mimic`` is the joint that it follows, with multiplier and offset; ``None`` for one that is commanded itself.
+    """
+
+    name: str
+    kind: str
+    parent: str
+    child: str
+    xyz: Array
+    rpy: Array
+    axis: Array
+    lower: float
+    upper: float
+    mimic: tuple[str, float, float] | None = None
+
+    @property
+    def movable(self) -> bool:
+        """Whether it moves at all."""
+        return self.kind in ("revolute", "continuous", "prismatic")
+
+    @property
+    def commanded(self) -> bool:
+        """Whether it is commanded itself, instead of following another one or standing still."""
+        return self.movable and self.mimic is None
+
+    @property
+    def held(self) -> float:
+        """Where a joint that is not commanded stands: 0, or its limit nearest to 0."""
+        return float(np.clip(0.0, self.lower, self.upper))
+
+
+@dataclass(frozen=True)
+class Tree:
+    """Joints in order from the root, masses (kg) and centres of mass (3,) by link, and the root link."""
+
+    root: str
+    joints: tuple[Joint, ...]
+    mass: dict[str, float]
+    centre: dict[str, Array]
+
+    def carried(self, link: str) -> float:
+        """Return the mass of a link and of all that hangs on it, kg."""
+        return self.mass[link] + sum(self.carried(j.child) for j in self.joints if j.parent == link)
+
+    def chain(self, tool_frame: str) -> tuple[Joint, ...]:
+        """Return the joints from the root to a link."""
+        by_child = {j.child: j for j in self.joints}
+        found: list[Joint] = []
+        link = tool_frame
+        while link != self.root:
+            found.insert(0, by_child[link])
+            link = found[0].parent
+        return tuple(found)
+
+
+def read(text: str) -> Tree:
+    """Read URDF text; meshes and everything that has no part in statics are passed over."""
+    text = re.sub(r"<\?xml[^>]*\?>", "", text)
+    robot = ElementTree.fromstring(text.strip())
+    mass, centre = {}, {}
+    for link in robot.findall("link"):
+        name, inertial = str(link.attrib["name"]), link.find("inertial")
+        weight = None if inertial is None else inertial.find("mass")
+        mass[name] = 0.0 if weight is None else float(weight.attrib["value"])
+        centre[name] = np.zeros(3) if inertial is None else _numbers(inertial.find("origin"), "xyz")
+    joints = {j.child: j for j in map(_joint, robot.findall("joint"))}
+    root = next(name for name in mass if name not in joints)
+    ordered: list[Joint] = []
+    reached = [root]
+    while reached:
+        at = reached.pop()
+        below = [j for j in joints.values() if j.parent == at]
+        ordered += below
+        reached += [j.child for j in below]
+    return Tree(root, tuple(ordered), mass, centre)
+
+
+def _joint(node: ElementTree.Element) -> Joint:
+    axis = _numbers(node.find("axis"), "xyz") if node.find("axis") is not None else np.array([1.0, 0, 0])
+    limit, mimic, kind = node.find("limit"), node.find("mimic"), node.attrib["type"]
+    bounded = limit is not None and kind in ("revolute", "prismatic")
+    parent, child = node.find("parent"), node.find("child")
+    assert parent is not None  # a URDF joint has both
+    assert child is not None
+    return Joint(
+        name=node.attrib["name"],
+        kind=kind,
+        parent=parent.attrib["link"],
+        child=child.attrib["link"],
+        xyz=_numbers(node.find("origin"), "xyz"),
+        rpy=_numbers(node.find("origin"), "rpy"),
+        axis=axis / max(float(np.linalg.norm(axis)), 1e-12),
+        lower=float(limit.get("lower", 0.0)) if bounded and limit is not None else -np.inf,
+        upper=float(limit.get("upper", 0.0)) if bounded and limit is not None else np.inf,
+        mimic=None
+        if mimic is None
+        else (mimic.attrib["joint"], float(mimic.get("multiplier", 1.0)), float(mimic.get("offset", 0.0))),
+    )
+
+
+def _numbers(node: ElementTree.Element | None, name: str) -> Array:
+    written = "0 0 0" if node is None else node.get(name, "0 0 0")
+    return np.array(written.split(), dtype=float)
+
 
 NODES = 3  # hinges into which a beam's bending is lumped
 _SHORTEST = 1e-6  # m
@@ -99,8 +248,8 @@ class World:
     coupling, rest
         (m, n) and (m,) where the m movable joints of the chain stand, those that follow another one among them:
         coupling · q + rest.
-    segments
-        Indices into ``chain`` of placements with a length, S of them.
+    segments, pieces
+        Indices into ``chain`` of placements with a length, S of them, and length of the pieces of each one's beam, m.
     slides
         (n,) whether a joint slides, so that its position is in m, instead of turning.
     """
@@ -117,14 +266,11 @@ class World:
         self.links = tuple(self.chain[k].parent for k in self.segments)
         self.lower = np.array([j.lower for j in self.joints])
         self.upper = np.array([j.upper for j in self.joints])
+        self.n = len(self.joints)
+        self.pieces = np.array([np.linalg.norm(self.chain[k].xyz) for k in self.segments]) / NODES
         self.coupling, self.rest = self._coupling()
         self._com = payload_com
         self._sound: dict[bool, mujoco.MjModel] = {}
-
-    @property
-    def n(self) -> int:
-        """Number of joints that are commanded."""
-        return len(self.joints)
 
     def _coupling(self) -> tuple[Array, Array]:
         joints = {j.name: j for j in self.tree.joints}
@@ -191,8 +337,7 @@ class World:
             free[address] = self.coupling @ (q[i] + body.joints[i]) + self.rest
             free[nodes] = (body.bow[i, : len(nodes)] * pieces[:, None])[:, :, None]
             torque[i] = _settle(model, data, free, compliance)[address] @ self.coupling
-            poses[i, :3, :3] = data.xmat[tool].reshape(3, 3)
-            poses[i, :3, 3] = data.xpos[tool]
+            poses[i] = _pose(data, tool)
         return poses, torque
 
     def overturning(self, q: Array, payload: Array) -> Array:
@@ -207,11 +352,6 @@ class World:
             mujoco.mj_kinematics(model, data)
             moments[i] = np.cross(model.body_mass @ data.xipos, model.opt.gravity)
         return moments
-
-    @property
-    def pieces(self) -> Array:
-        """(S,) length of the pieces of each segment's beam, m."""
-        return np.array([np.linalg.norm(self.chain[k].xyz) for k in self.segments]) / NODES
 
     def address(self, model: mujoco.MjModel) -> list[int]:
         """Return where the m movable joints of the chain stand among the coordinates."""
@@ -312,14 +452,21 @@ class World:
             model.body_quat[body] = quaternion(rotation @ error[:3, :3])
 
 
+def _held(model: mujoco.MjModel, data: mujoco.MjData) -> Array:
+    """Return what holds every coordinate against gravity."""
+    held = np.zeros(model.nv)
+    mujoco.mj_kinematics(model, data)
+    mujoco.mj_comPos(model, data)
+    mujoco.mj_rne(model, data, 0, held)
+    return held
+
+
 def _settle(model: mujoco.MjModel, data: mujoco.MjData, free: Array, compliance: Array) -> Array:
     """Let joints yield from where they are free until springs balance gravity; return what holds them, N·m."""
-    held, yields = np.zeros(model.nv), bool(compliance.any())
+    yields = bool(compliance.any())
     data.qpos[:] = free
     for _ in range(_ROUNDS):
-        mujoco.mj_kinematics(model, data)
-        mujoco.mj_comPos(model, data)
-        mujoco.mj_rne(model, data, 0, held)
+        held = _held(model, data)
         settled = free - compliance @ held
         change = float(np.abs(settled - data.qpos).max())
         data.qpos[:] = settled
@@ -336,3 +483,101 @@ def cross_axes(direction: Array) -> tuple[Array, Array]:
     first = np.cross(along, least)
     first /= np.linalg.norm(first)
     return first, np.cross(along, first)
+
+
+@dataclass(frozen=True, eq=False)
+class Slopes:
+    """Derivatives of the target's place in the root frame, M rows.
+
+    Attributes
+    ----------
+    poses
+        (M, 4, 4) of the sound robot's tool frame.
+    target
+        (3,) in it, m.
+    joints
+        (M, 3, n) by each joint that is commanded, with all that follow it.
+    torque
+        (M, n) what holds them, N·m.
+    placements
+        (M, 3, S', 6) by the placement of each joint of the chain, in its own frame.
+    growth
+        (M, 3, S) by the relative growth of each segment.
+    bow, sag
+        (M, 3, S, 2) by the curvature of each segment, 1/m, and by its bending compliance, 1/(N·m²).
+    """
+
+    poses: Array
+    target: Array
+    joints: Array
+    torque: Array
+    placements: Array
+    growth: Array
+    bow: Array
+    sag: Array
+
+    def place(self, body: Body) -> Array:
+        """(M, 3) where the target is in the root frame as the instrument sees it, with what is wrong with the robot."""
+        tool = body.tool[:, :3, :3] @ self.target + body.tool[:, :3, 3]
+        seen = np.einsum("mij,mj->mi", self.poses[:, :3, :3], tool) + self.poses[:, :3, 3]
+        seen += np.einsum("mij,mj->mi", self.joints, body.joints - body.springs * self.torque)
+        seen += np.einsum("mis,ms->mi", self.growth, body.growth)
+        seen += np.einsum("misk,msk->mi", self.bow, body.bow)
+        seen += np.einsum("misk,sk->mi", self.sag, body.beams)
+        twists = "sk" if body.placements.ndim == 2 else "msk"
+        seen += np.einsum(f"misk,{twists}->mi", self.placements, body.placements)
+        seen = np.einsum("mij,mj->mi", body.base[:, :3, :3], seen) + body.base[:, :3, 3]
+        return np.asarray(seen * (1.0 + body.scale))
+
+
+def slopes(world: World, q: Array, payload: Array, target: Array) -> Slopes:
+    """Differentiate at (M, n) commands with (M,) payloads, kg; the target is in the tool frame, m."""
+    model = copy(world.compile(True, None))  # its payload changes
+    data = mujoco.MjData(model)
+    address, nodes = world.address(model), world.nodes(model)
+    tool, carried = model.body(f"link:{world.tool_frame}").id, model.body("payload").id
+    rows, heaviness = [], np.nan
+    for command, weight in zip(q, payload, strict=True):
+        if weight != heaviness:
+            heaviness = weight
+            model.body_mass[carried] = weight
+            mujoco.mj_setConst(model, data)
+        data.qpos[:] = 0.0
+        data.qpos[address] = world.coupling @ command + world.rest
+        held = _held(model, data)
+        point = data.xpos[tool] + data.xmat[tool].reshape(3, 3) @ target
+        turn = np.empty((3, model.nv))
+        mujoco.mj_jac(model, data, turn, None, point, tool)
+        hinges = turn[:, nodes]
+        rows.append(
+            (
+                _pose(data, tool),
+                turn[:, address] @ world.coupling,
+                held[address] @ world.coupling,
+                *_placed(world, model, data, point),
+                hinges.sum(axis=3) * world.pieces[:, None],
+                -(hinges * held[nodes]).sum(axis=3) * world.pieces[:, None],
+            )
+        )
+    poses, joints, torque, placements, growth, bow, sag = (np.stack(part) for part in zip(*rows, strict=True))
+    return Slopes(poses, target, joints, torque, placements, growth, bow, sag)
+
+
+def _pose(data: mujoco.MjData, body: int) -> Array:
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = data.xmat[body].reshape(3, 3), data.xpos[body]
+    return pose
+
+
+def _placed(world: World, model: mujoco.MjModel, data: mujoco.MjData, point: Array) -> tuple[Array, Array]:
+    """(3, S', 6) and (3, S) by placements and by growth."""
+    placements, growth = np.empty((3, len(world.chain), 6)), np.empty((3, len(world.segments)))
+    for k, joint in enumerate(world.chain):
+        carrier = _pose(data, model.body(f"link:{joint.parent}").id)
+        frame = carrier[:3, :3] @ rpy_matrix(joint.rpy)
+        lever = point - carrier[:3, 3] - carrier[:3, :3] @ joint.xyz
+        placements[:, k, :3] = frame
+        placements[:, k, 3:] = np.cross(frame.T, lever).T
+        if k in world.segments:
+            growth[:, world.segments.index(k)] = carrier[:3, :3] @ joint.xyz
+    return placements, growth

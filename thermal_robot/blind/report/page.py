@@ -2,21 +2,300 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from html import escape
-from typing import Any
+from math import sqrt
+from typing import TYPE_CHECKING, Any
 
-from thermal_robot.blind.report.plots import calibration_figure, confusion_figure, power_figure, shrinkage_figure
-from thermal_robot.blind.report.text import section
-from thermal_robot.blind.report.words import coefficients, count, facts, interval, kind, miss, needed, question
+from matplotlib.patches import Rectangle
+from matplotlib.ticker import FuncFormatter
+
+from thermal_robot.blind.judged import KNOWN
+from thermal_robot.blind.report.text import (
+    ASKED,
+    coefficients,
+    count,
+    effect,
+    facts,
+    interval,
+    kind,
+    miss,
+    needed,
+    question,
+)
 from thermal_robot.report import units
+from thermal_robot.report.drawing import (
+    AFTER,
+    BEFORE,
+    FAINT,
+    INK,
+    MUTED,
+    PAPER,
+    SMALL,
+    THIRD,
+    Drawing,
+    log_axis,
+    note,
+    plain,
+    tidy,
+    title,
+)
 from thermal_robot.report.html_parts import bullets, document, figure, paragraph, row, signature, table
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+
+_HEADINGS = {
+    "single": "Named first, by what is at work",
+    "hard": "Named first, where one small effect is at work and rows are few",
+    "removed": "Named first, where the effect at work is not in the library",
+}
+_DARK = 0.55  # share of a row above which its number is written in the colour of the paper
+_LEAST = 1e-4  # of the gap: what is less is drawn at the edge
+_GROUPS = {
+    "known effect at work": (AFTER, "o", (*KNOWN, "mixed")),
+    "cause withheld": (THIRD, "^", ("removed", "hidden", "unlisted", "both")),
+    "real campaign": (BEFORE, "s", ("real",)),
+}
+
+
+def confusion_figure(score: Mapping[str, Any], which: str = "single") -> Figure:
+    """Draw how often each truth was answered by each name.
+
+    Parameters
+    ----------
+    score
+        Of the format ``thermal-robot/blind/1``.
+    which
+        Name of a table of its ``confusion``.
+
+    Returns
+    -------
+    Figure
+        Numbers are cases; the stronger the colour, the larger the share of its row; the right answer is framed.
+    """
+    table = score["confusion"].get(which)
+    if table is None:
+        return _empty(_HEADINGS.get(which, which), "No case of this kind.")
+    rows, columns = table["rows"], table["columns"]
+    figure = Drawing(2.3 + 0.37 * len(columns), 1.9 + 0.3 * len(rows))
+    axes = figure.subplots()
+    for line, (name, counts) in enumerate(zip(rows, table["counts"], strict=True)):
+        total = sum(counts)
+        for column, number in enumerate(counts):
+            right = columns[column] == _right(name, which)
+            axes.add_patch(_cell(column, line, number / total, right))
+            if number:
+                colour = PAPER if number / total > _DARK else INK
+                axes.text(column, line, str(number), ha="center", va="center", fontsize=SMALL, color=colour)
+        axes.text(len(columns) - 0.2, line, str(total), va="center", fontsize=SMALL, color=MUTED)
+    axes.text(len(columns) - 0.2, -0.9, "cases", va="center", fontsize=SMALL, color=MUTED)
+    axes.set_xlim(-0.5, len(columns) - 0.5)
+    axes.set_ylim(len(rows) - 0.5, -0.5)
+    axes.set_xticks(range(len(columns)), [plain(effect(c)) for c in columns], rotation=50, ha="right")
+    axes.set_yticks(range(len(rows)), [plain(effect(r)) for r in rows])
+    axes.set_xlabel("said")
+    axes.set_ylabel("true")
+    tidy(axes, grid="")
+    axes.tick_params(length=0)
+    for tick in axes.get_xticklabels():
+        tick.set_rotation_mode("anchor")
+    for spine in axes.spines.values():
+        spine.set_visible(False)
+    title(axes, _HEADINGS.get(which, which))
+    return figure
+
+
+def _right(row: str, which: str) -> str:
+    return "unexplained" if row == "unlisted" or which == "removed" else row
+
+
+def _cell(column: int, line: int, share: float, right: bool) -> Rectangle:
+    edge = INK if right else FAINT
+    cell = Rectangle((column - 0.5, line - 0.5), 1.0, 1.0, edgecolor=edge, linewidth=1.0 if right else 0.5)
+    # the colour of the page shows through, so that it is right on a dark one, too
+    cell.set_facecolor((AFTER, share))
+    cell.set_zorder(2.0 if right else 1.0)
+    return cell
+
+
+def calibration_figure(score: Mapping[str, Any]) -> Figure:
+    """Draw how often effects were at work against how probable they were said to be, and how many there were.
+
+    Returns
+    -------
+    Figure
+        Above, for each bin of probabilities, the share that was at work with its 95 % bar; below, how many there were.
+    """
+    steps = score["calibration"]["all"]["bins"]
+    if not any(b["present"]["trials"] for b in steps):
+        return _empty("Probabilities", "No probability was given.")
+    figure = Drawing(5.6, 6.0)
+    upper, lower = figure.subplots(2, 1, sharex=True, height_ratios=(3.2, 1.0))
+    _frequencies(upper, steps)
+    upper.text(0.02, 0.97, _error(score["calibration"]), transform=upper.transAxes, va="top", fontsize=SMALL, color=INK)
+    _numbers(lower, steps)
+    lower.set_xlim(-2.0, 102.0)
+    lower.set_xlabel("said to be probable (%)")
+    for axes in (upper, lower):
+        tidy(axes)
+    title(upper, "Do the probabilities hold?")
+    return figure
+
+
+def _frequencies(axes: Axes, steps: Sequence[Mapping[str, Any]]) -> None:
+    """Draw the share at work of each bin against the mean probability in it, beside the line of a sound scale."""
+    axes.plot([0.0, 100.0], [0.0, 100.0], color=MUTED, linewidth=0.9, linestyle="--")
+    said = axes.text(13.0, 15.5, "as it should be", fontsize=SMALL, color=MUTED)
+    said.set(rotation=45, rotation_mode="anchor", transform_rotates_text=True)
+    told = [b for b in steps if b["present"]["trials"]]
+    for b in told:
+        low, high = (100.0 * bound for bound in b["present"]["interval"])
+        axes.plot([100.0 * b["mean"]] * 2, [low, high], color=AFTER, linewidth=1.3)
+    means, shares = [100.0 * b["mean"] for b in told], [100.0 * b["present"]["value"] for b in told]
+    axes.plot(means, shares, linestyle="none", marker="o", markersize=5.5, color=AFTER, label="effects")
+    axes.set_ylabel("at work, 95 % bars (%)")
+    axes.set_ylim(-3.0, 103.0)
+
+
+def _numbers(axes: Axes, steps: Sequence[Mapping[str, Any]]) -> None:
+    """Draw how many effects each bin holds, on a logarithmic axis."""
+    for b in steps:
+        number, width = b["present"]["trials"], 100.0 * (b["high"] - b["low"])
+        axes.bar(100.0 * b["low"], number, width=width, align="edge", color=FAINT, edgecolor=MUTED, linewidth=0.8)
+        if number:
+            top = (50.0 * (b["low"] + b["high"]), number)
+            said = axes.annotate(str(number), top, (0, 2), textcoords="offset points", fontsize=SMALL, color=INK)
+            said.set_horizontalalignment("center")
+    axes.set_yscale("log")
+    axes.set_ylim(0.7, 4.0 * max(b["present"]["trials"] for b in steps))
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axes.minorticks_off()
+    axes.set_ylabel("effects")
+
+
+def _error(calibration: Mapping[str, Any]) -> str:
+    all_, sure = calibration["all"], calibration["doubtful"]
+    said = f"calibration error {units.percent(all_['error'])} over {all_['trials']} effects"
+    if sure["trials"]:
+        said += f"\n{units.percent(sure['error'])} over the {sure['trials']} between 5 and 95 %"
+    return said
+
+
+def shrinkage_figure(score: Mapping[str, Any]) -> Figure:
+    """Draw what stays of the gap's mean square on fresh samples against what the diagnosis claims to stay."""
+    pairs = score["shrinkage"]["pairs"]
+    if not pairs:
+        return _empty("How far the gap shrinks", "No case has fresh samples.")
+    figure = Drawing(5.4, 5.0)
+    axes = figure.subplots()
+    most = max(1.0, *(1.0 - p[side] for p in pairs for side in ("claimed", "real")))
+    limits = (100.0 * _LEAST / 1.5, 150.0 * most)
+    axes.plot(limits, limits, color=MUTED, linewidth=0.9, linestyle="--")
+    for name, (colour, marker, kinds) in _GROUPS.items():
+        chosen = [p for p in pairs if p["kind"] in kinds]
+        if chosen:
+            x, y = ([100.0 * max(1.0 - p[side], _LEAST) for p in chosen] for side in ("claimed", "real"))
+            label = f"{name} ({len(chosen)})"
+            axes.plot(x, y, marker, color=colour, markersize=4.5, markeredgewidth=0.0, alpha=0.75, label=label)
+    axes.set(xscale="log", yscale="log", xlim=limits, ylim=limits)
+    for axis in (axes.xaxis, axes.yaxis):
+        axis.set_major_formatter(FuncFormatter(_remains))
+    axes.minorticks_off()
+    axes.set_aspect("equal")
+    axes.set_xlabel("claimed to stay of the gap's mean square, from rows held out (%)")
+    axes.set_ylabel("stays on fresh samples (%)")
+    axes.legend(loc="upper left", fontsize=SMALL, frameon=False, labelcolor=INK, handletextpad=0.2)
+    apart = units.percent(score["shrinkage"]["median_absolute_difference"])
+    said = f"apart by {apart} of the gap\nin the median"
+    axes.text(0.98, 0.03, said, transform=axes.transAxes, ha="right", fontsize=SMALL, color=INK)
+    tidy(axes, grid="both")
+    title(axes, "Does the gap shrink as claimed?")
+    return figure
+
+
+def _remains(value: float, _: int) -> str:
+    return f"≤ {value:g}" if value <= 100.0 * _LEAST * 1.001 else f"{value:g}"
+
+
+def _empty(heading: str, why: str) -> Drawing:
+    figure = Drawing(5.4, 1.6)
+    axes: Axes = figure.subplots()
+    title(axes, heading)
+    note(axes, why)
+    return figure
+
+
+_LAST = 1.5  # times the lower bound: where a step without an upper one ends in the drawing
+
+
+def power_figure(score: Mapping[str, Any]) -> Figure:
+    """Draw the share of effects found against their size and against the number of rows.
+
+    Returns
+    -------
+    Figure
+        Points: cases of one step, with 95 % bars and their number; lines: the curve fitted to all cases, at the lower
+        and the upper quartile of the other quantity.
+    """
+    detection = score["detection"]
+    figure = Drawing(9.6, 4.0)
+    left, right = figure.subplots(1, 2, sharey=True)
+    curve = detection["curve"] or {"over_ratio": (), "over_samples": ()}
+    _panel(left, detection["ratio"], curve["over_ratio"], lambda rows: f"with {rows:.0f} rows")
+    left.set_xlabel("size: what it leaves over the noise, rms")
+    left.set_ylabel("found, 95 % bars (%)")
+    _panel(right, detection["samples"], curve["over_samples"], lambda size: f"{size:.2g} times the noise")
+    right.set_xlabel("rows of the campaign")
+    if left.lines:
+        left.text(-0.015, 106.0, "cases", transform=left.get_yaxis_transform(), fontsize=SMALL, color=MUTED, ha="right")
+    title(left, "Found, by size")
+    title(right, "Found, by number of rows")
+    return figure
+
+
+def _panel(
+    axes: Axes, steps: Sequence[Mapping[str, Any]], lines: Sequence[Mapping[str, Any]], other: Callable[[float], str]
+) -> None:
+    told = [s for s in steps if s["found"]["trials"]]
+    if not told:
+        note(axes, "No case with one effect of known size.")
+        return
+    for line, style in zip(lines, ("--", "-"), strict=False):
+        shown = [100.0 * p for p in line["chance"]]
+        axes.plot(line["x"], shown, color=THIRD, linestyle=style, linewidth=1.4, label=other(line["other"]))
+    for s in told:
+        low, high = s["low"], s["high"] or _LAST * s["low"]
+        middle = sqrt(low * high)
+        bottom, top = (100.0 * bound for bound in s["found"]["interval"])
+        value = 100.0 * s["found"]["value"]
+        axes.plot([low, high], [value, value], color=AFTER, linewidth=0.9, alpha=0.6)
+        axes.plot([middle, middle], [bottom, top], color=AFTER, linewidth=1.3)
+        axes.text(middle, 106.0, str(s["found"]["trials"]), ha="center", fontsize=SMALL, color=MUTED)
+    axes.plot(
+        [sqrt(s["low"] * (s["high"] or _LAST * s["low"])) for s in told],
+        [100.0 * s["found"]["value"] for s in told],
+        linestyle="none",
+        marker="o",
+        markersize=5.5,
+        color=AFTER,
+    )
+    log_axis(axes, told[0]["low"] / 1.1, 1.1 * (told[-1]["high"] or _LAST * told[-1]["low"]))
+    axes.set_xticks(sorted({s["low"] for s in told} | {s["high"] for s in told if s["high"]}))
+    axes.minorticks_off()
+    axes.set_ylim(-3.0, 112.0)
+    axes.set_yticks(range(0, 101, 20))
+    if lines:
+        axes.legend(loc="lower right", fontsize=SMALL, frameon=False, labelcolor=INK)
+    tidy(axes, grid="y")
+
 
 Plain = Mapping[str, Any]
 
 _CARDS = ("single", "null", "removed", "unlisted")
 _CHANGES = ("exact", "found", "way", "day", "false_alarm")
-_ASKED = ("exact", "right", "first_named", "found", "false_alarm", "place", "near_place", "quantity")
 
 
 def html(score: Plain, generated: str) -> str:
@@ -35,6 +314,11 @@ def html(score: Plain, generated: str) -> str:
         A complete HTML document.
     """
     return document("Blind trial", "\n".join(_whole(score, generated)))
+
+
+def section(heading: str, *content: str) -> str:
+    """Return a section; its content is HTML."""
+    return f"<section><h2>{escape(heading)}</h2>{''.join(content)}</section>"
 
 
 def _whole(score: Plain, generated: str) -> Iterator[str]:
@@ -120,7 +404,7 @@ def _kinds(kinds: Iterable[Plain]) -> str:
     return table(("", "cases", "share", "95 % interval"), rows)
 
 
-def _groups(heading: str, groups: Mapping[str, Plain], questions: Sequence[str] = _ASKED) -> str:
+def _groups(heading: str, groups: Mapping[str, Plain], questions: Sequence[str] = ASKED) -> str:
     asked = [q for q in questions if any(q in rates for rates in groups.values())]
     rows = (row((escape(name), *(_share(rates.get(q)) for q in asked))) for name, rates in groups.items())
     return f'<p class="tr-kicker">{escape(heading)}</p>{table(("", *map(question, asked)), rows)}'
