@@ -10,7 +10,7 @@ from campaign.files import put
 from campaign.spoilt import toml_is_refused
 
 from thermal_robot.campaign import Settings, Units, read_campaign
-from thermal_robot.campaign.declaration import Declaration, check_gears, read_declaration
+from thermal_robot.campaign.document import Declaration, check_gears, read_declaration
 from thermal_robot.errors import CampaignError
 
 # what is replaced, by what, row, column, found, words of the sentence

@@ -9,6 +9,8 @@ all that its targets say of the robot: the rest is how they move against each ot
 To first order the twist (t, ω) of that frame, in its own axes, has the covariance σ² (Σ_k J_kᵀ J_k)⁻¹ over the targets
 that are seen, with J_k = [1, −[s_k]×]. Where all are seen its six figures are independent; where some are not, what
 they then have in common is left out.
+
+The instrument's noise of a point, and of single rows, tells that of the frame.
 """
 
 from __future__ import annotations
@@ -198,3 +200,53 @@ def _spread(places: Array, seen: Mask) -> Array:
     variance = np.linalg.inv(np.einsum("nk,kab->nab", seen.astype(float), each)).diagonal(axis1=1, axis2=2).copy()
     variance[:, :3] = variance[:, :3].mean(axis=1, keepdims=True)
     return np.asarray(np.sqrt(variance))
+
+
+def sigma_of_all(sigmas: Array, targets: Targets | None) -> tuple[float, float | None]:
+    """Return one sigma of positions, m, and where several targets tell it of turns, rad: root mean squares over rows.
+
+    Parameters
+    ----------
+    sigmas
+        (N,) of a point in each row, m; of equal ones it is they themselves, to the last digit.
+    targets
+        Whose common frame is measured.
+    """
+    alike = bool(sigmas.min() == sigmas.max())
+    whole = float(sigmas[0]) if alike else float(np.sqrt((sigmas**2).mean()))
+    return told_by(whole, targets)
+
+
+def told_by(sigma: float, targets: Targets | None) -> tuple[float, float | None]:
+    """Return one sigma of positions, m, and where several targets tell it of turns, rad, from that of a point."""
+    return (sigma, None) if targets is None else (sigma * float(targets.typical[0]), sigma * float(targets.typical[1]))
+
+
+def of_a_point(sigma: float, targets: Targets | None) -> float:
+    """Return one sigma of a point, m, from that of positions."""
+    return sigma if targets is None else sigma / float(targets.typical[0])
+
+
+def relative_sigmas(sigmas: Array | None, whole: float | None, targets: Targets | None, turned: bool) -> Array | None:
+    """(N, m) one sigma of each figure of a row over that of all rows; ``None`` where it is one for all.
+
+    Parameters
+    ----------
+    sigmas
+        (N,) of a point in each row, m; ``None`` where one holds for all.
+    whole
+        Of positions, of all rows, m.
+    targets
+        Whose common frame is measured.
+    turned
+        Whether orientations were measured, m being 6; their noise is the same in all rows unless targets tell it.
+    """
+    factor = np.ones(1) if sigmas is None or not whole else sigmas / of_a_point(whole, targets)
+    if targets is not None:
+        found = targets.spread / np.repeat(targets.typical, 3) * factor[:, None]
+        found = found if turned else found[:, :3]
+    elif bool((factor == 1.0).all()):
+        return None
+    else:
+        found = np.column_stack([factor] * 3 + [np.ones(len(factor))] * (3 if turned else 0))
+    return None if bool((found == 1.0).all()) else found

@@ -1,4 +1,4 @@
-"""From a campaign to files: campaign.toml, its table and its robot; and the table of predictions."""
+"""From a campaign to files, to pandas and to notebooks: campaign.toml, table and robot; the table of predictions."""
 
 from __future__ import annotations
 
@@ -14,10 +14,11 @@ from numpy.typing import ArrayLike
 
 from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign
-from thermal_robot.campaign.declaration import FILE_NAME
-from thermal_robot.campaign.headings import headings
-from thermal_robot.campaign.noise import of_a_point
-from thermal_robot.campaign.tabular import NO_PARQUET, PARQUET, WITH_PARQUET
+from thermal_robot.campaign.describe import described_html
+from thermal_robot.campaign.document import FILE_NAME
+from thermal_robot.campaign.recognise import headings
+from thermal_robot.campaign.table import NO_PARQUET, PARQUET, WITH_PARQUET
+from thermal_robot.campaign.targets import of_a_point
 from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, Units, covariate_scale
 from thermal_robot.errors import CampaignError, require
 from thermal_robot.files import whole, write_text
@@ -25,6 +26,7 @@ from thermal_robot.robot import Robot
 
 if TYPE_CHECKING:
     import pandas as pd
+
 
 TABLE_NAME = "measurements.csv"
 PLAN_NAME = "plan.csv"
@@ -336,3 +338,21 @@ def _document(campaign: Campaign) -> dict[str, Any]:
         "gears": dict(settings.gears),
     }
     return {section: content for section, content in document.items() if content}
+
+
+def frame(campaign: Campaign) -> pd.DataFrame:
+    """Return the table as :func:`~thermal_robot.campaign.write.write_table` would write it.
+
+    Its ``attrs`` hold the units, so that :func:`~thermal_robot.campaign_from_table` need not be told them.
+    """
+    import pandas as pd
+
+    labels = {name: labels.astype(object) for name, labels in campaign.labels.items()}
+    shown = pd.DataFrame({**dict(table_columns(campaign)), **labels}, index=pd.Index(campaign.rows, name="row"))
+    shown.attrs = {"angle_unit": campaign.units.angle, "length_unit": campaign.units.length}
+    return shown
+
+
+def html(campaign: Campaign) -> str:
+    """Return robot, frames, joints, conditions and warnings as tables."""
+    return described_html(campaign)

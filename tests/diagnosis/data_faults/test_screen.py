@@ -8,10 +8,8 @@ from conftest import load_arm
 from simulate import simulate
 from spoilt_tables import SPOILT
 
-from thermal_robot.diagnosis.data_faults.find import KINDS
+from thermal_robot.diagnosis.data_faults.find import KINDS, Screen, Struck
 from thermal_robot.diagnosis.data_faults.readings import Readings
-from thermal_robot.diagnosis.data_faults.screen import Screen
-from thermal_robot.diagnosis.data_faults.struck import Struck
 
 
 @pytest.fixture(scope="module")

@@ -6,9 +6,8 @@ from conftest import load_arm
 from simulate import simulate
 from spoilt_tables import with_joints
 
-from thermal_robot.diagnosis.data_faults.find import KINDS
+from thermal_robot.diagnosis.data_faults.find import KINDS, Struck, consensus, misfit, mixture, part_of, spread, window
 from thermal_robot.diagnosis.data_faults.readings import Readings
-from thermal_robot.diagnosis.data_faults.struck import Struck, consensus, misfit, mixture, part_of, spread, window
 
 
 @pytest.fixture(scope="module")

@@ -10,10 +10,9 @@ import numpy as np
 
 from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign
-from thermal_robot.campaign.headings import headings, size, wanted
-from thermal_robot.campaign.importers.columns import JOINTS, Column, found
-from thermal_robot.campaign.importers.plan import Plan, planned
+from thermal_robot.campaign.importers.plan import JOINTS, Column, Plan, found, planned
 from thermal_robot.campaign.names import listed
+from thermal_robot.campaign.recognise import headings, size, wanted
 from thermal_robot.campaign.table import Cells, Table
 from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS
 from thermal_robot.campaign.validate import build_campaign
