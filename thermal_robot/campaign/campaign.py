@@ -340,24 +340,12 @@ class Campaign:
     @property
     def settings(self) -> Settings:
         """What is not in the table; the chain's root and gravity as the robot has them."""
-        return Settings(
-            urdf=self.urdf,
-            tool_frame=self.robot.tool_frame,
-            root_frame=self.robot.root_frame,
-            gravity=as_vector(self.robot.gravity),
-            moves=self.moves,
-            reference_temperature=self.reference_temperature,
-            units=self.units,
-            base_known=self.base_known,
-            tool_known=self.tool_known,
-            target=as_vector(self.target),
-            noise_position=self.noise_position,
-            noise_orientation=self.noise_orientation,
-            payload_com=as_vector(self.payload_com),
-            priors=dict(self.priors),
-            gears=dict(self.gears),
-            turned=self.turned,
-        )
+        alike = ("urdf", "moves", "reference_temperature", "units", "base_known", "tool_known", "turned")
+        own: dict[str, Any] = {key: getattr(self, key) for key in (*alike, "noise_position", "noise_orientation")}
+        own |= {key: as_vector(getattr(self, key)) for key in ("target", "payload_com")}
+        own |= {key: dict(getattr(self, key)) for key in ("priors", "gears")}
+        own |= {key: getattr(self.robot, key) for key in ("tool_frame", "root_frame")}
+        return Settings(**own, gravity=as_vector(self.robot.gravity))
 
     def take(self, rows: ArrayLike) -> Campaign:
         """Return the campaign of some of the rows, without validating again.

@@ -136,18 +136,15 @@ def _at(found: str, index: int, rows: Rows | None) -> dict[str, Any]:
     return {"found": f"{found} at index {index}"} if rows is None else {"found": found, "row": int(rows[index])}
 
 
-def check_joints(file: str, key: str, named: Iterable[str], joints: tuple[str, ...]) -> None:
-    """Refuse what is stated of a joint that the chain does not have.
-
-    Raises
-    ------
-    CampaignError
-        Naming it, and the nearest joint of the chain.
-    """
+def check_joints(
+    file: str, key: str, named: Iterable[str], joints: tuple[str, ...], lines: Mapping[str, int | None] | None = None
+) -> None:
+    """Refuse what is stated of a joint that the chain does not have, with its line; name the nearest joint."""
     for joint in named:
         if joint not in joints:
             problem = f"the chain has no such joint{did_you_mean(joint, joints)}"
-            raise CampaignError(file, problem, column=f"{key}.{joint}", expected=f"one of {listed(joints)}")
+            row, expected = (lines or {}).get(joint), f"one of {listed(joints)}"
+            raise CampaignError(file, problem, row=row, column=f"{key}.{joint}", expected=expected)
 
 
 def checked_number(file: str, key: str, value: Any, *, least: float = -LARGEST, expected: str = "a number") -> float:

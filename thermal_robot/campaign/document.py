@@ -129,36 +129,26 @@ class Document:
                 return number
         return None
 
+    def _error(self, problem: str, section: str, key: str = "", column: str = "", **told: str) -> CampaignError:
+        """Return an error of a section or of its key, with the line."""
+        column = column or (f"{section}.{key}" if key else section)
+        return CampaignError(self.file, problem, row=self.row(section, key), column=column, **told)
+
     def _refuse_unknown(self) -> None:
         for section, content in self.data.items():
             if section not in self.kinds:
-                raise CampaignError(
-                    self.file,
-                    f"unknown section or key{did_you_mean(section, self.kinds)}",
-                    row=self.row(section),
-                    column=section,
-                    expected=f"one of the sections {', '.join(self.kinds)}",
-                )
+                expected = f"one of the sections {', '.join(self.kinds)}"
+                problem = f"unknown section or key{did_you_mean(section, self.kinds)}"
+                raise self._error(problem, section, expected=expected)
             if not isinstance(content, dict):
-                raise CampaignError(
-                    self.file,
-                    "wrong kind of value",
-                    row=self.row(section),
-                    column=section,
-                    found=shown(content),
-                    expected=f"a section [{section}]",
-                )
+                found, expected = shown(content), f"a section [{section}]"
+                raise self._error("wrong kind of value", section, found=found, expected=expected)
             kind = self.kinds[section]
             known = kind if isinstance(kind, Mapping) else dict.fromkeys(content)
             for key in content:
                 if key not in known:
-                    raise CampaignError(
-                        self.file,
-                        f"unknown key{did_you_mean(key, known)}",
-                        row=self.row(section, key),
-                        column=f"{section}.{key}",
-                        expected=f"one of {', '.join(known)}" if len(known) > 1 else next(iter(known)),
-                    )
+                    expected = f"one of {', '.join(known)}" if len(known) > 1 else next(iter(known))
+                    raise self._error(f"unknown key{did_you_mean(key, known)}", section, key, expected=expected)
 
     def _fitted(self, section: str, content: Any) -> dict[str, Any]:
         """Return the values of a section; what is not of its kind is told with its line."""
@@ -168,14 +158,9 @@ class Document:
             values: dict[str, Any] = kind(content, section)
         except MisfitError as error:
             key = re.split(r"[.\[]", error.path.removeprefix(f"{section}."))[0]
-            raise CampaignError(
-                self.file,
-                error.problem or "wrong kind of value",
-                row=self.row(section, key) or self.row(section),
-                column=error.path,
-                found=shown(error.value),
-                expected=error.expected,
-            ) from None
+            key = key if self.row(section, key) else ""
+            problem, found = error.problem or "wrong kind of value", shown(error.value)
+            raise self._error(problem, section, key, error.path, found=found, expected=error.expected) from None
         return values
 
     def required(self, section: str, key: str) -> Any:
@@ -193,13 +178,7 @@ class Document:
             expected = str(known[key](None, key)) if isinstance(known, Mapping) else ""
         except MisfitError as error:
             expected = error.expected
-        raise CampaignError(
-            self.file,
-            "is missing",
-            row=self.row(section) if section in self.data else None,
-            column=f"{section}.{key}",
-            expected=f"{expected} under [{section}]",
-        )
+        raise self._error("is missing", section, column=f"{section}.{key}", expected=f"{expected} under [{section}]")
 
 
 FILE_NAME = "campaign.toml"
@@ -270,25 +249,6 @@ def read_declaration(path: Path, folder: Path | None = None) -> Declaration:
     rows = {joint: document.row("gears", joint) for joint in settings.gears}
     kinematics = robot.get("kinematics")
     return Declaration(file, table, settings, rows, folder, folder / kinematics if kinematics else None)
-
-
-def check_gears(declaration: Declaration, joints: tuple[str, ...]) -> None:
-    """Refuse a transmission ratio for a joint that the chain does not have.
-
-    Raises
-    ------
-    CampaignError
-        Naming the joint, its line, and the nearest joint of the chain.
-    """
-    for joint in declaration.settings.gears:
-        if joint not in joints:
-            raise CampaignError(
-                str(declaration.file),
-                f"the chain has no such joint{did_you_mean(joint, joints)}",
-                row=declaration.gear_rows.get(joint),
-                column=f"gears.{joint}",
-                expected=f"one of {listed(joints)}",
-            )
 
 
 def _absent(path: Path) -> CampaignError:

@@ -28,8 +28,7 @@ from typing import Any
 import numpy as np
 
 from thermal_robot.campaign.document import is_yaml, read_yaml
-from thermal_robot.campaign.importers.mapped import Format, Source, files_of
-from thermal_robot.campaign.importers.plan import Plan, planned
+from thermal_robot.campaign.importers.plan import Format, Plan, Source, files_of, planned
 from thermal_robot.campaign.importers.table import joined
 from thermal_robot.campaign.names import listed
 from thermal_robot.campaign.table import Table, read_table

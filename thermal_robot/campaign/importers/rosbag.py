@@ -30,8 +30,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import names
-from thermal_robot.campaign.importers.mapped import Format, Source
-from thermal_robot.campaign.importers.plan import Plan, planned
+from thermal_robot.campaign.importers.plan import Format, Plan, Source, planned
 from thermal_robot.campaign.names import listed
 from thermal_robot.campaign.recognise import joint_columns
 from thermal_robot.campaign.table import Cells, Layout, Table, read_table

@@ -8,8 +8,7 @@ from pathlib import Path
 
 from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.document import FILE_NAME
-from thermal_robot.campaign.importers.mapped import Format, campaign_of
-from thermal_robot.campaign.importers.plan import Plan
+from thermal_robot.campaign.importers.plan import Format, Plan, campaign_of
 from thermal_robot.campaign.importers.programs import KUKA, RAPID
 from thermal_robot.campaign.importers.robot_calibration import FIGAROH, ROBOT_CALIBRATION
 from thermal_robot.campaign.importers.rosbag import ROSBAG

@@ -32,8 +32,7 @@ from typing import Any
 
 import numpy as np
 
-from thermal_robot.campaign.importers.mapped import Format, Source
-from thermal_robot.campaign.importers.plan import JOINING, Plan, found, planned
+from thermal_robot.campaign.importers.plan import JOINING, Format, Plan, Source, found, planned
 from thermal_robot.campaign.names import listed
 from thermal_robot.campaign.table import PLAIN, SPACE, Cells, Layout, Table, read_table
 from thermal_robot.errors import CampaignError
