@@ -187,29 +187,15 @@ _MOST_NAMED = 5  # campaigns of a folder in one sentence
 
 @dataclass(frozen=True)
 class Declaration:
-    """What campaign.toml says.
+    """What campaign.toml says."""
 
-    Attributes
-    ----------
-    file
-        Path of the file as the user gave it.
-    table
-        Path of the table.
-    settings
-        All the rest, SI.
-    gear_rows
-        Line of each key of ``[gears]``, for a message once the robot's joints are known.
-    folder
-        Against which its paths are resolved.
-    kinematics
-        Path of the calibration that a robot of Universal Robots brings along; ``None`` without one.
-    """
-
-    file: Path
-    table: Path
-    settings: Settings
+    file: Path  # path of the file as the user gave it
+    table: Path  # path of the table
+    settings: Settings  # all the rest, SI
+    # line of each key of ``[gears]``, for a message once the robot's joints are known
     gear_rows: Mapping[str, int | None]
-    folder: Path
+    folder: Path  # against which its paths are resolved
+    # path of the calibration that a robot of Universal Robots brings along; ``None`` without one
     kinematics: Path | None = None
 
     @property

@@ -214,35 +214,18 @@ _COVARIATE, _EXTRA, _IGNORED = "covariate", "extra", "ignored"
 
 @dataclass(frozen=True)
 class Columns:
-    """A table's columns by their part in the campaign.
+    """A table's columns by their part in the campaign."""
 
-    Attributes
-    ----------
-    covariates
-        Those that the format defines, except empty ones.
-    extra
-        Numeric columns that the format does not define.
-    labels
-        ``session``, ``pose`` and ``path`` where present.
-    has_orientation, has_simulated_position, has_simulated_orientation
-        Whether these groups are there, each whole.
-    has_noise
-        Whether the noise of each row is there.
-    targets
-        Numbers of several targets of one pose, in their order; empty where there is one.
-    warnings
-        Columns left out, and names that look like typing errors.
-    """
-
-    covariates: tuple[str, ...]
-    extra: tuple[str, ...]
-    labels: tuple[str, ...]
+    covariates: tuple[str, ...]  # those that the format defines, except empty ones
+    extra: tuple[str, ...]  # numeric columns that the format does not define
+    labels: tuple[str, ...]  # ``session``, ``pose`` and ``path`` where present
+    # has_orientation, has_simulated_position, has_simulated_orientation: whether these groups are there, each whole
     has_orientation: bool
     has_simulated_position: bool
     has_simulated_orientation: bool
-    has_noise: bool
-    targets: tuple[int, ...]
-    warnings: tuple[str, ...]
+    has_noise: bool  # whether the noise of each row is there
+    targets: tuple[int, ...]  # numbers of several targets of one pose, in their order; empty where there is one
+    warnings: tuple[str, ...]  # columns left out, and names that look like typing errors
 
 
 def recognise(table: Table, robot: Robot, *, measured: bool) -> Columns:

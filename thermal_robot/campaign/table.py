@@ -46,30 +46,14 @@ def without_names(header: Iterable[str], file: str) -> str:
 
 @dataclass(frozen=True)
 class Table:
-    """Columns of equal length with the row number of each entry.
+    """Columns of equal length with the row number of each entry."""
 
-    Attributes
-    ----------
-    file
-        Name of the file as the user gave it, for messages.
-    columns
-        Cells by name, names stripped of blanks.
-    rows
-        (N,) row numbers: as a text editor counts them, or the integer index of a data frame.
-    header
-        Row number of the header, ``None`` for a data frame.
-    decimal_comma
-        Numbers are written 1,5.
-    warnings
-        What was odd about the file.
-    """
-
-    file: str
-    columns: Mapping[str, Cells]
-    rows: NDArray[np.int64]
-    header: int | None = None
-    decimal_comma: bool = False
-    warnings: tuple[str, ...] = ()
+    file: str  # name of the file as the user gave it, for messages
+    columns: Mapping[str, Cells]  # cells by name, names stripped of blanks
+    rows: NDArray[np.int64]  # (N,) row numbers: as a text editor counts them, or the integer index of a data frame
+    header: int | None = None  # row number of the header, ``None`` for a data frame
+    decimal_comma: bool = False  # numbers are written 1,5
+    warnings: tuple[str, ...] = ()  # what was odd about the file
 
     @property
     def headless(self) -> str:
@@ -241,25 +225,14 @@ SPACE = " "
 
 @dataclass(frozen=True)
 class Layout:
-    """How a text file is laid out that other programs wrote.
+    """How a text file is laid out that other programs wrote."""
 
-    Attributes
-    ----------
-    separator
-        One character, :data:`SPACE`, or empty: the first line that holds anything tells, and blanks separate where it
-        has no other separator and the next line falls into as many parts.
-    skip
-        Lines before the header, or before the first row, that hold something else.
-    header
-        Whether there is a line of names; columns are called 1, 2, 3 … where there is none.
-    comment
-        Lines that begin so are left out; empty where there are none.
-    """
-
+    # one character, :data:`SPACE`, or empty: the first line that holds anything tells, and blanks separate where it has
+    # no other separator and the next line falls into as many parts
     separator: str = ""
-    skip: int = 0
-    header: bool = True
-    comment: str = ""
+    skip: int = 0  # lines before the header, or before the first row, that hold something else
+    header: bool = True  # whether there is a line of names; columns are called 1, 2, 3 … where there is none
+    comment: str = ""  # lines that begin so are left out; empty where there are none
 
 
 PLAIN = Layout()

@@ -43,30 +43,15 @@ TINY = 1e-30
 
 @dataclass(frozen=True, eq=False)
 class Targets:
-    """What was seen of K targets in N rows.
+    """What was seen of K targets in N rows."""
 
-    Attributes
-    ----------
-    numbers
-        K numbers, as of ``x.1``.
-    points
-        (N, K, 3) measured places, measurement frame, m; NaN where one was not seen.
-    places
-        (K, 3) in their common frame, m.
-    spread
-        (N, 6) one sigma of the common frame's place, 1, and of its turn about its own axes, 1/m, over that of a target.
-    typical
-        (2,) root mean squares of both, over the rows with which the targets were read.
-    sigma
-        One sigma per axis by which the targets move against each other, m: the median over the rows.
-    """
-
-    numbers: tuple[int, ...]
-    points: Array
-    places: Array
+    numbers: tuple[int, ...]  # K numbers, as of ``x.1``
+    points: Array  # (N, K, 3) measured places, measurement frame, m; NaN where one was not seen
+    places: Array  # (K, 3) in their common frame, m
+    # (N, 6) one sigma of the common frame's place, 1, and of its turn about its own axes, 1/m, over that of a target
     spread: Array
-    typical: Array
-    sigma: float
+    typical: Array  # (2,) root mean squares of both, over the rows with which the targets were read
+    sigma: float  # one sigma per axis by which the targets move against each other, m: the median over the rows
 
     def take(self, rows: NDArray[np.int64] | Mask) -> Targets:
         """Return those of some rows; places and what is typical stay."""
@@ -75,22 +60,13 @@ class Targets:
 
 @dataclass(frozen=True, eq=False)
 class Posed:
-    """Targets, and what they tell of each row.
+    """Targets, and what they tell of each row."""
 
-    Attributes
-    ----------
-    targets
-        Of the rows that tell a pose.
-    position, orientation
-        (N, 3) m and (N, 4) unit quaternions wxyz of their common frame.
-    deviation
-        (N,) one sigma per axis by which the targets of each row are off their places, m.
-    """
-
-    targets: Targets
+    targets: Targets  # of the rows that tell a pose
+    # position, orientation: (N, 3) m and (N, 4) unit quaternions wxyz of their common frame
     position: Array
     orientation: Array
-    deviation: Array
+    deviation: Array  # (N,) one sigma per axis by which the targets of each row are off their places, m
 
 
 def telling(points: Array) -> Mask:

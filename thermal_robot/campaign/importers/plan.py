@@ -53,31 +53,16 @@ _NUMBER = number()
 
 @dataclass(frozen=True)
 class Column:
-    """Where the values of one column come from: the sum of some columns, times ``scale``, plus ``offset``.
+    """Where the values of one column come from: the sum of some columns, times ``scale``, plus ``offset``."""
 
-    Attributes
-    ----------
-    sources
-        Names of columns, or numbers from 1; several are added.
-    scale, offset
-        In the unit that the campaign's column has.
-    time
-        Pattern of an instant, as of :meth:`datetime.datetime.strptime`; empty for numbers.
-    since_first
-        Whether the smallest value is taken off, as of a clock that began elsewhere.
-    value
-        The same number or text in every row, instead of a source.
-    counted
-        0, 1, 2 … in the order of the rows, instead of a source.
-    """
-
-    sources: tuple[str | int, ...] = ()
+    sources: tuple[str | int, ...] = ()  # names of columns, or numbers from 1; several are added
+    # scale, offset: in the unit that the campaign's column has
     scale: float = 1.0
     offset: float = 0.0
-    time: str = ""
-    since_first: bool = False
-    value: float | str | None = None
-    counted: bool = False
+    time: str = ""  # pattern of an instant, as of :meth:`datetime.datetime.strptime`; empty for numbers
+    since_first: bool = False  # whether the smallest value is taken off, as of a clock that began elsewhere
+    value: float | str | None = None  # the same number or text in every row, instead of a source
+    counted: bool = False  # 0, 1, 2 … in the order of the rows, instead of a source
 
     def numbers(self, table: Table) -> NDArray[np.float64]:
         """Return (N,) numbers, NaN where a cell is empty.
@@ -240,31 +225,16 @@ _TURNED = 0.01
 
 @dataclass(frozen=True)
 class Orientation:
-    """How orientations are written.
+    """How orientations are written."""
 
-    Attributes
-    ----------
-    kind
-        One of those above.
-    columns
-        Where the figures come from; of a matrix row by row.
-    scalar_last
-        Whether a quaternion is x y z w instead of w x y z.
-    sequence
-        Axes of Euler angles, in the order of the columns: capitals turn about the moving axes, small letters about
-        the fixed ones.
-    unit
-        Of Euler angles and rotation vectors, ``"rad"`` or ``"deg"``, where no header names one.
-    inverse
-        Whether they turn vectors of the measurement frame into the target's.
-    """
-
-    kind: str
-    columns: tuple[Column, ...]
-    scalar_last: bool = False
+    kind: str  # one of those above
+    columns: tuple[Column, ...]  # where the figures come from; of a matrix row by row
+    scalar_last: bool = False  # whether a quaternion is x y z w instead of w x y z
+    # axes of Euler angles, in the order of the columns: capitals turn about the moving axes, small letters about the
+    # fixed ones
     sequence: str = "XYZ"
-    unit: str = "rad"
-    inverse: bool = False
+    unit: str = "rad"  # of Euler angles and rotation vectors, ``"rad"`` or ``"deg"``, where no header names one
+    inverse: bool = False  # whether they turn vectors of the measurement frame into the target's
 
     def quaternions(self, table: Table) -> NDArray[np.float64]:
         """Return (N, 4) unit quaternions wxyz, which turn vectors of the target's frame into the measurement frame.
@@ -373,17 +343,10 @@ KINDS: dict[str, Mapping[str, Kind] | Kind] = {
 
 @dataclass(frozen=True)
 class Plan:
-    """How tables of another program become a campaign.
+    """How tables of another program become a campaign."""
 
-    Attributes
-    ----------
-    file
-        The mapping that the user wrote; empty where there is none.
-    sections
-        Values by section and key, each of its kind; what is not stated is absent.
-    """
-
-    file: str = ""
+    file: str = ""  # the mapping that the user wrote; empty where there is none
+    # values by section and key, each of its kind; what is not stated is absent
     sections: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
 
     def get(self, section: str, key: str, default: Any = None) -> Any:
@@ -465,43 +428,24 @@ def read_mapping(path: Path) -> Plan:
 
 @dataclass(frozen=True)
 class Source:
-    """What a format makes of the files that it is given.
+    """What a format makes of the files that it is given."""
 
-    Attributes
-    ----------
-    table
-        Rows of commands and measurements, in the columns of that program.
-    plan
-        What the format says of these columns; the user's mapping counts for more.
-    notes
-        What was left out before, and why; what was found out. A sentence each.
-    comments
-        Sentences that belong into campaign.toml.
-    """
-
-    table: Table
-    plan: Plan
-    notes: tuple[str, ...] = ()
-    comments: tuple[str, ...] = ()
+    table: Table  # rows of commands and measurements, in the columns of that program
+    plan: Plan  # what the format says of these columns; the user's mapping counts for more
+    notes: tuple[str, ...] = ()  # what was left out before, and why; what was found out. A sentence each.
+    comments: tuple[str, ...] = ()  # sentences that belong into campaign.toml
 
 
 @dataclass(frozen=True)
 class Format:
-    """A format that can be imported.
+    """A format that can be imported."""
 
-    Attributes
-    ----------
-    does, files
-        What it reads, and which files, for the help.
-    read
-        Makes a table of them, and says as a mapping would what its columns are.
-    least, most
-        How many files it has.
-    """
-
+    # does, files: what it reads, and which files, for the help
     does: str
     files: str
+    # makes a table of them, and says as a mapping would what its columns are
     read: Callable[[Sequence[Path], Plan], Source]
+    # least, most: how many files it has
     least: int = 1
     most: int = 2
 

@@ -56,24 +56,12 @@ TOLERANCE = 0.05
 
 @dataclass(frozen=True)
 class Stream:
-    """N samples of k quantities.
+    """N samples of k quantities."""
 
-    Attributes
-    ----------
-    file
-        Where they come from, for messages.
-    time
-        (N,) s, increasing.
-    values
-        (N, k) in the unit of the recording.
-    names
-        Of the k columns: joints, or x y z and perhaps qw qx qy qz.
-    """
-
-    file: str
-    time: Array
-    values: Array
-    names: tuple[str, ...]
+    file: str  # where they come from, for messages
+    time: Array  # (N,) s, increasing
+    values: Array  # (N, k) in the unit of the recording
+    names: tuple[str, ...]  # of the k columns: joints, or x y z and perhaps qw qx qy qz
 
     def between(self, times: Array) -> Array:
         """Return (M, k) values between the samples, on straight lines; held beyond the ends."""
@@ -109,25 +97,14 @@ def stream(file: str, time: Array, values: Array, names: Sequence[str]) -> Strea
 
 @dataclass(frozen=True)
 class Pairs:
-    """Samples of two recordings at standstill.
+    """Samples of two recordings at standstill."""
 
-    Attributes
-    ----------
-    times
-        (M,) s, of the robot's clock.
-    joints, target
-        (M, n) and (M, k) of the samples nearest in time.
-    short
-        How many standstills were too short.
-    lonely
-        How many had no sample of the target within the tolerance.
-    """
-
-    times: Array
+    times: Array  # (M,) s, of the robot's clock
+    # joints, target: (M, n) and (M, k) of the samples nearest in time
     joints: Array
     target: Array
-    short: int
-    lonely: int
+    short: int  # how many standstills were too short
+    lonely: int  # how many had no sample of the target within the tolerance
 
 
 def paired(
@@ -185,21 +162,11 @@ LEAST = 60
 
 @dataclass(frozen=True)
 class Lag:
-    """By how much the clocks differ.
+    """By how much the clocks differ."""
 
-    Attributes
-    ----------
-    value
-        s: the robot's clock shows that much more than the instrument's at the same instant.
-    std
-        One standard deviation, s.
-    left
-        m rms: distance in motion that lag and frames leave.
-    """
-
-    value: float
-    std: float
-    left: float
+    value: float  # s: the robot's clock shows that much more than the instrument's at the same instant
+    std: float  # one standard deviation, s
+    left: float  # m rms: distance in motion that lag and frames leave
 
 
 def lag(joints: Stream, target: Stream, robot: Robot, place: Array) -> Lag:

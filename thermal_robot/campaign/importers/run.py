@@ -36,21 +36,11 @@ IMPORTED = "Imported by `thermal-robot import"
 
 @dataclass(frozen=True)
 class Imported:
-    """A campaign that was imported.
+    """A campaign that was imported."""
 
-    Attributes
-    ----------
-    campaign
-        As it was written.
-    file
-        Its campaign.toml.
-    notes
-        How many rows were read, what was left out and why, what was found out; a sentence each.
-    """
-
-    campaign: Campaign
-    file: Path
-    notes: tuple[str, ...]
+    campaign: Campaign  # as it was written
+    file: Path  # its campaign.toml
+    notes: tuple[str, ...]  # how many rows were read, what was left out and why, what was found out; a sentence each
 
 
 def import_files(format: str, files: Sequence[Path], directory: Path, plan: Plan | None = None) -> Imported:

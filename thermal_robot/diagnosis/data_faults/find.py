@@ -45,24 +45,12 @@ from thermal_robot.inference.alternation import Placed, middle, soft
 
 @dataclass(frozen=True, eq=False)
 class Tried:
-    """A fault with what is left once it is mended: the distance of each row of a sample that it determines, m.
+    """A fault with what is left once it is mended: the distance of each row of a sample that it determines, m."""
 
-    Attributes
-    ----------
-    fault
-        What was mended.
-    distance
-        (K,) m.
-    place
-        (3,) where the target then sits on the tool frame, m.
-    still
-        m, the median distance that a robot which does not move would leave.
-    """
-
-    fault: Fault
-    distance: Array
-    place: Array
-    still: float = np.inf
+    fault: Fault  # what was mended
+    distance: Array  # (K,) m
+    place: Array  # (3,) where the target then sits on the tool frame, m
+    still: float = np.inf  # m, the median distance that a robot which does not move would leave
 
     @property
     def median(self) -> float:
@@ -77,23 +65,12 @@ class Tried:
 
 @dataclass(frozen=True, eq=False)
 class Struck:
-    """The rows that a fault may have struck, and how far they are from the prediction.
+    """The rows that a fault may have struck, and how far they are from the prediction."""
 
-    Attributes
-    ----------
-    readings
-        All rows as they stand.
-    rows
-        (N,) those in question.
-    distance
-        (N,) of all rows as they stand, m.
-    frames
-        Where the other rows put the frames; ``None`` where all are in question, and the frames with them.
-    """
-
-    readings: Readings
-    rows: Rows
-    distance: Array
+    readings: Readings  # all rows as they stand
+    rows: Rows  # (N,) those in question
+    distance: Array  # (N,) of all rows as they stand, m
+    # where the other rows put the frames; ``None`` where all are in question, and the frames with them
     frames: Placed | None
 
     @classmethod

@@ -28,23 +28,13 @@ Repair = Callable[[Readings, Rows], Readings]
 
 @dataclass(frozen=True)
 class Proposal:
-    """One fault that may have struck, and the readings without it.
+    """One fault that may have struck, and the readings without it."""
 
-    Attributes
-    ----------
-    kind
-        What kind of fault.
-    place
-        Where it struck, in words: joints, columns, how many rows; several are listed where data cannot tell them.
-    repair
-        Mends it.
-    joints
-        Those that are turned round, where that is what is wrong: a larger set that fits no better says nothing more.
-    """
-
-    kind: Kind
+    kind: Kind  # what kind of fault
+    # where it struck, in words: joints, columns, how many rows; several are listed where data cannot tell them
     place: str
-    repair: Repair
+    repair: Repair  # mends it
+    # those that are turned round, where that is what is wrong: a larger set that fits no better says nothing more
     joints: frozenset[str] = frozenset()
 
 
@@ -61,42 +51,22 @@ def repaired(fault: Fault, readings: Readings, struck: Rows) -> Readings:
 
 @dataclass(frozen=True)
 class Offsets:
-    """Faults of one kind that differ by a number: which to try first, and the fault of each.
+    """Faults of one kind that differ by a number: which to try first, and the fault of each."""
 
-    Attributes
-    ----------
-    tried
-        Numbers, in order, between which the best is looked for.
-    of
-        Returns the proposal of a number.
-    """
-
-    tried: tuple[float, ...]
-    of: Callable[[float], Proposal]
+    tried: tuple[float, ...]  # numbers, in order, between which the best is looked for
+    of: Callable[[float], Proposal]  # returns the proposal of a number
 
 
 @dataclass(frozen=True)
 class Kind:
-    """A kind of fault.
+    """A kind of fault."""
 
-    Attributes
-    ----------
-    name
-        Short, for those who count kinds.
-    says
-        What is wrong, ``{}`` standing for the place.
-    remedy
-        What to do about it.
-    proposals
-        Yields place and repair of each fault of this kind that readings may have, and the joints turned round, if any.
-    offsets
-        Yields families of such faults that differ by a number.
-    """
-
-    name: str
-    says: str
-    remedy: str
+    name: str  # short, for those who count kinds
+    says: str  # what is wrong, ``{}`` standing for the place
+    remedy: str  # what to do about it
+    # yields place and repair of each fault of this kind that readings may have, and the joints turned round, if any
     proposals: Callable[[Readings], Iterable[tuple[str, Repair] | tuple[str, Repair, frozenset[str]]]] = lambda _: ()
+    # yields families of such faults that differ by a number
     offsets: Callable[[Readings], Iterable[tuple[tuple[float, ...], Callable[[float], tuple[str, Repair]]]]] = (
         lambda _: ()
     )

@@ -54,28 +54,17 @@ class Recalibrated:
 
     The first joint's placement is the base's, and what lies behind the last joint the target's. What the readings do
     not determine stays as the URDF has it (Levenberg-Marquardt with prior sizes that no robot reaches).
-
-    Attributes
-    ----------
-    readings
-        Commands and measurements, and the robot as the URDF has it.
-    parts
-        (N,) to which part of the rows each belongs, from 0 on.
-    robot
-        The calibrated robot.
-    bases, points, turns
-        (B, 4, 4), (B, 3) and (B, 3, 3): of each part the base, the target's place on the tool and its turn.
-    held
-        (6 J, 6 J) precision to which shift and turn of the J joints behind the first are held.
     """
 
-    readings: Readings
-    parts: NDArray[np.int64]
-    robot: Robot
+    readings: Readings  # commands and measurements, and the robot as the URDF has it
+    parts: NDArray[np.int64]  # (N,) to which part of the rows each belongs, from 0 on
+    robot: Robot  # the calibrated robot
+    # bases, points, turns: (B, 4, 4), (B, 3) and (B, 3, 3): of each part the base, the target's place on the tool and
+    # its turn
     bases: Array
     points: Array
     turns: Array
-    held: Array
+    held: Array  # (6 J, 6 J) precision to which shift and turn of the J joints behind the first are held
 
     @classmethod
     def of(cls, readings: Readings, parts: NDArray[np.int64], begun: Robot) -> Recalibrated:
