@@ -93,13 +93,7 @@ def checked_array(file: str, key: str, value: Any, shape: tuple[int, ...], kind:
 
 
 def check_quaternions(file: str, key: str, quaternions: NDArray[np.float64], rows: Rows | None = None) -> None:
-    """Refuse (N, 4) quaternions of which one is no orientation.
-
-    Raises
-    ------
-    CampaignError
-        Naming the first: by its number of (N,) ``rows``, else by its index.
-    """
+    """Refuse (N, 4) quaternions of which one is no orientation, naming its number of (N,) ``rows``, or its index."""
     index = no_orientation(quaternions)
     if index is not None:
         four = ", ".join(f"{part:g}" for part in quaternions[index])
@@ -109,13 +103,7 @@ def check_quaternions(file: str, key: str, quaternions: NDArray[np.float64], row
 
 
 def check_covariate(file: str, name: str, values: NDArray[np.float64], rows: Rows | None = None) -> None:
-    """Refuse (N,) numbers that cannot be what their name says; NaN passes.
-
-    Raises
-    ------
-    CampaignError
-        Naming the first: by its number of (N,) ``rows``, else by its index.
-    """
+    """Refuse (N,) numbers that cannot be what their name says, naming the number of (N,) ``rows``, or the index."""
     quantity, place = split_name(name)
     if quantity == "approach" and place:
         refused, expected = ~np.isin(values, (-1.0, 0.0, 1.0)) & ~np.isnan(values), "-1, 0 or 1"
@@ -148,13 +136,7 @@ def check_joints(
 
 
 def checked_number(file: str, key: str, value: Any, *, least: float = -LARGEST, expected: str = "a number") -> float:
-    """Return a finite number, at least ``least``.
-
-    Raises
-    ------
-    CampaignError
-        Anything else.
-    """
+    """Return a finite number, at least ``least``; refuse anything else."""
     if isinstance(value, (int, float, np.integer, np.floating)) and type(value) is not bool:
         if least <= value <= LARGEST:
             return float(value)
@@ -169,13 +151,7 @@ def checked_noise(file: str, key: str, sigma: Any) -> float | None:
 
 
 def checked_sigmas(file: str, key: str, sigmas: Any, samples: int) -> NDArray[np.float64]:
-    """Return (N,) standard deviations, read-only.
-
-    Raises
-    ------
-    CampaignError
-        Another shape, or one that is not above 0: naming the first.
-    """
+    """Return (N,) standard deviations, read-only; refuse one that is not above 0."""
     values = checked_array(file, key, sigmas, (samples,), np.float64)
     refused = values < SMALLEST
     if refused.any():
@@ -193,13 +169,7 @@ def checked_sizes(file: str, key: str, sizes: Any) -> dict[str, float]:
 
 
 def checked_mapping(file: str, key: str, given: Any) -> Mapping[str, Any]:
-    """Return what is given by names.
-
-    Raises
-    ------
-    CampaignError
-        Something else than a mapping, or keys that are no text.
-    """
+    """Return what is given by names; refuse anything else than a mapping whose keys are text."""
     if isinstance(given, Mapping) and all(isinstance(name, str) for name in given):
         return given
     raise CampaignError(

@@ -164,13 +164,7 @@ class Document:
         return values
 
     def required(self, section: str, key: str) -> Any:
-        """Return a value that must be stated.
-
-        Raises
-        ------
-        CampaignError
-            It is not.
-        """
+        """Return a value that must be stated."""
         if key in self.sections.get(section, {}):
             return self.sections[section][key]
         known = self.kinds[section]
@@ -267,13 +261,7 @@ def is_yaml(file: Path) -> bool:
 
 
 def read_yaml(file: Path) -> list[Any]:
-    """Return the documents of a YAML file, of plain values alone; the empty ones are left out.
-
-    Raises
-    ------
-    CampaignError
-        No such file, one that is no YAML, or PyYAML that is not installed.
-    """
+    """Return the documents of a YAML file, of plain values alone; the empty ones are left out."""
     try:
         import yaml
     except ImportError as error:

@@ -249,11 +249,8 @@ LOOSE = 2.0
 def of_targets(table: Table, columns: Columns, settings: Settings) -> tuple[Table, Posed, list[str]]:
     """Return the rows that tell a pose, what they tell, and what is left out or doubtful, in sentences.
 
-    Raises
-    ------
-    CampaignError
-        Targets beside a simulator's; a place of which one or two figures lack; targets on
-        a line in all rows, or one that is never seen beside the others.
+    Refused are targets beside a simulator's, a place of which one or two figures lack, targets on a line in all rows,
+    and one that is never seen beside the others.
     """
     _refuse_simulated(table, columns)
     points = np.stack([_points(table, number) for number in columns.targets], axis=1) * settings.units.length_scale
@@ -342,19 +339,11 @@ _HELD = ("payload", "speed")
 
 
 def fill(column: str, values: Array, clock: Array | None = None) -> tuple[Array, str]:
-    """Return a covariate without NaN, and in plain words how its gaps were filled.
+    """Return a covariate (N,) without NaN, and in plain words how its gaps were filled.
 
-    A direction, velocity or acceleration that nobody noted is 0, which says "unknown" or "at rest". A payload
-    or speed stays until it is changed. Everything else varies smoothly: linear in between, held at both ends.
-
-    Parameters
-    ----------
-    column
-        Name of the covariate.
-    values
-        (N,) with at least one number.
-    clock
-        (N,) when each row was measured: ``time``, or ``order``; the rows follow each other where it is absent.
+    A direction, velocity or acceleration that nobody noted is 0, which says "unknown" or "at rest". A payload or speed
+    stays until it is changed. Everything else varies smoothly: linear in between, held at both ends. ``clock`` (N,)
+    tells when each row was measured; the rows follow each other where it is absent.
     """
     gaps = np.isnan(values)
     quantity, _ = split_name(column)

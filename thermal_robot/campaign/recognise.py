@@ -288,10 +288,7 @@ def recognise(table: Table, robot: Robot, *, measured: bool) -> Columns:
 def _targets(table: Table, robot: Robot) -> tuple[tuple[int, ...], list[str]]:
     """Return the numbers of several targets, and what is left out for them; none where there is one.
 
-    Raises
-    ------
-    CampaignError
-        An axis that lacks, too few targets, or one without a number beside them.
+    Refused are an axis that lacks, too few targets, and one without a number beside them.
     """
     named = (names.target_of(column) for column in table.columns if column not in robot.joint_names)
     numbers = sorted({target[1] for target in named if target})

@@ -181,12 +181,7 @@ def _spread(places: Array, seen: Mask) -> Array:
 def sigma_of_all(sigmas: Array, targets: Targets | None) -> tuple[float, float | None]:
     """Return one sigma of positions, m, and where several targets tell it of turns, rad: root mean squares over rows.
 
-    Parameters
-    ----------
-    sigmas
-        (N,) of a point in each row, m; of equal ones it is they themselves, to the last digit.
-    targets
-        Whose common frame is measured.
+    ``sigmas`` (N,) are of a point in each row, m; of equal ones it is they themselves, to the last digit.
     """
     alike = bool(sigmas.min() == sigmas.max())
     whole = float(sigmas[0]) if alike else float(np.sqrt((sigmas**2).mean()))
@@ -206,16 +201,9 @@ def of_a_point(sigma: float, targets: Targets | None) -> float:
 def relative_sigmas(sigmas: Array | None, whole: float | None, targets: Targets | None, turned: bool) -> Array | None:
     """(N, m) one sigma of each figure of a row over that of all rows; ``None`` where it is one for all.
 
-    Parameters
-    ----------
-    sigmas
-        (N,) of a point in each row, m; ``None`` where one holds for all.
-    whole
-        Of positions, of all rows, m.
-    targets
-        Whose common frame is measured.
-    turned
-        Whether orientations were measured, m being 6; their noise is the same in all rows unless targets tell it.
+    ``sigmas`` (N,) are of a point in each row, m, ``None`` where one holds for all; ``whole`` of positions, of all
+    rows, m. Where orientations were measured, ``turned``, m is 6; their noise is the same in all rows unless targets
+    tell it.
     """
     factor = np.ones(1) if sigmas is None or not whole else sigmas / of_a_point(whole, targets)
     if targets is not None:

@@ -65,13 +65,7 @@ class Column:
     counted: bool = False  # 0, 1, 2 … in the order of the rows, instead of a source
 
     def numbers(self, table: Table) -> NDArray[np.float64]:
-        """Return (N,) numbers, NaN where a cell is empty.
-
-        Raises
-        ------
-        CampaignError
-            No such column, text where a number should be, an instant of another pattern.
-        """
+        """Return (N,) numbers, NaN where a cell is empty; refuse text and an instant of another pattern."""
         if self.counted:
             return np.arange(float(len(table.rows)))
         if self.value is not None:
@@ -91,13 +85,7 @@ class Column:
         return bare(found(table, self.sources[0])).unit if plain else None
 
     def complete(self, table: Table, name: str = "") -> NDArray[np.float64]:
-        """Return (N,) numbers of which none may be missing; ``name`` is the campaign's column.
-
-        Raises
-        ------
-        CampaignError
-            An empty cell, or what :meth:`numbers` raises.
-        """
+        """Return (N,) numbers of which none may be missing; ``name`` is the campaign's column, for a message."""
         values = self.numbers(table)
         if np.isnan(values).any():
             problem = "a value is missing" + (f", for the column {name!r} of the campaign" if name else "")
@@ -107,13 +95,7 @@ class Column:
         return values
 
     def text(self, table: Table) -> list[str]:
-        """Return N texts; those of several columns with a blank between.
-
-        Raises
-        ------
-        CampaignError
-            No such column.
-        """
+        """Return N texts; those of several columns with a blank between."""
         if self.value is not None:
             return [str(self.value)] * len(table.rows)
         parts = [table.text(found(table, source)) for source in self.sources]
@@ -141,13 +123,7 @@ class Column:
 
 
 def found(table: Table, source: str | int) -> str:
-    """Return the name of a column of the table, by its name or its number.
-
-    Raises
-    ------
-    CampaignError
-        There is none.
-    """
+    """Return the name of a column of the table, by its name or its number; refuse one that is not there."""
     names = list(table.columns)
     if source in names or (table.header is None and str(source) in names):  # without a header numbers are names
         return str(source)
@@ -239,10 +215,7 @@ class Orientation:
     def quaternions(self, table: Table) -> NDArray[np.float64]:
         """Return (N, 4) unit quaternions wxyz, which turn vectors of the target's frame into the measurement frame.
 
-        Raises
-        ------
-        CampaignError
-            No such column, a missing figure, a quaternion whose length is not 1, a matrix that is no rotation.
+        Refused are a missing figure, a quaternion whose length is not 1, a matrix that is no rotation.
         """
         from scipy.spatial.transform import Rotation
 
@@ -371,15 +344,7 @@ class Plan:
         return Layout(**stated)
 
     def robot(self) -> Robot:
-        """Load the robot.
-
-        Raises
-        ------
-        CampaignError
-            None is named.
-        RobotError
-            It cannot be loaded, or has no such link.
-        """
+        """Load the robot; a plan must name one."""
         urdf = self.get("robot", "urdf")
         if urdf is None:
             expected = "--robot URDF, or [robot] urdf in the file of --mapping"
@@ -390,13 +355,7 @@ class Plan:
         return with_kinematics(robot, measured) if measured else robot
 
     def settings(self, robot: Robot) -> Settings:
-        """Return what a campaign says once about all its rows, SI.
-
-        Raises
-        ------
-        CampaignError
-            Units of angles or lengths that are not stated.
-        """
+        """Return what a campaign says once about all its rows, SI; units of angles and lengths must be stated."""
         for key in ("angle_unit", "length_unit"):
             if self.get("measurements", key) is None:
                 expected = f"[measurements] {key} in the file of --mapping"
@@ -412,13 +371,7 @@ def planned(sections: Mapping[str, Mapping[str, Any]]) -> Plan:
 
 
 def read_mapping(path: Path) -> Plan:
-    """Read a mapping; the robot's path is relative to the file.
-
-    Raises
-    ------
-    CampaignError
-        No such file, a syntax error, a section or key that is unknown, a value of the wrong kind: with its line.
-    """
+    """Read a mapping; the robot's path is relative to the file. An error names the line."""
     sections = Document(path, KINDS).sections
     for key, named in sections.get("robot", {}).items():
         if key in ("urdf", "kinematics") and not named.startswith((BUILTIN, EXAMPLE_ROBOT_DATA)):
@@ -450,25 +403,13 @@ class Format:
     most: int = 2
 
     def source(self, files: Sequence[Path], plan: Plan) -> Source:
-        """Read the files.
-
-        Raises
-        ------
-        CampaignError
-            Another number of files than the format has, or what its reader raises.
-        """
+        """Read the files, as many as the format has."""
         files_of(files, self.files, self.least, self.most)
         return self.read(files, plan)
 
 
 def files_of(files: Sequence[Path], expected: str, least: int, most: int) -> None:
-    """Refuse another number of files than a format has.
-
-    Raises
-    ------
-    CampaignError
-        Naming what is expected.
-    """
+    """Refuse another number of files than a format has, naming what is expected."""
     if not least <= len(files) <= most:
         raise CampaignError(
             "FILES", "another number of files than this format has", found=str(len(files)), expected=expected

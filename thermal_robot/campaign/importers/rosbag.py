@@ -79,13 +79,7 @@ class Stream:
 
 
 def stream(file: str, time: Array, values: Array, names: Sequence[str]) -> Stream:
-    """Return a stream in the sequence of its clock, without samples that have a gap and without repeated instants.
-
-    Raises
-    ------
-    CampaignError
-        Fewer than two samples.
-    """
+    """Return a stream in the sequence of its clock, without samples that have a gap and without repeated instants."""
     kept = ~(np.isnan(time) | np.isnan(values).any(axis=1))
     _, first = np.unique(time[kept], return_index=True)
     if len(first) < 2:
@@ -119,14 +113,7 @@ def paired(
 ) -> Pairs:
     """Return a pair for each standstill, in its middle once the arm has settled.
 
-    Parameters
-    ----------
-    joints, target
-        The recordings.
-    lag
-        s: the robot's clock shows that much more than the instrument's.
-    tolerance, standstill, velocity, settling
-        As the constants of this module.
+    ``lag``, s: the robot's clock shows that much more than the instrument's. The limits are as the constants above.
     """
     times = joints.time
     moved = joints.between(times + WINDOW / 2) - joints.between(times - WINDOW / 2)
@@ -170,23 +157,9 @@ class Lag:
 
 
 def lag(joints: Stream, target: Stream, robot: Robot, place: Array) -> Lag:
-    """Estimate by how much the clocks of two recordings differ.
+    """Estimate by how much two recordings' clocks differ; refuse those that show no motion in common, or hardly any.
 
-    Parameters
-    ----------
-    joints
-        Positions of the robot's joints, by its clock.
-    target
-        Positions of the target, by the instrument's clock, in any frame that stands still.
-    robot
-        The chain.
-    place
-        (3,) m: where the target roughly is on the tool frame.
-
-    Raises
-    ------
-    CampaignError
-        Recordings that do not show one motion, or hardly any.
+    The target's positions are in any frame that stands still; ``place`` (3,), m, is where it roughly is on the tool.
     """
     # clocks that count from 1970 leave too few digits for a derivative by time: from here on both begin at 0
     begun = float(joints.time[0] - target.time[0])
@@ -284,19 +257,9 @@ _BEFORE_NAMES = 2
 
 
 def read_streams(file: Path, joints: Sequence[str]) -> tuple[Stream | None, Stream | None]:
-    """Return what a file has of the joints and of the target; ``None`` for what it has not.
+    """Return what a CSV of topics has of the chain's joints and of the target; ``None`` for what it has not.
 
-    Parameters
-    ----------
-    file
-        CSV of one topic, or of several.
-    joints
-        Of the chain.
-
-    Raises
-    ------
-    CampaignError
-        A file that is no table, has no clock, or has some of the joints only.
+    A file that is no table, has no clock, or has some of the joints only is refused.
     """
     if _begins_with_figures(file):
         return _without_header(read_table(file, _WITHOUT_HEADER), joints)
@@ -402,22 +365,10 @@ WITH_ROSBAGS = 'pip install "thermal-robot[ros]"'
 def read_bag(
     path: Path, joints: Sequence[str], joint_topic: str | None, target_topic: str | None
 ) -> tuple[Stream | None, Stream | None]:
-    """Return what a bag has of the joints and of the target; ``None`` where no topic has messages of that kind.
+    """Return what a bag has of the chain's joints and of the target; ``None`` where no topic has messages of that kind.
 
-    Parameters
-    ----------
-    path
-        File of ROS 1, or file or folder of ROS 2.
-    joints
-        Of the chain.
-    joint_topic, target_topic
-        Which topics; ``None`` where one alone has messages of that kind.
-
-    Raises
-    ------
-    CampaignError
-        A bag that cannot be read, several topics to choose from, a joint that is not recorded, or rosbags that is not
-        installed.
+    A topic is ``None`` where one alone has such messages. A bag that cannot be read is refused, and so are several
+    topics to choose from and a joint that is not recorded.
     """
     try:
         from rosbags.highlevel import AnyReader, AnyReaderError

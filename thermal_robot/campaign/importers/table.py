@@ -46,11 +46,6 @@ def commands(file: Path, plan: Plan) -> Table:
 
     A layout fits where the header, if it has any, is no row of numbers, and where no row is a header. What does not fit
     is tried with a header or without, and as any table is read.
-
-    Raises
-    ------
-    CampaignError
-        A table that cannot be read.
     """
     if plan.sections.get("commands"):
         return read_table(file, plan.layout("commands"))
@@ -277,20 +272,9 @@ def _names_before(table: Table) -> int:
 def grouped(table: Table, key: str, targets: str) -> tuple[Table, str]:
     """Return a table with a row for each visit of a pose, and in a sentence which targets there are.
 
-    Targets are numbered as they first appear. One that is measured again at a pose begins another visit. A target that
-    a visit lacks has empty cells there.
-
-    Parameters
-    ----------
-    table
-        A line a point, with the columns x, y and z.
-    key, targets
-        Columns of the names of poses, and of those of targets on the tool.
-
-    Raises
-    ------
-    CampaignError
-        A column that is not there; a single target.
+    Each line of the table is a point, x y z. Targets are numbered as they first appear. One that is measured again at a
+    pose begins another visit. A target that a visit lacks has empty cells there. ``key`` and ``targets`` are the
+    columns of the names of poses and of targets; a single target is refused.
     """
     import pandas as pd
 

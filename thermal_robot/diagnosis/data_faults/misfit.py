@@ -231,14 +231,9 @@ _MOVES = re.compile(r"\btype\s*=\s*[\"'](revolute|continuous|prismatic)")
 
 
 def fitting(readings: Readings, near: float) -> tuple[str, float] | None:
-    """Return the shipped robot that fits readings best, and the median distance that it leaves, m.
+    """Return the shipped robot that fits readings best, and the median distance, m, that it leaves with frames fitted.
 
-    Parameters
-    ----------
-    readings
-        Commands and measurements; both frames are fitted.
-    near
-        Distance, m, within which a robot fits; ``None`` is returned where none does.
+    None is returned where none fits within the distance ``near``, m.
     """
     own = readings.robot
     alike = [name for name in shipped() if set(own.joint_names) <= _movable(name)]
@@ -302,19 +297,9 @@ def another_robot(campaign: Campaign, progress: Callable[[str], None] = lambda _
     """Tell whether it takes another robot, or another motion, to bring commands and measurements together.
 
     Where frames alone leave a gap, every joint's placement is calibrated. Rows of one session, or a quarter of them in
-    their order, may have frames of their own: a base that was moved is no other robot.
-
-    Parameters
-    ----------
-    campaign
-        With measurements.
-    progress
-        Called with a few words where a gap asks for it.
-
-    Returns
-    -------
-    Misfit or None
-        With the model that is meant, as far as it can be told; ``None`` where a robot of this kind can err so.
+    their order, may have frames of their own: a base that was moved is no other robot. The model that is meant is told
+    as far as it can be; ``None`` where a robot of this kind can err so. ``progress`` is called with a few words where a
+    gap asks for it.
     """
     if campaign.simulated_position is not None or campaign.samples <= settings.DRAWN:
         return None  # another simulator is no other robot
@@ -431,17 +416,7 @@ def delivered(last: Conclusion, candidates: Sequence[Effect]) -> Conclusion:
 
 
 def frames_alone(campaign: Campaign, candidates: Sequence[Effect], needed: str = _NEEDED) -> Conclusion:
-    """Conclude from the unknown frames and nothing else: no candidate can be tested.
-
-    Parameters
-    ----------
-    campaign
-        With measurements.
-    candidates
-        Effects that were asked for.
-    needed
-        What they would need.
-    """
+    """Conclude from the unknown frames and nothing else: no candidate can be tested, for want of what is ``needed``."""
     bare = replace(fit(campaign, ()), needs={effect.name: (needed,) for effect in candidates})
     left = examine(bare)
     return Conclusion(bare, (), left.unexplained, left, nothing_random(bare), {})
