@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -135,9 +135,7 @@ def write_commands(
         empty = recorded and names.split_name(name)[0] == "temperature"
         if name not in derived:
             table[name] = blank if empty else [f"{value:.9g}" for value in values]
-    table |= {name: [str(label) for label in labels] for name, labels in commands.labels.items()}
-    table |= dict.fromkeys(measured, blank)
-    _write_csv(Path(path), list(table), list(table.values()))
+    _write_csv(Path(path), {**table, **_labelled(commands), **dict.fromkeys(measured, blank)})
 
 
 def _declare(campaign: Campaign, folder: Path, comments: Sequence[str]) -> Path:
@@ -159,15 +157,11 @@ def _declare(campaign: Campaign, folder: Path, comments: Sequence[str]) -> Path:
 
 def write_table(campaign: Campaign, path: str | Path) -> None:
     """Write the table of a campaign, or of samples, as CSV in the campaign's units, with all digits."""
-    columns: list[str] = []
-    data: list[Sequence[str]] = []
-    for name, values in table_columns(campaign):
-        columns.append(name)
-        data.append(["" if np.isnan(value) else repr(float(value)) for value in values])
-    for name, labels in campaign.labels.items():
-        columns.append(name)
-        data.append([str(label) for label in labels])
-    _write_csv(Path(path), columns, data)
+    numbers = {
+        name: ["" if np.isnan(value) else repr(float(value)) for value in values]
+        for name, values in table_columns(campaign)
+    }
+    _write_csv(Path(path), {**numbers, **_labelled(campaign)})
 
 
 def with_prediction(
@@ -293,12 +287,16 @@ def table_columns(campaign: Campaign) -> Iterator[tuple[str, np.ndarray[Any, np.
         yield name, values / covariate_scale(name, robot, units)
 
 
-def _write_csv(path: Path, columns: Sequence[str], data: Sequence[Sequence[str]]) -> None:
+def _labelled(campaign: Campaign) -> dict[str, list[str]]:
+    return {name: [str(label) for label in labels] for name, labels in campaign.labels.items()}
+
+
+def _write_csv(path: Path, columns: Mapping[str, Sequence[str]]) -> None:
     try:
         with whole(path) as place, place.open("w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow(columns)
-            writer.writerows(zip(*data, strict=True))
+            writer.writerows(zip(*columns.values(), strict=True))
     except OSError as error:
         raise CampaignError(str(path), f"cannot be written: {error.strerror}") from error
 

@@ -11,7 +11,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import combinations, permutations
+from typing import NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -49,8 +51,7 @@ def repaired(fault: Fault, readings: Readings, struck: Rows) -> Readings:
     return readings
 
 
-@dataclass(frozen=True)
-class Offsets:
+class Offsets(NamedTuple):
     """Faults of one kind that differ by a number: which to try first, and the fault of each."""
 
     tried: tuple[float, ...]  # numbers, in order, between which the best is looked for
@@ -113,13 +114,10 @@ def reversing(signs: NDArray[np.int64], readings: Readings) -> tuple[str, Repair
     return said, _changed(joints, np.negative), frozenset(names)
 
 
-def _reversed(several: bool) -> Callable[[Readings], Iterator[tuple[str, Repair, frozenset[str]]]]:
-    def proposals(readings: Readings) -> Iterator[tuple[str, Repair, frozenset[str]]]:
-        for signs in sign_patterns(readings.robot.n):
-            if ((signs < 0).sum() > 1) is np.bool_(several):
-                yield reversing(signs, readings)
-
-    return proposals
+def _reversed(readings: Readings, several: bool) -> Iterator[tuple[str, Repair, frozenset[str]]]:
+    for signs in sign_patterns(readings.robot.n):
+        if ((signs < 0).sum() > 1) is np.bool_(several):
+            yield reversing(signs, readings)
 
 
 def _coupled(readings: Readings) -> Iterator[tuple[str, Repair]]:
@@ -138,24 +136,18 @@ def _exchanged(readings: Readings) -> Iterator[tuple[str, Repair]]:
         yield f"{names[i]} and {names[j]}", _changed([i, j], lambda two: two[..., ::-1])
 
 
-def _scaled(factor: float) -> Callable[[Readings], Iterator[tuple[str, Repair]]]:
-    def proposals(readings: Readings) -> Iterator[tuple[str, Repair]]:
-        turning = _turning(readings)
-        for j in turning:
-            yield readings.robot.joint_names[j], _changed([j], lambda angle: angle * factor)
-        if len(turning) > 1:
-            yield "all joints", _changed(turning, lambda angle: angle * factor)
-
-    return proposals
+def _scaled(readings: Readings, factor: float) -> Iterator[tuple[str, Repair]]:
+    turning = _turning(readings)
+    for j in turning:
+        yield readings.robot.joint_names[j], _changed([j], lambda angle: angle * factor)
+    if len(turning) > 1:
+        yield "all joints", _changed(turning, lambda angle: angle * factor)
 
 
-def _zeros(*shifts: float) -> Callable[[Readings], Iterator[tuple[str, Repair]]]:
-    def proposals(readings: Readings) -> Iterator[tuple[str, Repair]]:
-        for j in _turning(readings):
-            for shift in shifts:
-                yield readings.robot.joint_names[j], _changed([j], lambda angle, by=shift: angle + by)  # type: ignore[misc]
-
-    return proposals
+def _zeros(readings: Readings, shifts: tuple[float, ...]) -> Iterator[tuple[str, Repair]]:
+    for j in _turning(readings):
+        for shift in shifts:
+            yield readings.robot.joint_names[j], _changed([j], lambda angle, by=shift: angle + by)  # type: ignore[misc]
 
 
 JOINT_KINDS = (
@@ -163,56 +155,46 @@ JOINT_KINDS = (
         "reversed joint",
         "{} is reversed: it counts the other way round",
         "change the sign of its column",
-        _reversed(False),
+        partial(_reversed, several=False),
     ),
-    Kind("reversed joints", "{}", "change the sign of their columns", _reversed(True)),
+    Kind("reversed joints", "{}", "change the sign of their columns", partial(_reversed, several=True)),
     Kind("coupled joints", "the column of {} (coupled, as on a Fanuc's pendant)", "undo the coupling", _coupled),
     Kind("exchanged joints", "the columns of {} are exchanged", "exchange their headers", _exchanged),
-    Kind("degrees read as rad", "degrees are read as rad in {}", "convert them", _scaled(np.pi / 180)),
-    Kind("rad read as degrees", "rad are read as degrees in {}", "convert them", _scaled(180 / np.pi)),
+    Kind("degrees read as rad", "degrees are read as rad in {}", "convert them", partial(_scaled, factor=np.pi / 180)),
+    Kind("rad read as degrees", "rad are read as degrees in {}", "convert them", partial(_scaled, factor=180 / np.pi)),
     Kind(
         "zero off by 90°",
         "the zero of {} is 90° off",
         "add 90° or take it off",
-        _zeros(settings.TURN / 2, -settings.TURN / 2),
+        partial(_zeros, shifts=(settings.TURN / 2, -settings.TURN / 2)),
     ),
-    Kind("zero off by 180°", "the zero of {} is 180° off", "add 180°", _zeros(settings.TURN)),
+    Kind("zero off by 180°", "the zero of {} is 180° off", "add 180°", partial(_zeros, shifts=(settings.TURN,))),
 )
 
 
-def _at_places(change: Callable[[Array], Array]) -> Repair:
-    """Return a repair that changes measured positions."""
+def _measured(column: str, change: Callable[[Array], Array]) -> Repair:
+    """Return a repair that changes measured positions, or orientations."""
 
     def repair(readings: Readings, struck: Rows) -> Readings:
-        return replace(readings, position=np.where(struck[:, None], change(readings.position), readings.position))
+        measured = np.asarray(getattr(readings, column))
+        return replace(readings, **{column: np.where(struck[:, None], change(measured), measured)})  # type: ignore[arg-type]
 
     return repair
 
 
-def _turns_changed(change: Callable[[Array], Array]) -> Repair:
-    """Return a repair that changes measured orientations."""
-
-    def repair(readings: Readings, struck: Rows) -> Readings:
-        measured = np.asarray(readings.orientation)
-        return replace(readings, orientation=np.where(struck[:, None], change(measured), measured))
-
-    return repair
+_at_places, _turns_changed = partial(_measured, "position"), partial(_measured, "orientation")
 
 
-def _sizes(steps: tuple[float, ...], ask: str = "") -> Callable[[Readings], Iterator[tuple[str, Repair]]]:
+def _sizes(readings: Readings, steps: tuple[float, ...], ask: str = "") -> Iterator[tuple[str, Repair]]:
     """Propose factors; one that is no unit beside the declared one was applied twice, or where none was due."""
-
-    def proposals(readings: Readings) -> Iterator[tuple[str, Repair]]:
-        if readings.spread() > settings.LARGEST_VOLUME:
-            return
-        read = LENGTH_UNITS[readings.length_unit]
-        for by in (sign for step in steps for sign in (step, 1.0 / step)):
-            size = f"lengths are {by if by > 1.0 else 1.0 / by:.4g} times too {'small' if by > 1.0 else 'large'}"
-            unit = next((own for own, one in LENGTH_UNITS.items() if abs(one / read / by - 1.0) < settings.ALIKE), "")
-            said = f"positions stand in {unit}, not in {readings.length_unit}: {size}" if unit else f"{size}{ask}"
-            yield said, _at_places(lambda p, by=by: p * by)  # type: ignore[misc]
-
-    return proposals
+    if readings.spread() > settings.LARGEST_VOLUME:
+        return
+    read = LENGTH_UNITS[readings.length_unit]
+    for by in (sign for step in steps for sign in (step, 1.0 / step)):
+        size = f"lengths are {by if by > 1.0 else 1.0 / by:.4g} times too {'small' if by > 1.0 else 'large'}"
+        unit = next((own for own, one in LENGTH_UNITS.items() if abs(one / read / by - 1.0) < settings.ALIKE), "")
+        said = f"positions stand in {unit}, not in {readings.length_unit}: {size}" if unit else f"{size}{ask}"
+        yield said, _at_places(lambda p, by=by: p * by)  # type: ignore[misc]
 
 
 def _axes_exchanged(_: Readings) -> Iterator[tuple[str, Repair]]:
@@ -278,9 +260,11 @@ def _angles_in_degrees(readings: Readings) -> Iterator[tuple[str, Repair]]:
 
 
 UNITS = (
-    Kind("metric unit", "{}", "correct length_unit", _sizes(settings.METRIC)),
-    Kind("inch", "{}", "convert them, or correct length_unit", _sizes(settings.INCHES, " (inches?)")),
-    Kind("foot", "{}", "convert them, or correct length_unit", _sizes(settings.FEET, " (feet?)")),
+    Kind("metric unit", "{}", "correct length_unit", partial(_sizes, steps=settings.METRIC)),
+    Kind(
+        "inch", "{}", "convert them, or correct length_unit", partial(_sizes, steps=settings.INCHES, ask=" (inches?)")
+    ),
+    Kind("foot", "{}", "convert them, or correct length_unit", partial(_sizes, steps=settings.FEET, ask=" (feet?)")),
 )
 AXES = (
     Kind("exchanged axes", "columns {} are exchanged", "exchange their headers", _axes_exchanged),
@@ -305,17 +289,17 @@ _JOINTS, _MEASURED = ("q", "simulated_position"), ("position",)
 
 def _shifted(readings: Readings) -> Iterator[tuple[str, Repair]]:
     for rows in (sign * k for k in range(1, settings.MOST_SHIFT + 1) for sign in (1, -1)):
-        yield f"{abs(rows)} row{'' if abs(rows) == 1 else 's'} {'below' if rows > 0 else 'above'}", _rolled(rows)
+        yield (
+            f"{abs(rows)} row{'' if abs(rows) == 1 else 's'} {'below' if rows > 0 else 'above'}",
+            partial(_rolled, by=rows),
+        )
 
 
-def _rolled(by: int) -> Repair:
-    def repair(readings: Readings, struck: Rows) -> Readings:
-        source = np.arange(len(readings.q)) + by
-        there = (source >= 0) & (source < len(source))
-        source = np.where(struck & there, source, np.arange(len(source)))
-        return _joints_of(readings, source, ~struck | there)
-
-    return repair
+def _rolled(readings: Readings, struck: Rows, by: int) -> Readings:
+    source = np.arange(len(readings.q)) + by
+    there = (source >= 0) & (source < len(source))
+    source = np.where(struck & there, source, np.arange(len(source)))
+    return _joints_of(readings, source, ~struck | there)
 
 
 def _joints_of(readings: Readings, source: NDArray[np.int64], known: Rows) -> Readings:
@@ -347,11 +331,12 @@ def _late(readings: Readings) -> Iterator[tuple[tuple[float, ...], Callable[[flo
     if clock is None or not np.ptp(clock) > 0.0:
         return
     tried = _offsets(readings)
-    for style in (_between, _before, _nearest):
-        yield tried, lambda by, style=style: (_words(by), style(by))  # type: ignore[misc]
+    # the arm goes straight on; waits in its pose; tables were joined by the nearest time
+    for style in (_between, partial(_of_one, least=1.0), partial(_of_one, least=0.5)):
+        yield tried, lambda by, style=style: (_words(by), partial(style, by=by))  # type: ignore[misc]
     if len(clock) <= settings.MIXED_ROWS:
-        yield tried, lambda by: (_words(by), _unmixed(-by, _JOINTS))
-        yield tried, lambda by: (_words(by), _unmixed(by, _MEASURED))
+        yield tried, lambda by: (_words(by), partial(_unmixed, by=-by, columns=_JOINTS))
+        yield tried, lambda by: (_words(by), partial(_unmixed, by=by, columns=_MEASURED))
 
 
 def _words(by: float) -> str:
@@ -373,53 +358,31 @@ def _places(readings: Readings, by: float) -> tuple[NDArray[np.int64], NDArray[n
     return order[after - 1], order[after], part, inside
 
 
-def _between(by: float) -> Repair:
+def _between(readings: Readings, struck: Rows, by: float) -> Readings:
     """Joints between two rows, where the arm goes straight from one to the next."""
-
-    def repair(readings: Readings, struck: Rows) -> Readings:
-        first, second, part, inside = _places(readings, by)
-        q = (1.0 - part)[:, None] * readings.q[first] + part[:, None] * readings.q[second]
-        return replace(readings, q=np.where(struck[:, None], q, readings.q), known=~struck | inside)
-
-    return repair
+    first, second, part, inside = _places(readings, by)
+    q = (1.0 - part)[:, None] * readings.q[first] + part[:, None] * readings.q[second]
+    return replace(readings, q=np.where(struck[:, None], q, readings.q), known=~struck | inside)
 
 
-def _of_one(by: float, least: float) -> Repair:
+def _of_one(readings: Readings, struck: Rows, by: float, least: float) -> Readings:
     """Joints of one row: of the next where so large a part of the way to it is gone, else of the last one."""
-
-    def repair(readings: Readings, struck: Rows) -> Readings:
-        first, second, part, inside = _places(readings, by)
-        source = np.where(part >= least, second, first)
-        return _joints_of(readings, np.where(struck, source, np.arange(len(source))), ~struck | inside)
-
-    return repair
+    first, second, part, inside = _places(readings, by)
+    source = np.where(part >= least, second, first)
+    return _joints_of(readings, np.where(struck, source, np.arange(len(source))), ~struck | inside)
 
 
-def _before(by: float) -> Repair:
-    """Joints of the last row before, where the arm waits in its pose."""
-    return _of_one(by, 1.0)
-
-
-def _nearest(by: float) -> Repair:
-    """Joints of the row that is nearest in time, as tables are joined."""
-    return _of_one(by, 0.5)
-
-
-def _unmixed(by: float, columns: tuple[str, ...]) -> Repair:
+def _unmixed(readings: Readings, struck: Rows, by: float, columns: tuple[str, ...]) -> Readings:
     """Columns that were interpolated at another time, as they were before."""
-
-    def repair(readings: Readings, struck: Rows) -> Readings:
-        first, second, part, _ = _places(readings, by)
-        own = np.arange(len(part))
-        mixture = np.zeros((len(part), len(part)))
-        mixture[own, np.where(struck, first, own)] = np.where(struck, 1.0 - part, 1.0)
-        mixture[own, second] += np.where(struck, part, 0.0)
-        back = np.linalg.pinv(mixture, rcond=settings.MIXED_FLOOR)
-        known = np.einsum("ij,ji->i", back, mixture) > settings.UNMIXED
-        changed = {name: back @ column for name in columns if (column := getattr(readings, name)) is not None}
-        return replace(readings, **changed, known=known)
-
-    return repair
+    first, second, part, _ = _places(readings, by)
+    own = np.arange(len(part))
+    mixture = np.zeros((len(part), len(part)))
+    mixture[own, np.where(struck, first, own)] = np.where(struck, 1.0 - part, 1.0)
+    mixture[own, second] += np.where(struck, part, 0.0)
+    back = np.linalg.pinv(mixture, rcond=settings.MIXED_FLOOR)
+    known = np.einsum("ij,ji->i", back, mixture) > settings.UNMIXED
+    changed = {name: back @ column for name in columns if (column := getattr(readings, name)) is not None}
+    return replace(readings, **changed, known=known)
 
 
 PAIRING_KINDS = (
