@@ -136,14 +136,8 @@ def _commands(table: Table, robot: Robot, units: Units) -> FloatArray:
     index = first_beyond(commands, LARGEST_COMMAND)
     if index is not None:
         joint = robot.joint_names[int(np.argmax(np.abs(commands[index])))]
-        raise CampaignError(
-            table.file,
-            "no joint goes so far",
-            row=int(table.rows[index]),
-            column=joint,
-            found=f"{table.numbers(joint)[index]:.15g}",
-            expected=f"at most {LARGEST_COMMAND:g} rad or m",
-        )
+        found, expected = f"{table.numbers(joint)[index]:.15g}", f"at most {LARGEST_COMMAND:g} rad or m"
+        raise table.error("no joint goes so far", joint, index, found=found, expected=expected)
     return commands
 
 
@@ -200,11 +194,10 @@ def _noise_of_rows(table: Table, settings: Settings) -> FloatArray:
     if refused.any():
         index = int(np.argmax(refused))
         empty = bool(np.isnan(sigmas[index]))
-        raise CampaignError(
-            table.file,
+        raise table.error(
             "a value is missing" if empty else "no standard deviation",
-            row=int(table.rows[index]),
-            column=names.NOISE,
+            names.NOISE,
+            index,
             found="an empty cell" if empty else f"{table.numbers(names.NOISE, gaps=True)[index]:.15g}",
             expected="one sigma above 0" + (", or [noise] position for the rows without one" if empty else ""),
         )
@@ -300,14 +293,9 @@ def _points(table: Table, number: int) -> Array:
     half = gaps.any(axis=1) & ~gaps.all(axis=1)
     if half.any():
         row = int(np.argmax(half))
-        raise CampaignError(
-            table.file,
-            "a value is missing",
-            row=int(table.rows[row]),
-            column=axes[int(np.argmax(gaps[row]))],
-            found="an empty cell",
-            expected=f"a number, or {axes[0]}, {axes[1]} and {axes[2]} empty where the target was not seen",
-        )
+        expected = f"a number, or {axes[0]}, {axes[1]} and {axes[2]} empty where the target was not seen"
+        column = axes[int(np.argmax(gaps[row]))]
+        raise table.error("a value is missing", column, row, found="an empty cell", expected=expected)
     return found
 
 

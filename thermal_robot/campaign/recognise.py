@@ -17,7 +17,6 @@ from thermal_robot.campaign.names import did_you_mean, listed, nearest, split_na
 from thermal_robot.campaign.table import Cells, Table
 from thermal_robot.campaign.targets import FEWEST
 from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, SI, Units, unit_of
-from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot
 
 _KINDS: tuple[dict[str, float], ...] = (
@@ -300,11 +299,9 @@ def _targets(table: Table, robot: Robot) -> tuple[tuple[int, ...], list[str]]:
         return (), []
     beside = [column for column in names.POSITION if column in table.columns]
     if beside or len(numbers) < FEWEST:
-        raise CampaignError(
-            table.file,
+        raise table.error(
             "a target without a number stands beside those with one" if beside else "too few targets to tell a pose",
-            row=table.header,
-            column=(beside or names.axes_of(numbers[0]))[0],
+            (beside or names.axes_of(numbers[0]))[0],
             found=f"{len(numbers)} with a number" if beside else f"{len(numbers)}",
             expected=f"at least {FEWEST} as x.1 y.1 z.1, x.2 …; or one, as x y z",
         )
@@ -367,13 +364,9 @@ def _refuse_two_meanings(table: Table, robot: Robot) -> None:
             or (quantity in names.PER_JOINT and place in robot.joint_names)
         )
         if column in robot.joint_names and reserved:
-            raise CampaignError(
-                table.file,
-                "this name is both a joint of the chain and a column that the format defines",
-                row=table.header,
-                column=column,
-                expected="a joint of another name; rename it in the URDF and in the table",
-            )
+            problem = "this name is both a joint of the chain and a column that the format defines"
+            remedy = "a joint of another name; rename it in the URDF and in the table"
+            raise table.error(problem, column, expected=remedy)
 
 
 def _require_joints(table: Table, robot: Robot) -> None:
@@ -390,14 +383,8 @@ def _require(table: Table, wanted: Sequence[str], why: str) -> None:
         if name not in table.columns:
             close = nearest(name, spare, cutoff=_PERHAPS_MEANT)
             found = f"the nearest names {listed(close)}" if close else f"the columns {listed(table.columns)}"
-            raise CampaignError(
-                table.file,
-                f"there is no such column; {why}{table.headless}",
-                row=table.header,
-                column=name,
-                found=found,
-                expected=listed(wanted),
-            )
+            problem = f"there is no such column; {why}{table.headless}"
+            raise table.error(problem, name, found=found, expected=listed(wanted))
 
 
 def _whole_group(table: Table, group: Sequence[str]) -> bool:
@@ -405,12 +392,6 @@ def _whole_group(table: Table, group: Sequence[str]) -> bool:
     here = [name for name in group if name in table.columns]
     if here and len(here) < len(group):
         lacking = next(name for name in group if name not in table.columns)
-        raise CampaignError(
-            table.file,
-            "the columns of this group stand together or not at all",
-            row=table.header,
-            column=lacking,
-            found=f"only {listed(here)}",
-            expected=listed(group),
-        )
+        problem = "the columns of this group stand together or not at all"
+        raise table.error(problem, lacking, found=f"only {listed(here)}", expected=listed(group))
     return bool(here)

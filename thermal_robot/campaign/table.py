@@ -65,6 +65,11 @@ class Table:
         """Whether the file has no header, so that its columns are called 1, 2, 3 …."""
         return self.header is None and all(name == str(k) for k, name in enumerate(self.columns, start=1))
 
+    def error(self, problem: str, column: str, index: int | None = None, **told: str) -> CampaignError:
+        """Return an error of a column: in the row of an index from 0, else in the header."""
+        row = self.header if index is None else int(self.rows[index])
+        return CampaignError(self.file, problem, row=row, column=column, **told)
+
     def told(self, chosen: NDArray[np.bool_]) -> str:
         """Say which rows were chosen (N,), a few of them by number: ``3 rows (4, 7, 9)``."""
         return told_rows(self.rows[chosen])
@@ -92,14 +97,8 @@ class Table:
             unfilled = len(values) > 1 and bool(np.isnan(values).all())
             empty = "the column is still to be filled in" if unfilled else "a value is missing"
             finite = "not a finite number" if np.isinf(value) else "larger than anything that is measured"
-            raise CampaignError(
-                self.file,
-                empty if np.isnan(value) else finite,
-                row=int(self.rows[index]),
-                column=column,
-                found=self._as_found(cells[index]),
-                expected="a number",
-            )
+            problem = empty if np.isnan(value) else finite
+            raise self.error(problem, column, index, found=self._as_found(cells[index]), expected="a number")
         return settled(values)
 
     def text(self, column: str) -> list[str]:
@@ -152,14 +151,9 @@ class Table:
         if None in values:
             index = values.index(None)
             mixed = self.decimal_comma and "." in cells[index]
-            raise CampaignError(
-                self.file,
-                "text where a number should be",
-                row=int(self.rows[index]),
-                column=column,
-                found=repr(cells[index]),
-                expected="a number" + (" with a decimal comma, as elsewhere in this file" if mixed else ""),
-            )
+            expected = "a number" + (" with a decimal comma, as elsewhere in this file" if mixed else "")
+            found = repr(cells[index])
+            raise self.error("text where a number should be", column, index, found=found, expected=expected)
         return np.array(values, dtype=np.float64)
 
     def _numbers_or_none(self, cells: Sequence[str]) -> list[float | None]:

@@ -89,9 +89,8 @@ class Column:
         values = self.numbers(table)
         if np.isnan(values).any():
             problem = "a value is missing" + (f", for the column {name!r} of the campaign" if name else "")
-            row, column = int(table.rows[int(np.argmax(np.isnan(values)))]), " + ".join(map(str, self.sources))
-            expected = "a number"
-            raise CampaignError(table.file, problem, row=row, column=column, found="an empty cell", expected=expected)
+            index, column = int(np.argmax(np.isnan(values))), " + ".join(map(str, self.sources))
+            raise table.error(problem, column, index, found="an empty cell", expected="a number")
         return values
 
     def text(self, table: Table) -> list[str]:
@@ -110,14 +109,8 @@ class Column:
             try:
                 instant = datetime.strptime(cell, self.time)
             except ValueError:
-                raise CampaignError(
-                    table.file,
-                    "no instant of this pattern",
-                    row=int(table.rows[k]),
-                    column=name,
-                    found=repr(cell),
-                    expected=repr(self.time),
-                ) from None
+                told = {"found": repr(cell), "expected": repr(self.time)}
+                raise table.error("no instant of this pattern", name, k, **told) from None
             seconds[k] = (instant if instant.tzinfo else instant.replace(tzinfo=timezone.utc)).timestamp()
         return seconds
 
@@ -133,14 +126,9 @@ def found(table: Table, source: str | int) -> str:
     if len(known) == 1:
         return known[0]
     meant = did_you_mean(str(source), names) if isinstance(source, str) else ""
-    raise CampaignError(
-        table.file,
-        f"there is no such column{meant}{table.headless}",
-        row=table.header,
-        column=str(source),
-        found=f"the columns {listed(names)}" if table.header else f"{len(names)} columns without names",
-        expected="a name or a number of one of them",
-    )
+    problem = f"there is no such column{meant}{table.headless}"
+    there = f"the columns {listed(names)}" if table.header else f"{len(names)} columns without names"
+    raise table.error(problem, str(source), found=there, expected="a name or a number of one of them")
 
 
 def _source(value: Any, path: str) -> str | int:
@@ -240,14 +228,9 @@ class Orientation:
 
     def _refuse(self, table: Table, index: int | None, problem: str, figures: NDArray[np.float64]) -> None:
         if index is not None:
-            raise CampaignError(
-                table.file,
-                problem,
-                row=int(table.rows[index]),
-                column=str((self.columns[0].sources or ("orientation",))[0]),
-                found=", ".join(f"{figure:g}" for figure in figures[index]),
-                expected="an orientation",
-            )
+            column = str((self.columns[0].sources or ("orientation",))[0])
+            told = ", ".join(f"{figure:g}" for figure in figures[index])
+            raise table.error(problem, column, index, found=told, expected="an orientation")
 
     @property
     def position(self) -> tuple[Column, ...]:

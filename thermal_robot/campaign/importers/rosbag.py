@@ -296,9 +296,7 @@ def _joints(table: Table, joints: Sequence[str]) -> dict[str, str]:
     columns |= {joint: named[name] for joint, name in series.items() if named[name] in table.columns}
     if columns and len(columns) < len(joints):
         lacking = next(joint for joint in joints if joint not in columns)
-        raise CampaignError(
-            table.file, "a joint of the chain is not recorded", row=table.header, column=lacking, expected="all of them"
-        )
+        raise table.error("a joint of the chain is not recorded", lacking, expected="all of them")
     return columns
 
 

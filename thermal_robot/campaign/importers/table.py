@@ -110,13 +110,8 @@ def joined(measured: Table, commanded: Table, key: str = "") -> tuple[Table, tup
         if name == taken:
             continue
         if name in columns:
-            raise CampaignError(
-                commanded.file,
-                f"has a column that {measured.file} has, too",
-                row=commanded.header,
-                column=name,
-                expected="every column in one of the two tables",
-            )
+            problem = f"has a column that {measured.file} has, too"
+            raise commanded.error(problem, name, expected="every column in one of the two tables")
         columns[name] = cells
     return Table(f"{measured.file} with {commanded.file}", columns, measured.rows, header), notes
 

@@ -195,7 +195,7 @@ def consensus(sample: Readings) -> Placed:
     return best
 
 
-def mixture(struck: Struck, kinds: Sequence[Kind]) -> Struck | None:
+def mixture(struck: Struck) -> Struck | None:
     """Return the rows that fit better mended than as they stand, by the fault beside which all rows fit best so.
 
     For a robot whose own errors are not small beside the fault: no row strays far. Frames are fitted to the rows as
@@ -205,7 +205,7 @@ def mixture(struck: Struck, kinds: Sequence[Kind]) -> Struck | None:
     readings = window(struck.readings)
     rows, every = spread(np.arange(len(readings.q)), settings.RELAXED), np.ones(len(readings.q), dtype=bool)
     own, begun = readings.take(rows), struck.sample.align(coarse=True)
-    proposals = [p for kind in kinds for p in (*kind.proposed(readings), *_numbered(kind, readings))]
+    proposals = [p for kind in KINDS for p in (*kind.proposed(readings), *_numbered(kind, readings))]
     best: list[tuple[float, Proposal, Placed]] = []
     for first in range(0, len(proposals), settings.ABREAST):
         some = proposals[first : first + settings.ABREAST]
@@ -237,22 +237,14 @@ Chosen = list[tuple[Fault, Array, float]]
 
 
 class Screen:
-    """The faults that may have struck some rows, and those of them that are worth a closer look.
+    """The faults that may have struck some rows, and those of them that are worth a closer look."""
 
-    Parameters
-    ----------
-    struck
-        The rows.
-    kinds
-        Of faults to look for.
-    """
-
-    def __init__(self, struck: Struck, kinds: Sequence[Kind]) -> None:
-        self.struck, self.asked, self._kinds = struck, 0, kinds
+    def __init__(self, struck: Struck) -> None:
+        self.struck, self.asked = struck, 0
 
     def singly(self) -> list[Tried]:
         """Return each fault by itself, where the frames are known: distances on a few rows."""
-        parts = [((p,), self.struck.sketch((p,), settings.SKETCHED)) for p in self._proposals(self._kinds)]
+        parts = [((p,), self.struck.sketch((p,), settings.SKETCHED)) for p in self._proposals(KINDS)]
         frames = self.struck.frames
         assert frames is not None
         self.asked += len(parts)
@@ -302,11 +294,11 @@ class Screen:
 
     @cached_property
     def _of_joints(self) -> list[Proposal]:
-        return [*self._proposals([k for k in self._kinds if k not in MEASUREMENT_KINDS])]
+        return [*self._proposals((*JOINT_KINDS, *PAIRING_KINDS))]
 
     @cached_property
     def _measured(self) -> list[Proposal]:
-        return [*self._proposals([k for k in self._kinds if k in MEASUREMENT_KINDS])]
+        return [*self._proposals(MEASUREMENT_KINDS)]
 
     def _reversed(self, joints: int) -> Kind:
         return JOINT_KINDS[0] if joints == 1 else JOINT_KINDS[1]
@@ -411,37 +403,37 @@ def data_fault(campaign: Campaign, progress: Callable[[str], None] = lambda _: N
     apart = every.median > misfit(readings)
     if apart:
         progress("faults of the data")
-    found = mended(every, KINDS) if apart else []
+    found = mended(every) if apart else []
     part = None if found else part_of(readings, consensus(every.sample) if apart else every.sample.align(coarse=True))
     if part is None and apart and not found:
-        part = mixture(every, KINDS)
+        part = mixture(every)
     if part is not None:
         progress("faults of the data in some rows")
-        every, found = part, mended(part, KINDS)
+        every, found = part, mended(part)
     return _told(campaign, every, found) if found else None
 
 
-def mended(struck: Struck, kinds: Sequence[Kind]) -> list[Tried]:
+def mended(struck: Struck) -> list[Tried]:
     """Return the faults that mend the rows and cannot be told apart, in the order of their kinds; none if none does.
 
     Two faults at once are told where they leave so much less than one that it is no chance.
     """
-    screen = Screen(struck, kinds)
+    screen = Screen(struck)
     if struck.frames is not None:
-        return _best(screen, screen.singly(), struck.median, kinds)
+        return _best(screen, screen.singly(), struck.median)
     tried = screen.both_sides()
-    one = _best(screen, [t for t in tried if len(t.fault) == 1], struck.median, kinds)
+    one = _best(screen, [t for t in tried if len(t.fault) == 1], struck.median)
     least, enough = min((t.median for t in one), default=struck.median), misfit(struck.readings)
     if one and least <= enough:
         return one
     pairs = [t for t in tried if len(t.fault) == 2]
-    two = _best(screen, pairs, least, kinds)
+    two = _best(screen, pairs, least)
     if not two or min(t.median for t in two) > enough:
-        two = _best(screen, [*pairs, *screen.two_of_joints()], least, kinds)
+        two = _best(screen, [*pairs, *screen.two_of_joints()], least)
     return two or one
 
 
-def _best(screen: Screen, tried: Sequence[Tried], before: float, kinds: Sequence[Kind]) -> list[Tried]:
+def _best(screen: Screen, tried: Sequence[Tried], before: float) -> list[Tried]:
     """Return the faults that bring the gap, m, down by far, and as far as the best of them."""
     struck = screen.struck
     likely = sorted(tried, key=attrgetter("typical"))[: settings.FULLY]
@@ -455,9 +447,7 @@ def _best(screen: Screen, tried: Sequence[Tried], before: float, kinds: Sequence
         return []
     said = [_log_likelihood(t, scale) * struck.count for t in full]
     alike = [t for t, own in zip(full, said, strict=True) if own > max(said) - settings.TIE]
-    return sorted(
-        (t for t in alike if not any(_says_more(t, other) for other in alike)), key=lambda t: _usual(t, kinds)
-    )
+    return sorted((t for t in alike if not any(_says_more(t, other) for other in alike)), key=_usual)
 
 
 def _says_more(one: Tried, other: Tried) -> bool:
@@ -470,9 +460,9 @@ def _says_more(one: Tried, other: Tried) -> bool:
     )
 
 
-def _usual(tried: Tried, kinds: Sequence[Kind]) -> tuple[int, ...]:
+def _usual(tried: Tried) -> tuple[int, ...]:
     """Order of the kinds, then the fewest joints."""
-    return (*(kinds.index(p.kind) for p in tried.fault), *(len(p.joints) for p in tried.fault))
+    return (*(KINDS.index(p.kind) for p in tried.fault), *(len(p.joints) for p in tried.fault))
 
 
 def _log_likelihood(tried: Tried, scale: float) -> float:
