@@ -94,7 +94,7 @@ class Campaign:
     derived
         Names of those covariates that were not recorded but follow from the order of the rows.
     turned
-        Quantities whose columns were read with the other sign (:mod:`thermal_robot.campaign.campaign`).
+        Quantities whose columns were read with the other sign (:func:`turned_round`).
     labels
         (N,) text for ``"session"``, ``"pose"`` and ``"path"`` where the table has them; ``""`` where a cell is empty.
     simulated_position, simulated_orientation
@@ -306,7 +306,7 @@ class Campaign:
 
     @cached_property
     def relative_noise(self) -> FloatArray | None:
-        """(N, m) one sigma of each figure of a row over that of all rows; see :mod:`thermal_robot.campaign.targets`."""
+        """(N, m) one sigma of each figure of a row over that of all rows; see ``campaign.targets.relative_sigmas``."""
         return relative_sigmas(self.noise_of_rows, self.noise_position, self.targets, self.orientation is not None)
 
     @property

@@ -419,9 +419,7 @@ def _limits(campaign: Campaign) -> Iterator[str]:
 
 
 def _time(campaign: Campaign) -> Iterator[str]:
-    time = campaign.covariates.get("time")
-    if time is None:
-        return
+    time = campaign.covariates.get("time", np.empty(0))
     back = np.diff(time) < 0
     if back.any():
         first = int(np.argmax(back)) + 1
@@ -432,9 +430,7 @@ def _time(campaign: Campaign) -> Iterator[str]:
 
 
 def _speed(campaign: Campaign) -> Iterator[str]:
-    speed = campaign.covariates.get("speed")
-    if speed is None:
-        return
+    speed = campaign.covariates.get("speed", np.empty(0))
     outside = (speed < 0) | (speed > 1)
     if outside.any():
         first = int(np.argmax(outside))
