@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import thermal_robot as tr
-from thermal_robot.campaign.appended import appended
+from thermal_robot.campaign.campaign import appended
 from thermal_robot.errors import CampaignError
 
 

@@ -10,7 +10,8 @@ from campaign.files import put
 from campaign.spoilt import toml_is_refused
 
 from thermal_robot.campaign import Settings, Units, read_campaign
-from thermal_robot.campaign.declaration import Declaration, check_gears, read_declaration
+from thermal_robot.campaign.checked import check_joints
+from thermal_robot.campaign.document import Declaration, read_declaration
 from thermal_robot.errors import CampaignError
 
 # what is replaced, by what, row, column, found, words of the sentence
@@ -119,9 +120,10 @@ def test_every_length_is_in_the_declared_unit(tmp_path: Path, unit: str, metres:
 
 def test_gears_are_of_joints_of_the_chain(tmp_path: Path) -> None:
     found = declared(tmp_path, BARE.format(urdf="r.urdf", unit="mm") + "[gears]\nlift = 101\nshoulder = 50\n")
-    check_gears(found, ("lift", "shoulder"))
+    told = (str(found.file), "gears", found.settings.gears)
+    check_joints(*told, ("lift", "shoulder"), found.gear_rows)
     with pytest.raises(CampaignError, match="no such joint") as caught:
-        check_gears(found, ("lift", "elbow"))
+        check_joints(*told, ("lift", "elbow"), found.gear_rows)
     assert (caught.value.row, caught.value.column) == (10, "gears.shoulder")
 
 

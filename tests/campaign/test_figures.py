@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from thermal_robot.campaign.figures import first_beyond, settled
+from thermal_robot.campaign.checked import first_beyond, settled
 
 
 @pytest.mark.parametrize("figure", [np.nan, np.inf, -np.inf, 1e21, -1e300])

@@ -9,7 +9,7 @@ import pytest
 from campaign.files import ROWS, add, put
 
 from thermal_robot.campaign import read_campaign
-from thermal_robot.campaign.fill import fill
+from thermal_robot.campaign.read import fill
 
 
 @pytest.mark.parametrize(

@@ -8,7 +8,7 @@ import pytest
 
 from thermal_robot.campaign import campaign_from_table
 from thermal_robot.campaign.campaign import Campaign
-from thermal_robot.campaign.headings import bare, headings, joint_columns
+from thermal_robot.campaign.recognise import bare, headings, joint_columns
 from thermal_robot.campaign.units import Units
 from thermal_robot.campaign.write import with_commands
 from thermal_robot.robot import Robot, load_robot

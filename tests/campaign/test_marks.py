@@ -9,8 +9,7 @@ from conftest import load_arm
 from simulate import simulate
 
 from thermal_robot import campaign_from_table, demo_campaign
-from thermal_robot.campaign.marks import copies, doubled, marks
-from thermal_robot.campaign.plausible import doubts
+from thermal_robot.campaign.plausible import copies, doubled, doubts, marks
 
 NAMES = ("rv_m2", "ur5", "panda")
 NO_CLOCK = {"covariates": {}}

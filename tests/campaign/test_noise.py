@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from thermal_robot.campaign.noise import of_a_point, of_all, relative, told_by
-from thermal_robot.campaign.targets import posed
+from thermal_robot.campaign.targets import of_a_point, posed, relative_sigmas, sigma_of_all, told_by
 from thermal_robot.kinematics import exp3
 
 SIGMAS = np.array([1e-5, 5e-5, 7e-5])
@@ -20,25 +19,27 @@ def targets():
 
 
 def test_of_all_rows_it_is_the_root_mean_square_and_of_equal_ones_they_themselves():
-    assert of_all(SIGMAS, None) == (pytest.approx(5e-5), None)
-    assert of_all(np.full(7, 0.1 + 0.2), None) == (0.1 + 0.2, None)
+    assert sigma_of_all(SIGMAS, None) == (pytest.approx(5e-5), None)
+    assert sigma_of_all(np.full(7, 0.1 + 0.2), None) == (0.1 + 0.2, None)
 
 
 @pytest.mark.parametrize("turned", [False, True])
 def test_orientations_have_one_noise_in_all_rows(turned):
-    found = relative(SIGMAS, 5e-5, None, turned)
+    found = relative_sigmas(SIGMAS, 5e-5, None, turned)
     np.testing.assert_allclose(found[:, :3], np.repeat(SIGMAS[:, None] / 5e-5, 3, axis=1))
     np.testing.assert_array_equal(found[:, 3:], np.ones((3, 3 if turned else 0)))
-    assert relative(np.full(3, 5e-5), 5e-5, None, turned) is None
-    assert relative(None, 5e-5, None, turned) is None
+    assert relative_sigmas(np.full(3, 5e-5), 5e-5, None, turned) is None
+    assert relative_sigmas(None, 5e-5, None, turned) is None
 
 
 @pytest.mark.parametrize("sigmas", [None, SIGMAS], ids=["one", "each"])
 def test_several_targets_tell_the_noise_of_every_figure(targets, sigmas):
     """That of a point times what the pose makes of it, whatever stands for all rows."""
-    place, turn = told_by(4e-5, targets) if sigmas is None else of_all(sigmas, targets)
-    found = relative(sigmas, place, targets, True) * np.repeat([place, turn], 3)
+    place, turn = told_by(4e-5, targets) if sigmas is None else sigma_of_all(sigmas, targets)
+    found = relative_sigmas(sigmas, place, targets, True) * np.repeat([place, turn], 3)
     np.testing.assert_allclose(found, targets.spread * np.reshape(4e-5 if sigmas is None else sigmas, (-1, 1)))
     assert of_a_point(told_by(4e-5, targets)[0], targets) == pytest.approx(4e-5)
     # nobody states it: how the figures compare is known all the same
-    np.testing.assert_allclose(relative(None, None, targets, True), targets.spread / np.repeat(targets.typical, 3))
+    np.testing.assert_allclose(
+        relative_sigmas(None, None, targets, True), targets.spread / np.repeat(targets.typical, 3)
+    )

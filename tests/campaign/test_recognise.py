@@ -13,7 +13,7 @@ from campaign.spoilt import read, renamed, table_is_refused, with_column
 
 from thermal_robot.campaign import campaign_from_table, read_campaign
 from thermal_robot.campaign.recognise import recognise
-from thermal_robot.campaign.tabular import read_table
+from thermal_robot.campaign.table import read_table
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import load_robot
 

@@ -3,8 +3,7 @@
 import pytest
 
 from thermal_robot import demo_campaign
-from thermal_robot.campaign import shower as module
-from thermal_robot.campaign.shower import shower, shown_by
+from thermal_robot.campaign.campaign import shower, shown_by
 
 
 class Own:
@@ -31,6 +30,6 @@ def test_the_last_one_that_was_registered_shows_campaigns():
 
 
 def test_nobody_is_an_error(monkeypatch):
-    monkeypatch.setattr(module, "_showers", [])
+    monkeypatch.setattr("thermal_robot.campaign.campaign._showers", [])
     with pytest.raises(RuntimeError, match="nobody can show a campaign"):
         shower()

@@ -13,8 +13,9 @@ from campaign.files import ROWS as WHOLE
 from campaign.files import add, put
 from campaign.spoilt import ROWS, TOML, refusal, renamed, table_is_refused
 
-from thermal_robot.campaign import read_campaign, tabular
-from thermal_robot.campaign.tabular import table_from_frame
+from thermal_robot.campaign import read_campaign
+from thermal_robot.campaign import table as tables
+from thermal_robot.campaign.table import table_from_frame
 from thermal_robot.errors import CampaignError
 
 SEMICOLONS = WHOLE.replace(",", ";").replace("1000", "1000,25")
@@ -62,13 +63,13 @@ def test_labels_keep_their_commas(tmp_path: Path) -> None:
 
 def test_marked_lines_before_the_rows_are_no_rows(tmp_path: Path) -> None:
     (tmp_path / "t.txt").write_text("# x y\n1 2\n3 4\n")
-    table = tabular.read_table(tmp_path / "t.txt", tabular.Layout(header=False))
+    table = tables.read_table(tmp_path / "t.txt", tables.Layout(header=False))
     assert (table.rows.tolist(), table.numbers("2").tolist()) == ([2, 3], [2.0, 4.0])
     (tmp_path / "t.csv").write_text("#,x\n1,2\n3,4\n")
-    assert list(tabular.read_table(tmp_path / "t.csv").columns) == ["#", "x"]
+    assert list(tables.read_table(tmp_path / "t.csv").columns) == ["#", "x"]
     (tmp_path / "t.csv").write_text("# only\n")
     with pytest.raises(CampaignError, match="has a header but no rows"):
-        tabular.read_table(tmp_path / "t.csv")
+        tables.read_table(tmp_path / "t.csv")
 
 
 @pytest.mark.parametrize("ending", ["xlsx", "ods"])
@@ -95,11 +96,11 @@ def test_a_workbook_is_laid_out_as_stated(tmp_path: Path) -> None:
     when = [pd.Timestamp("2020-07-14 16:39:04"), pd.Timestamp("2020-07-14 16:40:00")]
     cells += [["// left out", None, None], [2, when[0], "3,5"], [0.1, when[1], None]]
     pd.DataFrame(cells).to_excel(tmp_path / "t.xlsx", header=False, index=False)
-    table = tabular.read_table(tmp_path / "t.xlsx", tabular.Layout(skip=1, comment="//"))
+    table = tables.read_table(tmp_path / "t.xlsx", tables.Layout(skip=1, comment="//"))
     assert (table.header, table.rows.tolist()) == (3, [4, 6, 7])
     np.testing.assert_array_equal(table.numbers("b", gaps=True), [2.5, 3.5, np.nan])
     assert table.text("when") == ["# no", *map(str, when)]
-    numbered = tabular.read_table(tmp_path / "t.xlsx", tabular.Layout(skip=3, header=False, comment="//"))
+    numbered = tables.read_table(tmp_path / "t.xlsx", tables.Layout(skip=3, header=False, comment="//"))
     assert (list(numbered.columns), numbered.rows.tolist()) == (["1", "2", "3"], [4, 6, 7])
 
 
@@ -324,7 +325,7 @@ def test_a_hostile_table_is_refused(tmp_path: Path, kind: str) -> None:
 def test_a_table_that_is_too_large_is_refused_before_it_is_read(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(tabular, "MOST_CELLS", 18)
+    monkeypatch.setattr(tables, "MOST_CELLS", 18)
     assert "has more cells than can be read" in str(refusal(tmp_path))
-    monkeypatch.setattr(tabular, "LARGEST_TABLE", len(ROWS) - 1)
+    monkeypatch.setattr(tables, "LARGEST_TABLE", len(ROWS) - 1)
     assert "is larger than any table" in str(refusal(tmp_path))

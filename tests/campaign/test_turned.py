@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from thermal_robot import demo_campaign
+from thermal_robot.campaign.campaign import read_alike, turned_round
 from thermal_robot.campaign.settings import Settings
-from thermal_robot.campaign.turned import read_alike, turned_round
 
 
 @pytest.mark.parametrize("quantity", ["approach", "temperature", "torque", "gravity"])

@@ -6,7 +6,7 @@ from commanded import refused
 
 from thermal_robot import cli
 from thermal_robot.campaign import read_campaign
-from thermal_robot.campaign.importers.formats import FORMATS
+from thermal_robot.campaign.importers.run import FORMATS
 
 TABLE = "turn,lift,slide,roll,x,y,z\n0.1,0.2,0.03,0.4,1,2,3\n-0.1,0.3,0.06,3.5,4,5,6\n0.5,-0.4,0.09,-0.4,7,8,9\n"
 MAPPING = '[robot]\nurdf = "robot.urdf"\ntool_frame = "hand"\n[measurements]\nangle_unit = "deg"\nlength_unit = "mm"\n'

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from clouds import cell
 
-from thermal_robot.campaign.validate import arrived
+from thermal_robot.campaign.read import arrived
 from thermal_robot.iso9283.groups import directions, repeats, times
 
 

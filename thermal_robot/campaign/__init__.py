@@ -1,13 +1,11 @@
 """The only room that knows files, units and tables."""
 
-import thermal_robot.campaign.shown as shown
-from thermal_robot.campaign.campaign import Campaign
+import thermal_robot.campaign.write as shown
+from thermal_robot.campaign.campaign import Campaign, shown_by
 from thermal_robot.campaign.describe import describe
-from thermal_robot.campaign.from_table import campaign_from_table
-from thermal_robot.campaign.read import read_campaign, read_samples
+from thermal_robot.campaign.read import campaign_from_table, read_campaign, read_samples
 from thermal_robot.campaign.settings import Settings
-from thermal_robot.campaign.shower import shown_by
-from thermal_robot.campaign.tabular import read_table
+from thermal_robot.campaign.table import read_table
 from thermal_robot.campaign.units import Units, unit_of
 from thermal_robot.campaign.write import (
     with_commands,

@@ -3,15 +3,14 @@
 from __future__ import annotations
 
 import dataclasses
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import TYPE_CHECKING, Any, TypeAlias
+from typing import TYPE_CHECKING, Any, Protocol, TypeAlias
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from thermal_robot.campaign import noise
 from thermal_robot.campaign.checked import (
     check_covariate,
     check_joints,
@@ -24,15 +23,40 @@ from thermal_robot.campaign.checked import (
     checked_sizes,
 )
 from thermal_robot.campaign.settings import MOVES, STANDARD_TEMPERATURE, Settings, as_vector
-from thermal_robot.campaign.shower import shower
-from thermal_robot.campaign.targets import Targets
+from thermal_robot.campaign.targets import Targets, relative_sigmas, sigma_of_all
 from thermal_robot.campaign.turning import clock_of, since_turns
 from thermal_robot.campaign.units import Units
 from thermal_robot.errors import CampaignError
-from thermal_robot.robot import Robot
+from thermal_robot.robot import Robot, load_robot
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+class Shower(Protocol):
+    """Who shows a campaign to pandas and to a notebook."""
+
+    def frame(self, campaign: Any, /) -> pd.DataFrame:
+        """Return its table, in the units of the file."""
+
+    def html(self, campaign: Any, /) -> str:
+        """Return what is said of it."""
+
+
+_showers: list[Shower] = []
+
+
+def shown_by(new: Shower) -> None:
+    """Register who shows every campaign from now on."""
+    _showers[:] = [new]
+
+
+def shower() -> Shower:
+    """Return who shows campaigns."""
+    if not _showers:
+        raise RuntimeError("nobody can show a campaign: import thermal_robot.campaign, or call shown_by")
+    return _showers[0]
+
 
 FloatArray: TypeAlias = NDArray[np.float64]
 IntArray: TypeAlias = NDArray[np.int64]
@@ -70,7 +94,7 @@ class Campaign:
     derived
         Names of those covariates that were not recorded but follow from the order of the rows.
     turned
-        Quantities whose columns were read with the other sign (:mod:`thermal_robot.campaign.turned`).
+        Quantities whose columns were read with the other sign (:func:`turned_round`).
     labels
         (N,) text for ``"session"``, ``"pose"`` and ``"path"`` where the table has them; ``""`` where a cell is empty.
     simulated_position, simulated_orientation
@@ -202,7 +226,7 @@ class Campaign:
         sigmas = checked_sigmas(file, "noise_of_rows", self.noise_of_rows, samples)
         object.__setattr__(self, "noise_of_rows", sigmas)
         if self.noise_position is None and samples:
-            place, turn = noise.of_all(sigmas, self.targets)
+            place, turn = sigma_of_all(sigmas, self.targets)
             object.__setattr__(self, "noise_position", place)
             object.__setattr__(self, "noise_orientation", turn or self.noise_orientation)
 
@@ -282,8 +306,8 @@ class Campaign:
 
     @cached_property
     def relative_noise(self) -> FloatArray | None:
-        """(N, m) one sigma of each figure of a row over that of all rows; see :mod:`thermal_robot.campaign.noise`."""
-        return noise.relative(self.noise_of_rows, self.noise_position, self.targets, self.orientation is not None)
+        """(N, m) one sigma of each figure of a row over that of all rows; see ``campaign.targets.relative_sigmas``."""
+        return relative_sigmas(self.noise_of_rows, self.noise_position, self.targets, self.orientation is not None)
 
     @property
     def clock(self) -> FloatArray | None:
@@ -316,24 +340,12 @@ class Campaign:
     @property
     def settings(self) -> Settings:
         """What is not in the table; the chain's root and gravity as the robot has them."""
-        return Settings(
-            urdf=self.urdf,
-            tool_frame=self.robot.tool_frame,
-            root_frame=self.robot.root_frame,
-            gravity=as_vector(self.robot.gravity),
-            moves=self.moves,
-            reference_temperature=self.reference_temperature,
-            units=self.units,
-            base_known=self.base_known,
-            tool_known=self.tool_known,
-            target=as_vector(self.target),
-            noise_position=self.noise_position,
-            noise_orientation=self.noise_orientation,
-            payload_com=as_vector(self.payload_com),
-            priors=dict(self.priors),
-            gears=dict(self.gears),
-            turned=self.turned,
-        )
+        alike = ("urdf", "moves", "reference_temperature", "units", "base_known", "tool_known", "turned")
+        own: dict[str, Any] = {key: getattr(self, key) for key in (*alike, "noise_position", "noise_orientation")}
+        own |= {key: as_vector(getattr(self, key)) for key in ("target", "payload_com")}
+        own |= {key: dict(getattr(self, key)) for key in ("priors", "gears")}
+        own |= {key: getattr(self.robot, key) for key in ("tool_frame", "root_frame")}
+        return Settings(**own, gravity=as_vector(self.robot.gravity))
 
     def take(self, rows: ArrayLike) -> Campaign:
         """Return the campaign of some of the rows, without validating again.
@@ -398,3 +410,110 @@ def _read_only(array: NDArray[Any]) -> NDArray[Any]:
     if array.base is None:
         array.flags.writeable = False
     return array
+
+
+GRAVITY = "gravity"
+"""The quantity that no column holds: the robot has it."""
+
+
+def turned_round(campaign: Campaign, quantity: str) -> Campaign:
+    """Return a campaign that reads a quantity with the other sign.
+
+    Parameters
+    ----------
+    campaign
+        Any; its arrays stay as they are.
+    quantity
+        ``torque`` or ``approach``, whose columns of all joints change their sign; ``temperature``, whose differences
+        from ``reference_temperature`` do; ``gravity``, of the robot.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> campaign = tr.demo_campaign()
+    >>> other = turned_round(campaign, "approach")
+    >>> other.turned, bool((other.covariates["approach.joint_1"] == -campaign.covariates["approach.joint_1"]).all())
+    (('approach',), True)
+    """
+    if quantity == GRAVITY:
+        robot = campaign.robot
+        up = load_robot(robot.urdf, robot.tool_frame, root_frame=robot.root_frame, gravity=-robot.gravity)
+        return replace(campaign, robot=up)
+    about = 2.0 * campaign.reference_temperature if quantity == "temperature" else 0.0
+    own = {name: about - values for name, values in campaign.covariates.items() if name.split(".")[0] == quantity}
+    names = {*campaign.turned} ^ {quantity}
+    return replace(campaign, covariates={**campaign.covariates, **own}, turned=tuple(sorted(names)))
+
+
+def read_alike(campaign: Campaign, robot: Robot, turned: Iterable[str]) -> Campaign:
+    """Return a campaign of a robot that reads the same quantities with the other sign as another one does."""
+    for quantity in {*campaign.turned} ^ {*turned}:
+        campaign = turned_round(campaign, quantity)
+    return campaign if (campaign.robot.gravity == robot.gravity).all() else replace(campaign, robot=robot)
+
+
+def appended(campaigns: Sequence[Campaign]) -> Campaign:
+    """Return the rows of several campaigns of one robot as one campaign, with the declarations of the first.
+
+    Parameters
+    ----------
+    campaigns
+        At least one; of the same joints. What is measured must be the same in all; covariates and labels that not
+        all have are left out.
+
+    Returns
+    -------
+    Campaign
+        Each row keeps its number, its side of approach, and how far its joints had gone since they last turned: of the
+        move from one campaign to the next nothing is known.
+
+    Raises
+    ------
+    CampaignError
+        If one has columns of measurements that another has not, or several targets of each pose, whose places on the
+        tool are found from all rows together.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import thermal_robot as tr
+    >>> from thermal_robot.campaign.campaign import appended
+    >>> campaign = tr.demo_campaign()
+    >>> both = appended([campaign.take(np.arange(100)), campaign.take(np.arange(100, 120))])
+    >>> both.samples, bool((both.q == campaign.q).all())
+    (120, True)
+    """
+    first = campaigns[0]
+    if len(campaigns) == 1:
+        return first
+    changes: dict[str, Any] = {}
+    for key in _PER_SAMPLE:
+        values = [getattr(one, key) for one in campaigns]
+        held = [value is not None for value in values]
+        if any(held) and not all(held):
+            expected = f"the same columns as in {first.name}"
+            raise CampaignError(campaigns[held.index(not held[0])].name, f"differs in {key}", expected=expected)
+        if held[0]:
+            changes[key] = np.concatenate(values)
+    if any(one.targets is not None for one in campaigns):
+        raise CampaignError(first.name, "has several targets of each pose: rows of another file cannot be put to them")
+    for key in ("covariates", "labels"):
+        changes[key] = _joined([getattr(one, key) for one in campaigns])
+    changes["missing"] = _missing(campaigns, changes["covariates"])
+    changes["travelled"] = _joined([one.since_turn for one in campaigns])
+    names = changes["covariates"]
+    changes["extra"] = tuple(name for name in first.extra if name in names)
+    changes["derived"] = tuple(name for name in first.derived if name in names)
+    return replace(first, **changes)
+
+
+def _joined(by_name: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    names = [name for name in by_name[0] if all(name in other for other in by_name)]
+    return {name: np.concatenate([own[name] for own in by_name]) for name in names}
+
+
+def _missing(campaigns: Sequence[Campaign], covariates: Mapping[str, Any]) -> dict[str, Any]:
+    """Return which cells were filled in, of the columns where any was."""
+    names = dict.fromkeys(name for one in campaigns for name in one.missing if name in covariates)
+    none = {id(one): np.zeros(one.samples, dtype=bool) for one in campaigns}
+    return {name: np.concatenate([one.missing.get(name, none[id(one)]) for one in campaigns]) for name in names}

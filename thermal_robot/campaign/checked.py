@@ -1,4 +1,4 @@
-"""What a program hands to the constructor of a campaign, as arrays and numbers that can be computed with."""
+"""What a program makes a campaign of: arrays and numbers that can be computed with, none too large or too small."""
 
 from __future__ import annotations
 
@@ -8,11 +8,38 @@ from typing import Any, TypeAlias
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.campaign.figures import LARGEST_COMMAND, SMALLEST, first_beyond, no_orientation, settled
 from thermal_robot.campaign.names import did_you_mean, listed, split_name
 from thermal_robot.campaign.settings import ABSOLUTE_ZERO
 from thermal_robot.errors import CampaignError
 from thermal_robot.schema import LARGEST
+
+SMALLEST = 1e-30
+"""In any unit: what is nearer to 0 is 0; a picometre in metres is 1e-12."""
+QUATERNION_TOLERANCE = 0.1
+"""A quaternion whose length differs from 1 by more is a mistake, not a rounding: four parts that are written with one
+decimal change the length by at most 0.05 · √4."""
+LARGEST_COMMAND = 1e6
+"""rad or m: 160 000 turns, which leave ten digits for the angle."""
+
+
+def first_beyond(values: NDArray[np.float64], most: float = LARGEST) -> int | None:
+    """Return the row of the first figure that is not finite or too large, of (N,) or (N, k); ``None`` without one."""
+    beyond = ~(np.abs(values) <= most)
+    rows = beyond if values.ndim == 1 else beyond.any(axis=1)
+    return int(np.argmax(rows)) if rows.any() else None
+
+
+def settled(values: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return the figures with those that are next to nothing as 0; the array itself where there are none."""
+    vanishing = (np.abs(values) < SMALLEST) & (values != 0.0)
+    return np.where(vanishing, 0.0, values) if vanishing.any() else values
+
+
+def no_orientation(quaternions: NDArray[np.float64]) -> int | None:
+    """Return the row of the first quaternion, of (N, 4), whose length is not 1; ``None`` without one."""
+    refused = np.abs(np.linalg.norm(quaternions, axis=1) - 1.0) > QUATERNION_TOLERANCE
+    return int(np.argmax(refused)) if refused.any() else None
+
 
 Rows: TypeAlias = "NDArray[np.int64]"
 
@@ -66,13 +93,7 @@ def checked_array(file: str, key: str, value: Any, shape: tuple[int, ...], kind:
 
 
 def check_quaternions(file: str, key: str, quaternions: NDArray[np.float64], rows: Rows | None = None) -> None:
-    """Refuse (N, 4) quaternions of which one is no orientation.
-
-    Raises
-    ------
-    CampaignError
-        Naming the first: by its number of (N,) ``rows``, else by its index.
-    """
+    """Refuse (N, 4) quaternions of which one is no orientation, naming its number of (N,) ``rows``, or its index."""
     index = no_orientation(quaternions)
     if index is not None:
         four = ", ".join(f"{part:g}" for part in quaternions[index])
@@ -82,13 +103,7 @@ def check_quaternions(file: str, key: str, quaternions: NDArray[np.float64], row
 
 
 def check_covariate(file: str, name: str, values: NDArray[np.float64], rows: Rows | None = None) -> None:
-    """Refuse (N,) numbers that cannot be what their name says; NaN passes.
-
-    Raises
-    ------
-    CampaignError
-        Naming the first: by its number of (N,) ``rows``, else by its index.
-    """
+    """Refuse (N,) numbers that cannot be what their name says, naming the number of (N,) ``rows``, or the index."""
     quantity, place = split_name(name)
     if quantity == "approach" and place:
         refused, expected = ~np.isin(values, (-1.0, 0.0, 1.0)) & ~np.isnan(values), "-1, 0 or 1"
@@ -109,28 +124,19 @@ def _at(found: str, index: int, rows: Rows | None) -> dict[str, Any]:
     return {"found": f"{found} at index {index}"} if rows is None else {"found": found, "row": int(rows[index])}
 
 
-def check_joints(file: str, key: str, named: Iterable[str], joints: tuple[str, ...]) -> None:
-    """Refuse what is stated of a joint that the chain does not have.
-
-    Raises
-    ------
-    CampaignError
-        Naming it, and the nearest joint of the chain.
-    """
+def check_joints(
+    file: str, key: str, named: Iterable[str], joints: tuple[str, ...], lines: Mapping[str, int | None] | None = None
+) -> None:
+    """Refuse what is stated of a joint that the chain does not have, with its line; name the nearest joint."""
     for joint in named:
         if joint not in joints:
             problem = f"the chain has no such joint{did_you_mean(joint, joints)}"
-            raise CampaignError(file, problem, column=f"{key}.{joint}", expected=f"one of {listed(joints)}")
+            row, expected = (lines or {}).get(joint), f"one of {listed(joints)}"
+            raise CampaignError(file, problem, row=row, column=f"{key}.{joint}", expected=expected)
 
 
 def checked_number(file: str, key: str, value: Any, *, least: float = -LARGEST, expected: str = "a number") -> float:
-    """Return a finite number, at least ``least``.
-
-    Raises
-    ------
-    CampaignError
-        Anything else.
-    """
+    """Return a finite number, at least ``least``; refuse anything else."""
     if isinstance(value, (int, float, np.integer, np.floating)) and type(value) is not bool:
         if least <= value <= LARGEST:
             return float(value)
@@ -145,13 +151,7 @@ def checked_noise(file: str, key: str, sigma: Any) -> float | None:
 
 
 def checked_sigmas(file: str, key: str, sigmas: Any, samples: int) -> NDArray[np.float64]:
-    """Return (N,) standard deviations, read-only.
-
-    Raises
-    ------
-    CampaignError
-        Another shape, or one that is not above 0: naming the first.
-    """
+    """Return (N,) standard deviations, read-only; refuse one that is not above 0."""
     values = checked_array(file, key, sigmas, (samples,), np.float64)
     refused = values < SMALLEST
     if refused.any():
@@ -169,13 +169,7 @@ def checked_sizes(file: str, key: str, sizes: Any) -> dict[str, float]:
 
 
 def checked_mapping(file: str, key: str, given: Any) -> Mapping[str, Any]:
-    """Return what is given by names.
-
-    Raises
-    ------
-    CampaignError
-        Something else than a mapping, or keys that are no text.
-    """
+    """Return what is given by names; refuse anything else than a mapping whose keys are text."""
     if isinstance(given, Mapping) and all(isinstance(name, str) for name in given):
         return given
     raise CampaignError(

@@ -10,9 +10,9 @@ from numpy.typing import NDArray
 from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.names import split_name
-from thermal_robot.campaign.noise import of_a_point
+from thermal_robot.campaign.read import SAME_CONFIGURATION
+from thermal_robot.campaign.targets import of_a_point
 from thermal_robot.campaign.units import covariate_scale, unit_of
-from thermal_robot.campaign.validate import SAME_CONFIGURATION
 from thermal_robot.errors import require
 from thermal_robot.percents import percent
 from thermal_robot.tables import html_table

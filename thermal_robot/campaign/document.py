@@ -1,15 +1,16 @@
-"""A TOML file with its lines: every key known, every value of its kind, nothing ignored in silence."""
+"""Documents: campaign.toml with its lines, each key of its kind, and what it declares; YAML of other programs."""
 
 from __future__ import annotations
 
 import re
 import sys
 from collections.abc import Mapping
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from thermal_robot.campaign.figures import SMALLEST
-from thermal_robot.campaign.names import did_you_mean
+from thermal_robot.campaign.checked import SMALLEST
+from thermal_robot.campaign.names import did_you_mean, listed
 from thermal_robot.campaign.settings import (
     ANGLE_UNIT,
     GEARS,
@@ -20,8 +21,10 @@ from thermal_robot.campaign.settings import (
     TEMPERATURE,
     VECTOR,
     WORD,
+    Settings,
 )
 from thermal_robot.errors import CampaignError
+from thermal_robot.files import is_file, is_folder
 from thermal_robot.schema import Kind, MisfitError, record, shown, text, word
 
 if sys.version_info >= (3, 11):
@@ -126,36 +129,26 @@ class Document:
                 return number
         return None
 
+    def _error(self, problem: str, section: str, key: str = "", column: str = "", **told: str) -> CampaignError:
+        """Return an error of a section or of its key, with the line."""
+        column = column or (f"{section}.{key}" if key else section)
+        return CampaignError(self.file, problem, row=self.row(section, key), column=column, **told)
+
     def _refuse_unknown(self) -> None:
         for section, content in self.data.items():
             if section not in self.kinds:
-                raise CampaignError(
-                    self.file,
-                    f"unknown section or key{did_you_mean(section, self.kinds)}",
-                    row=self.row(section),
-                    column=section,
-                    expected=f"one of the sections {', '.join(self.kinds)}",
-                )
+                expected = f"one of the sections {', '.join(self.kinds)}"
+                problem = f"unknown section or key{did_you_mean(section, self.kinds)}"
+                raise self._error(problem, section, expected=expected)
             if not isinstance(content, dict):
-                raise CampaignError(
-                    self.file,
-                    "wrong kind of value",
-                    row=self.row(section),
-                    column=section,
-                    found=shown(content),
-                    expected=f"a section [{section}]",
-                )
+                found, expected = shown(content), f"a section [{section}]"
+                raise self._error("wrong kind of value", section, found=found, expected=expected)
             kind = self.kinds[section]
             known = kind if isinstance(kind, Mapping) else dict.fromkeys(content)
             for key in content:
                 if key not in known:
-                    raise CampaignError(
-                        self.file,
-                        f"unknown key{did_you_mean(key, known)}",
-                        row=self.row(section, key),
-                        column=f"{section}.{key}",
-                        expected=f"one of {', '.join(known)}" if len(known) > 1 else next(iter(known)),
-                    )
+                    expected = f"one of {', '.join(known)}" if len(known) > 1 else next(iter(known))
+                    raise self._error(f"unknown key{did_you_mean(key, known)}", section, key, expected=expected)
 
     def _fitted(self, section: str, content: Any) -> dict[str, Any]:
         """Return the values of a section; what is not of its kind is told with its line."""
@@ -165,24 +158,13 @@ class Document:
             values: dict[str, Any] = kind(content, section)
         except MisfitError as error:
             key = re.split(r"[.\[]", error.path.removeprefix(f"{section}."))[0]
-            raise CampaignError(
-                self.file,
-                error.problem or "wrong kind of value",
-                row=self.row(section, key) or self.row(section),
-                column=error.path,
-                found=shown(error.value),
-                expected=error.expected,
-            ) from None
+            key = key if self.row(section, key) else ""
+            problem, found = error.problem or "wrong kind of value", shown(error.value)
+            raise self._error(problem, section, key, error.path, found=found, expected=error.expected) from None
         return values
 
     def required(self, section: str, key: str) -> Any:
-        """Return a value that must be stated.
-
-        Raises
-        ------
-        CampaignError
-            It is not.
-        """
+        """Return a value that must be stated."""
         if key in self.sections.get(section, {}):
             return self.sections[section][key]
         known = self.kinds[section]
@@ -190,10 +172,115 @@ class Document:
             expected = str(known[key](None, key)) if isinstance(known, Mapping) else ""
         except MisfitError as error:
             expected = error.expected
-        raise CampaignError(
-            self.file,
-            "is missing",
-            row=self.row(section) if section in self.data else None,
-            column=f"{section}.{key}",
-            expected=f"{expected} under [{section}]",
-        )
+        raise self._error("is missing", section, column=f"{section}.{key}", expected=f"{expected} under [{section}]")
+
+
+FILE_NAME = "campaign.toml"
+_MOST_NAMED = 5  # campaigns of a folder in one sentence
+
+
+@dataclass(frozen=True)
+class Declaration:
+    """What campaign.toml says."""
+
+    file: Path  # path of the file as the user gave it
+    table: Path  # path of the table
+    settings: Settings  # all the rest, SI
+    # line of each key of ``[gears]``, for a message once the robot's joints are known
+    gear_rows: Mapping[str, int | None]
+    folder: Path  # against which its paths are resolved
+    # path of the calibration that a robot of Universal Robots brings along; ``None`` without one
+    kinematics: Path | None = None
+
+    @property
+    def robot(self) -> str | Path:
+        """What :func:`thermal_robot.robot.load_robot` wants: a reference to a known robot, or a path."""
+        urdf = self.settings.urdf
+        return urdf if urdf.startswith(("example-robot-data:", "builtin:")) else self.folder / urdf
+
+
+def read_declaration(path: Path, folder: Path | None = None) -> Declaration:
+    """Read campaign.toml.
+
+    Parameters
+    ----------
+    path
+        The file, or the directory that holds it.
+    folder
+        Against which its paths are resolved; its own where absent.
+
+    Raises
+    ------
+    CampaignError
+        No such file, a syntax error, a section or key that is unknown or missing, a value of the wrong kind.
+    """
+    file = path / FILE_NAME if is_folder(path) else path
+    if not is_file(file):
+        raise _absent(path)
+    document = Document(file)
+    for key in ("angle_unit", "length_unit"):
+        document.required("measurements", key)
+    robot = document.sections.get("robot", {})
+    ends = {key: robot.get(key) for key in ("root_frame", "gravity")}
+    named = {key: document.required("robot", key) for key in ("urdf", "tool_frame")}
+    settings = Settings.stated(document.sections, **named, **ends)
+    folder = file.parent if folder is None else folder
+    table = folder / document.required("measurements", "file")
+    rows = {joint: document.row("gears", joint) for joint in settings.gears}
+    kinematics = robot.get("kinematics")
+    return Declaration(file, table, settings, rows, folder, folder / kinematics if kinematics else None)
+
+
+def _absent(path: Path) -> CampaignError:
+    """Say that there is no campaign, and which there are beside it."""
+    problem = f"this folder has no {FILE_NAME}" if is_folder(path) else "there is no such file"
+    found = _campaigns(path if is_folder(path) else path.parent)
+    beside = f"; campaigns there: {listed(found, _MOST_NAMED)}" if found else ""
+    return CampaignError(str(path), problem + beside, expected=f"{FILE_NAME}, or the folder that holds it")
+
+
+def _campaigns(folder: Path) -> list[str]:
+    """Return the names of campaigns in a folder: files that have their section, folders that have their file."""
+    try:
+        inside = sorted(folder.iterdir())
+        files = [f for f in inside if f.suffix == ".toml" and f.is_file() and b"[measurements]" in f.read_bytes()]
+        folders = [f for f in inside if f.is_dir() and (f / FILE_NAME).is_file()]
+    except (OSError, ValueError):  # nothing can be proposed where nothing can be read
+        return []
+    return [f.name for f in (*files, *folders)]
+
+
+_LARGEST_YAML = 64 << 20
+"""Bytes: ten thousand samples of a calibration as text; it takes a minute to read them."""
+WITH_YAML = 'pip install "thermal-robot[yaml]"'
+
+
+def is_yaml(file: Path) -> bool:
+    """Return whether a file is YAML by its name."""
+    return file.suffix.lower() in (".yaml", ".yml")
+
+
+def read_yaml(file: Path) -> list[Any]:
+    """Return the documents of a YAML file, of plain values alone; the empty ones are left out."""
+    try:
+        import yaml
+    except ImportError as error:
+        raise CampaignError(str(file), "YAML files need PyYAML, which is not installed", expected=WITH_YAML) from error
+    if not is_file(file):
+        problem = "is a directory" if is_folder(file) else "there is no such file"
+        raise CampaignError(str(file), problem, expected="a YAML file")
+    if file.stat().st_size > _LARGEST_YAML:
+        raise CampaignError(str(file), "is larger than can be read", expected=f"at most {_LARGEST_YAML >> 20} MiB")
+    try:
+        loader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+        documents = list(yaml.load_all(file.read_text(encoding="utf-8-sig"), Loader=loader))
+    except OSError as error:
+        raise CampaignError(str(file), f"cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError as error:
+        raise CampaignError(str(file), "is not UTF-8 text", expected="a YAML file") from error
+    except (yaml.YAMLError, ValueError, RecursionError) as error:
+        mark = getattr(error, "problem_mark", None)
+        row = None if mark is None else mark.line + 1
+        reason = getattr(error, "problem", None) or str(error)
+        raise CampaignError(str(file), f"not valid YAML: {reason}", row=row) from error
+    return [document for document in documents if document is not None]

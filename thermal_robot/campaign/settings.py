@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field, fields
 from typing import Any, TypeAlias
-
-import numpy as np
 
 from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, SI, Units
 from thermal_robot.robot import STRONGEST_GRAVITY
@@ -108,37 +106,15 @@ class Settings:
 
     def to_dict(self) -> dict[str, Any]:
         """Return a dict of strings, numbers, booleans, lists and dicts only, ready for JSON; lengths in m."""
-        return {
-            "urdf": self.urdf,
-            "tool_frame": self.tool_frame,
-            "root_frame": self.root_frame,
-            "gravity": None if self.gravity is None else list(self.gravity),
-            "moves": self.moves,
-            "reference_temperature": self.reference_temperature,
-            "units": {"angle": self.units.angle, "length": self.units.length},
-            "base_known": self.base_known,
-            "tool_known": self.tool_known,
-            "target": list(self.target),
-            "noise_position": self.noise_position,
-            "noise_orientation": self.noise_orientation,
-            "payload_com": list(self.payload_com),
-            "priors": dict(self.priors),
-            "gears": dict(self.gears),
-            **({"turned": list(self.turned)} if self.turned else {}),
-        }
+        own = {each.name: getattr(self, each.name) for each in fields(self)}
+        own |= {"units": asdict(self.units), "priors": dict(self.priors), "gears": dict(self.gears)}
+        plain = {key: list(value) if isinstance(value, tuple) else value for key, value in own.items()}
+        return plain if self.turned else {key: value for key, value in plain.items() if key != "turned"}
 
     def of_rows(self) -> dict[str, Any]:
         """Return the fields of a :class:`~thermal_robot.Campaign` that say how its rows are meant, by name."""
-        return {
-            "base_known": self.base_known,
-            "tool_known": self.tool_known,
-            "target": np.array(self.target),
-            "payload_com": np.array(self.payload_com),
-            "moves": self.moves,
-            "reference_temperature": self.reference_temperature,
-            "gears": self.gears,
-            "units": self.units,
-        }
+        once = ("moves", "reference_temperature", "gears", "units")
+        return {key: getattr(self, key) for key in ("base_known", "tool_known", "target", "payload_com", *once)}
 
     @classmethod
     def stated(cls, sections: Mapping[str, Mapping[str, Any]], **ends: Any) -> Settings:

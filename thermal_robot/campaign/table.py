@@ -1,19 +1,30 @@
-"""A table as text or numbers, with its row numbers; knows nothing of robots or of what columns mean."""
+"""A table as text or numbers, with its row numbers; and how CSV, Parquet, spreadsheets and data frames become one.
+
+It knows nothing of robots or of what columns mean.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+import codecs
+import csv
+import re
+from collections import Counter
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any, TypeAlias
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, TextIO, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.campaign.figures import first_beyond, settled
+from thermal_robot.campaign.checked import first_beyond, settled
+from thermal_robot.campaign.names import LABELS
 from thermal_robot.errors import CampaignError
+from thermal_robot.files import is_file, is_folder
 
 if TYPE_CHECKING:
     import pandas as pd
+
 
 Cells: TypeAlias = "Sequence[str] | NDArray[np.float64]"
 """A column: text as it stands in the file, or numbers where the source has a type of its own."""
@@ -35,30 +46,14 @@ def without_names(header: Iterable[str], file: str) -> str:
 
 @dataclass(frozen=True)
 class Table:
-    """Columns of equal length with the row number of each entry.
+    """Columns of equal length with the row number of each entry."""
 
-    Attributes
-    ----------
-    file
-        Name of the file as the user gave it, for messages.
-    columns
-        Cells by name, names stripped of blanks.
-    rows
-        (N,) row numbers: as a text editor counts them, or the integer index of a data frame.
-    header
-        Row number of the header, ``None`` for a data frame.
-    decimal_comma
-        Numbers are written 1,5.
-    warnings
-        What was odd about the file.
-    """
-
-    file: str
-    columns: Mapping[str, Cells]
-    rows: NDArray[np.int64]
-    header: int | None = None
-    decimal_comma: bool = False
-    warnings: tuple[str, ...] = ()
+    file: str  # name of the file as the user gave it, for messages
+    columns: Mapping[str, Cells]  # cells by name, names stripped of blanks
+    rows: NDArray[np.int64]  # (N,) row numbers: as a text editor counts them, or the integer index of a data frame
+    header: int | None = None  # row number of the header, ``None`` for a data frame
+    decimal_comma: bool = False  # numbers are written 1,5
+    warnings: tuple[str, ...] = ()  # what was odd about the file
 
     @property
     def headless(self) -> str:
@@ -69,6 +64,11 @@ class Table:
     def unnamed(self) -> bool:
         """Whether the file has no header, so that its columns are called 1, 2, 3 …."""
         return self.header is None and all(name == str(k) for k, name in enumerate(self.columns, start=1))
+
+    def error(self, problem: str, column: str, index: int | None = None, **told: str) -> CampaignError:
+        """Return an error of a column: in the row of an index from 0, else in the header."""
+        row = self.header if index is None else int(self.rows[index])
+        return CampaignError(self.file, problem, row=row, column=column, **told)
 
     def told(self, chosen: NDArray[np.bool_]) -> str:
         """Say which rows were chosen (N,), a few of them by number: ``3 rows (4, 7, 9)``."""
@@ -97,14 +97,8 @@ class Table:
             unfilled = len(values) > 1 and bool(np.isnan(values).all())
             empty = "the column is still to be filled in" if unfilled else "a value is missing"
             finite = "not a finite number" if np.isinf(value) else "larger than anything that is measured"
-            raise CampaignError(
-                self.file,
-                empty if np.isnan(value) else finite,
-                row=int(self.rows[index]),
-                column=column,
-                found=self._as_found(cells[index]),
-                expected="a number",
-            )
+            problem = empty if np.isnan(value) else finite
+            raise self.error(problem, column, index, found=self._as_found(cells[index]), expected="a number")
         return settled(values)
 
     def text(self, column: str) -> list[str]:
@@ -157,14 +151,9 @@ class Table:
         if None in values:
             index = values.index(None)
             mixed = self.decimal_comma and "." in cells[index]
-            raise CampaignError(
-                self.file,
-                "text where a number should be",
-                row=int(self.rows[index]),
-                column=column,
-                found=repr(cells[index]),
-                expected="a number" + (" with a decimal comma, as elsewhere in this file" if mixed else ""),
-            )
+            expected = "a number" + (" with a decimal comma, as elsewhere in this file" if mixed else "")
+            found = repr(cells[index])
+            raise self.error("text where a number should be", column, index, found=found, expected=expected)
         return np.array(values, dtype=np.float64)
 
     def _numbers_or_none(self, cells: Sequence[str]) -> list[float | None]:
@@ -204,3 +193,342 @@ def told_rows(numbers: NDArray[np.int64]) -> str:
     """Say how many rows, and a few of them by number: ``3 rows (4, 7, 9)``."""
     more = "" if len(numbers) <= _FEW else " …"
     return f"{len(numbers)} row{'s' if len(numbers) > 1 else ''} ({', '.join(map(str, numbers[:_FEW]))}{more})"
+
+
+_DECIMAL_COMMA = re.compile(r"[+\-−]?\d*,\d+([eE][+-]?\d+)?")
+_MARKED = re.compile(r" *# *(?=[^\s,;#])")  # a column of numbers that is called # is no mark
+_BLOCK = 1 << 20  # bytes, or characters: what is read of a file at once
+_MOST_BLANK_LINES = 100_000  # in succession: nobody scrolls past so many
+LARGEST_TABLE = 256 << 20
+"""Bytes: a million rows of ten columns with all digits, which are read in 1.5 GB."""
+MOST_CELLS = 20_000_000
+"""The same, for a file whose cells are short or packed."""
+MOST_COLUMNS = 1000
+"""Logs of two arms with every quantity that a controller knows have a few hundred."""
+PARQUET = (".parquet", ".pq")
+"""Endings of the names of Parquet files."""
+WORKBOOKS = {".xlsx": "openpyxl", ".xlsm": "openpyxl", ".ods": "odfpy"}
+"""Endings of the names of workbooks, and what pandas reads them with."""
+NO_PARQUET = "Parquet files need pyarrow, which is not installed"
+WITH_PARQUET = 'pip install "thermal-robot[parquet]", or the table as CSV'
+WITH_EXCEL = 'pip install "thermal-robot[excel]", or the table as CSV'
+
+SPACE = " "
+"""A separator of which any number is one, as of blanks and tabs in a list that is lined up for the eye."""
+
+
+@dataclass(frozen=True)
+class Layout:
+    """How a text file is laid out that other programs wrote."""
+
+    # one character, :data:`SPACE`, or empty: the first line that holds anything tells, and blanks separate where it has
+    # no other separator and the next line falls into as many parts
+    separator: str = ""
+    skip: int = 0  # lines before the header, or before the first row, that hold something else
+    header: bool = True  # whether there is a line of names; columns are called 1, 2, 3 … where there is none
+    comment: str = ""  # lines that begin so are left out; empty where there are none
+
+
+PLAIN = Layout()
+"""A header and rows, nothing else."""
+
+
+def read_table(path: Path, layout: Layout = PLAIN) -> Table:
+    """Read a CSV or, by its ending, a Parquet file or the first sheet of a workbook (.xlsx, .ods).
+
+    Columns of a CSV file may be separated by commas, semicolons, tabs or blanks, with decimal commas where the
+    separator is not a comma; a byte-order mark, Windows line ends and blank lines do no harm.
+
+    Parameters
+    ----------
+    path
+        The file.
+    layout
+        Of a text file, where it is not a header and rows alone.
+
+    Raises
+    ------
+    CampaignError
+        No such file, an empty one, a header without rows, a row with too few or too many fields, a duplicate
+        column.
+    """
+    file = str(path)
+    if not is_file(path):
+        problem = "is a directory" if is_folder(path) else "there is no such file"
+        raise CampaignError(file, problem, expected="the table of measurements")
+    if path.stat().st_size > LARGEST_TABLE:
+        raise CampaignError(file, "is larger than any table that can be read", expected=f"{LARGEST_TABLE >> 20} MiB")
+    if path.suffix.lower() in PARQUET:
+        return _read_parquet(path)
+    if path.suffix.lower() in WORKBOOKS:
+        return _read_workbook(path, layout)
+    encoding, warnings = _encoding(path)
+    with path.open(encoding=encoding, errors="replace", newline="") as stream:
+        separator = layout.separator or _separator(_lines(stream, layout))
+        stream.seek(0)
+        lines = _lines(stream, layout, even=separator == SPACE)
+        header, cells, numbers = _records(file, csv.reader(lines, delimiter=separator, strict=True), layout.header)
+    return _table(file, header, cells, numbers, layout.header, separator != ",", warnings)
+
+
+def _table(
+    file: str,
+    header: list[str],
+    cells: list[list[str]],
+    numbers: list[int],
+    named: bool = True,
+    comma: bool = True,
+    warnings: tuple[str, ...] = (),
+) -> Table:
+    """Return what was read of a file; ``numbers`` are the rows of the header and of all others."""
+    if len(numbers) < 2:
+        raise CampaignError(file, "has a header but no rows", expected="one row per measurement")
+    # A separator at the end of every line makes a column of nothing.
+    kept = [i for i, name in enumerate(header) if name or any(cells[i])]
+    _check_header(file, [header[i] for i in kept], number=numbers[0])
+    columns = {header[i]: cells[i] for i in kept}
+    comma = comma and _has_decimal_comma(columns)
+    rows = np.array(numbers[1:], dtype=np.int64)
+    return Table(file, columns, rows, numbers[0] if named else None, comma, warnings)
+
+
+def table_from_frame(frame: pd.DataFrame, file: str = "<table>", *, first_row: int | None = None) -> Table:
+    """Return a pandas data frame as a table.
+
+    Parameters
+    ----------
+    frame
+        The data.
+    file
+        What to call it in messages.
+    first_row
+        Number of the first row; without it rows are known by an integer index of the frame, so that
+        ``frame.loc[row]`` finds the one a message speaks of, or by position from 0.
+
+    Raises
+    ------
+    CampaignError
+        No rows, a duplicate column.
+    """
+    import pandas as pd
+
+    header = [_as_text(name) for name in frame.columns]
+    _check_header(file, header, number=None if first_row is None else 1)
+    if len(frame) == 0:
+        raise CampaignError(file, "has a header but no rows", expected="one row per measurement")
+    if first_row is not None:
+        rows = np.arange(first_row, first_row + len(frame))
+    elif pd.api.types.is_signed_integer_dtype(frame.index.dtype) and frame.index.is_unique and not frame.index.hasnans:
+        rows = frame.index.to_numpy(dtype=np.int64)
+    else:
+        rows = np.arange(len(frame))
+    columns: dict[str, Cells] = {}
+    for i, name in enumerate(header):
+        series = frame.iloc[:, i]
+        if pd.api.types.is_numeric_dtype(series.dtype) and not pd.api.types.is_complex_dtype(series.dtype):
+            columns[name] = series.to_numpy(dtype=np.float64, na_value=np.nan)
+        else:
+            columns[name] = ["" if gap else _as_text(cell) for cell, gap in zip(series, series.isna(), strict=True)]
+    return Table(file, columns, rows.astype(np.int64), None if first_row is None else 1)
+
+
+def _as_text(cell: object) -> str:
+    """Return any value as one line of text; what cannot say itself by its type."""
+    try:
+        return str(cell).strip()
+    except Exception:  # a cell may hold anybody's object, and Python writes no whole number of 5000 digits
+        return f"<{type(cell).__name__}>"
+
+
+def _read_parquet(path: Path) -> Table:
+    import pandas as pd
+
+    try:
+        from pyarrow.parquet import read_metadata
+
+        held = read_metadata(path)
+        _require_size(str(path), held.num_rows, held.num_columns)
+        frame = pd.read_parquet(path)
+    except ImportError as error:
+        raise CampaignError(str(path), NO_PARQUET, expected=WITH_PARQUET) from error
+    except CampaignError:
+        raise
+    except Exception as error:  # pyarrow raises its own, which cannot be named without importing it
+        reason = " ".join(str(error).split())
+        raise CampaignError(str(path), f"cannot be read as a Parquet file ({reason})") from error
+    # An index with a name is a column that pandas set aside.
+    if twice := [name for name in frame.index.names if name in frame.columns]:
+        raise CampaignError(str(path), "duplicate column", column=str(twice[0]), found="it as the index, too")
+    frame = frame.reset_index(drop=frame.index.names == [None])
+    return table_from_frame(frame, str(path), first_row=2)
+
+
+def _read_workbook(path: Path, layout: Layout) -> Table:
+    """Return the first sheet of a workbook; its rows are counted as the spreadsheet does."""
+    import pandas as pd
+
+    try:
+        sheets = pd.read_excel(path, sheet_name=None, header=None, dtype=object)
+    except ImportError as error:
+        problem = f"workbooks need {WORKBOOKS[path.suffix.lower()]}, which is not installed"
+        raise CampaignError(str(path), problem, expected=WITH_EXCEL) from error
+    except Exception as error:  # each reader raises its own
+        raise CampaignError(str(path), f"cannot be read as a workbook ({' '.join(str(error).split())})") from error
+    first, frame = next(iter(sheets.items()))
+    _require_size(str(path), *frame.shape)
+    lines = ([_as_text(cell) for cell in row] for row in frame.astype(object).where(frame.notna(), "").to_numpy())
+    kept = ([] if k < layout.skip or (layout.comment and row[0].startswith(layout.comment)) else row
+            for k, row in enumerate(lines))  # fmt: skip
+    header, cells, numbers = _records(str(path), kept, layout.header)
+    more = f"{path} has {len(sheets)} sheets: the first, {first!r}, was read"
+    return _table(str(path), header, cells, numbers, layout.header, warnings=(more,) if len(sheets) > 1 else ())
+
+
+def _encoding(path: Path) -> tuple[str, tuple[str, ...]]:
+    """Return how a file's text is encoded, and what was odd about it."""
+    file = str(path)
+    try:
+        with path.open("rb") as stream:
+            head = stream.read(4)
+            if head == b"PK\x03\x04":
+                raise CampaignError(
+                    file,
+                    "is a workbook or an archive",
+                    expected="a name that ends in .xlsx or .ods, or a table saved as CSV or Parquet",
+                )
+            if head == b"PAR1":
+                raise CampaignError(file, "is a Parquet file by its contents", expected="a name that ends in .parquet")
+            if head.startswith((b"\xff\xfe", b"\xfe\xff")):
+                return "utf-16", ()
+            decoder = codecs.getincrementaldecoder("utf-8")()
+            block = head
+            while block:
+                decoder.decode(block)
+                block = stream.read(_BLOCK)
+            decoder.decode(b"", final=True)
+            return "utf-8-sig", ()
+    except OSError as error:
+        raise CampaignError(file, f"cannot be read: {error.strerror}") from error
+    except UnicodeDecodeError:
+        # Spreadsheets still write the Windows code page; only letters outside ASCII differ.
+        odd = f"{file} is not UTF-8 and was read as Windows-1252: check names and labels with accents"
+        return "cp1252", (odd,)
+
+
+def _lines(stream: TextIO, layout: Layout, *, even: bool = False) -> Iterator[str]:
+    """Yield the lines; what is left out is blank, so that each keeps its number; of blanks one is left if ``even``.
+
+    Of lines that begin with # before any other the last is the header, as numpy writes it, unless a comment is stated.
+    """
+    marked: str | None = None
+    leading = not layout.comment
+    for number, line in enumerate(stream):
+        if number < layout.skip or (layout.comment and line.lstrip().startswith(layout.comment)):
+            line = "\n"
+        elif even:
+            line = f"{SPACE.join(line.split())}\n"
+        if leading and (found := _MARKED.match(line)):
+            if marked is not None:
+                yield "\n"
+            marked = line[found.end() :] if layout.header else "\n"
+            continue
+        if marked is not None:
+            yield marked
+            marked = None
+        leading = leading and not line.strip()
+        yield line
+    if marked is not None:
+        yield marked
+
+
+def _separator(lines: Iterator[str]) -> str:
+    """Return the separator of the header, the first line that holds anything: blanks where no other is in it."""
+    held = (line for line in lines if line.strip())
+    header, line = next(held, ""), next(held, "")
+    parts = header.split()
+    figures = all(_DECIMAL_COMMA.fullmatch(part) or "," not in part for part in parts)
+    blanks = len(parts) > 1 and figures and len(line.split()) == len(parts)
+    return next((each for each in (";", "\t") if each in header), SPACE if blanks else ",")
+
+
+def _records(
+    file: str, reader: Iterable[list[str]], named: bool = True
+) -> tuple[list[str], list[list[str]], list[int]]:
+    """Return the header, the cells by column, and the numbers of the lines where header and rows start.
+
+    Where columns are not ``named``, the header is 1, 2, 3 … and stands in line 0.
+    """
+    header: list[str] = []
+    cells: list[list[str]] = []
+    numbers: list[int] = []
+    before = 0
+    try:
+        for fields in reader:
+            # a field may hold the end of a line, which csv counts; a workbook has a row for each
+            start, before = before + 1, getattr(reader, "line_num", before + 1)
+            if not any(field.strip() for field in fields):
+                if start - (numbers[-1] if numbers else 0) > _MOST_BLANK_LINES:
+                    raise CampaignError(file, f"more than {_MOST_BLANK_LINES} lines in succession are blank", row=start)
+                continue
+            if not header and not named:
+                header, cells, numbers = [str(k + 1) for k in range(len(fields))], [[] for _ in fields], [0]
+            if header and len(fields) != len(header):
+                raise CampaignError(
+                    file,
+                    "wrong number of fields",
+                    row=start,
+                    found=str(len(fields)),
+                    expected=f"{len(header)} as in the {'header' if named else 'first row'}",
+                )
+            numbers.append(start)
+            if header:
+                for column, field in zip(cells, fields, strict=True):
+                    column.append(field.strip())
+                _require_size(file, len(numbers), len(header))
+            else:
+                header = [name.strip() for name in fields]
+                cells = [[] for _ in header]
+    except csv.Error as error:
+        raise CampaignError(file, f"cannot be read as CSV ({error})", row=before + 1) from error
+    if not header:
+        raise CampaignError(file, "is empty", expected="a header and one row per measurement")
+    return header, cells, numbers
+
+
+def _require_size(file: str, rows: int, columns: int) -> None:
+    if rows * columns > MOST_CELLS:
+        raise CampaignError(
+            file,
+            "has more cells than can be read",
+            found=f"{columns} columns of {rows} rows and more",
+            expected=f"at most {MOST_CELLS} cells: leave out rows or columns",
+        )
+
+
+def _check_header(file: str, header: Sequence[str], number: int | None) -> None:
+    if len(header) > MOST_COLUMNS:
+        expected = f"at most {MOST_COLUMNS}: leave out those that do not bear on the measurements"
+        raise CampaignError(file, "too many columns", row=number, found=str(len(header)), expected=expected)
+    for name, count in Counter(header).items():
+        if not name:
+            raise CampaignError(
+                file, "a column has no name", row=number, found=f"column {header.index('') + 1} without one"
+            )
+        if count > 1:
+            raise CampaignError(
+                file,
+                f"duplicate column{without_names(header, file)}",
+                row=number,
+                column=name,
+                found=f"it {count} times",
+                expected="every column once",
+            )
+
+
+def _has_decimal_comma(columns: Mapping[str, Sequence[str]]) -> bool:
+    return any(
+        "," in cell and _DECIMAL_COMMA.fullmatch(cell)
+        for name, cells in columns.items()
+        if name not in LABELS
+        for cell in cells
+    )

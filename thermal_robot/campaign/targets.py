@@ -9,6 +9,8 @@ all that its targets say of the robot: the rest is how they move against each ot
 To first order the twist (t, ω) of that frame, in its own axes, has the covariance σ² (Σ_k J_kᵀ J_k)⁻¹ over the targets
 that are seen, with J_k = [1, −[s_k]×]. Where all are seen its six figures are independent; where some are not, what
 they then have in common is left out.
+
+The instrument's noise of a point, and of single rows, tells that of the frame.
 """
 
 from __future__ import annotations
@@ -41,30 +43,15 @@ TINY = 1e-30
 
 @dataclass(frozen=True, eq=False)
 class Targets:
-    """What was seen of K targets in N rows.
+    """What was seen of K targets in N rows."""
 
-    Attributes
-    ----------
-    numbers
-        K numbers, as of ``x.1``.
-    points
-        (N, K, 3) measured places, measurement frame, m; NaN where one was not seen.
-    places
-        (K, 3) in their common frame, m.
-    spread
-        (N, 6) one sigma of the common frame's place, 1, and of its turn about its own axes, 1/m, over that of a target.
-    typical
-        (2,) root mean squares of both, over the rows with which the targets were read.
-    sigma
-        One sigma per axis by which the targets move against each other, m: the median over the rows.
-    """
-
-    numbers: tuple[int, ...]
-    points: Array
-    places: Array
+    numbers: tuple[int, ...]  # K numbers, as of ``x.1``
+    points: Array  # (N, K, 3) measured places, measurement frame, m; NaN where one was not seen
+    places: Array  # (K, 3) in their common frame, m
+    # (N, 6) one sigma of the common frame's place, 1, and of its turn about its own axes, 1/m, over that of a target
     spread: Array
-    typical: Array
-    sigma: float
+    typical: Array  # (2,) root mean squares of both, over the rows with which the targets were read
+    sigma: float  # one sigma per axis by which the targets move against each other, m: the median over the rows
 
     def take(self, rows: NDArray[np.int64] | Mask) -> Targets:
         """Return those of some rows; places and what is typical stay."""
@@ -73,22 +60,13 @@ class Targets:
 
 @dataclass(frozen=True, eq=False)
 class Posed:
-    """Targets, and what they tell of each row.
+    """Targets, and what they tell of each row."""
 
-    Attributes
-    ----------
-    targets
-        Of the rows that tell a pose.
-    position, orientation
-        (N, 3) m and (N, 4) unit quaternions wxyz of their common frame.
-    deviation
-        (N,) one sigma per axis by which the targets of each row are off their places, m.
-    """
-
-    targets: Targets
+    targets: Targets  # of the rows that tell a pose
+    # position, orientation: (N, 3) m and (N, 4) unit quaternions wxyz of their common frame
     position: Array
     orientation: Array
-    deviation: Array
+    deviation: Array  # (N,) one sigma per axis by which the targets of each row are off their places, m
 
 
 def telling(points: Array) -> Mask:
@@ -198,3 +176,41 @@ def _spread(places: Array, seen: Mask) -> Array:
     variance = np.linalg.inv(np.einsum("nk,kab->nab", seen.astype(float), each)).diagonal(axis1=1, axis2=2).copy()
     variance[:, :3] = variance[:, :3].mean(axis=1, keepdims=True)
     return np.asarray(np.sqrt(variance))
+
+
+def sigma_of_all(sigmas: Array, targets: Targets | None) -> tuple[float, float | None]:
+    """Return one sigma of positions, m, and where several targets tell it of turns, rad: root mean squares over rows.
+
+    ``sigmas`` (N,) are of a point in each row, m; of equal ones it is they themselves, to the last digit.
+    """
+    alike = bool(sigmas.min() == sigmas.max())
+    whole = float(sigmas[0]) if alike else float(np.sqrt((sigmas**2).mean()))
+    return told_by(whole, targets)
+
+
+def told_by(sigma: float, targets: Targets | None) -> tuple[float, float | None]:
+    """Return one sigma of positions, m, and where several targets tell it of turns, rad, from that of a point."""
+    return (sigma, None) if targets is None else (sigma * float(targets.typical[0]), sigma * float(targets.typical[1]))
+
+
+def of_a_point(sigma: float, targets: Targets | None) -> float:
+    """Return one sigma of a point, m, from that of positions."""
+    return sigma if targets is None else sigma / float(targets.typical[0])
+
+
+def relative_sigmas(sigmas: Array | None, whole: float | None, targets: Targets | None, turned: bool) -> Array | None:
+    """(N, m) one sigma of each figure of a row over that of all rows; ``None`` where it is one for all.
+
+    ``sigmas`` (N,) are of a point in each row, m, ``None`` where one holds for all; ``whole`` of positions, of all
+    rows, m. Where orientations were measured, ``turned``, m is 6; their noise is the same in all rows unless targets
+    tell it.
+    """
+    factor = np.ones(1) if sigmas is None or not whole else sigmas / of_a_point(whole, targets)
+    if targets is not None:
+        found = targets.spread / np.repeat(targets.typical, 3) * factor[:, None]
+        found = found if turned else found[:, :3]
+    elif bool((factor == 1.0).all()):
+        return None
+    else:
+        found = np.column_stack([factor] * 3 + [np.ones(len(factor))] * (3 if turned else 0))
+    return None if bool((found == 1.0).all()) else found

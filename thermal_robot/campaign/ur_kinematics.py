@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from thermal_robot.arrays import Array
-from thermal_robot.campaign.importers.given import read_yaml
+from thermal_robot.campaign.document import read_yaml
 from thermal_robot.errors import CampaignError
 from thermal_robot.kinematics.rewritten import rewritten
 from thermal_robot.robot import Robot, load_robot
@@ -37,13 +37,7 @@ and of two models or of two conventions at least one origin differs by more."""
 
 
 def elements(robot: Robot, file: str) -> dict[str, int]:
-    """Return the chain's element of each link's joint.
-
-    Raises
-    ------
-    CampaignError
-        The chain lacks one of them, or its axis is not z.
-    """
+    """Return the chain's element of each link's joint; refuse a chain that lacks one, or whose axis is not z."""
     chain = robot.chain
     found = {}
     for link, ending in LINKS.items():

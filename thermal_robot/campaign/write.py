@@ -1,10 +1,10 @@
-"""From a campaign to files: campaign.toml, its table and its robot; and the table of predictions."""
+"""From a campaign to files, to pandas and to notebooks: campaign.toml, table and robot; the table of predictions."""
 
 from __future__ import annotations
 
 import csv
 import os
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -14,10 +14,11 @@ from numpy.typing import ArrayLike
 
 from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign
-from thermal_robot.campaign.declaration import FILE_NAME
-from thermal_robot.campaign.headings import headings
-from thermal_robot.campaign.noise import of_a_point
-from thermal_robot.campaign.tabular import NO_PARQUET, PARQUET, WITH_PARQUET
+from thermal_robot.campaign.describe import described_html
+from thermal_robot.campaign.document import FILE_NAME
+from thermal_robot.campaign.recognise import headings
+from thermal_robot.campaign.table import NO_PARQUET, PARQUET, WITH_PARQUET
+from thermal_robot.campaign.targets import of_a_point
 from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, Units, covariate_scale
 from thermal_robot.errors import CampaignError, require
 from thermal_robot.files import whole, write_text
@@ -25,6 +26,7 @@ from thermal_robot.robot import Robot
 
 if TYPE_CHECKING:
     import pandas as pd
+
 
 TABLE_NAME = "measurements.csv"
 PLAN_NAME = "plan.csv"
@@ -133,9 +135,7 @@ def write_commands(
         empty = recorded and names.split_name(name)[0] == "temperature"
         if name not in derived:
             table[name] = blank if empty else [f"{value:.9g}" for value in values]
-    table |= {name: [str(label) for label in labels] for name, labels in commands.labels.items()}
-    table |= dict.fromkeys(measured, blank)
-    _write_csv(Path(path), list(table), list(table.values()))
+    _write_csv(Path(path), {**table, **_labelled(commands), **dict.fromkeys(measured, blank)})
 
 
 def _declare(campaign: Campaign, folder: Path, comments: Sequence[str]) -> Path:
@@ -157,15 +157,11 @@ def _declare(campaign: Campaign, folder: Path, comments: Sequence[str]) -> Path:
 
 def write_table(campaign: Campaign, path: str | Path) -> None:
     """Write the table of a campaign, or of samples, as CSV in the campaign's units, with all digits."""
-    columns: list[str] = []
-    data: list[Sequence[str]] = []
-    for name, values in table_columns(campaign):
-        columns.append(name)
-        data.append(["" if np.isnan(value) else repr(float(value)) for value in values])
-    for name, labels in campaign.labels.items():
-        columns.append(name)
-        data.append([str(label) for label in labels])
-    _write_csv(Path(path), columns, data)
+    numbers = {
+        name: ["" if np.isnan(value) else repr(float(value)) for value in values]
+        for name, values in table_columns(campaign)
+    }
+    _write_csv(Path(path), {**numbers, **_labelled(campaign)})
 
 
 def with_prediction(
@@ -291,12 +287,16 @@ def table_columns(campaign: Campaign) -> Iterator[tuple[str, np.ndarray[Any, np.
         yield name, values / covariate_scale(name, robot, units)
 
 
-def _write_csv(path: Path, columns: Sequence[str], data: Sequence[Sequence[str]]) -> None:
+def _labelled(campaign: Campaign) -> dict[str, list[str]]:
+    return {name: [str(label) for label in labels] for name, labels in campaign.labels.items()}
+
+
+def _write_csv(path: Path, columns: Mapping[str, Sequence[str]]) -> None:
     try:
         with whole(path) as place, place.open("w", encoding="utf-8", newline="") as file:
             writer = csv.writer(file, lineterminator="\n")
             writer.writerow(columns)
-            writer.writerows(zip(*data, strict=True))
+            writer.writerows(zip(*columns.values(), strict=True))
     except OSError as error:
         raise CampaignError(str(path), f"cannot be written: {error.strerror}") from error
 
@@ -336,3 +336,21 @@ def _document(campaign: Campaign) -> dict[str, Any]:
         "gears": dict(settings.gears),
     }
     return {section: content for section, content in document.items() if content}
+
+
+def frame(campaign: Campaign) -> pd.DataFrame:
+    """Return the table as :func:`~thermal_robot.campaign.write.write_table` would write it.
+
+    Its ``attrs`` hold the units, so that :func:`~thermal_robot.campaign_from_table` need not be told them.
+    """
+    import pandas as pd
+
+    labels = {name: labels.astype(object) for name, labels in campaign.labels.items()}
+    shown = pd.DataFrame({**dict(table_columns(campaign)), **labels}, index=pd.Index(campaign.rows, name="row"))
+    shown.attrs = {"angle_unit": campaign.units.angle, "length_unit": campaign.units.length}
+    return shown
+
+
+def html(campaign: Campaign) -> str:
+    """Return robot, frames, joints, conditions and warnings as tables."""
+    return described_html(campaign)

@@ -59,7 +59,7 @@ def _commands(options: argparse.Namespace, model: CorrectedModel) -> list[tuple[
     if not options.poses:
         return []
     from thermal_robot.campaign import read_table, write_predictions
-    from thermal_robot.campaign.tabular import PARQUET
+    from thermal_robot.campaign.table import PARQUET
 
     read = read_table(Path(options.poses))
     poses = model.samples(read)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import argparse
 from pathlib import Path
 
-from thermal_robot.campaign.importers.formats import FORMATS
+from thermal_robot.campaign.importers.run import FORMATS
 from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS
 from thermal_robot.commands.shared import tell
 from thermal_robot.robot import ENDS

@@ -30,7 +30,7 @@ def add_arguments(parser: argparse.ArgumentParser) -> None:
 def run(options: argparse.Namespace) -> None:
     """Predict a table of samples and write it."""
     from thermal_robot.campaign import read_table, write_predictions
-    from thermal_robot.campaign.tabular import PARQUET
+    from thermal_robot.campaign.table import PARQUET
     from thermal_robot.correction import CorrectedModel
 
     require_free((options.output,), (options.model, options.samples))

@@ -57,7 +57,7 @@ def folder(options: argparse.Namespace) -> Path | None:
 
 def read_from(options: argparse.Namespace) -> list[Path]:
     """Return the files that a campaign is read from."""
-    from thermal_robot.campaign.declaration import read_declaration
+    from thermal_robot.campaign.document import read_declaration
 
     declaration = read_declaration(Path(options.campaign), folder(options))
     robot = [declaration.robot] if isinstance(declaration.robot, Path) else []

@@ -14,8 +14,8 @@ from numpy.typing import ArrayLike
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign, Settings, read_samples, read_table, with_commands, with_prediction
+from thermal_robot.campaign.campaign import read_alike
 from thermal_robot.campaign.table import Table
-from thermal_robot.campaign.turned import read_alike
 from thermal_robot.correction.arrays import of_arrays
 from thermal_robot.correction.commands import Commands, corrected, nominal_positions
 from thermal_robot.correction.required import require_finite, require_needed

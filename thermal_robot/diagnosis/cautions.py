@@ -9,7 +9,7 @@ from types import MappingProxyType
 import numpy as np
 
 from thermal_robot.campaign import Campaign
-from thermal_robot.campaign.marks import copies, marks
+from thermal_robot.campaign.plausible import copies, marks
 from thermal_robot.campaign.table import told_rows
 from thermal_robot.diagnosis.credible import cancelling, cancelling_within, outsized
 from thermal_robot.diagnosis.parts import Refused, Sensitivity

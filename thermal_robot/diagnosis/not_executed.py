@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis.data_faults import settings as faults
+from thermal_robot.diagnosis.data_faults.find import misfit, spread
 from thermal_robot.diagnosis.data_faults.readings import Readings
-from thermal_robot.diagnosis.data_faults.struck import misfit, spread
 from thermal_robot.inference import settings
 from thermal_robot.inference.alternation import Placed
 from thermal_robot.inference.rows import in_order

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
-from thermal_robot.campaign.turned import GRAVITY, turned_round
+from thermal_robot.campaign.campaign import GRAVITY, turned_round
 from thermal_robot.diagnosis import settings
 from thermal_robot.effects import Effect, Parameter, choose, gate
 from thermal_robot.inference import settings as inference_settings

@@ -17,7 +17,7 @@ from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
-from thermal_robot.campaign.declaration import read_declaration
+from thermal_robot.campaign.document import read_declaration
 from thermal_robot.errors import CampaignError
 from thermal_robot.files import checksum
 from thermal_robot.fleet import settings

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from thermal_robot.campaign import read_table
-from thermal_robot.campaign.declaration import FILE_NAME
+from thermal_robot.campaign.document import FILE_NAME
 from thermal_robot.campaign.names import did_you_mean, listed
 from thermal_robot.errors import CampaignError, require
 from thermal_robot.files import is_file, is_folder

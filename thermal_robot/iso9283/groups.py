@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.campaign import Campaign
-from thermal_robot.campaign.marks import SAME_COMMAND
 from thermal_robot.campaign.names import split_name
+from thermal_robot.campaign.plausible import SAME_COMMAND
 from thermal_robot.campaign.turning import arrivals
 from thermal_robot.inference.rows import in_order, repeated_poses
 

@@ -6,8 +6,8 @@ from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from thermal_robot.campaign.marks import SAME_COMMAND
 from thermal_robot.campaign.names import listed
+from thermal_robot.campaign.plausible import SAME_COMMAND
 from thermal_robot.iso9283.criteria import of_noise
 from thermal_robot.iso9283.groups import CYCLES, PATH_CYCLES, Repeats
 from thermal_robot.iso9283.parts import PathCriteria, PoseCriteria

@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
-from thermal_robot.campaign.marks import SAME_COMMAND
+from thermal_robot.campaign.plausible import SAME_COMMAND
 from thermal_robot.errors import CampaignError, require
 from thermal_robot.inference.frames import register
 from thermal_robot.iso9283.criteria import Accuracy, Attained, accuracy

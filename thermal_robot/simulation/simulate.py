@@ -16,8 +16,8 @@ from thermal_robot.campaign import names as columns
 from thermal_robot.campaign.checked import checked_mapping
 from thermal_robot.campaign.names import did_you_mean, listed, split_name, tilted
 from thermal_robot.campaign.plausible import doubts
+from thermal_robot.campaign.read import arrived
 from thermal_robot.campaign.recognise import TYPING_ERROR
-from thermal_robot.campaign.validate import arrived
 from thermal_robot.effects import Effect, Parameter, RandomEffect, gate, named
 from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.quantities import unit

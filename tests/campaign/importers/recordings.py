@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from thermal_robot.campaign.importers.standstill import Stream
+from thermal_robot.campaign.importers.rosbag import Stream
 from thermal_robot.kinematics import exp3, tool_poses
 
 TARGET = np.array([0.02, -0.03, 0.11])

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from campaign.importers.recordings import TARGET, recorded
 
-from thermal_robot.campaign.importers.clock import lag
+from thermal_robot.campaign.importers.rosbag import lag
 from thermal_robot.errors import CampaignError
 
 NOWHERE = np.zeros(3)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from thermal_robot.campaign.importers.columns import column_kind, columns_kind
+from thermal_robot.campaign.importers.plan import column_kind, columns_kind
 from thermal_robot.campaign.table import Table
 from thermal_robot.errors import CampaignError
 from thermal_robot.schema import MisfitError

@@ -5,7 +5,7 @@ from pathlib import Path
 
 import pytest
 
-from thermal_robot.campaign.importers.formats import FORMATS
+from thermal_robot.campaign.importers.run import FORMATS
 
 
 @pytest.mark.parametrize("name", FORMATS)

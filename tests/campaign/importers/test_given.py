@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from thermal_robot.campaign.importers.given import is_yaml, read_yaml
+from thermal_robot.campaign.document import is_yaml, read_yaml
 from thermal_robot.errors import CampaignError
 
 

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from thermal_robot.campaign.importers.mapped import Source, campaign_of, files_of
-from thermal_robot.campaign.importers.plan import Plan, planned
+from thermal_robot.campaign.importers.plan import Plan, Source, campaign_of, files_of, planned
 from thermal_robot.campaign.table import Table
 from thermal_robot.errors import CampaignError
 from thermal_robot.kinematics import exp3

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from thermal_robot.campaign.importers.orientation import orientation_kind
+from thermal_robot.campaign.importers.plan import orientation_kind
 from thermal_robot.campaign.table import Table
 from thermal_robot.errors import CampaignError
 from thermal_robot.kinematics import quaternion_to_rotation

@@ -4,7 +4,7 @@ import sys
 
 import pytest
 
-from thermal_robot.campaign.importers.ros_bag import read_bag
+from thermal_robot.campaign.importers.rosbag import read_bag
 from thermal_robot.errors import CampaignError
 
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from thermal_robot.campaign.importers.ros_csv import read_streams
+from thermal_robot.campaign.importers.rosbag import read_streams
 from thermal_robot.errors import CampaignError
 
 JOINTS = ("a", "b")

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from campaign.importers.recordings import recorded
 
-from thermal_robot.campaign.importers.standstill import STANDSTILL, Stream, paired, stream
+from thermal_robot.campaign.importers.rosbag import STANDSTILL, Stream, paired, stream
 from thermal_robot.errors import CampaignError
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from other_robots import base_moved, lengthened, measured, read_with
 
-from thermal_robot.diagnosis.data_faults.another_robot import another_robot
+from thermal_robot.diagnosis.data_faults.misfit import another_robot
 from thermal_robot.robot import load_robot
 
 EXAMPLES = ("ur3", "ur5", "ur10")

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from other_robots import measured, read_with
 
-from thermal_robot.diagnosis.data_faults.known_robots import fitting
+from thermal_robot.diagnosis.data_faults.misfit import fitting
 from thermal_robot.diagnosis.data_faults.readings import Readings
 from thermal_robot.robot import load_robot
 

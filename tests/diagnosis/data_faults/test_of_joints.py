@@ -6,7 +6,7 @@ from conftest import load_arm
 from simulate import simulate
 from spoilt_tables import SPOILT
 
-from thermal_robot.diagnosis.data_faults.of_joints import KINDS
+from thermal_robot.diagnosis.data_faults.kind import JOINT_KINDS as KINDS
 from thermal_robot.diagnosis.data_faults.readings import Readings
 
 

@@ -8,7 +8,7 @@ from conftest import load_arm
 from simulate import simulate
 from spoilt_tables import joints_read_at, measured_at
 
-from thermal_robot.diagnosis.data_faults.of_pairing import KINDS
+from thermal_robot.diagnosis.data_faults.kind import PAIRING_KINDS as KINDS
 from thermal_robot.diagnosis.data_faults.readings import Readings
 
 SHIFTED, LATE = KINDS

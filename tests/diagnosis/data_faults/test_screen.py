@@ -8,10 +8,8 @@ from conftest import load_arm
 from simulate import simulate
 from spoilt_tables import SPOILT
 
-from thermal_robot.diagnosis.data_faults.find import KINDS
+from thermal_robot.diagnosis.data_faults.find import Screen, Struck
 from thermal_robot.diagnosis.data_faults.readings import Readings
-from thermal_robot.diagnosis.data_faults.screen import Screen
-from thermal_robot.diagnosis.data_faults.struck import Struck
 
 
 @pytest.fixture(scope="module")
@@ -22,7 +20,7 @@ def sound():
 def screened(*spoil, campaign):
     for one in spoil:
         campaign = SPOILT[one](campaign)
-    return Screen(Struck.whole(Readings.of(campaign)), KINDS)
+    return Screen(Struck.whole(Readings.of(campaign)))
 
 
 def best(tried, faults):
@@ -58,7 +56,7 @@ def test_known_frames_are_not_fitted(sound):
     readings = Readings.of(SPOILT["reversed joint"](sound))
     rows = np.ones(sound.samples, dtype=bool)
     frames = Readings.of(sound).align()
-    screen = Screen(Struck(readings, rows, readings.distance(frames), frames), KINDS)
+    screen = Screen(Struck(readings, rows, readings.distance(frames), frames))
     kinds, own = best(screen.singly(), 1)
     assert kinds == {"reversed joint"}
     assert own.typical < 2e-3
@@ -68,7 +66,7 @@ def test_where_not_even_a_map_leaves_little_nothing_is_looked_at(sound):
     """A joint that does something else than its column says: neither units nor axes nor two faults mend it."""
     q = np.array(sound.q)
     q[:, 1] = np.sin(2.0 * q[:, 1]) + 0.3 * q[:, 2]
-    screen = Screen(Struck.whole(Readings.of(replace(sound, q=q, orientation=None, noise_orientation=None))), KINDS)
+    screen = Screen(Struck.whole(Readings.of(replace(sound, q=q, orientation=None, noise_orientation=None))))
     assert [t for t in screen.both_sides() if len(t.fault) == 2] == []
     assert screen.two_of_joints() == []
     assert screen.asked > 10_000  # they count as tried all the same

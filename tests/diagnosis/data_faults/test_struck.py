@@ -6,9 +6,8 @@ from conftest import load_arm
 from simulate import simulate
 from spoilt_tables import with_joints
 
-from thermal_robot.diagnosis.data_faults.find import KINDS
+from thermal_robot.diagnosis.data_faults.find import KINDS, Struck, consensus, misfit, mixture, part_of, spread, window
 from thermal_robot.diagnosis.data_faults.readings import Readings
-from thermal_robot.diagnosis.data_faults.struck import Struck, consensus, misfit, mixture, part_of, spread, window
 
 
 @pytest.fixture(scope="module")
@@ -40,9 +39,9 @@ def test_nobody_strays_from_a_sound_table(sound):
 @pytest.mark.parametrize("share", [0.55, 0.65])
 def test_rows_that_choose_between_two_tables_are_told_apart(sound, share):
     readings, struck = spoilt(sound, share)
-    found = mixture(Struck.whole(readings), KINDS)
+    found = mixture(Struck.whole(readings))
     assert (found.rows != struck).mean() < 0.05
-    assert mixture(Struck.whole(Readings.of(sound)), KINDS) is None
+    assert mixture(Struck.whole(Readings.of(sound))) is None
 
 
 def test_a_sketch_has_so_many_rows_and_is_none_where_most_are_not_determined(sound):

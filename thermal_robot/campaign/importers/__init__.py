@@ -1,1 +1,1 @@
-"""Other programs' files become campaigns: a format is a module here, and a line in :mod:`formats`."""
+"""Other programs' files become campaigns: a format is a module here, and a line in :mod:`run`."""

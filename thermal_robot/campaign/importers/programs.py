@@ -24,11 +24,9 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from thermal_robot.campaign.importers.mapped import Format, Source
-from thermal_robot.campaign.importers.plan import Plan, planned
+from thermal_robot.campaign.importers.plan import Format, Plan, Source, planned
 from thermal_robot.campaign.importers.table import joined
-from thermal_robot.campaign.table import Table
-from thermal_robot.campaign.tabular import LARGEST_TABLE, read_table, table_from_frame
+from thermal_robot.campaign.table import LARGEST_TABLE, Table, read_table, table_from_frame
 from thermal_robot.errors import CampaignError
 from thermal_robot.files import is_file
 

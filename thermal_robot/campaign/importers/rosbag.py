@@ -1,35 +1,456 @@
 """Recordings of a robot's joints and of an instrument, in a bag or as CSV: a row for each standstill.
 
-Which headers are known stands in :mod:`~thermal_robot.campaign.importers.ros_csv`. The joints are those that the robot
-reports, and stand for the commands. Figures are in rad and m, as everywhere in ROS, unless the mapping says otherwise.
+The joints are those that the robot reports, and stand for the commands. Figures are in rad and m, as everywhere in ROS,
+unless the mapping says otherwise.
+
+Bags are read by the library rosbags (ternaris.gitlab.io/rosbags, ``rosbags.highlevel.AnyReader``), CSV by its headers.
+Sources: ``rostopic echo -p`` writes %time in ns and a column for each field, as field.header.stamp, field.name0,
+field.position0, field.pose.position.x (wiki.ros.org/rostopic). PlotJuggler writes __time in s and a column for each
+series, which its parsers call <topic>/<joint>/position and <topic>/pose/position/x (``ros2_parsers/jointstates_msg.h``
+and ``pose_msg.h`` of PlotJuggler/plotjuggler-ros-plugins). ``ros2 topic echo --csv`` writes no header and all fields
+one after another: sec, nanosec, frame, the names, the positions, then velocities and efforts (ros2/rosidl_runtime_py,
+``convert.py``, ``message_to_csv``). A table of one's own has time in s, and columns named as in a campaign.
+
+By how much the clocks of robot and instrument differ is told by one motion that both recorded: roughly from the speeds
+of the target, which need no frames: the lag at which they are most alike. Then the lag, the place of the instrument and
+the place of the target are fitted together to what was measured in motion.
 """
 
 from __future__ import annotations
 
+import itertools
+import re
 from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import names
-from thermal_robot.campaign.importers.clock import lag
-from thermal_robot.campaign.importers.mapped import Format, Source
-from thermal_robot.campaign.importers.plan import Plan, planned
-from thermal_robot.campaign.importers.ros_bag import ENDINGS, read_bag
-from thermal_robot.campaign.importers.ros_csv import read_streams
-from thermal_robot.campaign.importers.standstill import Pairs, Stream, paired
-from thermal_robot.campaign.table import Cells, Table
+from thermal_robot.campaign.importers.plan import Format, Plan, Source, planned
+from thermal_robot.campaign.names import listed
+from thermal_robot.campaign.recognise import joint_columns
+from thermal_robot.campaign.table import Cells, Layout, Table, read_table
 from thermal_robot.campaign.units import Units
 from thermal_robot.errors import CampaignError
-from thermal_robot.files import is_folder
+from thermal_robot.files import is_file, is_folder
+from thermal_robot.kinematics import align, exp3, tool_poses
 from thermal_robot.robot import Robot
+
+WINDOW = 0.2
+"""s over which the velocity of a joint is taken: it averages the steps of an encoder, 1e-5 rad of which are then
+1e-4 rad/s at most."""
+VELOCITY = 1e-3
+"""rad/s or m/s: slower than that a joint stands. In the tolerance of a pair a target 1 m away then moves 50 µm at most,
+and mostly not at all."""
+STANDSTILL = 0.5
+"""s that a robot stands at least: shorter is a turning point, or still swings."""
+SETTLING = 0.25
+"""s after stopping that are not used: arms swing out at some 10 Hz, and controllers settle."""
+TOLERANCE = 0.05
+"""s between a row's instant and the sample paired with it; instruments measure twenty times a second or more."""
+
+
+@dataclass(frozen=True)
+class Stream:
+    """N samples of k quantities."""
+
+    file: str  # where they come from, for messages
+    time: Array  # (N,) s, increasing
+    values: Array  # (N, k) in the unit of the recording
+    names: tuple[str, ...]  # of the k columns: joints, or x y z and perhaps qw qx qy qz
+
+    def between(self, times: Array) -> Array:
+        """Return (M, k) values between the samples, on straight lines; held beyond the ends."""
+        return np.column_stack([np.interp(times, self.time, column) for column in self.values.T])
+
+    def scaled(self, scale: Array) -> Stream:
+        """Return the stream in other units, (k,) of them to one of its own."""
+        return replace(self, values=self.values * scale)
+
+    def nearest(self, times: Array) -> NDArray[np.int64]:
+        """Return (M,) indices of the samples that are nearest in time."""
+        after = np.clip(np.searchsorted(self.time, times), 1, len(self.time) - 1)
+        earlier = times - self.time[after - 1] < self.time[after] - times
+        return np.where(earlier, after - 1, after)
+
+
+def stream(file: str, time: Array, values: Array, names: Sequence[str]) -> Stream:
+    """Return a stream in the sequence of its clock, without samples that have a gap and without repeated instants."""
+    kept = ~(np.isnan(time) | np.isnan(values).any(axis=1))
+    _, first = np.unique(time[kept], return_index=True)
+    if len(first) < 2:
+        raise CampaignError(
+            file, "has fewer than two samples", found=f"{len(first)} of {', '.join(names)}", expected="a recording"
+        )
+    return Stream(file, time[kept][first], values[kept][first], tuple(names))
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """Samples of two recordings at standstill."""
+
+    times: Array  # (M,) s, of the robot's clock
+    # joints, target: (M, n) and (M, k) of the samples nearest in time
+    joints: Array
+    target: Array
+    short: int  # how many standstills were too short
+    lonely: int  # how many had no sample of the target within the tolerance
+
+
+def paired(
+    joints: Stream,
+    target: Stream,
+    lag: float,
+    *,
+    tolerance: float = TOLERANCE,
+    standstill: float = STANDSTILL,
+    velocity: float = VELOCITY,
+    settling: float = SETTLING,
+) -> Pairs:
+    """Return a pair for each standstill, in its middle once the arm has settled.
+
+    ``lag``, s: the robot's clock shows that much more than the instrument's. The limits are as the constants above.
+    """
+    times = joints.time
+    moved = joints.between(times + WINDOW / 2) - joints.between(times - WINDOW / 2)
+    still = np.abs(moved).max(axis=1) <= velocity * WINDOW
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], still, [False]]).astype(int)))
+    begins, ends = edges[::2], edges[1::2] - 1
+    long = times[ends] - times[begins] >= standstill
+    middles = (times[begins] + np.minimum(settling, (times[ends] - times[begins]) / 2) + times[ends])[long] / 2
+    own, seen = joints.nearest(middles), target.nearest(middles - lag)
+    near = np.abs(target.time[seen] + lag - middles) <= tolerance
+    return Pairs(
+        middles[near], joints.values[own[near]], target.values[seen[near]], int((~long).sum()), int((~near).sum())
+    )
+
+
+FINEST = 0.005
+"""s between the instants at which speeds are compared: faster than that no joint state is published as a rule."""
+LONGEST = 2_000_000
+"""Instants of either recording that are compared: three hours at the finest step; longer ones take a coarser step."""
+UNEXPLAINED = 0.1
+"""Share of the spread of the measured places that may be left once lag and frames are fitted: a robot that is bent by
+millimetres leaves less than 0.01, two recordings that have nothing to do with each other more than 0.5."""
+MOVING = 0.1
+"""Share of the fastest speed from which a sample tells the time: at rest it does not."""
+MOST = 2000
+"""Samples in motion that are fitted; more take time and add little."""
+BLOCKS = 10
+"""Parts of the recording of which each is left out once: their scatter is the deviation of the lag, whatever the errors
+of the robot that the fit knows nothing of (Tukey's jackknife)."""
+LEAST = 60
+"""Samples in motion that a fit of ten figures and its scatter want."""
+
+
+@dataclass(frozen=True)
+class Lag:
+    """By how much the clocks differ."""
+
+    value: float  # s: the robot's clock shows that much more than the instrument's at the same instant
+    std: float  # one standard deviation, s
+    left: float  # m rms: distance in motion that lag and frames leave
+
+
+def lag(joints: Stream, target: Stream, robot: Robot, place: Array) -> Lag:
+    """Estimate by how much two recordings' clocks differ; refuse those that show no motion in common, or hardly any.
+
+    The target's positions are in any frame that stands still; ``place`` (3,), m, is where it roughly is on the tool.
+    """
+    # clocks that count from 1970 leave too few digits for a derivative by time: from here on both begin at 0
+    begun = float(joints.time[0] - target.time[0])
+    joints, target = (replace(each, time=each.time - each.time[0]) for each in (joints, target))
+    rough = _by_speed(joints, target, robot, place)
+    speed = _speeds(target, target.time)
+    inside = (target.time + rough > joints.time[0]) & (target.time + rough < joints.time[-1])
+    moving = np.flatnonzero(inside & (speed > MOVING * np.max(speed[inside], initial=0.0)))
+    if len(moving) < LEAST:
+        raise CampaignError(
+            target.file,
+            "too few samples are in motion to estimate the offset of the clocks",
+            found=str(len(moving)),
+            expected=f"at least {LEAST}; or [recording] offset in the mapping",
+        )
+    chosen = moving[np.linspace(0, len(moving) - 1, min(MOST, len(moving))).astype(int)]
+    start = np.concatenate([[rough], np.zeros(6), place])
+    whole, left = _fitted(joints, target, robot, chosen, start)
+    spread = float(np.linalg.norm(target.values[chosen, :3].std(axis=0)))
+    if not left <= UNEXPLAINED * spread:
+        raise CampaignError(
+            f"{joints.file} and {target.file}",
+            "the joints do not move the target as it was measured, however the clocks differ",
+            found=f"{1e3 * left:.0f} mm rms of {1e3 * spread:.0f} mm that no offset explains",
+            expected="recordings of one motion of this robot",
+        )
+    parts = np.array_split(np.arange(len(chosen)), BLOCKS)
+    without = [_fitted(joints, target, robot, np.delete(chosen, part), whole)[0][0] for part in parts]
+    deviation = np.sqrt((BLOCKS - 1) / BLOCKS * np.sum((np.array(without) - np.mean(without)) ** 2))
+    return Lag(begun + float(whole[0]), float(deviation), left)
+
+
+def _by_speed(joints: Stream, target: Stream, robot: Robot, place: Array) -> float:
+    """Return the lag at which the speeds of recordings that begin at 0 are most alike, s."""
+    from scipy.signal import correlate, correlation_lags
+
+    spans = [stream.time[-1] - stream.time[0] for stream in (joints, target)]
+    usual = [float(np.median(np.diff(stream.time))) for stream in (joints, target)]
+    step = max(FINEST, max(usual), max(spans) / LONGEST)
+    grids = [np.arange(0.0, span, step) for span in spans]
+    poses = tool_poses(robot, joints.values)
+    reached = Stream(joints.file, joints.time, poses[:, :3, 3] + poses[:, :3, :3] @ place, ("x", "y", "z"))
+    one, other = (_speeds(s, grid) for s, grid in ((reached, grids[0]), (target, grids[1])))
+    one, other = one - one.mean(), other - other.mean()
+    products = correlate(one, other, method="fft")
+    best = int(np.argmax(products))
+    steps = int(correlation_lags(len(one), len(other))[best])
+    return float(steps * step)
+
+
+def _speeds(stream: Stream, times: Array) -> Array:
+    """Return (M,) m/s of the target at some instants, over two steps of them."""
+    places = stream.between(times)[:, :3]
+    speeds: Array = np.linalg.norm(np.gradient(places, times, axis=0), axis=1)
+    return speeds
+
+
+def _fitted(joints: Stream, target: Stream, robot: Robot, chosen: Any, start: Array) -> tuple[Array, float]:
+    """Return lag, motion of the instrument's frame and place of the target that fit samples, and what is left, m rms.
+
+    Least squares. The motion turns about the aligned start, so that ten figures near nothing are sought.
+    """
+    from scipy.optimize import least_squares
+
+    times, measured = target.time[chosen], target.values[chosen, :3]
+
+    def reached(figures: Array) -> Array:
+        poses = tool_poses(robot, joints.between(times + figures[0]))
+        places: Array = poses[:, :3, 3] + poses[:, :3, :3] @ figures[7:]
+        return places
+
+    frame = align(reached(start), measured, np.ones(len(times)))
+    middle = measured.mean(axis=0)
+
+    def gap(figures: Array) -> Array:
+        seen: Array = reached(figures) @ frame[:3, :3].T + frame[:3, 3] - middle
+        away: Array = seen @ exp3(figures[1:4]).T + middle + figures[4:7] - measured
+        return np.ravel(away)
+
+    begin = np.concatenate([start[:1], np.zeros(6), start[7:]])
+    # the sizes of what is sought: a step of the clock, angles, metres
+    found = least_squares(gap, begin, x_scale=np.array([0.01, *[0.01] * 3, *[0.01] * 6]))
+    return found.x, float(np.sqrt(2 * found.cost / len(times)))
+
+
+_NANOSECOND = 1e-9
+_CLOCKS = {"field.header.stamp": _NANOSECOND, "%time": _NANOSECOND, "__time": 1.0, "time": 1.0, "timestamp": 1.0}
+"""Columns that tell the time, the best first, and their units in s: a stamp is of the measurement, %time of its
+coming."""
+_PLACE = re.compile(r"(?:^|[./])(?:position|point|translation)[./](?P<axis>[xyz])$")
+_TURN = re.compile(r"(?:^|[./])(?:orientation|rotation)[./](?P<axis>[xyzw])$")
+_WITHOUT_HEADER = Layout(",", 0, False)
+_BEFORE_NAMES = 2
+"""Fields of a stamp, sec and nanosec, at the beginning of each line without a header."""
+
+
+def read_streams(file: Path, joints: Sequence[str]) -> tuple[Stream | None, Stream | None]:
+    """Return what a CSV of topics has of the chain's joints and of the target; ``None`` for what it has not.
+
+    A file that is no table, has no clock, or has some of the joints only is refused.
+    """
+    if _begins_with_figures(file):
+        return _without_header(read_table(file, _WITHOUT_HEADER), joints)
+    table = read_table(file)
+    clock = next((name for name in _CLOCKS if name in table.columns), None)
+    if clock is None:
+        raise CampaignError(
+            str(file), "has no column of time", row=table.header, expected=f"one of {', '.join(_CLOCKS)}"
+        )
+    time = table.numbers(clock, gaps=True) * _CLOCKS[clock]
+    places = [columns and stream(str(file), time, _figures(table, list(columns.values())), list(columns))
+              for columns in (_joints(table, joints), _target(table))]  # fmt: skip
+    return places[0] or None, places[1] or None
+
+
+def _begins_with_figures(file: Path) -> bool:
+    """Return whether the first line begins with two whole numbers, a stamp, and is no header."""
+    if not is_file(file):
+        return False
+    with file.open("rb") as content:
+        return re.match(rb"\d+,\d+,", content.read(64)) is not None
+
+
+def _figures(table: Table, columns: Sequence[str]) -> Array:
+    return np.column_stack([table.numbers(name, gaps=True) for name in columns])
+
+
+def _joints(table: Table, joints: Sequence[str]) -> dict[str, str]:
+    """Return the column of each joint; nothing where there is none of any."""
+    named = {table.text(name)[0]: f"field.position{name[len('field.name'):]}"
+             for name in table.columns if re.fullmatch(r"field\.name\d+", name)}  # fmt: skip
+    columns = joint_columns(table.columns, joints)
+    series = joint_columns(named, joints)
+    columns |= {joint: named[name] for joint, name in series.items() if named[name] in table.columns}
+    if columns and len(columns) < len(joints):
+        lacking = next(joint for joint in joints if joint not in columns)
+        raise table.error("a joint of the chain is not recorded", lacking, expected="all of them")
+    return columns
+
+
+def _target(table: Table) -> dict[str, str]:
+    """Return the columns of the target's place, and of its orientation where all four are there."""
+    place: dict[str, str] = {}
+    turn: dict[str, str] = {}
+    for name in table.columns:
+        if found := _PLACE.search(name):
+            place.setdefault(found["axis"], name)
+        elif found := _TURN.search(name):
+            turn.setdefault(f"q{found['axis']}", name)
+    own = {name: name for name in names.MEASURED if name in table.columns}
+    place = place or {axis: own[axis] for axis in names.POSITION if axis in own}
+    turn = turn or {part: own[part] for part in names.ORIENTATION if part in own}
+    if set(place) != set(names.POSITION):
+        return {}
+    whole = names.MEASURED if set(turn) == set(names.ORIENTATION) else names.POSITION
+    return {name: {**place, **turn}[name] for name in whole}
+
+
+def _without_header(table: Table, joints: Sequence[str]) -> tuple[Stream | None, Stream | None]:
+    """Return the stream of a file whose fields have an order and no names."""
+    fields = list(table.columns)
+    time = table.numbers(fields[0]) + table.numbers(fields[1]) * _NANOSECOND
+    # texts, or nothing where a frame has no name; figures that are nan throughout, as efforts, are no texts
+    texts = list(itertools.takewhile(lambda name: table.first_text(name) is not None or not any(table.columns[name]),
+                                     fields[_BEFORE_NAMES:]))  # fmt: skip
+    first = _BEFORE_NAMES + len(texts)
+    recorded = [table.text(name)[0] for name in texts[1:]]  # the first text is the frame
+    columns = joint_columns(recorded, joints)
+    if columns and len(columns) == len(joints):
+        wanted = [fields[first + recorded.index(columns[joint])] for joint in joints]
+        return stream(table.file, time, _figures(table, wanted), joints), None
+    if len(recorded) > 1:
+        lacking = next(joint for joint in joints if joint not in columns)
+        raise CampaignError(table.file, "a joint of the chain is not among the names", column=lacking,
+                            found=listed(recorded), expected=f"all of {listed(joints)}")  # fmt: skip
+    rest = [name for name in fields[first:] if any(table.columns[name])]  # a comma at the end is no field
+    if len(rest) in (len(names.POSITION), len(names.MEASURED)):
+        order = ("x", "y", "z", "qx", "qy", "qz", "qw")[: len(rest)]
+        by_name = dict(zip(order, rest, strict=True))
+        wanted = [name for name in names.MEASURED if name in by_name]
+        return None, stream(table.file, time, _figures(table, [by_name[name] for name in wanted]), wanted)
+    raise CampaignError(
+        table.file,
+        "neither joint states nor poses are recognised in lines without a header",
+        found=f"{len(fields)} fields",
+        expected="sec, nanosec, frame, and names and positions of the joints, or x y z (qx qy qz qw)",
+    )
+
+
+ENDINGS = (".bag", ".mcap", ".db3")
+_JOINT_STATES = ("sensor_msgs/msg/JointState",)
+_TARGETS = {
+    "geometry_msgs/msg/PoseStamped": "pose",
+    "geometry_msgs/msg/TransformStamped": "transform",
+    "geometry_msgs/msg/PointStamped": "point",
+}
+"""Types of messages with a place, and the field that holds it."""
+WITH_ROSBAGS = 'pip install "thermal-robot[ros]"'
+
+
+def read_bag(
+    path: Path, joints: Sequence[str], joint_topic: str | None, target_topic: str | None
+) -> tuple[Stream | None, Stream | None]:
+    """Return what a bag has of the chain's joints and of the target; ``None`` where no topic has messages of that kind.
+
+    A topic is ``None`` where one alone has such messages. A bag that cannot be read is refused, and so are several
+    topics to choose from and a joint that is not recorded.
+    """
+    try:
+        from rosbags.highlevel import AnyReader, AnyReaderError
+        from rosbags.typesys import Stores, get_typestore
+    except ImportError as error:
+        raise CampaignError(str(path), "bags need rosbags, which is not installed", expected=WITH_ROSBAGS) from error
+    try:
+        with AnyReader([path], default_typestore=get_typestore(Stores.LATEST)) as reader:
+            found = []
+            for types, topic, key in ((_JOINT_STATES, joint_topic, "joints"), (tuple(_TARGETS), target_topic, "pose")):
+                chosen = _connections(str(path), reader, types, topic, key)
+                messages = [
+                    (stamp, reader.deserialize(raw, connection.msgtype), connection.msgtype)
+                    for connection, stamp, raw in (reader.messages(connections=chosen) if chosen else ())
+                ]
+                found.append(messages)
+    except AnyReaderError as error:
+        raise CampaignError(
+            str(path), f"cannot be read as a bag ({error})", expected="a bag of ROS 1 or ROS 2"
+        ) from error
+    return _joint_stream(str(path), found[0], joints), _target_stream(str(path), found[1])
+
+
+def _connections(file: str, reader: Any, types: Sequence[str], topic: str | None, key: str) -> list[Any]:
+    """Return the connections of one topic."""
+    fitting = [c for c in reader.connections if c.msgtype in types]
+    topics = sorted({c.topic for c in fitting})
+    if topic is None and len(topics) > 1:
+        raise CampaignError(
+            file,
+            f"several topics have messages of {' or '.join(types)}",
+            found=listed(topics),
+            expected=f"[recording] {key} in the mapping",
+        )
+    if topic is not None and topic not in topics:
+        raise CampaignError(
+            file, f"no messages of {' or '.join(types)} in topic {topic!r}", found=listed(topics), expected="its topics"
+        )
+    return [c for c in fitting if topic in (None, c.topic)]
+
+
+def _instant(stamp: int, message: Any) -> float:
+    """Return when a message was measured, s; when it was recorded where it does not say."""
+    header = message.header.stamp
+    return header.sec + header.nanosec * _NANOSECOND if header.sec or header.nanosec else stamp * _NANOSECOND
+
+
+def _joint_stream(file: str, messages: Sequence[Any], joints: Sequence[str]) -> Stream | None:
+    if not messages:
+        return None
+    times, rows = [], []
+    for stamp, message, _ in messages:
+        where = joint_columns(message.name, joints)
+        if len(where) == len(joints):  # a hand may speak in messages of its own
+            times.append(_instant(stamp, message))
+            rows.append([message.position[message.name.index(where[joint])] for joint in joints])
+    if not rows:
+        recorded = sorted({name for _, message, _ in messages for name in message.name})
+        raise CampaignError(
+            file, "no message has all joints of the chain", found=listed(recorded), expected=listed(joints)
+        )
+    return stream(file, np.array(times), np.array(rows, dtype=float), joints)
+
+
+def _target_stream(file: str, messages: Sequence[Any]) -> Stream | None:
+    if not messages:
+        return None
+    times, rows = [], []
+    for stamp, message, kind in messages:
+        held = getattr(message, _TARGETS[kind])
+        place = next((getattr(held, name) for name in ("position", "translation") if hasattr(held, name)), held)
+        turn = next((getattr(held, name) for name in ("orientation", "rotation") if hasattr(held, name)), None)
+        parts = [] if turn is None else [turn.w, turn.x, turn.y, turn.z]
+        times.append(_instant(stamp, message))
+        rows.append([place.x, place.y, place.z, *parts])
+    whole = names.MEASURED if len(rows[0]) == len(names.MEASURED) else names.POSITION
+    return stream(file, np.array(times), np.array(rows, dtype=float), whole)
+
 
 _UNITS = {"measurements": {"angle_unit": "rad", "length_unit": "m"}}
 _LIMITS = ("tolerance", "standstill", "velocity", "settling")
 
 
-def _read(files: Sequence[Path], plan: Plan) -> Source:
+def _read_recordings(files: Sequence[Path], plan: Plan) -> Source:
     """Read both recordings, estimate how their clocks differ unless it is stated, and pair them at standstill."""
     own = planned(_UNITS)
     robot = plan.robot()
@@ -103,8 +524,8 @@ def _table(joints: Stream, target: Stream, pairs: Pairs, scale: Array) -> Table:
     return Table(f"{joints.file} with {target.file}", columns, np.arange(1, len(pairs.times) + 1))
 
 
-FORMAT = Format(
+ROSBAG = Format(
     "joint_states and poses of the target: ROS bags, or CSV of rostopic, ros2 topic echo, PlotJuggler",
     "BAG, or BAG POSES.csv, or JOINT_STATES.csv POSES.csv",
-    _read,
+    _read_recordings,
 )

@@ -1,4 +1,4 @@
-"""Files of another program in, the folder of a campaign out."""
+"""Files of another program in, the folder of a campaign out; the formats that can be imported."""
 
 from __future__ import annotations
 
@@ -7,12 +7,28 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from thermal_robot.campaign.campaign import Campaign
-from thermal_robot.campaign.declaration import FILE_NAME
-from thermal_robot.campaign.importers.formats import FORMATS
-from thermal_robot.campaign.importers.mapped import campaign_of
-from thermal_robot.campaign.importers.plan import Plan
+from thermal_robot.campaign.document import FILE_NAME
+from thermal_robot.campaign.importers.plan import Format, Plan, campaign_of
+from thermal_robot.campaign.importers.programs import KUKA, RAPID
+from thermal_robot.campaign.importers.robot_calibration import FIGAROH, ROBOT_CALIBRATION
+from thermal_robot.campaign.importers.rosbag import ROSBAG
+from thermal_robot.campaign.importers.table import IPA_UR10, JACOBI, POINTS, TABLE
 from thermal_robot.campaign.write import ROBOT_NAME, TABLE_NAME, write_campaign
 from thermal_robot.errors import CampaignError
+
+FORMATS: dict[str, Format] = {
+    "table": TABLE,
+    "points": POINTS,
+    "kuka": KUKA,
+    "rapid": RAPID,
+    "figaroh": FIGAROH,
+    "robot_calibration": ROBOT_CALIBRATION,
+    "rosbag": ROSBAG,
+    "jacobi": JACOBI,
+    "ipa_ur10": IPA_UR10,
+}
+"""Formats by name, in the order of the help."""
+
 
 IMPORTED = "Imported by `thermal-robot import"
 """What the first line of a campaign.toml says that was imported."""
@@ -20,21 +36,11 @@ IMPORTED = "Imported by `thermal-robot import"
 
 @dataclass(frozen=True)
 class Imported:
-    """A campaign that was imported.
+    """A campaign that was imported."""
 
-    Attributes
-    ----------
-    campaign
-        As it was written.
-    file
-        Its campaign.toml.
-    notes
-        How many rows were read, what was left out and why, what was found out; a sentence each.
-    """
-
-    campaign: Campaign
-    file: Path
-    notes: tuple[str, ...]
+    campaign: Campaign  # as it was written
+    file: Path  # its campaign.toml
+    notes: tuple[str, ...]  # how many rows were read, what was left out and why, what was found out; a sentence each
 
 
 def import_files(format: str, files: Sequence[Path], directory: Path, plan: Plan | None = None) -> Imported:
@@ -43,7 +49,7 @@ def import_files(format: str, files: Sequence[Path], directory: Path, plan: Plan
     Parameters
     ----------
     format
-        One of :data:`~thermal_robot.campaign.importers.formats.FORMATS`.
+        One of :data:`~thermal_robot.campaign.importers.run.FORMATS`.
     files
         As many as the format has.
     directory

@@ -1,20 +1,40 @@
-"""Any table, by a mapping (docs/importers.md); or two, measured and commanded: joined by names, or row by row."""
+"""Tables and lists of points: any, by a mapping (docs/importers.md); two that are joined; those of public data sets.
+
+Source of SpatialAnalyzer's layout: New River Kinematics, *SpatialAnalyzer User's Manual*, "Exporting ASCII Formatted
+Points": a line holds the collection, the group and the target, or the last two, or the last, or none of them, then x y
+z, separated by blanks or commas; lines that begin with // are comments. What else can be exported (tolerances,
+uncertainties, time stamps) stands behind in an order that the manual does not give: it is left out here.
+
+A generic list has the same lines, or a header. Several targets of one pose, where the mapping names their column, make
+one row.
+
+Public data sets are a mapping each. P. Jacobi, github.com/pauljac7700/serial_robots_datasets, README, "Data Format":
+target positions x_t y_t z_t and their differences from the positions that were reached x_dif y_dif z_dif, mm; commanded
+joints joint_1 …, degrees; step_order. Measured is target + difference: that sum has six decimals in every row, the
+difference of the two has not.
+
+Landgraf et al. (2021), github.com/christianlandgraf/ipa-robot-accuracy, README and the headers of its tables: commanded
+joints by their names in the URDF, rad; measurement_x y z, mm, and measurement_rx ry rz, degrees, of the T-Mac in the
+tracker's frame; measurement_temperature of the air, °C; Timestamp as 20200714163904. That rx ry rz turn about the
+moving axes x, y, z in this order is not written there: this convention agrees with the joints to 2 mrad, where each
+other leaves more than 20. In some series the time stamps are rounded to 2,02011E+13: then the order of the rows takes
+their place. The T-Mac sits about 93 mm before the flange, which is where its place is looked for first.
+"""
 
 from __future__ import annotations
 
+import re
 from collections import Counter
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
-from thermal_robot.campaign.importers.columns import found
-from thermal_robot.campaign.importers.mapped import Format, Source
-from thermal_robot.campaign.importers.plan import Plan
+from thermal_robot.campaign.importers.plan import JOINING, Format, Plan, Source, found, planned
 from thermal_robot.campaign.names import listed
-from thermal_robot.campaign.table import Cells, Table
-from thermal_robot.campaign.tabular import PLAIN, read_table
+from thermal_robot.campaign.table import PLAIN, SPACE, Cells, Layout, Table, read_table
 from thermal_robot.errors import CampaignError
 
 _FEW = 3
@@ -26,11 +46,6 @@ def commands(file: Path, plan: Plan) -> Table:
 
     A layout fits where the header, if it has any, is no row of numbers, and where no row is a header. What does not fit
     is tried with a header or without, and as any table is read.
-
-    Raises
-    ------
-    CampaignError
-        A table that cannot be read.
     """
     if plan.sections.get("commands"):
         return read_table(file, plan.layout("commands"))
@@ -95,13 +110,8 @@ def joined(measured: Table, commanded: Table, key: str = "") -> tuple[Table, tup
         if name == taken:
             continue
         if name in columns:
-            raise CampaignError(
-                commanded.file,
-                f"has a column that {measured.file} has, too",
-                row=commanded.header,
-                column=name,
-                expected="every column in one of the two tables",
-            )
+            problem = f"has a column that {measured.file} has, too"
+            raise commanded.error(problem, name, expected="every column in one of the two tables")
         columns[name] = cells
     return Table(f"{measured.file} with {commanded.file}", columns, measured.rows, header), notes
 
@@ -164,7 +174,7 @@ def _settled(table: Table, order: Sequence[int]) -> dict[str, Cells]:
     return columns
 
 
-def _read(files: Sequence[Path], plan: Plan) -> Source:
+def _read_table(files: Sequence[Path], plan: Plan) -> Source:
     """Read one table, or two that are joined by the names in ``[table] key``, else row by row."""
     if plan.get("table", "targets") is not None:
         expected = 'the format `points`; or the columns of each target, "x.1" = …, in [columns]'
@@ -177,8 +187,158 @@ def _read(files: Sequence[Path], plan: Plan) -> Source:
     return Source(both, Plan(), notes)
 
 
-FORMAT = Format(
+TABLE = Format(
     "any table, by a mapping; or two, of what was measured and of what was commanded",
     "TABLE, or MEASURED COMMANDED",
-    _read,
+    _read_table,
+)
+
+
+COMMENT = "//"
+_NAMES = ("collection", "group", "target")
+_AXES = ("x", "y", "z")
+
+
+def _read_points(files: Sequence[Path], plan: Plan) -> Source:
+    """Read points and commands, joined by the name of the point; without names, row by row."""
+    laid_out = set(plan.sections.get("table", {})) - set(JOINING)
+    layout = plan.layout() if laid_out else _laid_out(files[0])
+    table = _called(read_table(files[0], layout), plan)
+    key = plan.get("table", "key") or _NAMES[-1]
+    targets = plan.get("table", "targets")
+    told: list[str] = []
+    if targets:
+        table, note = grouped(table, key, targets)
+        told.append(note)
+    both, notes = joined(table, commands(files[1], plan), key if key in table.columns else "")
+    sections = {"columns": {} if targets else {axis: axis for axis in _AXES}}
+    if key in table.columns:
+        sections["columns"]["pose"] = key
+    return Source(both, planned(sections), (*told, *notes))
+
+
+def _laid_out(file: Path) -> Layout:
+    """Return how a list of points is laid out: its first line that is no comment tells."""
+    separators = {separator: Layout(separator, 0, False, COMMENT) for separator in (",", ";", "\t", SPACE)}
+    for layout in separators.values():
+        try:
+            table = read_table(file, layout)
+        except CampaignError:  # another number of fields in some line: not this separator
+            continue
+        if len(table.columns) >= len(_AXES):
+            first = table.take(table.rows == table.rows[0])
+            named = not any(first.first_text(name) is None for name in first.columns)
+            return Layout(layout.separator, 0, named, COMMENT)
+    raise CampaignError(
+        str(file), "is no list of points", expected="lines of names and x y z, separated by blanks, commas or tabs"
+    )
+
+
+def _called(table: Table, plan: Plan) -> Table:
+    """Return the table with its columns called collection, group, target, x, y, z as far as they are there."""
+    if table.header is not None:
+        axes = {name: name.lower() for name in table.columns if name.lower() in _AXES}
+        first = min((k for k, name in enumerate(table.columns) if name in axes), default=0)
+    else:
+        first = _names_before(table)
+        axes = dict(zip(list(table.columns)[first:], _AXES, strict=False))
+    if sorted(axes.values()) != list(_AXES) and not plan.sections.get("columns"):
+        raise CampaignError(
+            table.file,
+            "x, y and z of the points are not found",
+            row=table.header,
+            found=listed(table.columns) if table.header is not None else f"{len(table.columns)} fields in a line",
+            expected="at most three names, then x y z; or [columns] in the mapping",
+        )
+    titles = dict(zip(list(table.columns)[:first], _NAMES[max(0, len(_NAMES) - first) :], strict=False))
+    return replace(table, columns={{**titles, **axes}.get(name, name): cells for name, cells in table.columns.items()})
+
+
+def _names_before(table: Table) -> int:
+    """Return how many fields of a line are names: text, or whole numbers throughout where three fields remain."""
+    columns = list(table.columns)
+    for count, name in enumerate(columns[: len(_NAMES)]):
+        figures = table.first_text(name) is None
+        if figures and (len(columns) - count <= len(_AXES) or not all(map(str.isdigit, table.text(name)))):
+            return count
+    return min(len(_NAMES), len(columns))
+
+
+def grouped(table: Table, key: str, targets: str) -> tuple[Table, str]:
+    """Return a table with a row for each visit of a pose, and in a sentence which targets there are.
+
+    Each line of the table is a point, x y z. Targets are numbered as they first appear. One that is measured again at a
+    pose begins another visit. A target that a visit lacks has empty cells there. ``key`` and ``targets`` are the
+    columns of the names of poses and of targets; a single target is refused.
+    """
+    import pandas as pd
+
+    lines = pd.DataFrame({"pose": table.text(found(table, key)), "called": table.text(found(table, targets))})
+    order = list(lines["called"].unique())
+    if len(order) < 2:
+        raise CampaignError(
+            table.file,
+            "holds a single target of each pose",
+            column=targets,
+            found=listed(order),
+            expected="names of several targets, or no [table] targets",
+        )
+    lines["visit"] = lines.groupby(["pose", "called"]).cumcount()
+    row = lines.groupby(["pose", "visit"], sort=False).ngroup().to_numpy()
+    _, first = np.unique(row, return_index=True)
+    values = np.full((len(first), len(order), 3), np.nan)
+    values[row, lines["called"].map(order.index)] = np.stack([table.numbers(a, gaps=True) for a in _AXES], axis=1)
+    columns: dict[str, Cells] = {key: list(lines["pose"].iloc[first])}
+    columns |= {f"{axis}.{k + 1}": values[:, k, i] for k in range(len(order)) for i, axis in enumerate(_AXES)}
+    both = Table(table.file, columns, table.rows[first], table.header, warnings=table.warnings)
+    return both, f"{len(order)} targets of each pose, numbered so: {listed(order)}"
+
+
+POINTS = Format(
+    "points of a laser tracker by name (SpatialAnalyzer, lists of names and x y z), and a table of commands",
+    "POINTS COMMANDS.csv",
+    _read_points,
+    least=2,
+)
+
+
+_STAMP = "Timestamp"
+
+
+def _jacobi(files: Sequence[Path], plan: Plan) -> Source:
+    table = read_table(files[0], plan.layout())
+    joints = sorted((name for name in table.columns if re.fullmatch(r"joint_\d", name)), key=lambda name: name[-1])
+    measured = {axis: {"sum": [f"{axis}_t", f"{axis}_dif"]} for axis in "xyz"}
+    sections: dict[str, dict[str, Any]] = {
+        "measurements": {"angle_unit": "deg", "length_unit": "mm"},
+        "columns": {"joints": joints, **measured, "order": "step_order"},
+    }
+    return Source(table, planned(sections))
+
+
+def _ipa_ur10(files: Sequence[Path], plan: Plan) -> Source:
+    table = read_table(files[0], plan.layout())
+    whole = _STAMP in table.columns and all(re.fullmatch(r"\d{14}", stamp) for stamp in table.text(_STAMP))
+    clock: dict[str, Any] = {"time": {"column": _STAMP, "time": "%Y%m%d%H%M%S"}}
+    measured = {axis: f"measurement_{axis}" for axis in "xyz"}
+    turned = {"kind": "euler", "sequence": "XYZ", "unit": "deg", "columns": [f"measurement_r{axis}" for axis in "xyz"]}
+    sections: dict[str, dict[str, Any]] = {
+        "measurements": {"angle_unit": "rad", "length_unit": "mm"},
+        "frames": {"target": [0.0, 0.0, 93.0]},
+        "columns": {
+            **measured,
+            **(clock if whole else {"order": {"count": True}}),
+            "temperature": "measurement_temperature",
+        },
+        "orientation": turned,
+    }
+    notes = () if whole else ("the time stamps are no instants: the order of the rows is taken",)
+    return Source(table, planned(sections), notes)
+
+
+JACOBI = Format(
+    "the data sets of P. Jacobi: UR5 and WAM, laser tracker", "3D_UR5_uncalibrated_grid_cleaned.csv", _jacobi, most=1
+)
+IPA_UR10 = Format(
+    "the data set of Landgraf et al.: UR10, laser tracker with T-Mac", "measurements_grid.csv", _ipa_ur10, most=1
 )

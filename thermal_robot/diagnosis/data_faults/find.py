@@ -1,21 +1,389 @@
-"""Find the fault of the data that repairs a campaign, or the two: all candidates are judged in the same way."""
+"""Find the fault of the data that repairs a campaign, or the two: all candidates are judged in the same way.
+
+What a repair is worth is how far it brings down the gap, its median over the rows, with the unknown frames fitted
+exactly and robustly: faults of a table are large, and nothing else is fitted.
+
+Candidates are screened side by side: thousands at a glance, a few hundred at a look. Where no frame is known, a linear
+map in place of a rigid motion (``Readings.relaxed``) tells what is wrong with the joints whatever unit and axes the
+instrument has, so that faults of both sides are found apart, and two at once.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
 from operator import attrgetter
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
 
+from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
-from thermal_robot.diagnosis.data_faults import of_joints, of_measurements, of_pairing, settings
-from thermal_robot.diagnosis.data_faults.kind import Kind
-from thermal_robot.diagnosis.data_faults.readings import Readings, rms
-from thermal_robot.diagnosis.data_faults.screen import Screen
-from thermal_robot.diagnosis.data_faults.struck import Struck, Tried, consensus, misfit, mixture, part_of
+from thermal_robot.diagnosis.data_faults import settings
+from thermal_robot.diagnosis.data_faults.kind import (
+    AXES,
+    JOINT_KINDS,
+    KINDS,
+    MEASUREMENT_KINDS,
+    PAIRING_KINDS,
+    TURNS,
+    UNITS,
+    Fault,
+    Kind,
+    Offsets,
+    Proposal,
+    repaired,
+    reversing,
+    sign_patterns,
+)
+from thermal_robot.diagnosis.data_faults.readings import Readings, Rows, rms, stacked
 from thermal_robot.diagnosis.parts import DataFault
+from thermal_robot.inference.alternation import Placed, middle, soft
 
-KINDS: tuple[Kind, ...] = (*of_joints.KINDS, *of_measurements.KINDS, *of_pairing.KINDS)
+
+@dataclass(frozen=True, eq=False)
+class Tried:
+    """A fault with what is left once it is mended: the distance of each row of a sample that it determines, m."""
+
+    fault: Fault  # what was mended
+    distance: Array  # (K,) m
+    place: Array  # (3,) where the target then sits on the tool frame, m
+    still: float = np.inf  # m, the median distance that a robot which does not move would leave
+
+    @property
+    def median(self) -> float:
+        """The median distance, m: what the fall of the gap is told by."""
+        return float(np.median(self.distance))
+
+    @property
+    def typical(self) -> float:
+        """The geometric mean of the distances, m: less the more rows are mended, and the better."""
+        return float(np.exp(np.mean(np.log(np.maximum(self.distance, settings.LEAST_GAP)))))
+
+
+@dataclass(frozen=True, eq=False)
+class Struck:
+    """The rows that a fault may have struck, and how far they are from the prediction."""
+
+    readings: Readings  # all rows as they stand
+    rows: Rows  # (N,) those in question
+    distance: Array  # (N,) of all rows as they stand, m
+    # where the other rows put the frames; ``None`` where all are in question, and the frames with them
+    frames: Placed | None
+
+    @classmethod
+    def whole(cls, readings: Readings) -> Struck:
+        """All rows; the frames are fitted to whatever is proposed."""
+        rows = np.ones(len(readings.q), dtype=bool)
+        struck = cls(readings, rows, np.zeros(len(rows)), None)
+        frames = struck.sample.align(coarse=True)
+        if np.median(readings.distance(frames)) > misfit(readings):
+            frames = struck.sample.align()
+        return replace(struck, distance=readings.distance(frames))
+
+    @property
+    def sample(self) -> Readings:
+        """A sample of the rows in question, as they stand."""
+        return self.readings.take(spread(np.flatnonzero(self.rows)))
+
+    @property
+    def median(self) -> float:
+        """The median distance of these rows, m."""
+        return float(np.median(self.distance[self.rows]))
+
+    @property
+    def count(self) -> int:
+        """How many rows candidates are compared on, less those that the frames take up."""
+        rows = min(int(self.rows.sum()), settings.SAMPLED)
+        return max(rows - (settings.FEWEST_STRAYS if self.frames is None else 0), 0)
+
+    def sketch(self, fault: Fault, most: int) -> Readings | None:
+        """Return so many of these rows, mended; ``None`` where the repair determines too few."""
+        mended = repaired(fault, self.readings, self.rows)
+        own = np.flatnonzero(self.rows & mended.known)
+        if 2 * len(own) < self.rows.sum() or len(own) < settings.FEWEST_STRAYS:
+            return None
+        return mended.take(own[np.linspace(0, len(own) - 1, min(most, self.rows.sum())).round().astype(np.int64)])
+
+    def tried(self, fault: Fault, begun: Array | None = None) -> Tried | None:
+        """Mend a fault in these rows; see what a sample of them leaves, aligned from a place and the declared one."""
+        part = self.sketch(fault, settings.SAMPLED)
+        if part is None:
+            return None
+        own = part.declared.tool[:3, 3]
+        frames = self.frames or part.align(begun=None if begun is None else np.stack([begun, own]))
+        return Tried(fault, part.distance(frames), frames.tool[:3, 3], float(part.still()))
+
+    def hit(self, found: Tried) -> Rows:
+        """(N,) those of these rows that a fault has struck: they fit better mended than as they stand.
+
+        Rows that nothing mends, and those that are not determined, count as the others.
+        """
+        mended = repaired(found.fault, self.readings, self.rows)
+        some = mended.take(spread(np.flatnonzero(mended.known)))
+        frames = self.frames or some.align(begun=found.place[None])
+        before, after = self.readings.distance(frames), mended.distance(frames)
+        better = self.rows & mended.known & (after < before)
+        return self.rows if better.sum() > settings.NEARLY_ALL * (self.rows & mended.known).sum() else better
+
+
+def spread(rows: NDArray[np.int64], most: int = settings.SAMPLED) -> NDArray[np.int64]:
+    """Return so many of the rows that candidates can be compared, evenly."""
+    if len(rows) <= most:
+        return rows
+    return np.asarray(rows[np.linspace(0, len(rows) - 1, most).round().astype(int)])
+
+
+def misfit(readings: Readings) -> float:
+    """Return the gap, m, above which robot and table are not taken to fit."""
+    return settings.MISFIT * readings.spread()
+
+
+def window(readings: Readings) -> Readings:
+    """Return the rows in the middle of the campaign, one after the other in time, on which clocks are compared."""
+    rows = len(readings.q)
+    if rows <= settings.WINDOW:
+        return readings
+    order = np.arange(rows) if readings.clock is None else np.argsort(readings.clock, kind="stable")
+    begin = (rows - settings.WINDOW) // 2
+    return readings.take(np.sort(order[begin : begin + settings.WINDOW]))
+
+
+def part_of(readings: Readings, begun: Placed) -> Struck | None:
+    """Return the rows that stray from the others, which are many; ``None`` where few stray, or most."""
+    distance = readings.distance(begun)
+    for _ in range(settings.PART_ROUNDS):
+        near = np.flatnonzero(~_strays(readings, distance))
+        if len(near) <= (1.0 - settings.MOST_STRAYS) * len(distance):
+            return None
+        frames = readings.take(spread(near)).align()
+        distance = readings.distance(frames)
+    away = _strays(readings, distance)
+    least = max(settings.FEWEST_STRAYS, settings.FEW_STRAYS * len(away))
+    if least <= away.sum() <= settings.MOST_STRAYS * len(away):
+        return Struck(readings, away, distance, frames)
+    return None
+
+
+def _strays(readings: Readings, distance: Array) -> Rows:
+    """(N,) rows that are far off, for those whose gap is near enough."""
+    near = float(np.quantile(distance, settings.NEAREST))
+    return np.asarray(distance > settings.STRAY * max(near, settings.LEAST * misfit(readings)))
+
+
+def consensus(sample: Readings) -> Placed:
+    """Return frames that bring many rows near where half of them may be wrong: the best of few rows drawn at random.
+
+    Fischler and Bolles, *Communications of the ACM* 24 (1981). All draws go side by side.
+    """
+    rng = np.random.default_rng(settings.SEED)
+    rows = np.array([rng.choice(len(sample.q), settings.DRAWN, replace=False) for _ in range(settings.DRAWS)])
+    best, least = sample.align(coarse=True), np.inf
+    for _ in range(1 + settings.PART_ROUNDS):
+        frames = sample.take(rows).align(coarse=True)
+        distance = sample.distance(frames)
+        reach = np.quantile(distance, settings.NEAREST, axis=1)
+        first = int(reach.argmin())
+        if reach[first] < least:
+            best, least = Placed(frames.base[first], frames.tool[first]), float(reach[first])
+        # go on from the most promising draws, each with the rows that it brings near
+        order = np.argsort(reach, kind="stable")[: max(len(reach) // settings.DRAWS_HALVED, 1)]
+        near = max(int(settings.NEAREST * distance.shape[1]), settings.DRAWN)
+        rows = np.argsort(distance[order], axis=1)[:, :near]
+    return best
+
+
+def mixture(struck: Struck) -> Struck | None:
+    """Return the rows that fit better mended than as they stand, by the fault beside which all rows fit best so.
+
+    For a robot whose own errors are not small beside the fault: no row strays far. Frames are fitted to the rows as
+    they stand and to the others mended, which are told anew in each round. Each row may choose, which counts against
+    the fault as one bit.
+    """
+    readings = window(struck.readings)
+    rows, every = spread(np.arange(len(readings.q)), settings.RELAXED), np.ones(len(readings.q), dtype=bool)
+    own, begun = readings.take(rows), struck.sample.align(coarse=True)
+    proposals = [p for kind in KINDS for p in (*kind.proposed(readings), *_numbered(kind, readings))]
+    best: list[tuple[float, Proposal, Placed]] = []
+    for first in range(0, len(proposals), settings.ABREAST):
+        some = proposals[first : first + settings.ABREAST]
+        mended = [p.repair(readings, every).take(rows) for p in some]
+        known, repair = np.stack([m.known for m in mended]), stacked(mended)
+        frames = begun
+        for _ in range(settings.MIXTURE_ROUNDS):
+            better = known & (repair.distance(frames) < own.distance(frames))
+            mixed = own.where(~better, repair)
+            frames = mixed.align(coarse=True, begun=np.atleast_2d(frames.tool[..., :3, 3])[:, None, :])
+        left = np.where(better.any(axis=1) & ~better.all(axis=1), middle(mixed.distance(frames)), np.inf)
+        k = int(left.argmin())
+        best.append((float(left[k]), some[k], Placed(frames.base[k], frames.tool[k])))
+    least, proposal, frames = min(best, key=lambda found: found[0])
+    fall = struck.median / (2.0 * max(least, settings.LEAST_GAP))
+    if fall < 1.0 or struck.count * np.log(fall) < np.log(len(proposals) / settings.LEVEL):
+        return None
+    mended_all, distance = proposal.repair(struck.readings, struck.rows), struck.readings.distance(frames)
+    return Struck(struck.readings, mended_all.known & (mended_all.distance(frames) < distance), distance, frames)
+
+
+def _numbered(kind: Kind, readings: Readings) -> list[Proposal]:
+    """Return the faults that differ by a number, for each number that is tried."""
+    return [family.of(number) for family in kind.families(readings) for number in family.tried]
+
+
+Chosen = list[tuple[Fault, Array, float]]
+"""Faults, (3,) where the target then sits on the tool, m, and what is left at least, of what a robot at rest leaves."""
+
+
+class Screen:
+    """The faults that may have struck some rows, and those of them that are worth a closer look."""
+
+    def __init__(self, struck: Struck) -> None:
+        self.struck, self.asked = struck, 0
+
+    def singly(self) -> list[Tried]:
+        """Return each fault by itself, where the frames are known: distances on a few rows."""
+        parts = [((p,), self.struck.sketch((p,), settings.SKETCHED)) for p in self._proposals(KINDS)]
+        frames = self.struck.frames
+        assert frames is not None
+        self.asked += len(parts)
+        return [Tried(own, part.distance(frames), frames.tool[:3, 3]) for own, part in parts if part is not None]
+
+    def both_sides(self) -> list[Tried]:
+        """Return faults of the joints, of the measurements, and of both, one on each side: distances on a few rows."""
+        joints = self._glanced([(), *((p,) for p in self._of_joints)])
+        units = [p for p in self._measured if p.kind in UNITS]
+        axes = [p for p in self._measured if p.kind in AXES]
+        sides: list[Fault] = [(), *((p,) for p in (*units, *axes)), *((u, a) for u in units for a in axes)]
+        asked = [((*own, *side), at, left) for own, at, left in joints for side in sides if len(own) + len(side) <= 2]
+        looked = self._looked(asked)
+        turns = [p for p in self._measured if p.kind in TURNS]
+        if self.struck.readings.orientation is None:
+            return looked
+        looked.sort(key=attrgetter("typical"))
+        near = [
+            t for two in (False, True) for t in [t for t in looked if (len(t.fault) > 1) is two][: settings.SURVIVORS]
+        ]
+        more = [((*t.fault, *turn), t.place, 0.0) for t in near for turn in ((), *((p,) for p in turns))]
+        return self._looked([own for own in more if len(own[0]) <= 2], turns=True)
+
+    def two_of_joints(self) -> list[Tried]:
+        """Return pairs of faults of the joints, among them any number that are reversed beside another fault."""
+        others = [p for p in self._of_joints if not p.joints]
+        signs = sign_patterns(self.struck.readings.robot.n)[: settings.PAIRED_PATTERNS]
+        scores: list[Array] = []
+        made: list[Fault] = []
+        turned = [Proposal(self._reversed((own < 0).sum()), *reversing(own, self.struck.readings)) for own in signs]
+        for other in others:
+            part = self.struck.sketch((other,), settings.RELAXED)
+            if part is None:
+                continue
+            several = [replace(part, q=part.q * signs[:, None, :])]
+            made += [(other, own) for own in turned]
+            every = np.ones(len(part.q), dtype=bool)
+            seconds = [p for p in others if p is not other and p.kind not in PAIRING_KINDS]
+            several.append(stacked([p.repair(part, every) for p in seconds]))
+            made += [(other, p) for p in seconds]
+            scores += [middle(own.relaxed()[0]) for own in several]
+        if not scores:
+            return []
+        self.asked += len(made)
+        order = np.argsort(np.concatenate(scores), kind="stable")[: settings.MOST_SURVIVORS]
+        return self._looked(self._glanced([made[k] for k in order]), turns=True)
+
+    @cached_property
+    def _of_joints(self) -> list[Proposal]:
+        return [*self._proposals((*JOINT_KINDS, *PAIRING_KINDS))]
+
+    @cached_property
+    def _measured(self) -> list[Proposal]:
+        return [*self._proposals(MEASUREMENT_KINDS)]
+
+    def _reversed(self, joints: int) -> Kind:
+        return JOINT_KINDS[0] if joints == 1 else JOINT_KINDS[1]
+
+    def _proposals(self, kinds: Sequence[Kind]) -> Iterator[Proposal]:
+        """Yield the faults of some kinds; of those that differ by a number the best of each family."""
+        for kind in kinds:
+            yield from kind.proposed(self.struck.readings)
+            for family in kind.families(self.struck.readings):
+                self.asked += len(family.tried)
+                if (best := self._refined(family)) is not None:
+                    yield best
+
+    def _refined(self, family: Offsets) -> Proposal | None:
+        """Return the best of a family: the best of those that are tried, then between its neighbours."""
+        if len(family.tried) < 3:
+            return None
+        struck = self.struck
+        if struck.frames is None and len(struck.rows) > settings.WINDOW:
+            part = window(struck.readings)
+            struck = replace(
+                struck, readings=part, rows=np.ones(len(part.q), dtype=bool), distance=np.zeros(len(part.q))
+            )
+        found = [self._typical(struck, (family.of(number),)) for number in family.tried]
+        k = int(np.argmin(found))
+        if found[k] * settings.PROMISING > self._typical(struck, ()):
+            return None
+        low, high = family.tried[max(k - 1, 0)], family.tried[min(k + 1, len(found) - 1)]
+        least = minimize_scalar(
+            lambda number: np.log(min(self._typical(struck, (family.of(number),)), found[k] * settings.WORSE)),
+            bounds=(low, high),
+            method="bounded",
+            options={"maxiter": settings.OFFSET_ROUNDS, "xatol": settings.OFFSET_SETTLED * (high - low)},
+        )
+        return family.of(float(least.x) if least.fun < np.log(found[k]) else family.tried[k])
+
+    def _typical(self, struck: Struck, fault: Fault) -> float:
+        part = struck.sketch(fault, settings.RELAXED)
+        if part is None:
+            return np.inf
+        left = part.relaxed()[0] if struck.frames is None else part.distance(struck.frames)
+        return float(np.exp(np.mean(np.log(np.maximum(left, settings.LEAST_GAP)))))
+
+    def _glanced(self, faults: Sequence[Fault]) -> Chosen:
+        """Return the faults that leave least of a linear map, fitted twice to the best of them."""
+        own = [(fault, part) for fault in faults if (part := self.struck.sketch(fault, settings.RELAXED)) is not None]
+        self.asked += len(faults)
+        if not own:
+            return []
+        left, place = stacked([part for _, part in own]).relaxed()
+        score = middle(left)
+        best = np.argsort(score, kind="stable")[: max(round(settings.AGAIN * len(own)), settings.SURVIVORS)]
+        left, place[best] = stacked([own[k][1] for k in best]).relaxed(soft(left[best]))
+        again = middle(left)
+        order = best[np.argsort(again, kind="stable")]
+        again = np.sort(again)
+        many = max(settings.SURVIVORS, int((again <= settings.NEAR * max(again[0], settings.LEAST_GAP)).sum()))
+        least = again * own[0][1].maps_place
+        chosen = zip(order, least, strict=True)
+        return [(own[k][0], place[k], float(at)) for k, at in [*chosen][: min(many, settings.MOST_SURVIVORS)]]
+
+    def _looked(self, chosen: Chosen, *, turns: bool = False) -> list[Tried]:
+        """Return the faults with what rigid frames leave on a few rows; points must have the extent of the motion.
+
+        Those of which even a map leaves more than a mend may are passed over.
+        """
+        self.asked += len(chosen)
+        chosen = [own for own in chosen if own[2] <= settings.NEAR * settings.STILL[max(len(own[0]), 1) - 1]]
+        parts = [self.struck.sketch(fault, settings.SKETCHED) for fault, *_ in chosen]
+        own = [k for k, part in enumerate(parts) if part is not None and _extends(part)]
+        found: list[Tried] = []
+        for first in range(0, len(own), settings.ABREAST):
+            some = own[first : first + settings.ABREAST]
+            side = stacked([parts[k] for k in some])  # type: ignore[misc]
+            frames = side.align(coarse=True, begun=np.stack([chosen[k][1] for k in some])[:, None, :])
+            left = side.distance(frames, turns=turns)
+            found += [Tried(chosen[k][0], own, at[:3, 3]) for k, own, at in zip(some, left, frames.tool, strict=True)]
+        return found
+
+
+def _extends(readings: Readings) -> bool:
+    """Tell whether measured and predicted points are about as far from each other."""
+    points = readings.poses[:, :3, 3] if readings.simulated_position is None else readings.simulated_position
+    times = [float(np.abs(own - own.mean(axis=0)).sum()) for own in (readings.position, points)]
+    return times[0] <= settings.EXTENT * times[1] and times[1] <= settings.EXTENT * times[0]
 
 
 def data_fault(campaign: Campaign, progress: Callable[[str], None] = lambda _: None) -> DataFault | None:
@@ -35,37 +403,37 @@ def data_fault(campaign: Campaign, progress: Callable[[str], None] = lambda _: N
     apart = every.median > misfit(readings)
     if apart:
         progress("faults of the data")
-    found = mended(every, KINDS) if apart else []
+    found = mended(every) if apart else []
     part = None if found else part_of(readings, consensus(every.sample) if apart else every.sample.align(coarse=True))
     if part is None and apart and not found:
-        part = mixture(every, KINDS)
+        part = mixture(every)
     if part is not None:
         progress("faults of the data in some rows")
-        every, found = part, mended(part, KINDS)
+        every, found = part, mended(part)
     return _told(campaign, every, found) if found else None
 
 
-def mended(struck: Struck, kinds: Sequence[Kind]) -> list[Tried]:
+def mended(struck: Struck) -> list[Tried]:
     """Return the faults that mend the rows and cannot be told apart, in the order of their kinds; none if none does.
 
     Two faults at once are told where they leave so much less than one that it is no chance.
     """
-    screen = Screen(struck, kinds)
+    screen = Screen(struck)
     if struck.frames is not None:
-        return _best(screen, screen.singly(), struck.median, kinds)
+        return _best(screen, screen.singly(), struck.median)
     tried = screen.both_sides()
-    one = _best(screen, [t for t in tried if len(t.fault) == 1], struck.median, kinds)
+    one = _best(screen, [t for t in tried if len(t.fault) == 1], struck.median)
     least, enough = min((t.median for t in one), default=struck.median), misfit(struck.readings)
     if one and least <= enough:
         return one
     pairs = [t for t in tried if len(t.fault) == 2]
-    two = _best(screen, pairs, least, kinds)
+    two = _best(screen, pairs, least)
     if not two or min(t.median for t in two) > enough:
-        two = _best(screen, [*pairs, *screen.two_of_joints()], least, kinds)
+        two = _best(screen, [*pairs, *screen.two_of_joints()], least)
     return two or one
 
 
-def _best(screen: Screen, tried: Sequence[Tried], before: float, kinds: Sequence[Kind]) -> list[Tried]:
+def _best(screen: Screen, tried: Sequence[Tried], before: float) -> list[Tried]:
     """Return the faults that bring the gap, m, down by far, and as far as the best of them."""
     struck = screen.struck
     likely = sorted(tried, key=attrgetter("typical"))[: settings.FULLY]
@@ -79,9 +447,7 @@ def _best(screen: Screen, tried: Sequence[Tried], before: float, kinds: Sequence
         return []
     said = [_log_likelihood(t, scale) * struck.count for t in full]
     alike = [t for t, own in zip(full, said, strict=True) if own > max(said) - settings.TIE]
-    return sorted(
-        (t for t in alike if not any(_says_more(t, other) for other in alike)), key=lambda t: _usual(t, kinds)
-    )
+    return sorted((t for t in alike if not any(_says_more(t, other) for other in alike)), key=_usual)
 
 
 def _says_more(one: Tried, other: Tried) -> bool:
@@ -94,9 +460,9 @@ def _says_more(one: Tried, other: Tried) -> bool:
     )
 
 
-def _usual(tried: Tried, kinds: Sequence[Kind]) -> tuple[int, ...]:
+def _usual(tried: Tried) -> tuple[int, ...]:
     """Order of the kinds, then the fewest joints."""
-    return (*(kinds.index(p.kind) for p in tried.fault), *(len(p.joints) for p in tried.fault))
+    return (*(KINDS.index(p.kind) for p in tried.fault), *(len(p.joints) for p in tried.fault))
 
 
 def _log_likelihood(tried: Tried, scale: float) -> float:

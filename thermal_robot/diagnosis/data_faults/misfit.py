@@ -1,11 +1,21 @@
-"""Say that robot and table do not belong together; then no effect is claimed."""
+"""Say that robot and table do not belong together; then no effect is claimed.
+
+Lengths that no robot errs by are those of another model: every placement of a joint is calibrated as freely as the
+commands allow, and the robots at hand are tried.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import replace
+import re
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from itertools import islice, pairwise
 
 import numpy as np
+from numpy.typing import NDArray
+from scipy.linalg import block_diag
+from scipy.optimize import minimize_scalar
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
@@ -13,15 +23,352 @@ from thermal_robot.campaign.plausible import another_unit
 from thermal_robot.diagnosis import settings as diagnosis_settings
 from thermal_robot.diagnosis.answer import Conclusion
 from thermal_robot.diagnosis.data_faults import data_fault, settings
-from thermal_robot.diagnosis.data_faults.another_robot import another_robot
+from thermal_robot.diagnosis.data_faults.find import misfit
 from thermal_robot.diagnosis.data_faults.readings import Readings
-from thermal_robot.diagnosis.data_faults.struck import misfit
 from thermal_robot.diagnosis.examine import examine
 from thermal_robot.diagnosis.parts import AnotherModel, Misfit
 from thermal_robot.effects import Effect
-from thermal_robot.inference import settings as inference_settings
+from thermal_robot.errors import RobotError
+from thermal_robot.inference import settings as inference
+from thermal_robot.inference.alternation import middle, soft
 from thermal_robot.inference.fit import Fit, fit
 from thermal_robot.inference.random_gap import nothing_random
+from thermal_robot.kinematics import (
+    ChainFrames,
+    chain_frames,
+    exp6,
+    log3,
+    placement_sensitivities,
+    quaternion_to_rotation,
+)
+from thermal_robot.kinematics.lie import exp3, skew
+from thermal_robot.kinematics.model import PRISMATIC
+from thermal_robot.robot import Robot, load_robot
+from thermal_robot.urdf_text import shipped, urdf_text
+
+
+@dataclass(frozen=True, eq=False)
+class Recalibrated:
+    """A robot whose joints sit where readings put them, with frames of its own for each part of the rows.
+
+    The first joint's placement is the base's, and what lies behind the last joint the target's. What the readings do
+    not determine stays as the URDF has it (Levenberg-Marquardt with prior sizes that no robot reaches).
+    """
+
+    readings: Readings  # commands and measurements, and the robot as the URDF has it
+    parts: NDArray[np.int64]  # (N,) to which part of the rows each belongs, from 0 on
+    robot: Robot  # the calibrated robot
+    # bases, points, turns: (B, 4, 4), (B, 3) and (B, 3, 3): of each part the base, the target's place on the tool and
+    # its turn
+    bases: Array
+    points: Array
+    turns: Array
+    held: Array  # (6 J, 6 J) precision to which shift and turn of the J joints behind the first are held
+
+    @classmethod
+    def of(cls, readings: Readings, parts: NDArray[np.int64], begun: Robot) -> Recalibrated:
+        """Calibrate, beginning with another robot of the same joints, such as one with longer links."""
+        own = [replace(readings.take(np.flatnonzero(parts == part)), robot=begun).align() for part in np.unique(parts)]
+        bases, tools = np.stack([frames.base for frames in own]), np.stack([frames.tool for frames in own])
+        found = cls(readings, parts, begun, bases, tools[:, :3, 3], tools[:, :3, :3], _held(readings.robot))
+        for _ in range(settings.CALIBRATION_STEPS):
+            after, settled = found._stepped()
+            if after is None:
+                break
+            found = after
+            if settled:
+                break
+        return found
+
+    @property
+    def _placed(self) -> tuple[list[int], list[int]]:
+        """Segments and chain elements of the joints behind the first."""
+        moving = [s for s, segment in enumerate(self.robot.segments) if segment.movable][1:]
+        return moving, [self.robot.segments[s].index for s in moving]
+
+    @property
+    def moved(self) -> tuple[Array, Array]:
+        """(J, 3) m and (J, 3) rad: shift and turn of each joint behind the first, in its own frame as in the URDF."""
+        was, own, (_, index) = self.readings.robot.chain, self.robot.chain, self._placed
+        back = was.rotations[index].transpose(0, 2, 1)
+        shift = (back @ (own.translations[index] - was.translations[index])[:, :, None])[:, :, 0]
+        return shift, log3(back @ own.rotations[index])
+
+    def farthest(self) -> tuple[str, float, float]:
+        """Return the joint that sits farthest from its place in the URDF, how far, m, and over the median of all.
+
+        A slide's own way is its zero and does not count.
+        """
+        (shift, _), (_, index), chain = self.moved, self._placed, self.robot.chain
+        slides = (chain.kinds[index] == PRISMATIC)[:, None]
+        axes = chain.axes[index]
+        far = np.linalg.norm(shift - slides * axes * (shift * axes).sum(axis=1)[:, None], axis=1)
+        j = int(np.argmax(far))
+        return chain.names[index[j]], float(far[j]), float(far[j] / max(np.median(far), settings.LEAST_GAP))
+
+    @property
+    def gap(self) -> Array:
+        """(N, m) measured − predicted in the root frame's axes: m, and turns times the length of a lever."""
+        return self._seen()[2]
+
+    def left(self) -> tuple[float, float, float]:
+        """Return the rms distance, m, the rms turn, rad, and the rms of both, m, that so many unknowns leave of one.
+
+        As medians tell them: few rows that nothing explains do not count.
+        """
+        unknown = 6 * len(self._placed[0]) + len(self.bases) * (6 + self.gap.shape[1])
+        freedom = self.gap.size / max(self.gap.size - unknown, len(self.gap))
+        parts = (self.gap[:, :3], self.gap[:, 3:] / inference.LEVER, self.gap)
+        away, turned, both = (np.median(np.linalg.norm(part, axis=1)) for part in parts)
+        scale = np.sqrt(3.0 * freedom) / settings.MEDIAN
+        return float(scale * away), float(scale * turned), float(scale * both)
+
+    def _seen(self) -> tuple[ChainFrames, Array, Array]:
+        readings, parts = self.readings, self.parts
+        frames = chain_frames(self.robot, readings.q)
+        point = frames.tool_position + (frames.tool_rotation @ self.points[parts][:, :, None])[:, :, 0]
+        bases = self.bases[parts]
+        gap = ((readings.position - bases[:, :3, 3])[:, None] @ bases[:, :3, :3])[:, 0] - point
+        if readings.orientation is not None:
+            measured = bases[:, :3, :3].transpose(0, 2, 1) @ quaternion_to_rotation(readings.orientation)
+            turned = log3(measured @ (frames.tool_rotation @ self.turns[parts]).transpose(0, 2, 1))
+            gap = np.hstack([gap, inference.LEVER * turned])
+        return frames, point, gap
+
+    def _stepped(self) -> tuple[Recalibrated | None, bool]:
+        """Return the calibration after one step downhill, ``None`` where there is none, and whether it settled."""
+        frames, point, gap = self._seen()
+        rows, measures = gap.shape
+        scale = max(float(middle(np.linalg.norm(gap, axis=1))) / settings.MEDIAN, settings.LEAST_GAP)
+        weight = np.sqrt(soft(np.linalg.norm(gap, axis=1))) / scale
+        _, index = self._placed
+        flat = self._frame_columns(frames, point, measures)
+        moved = placement_sensitivities(self.robot, self.readings.q, frames=frames, point=self.points[self.parts])
+        moved = moved[:, :measures, self._placed[0]]
+        turned = self.robot.chain.rotations[index].transpose(0, 2, 1) @ self.readings.robot.chain.rotations[index]
+        moved[..., :3] = np.einsum("nmji,jik->nmjk", moved[..., :3], turned)
+        moved = moved.reshape(rows, measures, -1)
+        lever = np.where(np.arange(measures) < 3, 1.0, inference.LEVER)
+        design = np.concatenate([flat, moved], axis=2) * (lever[:, None] * weight[:, None, None])
+        design, known = design.reshape(rows * measures, -1), np.arange(flat.shape[2])
+        matrix, vector = design.T @ design, design.T @ (gap * weight[:, None]).ravel()
+        held = np.arange(len(known), len(matrix))
+        matrix[known, known] += settings.ROUNDED * matrix.diagonal()[known].max()
+        matrix[np.ix_(held, held)] += self.held
+        vector[held] -= self.held @ self._state
+        step, cost = np.linalg.solve(matrix, vector), self._cost(scale)
+        for share in settings.STEP_SHARES:
+            taken = np.asarray(share * step, dtype=float)
+            ahead = self._ahead(taken[known], taken[held])
+            if (after := ahead._cost(scale)) < cost:
+                return ahead, cost - after < settings.CALIBRATED * cost
+        return None, True
+
+    @property
+    def _state(self) -> Array:
+        return np.hstack(self.moved).ravel()
+
+    def _cost(self, scale: float) -> float:
+        """Return Cauchy's cost of the gap at a scale, and what the prior sizes cost."""
+        wide = (inference.CAUCHY_SCALE * settings.MEDIAN) ** 2
+        away = (self.gap**2).sum(axis=1) / scale**2
+        return float(wide * np.log1p(away / wide).sum() + self._state @ self.held @ self._state)
+
+    def _frame_columns(self, frames: ChainFrames, point: Array, measures: int) -> Array:
+        """(N, m, F) derivative of the prediction by base and target of each part."""
+        columns = np.zeros((len(point), measures, len(self.bases), 6 + measures))
+        for part in range(len(self.bases)):
+            own = self.parts == part
+            columns[own, :3, part, :3], columns[own, :3, part, 3:6] = np.eye(3), -skew(point[own])
+            for first in range(0, measures, 3):
+                columns[own, first : first + 3, part, 6 + first : 9 + first] = frames.tool_rotation[own]
+            columns[own, 3:, part, 3:6] = np.eye(3)[: measures - 3]
+        return columns.reshape(len(point), measures, -1)
+
+    def _ahead(self, frames: Array, twists: Array) -> Recalibrated:
+        """Move frames and joints by a step."""
+        by_part, by_joint, (_, index) = frames.reshape(len(self.bases), -1), twists.reshape(-1, 6), self._placed
+        chain = self.robot.chain
+        rotations, translations = chain.rotations.copy(), chain.translations.copy()
+        translations[index] += (self.readings.robot.chain.rotations[index] @ by_joint[:, :3, None])[:, :, 0]
+        rotations[index] = chain.rotations[index] @ exp3(by_joint[:, 3:])
+        return replace(
+            self,
+            robot=replace(self.robot, chain=replace(chain, rotations=rotations, translations=translations)),
+            bases=self.bases @ exp6(by_part[:, :6]),
+            points=self.points + by_part[:, 6:9],
+            turns=exp3(by_part[:, 9:]) @ self.turns if by_part.shape[1] > 9 else self.turns,
+        )
+
+
+def _held(robot: Robot) -> Array:
+    """(6 J, 6 J) precision to which shifts, turns of the axes and zeros are held.
+
+    Where a joint is shifted along the axis before it that axis' own joint may as well be: the shift is that one's.
+    """
+    chain, frames = robot.chain, chain_frames(robot, np.zeros((1, robot.n)))
+    index = [segment.index for segment in robot.segments if segment.movable]
+    length = settings.PRIOR_LENGTH * arm_length(robot)
+    looser = settings.PRIOR_TURN**-2 - settings.PRIOR_ZERO**-2
+    blocks = []
+    for before, k in pairwise(index):
+        axis = chain.axes[k] * (chain.kinds[k] != PRISMATIC)
+        along = frames.rotations[0, k].T @ frames.rotations[0, before] @ chain.axes[before]
+        shifts = (np.eye(3) + settings.ANOTHERS * np.outer(along, along)) / length**2
+        blocks += [shifts, np.eye(3) / settings.PRIOR_TURN**2 - looser * np.outer(axis, axis)]
+    return np.asarray(block_diag(*blocks))
+
+
+def arm_length(robot: Robot) -> float:
+    """Return the length of all segments together, m: as far as the tool can be from the root, slides drawn in."""
+    return float(sum(segment.length for segment in robot.segments))
+
+
+_JOINT = re.compile(r"<joint\b[^>]*>")
+_NAME = re.compile(r"\bname\s*=\s*[\"']([^\"']+)")
+_MOVES = re.compile(r"\btype\s*=\s*[\"'](revolute|continuous|prismatic)")
+
+
+def fitting(readings: Readings, near: float) -> tuple[str, float] | None:
+    """Return the shipped robot that fits readings best, and the median distance, m, that it leaves with frames fitted.
+
+    None is returned where none fits within the distance ``near``, m.
+    """
+    own = readings.robot
+    alike = [name for name in shipped() if set(own.joint_names) <= _movable(name)]
+    best = None
+    for name in (*alike, *(name for name in shipped() if name not in alike)):
+        if best is not None and name not in alike:
+            break
+        for robot in _chains(name, own.joint_names, own.joint_types, own.root_frame, own.tool_frame):
+            other = replace(readings, robot=robot, q=readings.q[:, _order(robot, own)])
+            left = float(np.median(other.distance(other.align())))
+            least = near if best is None else settings.LIKE_ANOTHER * best[1]
+            if left < min(least, settings.MISFIT * other.spread()):
+                best = name, left
+    return best
+
+
+def _order(robot: Robot, own: Robot) -> list[int]:
+    """Return which column of the table drives each joint: that of its name, else that of its place in the chain."""
+    if set(robot.joint_names) == set(own.joint_names):
+        return [own.joint_names.index(name) for name in robot.joint_names]
+    return list(range(robot.n))
+
+
+@cache
+def _movable(name: str) -> frozenset[str]:
+    """Return the movable joints of a shipped robot; none where it cannot be read."""
+    try:
+        joints = _JOINT.findall(urdf_text(name).text)
+    except RobotError:
+        return frozenset()
+    return frozenset(found[1] for joint in joints if _MOVES.search(joint) and (found := _NAME.search(joint)))
+
+
+@cache
+def _chains(name: str, joints: tuple[str, ...], kinds: tuple[str, ...], root: str, tool: str) -> tuple[Robot, ...]:
+    """Return the chains of a shipped robot that the joints may drive: those of the same ends, else those to a hand."""
+    alike = set(joints) <= _movable(name)
+    if not alike and not len(joints) <= len(_movable(name)) <= len(joints) + settings.HAND_JOINTS:
+        return ()
+    slides = [kind == "prismatic" for kind in kinds]
+    found = (robot for robot in _loaded(name, root, tool) if [k == "prismatic" for k in robot.joint_types] == slides)
+    return tuple(islice((robot for robot in found if not alike or set(robot.joint_names) == set(joints)), 1))
+
+
+def _loaded(name: str, root: str, tool: str) -> Iterator[Robot]:
+    """Yield chains of a robot: between links of these names, then from its root to each of its ends."""
+    ends: tuple[str, ...] = ()
+    for tool_frame, root_frame in ((tool, root), (tool, None), ("", None)):
+        try:
+            yield load_robot(name, tool_frame, root_frame=root_frame)
+        except RobotError as error:
+            ends = error.candidates
+    for end in ends if len(ends) <= settings.ENDS else ():
+        try:
+            yield load_robot(name, end)
+        except RobotError:
+            continue
+
+
+def another_robot(campaign: Campaign, progress: Callable[[str], None] = lambda _: None) -> Misfit | None:
+    """Tell whether it takes another robot, or another motion, to bring commands and measurements together.
+
+    Where frames alone leave a gap, every joint's placement is calibrated. Rows of one session, or a quarter of them in
+    their order, may have frames of their own: a base that was moved is no other robot. The model that is meant is told
+    as far as it can be; ``None`` where a robot of this kind can err so. ``progress`` is called with a few words where a
+    gap asks for it.
+    """
+    if campaign.simulated_position is not None or campaign.samples <= settings.DRAWN:
+        return None  # another simulator is no other robot
+    whole = Readings.of(campaign)
+    rows = np.linspace(0, campaign.samples - 1, min(campaign.samples, settings.SAMPLED)).round().astype(np.int64)
+    readings = replace(whole.take(rows), base_known=False, tool_known=False)
+    near, gap = settings.MISFIT * readings.spread(), _left(readings)
+    if gap <= near or near < settings.LEAST_GAP or sum(segment.movable for segment in campaign.robot.segments) < 2:
+        return None
+    progress("another robot")
+    factor, longer = _lengthened(readings)
+    shorter = gap > settings.FALL * _left(replace(readings, robot=longer))
+    common = factor if shorter and abs(factor - 1.0) > settings.SCALE_ERROR else None
+    misfit = None
+    for parts in (np.zeros(len(rows), dtype=np.int64), _parts(campaign, rows)):
+        misfit = _judged(Recalibrated.of(readings, parts, longer if shorter else readings.robot), common)
+        if misfit is None:
+            return None
+    known = fitting(readings, near)
+    if known is None or misfit is None:
+        return misfit
+    return replace(misfit, model=replace(misfit.model or AnotherModel(), fits=known[0], remains=known[1]))
+
+
+def _judged(found: Recalibrated, factor: float | None) -> Misfit | None:
+    (away, turned, both), (joint, far, times) = found.left(), found.farthest()
+    if turned > settings.ANOTHER_TURN:
+        places = Recalibrated.of(replace(found.readings, orientation=None), found.parts, found.robot)
+        return _judged(places, factor) or Misfit(turned=turned)
+    if away > settings.ANOTHER_MOTION * found.readings.spread():
+        return Misfit(away=away, model=None if factor is None else AnotherModel(factor))
+    most = settings.FARTHEST_ALONE if times > settings.ALONE else settings.FARTHEST
+    off = far > max(most * arm_length(found.readings.robot), settings.CLEARLY * both)
+    return Misfit(away=away, model=AnotherModel(factor, joint, far)) if off or factor is not None else None
+
+
+def _parts(campaign: Campaign, rows: NDArray[np.int64]) -> NDArray[np.int64]:
+    """(N,) the session of each row, or which quarter of them it belongs to."""
+    sessions = campaign.labels.get("session")
+    if sessions is not None:
+        _, parts, counts = np.unique(sessions[rows], return_inverse=True, return_counts=True)
+        if len(counts) > 1 and counts.min() >= settings.PART_ROWS:
+            return parts
+    count = min(settings.PARTS, len(rows) // settings.PART_ROWS) or 1
+    return np.arange(len(rows)) * count // len(rows)
+
+
+def _left(readings: Readings) -> float:
+    """Return the median distance, m, that frames alone leave."""
+    return float(np.median(readings.distance(readings.align())))
+
+
+def _lengthened(readings: Readings) -> tuple[float, Robot]:
+    """Return the common factor by which the links fit best, and the robot with such links."""
+    robot = readings.robot
+    measured = float(np.linalg.norm(np.ptp(readings.position, axis=0)))
+    first = np.log(max(measured, settings.LEAST_GAP) / readings.spread())
+
+    def longer(factor: float) -> Robot:
+        return replace(robot, chain=replace(robot.chain, translations=factor * robot.chain.translations))
+
+    def gap(exponent: float) -> float:
+        there = replace(readings, robot=longer(float(np.exp(exponent))))
+        return float(np.log(np.median(there.distance(there.align(coarse=True))) + settings.LEAST_GAP))
+
+    bounds = (first - settings.FACTOR_OFF, first + settings.FACTOR_OFF)
+    found = minimize_scalar(gap, bounds=bounds, method="bounded", options={"maxiter": settings.FACTOR_ROUNDS})
+    factor = float(np.exp(found.x))
+    return factor, longer(factor)
+
 
 _NEEDED = "a table that fits the robot"
 _SETTLED = "a fit that settles"
@@ -68,17 +415,7 @@ def delivered(last: Conclusion, candidates: Sequence[Effect]) -> Conclusion:
 
 
 def frames_alone(campaign: Campaign, candidates: Sequence[Effect], needed: str = _NEEDED) -> Conclusion:
-    """Conclude from the unknown frames and nothing else: no candidate can be tested.
-
-    Parameters
-    ----------
-    campaign
-        With measurements.
-    candidates
-        Effects that were asked for.
-    needed
-        What they would need.
-    """
+    """Conclude from the unknown frames and nothing else: no candidate can be tested, for want of what is ``needed``."""
     bare = replace(fit(campaign, ()), needs={effect.name: (needed,) for effect in candidates})
     left = examine(bare)
     return Conclusion(bare, (), left.unexplained, left, nothing_random(bare), {})
@@ -91,8 +428,8 @@ def unsettled(fit: Fit) -> str:
     elsewhere, as with errors so large that nothing is linear, their figures are not those of the model that is saved.
     """
     kept = ~fit.explanation.outliers
-    exact, linear = _left(fit.corrected.gap[kept]), _left(fit.explanation.remainder[kept])
-    if not fit.effects or exact <= diagnosis_settings.UNSETTLED * max(linear, inference_settings.ROUNDING):
+    exact, linear = _rms(fit.corrected.gap[kept]), _rms(fit.explanation.remainder[kept])
+    if not fit.effects or exact <= diagnosis_settings.UNSETTLED * max(linear, inference.ROUNDING):
         return ""
     names = ", ".join(effect.name for effect, _ in fit.effects)
     return (
@@ -101,5 +438,5 @@ def unsettled(fit: Fit) -> str:
     )
 
 
-def _left(gap: Array) -> float:
+def _rms(gap: Array) -> float:
     return float(np.sqrt((gap[:, :3] ** 2).sum(axis=1).mean()))

@@ -26,39 +26,21 @@ COLUMNS = ("q", "position", "orientation", "simulated_position")
 
 @dataclass(frozen=True, eq=False)
 class Readings:
-    """The columns that a fault of the data may have struck.
+    """The columns that a fault of the data may have struck."""
 
-    Attributes
-    ----------
-    robot
-        The robot.
-    q
-        (N, n) commanded joint positions, rad or m.
-    position, orientation
-        (N, 3) m and (N, 4) wxyz as measured; the latter ``None`` where it was not.
-    simulated_position
-        (N, 3) m, what the user's own simulator predicts; ``None`` where it is not given.
-    clock
-        (N,) time, s; ``None`` where it was not recorded.
-    base_known, tool_known, declared
-        Which frames are known, and all as declared.
-    length_unit
-        In which the file gives positions.
-    known
-        (N,) rows that are determined: a shifted column ends before the table does.
-    """
-
-    robot: Robot
-    q: Array
+    robot: Robot  # the robot
+    q: Array  # (N, n) commanded joint positions, rad or m
+    # position, orientation: (N, 3) m and (N, 4) wxyz as measured; the latter ``None`` where it was not
     position: Array
     orientation: Array | None
-    simulated_position: Array | None
-    clock: Array | None
+    simulated_position: Array | None  # (N, 3) m, what the user's own simulator predicts; ``None`` where it is not given
+    clock: Array | None  # (N,) time, s; ``None`` where it was not recorded
+    # base_known, tool_known, declared: which frames are known, and all as declared
     base_known: bool
     tool_known: bool
     declared: Frames
-    length_unit: str
-    known: Rows
+    length_unit: str  # in which the file gives positions
+    known: Rows  # (N,) rows that are determined: a shifted column ends before the table does
 
     @classmethod
     def of(cls, campaign: Campaign) -> Readings:

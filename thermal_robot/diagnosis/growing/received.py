@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from thermal_robot.campaign import Campaign
-from thermal_robot.campaign.tabular import table_from_frame
-from thermal_robot.campaign.turned import read_alike
-from thermal_robot.campaign.validate import build_campaign
+from thermal_robot.campaign.campaign import read_alike
+from thermal_robot.campaign.read import build_campaign
+from thermal_robot.campaign.table import table_from_frame
 from thermal_robot.diagnosis.growing import settings
 from thermal_robot.diagnosis.growing.choice import Choice
 from thermal_robot.diagnosis.growing.linearised import Seen

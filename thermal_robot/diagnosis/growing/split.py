@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from thermal_robot.arrays import Array
-from thermal_robot.campaign.appended import appended
+from thermal_robot.campaign.campaign import appended
 from thermal_robot.diagnosis.growing import settings
 from thermal_robot.diagnosis.growing.choice import Choice, Point, together
 from thermal_robot.diagnosis.growing.linearised import Seen, frame_names, products
