@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.assembly.repeatability import tool_covariance
-from thermal_robot.assembly.thermal.elongation import PerSegment, displacement, elongation
+from thermal_robot.assembly.thermal import PerSegment, displacement, elongation
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics import chain_frames, frame_jacobians
 from thermal_robot.robot import Robot
@@ -172,7 +172,7 @@ def assembly_map(
     sigma_q
         Standard deviation of each joint, as for :func:`~thermal_robot.assembly.repeatability.tool_covariance`.
     coefficients, rise
-        1/K and K: of each segment, in the forms of :func:`~thermal_robot.assembly.thermal.elongation`.
+        1/K and K: of each segment, in the forms of :func:`~thermal_robot.assembly.thermal`.
     clearance
         Diameter, m, for the map of the probability.
     capability

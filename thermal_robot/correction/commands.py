@@ -77,19 +77,7 @@ def corrected(
 ) -> Commands:
     """Return the commands that bring the real target to the nominal poses of samples.
 
-    Parameters
-    ----------
-    samples
-        Nominal joint positions (N, n) and the conditions of each row.
-    frames, effects, spread
-        Of the corrected model.
-
-    Raises
-    ------
-    CampaignError
-        If a pose cannot be reached within the limits; its row is named; so is a joint beyond its limit.
-    EffectError
-        If an effect cannot be told in these rows.
+    A pose that cannot be reached within the limits, and a joint beyond its limit, is refused with its row.
     """
     robot, tool = samples.robot, frames.tool
     farthest = np.array([FARTHEST[kind] for kind in robot.joint_types])
@@ -117,10 +105,7 @@ def corrected(
 def nominal_positions(robot: Robot, frames: Frames, poses: ArrayLike) -> Array:
     """(N, n) joint positions, rad or m, at which the nominal robot brings the target to poses (N, 4, 4), root frame.
 
-    Raises
-    ------
-    CampaignError
-        If they are no poses, or one is out of reach; it is named by its row among them, which count from 1.
+    One that is out of reach is refused by its row among them, which count from 1.
     """
     expected = "an array (N, 4, 4) of poses, m"
     try:

@@ -1,10 +1,13 @@
-"""The corrected model: nominal robot, frames and effects; it predicts, and is saved and loaded as JSON."""
+"""The corrected model: nominal robot, frames and effects; it predicts, and is saved and loaded as JSON.
+
+Samples to predict are made from a table or from arrays and conditions, and must bring what the model needs.
+"""
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
@@ -13,24 +16,109 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from thermal_robot.arrays import Array
-from thermal_robot.campaign import Campaign, Settings, read_samples, read_table, with_commands, with_prediction
+from thermal_robot.campaign import Campaign, Settings, names, read_samples, read_table, with_commands, with_prediction
 from thermal_robot.campaign.table import Table
 from thermal_robot.campaign.turned import read_alike
-from thermal_robot.correction.arrays import of_arrays
 from thermal_robot.correction.commands import Commands, corrected, nominal_positions
-from thermal_robot.correction.required import require_finite, require_needed
 from thermal_robot.effects import Effect
 from thermal_robot.effects.apply import displacement
-from thermal_robot.errors import require
+from thermal_robot.effects.dependence import depends_on
+from thermal_robot.errors import CampaignError, EffectError, require
 from thermal_robot.files import write_text
 from thermal_robot.kinematics import rotation_to_quaternion
 from thermal_robot.model_file import fields_of, read, written
-from thermal_robot.observations import Frames, observe
+from thermal_robot.observations import Frames, Observations, observe
 from thermal_robot.prediction import Prediction, Spread
 from thermal_robot.robot import Robot
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+NAME = "<conditions>"
+"""What such samples are called in messages."""
+
+
+def of_arrays(
+    robot: Robot, settings: Settings, q: Any, conditions: Mapping[str, ArrayLike], needs: Collection[str] = ()
+) -> Campaign:
+    """Return samples to predict: (N, n) joint positions, rad or m, and conditions in SI, by column name.
+
+    ``needs``: columns that the model needs; what an effect of the user's own reads may have any name.
+    """
+    _require_known(robot, conditions, needs)
+    given = {}
+    try:
+        rows = np.atleast_2d(np.asarray(q, dtype=float))
+        for key, value in conditions.items():
+            given[key] = np.broadcast_to(np.asarray(value, dtype=float), len(rows)).copy()
+    except (TypeError, ValueError) as error:
+        what = f"an array (N, {robot.n}), and for each condition one number or N"
+        raise CampaignError(NAME, "these are no rows of numbers", found=str(error), expected=what) from error
+    return Campaign(name=NAME, robot=robot, q=rows, covariates=given, **settings.of_rows())
+
+
+def _require_known(robot: Robot, conditions: Mapping[str, ArrayLike], needs: Collection[str]) -> None:
+    """Refuse a condition that neither the model needs nor any campaign has."""
+    known = dict.fromkeys(needs) | names.conditions(robot.joint_names, robot.urdf_links)
+    for name in conditions:
+        if name not in known:
+            raise CampaignError(
+                NAME,
+                f"nothing has this name{names.did_you_mean(str(name), known)}",
+                column=str(name),
+                expected=", ".join(needs) or "none, as the model needs no condition",
+            )
+
+
+def require_needed(samples: Campaign, needs: Sequence[str], effects: Sequence[Effect], simulated: bool) -> None:
+    """Refuse samples that lack a column, or a cell of it, that a model needs.
+
+    ``simulated``: the model corrects the prediction of the user's own simulator. The error names the column, and the
+    row of an empty cell.
+    """
+    for column in needs:
+        if column not in samples.covariates:
+            reason = _reason(samples, needs, effects, column)
+            raise CampaignError(samples.name, reason, column=column, found="no such column", expected="numbers")
+        gaps = np.flatnonzero(samples.missing.get(column, np.zeros(0, dtype=bool)))
+        if gaps.size:
+            row, reason = int(samples.rows[gaps[0]]), _reason(samples, needs, effects, column)
+            raise CampaignError(
+                samples.name, reason, row=row, column=column, found="an empty cell", expected="a number"
+            )
+    if simulated and samples.simulated_position is None:
+        raise CampaignError(
+            samples.name,
+            "the model corrects the prediction of your simulator",
+            column="sim.x",
+            found="no such column",
+            expected="sim.x, sim.y, sim.z",
+        )
+
+
+def _reason(samples: Campaign, needs: Sequence[str], effects: Sequence[Effect], column: str) -> str:
+    """Say which effects of the model need a column."""
+    # what they read is asked of rows that have all columns; any possible values will do
+    whole = {name: np.ones(samples.samples) for name in needs}
+    seen = observe(replace(samples, covariates=whole, missing={}))
+    own = [effect.name for effect in effects if _depends(effect, seen, column)]
+    return f"the model ({', '.join(own or [effect.name for effect in effects])}) needs this column"
+
+
+def _depends(effect: Effect, seen: Observations, column: str) -> bool:
+    try:
+        return column in depends_on(effect, seen)
+    except EffectError:  # it may refuse such values: then it reads them
+        return True
+
+
+def require_finite(samples: Campaign, position: Array) -> None:
+    """Refuse positions (N, 3) that are not finite, by the first row."""
+    wrong = np.flatnonzero(~np.isfinite(position).all(axis=1))
+    if wrong.size:
+        row = int(samples.rows[wrong[0]])
+        raise CampaignError(samples.name, "the values of this row lead to no finite position", row=row)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -16,14 +16,7 @@ from thermal_robot.arrays import Array
 class Parallelotope:
     """One piece of a spread: ``centre + generators @ u`` with the ``u`` independent and uniform on [-1, 1].
 
-    Parameters
-    ----------
-    weight
-        Share of the spread's probability.
-    centre
-        Shape ``(d,)``.
-    generators
-        Half edges as columns, shape ``(d, m)``, none of them zero, longest first.
+    ``weight``: share of the spread's probability; generators are half edges ``(d, m)``, none zero, longest first.
     """
 
     weight: float
@@ -144,13 +137,7 @@ class UniformSpread:
 def generator_bounds(
     generators: npt.ArrayLike, lower: npt.ArrayLike, upper: npt.ArrayLike
 ) -> tuple[Array, Array, Array]:
-    """Check columns ``(d, k)`` and their bounds, scalars or ``(k,)``; return all three as arrays.
-
-    Raises
-    ------
-    ValueError
-        For wrong shapes, numbers that are not finite, or a lower bound above its upper bound.
-    """
+    """Check columns ``(d, k)`` and their bounds, scalars or ``(k,)``, finite and ascending; return all as arrays."""
     columns = np.asarray(generators, dtype=float)
     if columns.ndim != 2:
         raise ValueError(f"generators must be columns, shape (d, k), not {columns.shape}")
