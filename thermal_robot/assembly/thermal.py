@@ -75,7 +75,7 @@ def sensitivity(robot: Robot, q: ArrayLike, *, coefficients: PerSegment) -> Arra
     q
         (N, n) rad or m; (n,) counts as one configuration.
     coefficients
-        1/K, as for :func:`~thermal_robot.assembly.thermal`.
+        1/K, as for :func:`~thermal_robot.assembly.thermal.elongation`.
 
     Returns
     -------
@@ -381,7 +381,7 @@ class LinkWarmUp:
     temperatures: Array
 
     def elongations(self, *, coefficients: PerSegment, reference: float = STANDARD_TEMPERATURE) -> Array:
-        """Elongations (T, S) m, Eq 5; arguments as for :func:`~thermal_robot.assembly.thermal`."""
+        """Elongations (T, S) m, Eq 5; arguments as for :func:`~thermal_robot.assembly.thermal.elongation`."""
         return elongation(self.robot, self.temperatures, coefficients=coefficients, reference=reference)
 
     def displacements(

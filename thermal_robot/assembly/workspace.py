@@ -172,7 +172,7 @@ def assembly_map(
     sigma_q
         Standard deviation of each joint, as for :func:`~thermal_robot.assembly.repeatability.tool_covariance`.
     coefficients, rise
-        1/K and K: of each segment, in the forms of :func:`~thermal_robot.assembly.thermal`.
+        1/K and K: of each segment, in the forms of :func:`~thermal_robot.assembly.thermal.elongation`.
     clearance
         Diameter, m, for the map of the probability.
     capability

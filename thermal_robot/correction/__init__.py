@@ -1,9 +1,8 @@
 """The robot as it really is: the corrected model, and what follows from it for commands and for robot files."""
 
 from thermal_robot.correction.calibrated import Calibrated, calibrated, calibrated_urdf, dh_table, ur_kinematics
-from thermal_robot.correction.commands import Commands
 from thermal_robot.correction.constant import determined, zero_offsets
-from thermal_robot.correction.model import CorrectedModel
+from thermal_robot.correction.model import Commands, CorrectedModel
 from thermal_robot.correction.mujoco_models import calibrated_mjcf, mjcf_of_urdf, with_simulator
 
 __all__ = [

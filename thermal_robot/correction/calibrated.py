@@ -154,7 +154,7 @@ def calibrated(
         °C at which lengths are to hold, where the model tells how they grow; by default the campaign's reference
         temperature, at which those of the nominal robot hold.
     min_sigma
-        Keep only what is so many standard deviations from zero (:func:`~thermal_robot.correction.constant`); all
+        Keep only what is so many standard deviations from zero (:func:`~thermal_robot.correction.determined`); all
         where absent.
 
     Raises

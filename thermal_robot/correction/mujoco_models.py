@@ -7,7 +7,7 @@ MJCF of its own, translated from its URDF.
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -80,28 +80,23 @@ def mjcf_of_urdf(urdf: str) -> str:
         text = spec.to_xml()
     except (ValueError, mujoco.FatalError) as error:
         raise CampaignError("the URDF", "MuJoCo does not take it", found=" ".join(str(error).split())) from None
-    return _exact(
-        text, model, [_equality(joint, mimic) for joint, mimic in mimics(urdf).items() if _both(model, joint, mimic)]
-    )
+    return _exact(text, model, "".join(_equalities(model, mimics(urdf))))
 
 
-def _equality(joint: str, mimic: Mimic) -> str:
-    """Return what makes a joint follow another: MuJoCo 3.3.0 does not read that from a URDF."""
-    numbers = digits([mimic.offset, mimic.multiplier, 0, 0, 0])
-    return f'    <joint joint1={quoteattr(joint)} joint2={quoteattr(mimic.joint)} polycoef="{numbers}"/>\n'
+def _equalities(model: Any, found: Mapping[str, Mimic]) -> Iterator[str]:
+    """Yield what makes joints that move follow others: MuJoCo 3.3.0 does not read that from a URDF."""
+    for joint, mimic in found.items():
+        if None not in (known(model, "joint", joint), known(model, "joint", mimic.joint)):
+            numbers = digits([mimic.offset, mimic.multiplier, 0, 0, 0])
+            yield f'    <joint joint1={quoteattr(joint)} joint2={quoteattr(mimic.joint)} polycoef="{numbers}"/>\n'
 
 
-def _both(model: Any, joint: str, mimic: Mimic) -> bool:
-    """Tell whether both joints move: a fixed one is none of an MJCF."""
-    return known(model, "joint", joint) is not None and known(model, "joint", mimic.joint) is not None
-
-
-def _exact(text: str, model: Any, equalities: Sequence[str]) -> str:
+def _exact(text: str, model: Any, equalities: str) -> str:
     """Give a model that MuJoCo wrote, in six digits, all of them; and its equalities."""
     content = encoded(text)
     found = tags(content)
     end = found[0].close
-    edits: list[Edit] = [(end, end, f"\n  <equality>\n{''.join(equalities)}  </equality>\n")] if equalities else []
+    edits: list[Edit] = [(end, end, f"\n  <equality>\n{equalities}  </equality>\n")] if equalities else []
     for tag in found:
         values: dict[str, tuple[Array, Sequence[float]]] = {}
         if tag.path[-1] == "body":
@@ -382,7 +377,7 @@ def with_simulator(campaign: Campaign, mjcf: str | Path) -> Campaign:
 
     The model's joints are put where they were commanded, and those that mimic another where that one takes them; no
     motor and no gravity is at work. A diagnosis then compares the robot with this simulator, not with the URDF, and
-    :func:`~thermal_robot.correction.mujoco_models` writes into the simulator what of the difference is constant.
+    :func:`~thermal_robot.correction.calibrated_mjcf` writes into the simulator what of the difference is constant.
 
     Parameters
     ----------

@@ -173,12 +173,8 @@ def _better(one: Reached, other: Reached, near: Array) -> Reached:
     far = [np.linalg.norm(each.q - near, axis=1) for each in (one, other)]
     alike = np.abs(cost[1] - cost[0]) <= ARM * _SAME
     taken = np.where(alike, far[1] < far[0], cost[1] < cost[0])[:, None]
-    chosen = (np.where(taken, b, a) for a, b in zip(_parts(one), _parts(other), strict=True))
-    return Reached(*chosen)
-
-
-def _parts(found: Reached) -> tuple[Array, Array, Array]:
-    return found.q, found.position, found.direction
+    pairs = (one.q, other.q), (one.position, other.position), (one.direction, other.direction)
+    return Reached(*(np.where(taken, b, a) for a, b in pairs))
 
 
 @dataclass(frozen=True, eq=False)

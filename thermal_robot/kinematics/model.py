@@ -340,7 +340,7 @@ def build_chain_model(
     """
     full = parse_urdf(urdf, source)
     links = {frame.name: i for i, frame in enumerate(full.frames) if frame.type == pin.FrameType.BODY}
-    root = _find_link(full, links, root_frame, "root frame") if root_frame is not None else _root_link(links)
+    root = _find_link(full, links, root_frame, "root frame") if root_frame is not None else min(links.values())
     tool = _find_link(full, links, tool_frame, "tool frame")
     elements = _elements_between(full, root, tool)
     # a fixed joint stays where it is, whatever it is said to mimic
@@ -520,10 +520,6 @@ def _limits(model: pin.Model, names: Sequence[str]) -> tuple[Array, Array]:
         if joint.nq == 1 and low < high:
             lower[i], upper[i] = low, high
     return lower, upper
-
-
-def _root_link(links: dict[str, int]) -> int:
-    return min(links.values())
 
 
 def _find_link(model: pin.Model, links: dict[str, int], name: str, role: str) -> int:

@@ -21,7 +21,7 @@ from scipy.special import ndtr, ndtri
 from thermal_robot.arrays import Array
 from thermal_robot.assembly.probability import UniformSpread, capability, failing_probability, required_clearance
 from thermal_robot.assembly.probability.normality import Power, normality_power, shapiro_wilk_critical
-from thermal_robot.assembly.probability.tolerance import polygon_in_plane
+from thermal_robot.assembly.probability.spread import polygon_in_plane
 from thermal_robot.assembly.repeatability import joint_sigmas, tool_covariance
 from thermal_robot.assembly.thermal import (
     displacement,

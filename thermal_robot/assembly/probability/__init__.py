@@ -25,8 +25,14 @@ from thermal_robot.assembly.probability.normality import (
     sample_size_to_see,
     shapiro_wilk_critical,
 )
-from thermal_robot.assembly.probability.spread import UniformSpread
-from thermal_robot.assembly.probability.tolerance import Zonotope, plane_axes, planes, polygon_in_plane, zonotope
+from thermal_robot.assembly.probability.spread import (
+    UniformSpread,
+    Zonotope,
+    plane_axes,
+    planes,
+    polygon_in_plane,
+    zonotope,
+)
 
 __all__ = [
     "FlatNormal",
