@@ -389,18 +389,6 @@ def _mass(attributes: Attributes, _: str) -> str:
     return _wrong(attributes, "value", "mass", "a number of kg that is not negative", 1, lambda m: m[0] >= 0.0)
 
 
-def _inertia(attributes: Attributes, _: str) -> str:
-    # its sign plays no part in statics, and exporters write −5e-20 for nothing
-    problems = (_wrong(attributes, name, f"inertia {name}", "a number of kg·m²", 1) for name in _INERTIAS)
-    return next((problem for problem in problems if problem), "")
-
-
-def _origin(attributes: Attributes, _: str) -> str:
-    return _wrong(attributes, "xyz", "origin", f"{_THREE}, m", 3) or _wrong(
-        attributes, "rpy", "origin", f"{_THREE}, rad", 3
-    )
-
-
 def _axis(attributes: Attributes, kind: str) -> str:
     if kind in _MOVABLE and "xyz" not in attributes:
         return f"its <axis> has no xyz, expected {_THREE}"
@@ -418,19 +406,21 @@ def _limit(attributes: Attributes, kind: str) -> str:
     return f"its limits are {low:g} and {high:g}, expected the lower one first" if low > high else ""
 
 
-def _mimic(attributes: Attributes, _: str) -> str:
-    problems = (_wrong(attributes, name, f"mimic {name}", "a number", 1) for name in ("multiplier", "offset"))
-    return next((problem for problem in problems if problem), "")
+def _each(*checks: tuple[str, str, str, int]) -> Callable[[Attributes, str], str]:
+    """Check several attributes alike; the first that is wrong is told."""
+    return lambda attributes, _: next(filter(None, (_wrong(attributes, *check) for check in checks)), "")
 
 
+_origin = _each(("xyz", "origin", f"{_THREE}, m", 3), ("rpy", "origin", f"{_THREE}, rad", 3))
 _CHECKS: dict[tuple[str, ...], Callable[[Attributes, str], str]] = {
     ("link", "inertial", "mass"): _mass,
-    ("link", "inertial", "inertia"): _inertia,
+    # its sign plays no part in statics, and exporters write −5e-20 for nothing
+    ("link", "inertial", "inertia"): _each(*((name, f"inertia {name}", "a number of kg·m²", 1) for name in _INERTIAS)),
     ("link", "inertial", "origin"): _origin,
     ("joint",): _joint,
     ("joint", "origin"): _origin,
     ("joint", "axis"): _axis,
-    ("joint", "mimic"): _mimic,
+    ("joint", "mimic"): _each(*((name, f"mimic {name}", "a number", 1) for name in ("multiplier", "offset"))),
     ("joint", "limit"): _limit,
 }
 _ONCE = {
