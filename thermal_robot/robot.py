@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics.model import SHORTEST_SEGMENT, Chain, build_chain_model, leaf_links
-from thermal_robot.kinematics.numbers import require_numbers
+from thermal_robot.kinematics.urdf import require_numbers
 from thermal_robot.tables import html_table
 from thermal_robot.urdf_text import DESCRIPTION, WritesUrdf, urdf_text
 
@@ -200,7 +200,7 @@ class Robot:
         >>> robot.jacobian([0.0] * 5).shape
         (6, 5)
         """
-        from thermal_robot.kinematics.jacobians import frame_jacobians
+        from thermal_robot.kinematics.frames import frame_jacobians
 
         return self._at(frame_jacobians, q)
 

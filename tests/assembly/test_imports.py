@@ -10,7 +10,7 @@ import thermal_robot
 PACKAGE = Path(thermal_robot.__file__).parent
 ROOM = PACKAGE / "assembly"
 MODULES = sorted(ROOM.rglob("*.py"))
-DOORS = {"errors", "compiling", "robot", "kinematics", "assembly"}
+DOORS = {"arrays", "errors", "compiling", "robot", "kinematics", "assembly"}
 FILES = {"pathlib", "os", "io", "csv", "json", "tomllib", "tomli_w", "xml", "pandas", "pyarrow", "shutil", "tempfile"}
 
 
@@ -40,7 +40,7 @@ named = pytest.mark.parametrize("path", MODULES, ids=[str(path.relative_to(ROOM)
 def test_the_walk_sees_imports_in_functions():
     assert ["assembly", "probability", "planes"] in own(ROOM / "workspace.py")
     assert any(part[:1] == ["kinematics"] for part in own(ROOM / "repeatability.py"))
-    assert len(MODULES) > 20
+    assert len(MODULES) > 10
 
 
 @named
@@ -57,4 +57,4 @@ def test_the_room_knows_no_files(path):
 @pytest.mark.parametrize("path", sorted((ROOM / "probability").glob("*.py")), ids=lambda path: path.name)
 def test_probability_knows_no_robot(path):
     for part in own(path):
-        assert part[0] in ("errors", "compiling") or part[:2] == ["assembly", "probability"], ".".join(part)
+        assert part[0] in ("arrays", "errors", "compiling") or part[:2] == ["assembly", "probability"], ".".join(part)

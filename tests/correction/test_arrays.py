@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from thermal_robot.campaign import Settings
-from thermal_robot.correction.arrays import of_arrays
+from thermal_robot.correction.model import of_arrays
 from thermal_robot.errors import CampaignError
 
 

@@ -11,7 +11,7 @@ from simulate import conditions, draw_effect, further_conditions
 from thermal_robot import CorrectedModel, diagnose, read_campaign
 from thermal_robot.blind.cases import Case, RobotChoice
 from thermal_robot.campaign import Campaign
-from thermal_robot.correction.commands import FARTHEST
+from thermal_robot.correction.model import FARTHEST
 from thermal_robot.effects.apply import displacement
 from thermal_robot.errors import CampaignError
 from thermal_robot.kinematics import frame_jacobians, tool_poses

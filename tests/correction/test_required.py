@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from thermal_robot import CampaignError, simulate
-from thermal_robot.correction.required import require_finite, require_needed
+from thermal_robot.correction.model import require_finite, require_needed
 from thermal_robot.effects import Drift, ThermalElongation
 
 

@@ -13,7 +13,7 @@ from thermal_robot import CorrectedModel, diagnose, load_robot
 from thermal_robot import simulate as run_of
 from thermal_robot.campaign import Units
 from thermal_robot.correction import zero_offsets
-from thermal_robot.correction.zero_offsets import NONE, TOLD, UNSEEN
+from thermal_robot.correction.constant import NONE, TOLD, UNSEEN
 from thermal_robot.effects import Geometric, JointGain, JointOffset, gate
 from thermal_robot.kinematics import exp6, tool_poses
 from thermal_robot.observations import Frames

@@ -8,7 +8,7 @@ from clouds import cell
 from simulate import random_motion
 
 from thermal_robot.errors import CampaignError
-from thermal_robot.iso9283.seen import Seen
+from thermal_robot.iso9283.measure import Seen
 from thermal_robot.observations import Frames, observe
 
 SHIFT = np.array([1e-3, 2e-3, 2e-3])

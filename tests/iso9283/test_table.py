@@ -5,15 +5,14 @@ from dataclasses import replace
 import pytest
 
 from thermal_robot.iso9283 import Accuracy, AlongPath, Drift, PathCriteria, PoseCriteria, Repeatability, Variation
-from thermal_robot.iso9283.table import (
+from thermal_robot.iso9283.performance import (
     MOST,
-    cycles_of,
+    Performance,
     drifts,
     lines,
     millimetres,
     path_turns,
     paths,
-    paths_of,
     poses,
     turns,
     variations,
@@ -94,11 +93,15 @@ def test_a_long_table_ends_with_how_many_are_left_out():
     [([30], "1 pose of 30 cycles"), ([30, 30], "2 poses of 30 "), ([5, 30, 12], "3 poses of 5 to 30 ")],
 )
 def test_cycles_are_told_beside_those_of_the_standard(counts, said):
-    told = cycles_of([replace(POSE, cycles=count) for count in counts])
+    told = extent([replace(POSE, cycles=count) for count in counts])
     assert told.startswith(said)
     assert told.endswith("(the standard: 30)")
-    assert cycles_of([]) == paths_of([]) == ""
-    assert paths_of([PathCriteria("seam", 20, 9, AlongPath(2e-4))]) == "1 path of 9 cycles (the standard: 10)"
+    assert extent([]) == ""
+    assert extent([], [PathCriteria("seam", 20, 9, AlongPath(2e-4))]) == "1 path of 9 cycles (the standard: 10)"
+
+
+def extent(at_rest, along=()):
+    return Performance("", "", "", tuple(at_rest), tuple(along)).extent
 
 
 def test_sentences_are_broken_at_the_width():

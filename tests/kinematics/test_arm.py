@@ -3,8 +3,8 @@
 import numpy as np
 
 from thermal_robot import kinematics as kin
-from thermal_robot.kinematics.arm import FIXED, SLIDES, TURNS, TURNS_ALIGNED, arm_of
 from thermal_robot.kinematics.model import PRISMATIC, REVOLUTE
+from thermal_robot.kinematics.walk import FIXED, SLIDES, TURNS, TURNS_ALIGNED, arm_of
 
 
 def test_kinds_are_those_of_the_chain(arm):

@@ -3,13 +3,13 @@
 import numpy as np
 
 from thermal_robot import kinematics as kin
-from thermal_robot.kinematics import blocks
+from thermal_robot.kinematics import lanes
 
 
 def test_cross_product():
     a, b = np.random.default_rng(1).normal(size=(2, 3, 40))
     out, term = np.empty((3, 40)), np.empty(40)
-    blocks.cross(a, b, out, term)
+    lanes.cross(a, b, out, term)
     np.testing.assert_allclose(out, np.cross(a, b, axis=0), rtol=0.0, atol=1e-15)
 
 

@@ -5,8 +5,8 @@ import pytest
 import reference
 
 from thermal_robot.errors import RobotError
-from thermal_robot.kinematics.displaced import Displaced, Displacement
 from thermal_robot.kinematics.frames import tool_poses
+from thermal_robot.kinematics.walk import Displaced, Displacement
 
 
 def test_nothing_displaced_is_nothing_to_apply(rv_m2):

@@ -5,7 +5,8 @@ import pytest
 import reference
 
 from thermal_robot import kinematics as kin
-from thermal_robot.kinematics import compiled, engines, lanes, settings, thin
+from thermal_robot.kinematics import compiled, lanes, settings, thin
+from thermal_robot.kinematics.frames import engine_for
 
 ROWS = 150
 POINT = np.array([0.05, -0.1, 0.2])
@@ -90,16 +91,16 @@ def test_frames_of_a_campaign_are_in_the_same_place(engine, arm, q):
 
 
 def test_pinocchio_is_for_few_and_for_chains_that_are_not_long(rv_m2, monkeypatch):
-    assert engines.engine_for(rv_m2, 1) is thin
-    assert engines.engine_for(rv_m2, settings.FEW) is thin
-    assert engines.engine_for(rv_m2, settings.FEW + 1) is lanes
+    assert engine_for(rv_m2, 1) is thin
+    assert engine_for(rv_m2, settings.FEW) is thin
+    assert engine_for(rv_m2, settings.FEW + 1) is lanes
     monkeypatch.setattr(settings, "MOST_PLACEMENTS", len(rv_m2.segments) - 1)
-    assert engines.engine_for(rv_m2, 1) is lanes
+    assert engine_for(rv_m2, 1) is lanes
 
 
 def test_compiled_lanes_are_for_very_many_and_for_those_who_have_numba(rv_m2, monkeypatch):
     monkeypatch.setattr(compiled, "installed", lambda: True)
-    assert engines.engine_for(rv_m2, settings.MANY - 1) is lanes
-    assert engines.engine_for(rv_m2, settings.MANY) is compiled
+    assert engine_for(rv_m2, settings.MANY - 1) is lanes
+    assert engine_for(rv_m2, settings.MANY) is compiled
     monkeypatch.setattr(compiled, "installed", lambda: False)
-    assert engines.engine_for(rv_m2, 10 * settings.MANY) is lanes
+    assert engine_for(rv_m2, 10 * settings.MANY) is lanes

@@ -6,8 +6,7 @@ from coupled import COUPLED, PARALLELOGRAM, joint, link, urdf
 
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics import tool_poses
-from thermal_robot.kinematics.held import held_configuration, held_position
-from thermal_robot.kinematics.mimic import Mimic, followed, mimics
+from thermal_robot.kinematics.model import Mimic, followed, held_configuration, held_position, mimics
 from thermal_robot.kinematics.urdf import parse_urdf
 from thermal_robot.robot import load_robot
 

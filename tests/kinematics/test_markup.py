@@ -3,7 +3,7 @@
 import pytest
 
 from thermal_robot.errors import RobotError
-from thermal_robot.kinematics.markup import bare, changed, comment, encoded, indent, tags, with_values
+from thermal_robot.kinematics.urdf import bare, changed, comment, encoded, indent, tags, with_values
 from thermal_robot.robot import load_robot
 
 TEXT = """<?xml version="1.0"?>

@@ -8,7 +8,7 @@ from coupled import ARMS, DRIVEN, by_hand, coupled, explicit, joint, link, urdf
 
 from thermal_robot import kinematics as kin
 from thermal_robot.errors import RobotError
-from thermal_robot.kinematics.mimic import Mimic, common_limits, couple, followed, mimics
+from thermal_robot.kinematics.model import Mimic, common_limits, couple, followed, mimics
 from thermal_robot.robot import load_robot
 
 STEP = 1e-5

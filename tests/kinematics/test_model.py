@@ -9,7 +9,7 @@ import yourdfpy
 
 from thermal_robot import kinematics as kin
 from thermal_robot.errors import RobotError
-from thermal_robot.kinematics.links import to_pinocchio
+from thermal_robot.kinematics.augmented import to_pinocchio
 from thermal_robot.kinematics.model import FIXED, PRISMATIC, REVOLUTE, build_chain_model, leaf_links, unit_motion
 from thermal_robot.kinematics.urdf import parse_urdf
 

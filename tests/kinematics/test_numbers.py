@@ -7,7 +7,7 @@ import pytest
 
 from thermal_robot.blind.plan import ARMS
 from thermal_robot.errors import RobotError
-from thermal_robot.kinematics.numbers import require_numbers
+from thermal_robot.kinematics.urdf import require_numbers
 from thermal_robot.robot import load_robot
 
 URDF = """<robot name="r" xmlns:xacro="x">

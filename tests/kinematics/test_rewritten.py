@@ -8,7 +8,7 @@ from coupled import joint, link, urdf
 
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics import exp3, exp6, tool_poses
-from thermal_robot.kinematics.rewritten import rewritten
+from thermal_robot.kinematics.urdf import rewritten
 from thermal_robot.robot import load_robot
 
 POSE = exp6([0.1, -0.2, 0.3, 0.5, -0.4, 0.3])

@@ -9,7 +9,7 @@ import pytest
 from thermal_robot import kinematics as kin
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics import settings
-from thermal_robot.kinematics.scratch import chunks, result, scratch
+from thermal_robot.kinematics.walk import chunks, result, scratch
 
 CALLS = {
     "poses": (kin.tool_poses, lambda robot: (4, 4)),

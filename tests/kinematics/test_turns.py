@@ -4,7 +4,7 @@ import mpmath
 import numpy as np
 import pytest
 
-from thermal_robot.kinematics.turns import sines_and_cosines
+from thermal_robot.kinematics.lie import sines_and_cosines
 
 
 def both(angles):

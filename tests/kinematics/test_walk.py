@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 import reference
 
-from thermal_robot.kinematics.displaced import NOWHERE
-from thermal_robot.kinematics.walk import steps, walk
+from thermal_robot.kinematics.walk import NOWHERE, steps, walk
 
 
 @pytest.mark.parametrize("keep", [True, False])

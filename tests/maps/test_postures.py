@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from thermal_robot.kinematics import tool_poses
-from thermal_robot.maps.postures import Task, all_postures
+from thermal_robot.maps.quantities import Task, all_postures
 
 DOWN = np.array([0.0, 0.0, -1.0])
 

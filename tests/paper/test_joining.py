@@ -7,7 +7,7 @@ import pytest
 from scipy.stats import norm
 
 from thermal_robot.paper import PaperInputs
-from thermal_robot.paper.joining import ROWS, capability_at, warmed
+from thermal_robot.paper.rows import JOINING, capability_at, warmed
 
 EXACT = {
     "C_p at L = 0.145 mm, row 1": [1.30128, 1.26237, 1.34217],
@@ -31,7 +31,7 @@ SIGMA, SHIFT = (14e-6, 18e-6), (7e-6, 16e-6)
 
 @cache
 def default():
-    return {entry.quantity: entry for entry in (row(PaperInputs()) for row in ROWS)}
+    return {entry.quantity: entry for entry in (row(PaperInputs()) for row in JOINING)}
 
 
 @pytest.mark.parametrize("quantity", EXACT)

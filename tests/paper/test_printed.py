@@ -5,7 +5,8 @@ import re
 import numpy as np
 import pytest
 
-from thermal_robot.paper import PaperInputs, printed
+from thermal_robot.paper import PaperInputs
+from thermal_robot.paper import rows as printed
 from thermal_robot.paper.entry import Printed
 
 UNITS = {"µm": 1e-6, "mm": 1e-3, "%": 1e-2, "": 1.0}

@@ -8,7 +8,7 @@ import pytest
 from scipy import stats
 
 from thermal_robot.paper import PaperInputs
-from thermal_robot.paper.randomised import ROWS
+from thermal_robot.paper.rows import RANDOMISED
 
 EXACT = {
     "Eq 18, area under the density": [*[1 / np.sqrt(np.pi)] * 3, 1, 1, 1],
@@ -26,7 +26,7 @@ SIMULATED = {
 
 @cache
 def computed(inputs):
-    return {entry.quantity: entry for entry in (row(inputs) for row in ROWS)}
+    return {entry.quantity: entry for entry in (row(inputs) for row in RANDOMISED)}
 
 
 def default():

@@ -9,7 +9,7 @@ import pytest
 from thermal_robot.kinematics import tool_poses
 from thermal_robot.paper import PaperInputs, rv_m2_with_hand
 from thermal_robot.paper.inputs import joints
-from thermal_robot.paper.scatter import ROWS
+from thermal_robot.paper.rows import SCATTER
 
 # SI, to the digits that are shown.
 EXACT = {
@@ -38,7 +38,7 @@ FITTED = {
 
 @cache
 def computed(inputs):
-    return {entry.quantity: entry for entry in (row(inputs) for row in ROWS)}
+    return {entry.quantity: entry for entry in (row(inputs) for row in SCATTER)}
 
 
 def default():

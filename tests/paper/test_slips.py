@@ -8,7 +8,7 @@ import pytest
 from thermal_robot.kinematics import tool_poses
 from thermal_robot.paper import PaperInputs, rv_m2_with_hand
 from thermal_robot.paper.inputs import joints
-from thermal_robot.paper.slips import ROWS
+from thermal_robot.paper.rows import SLIPS
 
 EXACT = {
     "q3 of row 1": [91.2439e-6, 2.98820e-9],
@@ -24,7 +24,7 @@ SIMULATED = {"Eq 12, points and equations": ([60.29, 5.991, 4], [3.0, 0.1, 0])}
 
 @cache
 def computed(inputs):
-    return {entry.quantity: entry for entry in (row(inputs) for row in ROWS)}
+    return {entry.quantity: entry for entry in (row(inputs) for row in SLIPS)}
 
 
 def default():

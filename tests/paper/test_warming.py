@@ -11,7 +11,7 @@ import pytest
 from thermal_robot.assembly.thermal import displacement
 from thermal_robot.paper import PaperInputs, rv_m2_with_hand
 from thermal_robot.paper.inputs import joints
-from thermal_robot.paper.warming import ROWS, critical, median_error, random_systems
+from thermal_robot.paper.rows import WARMING, critical, median_error, random_systems
 
 EXACT = {
     "Table 2 row 1, calculated": [8.42280e-6, 14.5920e-6, 9.39402e-6],
@@ -38,7 +38,7 @@ SIMULATED = {
 
 @cache
 def computed(inputs):
-    return {entry.quantity: entry for entry in (row(inputs) for row in ROWS)}
+    return {entry.quantity: entry for entry in (row(inputs) for row in WARMING)}
 
 
 def default():

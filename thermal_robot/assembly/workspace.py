@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.assembly.repeatability import tool_covariance
-from thermal_robot.assembly.thermal.elongation import PerSegment, displacement, elongation
+from thermal_robot.assembly.thermal import PerSegment, displacement, elongation
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics import chain_frames, frame_jacobians
 from thermal_robot.robot import Robot

@@ -18,7 +18,7 @@ import numpy as np
 from thermal_robot.arrays import Array
 from thermal_robot.campaign.document import read_yaml
 from thermal_robot.errors import CampaignError
-from thermal_robot.kinematics.rewritten import rewritten
+from thermal_robot.kinematics.urdf import rewritten
 from thermal_robot.robot import Robot, load_robot
 
 LINKS = {

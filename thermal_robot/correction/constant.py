@@ -3,11 +3,24 @@
 No effect is asked for by name. Each parameter's unit responses are read in rows whose configurations and conditions are
 all different. Those that are one number, or one twist, in all of them are constant. Others become constant once the
 temperature is fixed: they are read again in rows of one temperature that has lasted, and must change with it.
+
+**Undetermined** constants can be taken out: the others take the values that they have then. To take a parameter out
+alone would leave those that were fitted beside it where they are, and what two of them do together would be half done.
+So each is set to zero as a piece of knowledge. What the posterior of frames and parameters, N(m, C), says of the others
+once θ_k = 0 is their conditional mean m − C_k m_k / C_kk and covariance C − C_k C_kᵀ / C_kk: what a fit without θ_k
+finds, as far as the model is linear in its errors. The least significant goes first, and significance is judged anew
+each time: of two of which only the sum is known, one stays.
+
+**Zeros** to enter in a controller. Where a model holds zero offsets, these are they. Where it holds geometry instead, a
+part of that is zeros: it is told in other coordinates, the zeros first and then the errors of the axes after Denavit
+and Hartenberg, as the diagnosis tells it (:mod:`thermal_robot.inference.inside`). What the unknown frames can take up
+nobody sees, and it is not told.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +29,21 @@ from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import CLOCK, LABELS, PER_LINK, split_name
 from thermal_robot.campaign.settings import ABSOLUTE_ZERO
 from thermal_robot.correction.model import CorrectedModel
-from thermal_robot.effects import Parameter, gate
+from thermal_robot.effects import Parameter, at_joint, at_segment, gate
 from thermal_robot.errors import CampaignError
+from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import orthonormal, without
+from thermal_robot.inference.columns import frame_columns, moved_by
+from thermal_robot.inference.frames import moved
+from thermal_robot.inference.inside import distinct, identified
 from thermal_robot.kinematics import Displacement
 from thermal_robot.observations import Observations, observe
+from thermal_robot.prediction import moves
 from thermal_robot.robot import Robot
+
+if TYPE_CHECKING:
+    import pandas as pd
+
 
 ROWS = 12
 """Of configurations and conditions: what is the same in so many that were drawn at random is constant."""
@@ -38,15 +61,7 @@ _WARMER = 1.0
 
 @dataclass(frozen=True)
 class Told:
-    """One parameter of a model.
-
-    Attributes
-    ----------
-    effect, parameter
-        Names of both.
-    value, std, unit
-        What was fitted, and its standard deviation, NaN where the model does not tell; in the parameter's own unit.
-    """
+    """One parameter of a model, in its own unit; its standard deviation is NaN where the model does not tell."""
 
     effect: str
     parameter: str
@@ -64,21 +79,9 @@ class Told:
 class Constant:
     """The part of a model that is the same in all configurations, at one temperature.
 
-    Attributes
-    ----------
-    temperature
-        °C of the robot, at which lengths hold.
-    parameters
-        All P parameters of the model, effect by effect, in the order of their values.
-    held
-        (P,) which of them are constant.
-    responses
-        (P, n + 6 S + 12) what one unit of each does in the chain: in the joints, the segments, the base and the tool;
-        zero where it is not constant.
-    joints
-        n.
-    grows
-        Whether any of it follows the temperature.
+    Of the P parameters, effect by effect, ``held`` (P,) are constant. ``responses`` (P, n + 6 S + 12): what one unit of
+    each does in the joints, the segments, the base and the tool; zero where it is not constant. At ``temperature``, °C
+    of the robot, lengths hold; ``grows`` where any of it follows that.
     """
 
     temperature: float
@@ -97,23 +100,11 @@ class Constant:
 
 
 def constant(model: CorrectedModel, temperature: float | None = None) -> Constant:
-    """Find what of a model is constant.
+    """Find what of a model is constant; of an effect in one place all is, or nothing.
 
-    Parameters
-    ----------
-    model
-        The corrected model. Of an effect in one place all is constant or nothing is.
-    temperature
-        °C of all links, for long enough that they have it; by default that at which the URDF's lengths hold. What a
-        model takes for settled in all rows to come (a law of the session, or of the row's number) counts as it was at
-        the end of the campaign.
-
-    Raises
-    ------
-    CampaignError
-        If the temperature is none.
-    EffectError
-        If an effect of the model breaks its contract.
+    ``temperature``, °C, is that of all links, for long enough that they have it; by default that at which the URDF's
+    lengths hold. What a model takes for settled in all rows to come (a law of the session, or of the row's number)
+    counts as it was at the end of the campaign.
     """
     degrees = float(model.settings.reference_temperature if temperature is None else temperature)
     if not ABSOLUTE_ZERO <= degrees < np.inf:
@@ -196,3 +187,206 @@ def _deviations(model: CorrectedModel) -> Array:
     if model.spread is None or len(model.spread.covariance) < count:
         return np.full(count, np.nan)
     return np.asarray(np.sqrt(model.spread.covariance.diagonal()[len(model.spread.covariance) - count :]))
+
+
+def determined(
+    model: CorrectedModel, min_sigma: float, temperature: float | None = None
+) -> tuple[CorrectedModel, tuple[Told, ...]]:
+    """Leave out of a model the constants that the data do not determine.
+
+    Parameters
+    ----------
+    model
+        The corrected model; what is not constant in it is kept, whatever is known of it.
+    min_sigma
+        A constant is kept if it is so many standard deviations away from zero.
+    temperature
+        °C, as for :func:`~thermal_robot.correction.constant.constant`.
+
+    Returns
+    -------
+    CorrectedModel
+        The same effects; those parameters are zero, frames and other parameters what they are without them.
+    tuple of Told
+        What was left out, as it was fitted.
+
+    Raises
+    ------
+    CampaignError
+        If the model does not say how far its parameters may be off, or ``min_sigma`` is no number of deviations.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> from thermal_robot.correction import determined
+    >>> model, left_out = determined(tr.diagnose(tr.demo_campaign()).model, min_sigma=2.0)
+    >>> left_out
+    ()
+    """
+    if not 0.0 <= min_sigma < np.inf:
+        raise CampaignError(
+            "min_sigma", "is no number of standard deviations", found=f"{min_sigma:g}", expected="a number such as 2"
+        )
+    known, spread = constant(model, temperature), model.spread
+    frames = frame_columns(rows_of_every_kind(model))[1]
+    names = tuple(name for name, own in zip(frames, moves(frames), strict=True) if own)
+    if spread is None or len(spread.covariance) != len(names) + len(known.parameters):
+        raise CampaignError(
+            "min_sigma", "the model does not say how sure its parameters are", expected="one of this version: diagnose"
+        )
+    state = np.concatenate([np.zeros(len(names)), [told.value for told in known.parameters]])
+    covariance, wider = spread.covariance, spread.wider
+    left, gone = (len(names) + np.flatnonzero(known.held)).tolist(), []
+    while left:
+        std = np.sqrt(np.maximum(covariance.diagonal(), settings.TINY))
+        weakest = min(left, key=lambda k: abs(state[k]) / std[k])
+        if abs(state[weakest]) >= min_sigma * std[weakest]:
+            break
+        left.remove(weakest)
+        gone.append(weakest)
+        wider = None if wider is None else _known(state, wider, weakest)[1]
+        state, covariance = _known(state, covariance, weakest)
+    ends = np.cumsum([len(names), *(len(values) for _, values in model.effects)])
+    kept = replace(
+        model,
+        effects=tuple((e, state[a:b]) for (e, _), a, b in zip(model.effects, ends, ends[1:], strict=False)),
+        frames=moved(model.frames, state[: len(names)], names),
+        spread=replace(spread, covariance=covariance, wider=wider),
+    )
+    return kept, tuple(known.parameters[k - len(names)] for k in sorted(gone))
+
+
+def _known(state: Array, covariance: Array, k: int) -> tuple[Array, Array]:
+    """Return mean (K,) and covariance (K, K) once one parameter is known to be zero."""
+    variance, along = covariance[k, k], covariance[:, k]
+    share = along / variance if variance > 0.0 else np.zeros(len(along))
+    mean, rest = state - share * state[k], covariance - np.outer(share, along)
+    mean[k], rest[k], rest[:, k] = 0.0, 0.0, 0.0
+    return mean, rest
+
+
+_ROWS = 100
+"""Of poses in which zeros are told from the rest of the geometry: as many as a good campaign has."""
+_SEEN = settings.SEEN**0.5
+"""Of the largest singular value: a direction below is an exact alias of the unknown frames, or of others."""
+TOLD, UNSEEN, NONE = "determined", "not determined", "not in the model"
+"""What may be said of a zero."""
+
+
+def zero_offsets(
+    model: CorrectedModel, *, temperature: float | None = None, min_sigma: float | None = None
+) -> pd.DataFrame:
+    """Return what to enter in a controller as the zeros of its joints.
+
+    Parameters
+    ----------
+    model
+        The corrected model.
+    temperature, min_sigma
+        As for :func:`~thermal_robot.correction.calibrated`.
+
+    Returns
+    -------
+    pandas.DataFrame
+        A row for each joint that is commanded. ``joint``; ``add_to_command``: the joint is where it was meant to be
+        once this is added to its command (it stands at its command minus this); ``std``, one standard deviation, empty
+        where the model does not tell; ``unit``, that of the joint's column in the campaign; ``zero``: ``determined``,
+        ``not determined`` (the unknown base or tool can take it up, or the data leave half or more of the deviation
+        that was expected before them: the rule by which a diagnosis calls a parameter identified) or
+        ``not in the model``, both with an offset of 0.
+
+    Raises
+    ------
+    CampaignError
+        As :func:`~thermal_robot.correction.calibrated`.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> from thermal_robot.correction import zero_offsets
+    >>> off = {"joint_offset": {"joint_2": 1e-3}}
+    >>> campaign = tr.simulate("builtin:rv_m2", off, tool_frame="tool0", rows=40, noise=1e-5, base_known=False)
+    >>> table = zero_offsets(tr.diagnose(campaign).model)
+    >>> table["zero"][1], round(float(table["add_to_command"][1]), 4)
+    ('determined', -0.001)
+    """
+    import pandas as pd
+
+    if min_sigma is not None:
+        model = determined(model, min_sigma, temperature)[0]
+    known = constant(model, temperature)
+    used = np.flatnonzero(
+        known.responses[:, :-12].any(axis=1) & np.array([t.value != 0.0 for t in known.parameters], dtype=bool)
+    )
+    change, said = _coordinates(model, known, used)
+    units, robot = model.settings.units, model.robot
+    scales = np.array([units.joint_scale(kind) for kind in robot.joint_types])
+    values = change @ np.array([known.parameters[k].value for k in used])
+    std, expected = _zero_spread(model, known, used, change)
+    told = np.array([word == TOLD for word in said]) & (np.isnan(std) | identified(std, expected))
+    said = [UNSEEN if word == TOLD and not own else word for word, own in zip(said, told, strict=True)]
+    return pd.DataFrame(
+        {
+            "joint": robot.joint_names,
+            "add_to_command": np.where(told, -values, 0.0) / scales + 0.0,
+            "std": np.where(told, std, np.nan) / scales,
+            "unit": [units.joint_unit(kind) for kind in robot.joint_types],
+            "zero": said,
+        }
+    )
+
+
+def _zero_spread(model: CorrectedModel, known: Constant, used: NDArray[np.int64], change: Array) -> tuple[Array, Array]:
+    """(n,) standard deviation of each joint's zero, NaN where the model does not tell, and what it was before the data.
+
+    A model of an older program does not say how large its parameters were expected to be: the effects do.
+    """
+    spread, count = model.spread, len(known.parameters)
+    if spread is None or len(spread.covariance) < count:
+        return np.full(len(change), np.nan), np.full(len(change), np.nan)
+    numbers = len(spread.covariance) - count + used
+    variance = (change @ spread.covariance[np.ix_(numbers, numbers)] * change).sum(axis=1)
+    prior = spread.prior
+    if prior is None or len(prior) != count:
+        seen = rows_of_every_kind(model)
+        prior = np.array([p.size for effect, _ in model.effects for p in gate.checked(effect, seen)])
+    return np.sqrt(np.maximum(variance, 0.0)), np.linalg.norm(change * prior[used], axis=1)
+
+
+def _coordinates(model: CorrectedModel, known: Constant, used: NDArray[np.int64]) -> tuple[Array, list[str]]:
+    """Return (n, U) the zero of each joint a unit of each used parameter, and what is said of each zero."""
+    robot, observations = model.robot, rows_of_every_kind(model, rows=_ROWS)
+    own = [_acting(robot, known, int(k)) for k in used]
+    zeros = [Parameter("zero", "", 1.0, "joint", name, (at_joint(j, 1.0),)) for j, name in enumerate(robot.joint_names)]
+    rest = [p for effect, _ in model.effects for p in gate.independent(effect, observations)]
+    frames = frame_columns(observations)[0]
+    equations = frames.shape[0] * frames.shape[1]
+    frames = frames.reshape(equations, -1) if frames.size else np.zeros((equations, 0))
+    whole = moved_by(observations, [*zeros, *rest, *own]).reshape(equations, -1)
+    length = np.linalg.norm(whole, axis=0) + settings.TINY
+    left = (without(whole, orthonormal(frames)) if frames.size else whole) / length
+    # what moves the target by rounding alone is hidden, too: a joint on whose axis it sits
+    hidden = (np.linalg.norm(left, axis=0) < _SEEN) | (length < _SEEN * length.max(initial=0.0))
+    change, said = np.zeros((robot.n, len(own))), [UNSEEN if unseen else NONE for unseen in hidden[: robot.n]]
+    if not own or hidden[-len(own) :].all():
+        return change, said
+    basis, size, turn = np.linalg.svd(left[:, -len(own) :], full_matrices=False)
+    seen = size > _SEEN * size[0]
+    # what each is in the directions of the constants that can be seen, if it is nothing beside them
+    inside = basis[:, seen].T @ left
+    within = ~hidden & (np.linalg.norm(left - basis[:, seen] @ inside, axis=0) < _SEEN)
+    across = inside / size[seen, None]
+    chosen = distinct(across / (np.linalg.norm(across, axis=0) + settings.TINY), within)
+    of_each = np.linalg.pinv(across[:, chosen]) @ turn[seen] * length[-len(own) :] / length[chosen, None]
+    for row, j in zip(of_each, chosen, strict=True):
+        if j < robot.n:
+            change[j], said[j] = row, TOLD
+    return change, said
+
+
+def _acting(robot: Robot, known: Constant, k: int) -> Parameter:
+    """Return a constant with what it does in joints and segments alone."""
+    joints, twists = known.responses[k, : robot.n], known.responses[k, robot.n : -12].reshape(-1, 6)
+    turned = [at_joint(int(j), joints[j]) for j in np.flatnonzero(joints)]
+    placed = [at_segment(int(s), twists[s]) for s in np.flatnonzero(twists.any(axis=1))]
+    return Parameter(known.parameters[k].parameter, "", 1.0, "link", "", (*turned, *placed))

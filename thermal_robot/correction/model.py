@@ -1,10 +1,23 @@
-"""The corrected model: nominal robot, frames and effects; it predicts, and is saved and loaded as JSON."""
+"""The corrected model: nominal robot, frames and effects; it predicts, corrects commands, and is saved as JSON.
+
+Samples to predict are made from a table or from arrays and conditions, and must bring what the model needs.
+
+**Commands** are joint positions at which the tool of the robot as it really is reaches the nominal poses. The nominal
+pose of a row is where the nominal robot would bring the target at the row's joint positions, p₀(q₀), in the root frame,
+on the target as it was fitted. The real robot brings it to p(q) = p₀ displaced by all that the effects do in the chain,
+at the row's conditions. Wanted is the q with p(q) = p₀(q₀).
+
+What displaces the base counts too (a pedestal that yields, drift): the pose is meant where the base was when the frames
+were fitted. What an instrument adds does not: its scale says nothing of where the tool is, and a robot that was moved
+for it would miss. Where a campaign brought the predictions of a simulator, what the simulator says at q is taken to
+differ from what it said at q₀ as the URDF's poses do.
+"""
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
@@ -13,24 +26,249 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from thermal_robot.arrays import Array
-from thermal_robot.campaign import Campaign, Settings, read_samples, read_table, with_commands, with_prediction
+from thermal_robot.campaign import Campaign, Settings, names, read_samples, read_table, with_commands, with_prediction
 from thermal_robot.campaign.campaign import read_alike
 from thermal_robot.campaign.table import Table
-from thermal_robot.correction.arrays import of_arrays
-from thermal_robot.correction.commands import Commands, corrected, nominal_positions
-from thermal_robot.correction.required import require_finite, require_needed
+from thermal_robot.campaign.units import SI
 from thermal_robot.effects import Effect
 from thermal_robot.effects.apply import displacement
-from thermal_robot.errors import require
+from thermal_robot.effects.dependence import depends_on
+from thermal_robot.errors import CampaignError, EffectError, require
 from thermal_robot.files import write_text
-from thermal_robot.kinematics import rotation_to_quaternion
+from thermal_robot.kinematics import (
+    Displacement,
+    inverse_kinematics,
+    nearest_postures,
+    rotation_to_quaternion,
+    tool_poses,
+)
 from thermal_robot.model_file import fields_of, read, written
-from thermal_robot.observations import Frames, observe
+from thermal_robot.observations import Frames, Observations, observe
 from thermal_robot.prediction import Prediction, Spread
 from thermal_robot.robot import Robot
 
 if TYPE_CHECKING:
     import pandas as pd
+
+
+MISSED = 1e-7
+"""m; a command that brings the target no nearer does not reach the pose: a hundredth of what any tracker sees."""
+ROUNDED = 1e-9
+"""rad, m by which a position may lie beyond its limit as it was rounded; less than a hundredth of :data:`MISSED`."""
+ORTHOGONAL = 1e-6
+"""By which the axes of a pose may fail to be orthogonal and of length one: rounding to six digits."""
+FARTHEST = {"revolute": 0.2, "continuous": 0.2, "prismatic": 0.05}
+"""rad, m; a joint goes no farther from its nominal position: ten times the largest errors of robots. What asks for more
+lies at a singular pose, or is another posture, whose way there nobody has looked at."""
+
+
+@dataclass(frozen=True, eq=False)
+class Commands:
+    """Joint positions to command, and what will be reached.
+
+    Attributes
+    ----------
+    q
+        (N, n) rad or m, in the chain's order, within the joints' limits.
+    std
+        (N, 3) one standard deviation per axis of where the target will be, measurement frame, m; NaN where the model
+        does not tell.
+    outside
+        Per row: the joints and columns in which it leaves what was measured.
+    direction
+        (N,) rad by which the direction of the target is missed: 0 but for rounding, unless the arm has fewer than six
+        joints, or stands at a singular pose or at a limit.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> campaign = tr.demo_campaign()
+    >>> commands = tr.diagnose(campaign).model.corrected_commands(campaign.take([0, 1]))
+    >>> commands.q.shape, commands.std.shape, commands.outside
+    ((2, 5), (2, 3), ((), ()))
+    """
+
+    q: Array
+    std: Array
+    outside: tuple[tuple[str, ...], ...]
+    direction: Array
+
+
+def corrected(
+    samples: Campaign, frames: Frames, effects: Sequence[tuple[Effect, Array]], spread: Spread | None
+) -> Commands:
+    """Return the commands that bring the real target to the nominal poses of samples.
+
+    A pose that cannot be reached within the limits, and a joint beyond its limit, is refused with its row.
+    """
+    robot, tool = samples.robot, frames.tool
+    farthest = np.array([FARTHEST[kind] for kind in robot.joint_types])
+    # a row beyond a limit is solved as it stands; the correction may bring it back
+    low = np.minimum(np.maximum(samples.q - farthest, robot.lower), samples.q)
+    high = np.maximum(np.minimum(samples.q + farthest, robot.upper), samples.q)
+
+    def displaced(q: Array) -> Displacement:
+        there = replace(samples, q=q, travelled=samples.since_turn)
+        return displacement(observe(there, frames), effects)[0]
+
+    wanted = tool_poses(robot, samples.q) @ tool
+    found = inverse_kinematics(robot, wanted, samples.q, tool=tool, displaced=displaced, within=(low, high))
+    _require_within_limits(samples, found.q)
+    _require_reached(samples, found.miss)
+    q = np.clip(found.q, robot.lower, robot.upper)
+    there = replace(samples, q=q, travelled=samples.since_turn)
+    if spread is None:
+        return Commands(q, np.full((samples.samples, 3), np.nan), ((),) * samples.samples, found.turned)
+    outside = spread.outside(there, effects)
+    std = spread.std(observe(there, frames, displacement=displaced(q)), effects, outside, noise=False)
+    return Commands(q, std, outside, found.turned)
+
+
+def nominal_positions(robot: Robot, frames: Frames, poses: ArrayLike) -> Array:
+    """(N, n) joint positions, rad or m, at which the nominal robot brings the target to poses (N, 4, 4), root frame.
+
+    One that is out of reach is refused by its row among them, which count from 1.
+    """
+    expected = "an array (N, 4, 4) of poses, m"
+    try:
+        wanted = np.asarray(poses, dtype=float)
+    except (TypeError, ValueError) as error:
+        raise CampaignError("<poses>", "these are no poses", found=str(error), expected=expected) from error
+    turns = wanted[..., :3, :3]
+    if wanted.shape[1:] != (4, 4) or not np.allclose(turns @ turns.swapaxes(-1, -2), np.eye(3), atol=ORTHOGONAL):
+        raise CampaignError("<poses>", "these are no poses", found=f"shape {wanted.shape}", expected=expected)
+    found = nearest_postures(robot, wanted, tool=frames.tool)
+    missed = np.flatnonzero(~(found.miss <= MISSED))
+    if missed.size:
+        left = f"{1e3 * found.miss[missed[0]]:.3g} mm are left"
+        raise CampaignError("<poses>", "out of reach for the nominal robot", row=int(missed[0]) + 1, found=left)
+    return found.q
+
+
+def _require_within_limits(samples: Campaign, q: Array) -> None:
+    """Refuse rows beyond a limit that no correction brings back: only such have commands (N, n) beyond one."""
+    robot = samples.robot
+    wrong = np.argwhere(np.maximum(robot.lower - q, q - robot.upper) > ROUNDED)
+    if len(wrong):
+        row, joint = (int(k) for k in wrong[0])
+        more = len(np.unique(wrong[:, 0])) - 1
+        low, high = (_in_units(samples, joint, end[joint]) for end in (robot.lower, robot.upper))
+        raise CampaignError(
+            samples.name,
+            "the joint cannot stand beyond its limit" + (f", nor in {more} more rows" if more else ""),
+            row=int(samples.rows[row]),
+            column=robot.joint_names[joint],
+            found=_in_units(samples, joint, samples.q[row, joint]),
+            expected=f"a position from {low} to {high} (arrays are in rad and m)",
+        )
+
+
+def _in_units(samples: Campaign, joint: int, position: float) -> str:
+    """Return a joint's position as the campaign's tables have it, and as arrays have it where that differs."""
+    kind = samples.robot.joint_types[joint]
+    units = dict.fromkeys((samples.units, SI))
+    own, *si = dict.fromkeys(f"{position / u.joint_scale(kind):.6g} {u.joint_unit(kind)}" for u in units)
+    return f"{own} ({si[0]})" if si else own
+
+
+def _require_reached(samples: Campaign, miss: Array) -> None:
+    missed = np.flatnonzero(~(miss <= MISSED))
+    if missed.size:
+        row = int(missed[0])
+        more = f", and so are {missed.size - 1} more rows" if missed.size > 1 else ""
+        raise CampaignError(
+            samples.name,
+            f"the pose of this row is out of reach for the real robot{more}",
+            row=int(samples.rows[row]),
+            found=f"{1e3 * miss[row]:.3g} mm are left",
+            expected="a pose within the limits, and away from singular ones",
+        )
+
+
+NAME = "<conditions>"
+"""What such samples are called in messages."""
+
+
+def of_arrays(
+    robot: Robot, settings: Settings, q: Any, conditions: Mapping[str, ArrayLike], needs: Collection[str] = ()
+) -> Campaign:
+    """Return samples to predict: (N, n) joint positions, rad or m, and conditions in SI, by column name.
+
+    ``needs``: columns that the model needs; what an effect of the user's own reads may have any name.
+    """
+    _require_known(robot, conditions, needs)
+    given = {}
+    try:
+        rows = np.atleast_2d(np.asarray(q, dtype=float))
+        for key, value in conditions.items():
+            given[key] = np.broadcast_to(np.asarray(value, dtype=float), len(rows)).copy()
+    except (TypeError, ValueError) as error:
+        what = f"an array (N, {robot.n}), and for each condition one number or N"
+        raise CampaignError(NAME, "these are no rows of numbers", found=str(error), expected=what) from error
+    return Campaign(name=NAME, robot=robot, q=rows, covariates=given, **settings.of_rows())
+
+
+def _require_known(robot: Robot, conditions: Mapping[str, ArrayLike], needs: Collection[str]) -> None:
+    """Refuse a condition that neither the model needs nor any campaign has."""
+    known = dict.fromkeys(needs) | names.conditions(robot.joint_names, robot.urdf_links)
+    for name in conditions:
+        if name not in known:
+            raise CampaignError(
+                NAME,
+                f"nothing has this name{names.did_you_mean(str(name), known)}",
+                column=str(name),
+                expected=", ".join(needs) or "none, as the model needs no condition",
+            )
+
+
+def require_needed(samples: Campaign, needs: Sequence[str], effects: Sequence[Effect], simulated: bool) -> None:
+    """Refuse samples that lack a column, or a cell of it, that a model needs.
+
+    ``simulated``: the model corrects the prediction of the user's own simulator. The error names the column, and the
+    row of an empty cell.
+    """
+    for column in needs:
+        if column not in samples.covariates:
+            reason = _reason(samples, needs, effects, column)
+            raise CampaignError(samples.name, reason, column=column, found="no such column", expected="numbers")
+        gaps = np.flatnonzero(samples.missing.get(column, np.zeros(0, dtype=bool)))
+        if gaps.size:
+            row, reason = int(samples.rows[gaps[0]]), _reason(samples, needs, effects, column)
+            raise CampaignError(
+                samples.name, reason, row=row, column=column, found="an empty cell", expected="a number"
+            )
+    if simulated and samples.simulated_position is None:
+        raise CampaignError(
+            samples.name,
+            "the model corrects the prediction of your simulator",
+            column="sim.x",
+            found="no such column",
+            expected="sim.x, sim.y, sim.z",
+        )
+
+
+def _reason(samples: Campaign, needs: Sequence[str], effects: Sequence[Effect], column: str) -> str:
+    """Say which effects of the model need a column."""
+    # what they read is asked of rows that have all columns; any possible values will do
+    whole = {name: np.ones(samples.samples) for name in needs}
+    seen = observe(replace(samples, covariates=whole, missing={}))
+    own = [effect.name for effect in effects if _depends(effect, seen, column)]
+    return f"the model ({', '.join(own or [effect.name for effect in effects])}) needs this column"
+
+
+def _depends(effect: Effect, seen: Observations, column: str) -> bool:
+    try:
+        return column in depends_on(effect, seen)
+    except EffectError:  # it may refuse such values: then it reads them
+        return True
+
+
+def require_finite(samples: Campaign, position: Array) -> None:
+    """Refuse positions (N, 3) that are not finite, by the first row."""
+    wrong = np.flatnonzero(~np.isfinite(position).all(axis=1))
+    if wrong.size:
+        row = int(samples.rows[wrong[0]])
+        raise CampaignError(samples.name, "the values of this row lead to no finite position", row=row)
 
 
 @dataclass(frozen=True, eq=False, repr=False)

@@ -5,6 +5,8 @@ from thermal_robot.iso9283.criteria import (
     AlongPath,
     Attained,
     Drift,
+    PathCriteria,
+    PoseCriteria,
     Repeatability,
     Variation,
     accuracy,
@@ -14,7 +16,6 @@ from thermal_robot.iso9283.criteria import (
     variation,
 )
 from thermal_robot.iso9283.measure import performance
-from thermal_robot.iso9283.parts import PathCriteria, PoseCriteria
 from thermal_robot.iso9283.performance import Performance
 
 __all__ = [

@@ -2,7 +2,7 @@
 
 Clauses: AP 7.2.1, RP 7.2.2, vAP 7.2.3, drift 7.6, AT and RT 8.2 and 8.3. The standard cuts the attained paths with
 planes across the commanded one. Here a point of the path is a command, and what was measured for it in each cycle
-belongs to it: how far the robot lags behind counts in AT.
+belongs to it: how far the robot lags behind counts in AT. The values of one pose or path are frozen.
 """
 
 from __future__ import annotations
@@ -283,3 +283,66 @@ def along_path(points: Sequence[Accuracy] | Sequence[Repeatability]) -> AlongPat
     """Return the path accuracy of the accuracies of its points; the path repeatability of their repeatabilities."""
     turns = [np.abs(point.angles) for point in points if point.angles is not None]
     return AlongPath(max(point.position for point in points), three(np.max(turns, axis=0)) if turns else None)
+
+
+@dataclass(frozen=True)
+class PoseCriteria:
+    """AP, RP, vAP and drift of one pose.
+
+    Attributes
+    ----------
+    pose
+        Its label.
+    cycles
+        How often it was repeated.
+    directions
+        From how many directions it was approached; ``None`` where that is unknown.
+    repeatability
+        RP, of all cycles.
+    accuracy
+        AP; ``None`` where the frames take up all that was measured.
+    corrected
+        AP against the prediction of a corrected model; ``None`` without one.
+    variation, variation_cycles
+        vAP, and the number of cycles from each direction that counts, two or more; ``None`` and empty with fewer than
+        two such directions.
+    drift, drift_cycles
+        Drift, and the number of cycles at each measuring time; ``None`` and empty with fewer than two times.
+    """
+
+    pose: str
+    cycles: int
+    directions: int | None
+    repeatability: Repeatability
+    accuracy: Accuracy | None = None
+    corrected: Accuracy | None = None
+    variation: Variation | None = None
+    variation_cycles: tuple[int, ...] = ()
+    drift: Drift | None = None
+    drift_cycles: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class PathCriteria:
+    """AT and RT of one path.
+
+    Attributes
+    ----------
+    path
+        Its label.
+    points
+        How many of its points were repeated.
+    cycles
+        How often each was, the least of all.
+    repeatability
+        RT.
+    accuracy, corrected
+        AT, and AT against the prediction of a corrected model; ``None`` as for a pose.
+    """
+
+    path: str
+    points: int
+    cycles: int
+    repeatability: AlongPath
+    accuracy: AlongPath | None = None
+    corrected: AlongPath | None = None

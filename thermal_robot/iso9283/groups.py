@@ -30,16 +30,9 @@ MOST_TIMES = 8
 
 @dataclass(frozen=True, eq=False)
 class Repeats:
-    """Rows that repeat one commanded pose.
+    """Rows (n,), in the sequence of measurement, that repeat one commanded pose; its path, or none for a pose at rest.
 
-    Attributes
-    ----------
-    label
-        The pose; without labels the row in the file that came first.
-    path
-        The path that it is a point of; empty for a pose at rest.
-    rows
-        (n,) indices in the sequence of measurement.
+    Without labels it is called as the row in the file that came first.
     """
 
     label: str
@@ -48,15 +41,10 @@ class Repeats:
 
 
 def repeats(campaign: Campaign) -> tuple[list[Repeats], int]:
-    """Find what was measured more than once.
+    """Find the poses that were measured more than once, as they were met, and the number of rows that repeat nothing.
 
     Rows with the same ``pose`` label belong together; without that column, rows with the same commands. Points of
     different paths, and poses at rest, never do.
-
-    Returns
-    -------
-    tuple
-        The poses in the sequence in which they were met, and the number of rows that repeat nothing.
     """
     pose, paths = campaign.labels.get("pose"), campaign.labels.get("path")
     number = repeated_poses(campaign)

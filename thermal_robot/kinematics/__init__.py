@@ -1,10 +1,15 @@
 """Poses, Jacobians, placement sensitivities and gravity torques in batches; the one room with Pinocchio."""
 
-from thermal_robot.kinematics.augmented import AugmentedModel, augmented_model, elongation_jacobian, growing
-from thermal_robot.kinematics.frames import ChainFrames, Displacement, chain_frames, tool_poses
+from thermal_robot.kinematics.augmented import AugmentedModel, augmented_model, elongation_jacobian, growing, link_poses
+from thermal_robot.kinematics.frames import (
+    ChainFrames,
+    chain_frames,
+    frame_jacobians,
+    placement_sensitivities,
+    tool_poses,
+)
 from thermal_robot.kinematics.gravity import gravity_torques, segment_loads, static_regressor
 from thermal_robot.kinematics.inverse import Reached, inverse_kinematics, nearest_postures
-from thermal_robot.kinematics.jacobians import frame_jacobians, placement_sensitivities
 from thermal_robot.kinematics.lie import (
     align,
     exp3,
@@ -14,7 +19,7 @@ from thermal_robot.kinematics.lie import (
     rotation_to_quaternion,
     rotation_to_rpy,
 )
-from thermal_robot.kinematics.links import link_poses
+from thermal_robot.kinematics.walk import Displacement
 
 __all__ = [
     "AugmentedModel",

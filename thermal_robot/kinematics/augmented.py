@@ -1,4 +1,7 @@
-"""Virtual prismatic joints: every segment with a length may grow along itself (Kluz et al. 2018, Eqs 6–11)."""
+"""Pinocchio's models of the whole robot: the poses of all links, and virtual prismatic joints.
+
+With these every segment with a length may grow along itself (Kluz et al. 2018, Eqs 6–11).
+"""
 
 from __future__ import annotations
 
@@ -242,3 +245,38 @@ def _add_movable(model: pin.Model, parent: int, robot: Robot, name: str, placeme
 
 def _frame(model: pin.Model, name: str, kind: pin.FrameType) -> pin.Frame:
     return model.frames[model.getFrameId(name, kind)]
+
+
+def link_poses(robot: Robot, q: ArrayLike) -> Array:
+    """Pose of every link of the URDF in the root frame, by Pinocchio, one configuration after another.
+
+    Parameters
+    ----------
+    robot
+        The robot; joints beside its chain stand where they are held.
+    q
+        (N, n) rad or m; (n,) counts as one configuration.
+
+    Returns
+    -------
+    ndarray
+        (N, L, 4, 4) homogeneous matrices, lengths in m, in the order of ``robot.urdf_links``.
+    """
+    model, data = robot.model, robot.model.createData()
+    frames = [model.getFrameId(link, pin.FrameType.BODY) for link in robot.urdf_links]
+    root = frames[robot.urdf_links.index(robot.root_frame)]
+    configurations = to_pinocchio(robot, q)
+    poses = np.empty((len(configurations), len(frames), 4, 4))
+    for i, configuration in enumerate(configurations):
+        pin.framesForwardKinematics(model, data, configuration)
+        poses[i] = [data.oMf[root].actInv(data.oMf[frame]).homogeneous for frame in frames]
+    return poses
+
+
+def to_pinocchio(robot: Robot, q: ArrayLike) -> Array:
+    """Write (N, n) configurations as Pinocchio does, (N, nq): mimicking ones too, continuous as cosine and sine."""
+    rows = robot.chain.coupling.positions(np.atleast_2d(np.asarray(q, dtype=float)))
+    columns = []
+    for joint, position in zip(list(robot.model.joints)[1:], rows.T, strict=True):
+        columns += [np.cos(position), np.sin(position)] if joint.nq == 2 else [position]
+    return np.column_stack(columns)

@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from thermal_robot.arrays import Array
 from thermal_robot.compiling import in_pieces, loads, rows_at_once
 from thermal_robot.kinematics import lanes, settings
-from thermal_robot.kinematics.arm import arm_of
-from thermal_robot.kinematics.scratch import rows_last, scratch
-
-if TYPE_CHECKING:
-    from thermal_robot.kinematics.displaced import Chained, Weighted
+from thermal_robot.kinematics.walk import Chained, Weighted, arm_of, rows_last, scratch
 
 
 def installed() -> bool:

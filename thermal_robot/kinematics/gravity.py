@@ -10,10 +10,9 @@ from numpy.typing import ArrayLike
 from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics import lanes
-from thermal_robot.kinematics.engines import engine_for
-from thermal_robot.kinematics.frames import ChainFrames, as_rows, chain_frames
+from thermal_robot.kinematics.frames import ChainFrames, as_rows, chain_frames, engine_for
 from thermal_robot.kinematics.model import REVOLUTE
-from thermal_robot.kinematics.scratch import result
+from thermal_robot.kinematics.walk import result
 
 if TYPE_CHECKING:
     from thermal_robot.robot import Robot
@@ -101,8 +100,9 @@ def segment_loads(
     """
     frames = chain_frames(robot, q) if frames is None else frames
     chain, rows = robot.chain, len(frames.tool_position)
-    rotations, positions, tool_rotation, tool_position = _rows_last(frames)
-    mass, moment = _at_the_tool(frames, payload, payload_com)
+    places, (mass, com) = frames.rows_last(), _payload(payload, payload_com, rows)
+    rotations, positions = places.rotations, places.positions
+    moment = mass * (places.tool_position + np.einsum("ijn,j->in", places.tool_rotation, com))
     segment_of = {int(k): s for s, k in enumerate(chain.placed)}
     joint_of = {int(k): j for j, k in enumerate(chain.movable)}
     gravity = robot.gravity[:, None]
@@ -111,7 +111,8 @@ def segment_loads(
     for k in range(len(chain.names) - 1, -1, -1):
         if k in joint_of:
             j, last = joint_of[k], k + 1 == len(chain.names)
-            rotation, position = (tool_rotation, tool_position) if last else (rotations[k + 1], positions[k + 1])
+            rotation = places.tool_rotation if last else rotations[k + 1]
+            position = places.tool_position if last else positions[k + 1]
             moment = moment + chain.masses[j] * (position + chain.mass_centres[j] @ rotation)
             mass = mass + chain.masses[j]
         if k not in segment_of:
@@ -163,23 +164,6 @@ def static_regressor(robot: Robot, q: ArrayLike, *, frames: ChainFrames | None =
                 regressor[:, j, b, 0] = -axis @ robot.gravity
     driven = chain.coupling.matrix.T @ regressor.reshape(rows, bodies, -1)
     return np.asarray(driven.reshape(rows, robot.n, bodies, 4))
-
-
-def _rows_last(frames: ChainFrames) -> tuple[Array, Array, Array, Array]:
-    """Rotations and positions of the chain and of the tool with the rows last, as sums over bodies want them."""
-    return (
-        np.moveaxis(frames.rotations, 0, -1),
-        np.moveaxis(frames.positions, 0, -1),
-        np.moveaxis(frames.tool_rotation, 0, -1),
-        frames.tool_position.T,
-    )
-
-
-def _at_the_tool(frames: ChainFrames, payload: ArrayLike | None, payload_com: ArrayLike) -> tuple[Array, Array]:
-    """(N,) mass of the payload, kg, and its (3, N) first moment in the root frame, kg·m."""
-    *_, rotation, position = _rows_last(frames)
-    mass, com = _payload(payload, payload_com, position.shape[1])
-    return mass, mass * (position + np.einsum("ijn,j->in", rotation, com))
 
 
 def _payload(payload: ArrayLike | None, com: ArrayLike, rows: int) -> tuple[Array, Array]:

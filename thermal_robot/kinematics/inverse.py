@@ -22,9 +22,9 @@ from numpy.typing import ArrayLike, NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
-from thermal_robot.kinematics.frames import ChainFrames, Displacement, as_rows, chain_frames
-from thermal_robot.kinematics.jacobians import frame_jacobians
+from thermal_robot.kinematics.frames import ChainFrames, as_rows, chain_frames, frame_jacobians
 from thermal_robot.kinematics.lie import log3
+from thermal_robot.kinematics.walk import Displacement
 
 if TYPE_CHECKING:
     from thermal_robot.robot import Robot
@@ -173,12 +173,8 @@ def _better(one: Reached, other: Reached, near: Array) -> Reached:
     far = [np.linalg.norm(each.q - near, axis=1) for each in (one, other)]
     alike = np.abs(cost[1] - cost[0]) <= ARM * _SAME
     taken = np.where(alike, far[1] < far[0], cost[1] < cost[0])[:, None]
-    chosen = (np.where(taken, b, a) for a, b in zip(_parts(one), _parts(other), strict=True))
-    return Reached(*chosen)
-
-
-def _parts(found: Reached) -> tuple[Array, Array, Array]:
-    return found.q, found.position, found.direction
+    pairs = (one.q, other.q), (one.position, other.position), (one.direction, other.direction)
+    return Reached(*(np.where(taken, b, a) for a, b in pairs))
 
 
 @dataclass(frozen=True, eq=False)

@@ -16,8 +16,8 @@ import numpy as np
 
 from thermal_robot.arrays import Array
 from thermal_robot.compiling import compiled
-from thermal_robot.kinematics.arm import SLIDES, TURNS, TURNS_ALIGNED, Arm
 from thermal_robot.kinematics.settings import LANES, LARGEST_REDUCED
+from thermal_robot.kinematics.walk import SLIDES, TURNS, TURNS_ALIGNED, Arm
 
 WIDE = np.uint64(LANES)
 _QUARTERS = 2.0 / math.pi

@@ -1,8 +1,13 @@
-"""From URDF text to a Pinocchio model and to the constant arrays of one kinematic chain."""
+"""From URDF text to a Pinocchio model and to the constant arrays of one kinematic chain.
+
+The linear coupling of joints that mimic another is applied outside Pinocchio. Its own (``JointModelMimic``, as of 4.1)
+has Jacobians and gravity torques, but no regressors, wants the driving joint to be nearer to the root, and cannot hold
+it.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,10 +16,217 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
-from thermal_robot.kinematics.hanging import hanging_masses
-from thermal_robot.kinematics.held import held_configuration
-from thermal_robot.kinematics.mimic import Coupling, common_limits, couple, followed, mimics
-from thermal_robot.kinematics.urdf import nearest, parse_urdf
+from thermal_robot.kinematics.urdf import bare, encoded, nearest, parse_urdf, tags
+
+
+@dataclass(frozen=True)
+class Mimic:
+    """What a mimicking joint follows: a position, rad or m, ``multiplier`` times that of ``joint`` + ``offset``."""
+
+    joint: str
+    multiplier: float = 1.0
+    offset: float = 0.0
+
+    def after(self, before: Mimic) -> Mimic:
+        """Return what is followed in the end, where ``joint`` itself follows as ``before`` says."""
+        return Mimic(before.joint, self.multiplier * before.multiplier, self.multiplier * before.offset + self.offset)
+
+
+@dataclass(frozen=True, eq=False)
+class Coupling:
+    """Positions of the M movable joints of a chain, from those of the n that drive them: ``matrix @ q + offset``.
+
+    A driving joint's row of ``matrix`` (M, n) is a unit vector, that of a joint which stands still is zero. ``driving``
+    (n,) numbers, among the movable joints, those that stand for the driving ones ``names``: the joint itself, or, of
+    one beside the chain, the first that mimics it.
+    """
+
+    names: tuple[str, ...]
+    driving: NDArray[np.int64]
+    matrix: Array
+    offset: Array
+
+    def positions(self, q: Array) -> Array:
+        """Return the (N, M) positions of the movable joints at (N, n) positions of the driving ones."""
+        return q @ self.matrix.T + self.offset
+
+    def leader(self, joint: int) -> int | None:
+        """Return which driving joint moves a movable one; ``None`` where it stands still."""
+        found = np.flatnonzero(self.matrix[joint])
+        return int(found[0]) if len(found) else None
+
+
+def mimics(urdf: str, source: str = "the robot description") -> dict[str, Mimic]:
+    """Read what every joint with a ``<mimic>`` tag follows, which Pinocchio's default parsing drops."""
+    found, every = {}, tags(bare(encoded(urdf)), source)
+    for tag in every:
+        if tag.path == ("robot", "joint", "mimic") and (name := every[tag.parent].attributes.get("name")):
+            said = tag.attributes
+            times, offset = float(said.get("multiplier", 1.0)), float(said.get("offset", 0.0))
+            found[name] = Mimic(said.get("joint", ""), times, offset)
+    return found
+
+
+def followed(found: Mapping[str, Mimic], joints: Collection[str], chain: Collection[str]) -> dict[str, Mimic]:
+    """Follow each mimicking joint, over others that mimic, to one that does not.
+
+    Outside the chain a joint that follows nothing, or in the end itself, is left out: as many a hand in use is written,
+    and it moves nothing that was measured. Within the chain it is refused, by name.
+    """
+    ends = {}
+    for name in found:
+        try:
+            ends[name] = _end(name, found, joints)
+        except RobotError:
+            if name in chain:
+                raise
+    return ends
+
+
+def _end(name: str, found: Mapping[str, Mimic], joints: Collection[str]) -> Mimic:
+    seen, end = [name], found[name]
+    while True:
+        if end.joint not in joints:
+            near = nearest(end.joint, joints)
+            raise RobotError(
+                f"joint {seen[-1]!r} mimics {end.joint!r}, which is not a joint of the robot; "
+                f"nearest: {', '.join(near)}",
+                name=seen[-1],
+                candidates=near,
+            )
+        if end.joint in seen:
+            circle = " mimics ".join(repr(joint) for joint in (*seen[seen.index(end.joint) :], end.joint))
+            raise RobotError(f"joints mimic each other in a circle: {circle}", name=end.joint)
+        if end.joint not in found:
+            return end
+        seen.append(end.joint)
+        end = end.after(found[end.joint])
+
+
+def couple(names: Sequence[str], ends: Mapping[str, Mimic], beside: Collection[str] = ()) -> Coupling:
+    """Couple the movable joints of a chain, from the root on, to what they follow in the end (:func:`followed`).
+
+    What mimics another one of the movable joints ``beside`` the chain is at the offset, as one that mimics a fixed
+    joint is.
+    """
+    driving: dict[str, int] = {}
+    for j, name in enumerate(names):
+        end = ends.get(name, Mimic(name))
+        if end.joint == name or (end.joint in beside and end.joint not in names and end.multiplier):
+            driving.setdefault(end.joint, j)
+    column = {driver: i for i, driver in enumerate(driving)}
+    matrix, offset = np.zeros((len(names), len(driving))), np.zeros(len(names))
+    for j, name in enumerate(names):
+        end = ends.get(name, Mimic(name))
+        offset[j] = end.offset
+        if end.joint in column:
+            matrix[j, column[end.joint]] = end.multiplier
+    numbers = np.array(list(driving.values()), dtype=np.int64)
+    for array in (numbers, matrix, offset):
+        array.setflags(write=False)
+    return Coupling(tuple(driving), numbers, matrix, offset)
+
+
+def common_limits(
+    coupling: Coupling, names: Sequence[str], lower: Array, upper: Array, own: tuple[Array, Array]
+) -> tuple[Array, Array]:
+    """Limits of the driving joints within which every joint that follows them is within its own.
+
+    All (M,) limits, and the driving joints' ``own`` (n,), are in rad or m, infinite where there is none. Refused where
+    a joint and one that follows it are never both within their limits.
+    """
+    low, high = (np.array(limits) for limits in own)
+    for j, name in enumerate(names):
+        i = coupling.leader(j)
+        if i is None:
+            continue
+        with np.errstate(over="ignore"):  # a joint that hardly follows never comes to its limits
+            ends = (np.array([lower[j], upper[j]]) - coupling.offset[j]) / coupling.matrix[j, i]
+        low[i], high[i] = max(low[i], ends.min()), min(high[i], ends.max())
+        if low[i] > high[i]:
+            raise RobotError(
+                f"joint {name!r} mimics {coupling.names[i]!r}, but the two are never both within their limits",
+                name=name,
+            )
+    return low, high
+
+
+def held_configuration(model: pin.Model, ends: Mapping[str, Mimic]) -> Array:
+    """(nq,) configuration of the whole model: joints at 0 or the limit nearest to 0, mimicking ones as they follow."""
+    q = np.asarray(pin.neutral(model), dtype=float)
+    for joint in list(model.joints)[1:]:
+        if joint.nq == 1:
+            low, high = model.lowerPositionLimit[joint.idx_q], model.upperPositionLimit[joint.idx_q]
+            if low < high:
+                q[joint.idx_q] = min(max(0.0, low), high)
+    for name, end in ends.items():
+        position = end.multiplier * held_position(model, q, end.joint) + end.offset
+        joint = model.joints[model.getJointId(name)]
+        if joint.nq == 1:
+            q[joint.idx_q] = position
+        elif joint.nv == 1:
+            q[joint.idx_q : joint.idx_q + 2] = np.cos(position), np.sin(position)
+    return q
+
+
+def held_position(model: pin.Model, q: Array, name: str) -> float:
+    """Position of one joint in a configuration of the whole model, rad or m; 0 for a fixed one; refused if several."""
+    if not model.existJointName(name):
+        return 0.0
+    joint = model.joints[model.getJointId(name)]
+    if joint.nv != 1:
+        raise RobotError(f"joint {name!r}, which another one mimics, has no single position", name=name)
+    if joint.nq == 1:
+        return float(q[joint.idx_q])
+    return float(np.arctan2(q[joint.idx_q + 1], q[joint.idx_q]))
+
+
+_NO_MASS = 1e-12
+"""kg; less is what rounding leaves of a body's mass once the links that are fixed to it are taken off."""
+
+
+def hanging_masses(full: pin.Model, elements: Sequence[int], held: Array) -> tuple[Array, Array]:
+    """(K,) kg that each fixed element of a chain carries, up to its next movable joint, and (K, 3) m their centres.
+
+    Pinocchio lumps the links between two joints into one body; a frame in its midst carries those behind it only.
+    """
+    data = full.createData()
+    pin.framesForwardKinematics(full, data, held)
+    place = {e: k for k, e in enumerate(elements)}
+    masses, moments = np.zeros(len(elements)), np.zeros((len(elements), 3))
+    for frame, mass, centre in _links(full, data):
+        while frame:
+            k = place.get(frame)
+            if k is not None:
+                if full.frames[frame].type == pin.FrameType.JOINT:
+                    break
+                masses[k] += mass
+                moments[k] += mass * data.oMf[frame].actInv(centre)
+            frame = full.frames[frame].parentFrame
+    return masses, moments / np.where(masses > 0.0, masses, 1.0)[:, None]
+
+
+def _links(full: pin.Model, data: pin.Data) -> list[tuple[int, float, Array]]:
+    """Frame to which each link's mass is fixed, the mass (kg) and its centre in the world (m)."""
+    found = []
+    joined = np.zeros(full.njoints)
+    moment = np.zeros((full.njoints, 3))
+    for f, frame in enumerate(full.frames):
+        # Pinocchio keeps the inertia of a link behind a fixed joint with that joint's frame, too
+        if frame.type == pin.FrameType.FIXED_JOINT and frame.inertia.mass > 0.0:
+            mass, centre = frame.inertia.mass, data.oMf[f].act(frame.inertia.lever)
+            found.append((f, float(mass), np.asarray(centre)))
+            joined[frame.parentJoint] += mass
+            moment[frame.parentJoint] += mass * centre
+    for f, frame in enumerate(full.frames):
+        if frame.type == pin.FrameType.JOINT:
+            j, body = frame.parentJoint, full.inertias[frame.parentJoint]
+            mass = body.mass - joined[j]
+            if mass > _NO_MASS:
+                centre = (body.mass * data.oMi[j].act(body.lever) - moment[j]) / mass
+                found.append((f, float(mass), np.asarray(centre)))
+    return found
+
 
 STANDARD_GRAVITY = 9.81
 """m/s²; the value Pinocchio uses."""
@@ -121,29 +333,14 @@ def build_chain_model(
     """Read a URDF and keep the chain from the root frame to the tool frame; every other joint is held.
 
     A joint is held at 0, or at the limit nearest to 0; one that mimics another, where that one takes it. One outside
-    that a joint of the chain mimics is no part of the chain and yet drives it: it is one of its joints.
-
-    Parameters
-    ----------
-    urdf
-        XML text.
-    tool_frame, root_frame
-        Names of links; ``None`` for the root link of the URDF.
-    gravity
-        (3,) m/s² in the root frame; ``None`` for 9.81 down the z axis of the root of the URDF.
-    source
-        What to call the URDF in an error.
-
-    Raises
-    ------
-    RobotError
-        If the text is not a URDF, a link is unknown, the tool is not below the root frame, or the chain holds
-        no movable joint or one that is not revolute, continuous or prismatic, or if a joint of the chain mimics
-        one that does not exist, that has no single position, or in the end itself.
+    that a joint of the chain mimics is no part of the chain and yet drives it: it is one of its joints. Without a root
+    frame it is the root link of the URDF, without ``gravity`` (3,) 9.81 m/s² down its z axis. :class:`RobotError` if
+    the text is not a URDF, a link is unknown, the tool is not below the root frame, the chain holds no movable joint or
+    one of another kind, or one that mimics what does not exist, has no single position, or is in the end itself.
     """
     full = parse_urdf(urdf, source)
     links = {frame.name: i for i, frame in enumerate(full.frames) if frame.type == pin.FrameType.BODY}
-    root = _find_link(full, links, root_frame, "root frame") if root_frame is not None else _root_link(links)
+    root = _find_link(full, links, root_frame, "root frame") if root_frame is not None else min(links.values())
     tool = _find_link(full, links, tool_frame, "tool frame")
     elements = _elements_between(full, root, tool)
     # a fixed joint stays where it is, whatever it is said to mimic
@@ -323,10 +520,6 @@ def _limits(model: pin.Model, names: Sequence[str]) -> tuple[Array, Array]:
         if joint.nq == 1 and low < high:
             lower[i], upper[i] = low, high
     return lower, upper
-
-
-def _root_link(links: dict[str, int]) -> int:
-    return min(links.values())
 
 
 def _find_link(model: pin.Model, links: dict[str, int], name: str, role: str) -> int:

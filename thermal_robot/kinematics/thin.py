@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import threading
-from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -12,11 +11,7 @@ import pinocchio as pin
 from thermal_robot.arrays import Array
 from thermal_robot.kinematics import settings
 from thermal_robot.kinematics.model import FIXED, REVOLUTE, Chain
-from thermal_robot.kinematics.walk import steps
-
-if TYPE_CHECKING:
-    from thermal_robot.kinematics.displaced import Chained, Weighted
-
+from thermal_robot.kinematics.walk import Chained, Weighted, steps
 
 _ALONG = {
     (True, 0): pin.JointModelRX,
@@ -35,13 +30,8 @@ _UPRIGHT = 1e-14
 class _Own:
     """A model of a chain whose world is its root frame, every joint with one coordinate, and memory to work in.
 
-    Parameters
-    ----------
-    chain
-        Its elements.
-    placed
-        Whether every segment is to be a joint: fixed ones too, which stay at zero. Pinocchio's kinematic regressor
-        knows the placements of joints only.
+    Where it is ``placed`` every segment is a joint, fixed ones too, which stay at zero: Pinocchio's kinematic regressor
+    knows the placements of joints only.
     """
 
     def __init__(self, chain: Chain, placed: bool) -> None:

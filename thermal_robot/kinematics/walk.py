@@ -6,35 +6,191 @@ homogeneous matrix, and the configurations last, so that every NumPy call works 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import math
+import threading
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any, NamedTuple, Protocol
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from thermal_robot.arrays import Array
-from thermal_robot.kinematics.displaced import Displaced
+from thermal_robot.errors import RobotError
+from thermal_robot.kinematics import settings
+from thermal_robot.kinematics.lie import exp6, sines_and_cosines
 from thermal_robot.kinematics.model import FIXED, PRISMATIC, Chain
-from thermal_robot.kinematics.scratch import scratch
-from thermal_robot.kinematics.turns import sines_and_cosines
+
+_FRAME = 12 * 8
+"""Bytes of one frame of one configuration."""
+
+_kept = threading.local()
+
+
+def scratch(name: str, *shape: int) -> Array:
+    """Return an array of that shape with anything in it, the same memory each time; until the next call it is yours.
+
+    Two arrays that are in use together have two names.
+    """
+    size = math.prod(shape)
+    kept: Array | None = getattr(_kept, name, None)
+    if kept is None or kept.size < size:
+        kept = np.empty(size)
+        setattr(_kept, name, kept)
+    return kept[:size].reshape(shape)
+
+
+def chunks(rows: int, frames: int) -> Iterator[slice]:
+    """Consecutive slices that cover all rows, each short enough for that many frames a row to stay in the cache."""
+    fits = settings.CACHE // (_FRAME * max(frames, 1))
+    step = max(min(settings.CHUNK, fits), min(settings.SHORTEST_CHUNK, settings.CHUNK))
+    return (slice(start, min(start + step, rows)) for start in range(0, rows, step))
+
+
+def rows_last(array: Array) -> Array:
+    """Return an array (N, ...) as (..., N), the same memory."""
+    return array.transpose(*range(1, array.ndim), 0)
+
+
+def result(out: Array | None, rows: int, *shape: int) -> Array:
+    """Return the array for the results of N configurations: a new one with N last in memory, or the caller's.
+
+    The caller's ``out`` is of shape (N, ...), in any layout; refused unless it is such an array of floats that may be
+    written to.
+    """
+    if out is None:
+        last = len(shape)
+        return np.empty((*shape, rows)).transpose(last, *range(last))
+    wanted = (rows, *shape)
+    if not isinstance(out, np.ndarray) or out.shape != wanted or out.dtype != np.float64:
+        raise RobotError(
+            f"out of shape {np.shape(out)} and type {getattr(out, 'dtype', type(out).__name__)} does not fit: "
+            f"expected an array of float64 of shape {wanted}"
+        )
+    if not out.flags.writeable:
+        raise RobotError("out must not be written to: give an array that may be, or none")
+    return out
+
+
+class Chained(Protocol):
+    """A chain with a name; a :class:`~thermal_robot.Robot` is one."""
+
+    @property
+    def name(self) -> str:
+        """Name of the robot, for messages."""
+
+    @property
+    def n(self) -> int:
+        """Number of joints that can be driven."""
+
+    @property
+    def segments(self) -> Sequence[Any]:
+        """The placements that may be displaced, from the root on."""
+
+    @property
+    def chain(self) -> Chain:
+        """Constant arrays of its elements."""
+
+
+class Weighted(Chained, Protocol):
+    """A chain on which gravity pulls; a :class:`~thermal_robot.Robot` is one."""
+
+    @property
+    def gravity(self) -> NDArray[np.float64]:
+        """(3,) m/s² in the root frame."""
+
+
+@dataclass(frozen=True, eq=False)
+class Displacement:
+    """Small errors in the four places where error enters a chain; ``None`` means none there.
+
+    The displaced tool pose is ``exp(base) · Π_k [P_k · exp(segment_k) · motion_k(q_k + joint_k)] ·
+    exp(tool)``; every array may have a row for each configuration or be one row for all. Twists are ordered
+    (linear m, angular rad). A joint that mimics another follows it where that one really is: ``q + joint``.
+
+    Parameters
+    ----------
+    joint
+        (N, n) or (n,) rad or m, added to the joint positions.
+    segment
+        (N, S, 6) or (S, 6): twist of each segment's placement, in its own frame (a right perturbation,
+        ``LOCAL`` in Pinocchio).
+    base
+        (N, 6) or (6,) in the root frame.
+    tool
+        (N, 6) or (6,) in the tool frame.
+    """
+
+    joint: ArrayLike | None = None
+    segment: ArrayLike | None = None
+    base: ArrayLike | None = None
+    tool: ArrayLike | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Displaced:
+    """A displacement made ready: joint offsets (1 or N, n), twists as rigid motions (4, 4, 1 or N)."""
+
+    joint: Array | None
+    segment: dict[int, Array]
+    base: Array | None
+    tool: Array | None
+
+    @staticmethod
+    def of(robot: Chained, displacement: Displacement | None, rows: int) -> Displaced:
+        """Make a displacement ready for that many rows."""
+        if displacement is None:
+            displacement = Displacement()
+        joint = _channel(robot, "joint", displacement.joint, (robot.n,), rows)
+        segment = _channel(robot, "segment", displacement.segment, (len(robot.segments), 6), rows)
+        base = _channel(robot, "base", displacement.base, (6,), rows)
+        tool = _channel(robot, "tool", displacement.tool, (6,), rows)
+        twists = {} if segment is None else {int(k): segment[:, s] for s, k in enumerate(robot.chain.placed)}
+        twists = {k: own for k, own in twists.items() if np.any(own)}
+        ends = {k: own for k, own in ((_BASE, base), (_TOOL, tool)) if own is not None}
+        motions = _motions({**twists, **ends})
+        return Displaced(joint, {k: motions[k] for k in twists}, motions.get(_BASE), motions.get(_TOOL))
+
+
+_BASE, _TOOL = -2, -1
+"""Numbers of the ends of the chain beside those of its elements."""
+NOWHERE = Displaced(None, {}, None, None)
+"""Nothing displaced."""
+
+
+def _channel(robot: Chained, name: str, value: ArrayLike | None, shape: tuple[int, ...], rows: int) -> Array | None:
+    if value is None:
+        return None
+    array = np.asarray(value, dtype=float)
+    if array.shape == shape:
+        return array[None]
+    if array.shape == (rows, *shape):
+        return array
+    raise RobotError(
+        f"displacement {name!r} of shape {array.shape} does not fit: expected {shape} or {(rows, *shape)}",
+        name=robot.name,
+    )
+
+
+def _motions(twists: dict[int, Array]) -> dict[int, Array]:
+    """(4, 4, N) of each of (N, 6) twists, (4, 4, 1) where all rows are the same, as most errors of an arm are."""
+    same = [k for k, own in twists.items() if (own == own[:1]).all()]
+    alike = exp6(np.array([twists[k][0] for k in same]).reshape(-1, 6))
+    motions = {k: motion[:, :, None] for k, motion in zip(same, alike, strict=True)}
+    for k in twists.keys() - motions.keys():
+        motions[k] = np.ascontiguousarray(np.moveaxis(exp6(twists[k]), 0, -1))
+    return motions
 
 
 @dataclass(frozen=True, eq=False)
 class Step:
     """What the walk does at one element: it goes on by a constant placement, then turns or slides.
 
-    Parameters
-    ----------
-    place
-        (4, 4), transposed: from where the walk stands to the element's frame.
-    joint
-        Number among the movable joints; ``None`` for a fixed element.
-    slides
-        (3,) axis of a prismatic joint; ``None`` for any other.
-    turns
-        Columns (a, b) of the rotation, where a revolute joint turns a towards b; (b, a); and the others of a frame.
-    aligned
-        (4, 4), transposed: constant rotation that puts the third axis on that of the joint; ``None`` where it is there.
+    ``place`` and ``aligned`` are (4, 4), transposed: from where the walk stands to the element's frame, and the
+    rotation that puts the third axis on that of the joint, ``None`` where it is there. ``turns``: columns (a, b) of the
+    rotation, where a revolute joint turns a towards b; (b, a); and the others of a frame. ``slides``: (3,) axis of a
+    prismatic joint.
     """
 
     place: Array
@@ -129,23 +285,9 @@ def walk(
 ) -> None:
     """Write the frames of a chunk of configurations.
 
-    Parameters
-    ----------
-    chain
-        With K elements.
-    q
-        (N, n) rad or m.
-    moved
-        Displacements of all N.
-    part
-        The chunk: C of the N rows.
-    frames
-        K arrays (3, 4, C) to write to: the frame after the placement of each element, before its motion. Consecutive
-        ones must not be the same.
-    tool
-        (3, 4, C) to write to.
-    keep
-        Whether all frames are wanted; if not, ``frames`` are only worked in.
+    Of the N rows of ``q`` the chunk ``part`` has C. ``frames`` are K arrays (3, 4, C) to write to: the frame after the
+    placement of each element, before its motion; consecutive ones must not be the same. Without ``keep`` they are only
+    worked in. ``tool`` is (3, 4, C).
     """
     taken, size = steps(chain), part.stop - part.start
     joints = _joints(chain, taken, q, moved, part)
@@ -224,3 +366,68 @@ def _followed(frame: Array, motions: Array) -> Array:
         product += frame[:, m, None] * motions[m]
     product[:, 3] += frame[:, 3]
     return np.asarray(product)
+
+
+TURNS, TURNS_ALIGNED, SLIDES = 1, 2, 3
+"""What happens behind a placement that is not ``FIXED``: a turn about an axis of the frame, or any other, a slide."""
+
+
+class Arm(NamedTuple):
+    """Constant arrays of a chain of K elements, M movable joints, n driving ones and S segments.
+
+    ``turns`` (K, 2): of the rotation the first column turns towards the second. ``place``, ``aligned``, ``back``: the
+    first three rows of what :class:`Steps` has. ``lead``, ``factor``, ``offset``, ``first``, ``last`` (M,): column of
+    the driving joint (−1: none), how a joint follows it, and whether it is the first or last to.
+    """
+
+    kinds: NDArray[np.int64]
+    joint: NDArray[np.int64]
+    turns: NDArray[np.int64]
+    place: Array
+    aligned: Array
+    back: Array
+    axes: Array
+    movable: NDArray[np.int64]
+    placed: NDArray[np.int64]
+    lead: NDArray[np.int64]
+    factor: Array
+    offset: Array
+    first: NDArray[np.bool_]
+    last: NDArray[np.bool_]
+    masses: Array
+    centres: Array
+    point: Array
+
+
+def arm_of(chain: Chain, point: Array | None) -> Arm:
+    """Write a chain, and a point of its tool, as the kernels want it."""
+    taken, matrix = steps(chain), chain.coupling.matrix
+    still = [step.joint is None for step in taken.each]
+    kinds = np.array([FIXED if f else TURNS for f in still])
+    kinds[[step.aligned is not None for step in taken.each]] = TURNS_ALIGNED
+    kinds[chain.kinds == PRISMATIC] = SLIDES
+    eye = np.eye(4)
+    lead = [chain.coupling.leader(j) for j in range(len(matrix))]
+    return Arm(
+        kinds=kinds,
+        joint=np.array([-1 if step.joint is None else step.joint for step in taken.each]),
+        turns=np.array([(step.turns[0].start, step.turns[1].start) for step in taken.each]),
+        place=_rigid([step.place for step in taken.each]),
+        aligned=_rigid([eye if step.aligned is None else step.aligned for step in taken.each]),
+        back=_rigid([eye if taken.last is None else taken.last])[0],
+        axes=np.array(chain.axes),
+        movable=np.array(chain.movable),
+        placed=np.array(chain.placed),
+        lead=np.array([-1 if j is None else j for j in lead]),
+        factor=np.array([0.0 if j is None else matrix[row, j] for row, j in enumerate(lead)]),
+        offset=np.array(chain.coupling.offset),
+        first=np.array([j not in lead[:row] for row, j in enumerate(lead)]),
+        last=np.array([j not in lead[row + 1 :] for row, j in enumerate(lead)]),
+        masses=np.array(chain.masses),
+        centres=np.array(chain.mass_centres),
+        point=np.array(np.zeros(3) if point is None else point),
+    )
+
+
+def _rigid(transposed: list[Array]) -> Array:
+    return np.ascontiguousarray(np.array(transposed).transpose(0, 2, 1)[:, :3])

@@ -3,9 +3,8 @@
 The room knows robots and the assembly's probabilities, no campaign.
 """
 
-from thermal_robot.maps.build import workspace_map
 from thermal_robot.maps.figures import plot_map
 from thermal_robot.maps.question import Joints, Positions, Question
-from thermal_robot.maps.stores import Map
+from thermal_robot.maps.stores import Map, workspace_map
 
 __all__ = ["Joints", "Map", "Positions", "Question", "plot_map", "workspace_map"]

@@ -1,4 +1,11 @@
-"""The columns of a map: what each configuration is good for."""
+"""The columns of a map: what each configuration is good for, in all postures of an arm at many places.
+
+At a few places they are searched from everywhere; from there each leads to those of the neighbours. Where the task
+leaves a direction free (a turn about the tool, a seventh joint), the configuration that is nearest to home is taken
+among those that hang together:
+
+    Δq = J⁺ e + (1 − J⁺J) λ (q_home − q),    J⁺ = Jᵀ (J Jᵀ + μ)⁻¹,  μ as the square of what is missing (e).
+"""
 
 from __future__ import annotations
 
@@ -9,13 +16,173 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
-from thermal_robot.assembly.thermal.elongation import elongation
+from thermal_robot.assembly.thermal import elongation
 from thermal_robot.assembly.workspace import assembly_map
 from thermal_robot.errors import RobotError
-from thermal_robot.kinematics import elongation_jacobian
+from thermal_robot.kinematics import chain_frames, elongation_jacobian, frame_jacobians
 from thermal_robot.maps import settings
-from thermal_robot.maps.postures import Task, all_postures
 from thermal_robot.maps.question import Joints, Spec, within
+from thermal_robot.robot import Robot
+
+Rows = NDArray[np.intp]
+
+
+class Task:
+    """A tip (3,) m that is to stand at places, its tool's ``axis`` along ``approach`` in the root frame; see `solve`.
+
+    Free directions are drawn to ``home``, (n,) rad or m.
+    """
+
+    def __init__(self, robot: Robot, approach: Array, axis: Array, tip: Array, home: Array) -> None:
+        self.robot, self.approach, self.axis, self.tip, self.home = robot, approach, axis, tip, home
+        self.turns = np.array([kind != "prismatic" for kind in robot.joint_types])
+        with np.errstate(invalid="ignore"):
+            self.whole = self.turns & (robot.upper - robot.lower > 2.0 * np.pi - 1e-9)
+
+    def nearest_turn(self, q: Array) -> Array:
+        """(N, n) the same postures, each joint that can turn once round within half a turn of home, if limits allow."""
+        turns = np.where(self.whole, np.round((q - self.home) / (2.0 * np.pi)), 0.0)
+        turned = q - 2.0 * np.pi * turns
+        return np.where((turned >= self.robot.lower) & (turned <= self.robot.upper), turned, q)
+
+    def way(self, start: Array, q: Array) -> Array:
+        """(N, n) how far joints have gone; a whole turn is none."""
+        gone = q - start
+        return np.where(self.whole, gone - 2.0 * np.pi * np.round(gone / (2.0 * np.pi)), gone)
+
+    def solve(self, targets: Array, start: Array) -> tuple[Array, NDArray[np.bool_]]:
+        """(N, n) configurations near others at which the tip is at (N, 3) places, and whether it is."""
+        q, found, robot = start.copy(), np.zeros(len(start), dtype=bool), self.robot
+        eye = np.eye(6)
+        for step_number in range(settings.STEPS):
+            open_ = np.flatnonzero(~found)
+            if not len(open_):
+                break
+            frames = chain_frames(robot, q[open_])
+            held = frames.tool_rotation @ self.axis
+            missing = np.empty((len(open_), 6))
+            missing[:, :3] = targets[open_] - frames.tool_position - frames.tool_rotation @ self.tip
+            missing[:, 3:] = np.cross(held, self.approach)  # vanishes at a half turn, too
+            jacobian = np.ascontiguousarray(frame_jacobians(robot, q[open_], frames=frames, point=self.tip))
+            jacobian[:, 3:] -= held[:, :, None] * np.einsum("ni,nij->nj", held, jacobian[:, 3:])[:, None]
+            damping = 0.5 * np.sum(missing**2, axis=1) + settings.DAMPING
+            square = jacobian @ np.swapaxes(jacobian, 1, 2) + damping[:, None, None] * eye
+            away = settings.PULL * (self.home - q[open_])
+            both = np.stack([missing, np.einsum("nij,nj->ni", jacobian, away)], axis=2)
+            task, along = np.moveaxis(np.swapaxes(jacobian, 1, 2) @ np.linalg.solve(square, both), 2, 0)
+            free = away - along
+            reached = (np.max(np.abs(missing), axis=1) < settings.CLOSE) & (held @ self.approach > 0.0)
+            late = step_number > settings.STEPS // 2  # what has not settled by then goes on without being drawn
+            settled = late | (np.max(np.abs(free), axis=1) < settings.SETTLED)
+            step = task if late else task + free
+            step *= np.minimum(1.0, settings.LONGEST / np.maximum(np.max(np.abs(step), axis=1), 1e-300))[:, None]
+            found[open_] = reached & settled
+            step[found[open_]] = 0.0
+            q[open_] += step
+        q = self.nearest_turn(q)
+        return q, found & np.all((q >= robot.lower) & (q <= robot.upper), axis=1)
+
+
+class _Known:
+    """The postures that are known of M places, so many at most."""
+
+    def __init__(self, task: Task, places: int) -> None:
+        self.task, self.q = task, np.full((places, settings.MOST, task.robot.n), np.nan)
+        self.count = np.zeros(places, dtype=np.intp)
+
+    def fresh(self, places: Rows, q: Array) -> NDArray[np.bool_]:
+        """Add configurations (K, n) of places (K,); return which were not known."""
+        new = np.zeros(len(places), dtype=bool)
+        left = np.arange(len(places))
+        while len(left):
+            # the first of each place at a time, so that two that are alike are compared with each other
+            _, first = np.unique(places[left], return_index=True)
+            rows = left[first]
+            apart = np.abs(self.task.way(self.q[places[rows]], q[rows, None])).max(axis=2)
+            unknown = ~(apart < settings.ALIKE).any(axis=1) & (self.count[places[rows]] < settings.MOST)
+            rows = rows[unknown]
+            self.q[places[rows], self.count[places[rows]]] = q[rows]
+            self.count[places[rows]] += 1
+            new[rows] = True
+            left = np.delete(left, first)
+        return new
+
+
+def all_postures(task: Task, targets: Array) -> tuple[Rows, Array]:
+    """Every posture at each of M places (M, 3) m: the place's row (K,), ascending; (K, n) rad or m, near home first.
+
+    Neighbours should lie no farther apart than about 0.2 m.
+    """
+    from scipy.spatial import cKDTree
+
+    near = cKDTree(targets).query(targets, k=min(settings.NEIGHBOURS, len(targets)))[1].reshape(len(targets), -1)
+    known = _Known(task, len(targets))
+    starts, random, idle = _everywhere(task), np.random.default_rng(0), 0
+
+    def searched(places: Rows, start: Array) -> tuple[Rows, Array]:
+        """Return the postures that are new."""
+        q, found = task.solve(targets[places], start)
+        new = found.copy()
+        new[found] = known.fresh(places[found], q[found])
+        return places[new], q[new]
+
+    while idle < settings.IDLE:
+        seeds = _wanting(known.count, random)
+        places, q = searched(np.repeat(seeds, len(starts)), np.tile(starts, (len(seeds), 1)))
+        every, all_q = [places], [q]
+        while len(places):
+            places, q = searched(*_flipped(task, places, q))
+            every, all_q = [*every, places], [*all_q, q]
+        places, q = np.concatenate(every), np.concatenate(all_q)
+        idle = 0 if len(places) else idle + 1
+        while len(places):
+            before = np.repeat(q, near.shape[1], axis=0)
+            places, q = searched(near[places].ravel(), before)
+        if known.count.min() == settings.MOST:
+            break
+    places = np.repeat(np.arange(len(targets)), known.count)
+    q = known.q[np.arange(settings.MOST) < known.count[:, None]]
+    order = np.lexsort((np.linalg.norm(q - task.home, axis=1), places))
+    return places[order], q[order]
+
+
+def _everywhere(task: Task) -> Array:
+    """(S, n) configurations that fill the limits evenly, a turn about home at most; home first."""
+    from scipy.stats import qmc
+
+    robot = task.robot
+    low = np.where(task.whole, task.home - np.pi, robot.lower)
+    high = np.where(task.whole, task.home + np.pi, robot.upper)
+    drawn = qmc.Sobol(robot.n, scramble=False).random(settings.STARTS)
+    return np.vstack([task.home, low + drawn * (high - low)])
+
+
+def _wanting(count: NDArray[np.intp], random: np.random.Generator) -> Rows:
+    """Return places without a posture, and such that have fewer than others: half of the seeds each."""
+    some = (count > 0) & (count < count.max())
+    halves = (np.flatnonzero(chosen) for chosen in (count == 0, some if some.any() else count > 0))
+    return np.concatenate([random.permutation(half)[: settings.SEEDS // 2] for half in halves])
+
+
+def _flipped(task: Task, places: Rows, q: Array) -> tuple[Rows, Array]:
+    """Return starts from which the others may be found.
+
+    One joint mirrored about home, or half a turn on; or mirrored as an elbow is, whose neighbours make up for it: two
+    equal links that bend the other way stand where they stood.
+    """
+    n, elbows = task.robot.n, np.arange(1, task.robot.n - 1)
+    starts = np.repeat(q[:, None], 2 * n + 2 * len(elbows), axis=1)
+    every = np.arange(n)
+    starts[:, every, every] = 2.0 * task.home - q
+    starts[:, n + every, every] = q + np.where(task.turns, np.pi, 0.0) * np.where(q > task.home, -1.0, 1.0)
+    for k, sign in enumerate((1.0, -1.0)):
+        rows = 2 * n + k * len(elbows) + np.arange(len(elbows))
+        starts[:, rows, elbows] = -q[:, elbows]
+        starts[:, rows, elbows - 1] += sign * q[:, elbows]
+        starts[:, rows, elbows + 1] += sign * q[:, elbows]
+    starts = np.clip(starts, task.robot.lower, task.robot.upper)
+    return np.repeat(places, starts.shape[1]), starts.reshape(-1, n)
+
 
 Columns = dict[str, NDArray[Any]]
 
@@ -45,15 +212,7 @@ UNITS = {
 
 
 def columns(spec: Spec, rows: NDArray[np.int64]) -> Columns:
-    """Return a chunk of the map: all postures of its places, or its configurations.
-
-    Parameters
-    ----------
-    spec
-        The map.
-    rows
-        Numbers of places or configurations, one after the other.
-    """
+    """Return a chunk of the map: all postures of the numbered places, or the numbered configurations."""
     robot, asked = spec.robot, spec.question
     if isinstance(spec.over, Joints):
         q = spec.over.drawn(rows, robot)
@@ -113,25 +272,11 @@ def _told(spec: Spec, q: Array) -> Columns:
 
 
 def polygon(edges: Array) -> tuple[Array, Array]:
-    """Area and width of the polygons in which a tip may be when each segment is anywhere between cold and warm.
+    """(N,) area, m², and width, m, of the polygons in which a tip may be when each segment is between cold and warm.
 
-    A polygon of edges ``g`` (Eqs 14-15) has the area ``sum |g_i x g_j|`` over all pairs; its width, the largest
-    distance of two corners, is the longest ``sum ± g_i``.
-
-    Parameters
-    ----------
-    edges
-        (N, 2, S) m: what the whole rise of each segment does across the tool.
-
-    Returns
-    -------
-    area, width
-        (N,) m² and m.
-
-    Raises
-    ------
-    RobotError
-        More segments than have their corners compared.
+    A polygon of edges ``g`` (N, 2, S), what the whole rise of each segment does across the tool (Eqs 14-15), has the
+    area ``sum |g_i x g_j|`` over all pairs; its width, the largest distance of two corners, is the longest ``sum ±
+    g_i``. Refused for more segments than have their corners compared.
     """
     links = edges.shape[2]
     if links > settings.MOST_LINKS:

@@ -114,10 +114,7 @@ def within(
 ) -> tuple[Array, Array]:
     """Return finite limits (n,) of the joints: those given, else the robot's, at most half a turn either side of zero.
 
-    Raises
-    ------
-    RobotError
-        A prismatic joint without limits, limits of another number of joints.
+    Refused: a prismatic joint without limits, limits of another number of joints.
     """
     turns = np.array([kind != "prismatic" for kind in robot.joint_types])
     low, high = (
@@ -131,13 +128,7 @@ def within(
 
 @dataclass(frozen=True)
 class Spec:
-    """A map: a robot, where, and what is asked.
-
-    Parameters
-    ----------
-    robot, over, question
-        As for :func:`~thermal_robot.maps.workspace_map`.
-    """
+    """A map: a robot, where, and what is asked, as for :func:`~thermal_robot.maps.workspace_map`."""
 
     robot: Robot
     over: Over

@@ -1,19 +1,21 @@
-"""Where a map is kept: Zarr or Parquet, in chunks, each whole or not there, so that a second run goes on."""
+"""A map of the workspace in chunks, Zarr or Parquet, each whole or not there: a stopped run is gone on with."""
 
 from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
 
-from thermal_robot.errors import CampaignError
+from thermal_robot.errors import CampaignError, RobotError, require
 from thermal_robot.maps import settings
-from thermal_robot.maps.quantities import UNITS, Columns
+from thermal_robot.maps.quantities import UNITS, Columns, columns
+from thermal_robot.maps.question import Joints, Over, Positions, Question, Spec
+from thermal_robot.robot import Robot
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -51,13 +53,7 @@ class Store(Protocol):
 
 
 def store(path: str | Path) -> Store:
-    """Return the store of a path, by how its name ends.
-
-    Raises
-    ------
-    CampaignError
-        Another ending; a library that is not installed.
-    """
+    """Return the store of a path, by how its name ends; refused for another one, or a library not installed."""
     folder = Path(path)
     if folder.suffix == ZARR:
         return ZarrStore(folder)
@@ -296,3 +292,84 @@ class Map:
         found = self.frame(["place", "x", "y", "z", by])
         best = found.sort_values(by, ascending=not largest, kind="stable").drop_duplicates("place").sort_values("place")
         return best[["x", "y", "z"]].to_numpy(dtype=float), best[by].to_numpy(dtype=float)
+
+
+def workspace_map(
+    robot: Robot,
+    over: Over,
+    path: str | Path,
+    question: Question | None = None,
+    *,
+    replace: bool = False,
+    progress: Callable[[str, int, int], None] = lambda _stage, _done, _all: None,
+) -> Map:
+    """Map what a robot is good for over its workspace: scatter, thermal displacement, probability, C_p, clearance.
+
+    Results are written chunk by chunk. A run that is stopped leaves a map that can be read; the same call goes on with
+    it, and gives the same file.
+
+    Parameters
+    ----------
+    robot
+        The robot.
+    over
+        Places of the tip, at which all postures are found, or joint positions.
+    path
+        ``F.zarr`` (extra ``maps``), or ``F.parquet``, a folder of parts (extra ``parquet``).
+    question
+        What is asked of each configuration.
+    replace
+        Begin anew where another map stands there.
+    progress
+        Called with a stage, how many chunks are done, and how many there are.
+
+    Returns
+    -------
+    Map
+        Read from there chunk by chunk.
+
+    Raises
+    ------
+    RobotError
+        Nothing to map, or a name that is not known.
+    CampaignError
+        Another map at that path, another ending.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> from thermal_robot.maps import Positions, Question, workspace_map
+    >>> robot = tr.load_robot("builtin:rv_m2", "tool0")
+    >>> line = Positions((0.0, 0.0, 1), (0.42, 0.48, 4), (0.2, 0.2, 1))
+    >>> found = workspace_map(robot, line, "line.parquet", Question(axis=(0.0, 1.0, 0.0)))
+    >>> found.frame(["place", "y", "required_warm"]).round(6).shape
+    (4, 3)
+    """
+    require("workspace_map()", robot, (Robot,), "a robot, as load_robot returns it")
+    require("workspace_map(), over", over, (Positions, Joints), "Positions or Joints")
+    spec = Spec(robot, over, question or Question())
+    if over.count < 1:
+        raise RobotError("there is nothing to map: an axis has no values", name=robot.name)
+    kept = store(path)
+    known = kept.notes
+    if not known or replace:
+        kept.begin({**spec.to_dict(), "fingerprint": spec.fingerprint, "parts": spec.parts})
+    elif known.get("fingerprint") != spec.fingerprint:
+        raise CampaignError(
+            str(path), "holds another map", found=_differs(known, spec), expected="the same settings, or replace"
+        )
+    done = kept.done
+    for k, rows in enumerate(spec.chunks()):
+        if k < done:
+            continue
+        progress("chunks", k, spec.parts)
+        kept.add(columns(spec, rows))
+    progress("chunks", spec.parts, spec.parts)
+    return Map(path)
+
+
+def _differs(known: dict[str, object], spec: Spec) -> str:
+    """Say in which settings two maps differ."""
+    own = spec.to_dict()
+    other = [key for key in own if known.get(key) != own[key]]
+    return "other " + ", ".join(other) if other else "settings of another version"

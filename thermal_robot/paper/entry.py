@@ -34,17 +34,7 @@ _SLACK = 1e-9
 
 @dataclass(frozen=True)
 class Printed:
-    """Figures as the paper prints them.
-
-    Parameters
-    ----------
-    text
-        As printed, with the unit.
-    values
-        The same numbers in SI units.
-    digits
-        Value of one unit of the last printed digit, SI: one for all, or one for each value.
-    """
+    """Figures as the paper prints them: as text, in SI units, and one unit of the last digit, of all or of each."""
 
     text: str
     values: tuple[float, ...]
@@ -107,19 +97,11 @@ def judge(
     low: ArrayLike | None = None,
     high: ArrayLike | None = None,
 ) -> str:
-    """Return the verdict on printed figures, all of them together.
+    """Return the verdict on printed figures, all together, beside as many computed numbers, SI.
 
-    Parameters
-    ----------
-    printed
-        The figures.
-    computed
-        As many numbers, SI.
-    otherwise
-        Verdict where neither rounding nor truncation leads to them: ``ERRATUM`` where the paper's own numbers
-        determine the figure, ``NOT_REPRODUCIBLE`` where they do not.
-    low, high
-        Range of each computed number over the rounding of the inputs, where that is to count.
+    ``otherwise`` where neither rounding nor truncation leads to them: ``ERRATUM`` where the paper's own numbers
+    determine the figure, ``NOT_REPRODUCIBLE`` where they do not. ``low``, ``high``: range of each computed number over
+    the rounding of the inputs, where that is to count.
     """
     if rounds_to(printed, computed) or (low is not None and high is not None and rounds_to(printed, low, high)):
         return AGREES

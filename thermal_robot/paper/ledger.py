@@ -8,9 +8,9 @@ from dataclasses import dataclass, fields, replace
 from textwrap import wrap
 from typing import Any, TypeAlias, cast
 
-from thermal_robot.paper import joining, randomised, scatter, slips, warming
 from thermal_robot.paper.entry import VERDICTS, Entry
 from thermal_robot.paper.inputs import PaperInputs
+from thermal_robot.paper.rows import ROWS
 
 WIDTH = 120
 _COLUMNS = (32, 22, 39, 21)
@@ -84,9 +84,6 @@ def _escaped(cell: str) -> str:
 
 
 Row: TypeAlias = Callable[[PaperInputs], Entry]
-
-ROWS: tuple[Row, ...] = (*scatter.ROWS, *warming.ROWS, *randomised.ROWS, *joining.ROWS, *slips.ROWS)
-"""Every row of the ledger as a function of the inputs."""
 
 
 @dataclass(frozen=True)

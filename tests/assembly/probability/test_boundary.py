@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from scipy.special import ndtr
 
-from thermal_robot.assembly.probability.boundary import angles_needed, disc_by_edge, segment_by_edge
+from thermal_robot.assembly.probability.planar import angles_needed, disc_by_edge, segment_by_edge
 
 
 def area(axes, centre):

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 from assembly.probability.test_boundary import area
 
-from thermal_robot.assembly.probability.chords import chords_resolve, disc_by_chords
+from thermal_robot.assembly.probability.planar import chords_resolve, disc_by_chords
 
 
 def chances(axes, centre):

@@ -5,7 +5,7 @@ import pytest
 from assembly.probability.test_discs import cases
 
 from thermal_robot.assembly.probability import failing_probability, required_clearance
-from thermal_robot.assembly.probability.clearances import disc_clearances
+from thermal_robot.assembly.probability.planar import disc_clearances
 
 
 @pytest.mark.parametrize("segments", [False, True])

@@ -3,9 +3,7 @@
 import numpy as np
 import pytest
 
-from thermal_robot.assembly.probability.discs import TOLD, disc_chances
-from thermal_robot.assembly.probability.planar import _graded
-from thermal_robot.assembly.probability.principal import Principal
+from thermal_robot.assembly.probability.planar import TOLD, Principal, _graded, disc_chances
 
 
 def cases(seed, ratio, segments, count=300):

@@ -5,7 +5,7 @@ import pytest
 from scipy import stats
 
 from thermal_robot.assembly.probability import FlatNormal, flat_normal
-from thermal_robot.assembly.probability.flat_normal_fit import fit_maximum_likelihood, fit_moments, log_likelihood
+from thermal_robot.assembly.probability.flat_normal import fit_maximum_likelihood, fit_moments, log_likelihood
 from thermal_robot.errors import EstimationError
 
 

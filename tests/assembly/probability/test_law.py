@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from thermal_robot.assembly.probability import UniformSpread, joining_probability
-from thermal_robot.assembly.probability.law import Law, check_covariance
+from thermal_robot.assembly.probability.joining import Law, check_covariance
 
 
 def test_leading_axes_broadcast():

@@ -4,7 +4,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from thermal_robot.assembly.probability.links import generator_lengths, link_nodes, planar_link_nodes
+from thermal_robot.assembly.probability.joining import generator_lengths, link_nodes, planar_link_nodes
 
 COLUMNS = np.array([[0.5, 0.2, 1.0, -0.3], [0.1, 0.6, 0.2, 0.4]])
 

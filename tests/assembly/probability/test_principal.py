@@ -4,7 +4,7 @@ import mpmath as mp
 import numpy as np
 import pytest
 
-from thermal_robot.assembly.probability.principal import Principal
+from thermal_robot.assembly.probability.planar import Principal
 
 
 @pytest.mark.parametrize("ratio", [1.0, 1e3, 1e8, 1e12])

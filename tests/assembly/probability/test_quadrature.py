@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.special import erf
 
-from thermal_robot.assembly.probability.quadrature import integrate_panels
+from thermal_robot.assembly.probability.kernels import integrate_panels
 
 
 def alone(function, breakpoints, **options):

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from thermal_robot.assembly.probability.regions import Disc, Rectangle
+from thermal_robot.assembly.probability.planar import Disc, Rectangle
 
 ANGLES = [0.0, 0.3, 0.5 * np.pi, -1.1, np.pi]
 

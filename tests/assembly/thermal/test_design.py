@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from thermal_robot.assembly.thermal.best_poses import RANK_TOLERANCE, axes_of, measured, rank_of, visible
+from thermal_robot.assembly.thermal import RANK_TOLERANCE, axes_of, measured, rank_of, visible
 from thermal_robot.errors import EstimationError
 
 

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 
 from thermal_robot import kinematics as kin
-from thermal_robot.assembly.thermal import displacement, elongation, segment_names, sensitivity
-from thermal_robot.assembly.thermal.elongation import lengths
+from thermal_robot.assembly.thermal import displacement, elongation, lengths, segment_names, sensitivity
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics.model import PRISMATIC
 

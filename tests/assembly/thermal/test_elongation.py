@@ -3,8 +3,15 @@
 import numpy as np
 import pytest
 
-from thermal_robot.assembly.thermal import elongation, expansion_coefficient, expansion_coefficients, segment_names
-from thermal_robot.assembly.thermal.elongation import columns_of, lengths, per_segment
+from thermal_robot.assembly.thermal import (
+    columns_of,
+    elongation,
+    expansion_coefficient,
+    expansion_coefficients,
+    lengths,
+    per_segment,
+    segment_names,
+)
 from thermal_robot.errors import RobotError
 
 PAPER = 1e-6 * np.array([14, 5, 9, 7, 8])  # m, Δl of the paper's section 3

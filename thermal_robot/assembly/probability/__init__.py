@@ -9,8 +9,13 @@ from thermal_robot.assembly.probability.capability import (
     failing_from_capability,
     required_clearance,
 )
-from thermal_robot.assembly.probability.flat_normal import FlatNormal, eq18_printed_area, flat_normal
-from thermal_robot.assembly.probability.flat_normal_nd import FlatNormalND, flat_normal_nd
+from thermal_robot.assembly.probability.flat_normal import (
+    FlatNormal,
+    FlatNormalND,
+    eq18_printed_area,
+    flat_normal,
+    flat_normal_nd,
+)
 from thermal_robot.assembly.probability.joining import failing_probability, joining_probability
 from thermal_robot.assembly.probability.normality import (
     NormalityDecision,
@@ -20,8 +25,14 @@ from thermal_robot.assembly.probability.normality import (
     sample_size_to_see,
     shapiro_wilk_critical,
 )
-from thermal_robot.assembly.probability.spread import UniformSpread
-from thermal_robot.assembly.probability.tolerance import Zonotope, plane_axes, planes, polygon_in_plane, zonotope
+from thermal_robot.assembly.probability.spread import (
+    UniformSpread,
+    Zonotope,
+    plane_axes,
+    planes,
+    polygon_in_plane,
+    zonotope,
+)
 
 __all__ = [
     "FlatNormal",

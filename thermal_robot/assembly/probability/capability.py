@@ -11,9 +11,15 @@ from scipy.optimize import brentq
 from scipy.special import log_ndtr, ndtri, ndtri_exp
 
 from thermal_robot.arrays import Array
-from thermal_robot.assembly.probability.clearances import disc_clearances
-from thermal_robot.assembly.probability.joining import Shape, failing_probability
-from thermal_robot.assembly.probability.law import Law, Randomised, Thermal, check_covariance
+from thermal_robot.assembly.probability.joining import (
+    Law,
+    Randomised,
+    Shape,
+    Thermal,
+    check_covariance,
+    failing_probability,
+)
+from thermal_robot.assembly.probability.planar import disc_clearances
 from thermal_robot.assembly.probability.spread import UniformSpread
 
 Convention = Literal["two_sided", "one_sided"]

@@ -9,7 +9,7 @@ import numpy as np
 import numpy.typing as npt
 
 from thermal_robot.arrays import Array
-from thermal_robot.assembly.probability.boundary import NODES
+from thermal_robot.assembly.probability.planar import NODES
 from thermal_robot.compiling import in_pieces, loads
 
 MANY = 20_000
@@ -17,18 +17,10 @@ MANY = 20_000
 
 
 def circle_chances(covariance: npt.ArrayLike, diameter: npt.ArrayLike, mean: npt.ArrayLike) -> Array | None:
-    """Return the chances that normal deviations lie in, and out of, circles about the origin.
+    """(2, ...) chances that normal deviations lie in, and out of, circles about the origin, by shapes that broadcast.
 
-    Parameters
-    ----------
-    covariance, diameter, mean
-        Shapes ``(..., 2, 2)``, ``(...)`` and ``(..., 2)``, or 0; they need not be checked.
-
-    Returns
-    -------
-    Array or None
-        Shape ``(2, ...)``; NaN for a case that is not proper, or that another integral tells. ``None`` where these
-        loops are not installed or not worth while, or the shapes do not fit.
+    They need not be checked: NaN for a case that is not proper, or that another integral tells. ``None`` where these
+    loops are not installed or not worth while, or the shapes do not fit.
     """
     matrices, sizes, means = np.asarray(covariance, float), np.asarray(diameter, float), np.asarray(mean, float)
     if not means.ndim and means == 0.0:

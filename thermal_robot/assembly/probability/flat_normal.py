@@ -15,16 +15,20 @@ The text has ``2 sqrt(6) pi r`` in the denominator; the area is then ``sqrt(6 pi
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 from scipy import stats
-from scipy.special import comb, ndtri
+from scipy.optimize import minimize
+from scipy.special import comb, logsumexp, ndtri
 
 from thermal_robot.arrays import Array
-from thermal_robot.assembly.probability.flat_normal_fit import fit_maximum_likelihood, fit_moments
+from thermal_robot.assembly.probability.joining import joining_probability, link_nodes
 from thermal_robot.assembly.probability.kernels import density, log_density, log_tail, tail
+from thermal_robot.assembly.probability.spread import Parallelotope, UniformSpread
+from thermal_robot.errors import EstimationError
 
 _ROOT_3 = np.sqrt(3.0)
 
@@ -231,3 +235,268 @@ def _entropy(sigma: float, half_width: float) -> float:
     points = edges[:-1, None] + half * (1.0 + nodes)
     log_values = log_density(points, sigma, half_width)
     return float(-2.0 * np.sum(half * weights * np.exp(log_values) * log_values))
+
+
+Estimate = tuple[float, float, float]
+Held = tuple[float | None, float | None, float | None]
+
+_STARTS = (0.5, 1.0, 1.5, 3.0, 10.0)  # of r, beside the moments' one: the likelihood may have more than one peak
+_BOUNDS = ((-2.0, 2.0), (-2.0, 2.0), (0.0, np.pi / 2.0 - 1e-4))
+# Of mean and logarithm of the size, in the sample's own standard deviations, and of arctan r.
+
+
+def _checked(sample: Array) -> Array:
+    if not np.all(np.isfinite(sample)):
+        raise EstimationError("the sample holds values that are not finite")
+    if sample.size < 4:
+        raise EstimationError(f"three parameters need at least four values, not {sample.size}")
+    if np.ptp(sample) == 0.0:
+        raise EstimationError("all values of the sample are equal: it determines no width")
+    return sample
+
+
+def fit_moments(sample: Array) -> Estimate:
+    """``(r, mean, total standard deviation)`` by the first, second and fourth moment.
+
+    The excess kurtosis is ``-6/5 (r**2 / (1 + r**2))**2``; a sample flatter than a uniform one gives ``inf``.
+    """
+    values = _checked(sample)
+    mean, scale = float(np.mean(values)), float(np.std(values))
+    excess = float(np.mean(((values - mean) / scale) ** 4)) - 3.0
+    share = float(np.sqrt(np.clip(-excess / 1.2, 0.0, 1.0)))
+    with np.errstate(divide="ignore"):
+        return float(np.sqrt(np.float64(share) / (1.0 - np.float64(share)))), mean, scale
+
+
+def log_likelihood(sample: Array, ratio: float, loc: float, scale: float) -> float:
+    """Logarithm of the likelihood."""
+    angle = np.arctan(ratio)
+    half_width = scale * _ROOT_3 * np.sin(angle)
+    sigma = 0.0 if np.isinf(ratio) else scale * np.cos(angle)
+    return float(np.sum(log_density(sample - loc, sigma, half_width)))
+
+
+def fit_maximum_likelihood(
+    sample: Array, *, ratio: float | None = None, loc: float | None = None, scale: float | None = None
+) -> Estimate:
+    """``(r, mean, total standard deviation)`` of the largest likelihood; given ones are held.
+
+    The search runs over mean, logarithm of the total standard deviation and ``arctan r``, in which both limits are at a
+    finite distance. The limits themselves are compared by their own closed-form estimates, since a maximum often lies
+    at ``r = 0``.
+    """
+    values = _checked(sample)
+    centre, width = float(np.mean(values)), float(np.std(values))
+    scaled = (values - centre) / width
+    held = (
+        None if loc is None else (loc - centre) / width,
+        None if scale is None else float(np.log(scale / width)),
+        None if ratio is None else float(np.arctan(ratio)),
+    )
+    candidates = _between_limits(scaled, held)
+    for limit in (0.0, np.inf):
+        if ratio is None or ratio == limit:
+            place, size = _limit(scaled, limit, held[0], held[1])
+            candidates.append((-log_likelihood(scaled, limit, place, size) / scaled.size, (limit, place, size)))
+    if not candidates:
+        candidates.append((0.0, _estimate(_completed(held, np.array([])))))
+    # A limit wins a tie: the simpler law.
+    best = min(candidates, key=lambda item: (round(item[0], 11), item[1][0] not in (0.0, np.inf)))[1]
+    return best[0], centre + width * best[1], width * best[2]
+
+
+def _between_limits(scaled: Array, held: Held) -> list[tuple[float, Estimate]]:
+    """Smallest losses, and where they are, from several starts; none where all three parameters are held."""
+    free = [k for k in range(3) if held[k] is None]
+    if not free:
+        return []
+
+    def loss(point: Array) -> float:
+        ratio, place, size = _estimate(_completed(held, point))
+        value = -log_likelihood(scaled, ratio, place, size) / scaled.size
+        return value if np.isfinite(value) else 1e6
+
+    bounds = [_BOUNDS[k] for k in free]
+    found = []
+    for start in {min(fit_moments(scaled)[0], 20.0), *_STARTS} if 2 in free else {1.0}:
+        first = np.array([(0.0, 0.0, np.arctan(start))[k] for k in free])
+        rough = minimize(loss, first, method="L-BFGS-B", bounds=bounds, options={"ftol": 1e-13})
+        options = {"xatol": 1e-9, "fatol": 1e-13, "maxiter": 400}
+        polished = minimize(loss, rough.x, method="Nelder-Mead", bounds=bounds, options=options)
+        found.append((float(polished.fun), _estimate(_completed(held, polished.x))))
+    return found
+
+
+def _completed(held: Held, point: Array) -> tuple[float, float, float]:
+    """Mean, logarithm of the size and angle: what is held, and the point's coordinates for the rest."""
+    rest = iter(point)
+    place, size, angle = (float(next(rest)) if value is None else value for value in held)
+    return place, size, angle
+
+
+def _estimate(point: tuple[float, float, float]) -> Estimate:
+    place, size, angle = point
+    return float(np.tan(angle)), place, float(np.exp(size))
+
+
+def _limit(scaled: Array, limit: float, loc: float | None, log_scale: float | None) -> tuple[float, float]:
+    """Mean and total standard deviation of the likeliest normal (``limit = 0``) or uniform (``inf``) distribution."""
+    if limit == 0.0:
+        place = float(np.mean(scaled)) if loc is None else loc
+        size = float(np.sqrt(np.mean((scaled - place) ** 2)))
+    else:
+        place = 0.5 * float(np.max(scaled) + np.min(scaled)) if loc is None else loc
+        size = float(np.max(np.abs(scaled - place))) * (1.0 + 1e-15) / float(_ROOT_3)
+    return place, size if log_scale is None else float(np.exp(log_scale))
+
+
+_LOG_2PI = np.log(2.0 * np.pi)
+_CHUNK = 2_000_000  # numbers held at once
+
+
+@dataclass(frozen=True)
+class FlatNormalND:
+    """Law of ``mean + normal + uniform``, both parts independent.
+
+    Parameters
+    ----------
+    normal_covariance
+        Covariance of the normal part, shape ``(d, d)``, positive definite.
+    spread
+        Uniform part; it may have a mean of its own.
+    offset
+        Mean of the normal part, shape ``(d,)``.
+
+    Raises
+    ------
+    ValueError
+        For shapes that do not fit, or a covariance that is not positive definite: there is no density then
+        (probabilities of joining do not need one, see `joining_probability`).
+    """
+
+    normal_covariance: Array
+    spread: UniformSpread
+    offset: Array
+
+    def __post_init__(self) -> None:
+        """Check shapes and definiteness."""
+        size = self.spread.dimension
+        if self.normal_covariance.shape != (size, size) or self.offset.shape != (size,):
+            raise ValueError(f"covariance and mean must have shapes ({size}, {size}) and ({size},)")
+        if not np.allclose(self.normal_covariance, self.normal_covariance.T, rtol=1e-9, atol=0.0):
+            raise ValueError("covariance must be symmetric")
+        if not np.all(np.linalg.eigvalsh(self.normal_covariance) > 0.0):
+            raise ValueError("covariance must be positive definite for a density")
+
+    @property
+    def mean(self) -> Array:
+        """Mean, shape ``(d,)``; exact."""
+        return np.asarray(self.offset + self.spread.mean)
+
+    @property
+    def covariance(self) -> Array:
+        """Covariance of both parts together, shape ``(d, d)``; exact (Eq 20)."""
+        return np.asarray(self.normal_covariance + self.spread.covariance)
+
+    def logpdf(self, x: npt.ArrayLike) -> Array:
+        """Logarithm of the density.
+
+        In units of the normal part, generators at right angles to each other (a segment; a box along the principal
+        axes) give a product of one-dimensional flat-normal densities, correct far into the tails. Otherwise that
+        holds for the longest one, and the others are Gauss-Legendre sums, relatively correct within nine standard
+        deviations.
+
+        Parameters
+        ----------
+        x
+            Shape ``(..., d)``.
+        """
+        points = np.asarray(x, dtype=float)
+        if points.shape[-1:] != self.offset.shape:
+            raise ValueError(f"points must have shape (..., {self.offset.size}), not {points.shape}")
+        flat = points.reshape(-1, self.offset.size) - self.offset
+        terms = [np.log(piece.weight) + self._log_piece(flat - piece.centre, piece) for piece in self.spread.pieces]
+        return np.asarray(logsumexp(terms, axis=0).reshape(points.shape[:-1]))
+
+    def pdf(self, x: npt.ArrayLike) -> Array:
+        """Density at points of shape ``(..., d)``; see `logpdf`."""
+        return np.exp(self.logpdf(x))
+
+    def rvs(self, size: int, random_state: int | np.random.Generator | None = None) -> Array:
+        """Draw ``size`` points, shape ``(size, d)``."""
+        generator = np.random.default_rng(random_state)
+        normal = generator.standard_normal((size, self.offset.size)) @ np.linalg.cholesky(self.normal_covariance).T
+        return self.offset + normal + self.spread.rvs(size, generator)
+
+    def box_probability(self, lower: npt.ArrayLike, upper: npt.ArrayLike) -> Array:
+        """Probability of ``lower <= X <= upper`` in the plane; infinite bounds make it the distribution function.
+
+        Parameters
+        ----------
+        lower, upper
+            Shape ``(..., 2)``.
+
+        Raises
+        ------
+        ValueError
+            In space, or for bounds in the wrong order.
+        """
+        if self.offset.size != 2:
+            raise ValueError("box probabilities are for the plane")
+        low, high = np.broadcast_arrays(np.asarray(lower, dtype=float), np.asarray(upper, dtype=float))
+        if not np.all(low <= high):
+            raise ValueError("a lower bound lies above its upper bound")
+        reach = 50.0 * np.sqrt(np.diag(self.covariance))
+        low = np.where(np.isneginf(low), np.minimum(self.mean - reach, high - reach), low)
+        high = np.where(np.isposinf(high), np.maximum(self.mean + reach, low + reach), high)
+        middle = 0.5 * (low + high)
+        return joining_probability(
+            self.normal_covariance, high - low, self.offset - middle, shape="rectangle", thermal=self.spread
+        )
+
+    def _log_piece(self, points: Array, piece: Parallelotope) -> Array:
+        factor = np.linalg.cholesky(self.normal_covariance)
+        white = np.linalg.solve(factor, points.T).T
+        edges = np.linalg.solve(factor, piece.generators)
+        lengths = np.linalg.norm(edges, axis=0)
+        edges, lengths = edges[:, np.argsort(-lengths)], np.sort(lengths)[::-1]
+        cosines = (edges / lengths).T @ (edges / lengths) - np.eye(lengths.size)
+        log_scale = -float(np.sum(np.log(np.diag(factor))))
+        if np.all(np.abs(cosines) < 1e-13):
+            return log_scale + _log_product(white, edges, lengths)
+        shifts, weights = link_nodes(np.eye(self.offset.size), edges[:, 1:])
+        result = np.empty(len(white))
+        step = max(1, _CHUNK // shifts.size)
+        for start in range(0, len(white), step):
+            part = white[start : start + step, None, :] - shifts
+            values = _log_product(part.reshape(-1, self.offset.size), edges[:, :1], lengths[:1])
+            result[start : start + step] = logsumexp(values.reshape(len(part), -1), b=weights, axis=1)
+        return log_scale + result
+
+
+def flat_normal_nd(covariance: npt.ArrayLike, spread: UniformSpread, mean: npt.ArrayLike | None = None) -> FlatNormalND:
+    """Build a flat-normal distribution in the plane or in space.
+
+    Parameters
+    ----------
+    covariance
+        Covariance of the normal part, shape ``(d, d)``, positive definite.
+    spread
+        Uniform part, of dimension ``d``.
+    mean
+        Mean of the normal part, shape ``(d,)``; zero by default.
+    """
+    offset = np.zeros(spread.dimension) if mean is None else np.asarray(mean, dtype=float)
+    return FlatNormalND(np.asarray(covariance, dtype=float), spread, offset)
+
+
+def _log_product(white: Array, edges: Array, lengths: Array) -> Array:
+    """Flat-normal along each of orthogonal edges, standard normal across; points in units of the normal part."""
+    directions = edges / lengths
+    along = white @ directions
+    across = white - along @ directions.T
+    rest = white.shape[1] - lengths.size
+    total = -0.5 * np.sum(across**2, axis=1) - 0.5 * rest * _LOG_2PI
+    for k, length in enumerate(lengths):
+        total = total + log_density(along[:, k], 1.0, length)
+    return np.asarray(total)

@@ -1,7 +1,12 @@
-"""Probability that a peg finds its hole (Eq 22): the position error stays within the clearance."""
+"""Probability that a peg finds its hole (Eq 22): the position error stays within the clearance.
+
+Several independent uniform parts are Gauss-Legendre sums, as fine as the normal part demands.
+"""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from itertools import product
 from typing import Literal
 
 import numpy as np
@@ -9,11 +14,195 @@ import numpy.typing as npt
 
 from thermal_robot.arrays import Array
 from thermal_robot.assembly.probability.compiled import circle_chances
-from thermal_robot.assembly.probability.law import Law, Randomised, Thermal
-from thermal_robot.assembly.probability.links import generator_lengths, planar_link_nodes
+from thermal_robot.assembly.probability.kernels import integrate_panels
 from thermal_robot.assembly.probability.planar import planar_probability
-from thermal_robot.assembly.probability.quadrature import integrate_panels
-from thermal_robot.assembly.probability.spread import Parallelotope
+from thermal_robot.assembly.probability.spread import Parallelotope, UniformSpread
+
+Randomised = Literal["uniform", "normal"]
+Thermal = UniformSpread | npt.ArrayLike | None
+
+
+@dataclass(frozen=True)
+class Law:
+    """Laws of planar errors; their leading axes broadcast.
+
+    Covariances ``(..., 2, 2)`` and means ``(..., 2)`` of the normal parts; a uniform ``spread`` of all of them, or one
+    of each, from ``-segment`` to ``segment``, ``(..., 2)``.
+    """
+
+    matrices: Array
+    means: Array
+    spread: UniformSpread | None = None
+    segments: Array | None = None
+
+    @classmethod
+    def of(
+        cls,
+        covariance: npt.ArrayLike,
+        mean: npt.ArrayLike = 0.0,
+        thermal: Thermal = None,
+        randomised: Randomised = "uniform",
+        segments: npt.ArrayLike | None = None,
+    ) -> Law:
+        """Check what `joining_probability` is given, and put the thermal part where it belongs."""
+        matrices = check_covariance(covariance)
+        ends = None if segments is None else _vectors(segments, "segments")
+        if ends is not None and isinstance(thermal, UniformSpread):
+            raise ValueError("a uniform part is one for all, as thermal, or one of each, as segments, not both")
+        nothing = np.ndim(mean) == 0 and float(np.asarray(mean)) == 0.0
+        means = np.zeros(2) if nothing else _vectors(mean, "mean")
+        if isinstance(thermal, UniformSpread):
+            if thermal.dimension != 2:
+                raise ValueError(f"the thermal part must be planar, not of dimension {thermal.dimension}")
+            if randomised == "normal":
+                return cls(matrices + thermal.covariance, means + thermal.mean)
+            if randomised == "uniform":
+                return cls(matrices, means, thermal)
+            raise ValueError(f"randomised must be 'uniform' or 'normal', not {randomised!r}")
+        return cls(matrices, means if thermal is None else means + _vectors(thermal, "a thermal shift"), None, ends)
+
+    @property
+    def leading(self) -> tuple[int, ...]:
+        """Shape of the laws."""
+        own = () if self.segments is None else self.segments.shape[:-1]
+        return np.broadcast_shapes(self.matrices.shape[:-2], self.means.shape[:-1], own)
+
+    def flat(self, leading: tuple[int, ...]) -> Law:
+        """Return the laws broadcast to a shape, one after the other."""
+        ends = self.segments
+        return Law(
+            np.broadcast_to(self.matrices, (*leading, 2, 2)).reshape(-1, 2, 2),
+            np.broadcast_to(self.means, (*leading, 2)).reshape(-1, 2),
+            self.spread,
+            None if ends is None else np.broadcast_to(ends, (*leading, 2)).reshape(-1, 2),
+        )
+
+    def rows(self, chosen: npt.NDArray[np.bool_] | npt.NDArray[np.intp]) -> Law:
+        """Return some of the laws that are flat."""
+        ends = self.segments
+        return Law(self.matrices[chosen], self.means[chosen], self.spread, None if ends is None else ends[chosen])
+
+
+def _vectors(value: npt.ArrayLike, name: str) -> Array:
+    array = np.asarray(value, dtype=float)
+    if array.shape[-1:] != (2,) or not np.all(np.isfinite(array)):
+        raise ValueError(f"{name} must be finite with shape (..., 2), not of shape {array.shape}")
+    return array
+
+
+def check_covariance(covariance: npt.ArrayLike) -> Array:
+    """Return a covariance of shape ``(..., 2, 2)``, or raise ``ValueError`` if it is none."""
+    matrices = np.asarray(covariance, dtype=float)
+    if matrices.shape[-2:] != (2, 2) or not np.all(np.isfinite(matrices)):
+        raise ValueError(f"covariance must be finite with shape (..., 2, 2), not of shape {matrices.shape}")
+    a, b, c, d = (matrices[..., i, j] for i in (0, 1) for j in (0, 1))
+    scale = np.maximum(np.abs(a), np.abs(d))
+    if np.any(np.abs(b - c) > 1e-9 * scale):
+        raise ValueError("covariance must be symmetric")
+    middle = 0.5 * (b + c)
+    if np.any(a < 0.0) or np.any(d < 0.0) or np.any(middle**2 > a * d * (1.0 + 1e-9) + (1e-12 * scale) ** 2):
+        raise ValueError("covariance must be positive semidefinite")
+    return np.stack([np.stack([a, middle], -1), np.stack([middle, d], -1)], -2)
+
+
+_LARGEST, _LARGEST_GRID = 400_000, 10_000  # nodes
+# Standard deviations of the normal part within which the sums are exact to rounding: all of double precision for one
+# generator, and as far as a failing probability of 1e-20 where sums multiply.
+_REACH, _REACH_MANY = 38.0, 9.0
+
+
+def link_nodes(covariance: Array, generators: Array) -> tuple[Array, Array]:
+    """(N, d) nodes and (N,) weights for the mean over ``generators @ u``, the ``u`` independent and uniform on [-1, 1].
+
+    A function smoothed by the normal part grows along a generator no faster than ``exp(reach * length * u)``, with the
+    length and the reach in standard deviations; panels and nodes follow from that. Refused where the normal part is too
+    narrow for a sum of reasonable length.
+    """
+    reach = _REACH if generators.shape[1] == 1 else _REACH_MANY
+    lengths = generator_lengths(covariance, generators)
+    # Counted before any node is made: next to a vanishing normal part there would be 1e12 of them.
+    if np.prod([panels * count for panels, count in (_rule_size(v, reach) for v in lengths)], dtype=float) > _LARGEST:
+        raise ValueError(_too_narrow(len(lengths) + 1))
+    rules = [_rule(length, reach) for length in lengths]
+    units = np.array(list(product(*(rule[0] for rule in rules)))).reshape(-1, len(rules))
+    weights = np.array([np.prod(w) for w in product(*(rule[1] for rule in rules))])
+    return units @ generators.T, weights
+
+
+def planar_link_nodes(covariance: Array, generators: Array) -> tuple[Array, Array]:
+    """(N, 2) nodes and (N,) weights for the same mean in the plane, as many for any number of generators.
+
+    A smooth function of the sum of many generators depends on a point in the plane only. The law of the sum is
+    therefore moved, one generator after the other, on a fixed product grid of Chebyshev points over the sum's bounding
+    box, such that every polynomial up to the grid's degree keeps its mean. Weights may be slightly negative. Refused
+    where the normal part is too narrow for a grid of reasonable size.
+    """
+    if generators.shape[1] < 2:
+        return link_nodes(covariance, generators)
+    axes = np.linalg.svd(generators)[0]
+    components = axes.T @ generators
+    half = np.sum(np.abs(components), axis=1)
+    half[half <= 1e-13 * np.max(half)] = 0.0
+    lengths = generator_lengths(covariance, axes * half)
+    counts = [
+        1 if h == 0.0 else _node_count(length * (_REACH_MANY + length)) for h, length in zip(half, lengths, strict=True)
+    ]
+    if counts[0] * counts[1] > _LARGEST_GRID:
+        raise ValueError(_too_narrow(generators.shape[1] + 1))
+    angles = [np.pi * (np.arange(n) + 0.5) / n for n in counts]
+    to_grid = [np.cos(np.outer(np.arange(n), angle)) * (2.0 / n) for n, angle in zip(counts, angles, strict=True)]
+    for matrix in to_grid:
+        matrix[0] *= 0.5
+    units, unit_weights = np.polynomial.legendre.leggauss(max(counts))
+    points, weights, reached = np.zeros((1, 2)), np.ones(1), np.zeros(2)
+    for k in range(generators.shape[1]):
+        points = (points[:, None, :] + units[:, None] * components[:, k]).reshape(-1, 2)
+        weights = np.outer(weights, 0.5 * unit_weights).ravel()
+        # The box of the sum so far; it must hold all points, since the next sum starts from its grid.
+        reached = reached + np.where(half > 0.0, np.abs(components[:, k]), 0.0)
+        bases = []
+        for axis in (0, 1):
+            scaled = points[:, axis] / reached[axis] if reached[axis] > 0.0 else np.zeros(len(points))
+            bases.append(np.cos(np.outer(np.arccos(np.clip(scaled, -1.0, 1.0)), np.arange(counts[axis]))))
+        weights = (to_grid[0].T @ (bases[0].T @ (weights[:, None] * bases[1])) @ to_grid[1]).ravel()
+        axes_points = [reach * np.cos(angle) for reach, angle in zip(reached, angles, strict=True)]
+        points = np.stack(np.meshgrid(*axes_points, indexing="ij"), -1).reshape(-1, 2)
+    return points @ axes.T, weights
+
+
+def generator_lengths(covariance: Array, generators: Array) -> list[float]:
+    """Length of every generator in standard deviations of the normal part along it."""
+    values, vectors = np.linalg.eigh(covariance)
+    components = vectors.T @ generators
+    floor = 1e-12 * max(float(values[-1]), float(np.max(np.sum(generators**2, axis=0))))
+    return [float(v) for v in np.sqrt(np.sum(components**2 / np.maximum(values, floor)[:, None], axis=0))]
+
+
+def _rule(length: float, reach: float) -> tuple[Array, Array]:
+    """Composite rule on [-1, 1] for functions that grow like ``exp(reach * length * u)``."""
+    panels, count = _rule_size(length, reach)
+    points, weights = np.polynomial.legendre.leggauss(count)
+    centres = (2.0 * np.arange(panels) + 1.0) / panels - 1.0
+    return (centres[:, None] + points / panels).ravel(), np.tile(weights / (2.0 * panels), panels)
+
+
+def _rule_size(length: float, reach: float) -> tuple[int, int]:
+    """Panels of that rule, and points on each."""
+    panels = max(1, int(np.ceil(length * (reach + length) / 12.0)))
+    return panels, _node_count(length / panels * (reach + length))
+
+
+def _node_count(rate: float) -> int:
+    """Points per panel [-1, 1] for functions that grow like ``exp(rate * u)``, to rounding."""
+    return int(np.ceil(7.0 + 0.8 * rate))
+
+
+def _too_narrow(count: int) -> str:
+    return (
+        f"{count} independent uniform links next to so narrow a normal part need too many nodes; "
+        "use a segment, a box, or a zonotope with over='area'"
+    )
+
 
 Shape = Literal["circle", "rectangle"]
 

@@ -1,8 +1,8 @@
 """Compiled loops of the probability of a disc: one deviation after the other, its angles side by side.
 
-Imported only where numba is installed. The same integral along the edge as in `boundary`, from the same numbers of
-angles, and the same principal axes as in `principal`; what it leaves out is told by NaN. Where constants of `boundary`
-or `discs` are changed, touch this file: numba looks at nothing else to see whether what it has kept is old.
+Imported only where numba is installed. The same integral along the edge as in `planar`, from the same numbers of angles
+and the same principal axes; what it leaves out is told by NaN. Where constants of `planar` are changed, touch this
+file: numba looks at nothing else to see whether what it has kept is old.
 """
 
 from __future__ import annotations
@@ -14,8 +14,7 @@ import numpy as np
 import numpy.typing as npt
 
 from thermal_robot.arrays import Array
-from thermal_robot.assembly.probability.boundary import BESIDES, FRACTION, NEAR, PER_DEVIATION, SERIES
-from thermal_robot.assembly.probability.discs import MOST
+from thermal_robot.assembly.probability.planar import BESIDES, FRACTION, MOST, NEAR, PER_DEVIATION, SERIES
 from thermal_robot.compiling import compiled
 
 _LOG2E, _LN2 = 1.4426950408889634, (6.93147180369123816490e-01, 1.90821492927058770002e-10)
@@ -107,7 +106,7 @@ def _edge(
 
 @_exact
 def _poles(axes: tuple[float, float], at: tuple[float, float], count: int) -> float:
-    """Return what the poles of exp(−h)/2h add to the sum over so many angles; see `boundary`."""
+    """Return what the poles of exp(−h)/2h add to the sum over so many angles; see `planar`."""
     lead, low = 0.5 * (axes[0] + axes[1]), 0.5 * (axes[0] - axes[1])
     middle = complex(at[0], at[1])
     root = np.sqrt(middle * middle - 4.0 * lead * low)
@@ -145,18 +144,8 @@ def circles(
 ) -> None:
     """Write the chances inside and outside of the cases from ``start`` to ``stop``, (2, N); NaN where others tell them.
 
-    Parameters
-    ----------
-    matrices, means, diameters
-        (N, 2, 2), (N, 2) and (N,).
-    nodes
-        Numbers of angles.
-    table, quarters
-        (K, 2, most) cosines and sines of the angles of each number, those of a quarter of the edge apart.
-    start, stop
-        Which cases.
-    found
-        (2, N) to write to.
+    ``nodes`` (K,) numbers of angles; ``table``, ``quarters`` (K, 2, most) their cosines and sines, those of a quarter
+    of the edge apart.
     """
     room = np.empty((3, table.shape[2]))
     bits = room.view(np.int64)

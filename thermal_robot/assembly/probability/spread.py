@@ -1,4 +1,9 @@
-"""The thermal part of an error: uniform on a segment, a box or a zonotope (Eqs 16 and 19, any dimension)."""
+"""The thermal part of an error, known by its bounds only: a zonotope (Eqs 14-15) and what is uniform on it (16, 19).
+
+The displacement is ``sum of g_i delta_i`` with ``lower_i <= delta_i <= upper_i``, the ``g_i`` being the sensitivities.
+The set of its values is a zonotope: in a plane a polygon whose edges are the ``g_i`` themselves (the parallel lines of
+Eq 15), in space a polyhedron. Both are built from the generators, never from their ``2**k`` corners.
+"""
 
 from __future__ import annotations
 
@@ -16,14 +21,7 @@ from thermal_robot.arrays import Array
 class Parallelotope:
     """One piece of a spread: ``centre + generators @ u`` with the ``u`` independent and uniform on [-1, 1].
 
-    Parameters
-    ----------
-    weight
-        Share of the spread's probability.
-    centre
-        Shape ``(d,)``.
-    generators
-        Half edges as columns, shape ``(d, m)``, none of them zero, longest first.
+    ``weight``: share of the spread's probability; generators are half edges ``(d, m)``, none zero, longest first.
     """
 
     weight: float
@@ -144,13 +142,7 @@ class UniformSpread:
 def generator_bounds(
     generators: npt.ArrayLike, lower: npt.ArrayLike, upper: npt.ArrayLike
 ) -> tuple[Array, Array, Array]:
-    """Check columns ``(d, k)`` and their bounds, scalars or ``(k,)``; return all three as arrays.
-
-    Raises
-    ------
-    ValueError
-        For wrong shapes, numbers that are not finite, or a lower bound above its upper bound.
-    """
+    """Check columns ``(d, k)`` and their bounds, scalars or ``(k,)``, finite and ascending; return all as arrays."""
     columns = np.asarray(generators, dtype=float)
     if columns.ndim != 2:
         raise ValueError(f"generators must be columns, shape (d, k), not {columns.shape}")
@@ -206,3 +198,323 @@ def _tiles(centre: Array, half: Array) -> tuple[Parallelotope, ...]:
         raise ValueError("a zonotope without area or volume has no uniform density; use over='links'")
     shares = np.array(volumes) / np.sum(volumes)
     return tuple(_piece(float(w), c, e) for w, (c, e) in zip(shares, chosen, strict=True))
+
+
+# Two generators whose directions differ by less than this are one direction; rounding of sines and cosines is a tenth
+# of it.
+_PARALLEL = 1e-12
+
+
+@dataclass(frozen=True)
+class Zonotope:
+    """All displacements within the bounds, in a plane or in space; in the unit of ``generators * bounds``.
+
+    Parameters
+    ----------
+    generators
+        Sensitivities as columns, shape ``(d, k)``.
+    lower, upper
+        Bounds of the elongations, shape ``(k,)``.
+    vertices
+        Shape ``(V, d)``. In a plane counter-clockwise from the lowest; a segment has two, a point one.
+    corners
+        Elongations that lead to each vertex, shape ``(V, k)``; every entry is one of its bounds.
+    faces
+        In space: indices of the vertices around each face, counter-clockwise seen from outside. In a plane, or if all
+        lies in one plane: empty.
+    """
+
+    generators: Array
+    lower: Array
+    upper: Array
+    vertices: Array
+    corners: Array
+    faces: tuple[tuple[int, ...], ...] = ()
+
+    @property
+    def dimension(self) -> int:
+        """Number of coordinates, 2 or 3."""
+        return int(self.generators.shape[0])
+
+    @property
+    def centre(self) -> Array:
+        """Point of symmetry, shape ``(d,)``."""
+        return np.asarray(self.generators @ (0.5 * (self.lower + self.upper)))
+
+    @property
+    def content(self) -> float:
+        """Area of the polygon, or volume of the polyhedron: the sum of ``|det|`` over choices of ``d`` generators."""
+        edges = self.generators * (self.upper - self.lower)
+        subsets = list(combinations(range(edges.shape[1]), self.dimension))
+        if not subsets:
+            return 0.0
+        return float(np.sum(np.abs(np.linalg.det(np.moveaxis(edges[:, np.array(subsets)], 1, 0)))))
+
+    @property
+    def area(self) -> float:
+        """Area of the polygon.
+
+        Raises
+        ------
+        ValueError
+            For a zonotope in space; ask for its `volume`, or for the polygon in a plane.
+        """
+        if self.dimension != 2:
+            raise ValueError("a zonotope in space has a volume; its polygon in a plane has an area")
+        return self.content
+
+    @property
+    def volume(self) -> float:
+        """Volume of the polyhedron.
+
+        Raises
+        ------
+        ValueError
+            For a polygon.
+        """
+        if self.dimension != 3:
+            raise ValueError("a polygon has an area, not a volume")
+        return self.content
+
+    @property
+    def farthest(self) -> Array:
+        """Vertex farthest from the origin, the nominal position; shape ``(d,)``."""
+        return np.asarray(self.vertices[self._farthest_index()])
+
+    @property
+    def farthest_corner(self) -> Array:
+        """Elongations that lead to `farthest`, shape ``(k,)``."""
+        return np.asarray(self.corners[self._farthest_index()])
+
+    @property
+    def farthest_distance(self) -> float:
+        """Largest displacement of the tool point."""
+        return float(np.linalg.norm(self.farthest))
+
+    def _farthest_index(self) -> int:
+        return int(np.argmax(np.linalg.norm(self.vertices, axis=1)))
+
+    def support(self, direction: npt.ArrayLike) -> Array:
+        """Largest value of ``direction . displacement``.
+
+        Parameters
+        ----------
+        direction
+            Shape ``(..., d)``, any length.
+        """
+        rates = np.asarray(direction, dtype=float) @ self.generators
+        return np.asarray(np.sum(np.maximum(rates * self.lower, rates * self.upper), axis=-1))
+
+    def contains(self, point: npt.ArrayLike, *, tolerance: float = 1e-12) -> npt.NDArray[np.bool_]:
+        """Whether points lie in the zonotope, edge included.
+
+        Parameters
+        ----------
+        point
+            Shape ``(..., d)``.
+        tolerance
+            Allowance, as a share of the zonotope's size.
+        """
+        points = np.asarray(point, dtype=float)
+        if points.shape[-1:] != (self.dimension,):
+            raise ValueError(f"points must have shape (..., {self.dimension}), not {points.shape}")
+        normals = _facet_normals(self.generators * (self.upper - self.lower))
+        size = float(np.max(np.abs(self.vertices))) + float(np.sum(np.abs(self.generators) @ (self.upper - self.lower)))
+        outward = np.concatenate([normals, -normals])
+        return np.asarray(np.all(points @ outward.T - self.support(outward) <= tolerance * size, axis=-1))
+
+
+def zonotope(generators: npt.ArrayLike, lower: npt.ArrayLike, upper: npt.ArrayLike) -> Zonotope:
+    """Build the polygon (Eqs 14-15) or the polyhedron of all displacements within the bounds.
+
+    Parameters
+    ----------
+    generators
+        Sensitivities of the displacement as columns, shape ``(2, k)`` or ``(3, k)``; the rows of Eq 14.
+    lower, upper
+        Bounds of the elongations, scalars or shape ``(k,)``.
+
+    Returns
+    -------
+    Zonotope
+
+    Raises
+    ------
+    ValueError
+        For wrong shapes, numbers that are not finite, or a lower bound above its upper bound.
+    """
+    columns, low, high = generator_bounds(generators, lower, upper)
+    if columns.shape[0] == 2:
+        vertices, corners = _polygon(columns, low, high)
+        return Zonotope(columns, low, high, vertices, corners)
+    if columns.shape[0] == 3:
+        return _polyhedron(columns, low, high)
+    raise ValueError(f"generators must have two or three rows, not {columns.shape[0]}")
+
+
+def polygon_in_plane(
+    generators: npt.ArrayLike, lower: npt.ArrayLike, upper: npt.ArrayLike, plane: npt.ArrayLike | str
+) -> Zonotope:
+    """Project the displacements on a plane, and return their polygon there.
+
+    Parameters
+    ----------
+    generators
+        Sensitivities as columns, shape ``(3, k)``.
+    lower, upper
+        Bounds of the elongations, scalars or shape ``(k,)``.
+    plane
+        Two coordinates by name (``"yz"`` as in Fig 5), two orthonormal directions as rows, shape ``(2, 3)``, or the
+        plane's normal, shape ``(3,)``: the polygon's axes are then those of `plane_axes`.
+    """
+    columns, low, high = generator_bounds(generators, lower, upper)
+    if columns.shape[0] != 3:
+        raise ValueError(f"generators must have three rows, not {columns.shape[0]}")
+    return zonotope(plane_axes(plane) @ columns, low, high)
+
+
+def plane_axes(plane: npt.ArrayLike | str) -> Array:
+    """Two orthonormal directions of a plane as rows, shape ``(2, 3)``; see `polygon_in_plane`.
+
+    For a normal, the first direction is horizontal (along ``x`` if the normal is vertical), and both together with
+    the normal are right-handed.
+    """
+    if isinstance(plane, str):
+        if len(plane) != 2 or plane[0] == plane[1] or not set(plane) <= set("xyz"):
+            raise ValueError(f"a plane is named by two of x, y, z, not {plane!r}")
+        return np.eye(3)[["xyz".index(letter) for letter in plane]]
+    array = np.asarray(plane, dtype=float)
+    if array.shape == (2, 3):
+        if not np.allclose(array @ array.T, np.eye(2), atol=1e-9):
+            raise ValueError("the directions of a plane must be orthonormal")
+        return array
+    length = float(np.linalg.norm(array)) if array.shape == (3,) else 0.0
+    if not 0.0 < length < np.inf:
+        raise ValueError("a plane is two coordinates, two directions (2, 3) or a normal (3,) that is not zero")
+    return np.asarray(planes(array))
+
+
+def planes(normals: npt.ArrayLike) -> Array:
+    """Two orthonormal directions of each plane, shape ``(..., 2, 3)``, as `plane_axes` for each normal ``(..., 3)``.
+
+    Normals are not zero; one that is NaN has NaN.
+    """
+    array = np.asarray(normals, dtype=float)
+    normal = array / np.linalg.norm(array, axis=-1, keepdims=True)
+    across = np.hypot(normal[..., 0], normal[..., 1])[..., None]
+    upright = across < 1e-9
+    first = np.stack([-normal[..., 1], normal[..., 0], np.zeros_like(normal[..., 0])], axis=-1)
+    first = np.where(upright, [1.0, 0.0, 0.0], first / np.where(upright, 1.0, across))
+    first = first - normal * np.sum(first * normal, axis=-1, keepdims=True)
+    first /= np.linalg.norm(first, axis=-1, keepdims=True)
+    return np.stack([first, np.cross(normal, first)], axis=-2)
+
+
+def _groups(edges: Array) -> list[tuple[Array, Array]]:
+    """Sort edge vectors ``(d, k)`` into directions: a unit vector, and the sign of each edge along it, or zero."""
+    found: list[tuple[Array, Array]] = []
+    lengths = np.linalg.norm(edges, axis=0)
+    for k in np.flatnonzero(lengths > _PARALLEL * np.max(lengths, initial=0.0)):
+        unit = edges[:, k] / lengths[k]
+        for direction, signs in found:
+            along = float(unit @ direction)
+            if float(np.linalg.norm(unit - along * direction)) <= _PARALLEL:
+                signs[k] = np.sign(along)
+                break
+        else:
+            signs = np.zeros(edges.shape[1])
+            signs[k] = 1.0
+            found.append((unit, signs))
+    return found
+
+
+def _polygon(columns: Array, low: Array, high: Array) -> tuple[Array, Array]:
+    """Vertices counter-clockwise: from the lowest, walk along the directions by their angle, out and back."""
+    edges = columns * (high - low)
+    groups = []
+    for direction, signs in _groups(edges):
+        up = -1.0 if direction[1] < -_PARALLEL or (abs(direction[1]) <= _PARALLEL and direction[0] < 0.0) else 1.0
+        angle = float(np.arctan2(max(up * direction[1], 0.0), up * direction[0]))
+        groups.append((angle, up * signs))
+    groups.sort(key=lambda group: group[0])
+    # Start where every edge that points up, or right, has not been taken.
+    corner = np.where(sum((signs for _, signs in groups), np.zeros(low.size)) >= 0.0, low, high)
+    corners = [corner]
+    for turn in (1.0, -1.0):
+        for _, signs in groups:
+            corner = np.where(signs * turn > 0.0, high, np.where(signs * turn < 0.0, low, corner))
+            corners.append(corner)
+    if groups:
+        corners.pop()  # the walk ends where it began
+    table = np.array(corners)
+    return table @ columns.T, table
+
+
+def _facet_normals(edges: Array) -> Array:
+    """Directions that, with their opposites, bound the zonotope of the given edges ``(d, k)``; shape ``(F, d)``."""
+    dimension = edges.shape[0]
+    directions = [direction for direction, _ in _groups(edges)]
+    basis = np.array(directions) if directions else np.empty((0, dimension))
+    rank = int(np.linalg.matrix_rank(basis, tol=1e-10)) if directions else 0
+    # What the zonotope does not extend along bounds it too, with width zero.
+    missing = np.linalg.svd(basis)[2][rank:] if directions else np.eye(dimension)
+    if rank == dimension:
+        if dimension == 2:
+            return np.stack([-basis[:, 1], basis[:, 0]], axis=1)
+        pairs = np.array([np.cross(a, b) for a, b in combinations(basis, 2)])
+        sizes = np.linalg.norm(pairs, axis=1)
+        return np.asarray(pairs[sizes > 1e-12] / sizes[sizes > 1e-12, None])
+    if rank == dimension - 1 and rank == 2:
+        return np.concatenate([missing, np.cross(basis, missing[0])])
+    if rank == 1:
+        return np.concatenate([missing, basis[:1]])
+    return missing
+
+
+def _polyhedron(columns: Array, low: Array, high: Array) -> Zonotope:
+    """Faces by their normals: each face is the polygon of the generators in it, at one end of all the others."""
+    edges = columns * (high - low)
+    groups = _groups(edges)
+    basis = np.array([direction for direction, _ in groups]) if groups else np.empty((0, 3))
+    rank = int(np.linalg.matrix_rank(basis, tol=1e-10)) if groups else 0
+    if rank < 3:
+        return _flat_polyhedron(columns, low, high, basis, rank)
+    members = np.abs(np.array([signs for _, signs in groups])) > 0.0
+    vertices: dict[bytes, int] = {}
+    corners: list[Array] = []
+    faces: list[tuple[int, ...]] = []
+    seen: list[frozenset[int]] = []
+    for i, j in combinations(range(len(groups)), 2):
+        if any(i in plane and j in plane for plane in seen):
+            continue
+        normal = np.cross(basis[i], basis[j])
+        normal /= np.linalg.norm(normal)
+        heights = basis @ normal
+        inside = np.abs(heights) <= 1e-10
+        seen.append(frozenset(np.flatnonzero(inside).tolist()))
+        lying = np.any(members[inside], axis=0) | ~np.any(members, axis=0)
+        for outward in (normal, -normal):
+            fixed = np.where(outward @ edges > 0.0, high, low)
+            axes = plane_axes(outward)
+            _, polygon = _polygon(axes @ columns[:, lying], low[lying], high[lying])
+            face = []
+            for local in polygon:
+                corner = fixed.copy()
+                corner[lying] = local
+                # A generator without length, or bounds without width, leads nowhere: one corner for all.
+                corner = np.where(np.any(members, axis=0), corner, low)
+                key = corner.tobytes()
+                if key not in vertices:
+                    vertices[key] = len(corners)
+                    corners.append(corner)
+                face.append(vertices[key])
+            faces.append(tuple(face))
+    table = np.array(corners)
+    return Zonotope(columns, low, high, table @ columns.T, table, tuple(faces))
+
+
+def _flat_polyhedron(columns: Array, low: Array, high: Array, basis: Array, rank: int) -> Zonotope:
+    """Build a zonotope in space that has no volume: its polygon, segment or point, in its own plane."""
+    axes = np.linalg.svd(basis)[2][:2] if rank else np.eye(3)[:2]
+    _, corners = _polygon(axes @ columns, low, high)
+    return Zonotope(columns, low, high, corners @ columns.T, corners)
