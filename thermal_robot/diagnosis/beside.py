@@ -94,23 +94,9 @@ def as_laws_say(left: Unexplained, found: Sequence[Discovery], discrepancy: Disc
 def beside_scatter(
     fit: Fit, chance: RandomGap, refused: Mapping[str, Refused], progress: Callable[[str], None]
 ) -> Conclusion:
-    """Choose the systematic effects again, with the joints' scatter in the covariance of the noise.
+    """Choose the systematic effects again, with the joints' scatter (``chance``) in the covariance of the noise.
 
-    Parameters
-    ----------
-    fit
-        Fit whose effects were chosen with the instrument's noise alone.
-    chance
-        The scatter, which accounts for the residual of that fit.
-    refused
-        Effects that rows held out refused.
-    progress
-        Called with a few words at each stage.
-
-    Returns
-    -------
-    Conclusion
-        Effects and laws that the scatter had imitated are no longer in the fit.
+    Effects and laws that the scatter had imitated are then no longer in the fit.
     """
     e = fit.explanation
     scatter, sensitivity = chance.scatter, fit.corrected.joint_sensitivity
@@ -148,24 +134,8 @@ def beside_steps(
 
     Where joints err anew in every pose, an effect with many parameters can fit a part of these errors. The fit takes
     them for normal; that they put the joint on an encoder's steps, or no longer do, is left out of its evidence. With
-    the odds P of an effect by the fit, and the Bayes factors B and B' of steps with it and without it, it stays while
-    P B > B'.
-
-    Parameters
-    ----------
-    fit
-        Fit of frames and systematic effects.
-    chance
-        The random part of its residual.
-    refused
-        Effects that were taken out before.
-    progress
-        Called with a few words at each stage.
-
-    Returns
-    -------
-    fit, chance, refused
-        Without the effects that steps speak against.
+    the odds P of an effect by the fit, and the Bayes factors B and B' of steps with it and without it, it stays while P
+    B > B'.
     """
     while hidden := {joint for joint, factor in chance.steps.items() if factor < 0.0}:
         rivals = []
@@ -195,15 +165,8 @@ def rippled(fit: Fit, progress: Callable[[str], None]) -> Fit:
     """Let waves of the joints join a fit, and leave it again, until they stay.
 
     What was fitted without them may have stood in for them, and hides others: the choice is made again beside the
-    waves, and these are looked for again beside the choice.
-
-    Parameters
-    ----------
-    fit
-        To which waves are added; one that was not to consider ripple comes back as it is, and one of so many rows that
-        each choice beside waves would take minutes. Beside very many rows it is made once.
-    progress
-        Called with a few words at each stage.
+    waves, and these are looked for again beside the choice; once where rows are very many, and not at all where each
+    choice would take minutes, or ripple was not to be considered.
     """
     name = JointRipple.name
     if name not in fit.variants or fit.campaign.samples > settings.RIPPLE_ROWS:

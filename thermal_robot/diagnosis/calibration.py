@@ -29,18 +29,10 @@ class Teller(Protocol):
 
 @dataclass(frozen=True)
 class Calibrated:
-    """One effect of a calibration.
+    """One effect of a calibration with its estimates; ``title`` is what it is in plain words.
 
-    Attributes
-    ----------
-    name, title
-        Its name, and what it is in plain words.
-    parameters
-        Its estimates.
-    unseen
-        Names of parameters that the data do not tell from those before them, or from the frames.
-    inside
-        Name of the larger effect that was fitted, of which this is a part or the rest; empty where it stands by itself.
+    ``unseen`` are parameters that the data do not tell from those before them, or from the frames; ``inside`` is the
+    larger effect that was fitted, of which this is a part or the rest.
     """
 
     name: str

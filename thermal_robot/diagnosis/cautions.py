@@ -70,17 +70,7 @@ def cautions(
     refused: Mapping[str, Refused] = MappingProxyType({}),
     sensitivity: Sensitivity | None = None,
 ) -> tuple[str, ...]:
-    """Return warnings about the diagnosis, one sentence each.
-
-    Parameters
-    ----------
-    fitted
-        The final fit.
-    refused
-        By effect that was taken out again: why.
-    sensitivity
-        How far the verdict depends on the prior sizes.
-    """
+    """Warnings about the diagnosis by its final fit, refused effects and sensitivity to priors; one sentence each."""
     notes = []
     campaign, e = fitted.campaign, fitted.explanation
     remains = float(e.whitening.noise[0] * e.best.noise)

@@ -28,15 +28,8 @@ from thermal_robot.inference.rows import blocks
 class Cancelling:
     """Two effects of which a part of one undoes a part of the other.
 
-    Attributes
-    ----------
-    effects
-        Their names.
-    sites
-        Kind and place of the two parts.
-    times
-        What the smaller part does, over what both do together: rms over the rows, unknown frames projected out, in
-        units of the noise.
+    ``sites``: kind and place of both parts. ``times``: what the smaller part does, over what both do together: rms over
+    the rows, unknown frames projected out, in units of the noise.
     """
 
     effects: tuple[str, str]
@@ -100,18 +93,10 @@ def _moved(fit: Fit) -> Iterator[tuple[str, list[tuple[str, str]], Array]]:
 
 @dataclass(frozen=True)
 class Doubt:
-    """Parts of effects of which one should not be in the explanation.
+    """Parts of effects of which one should not be in the explanation; ``words`` say why, without a full stop.
 
-    Attributes
-    ----------
-    parts
-        Name of each effect, and the joint or link; empty where it is all of the effect.
-    words
-        Why, in a sentence without a full stop.
-    times
-        By how much they are in doubt, as a ratio.
-    impossible
-        Whether it is told, and nothing more: beyond what is physically possible.
+    ``parts``: effect, and joint or link (empty: all of it). ``times``: by how much they are in doubt, as a ratio. One
+    that is ``impossible`` is beyond what is physically possible: it is told, and nothing more.
     """
 
     parts: tuple[tuple[str, str], ...]
@@ -159,16 +144,9 @@ def credible(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, 
 
     A part is what an effect does in one joint or link. The explanation is chosen again without each part in doubt, and
     that one is left out without which rows held out are predicted best; none is where they are then predicted clearly
-    worse. Where rows are very many, only the worst doubt is weighed; of more still, the whole effect, which takes less
-    time.
-
-    Returns
-    -------
-    fit
-        With what is left.
-    refused
-        What was left out, by its name: the probability of a known effect all of which was, by the evidence of the two
-        explanations that keep one of a pair.
+    worse. Where rows are very many, only the worst doubt is weighed; of more still, the whole effect. Refused, by name:
+    the probability of a known effect all of which was left out, by the evidence of the two explanations that keep one
+    of a pair.
     """
     refused: dict[str, Refused] = {}
     weighed: set[tuple[tuple[str, str], ...]] = set()
@@ -213,17 +191,8 @@ def goes_astray(fit: Fit) -> float:
 def in_full(fit: Fit, progress: Callable[[str], None]) -> Fit:
     """Let fuller settings compete where a parameter is surely larger than 99 % of robots have.
 
-    Parameters
-    ----------
-    fit
-        Of at most as many rows as ripple is looked for in: further settings of more would take minutes.
-    progress
-        Called with a few words at each stage.
-
-    Returns
-    -------
-    Fit
-        The choice made again beside them, unless rows held out are then predicted clearly worse.
+    The choice beside them stays unless rows held out are then predicted clearly worse; of more rows than ripple is
+    looked for in, which would take minutes, nothing is asked.
     """
     if fit.campaign.samples > settings.RIPPLE_ROWS:
         return fit

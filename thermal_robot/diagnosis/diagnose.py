@@ -210,13 +210,7 @@ def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
 
 
 def check_priors(campaign: Campaign, known: set[str]) -> None:
-    """Refuse a campaign that states the size of an effect that nobody knows.
-
-    Raises
-    ------
-    CampaignError
-        Naming it, and what was probably meant.
-    """
+    """Refuse a campaign that states the size of an effect that nobody knows, and say what was probably meant."""
     for name in campaign.priors:
         if name not in known:
             expected = "one of " + ", ".join(sorted(known))

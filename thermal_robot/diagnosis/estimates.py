@@ -16,16 +16,9 @@ from thermal_robot.inference.inside import divided, identified
 
 @dataclass(frozen=True)
 class Inside:
-    """An effect's part of one that was fitted, or the rest of that.
+    """Estimates of an effect's part of one that was fitted (``container``), or the rest of that.
 
-    Attributes
-    ----------
-    container
-        Name of the effect that was fitted.
-    parameters
-        Estimates.
-    unseen
-        Names of parameters that the data do not tell from those before them, or from the frames.
+    ``unseen`` are parameters that the data do not tell from those before them, or from the frames.
     """
 
     container: str

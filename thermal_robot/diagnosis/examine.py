@@ -26,15 +26,7 @@ from thermal_robot.percents import percent
 
 @dataclass(frozen=True, eq=False)
 class Remainder:
-    """Residual of a fit, of the N rows that are not outliers.
-
-    Attributes
-    ----------
-    rows
-        Their numbers.
-    target
-        The residual in units of the estimated noise, with all fitted columns projected out.
-    """
+    """Residual of the rows that are no outliers, in units of the estimated noise, all fitted columns projected out."""
 
     rows: NDArray[np.int64]
     target: Target
@@ -214,16 +206,10 @@ def _asked(observations: Observations) -> dict[str, Array]:
 
 @dataclass(frozen=True)
 class Examined:
-    """Whether the residual is noise.
+    """Whether the residual is noise, and where it enters and what it follows.
 
-    Attributes
-    ----------
-    unexplained
-        The residual, with the place where it enters and the quantity that it follows.
-    floor
-        Noise floor: one sigma per axis of instrument and repeatability together, m.
-    source
-        Where the floor comes from: ``stated``, ``repeats``, ``scatter`` or ``remainder``.
+    ``floor``: one sigma per axis of instrument and repeatability together, m, by its ``source``: ``stated``,
+    ``repeats``, ``scatter`` or ``remainder``.
     """
 
     unexplained: Unexplained

@@ -24,18 +24,11 @@ from thermal_robot.inference.random_gap import Kept, RandomGap
 
 
 def random_findings(fit: Fit, chance: RandomGap) -> tuple[Finding, ...]:
-    """Return a finding for every random effect.
+    """Return a finding for every random effect; none shrinks the gap, as a correction predicts a mean.
 
-    None shrinks the gap, as a correction predicts a mean and leaves scatter. Scatter between poses (encoder steps) and
-    scatter between visits (repeatability) are told apart by repeated poses. Without repeats, scatter between visits is
-    not testable, and scatter between poses is confounded with it unless the steps of the encoder are seen.
-
-    Parameters
-    ----------
-    fit
-        Fit of frames and systematic effects.
-    chance
-        The random part of its residual.
+    Scatter between poses (encoder steps) and scatter between visits (repeatability) are told apart by repeated poses.
+    Without repeats, scatter between visits is not testable, and scatter between poses is confounded with it unless the
+    steps of the encoder are seen.
     """
     return tuple(_finding(fit, chance, effect) for effect in random_effects())
 
@@ -93,17 +86,10 @@ def within_frames(fit: Fit, block: int) -> bool:
 
 
 def rivals(fit: Fit, explained: Mapping[str, int]) -> dict[str, tuple[str, ...]]:
-    """Return by effect the effects that it is confounded with.
+    """By effect of the fit (with its block): the effects that it is confounded with.
 
-    An effect of the fit is confounded with a known one outside it where that one, fitted anew in its place, is nearly
-    as probable: by more than ``IN_ITS_PLACE`` it is at work and the effect is not, and nothing else joins it.
-
-    Parameters
-    ----------
-    fit
-        The fit.
-    explained
-        By effect of the fit: its block.
+    That is a known one outside the fit that, fitted anew in its place, is nearly as probable: by more than
+    ``IN_ITS_PLACE`` it is at work and the effect is not, and nothing else joins it.
     """
     best, found = frozenset(explained), dict[tuple[str, str], float]()
     for combination, p in zip(fit.explanation.combinations, fit.explanation.probabilities, strict=True):
@@ -131,18 +117,8 @@ def findings(
 ) -> tuple[Finding, ...]:
     """Return a finding for every candidate; those that are not testable come last.
 
-    Parameters
-    ----------
-    fit
-        The final fit.
-    shares
-        By effect: share of the gap on held-out rows, and its 95 % interval.
-    locations
-        By effect of the fit: its places.
-    laws
-        By discovered law of the fit: probability that what it follows, where, is right.
-    refused
-        Effects that were taken out of the fit again.
+    ``shares``: share of the gap on held-out rows with its 95 % interval, by effect; ``laws``: probability that what a
+    discovered law follows, where, is right.
     """
     explained = {effect.name: b for b, (effect, _) in zip(fit.explanation.best.blocks, fit.effects, strict=True)}
     known = {effect.name: effect for effect, _ in fit.effects}

@@ -28,20 +28,11 @@ Share = tuple[float, tuple[float, float]]
 class Shrinkage:
     """Held-out shrinkage of the gap, overall and per effect; all with the noise of the held-out rows in it.
 
-    Attributes
-    ----------
-    overall
-        Rms before and after on held-out rows; :func:`held_out` says what is fitted anew in each fold.
-    before, after
-        (N,) distance of each row while it was held out, m; NaN where it was set aside.
-    with_aside
-        Rms before and after, m, over all held-out rows: those set aside count, too.
-    shares
-        By effect: share of the gap's mean square with its 95 % interval. For an effect of the fit it is the Shapley
-        value, and these sum to the overall shrinkage; for another the gain from adding it to the fit.
-    left
-        (N, m) what the model left of each row while it was held out, root frame, m and rad; those set aside, too. NaN
-        where a row never was held out.
+    ``overall``: rms before and after; ``with_aside``: the same, m, over all rows, set aside or not. ``before`` and
+    ``after`` (N,): distance of each row while it was held out, m, NaN where set aside. ``shares`` of the gap's mean
+    square, with 95 % intervals: for an effect of the fit the Shapley value (these sum to the overall shrinkage), for
+    another the gain from adding it. ``left`` (N, m): what the model left of each row, root frame, m and rad, NaN where
+    never held out.
     """
 
     overall: HeldOut
@@ -59,15 +50,10 @@ def held_out(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Shri
     effects, the place and quantity of a law, refined constants, prior scales, the point of linearisation, noise, and
     which rows are set aside. Choosing anew in each fold was tried: as an estimate for the model that is saved it is off
     by more, not by less. The price is that an effect chosen by chance from noise alone seems worth a little;
-    :func:`~thermal_robot.diagnosis.earned.earned` asks for more than that.
-
-    The intervals are of what fresh rows of the same kind would say of the saved model, noise included: for the whole of
-    the mean squares after and before, for an effect of its Shapley value.
-
-    Raises
-    ------
-    EstimationError
-        If all rows repeat one pose, so that there is only one fold.
+    :func:`~thermal_robot.diagnosis.earned.earned` asks for more than that. The intervals are of what fresh rows of the
+    same kind would say of the saved model, noise included: for the whole of the mean squares after and before, for an
+    effect of its Shapley value. Raises :class:`EstimationError` if all rows repeat one pose, so that there is only one
+    fold.
     """
     block = blocks(fit.campaign)
     count = int(block.max()) + 1
@@ -79,18 +65,10 @@ def held_out(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Shri
 
 
 def shrinkage(explanation: Explanation, before: Linear, families: Sequence[str], block: Labels) -> Shrinkage:
-    """Cross-validate an explanation; see :func:`held_out`.
+    """Cross-validate an explanation, linearised at the corrected model; see :func:`held_out`.
 
-    Parameters
-    ----------
-    explanation
-        Linearised at the corrected model.
-    before
-        The problem at the nominal robot with the blocks of the explanation's best combination, in their order.
-    families
-        Name of the effect that each block of the explanation belongs to.
-    block
-        (N,) label 0..B−1 of each row: which are held out together.
+    ``before`` is the problem at the nominal robot with the blocks of the best combination, in their order; rows of one
+    ``block`` (N,) are held out together.
     """
     walks = _Walks.of(explanation, before, families, block)
     left = walks.residuals(walks.players)
@@ -107,17 +85,8 @@ def shrinkage(explanation: Explanation, before: Linear, families: Sequence[str],
 class _Walks:
     """What is left before and after: of the nominal robot, and of the model with some of its effects.
 
-    Attributes
-    ----------
-    before, after
-        The walks: of the nominal robot with a part of the model's effects, and of the model with every effect that is
-        asked about.
-    numbers
-        Per effect of the walk: its block in the explanation.
-    players
-        Those that are in the model.
-    seen
-        Sums of squares by the effects that are in.
+    ``before`` has a part of the model's effects, ``after`` every effect asked about; ``numbers`` are their blocks in
+    the explanation, ``players`` those in the model, ``seen`` sums of squares by the effects that are in.
     """
 
     before: Walk

@@ -26,20 +26,7 @@ Flags = NDArray[np.bool_]
 
 
 def not_executed(campaign: Campaign) -> tuple[Campaign, tuple[str, ...]]:
-    """Leave out the rows whose measured pose is that of another row's command; return a sentence for each run of them.
-
-    Parameters
-    ----------
-    campaign
-        With measurements.
-
-    Returns
-    -------
-    Campaign
-        As it is where there is no such row.
-    tuple of str
-        Which rows, and what was measured in them instead.
-    """
+    """Leave out rows whose measured pose is that of another row's command, with a sentence for each run of them."""
     if campaign.samples <= faults.DRAWN:
         return campaign, ()
     order = in_order(campaign)

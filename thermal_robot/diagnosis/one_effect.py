@@ -33,20 +33,7 @@ from thermal_robot.observations import Observations
 
 
 def explained(fit: Fit, effect: str) -> Explained:
-    """Return what one effect of the fit explains at each place, without the outliers.
-
-    Parameters
-    ----------
-    fit
-        The fit.
-    effect
-        Name of an effect of the fit.
-
-    Raises
-    ------
-    EffectError
-        If the effect is not part of the fit.
-    """
+    """Tell what one effect of the fit explains at each place, outliers left out; :class:`EffectError` if not in it."""
     held = {e.name: (e, values) for e, values in fit.effects}
     if effect not in held:
         listed = ", ".join(held) or "no effect"

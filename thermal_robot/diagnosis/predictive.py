@@ -35,16 +35,9 @@ from thermal_robot.prediction import Spread, by_parameters, moves, sensitivity
 
 
 def uncertainty(fit: Fit, needs: tuple[str, ...], floor: float) -> Spread:
-    """Return what makes the predictions of a fit uncertain.
+    """Return what makes predictions of a fit uncertain; ``needs`` are the columns that its model reads.
 
-    Parameters
-    ----------
-    fit
-        The fit whose model predicts.
-    needs
-        Columns that it reads.
-    floor
-        One sigma per axis of the noise where the campaign states none, m.
+    ``floor`` is one sigma per axis of the noise where the campaign states none, m.
     """
     campaign, model = fit.campaign, Model.of(fit.explanation, blocks(fit.campaign))
     covariance, wider = _covariances(fit, model)

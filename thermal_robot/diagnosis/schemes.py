@@ -28,21 +28,11 @@ Rows = NDArray[np.bool_]
 
 
 def worst_folds(fit: Fit) -> tuple[FoldScheme, ...]:
-    """Hold rows out by time, session, temperature, region and reach; the least favourable scheme comes first.
+    """Hold rows out by time, session, temperature, region and reach; the scheme of the largest rms after comes first.
 
-    The least favourable scheme has the largest rms after. Its shrinkage need not be the smallest, as the gap before may
-    be larger on its rows, too. Every figure has the noise of the held-out rows in it.
-
-    Parameters
-    ----------
-    fit
-        The fit, with or without effects.
-
-    Returns
-    -------
-    tuple of FoldScheme
-        In order of rms_after, the largest first. A scheme is left out if the campaign lacks its column; a fold is left
-        out if its training rows do not determine the frames.
+    Its shrinkage need not be the smallest, as the gap before may be larger on its rows, too. Every figure has the noise
+    of the held-out rows in it. A scheme is left out if the campaign lacks its column; a fold if its training rows do
+    not determine the frames.
     """
     model = Model.of(fit.explanation, blocks(fit.campaign))
     plain = model.bare(fit.before)

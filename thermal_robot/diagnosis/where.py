@@ -52,22 +52,10 @@ def without_laws(fit: Fit, left: Unexplained) -> Unexplained:
 
 
 def locate(fit: Fit, shrinkage: dict[str, float]) -> tuple[Where, dict[str, tuple[Location, ...]]]:
-    """Attribute the gap to places.
+    """Attribute the gap to places: shares over axes, joints, links, base, tool, instrument, quantities; by effect.
 
-    Parameters
-    ----------
-    fit
-        The fit.
-    shrinkage
-        By effect of the fit: its share of the gap on held-out rows, which is divided among its places.
-
-    Returns
-    -------
-    where
-        Shares over axes, joints, links, base, tool and instrument, and quantities.
-    locations
-        By effect: its places, largest first. The share of a place is proportional to the mean square displacement that
-        its parameters cause, with the unknown frames projected out.
+    The ``shrinkage`` of an effect on held-out rows is divided among its places, largest first, in proportion to the
+    mean square displacement that its parameters there cause, with the unknown frames projected out.
     """
     e = fit.explanation
     rows = np.flatnonzero(~e.outliers)

@@ -20,26 +20,11 @@ if TYPE_CHECKING:
 def displacement(
     observations: Observations, effects: Sequence[tuple[Effect, Array]]
 ) -> tuple[Displacement, Array | None]:
-    """Return what a set of fitted values does: the displacement of the chain, and of the measured point.
+    """Displacement of the chain's four channels by fitted values (P,) of effects, and of the measured point (N, 3), m.
 
-    Parameters
-    ----------
-    observations
-        What the responses are read from.
-    effects
-        Each effect with the (P,) values of its parameters.
-
-    Returns
-    -------
-    displacement
-        The four channels.
-    instrument
-        (N, 3) in the measurement frame, m; ``None`` where no effect acts on the instrument.
-
-    Raises
-    ------
-    EffectError
-        If an effect's parameters break the contract, or are not as many as its values: the rows lack what it reads.
+    The latter stands in the measurement frame, ``None`` where no effect acts on the instrument. Raises
+    :class:`EffectError` if parameters break the contract, or are not as many as the values: the rows lack what the
+    effect reads.
     """
     samples, robot = observations.campaign.samples, observations.robot
     joint = np.zeros((samples, robot.n))

@@ -118,13 +118,7 @@ def _refuse(effect: Effect, known: dict[str, Effect]) -> None:
 
 @cache
 def restored(name: str, arguments: str) -> Effect:
-    """Return an effect of the library by its name and its arguments, JSON text.
-
-    Raises
-    ------
-    EffectError
-        If no effect of that name is installed, or it does not take these arguments.
-    """
+    """Effect of the library by its name and its JSON arguments; :class:`EffectError` if not installed, or not taken."""
     known = library()
     if name not in known:
         raise EffectError(f"no effect is named {name!r} here")
@@ -161,20 +155,7 @@ def named(name: str) -> Effect:
 
 
 def of_effect(answers: Mapping[str, _Said], name: str) -> _Said:
-    """Return what an answer says of one effect.
-
-    Parameters
-    ----------
-    answers
-        By the names of those that were considered.
-    name
-        Of the effect.
-
-    Raises
-    ------
-    UnknownEffectError
-        If it was not considered; says which name was probably meant.
-    """
+    """Return what an answer says of one effect; :class:`UnknownEffectError` says which name was probably meant."""
     if name not in answers:
         meant = did_you_mean(str(name), answers) or f"; there are {', '.join(sorted(answers)) or 'none'}"
         raise UnknownEffectError(f"no effect named {name!r} was considered{meant}")

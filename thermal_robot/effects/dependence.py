@@ -19,25 +19,10 @@ if TYPE_CHECKING:
 
 
 def depends_on(effect: Effect, observations: Observations) -> tuple[str, ...]:
-    """Return the columns without which, or with other values in which, an effect would do something else.
+    """Columns of :func:`gate.reads` without which, or with other values of which, a fitted effect does something else.
 
-    Parameters
-    ----------
-    effect
-        As it was fitted, with the places that it sits in.
-    observations
-        N rows that its responses are read from.
-
-    Returns
-    -------
-    tuple of str
-        Of what it reads (:func:`gate.reads`), in its order. A column counts where the effect's own parameters change as
-        it is left out, or takes other values: one that equals another column here need not do so elsewhere.
-
-    Raises
-    ------
-    EffectError
-        If the effect breaks the contract in these rows.
+    A column counts where the effect's own parameters change as it is left out, or takes other values: one that equals
+    another column here need not do so elsewhere. Raises :class:`EffectError` if the effect breaks the contract.
     """
     campaign, own = observations.campaign, gate.checked(effect, observations)
     read = gate.reads(effect, observations)

@@ -28,18 +28,11 @@ _OF_A_MODEL = ("found", "means", "rests", "fades")
 
 @dataclass(frozen=True)
 class Fading(Effect):
-    """An effect with the range that it was found in.
+    """An effect with the range of its driver in which it was ``found``; empty where it is to have no end.
 
-    Attributes
-    ----------
-    found
-        Least and largest value of what drives it, where it was found; empty where it is to have no end.
-    means
-        Of each of its functions over the rows where it was found; zero where absent.
-    rests
-        Twists of the base (6) and of the tool (6) that frames take over of a unit of each parameter; empty for none.
-    fades
-        Whether it fades beyond, or keeps the value of the edge.
+    It ``fades`` beyond, or keeps the value of the edge. ``means``: of each of its functions over the rows where it was
+    found, zero where absent; ``rests``: twists of the base (6) and of the tool (6) that frames take over of a unit of
+    each parameter.
     """
 
     found: tuple[float, ...] = field(default=(), kw_only=True)

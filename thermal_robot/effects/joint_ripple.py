@@ -28,19 +28,12 @@ class JointRipple(OfPosition):
     Teeth, balls and the motor's own wheel come round n times in a turn of the joint; n need be no whole number. Strain
     wave gears are rated for a transmission error of 1 to 2 minutes of arc peak to peak, most of it twice a turn of the
     motor; the waves of three UR robots have amplitudes of 0.02 to 0.33 mrad. Expected size 0.1 mrad. What comes round
-    once or twice in a turn is :class:`TransmissionError`.
+    once or twice in a turn is :class:`TransmissionError`. Where the campaign states a gear ratio, an order near a whole
+    or half multiple of it is said to be the motor's.
 
-    Where the campaign states a gear ratio, an order near a whole or half multiple of it is said to be the motor's.
-
-    Orders are no parameters: they are looked for in what remains, joint by joint, and join one after another
-    (:mod:`thermal_robot.inference.ripple`). Without waves the effect does nothing.
-
-    Attributes
-    ----------
-    joints, orders
-        Joint and order (rad per rad; rad/m where it slides) of each wave.
-    tried
-        Among how many waves all of these were picked: the product of the numbers for each.
+    ``orders`` (rad per rad; rad/m where the joint slides) are no parameters: they are looked for in what remains, joint
+    by joint, and join one after another (:mod:`thermal_robot.inference.ripple`); ``tried`` is among how many waves all
+    of these were picked, the product of the numbers for each. Without waves the effect does nothing.
     """
 
     joints: tuple[str, ...] = ()

@@ -15,15 +15,7 @@ _FOLLOWED = 64  # histories and lags of which it is kept how far a body is behin
 
 @dataclass(frozen=True)
 class History:
-    """A temperature as it was recorded, running straight between its points.
-
-    Attributes
-    ----------
-    times
-        (K,) s, increasing.
-    temperatures
-        (K,) °C.
-    """
+    """A temperature as it was recorded, straight between its points: increasing (K,) times, s, and temperatures, °C."""
 
     times: tuple[float, ...]
     temperatures: tuple[float, ...]
@@ -37,18 +29,12 @@ class History:
         return cls(tuple(instants[kept].tolist()), tuple(values[kept].tolist()))
 
     def followed(self, lag: float, times: Array, temperatures: Array) -> Array:
-        """Return (N,) the temperature of a body that obeys dT/dt = (T_recorded − T) / lag.
+        """(N,) temperature of a body that obeys dT/dt = (T_recorded − T) / lag, a first-order lag of ``lag`` s.
 
-        It is in balance at the first point. Between two points the solution is exact:
-        T = u(t) − r·lag + (T_i − u_i + r·lag) exp(−(t − t_i)/lag), where u runs at the rate r.
-
-        Parameters
-        ----------
-        lag
-            Time constant, s.
-        times, temperatures
-            (N,) s and °C of the rows that are asked for. Beyond the record the row's own temperature is taken to have
-            held since its end; before the record the body is in balance with it.
+        It is in balance at the first point. Between two points the solution is exact: T = u(t) − r·lag + (T_i − u_i +
+        r·lag) exp(−(t − t_i)/lag), where u runs at the rate r. Rows are asked for by times and temperatures (N,), s and
+        °C: beyond the record the row's own is taken to have held since its end; before it the body is in balance with
+        it.
         """
         t, u = np.array(self.times), np.array(self.temperatures)
         rate = np.diff(u) / np.diff(t)

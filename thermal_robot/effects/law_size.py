@@ -20,18 +20,9 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Size:
-    """How much a law, or an effect in one joint, changes over the rows that were measured.
+    """How much a law, or an effect in one joint, changes over the rows that were measured, with one sigma, in SI.
 
-    Attributes
-    ----------
-    what
-        Of what it is the size: ``step``, ``range``.
-    value, std
-        The change and its standard deviation, one sigma; never undetermined, as a constant has no part in it.
-    unit
-        Of both, SI.
-    place
-        The joint, where the effect acts in several; empty for a law.
+    ``what`` it is the size of is ``step`` or ``range``; ``place`` is the joint, where the effect acts in several.
     """
 
     what: str
@@ -42,22 +33,11 @@ class Size:
 
 
 def sizes(law: Discovered, observations: Observations, values: Array, covariance: Array) -> tuple[Size, ...]:
-    """Return how much a law changes between the two rows between which it changes most.
+    """How much a law changes between the two rows between which it changes most.
 
-    Parameters
-    ----------
-    law
-        The law.
-    observations
-        The rows over which it is judged.
-    values, covariance
-        Of its K·C parameters, as fitted: (K·C,) and (K·C, K·C), functions first, SI.
-
-    Returns
-    -------
-    tuple of Size
-        One for a joint, and for an effect that changes; at a link, the base or the tool one of the translation, m, and
-        one of the rotation, rad, each the length of a vector. Empty where the campaign cannot tell the law's values.
+    Values (K·C,) and covariance are as fitted, functions first, SI. One size for a joint, and for an effect that
+    changes; at a link, the base or the tool one of the translation, m, and one of the rotation, rad, each the length of
+    a vector. Empty where the campaign cannot tell the law's values.
     """
     rows, parameters = law.at_rows(observations), law.parameters(observations)
     if rows is None or not parameters:
@@ -84,23 +64,10 @@ def sizes(law: Discovered, observations: Observations, values: Array, covariance
 
 
 def in_joints(what: str, parameters: Sequence[Parameter], values: Array, covariance: Array) -> tuple[Size, ...]:
-    """Return how much an effect of joints changes in each of them between the two rows between which it changes most.
+    """How much an effect of joints changes in each of them between the two rows between which it changes most.
 
     Single waves of a joint that moves over part of a turn do the same in part; what they do together is better known.
-
-    Parameters
-    ----------
-    what
-        Of what it is the size.
-    parameters
-        Of the effect, K in all.
-    values, covariance
-        As fitted: (K,) and (K, K), SI.
-
-    Returns
-    -------
-    tuple of Size
-        One a joint, the largest first; none of a place that does not err in its joint alone.
+    Values (K,) and covariance are SI; largest first, none of a place that does not err in its joint alone.
     """
     found = []
     for place in dict.fromkeys(parameter.place for parameter in parameters):

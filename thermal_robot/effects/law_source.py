@@ -11,17 +11,7 @@ from thermal_robot.arrays import Array
 
 
 def source(arguments: Mapping[str, Any], what: str, values: Array, name: str) -> str:
-    """Return the text of a Python file with a law as an effect.
-
-    Parameters
-    ----------
-    arguments, what
-        Of the law, and what it is in words.
-    values
-        As it was fitted, (P,) SI; they stand in the file as a comment, as an effect holds none.
-    name
-        Of the effect.
-    """
+    """Text of a Python file with a law as an effect; the fitted values (P,), SI, stand in it as a comment."""
     fields = {k: v for k, v in arguments.items() if k != "name"}
     lines = "\n".join(f"    {key}: Any = {pformat(value, width=100)}" for key, value in fields.items())
     title = "".join(part.capitalize() for part in name.split("_"))

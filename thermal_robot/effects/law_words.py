@@ -79,22 +79,7 @@ WHETHER = {
 
 
 def kind_of(quantity: str, place: str, joints: Sequence[str]) -> str:
-    """Return the kind of a quantity, as seen from a place.
-
-    Parameters
-    ----------
-    quantity
-        Name of a column, a joint, or something derived (:mod:`thermal_robot.effects.quantities`).
-    place
-        Where the error enters: a joint's name, or another.
-    joints
-        Names of the robot's joints.
-
-    Returns
-    -------
-    str
-        One of those in :data:`TELLS`, or empty for a quantity that only this campaign knows.
-    """
+    """Kind of a quantity as seen from a place, one of :data:`TELLS`; empty for one that only this campaign knows."""
     column, _, of = quantity.partition(".")
     if quantity.startswith(TURN):
         return "memory"
@@ -154,20 +139,8 @@ def is_event(law: object) -> bool:
 def event(law: Discovered, observations: Observations, sizes: Sequence[Size]) -> tuple[str, str]:
     """Tell an event by the rows in which it shows: in a few words, and in a sentence without a full stop.
 
-    Parameters
-    ----------
-    law
-        A law.
-    observations
-        The rows that were measured.
-    sizes
-        How far it moved, as fitted.
-
-    Returns
-    -------
-    short, whole
-        Both empty for what is no event, for levels of more than one session, and where its rows do not follow each
-        other in the file: no row then tells when it was.
+    Both empty for what is no event, for levels of more than one session, and where its rows do not follow each other in
+    the file: no row then tells when it was.
     """
     rows = law.at_rows(observations) if is_event(law) and law.shape != "levels" else None
     there = np.zeros(0, dtype=bool) if rows is None else rows[0][:, 1] > 0.0

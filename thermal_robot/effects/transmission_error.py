@@ -29,21 +29,14 @@ _NOT_LEARNT = 0.05  # of the logarithm of its size: a curve that could grow woul
 class TransmissionError(OfPosition):
     """Every joint deviates periodically: q_actual = q_command + Σ_k a_k sin(k q) + b_k cos(k q).
 
-    An eccentric wheel or encoder disc on the joint's side gives order 1, an oval one order 2; where the campaign
-    states a gear ratio (``[gears]``), those of the motor's side give the ratio and twice that. Expected size 0.3 mrad,
-    one minute of arc: catalogues of strain-wave gears state 1 to 2′ from peak to peak.
+    An eccentric wheel or encoder disc on the joint's side gives order 1, an oval one order 2; where the campaign states
+    a gear ratio (``[gears]``), those of the motor's ``side`` give the ratio and twice that. Expected size 0.3 mrad, one
+    minute of arc: catalogues of strain-wave gears state 1 to 2′ from peak to peak.
 
     Over part of a turn orders 1 and 2 are nearly a line and a parabola. Where a joint errs by neither, they come out
     many times too large (4 mrad in a UR10, for 0.3 mrad over 2 rad). Its error curve has all orders from 1 to 8, above
     2 of sizes that fall as one over the order, and all together as large as one wave. It could take any shape: its size
-    is that of the source, not learnt.
-
-    Attributes
-    ----------
-    harmonics
-        Orders a turn of the wheel, on either side.
-    side
-        Whose wheels err: ``joint``, ``motor``, or ``both``.
+    is that of the source, not learnt. ``harmonics`` are orders a turn of the wheel, on either side.
     """
 
     harmonics: tuple[Order, ...] = (1, 2)

@@ -76,25 +76,9 @@ def alternate(
 ) -> tuple[Array, Placed]:
     """Alternate the rigid alignment of the base with the linear fit of the target's place, robustly.
 
-    Parameters
-    ----------
-    campaign
-        With measurements; its columns may have several in front (..., N), which go side by side.
-    declared
-        Frames as declared; known ones stay.
-    targets
-        (..., S, 3) where the target may sit on the tool frame, m: from each of them.
-    rounds
-        Alternations at most.
-    some
-        Rows that are looked at.
-    poses
-        (..., N, 4, 4) of the tool frame in these rows, where they are at hand.
-
-    Returns
-    -------
-    tuple
-        Of the start that ends nearest: (...) median distance that is left, m, and the frames.
+    Targets (..., S, 3), m in the tool frame, are S starts; the columns of the campaign may have several in front (...,
+    N), which go side by side; ``poses`` (..., N, 4, 4) are the tool frame's in the rows ``some``. Returns (...) the
+    median distance that the nearest start leaves, m, and its frames.
     """
     lead, many = campaign.q.shape[:-2], targets.shape[-2]
     measured, turns = np.asarray(campaign.position)[..., some, :], None

@@ -27,18 +27,9 @@ from thermal_robot.inference.thin import Thin
 
 @dataclass(frozen=True, eq=False)
 class Discovery:
-    """A law of a fit, with its rivals.
+    """A law of a fit with the probability that one of its quantity at its place is at work, and its rivals.
 
-    Attributes
-    ----------
-    law
-        What it is.
-    probability
-        That a law of this quantity at this place is at work.
-    places
-        (kind, name) with the posterior probability of each, most probable first.
-    quantities
-        The same of what is followed.
+    ``places`` and ``quantities``: the posterior probability of each, most probable first.
     """
 
     law: Discovered
@@ -48,20 +39,10 @@ class Discovery:
 
 
 def candidates(fit: Fit, number: int, happened: Sequence[Discovered] | None = None) -> tuple[Discovered, ...]:
-    """Return the laws that may be worth their place, best first.
+    """Laws that may be worth their place, best first, the events that may have happened before all others.
 
-    Several remainders are scanned: that of the explanation, and unless one effect leaves but noise, that of the laws
-    alone and that without each of the effects. Known effects may have absorbed an unlisted cause, which then shows only
-    where they are left out.
-
-    Parameters
-    ----------
-    fit
-        An explanation.
-    number
-        Of the law: it is called ``discovered.<number>``.
-    happened
-        Events that may have happened, which come first; they are looked for where absent.
+    Scanned are the remainders of the explanation and, unless one effect leaves but noise, of the laws alone and without
+    each effect: known effects may have absorbed an unlisted cause. A law is called ``discovered.<number>``.
     """
     thin = Thin.of(fit)
     remainders = list(dict.fromkeys(_remainders(fit)))

@@ -97,18 +97,7 @@ class _Sums:
 
 
 def events(fit: Fit) -> tuple[Discovered, ...]:
-    """Return the events that may be at work in a fit, the plainest first, one a place; none where none is worth it.
-
-    Parameters
-    ----------
-    fit
-        An explanation, with rows that it has set aside.
-
-    Returns
-    -------
-    tuple of Discovered
-        Steps in time, runs, and sessions that are apart, each with the number of laws among which it was picked.
-    """
+    """Events that may be at work in a fit: steps in time, runs, and sessions apart; the plainest first, one a place."""
     if fit.campaign.samples > settings.RIPPLE_ROWS or fit.campaign.samples < settings.FEWEST_WITH_EVENTS:
         return ()
     observations = fit.corrected

@@ -29,24 +29,10 @@ from thermal_robot.inference.posterior import UNDETERMINED, Columns, Posterior
 class Combination:
     """One combination of blocks, its scales at their most probable values.
 
-    Attributes
-    ----------
-    blocks
-        Numbers of the blocks that are in.
-    log_evidence
-        Log marginal likelihood with log prior odds.
-    noise
-        s, in units of the whitening noise.
-    scales
-        λ of each block.
-    values
-        Posterior mode of the reduced columns, block after block; zero for those that would be negative and cannot.
-    covariance
-        Their posterior covariance.
-    effective
-        How many parameters the data determine.
-    exact
-        Whether all scales are at their most probable values; else at most those of one block are.
+    ``log_evidence`` is the log marginal likelihood with log prior odds; ``noise`` s, in units of the whitening noise;
+    ``scales`` λ of each block; ``values`` and ``covariance`` the posterior mode of the reduced columns, block after
+    block, zero for those that would be negative and cannot; ``effective`` the number of determined parameters;
+    ``exact`` whether all scales are converged, else at most those of one block are.
     """
 
     blocks: tuple[int, ...]
@@ -67,22 +53,10 @@ def evidence(
     floor: float = -np.inf,
     settled: float = settings.EVIDENCE_SETTLED,
 ) -> Combination:
-    """Return one combination with noise and scales at their most probable values.
+    """Log evidence of one combination with noise and scales at their most probable values (empirical Bayes).
 
-    Parameters
-    ----------
-    gram
-        The problem.
-    blocks
-        That are in it.
-    prior
-        Their log prior odds.
-    start
-        A combination like it, from whose noise and scales the iteration starts.
-    floor
-        Log evidence that is of interest: where it is clear that this is not reached, the iteration ends.
-    settled
-        By how much the logarithms of noise and scales still move when they are found.
+    The iteration starts at the noise and scales of ``start``, ends once their logarithms move less than ``settled``,
+    and early where it is clear that the log evidence ``floor`` is not reached.
     """
     used = gram.columns_of(blocks)
     owner = np.repeat(np.arange(len(blocks)), [gram.slices[b].stop - gram.slices[b].start for b in blocks])

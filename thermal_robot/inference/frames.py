@@ -17,29 +17,11 @@ from thermal_robot.observations import Frames, observe
 
 
 def register(campaign: Campaign, keep: NDArray[np.bool_] | None = None) -> Frames:
-    """Fit the unknown frames to the nominal robot, and nothing else.
+    """Fit the unknown frames to the nominal robot, and nothing else; known ones stay as declared.
 
     Alternates the rigid alignment of the base with the linear fit of the target's place, from several starts (the
-    target may sit 0.3 m from the tool frame), on a sample of the rows and with weights that let gross errors go; then
-    Gauss-Newton on all rows.
-
-    Parameters
-    ----------
-    campaign
-        With measurements.
-    keep
-        (N,) True for the rows to fit by least squares, False for those set aside; where absent all are fitted,
-        robustly.
-
-    Returns
-    -------
-    Frames
-        Known frames as declared, unknown ones fitted.
-
-    Raises
-    ------
-    EstimationError
-        If fewer than three rows have weight.
+    target may sit 0.3 m from the tool frame), on a sample of the rows, robustly; then Gauss-Newton on all rows, or by
+    least squares on those of ``keep`` (N,). Raises :class:`EstimationError` if fewer than three rows have weight.
     """
     if frames_known(campaign):
         return Frames.declared(campaign)
@@ -53,13 +35,7 @@ def frames_known(campaign: Campaign) -> bool:
 
 
 def found_frames(campaign: Campaign) -> Frames:
-    """Find the unknown frames to where they are nearly linear: known ones as declared.
-
-    Raises
-    ------
-    EstimationError
-        If there are fewer than three rows.
-    """
+    """Find the unknown frames to where they are nearly linear; :class:`EstimationError` below three rows."""
     frames, rows = Frames.declared(campaign), campaign.samples
     if rows < 3:
         raise EstimationError("at least three rows are needed to fit the unknown frames")

@@ -35,16 +35,9 @@ _LOG_2, _ROOT_2 = np.log(2.0), np.sqrt(2.0)
 
 @dataclass(frozen=True, eq=False)
 class _Alike:
-    """Blocks of as many columns.
+    """Blocks of as many columns: their numbers, w and c² (K, D) of the columns not held at zero, and the sided ones.
 
-    Attributes
-    ----------
-    blocks
-        Their numbers.
-    value, along
-        (K, D) w, and c², of the columns that are not held at zero.
-    sides
-        (J,) place in ``blocks``, w and c of each column that cannot be negative.
+    ``sides`` (J,): place in ``blocks``, w and c of each column that cannot be negative.
     """
 
     blocks: list[int]

@@ -16,29 +16,12 @@ from thermal_robot.arrays import Array
 class Gram:
     """Normal equations of a linear problem after the frames are projected out, whitened, in units of prior sizes.
 
-    Attributes
-    ----------
-    matrix, vector, total
-        G (D, D), b (D,), y'y.
-    slices
-        Where each block's D_b columns stand; blocks are reduced to what the data can see of them.
-    bases
-        Per block, (P_b, D_b): parameter values, in prior sizes, of a unit of each reduced column.
-    positive
-        (D,) which reduced columns cannot be negative; in a block with any of them each is a parameter.
-    ranks
-        Per block: how many directions of it the data see.
-    spreads
-        (B,) of each block: standard deviation of ln λ before the data.
-    most
-        (B,) λ of each block, at most; ``None`` where nothing bounds any.
-    equations
-        n: scalar equations with weight, less the rank of the frames.
-    noise_dof
-        How firmly the whitening noise is held (degrees of freedom); 0 where it is not known.
-    offset
-        Log evidence that all combinations share: −½ log of the determinants of the rows' covariance and of the frames,
-        and the log prior of that covariance.
+    G (D, D), b (D,) and y'y are ``matrix``, ``vector`` and ``total``; each block, reduced to what the data see of it
+    (``ranks``), has D_b columns (``slices``), of which ``bases`` (P_b, D_b) are the parameter values. ``positive`` (D,)
+    cannot be negative: each is then a parameter. ``spreads`` (B,): prior standard deviation of ln λ; ``most`` (B,): λ
+    at most. ``equations`` n is less the rank of the frames; ``noise_dof`` holds the whitening noise, 0 where it is not
+    known; ``offset`` is the log evidence that all combinations share: −½ log of the determinants of the rows'
+    covariance and of the frames, and the log prior of that covariance.
     """
 
     matrix: Array

@@ -27,16 +27,8 @@ from thermal_robot.inference.problem import Linear, gram
 class Portion:
     """What one effect does of all that a larger one was found to do, or the larger one's rest.
 
-    Attributes
-    ----------
-    effect
-        Name of the effect.
-    parameters
-        The k of them that are told.
-    values, spread, prior
-        (k,) value and posterior and prior standard deviation of each, in its unit.
-    unseen
-        Parameters that the data do not tell from those before them, or from the frames.
+    (k,) value, posterior (``spread``) and ``prior`` standard deviation of each parameter, in its unit; ``unseen`` are
+    those that the data do not tell from the ones before, or from the frames.
     """
 
     effect: str
@@ -50,18 +42,8 @@ class Portion:
 def divided(fit: Fit, name: str) -> tuple[Portion, ...]:
     """Divide an effect of a fit: first what is inside it and told there, the rest last.
 
-    Parameters
-    ----------
-    fit
-        The fit.
-    name
-        Of an effect of the fit.
-
-    Returns
-    -------
-    tuple of Portion
-        Empty where the effect is told in its own parameters. All parts together move the target as the effect does, but
-        for the unknown frames.
+    All parts together move the target as the effect does, but for the unknown frames; empty where it is told in its own
+    parameters.
     """
     number = next(k for k, (effect, _) in enumerate(fit.effects) if effect.name == name)
     effect, values = fit.effects[number]

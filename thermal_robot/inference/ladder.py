@@ -28,20 +28,9 @@ PLAIN: Rung = (-1, 0.0)
 class Ladder:
     """Evaluates combinations of blocks beside discrepancies of several forms and sizes.
 
-    Parameters
-    ----------
-    linear, whitening
-        The problem; its whitening without a discrepancy.
-    forms
-        Of the discrepancy; none where none is to be considered.
-    log_prior
-        Log prior odds of each block.
-    exclusive
-        Pairs of blocks that must not be together, beside those of which one contains the other.
-    among
-        Number of forms of which these are left, if they are not all: each keeps its share of the prior.
-    stack
-        The problem's columns, where they are known already.
+    ``whitening`` is without a discrepancy; ``exclusive`` are pairs of blocks that must not be together, beside those of
+    which one contains the other; ``among`` is the number of forms of which these are left: each keeps its share of the
+    prior.
     """
 
     linear: Linear

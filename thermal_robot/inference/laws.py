@@ -30,17 +30,7 @@ __all__ = [
 
 
 def laws(observations: Observations, kinds: Sequence[str], names: Iterable[str] | None = None) -> list[Discovered]:
-    """Return a smooth law of each quantity at each place of the given kinds, and at a segment a constant one, too.
-
-    Parameters
-    ----------
-    observations
-        Where quantities are read from.
-    kinds
-        ``joint``, ``base``, ``tool``, ``link``.
-    names
-        Of the quantities; all where absent.
-    """
+    """Smooth laws of each quantity at each place of the given kinds, and at a segment constant ones, too."""
     turns = observations.campaign.measures == "pose"
     robot = observations.robot
     places = {
@@ -157,14 +147,8 @@ def _of_two(law: Discovered, values: Array) -> list[Discovered]:
 def hystereses(law: Discovered, values: Array) -> list[Discovered]:
     """Return a law of a joint's memory as elements that slip: over the whole range, coarsely first, or some neighbours.
 
-    One that slips between two of the grid is nearly a sum of these two.
-
-    Parameters
-    ----------
-    law
-        Of the distance (N,) from the joint's last turning point.
-    values
-        That distance, rad or m: which slips show, it tells.
+    ``values`` (N,), rad or m from the last turning point, tell which slips show. One between two of the grid is nearly
+    their sum.
     """
     least, most = (share * float(np.abs(values).max()) for share in settings.SLIP_SHARES)
     slips = tuple(r for r in SLIPS if least <= r <= most)

@@ -34,21 +34,12 @@ def independent(grid: Array) -> float:
 
 
 def periodogram(seat: Seat, q: Array, at: Array) -> Array:
-    """Return the (K,) log evidence that a wave of each order gains: 1, sin kq and cos kq by least squares.
+    """(K,) log evidence that a wave of each order gains: 1, sin kq and cos kq by least squares.
 
     The least-squares periodogram with a floating mean (Zechmeister and Kuerster, *The generalised Lomb-Scargle
-    periodogram*, 2009), of many equations a row, the design projected out. Gains are those of
-    :meth:`~thermal_robot.inference.target.Seat.gains`; orders that the design can do, or whose sine and cosine the
-    positions cannot tell apart, gain −∞.
-
-    Parameters
-    ----------
-    seat
-        The target seen from the joint, one component.
-    q
-        (N,) the joint's position, rad or m.
-    at
-        (K,) orders, in equal steps.
+    periodogram*, 2009), of many equations a row, the design projected out. Positions q (N,), rad or m; orders in equal
+    steps (K,). Gains are those of :meth:`~thermal_robot.inference.target.Seat.gains`; orders that the design can do, or
+    whose sine and cosine the positions cannot tell apart, gain −∞.
     """
     found = [_chunk(seat, q, at[k : k + settings.ORDER_CHUNK]) for k in range(0, len(at), settings.ORDER_CHUNK)]
     return np.concatenate([*found, np.zeros(0)])

@@ -19,13 +19,6 @@ class Products:
 
     A block that takes the place of another costs its own columns and their products with the others. What is kept of a
     block goes with it.
-
-    Parameters
-    ----------
-    linear
-        The gap and the frames; its blocks bear on nothing.
-    whitening
-        Weights and noise.
     """
 
     def __init__(self, linear: Linear, whitening: Whitening) -> None:

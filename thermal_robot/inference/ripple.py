@@ -28,20 +28,10 @@ Rows = NDArray[np.bool_]
 
 
 def left_out(columns: Array, values: Array, flat: int, prior: Array, folds: Sequence[Rows]) -> float:
-    """Return the sum of squares that fits to the other rows leave in each fold, in units of the noise.
+    """Cross-validation: sum of squares that fits to the other rows leave in each fold, in units of the noise.
 
-    Parameters
-    ----------
-    columns
-        (N, m, K) weighted, in units of the noise.
-    values
-        (N, m) the same of what is fitted.
-    flat
-        Number of leading columns without a prior.
-    prior
-        (K − flat,) one over the prior variance of each other column.
-    folds
-        (N,) rows of each fold.
+    Columns (N, m, K) are weighted, the first ``flat`` without a prior, ``prior`` (K − flat,) one over the others'
+    variances.
     """
     stack = np.concatenate([columns, values[:, :, None]], axis=2)
     whole = _products(equations_of(stack))
@@ -90,24 +80,11 @@ class _Wave:
 
 @dataclass(frozen=True, eq=False)
 class _Pursuit:
-    """Waves that are found one after another.
+    """Waves that are found one after another (matching pursuit), at the rows that are looked at.
 
-    Attributes
-    ----------
-    observations
-        Of the corrected model, at the rows that are looked at.
-    gap
-        (N, m) what all effects and waves have to explain.
-    design, flat
-        (N, m, K) columns of the frames and the other effects; how many are the frames'.
-    prior
-        (K − flat,) one over the prior variance of each column but the first, ``flat`` ones.
-    grids
-        By joint: the orders that are tried.
-    folds
-        By scheme: the rows (N,) of each fold.
-    changed
-        (N,) rows that weigh fully, however far they are.
+    ``gap`` (N, m) is what all effects and waves explain; ``design`` (N, m, K) the columns of ``flat`` frame parameters
+    and the other effects, ``prior`` (K − flat,) one over their prior variances; ``grids`` the orders tried by joint,
+    ``folds`` the rows (N,) of each fold by scheme; rows that are ``changed`` (N,) weigh fully, however far they are.
     """
 
     observations: Observations

@@ -35,19 +35,11 @@ def conditions(observations: Observations, joint: str = "") -> list[str]:
 
 
 def modulated(observations: Observations, effects: Iterable[Effect] | None = None) -> list[Discovered]:
-    """Return laws of known effects whose size in one joint changes with a condition or with the joint's position.
+    """Laws of known effects (by default the library) whose size in one joint changes with a condition or position.
 
-    An effect whose response is the same in all rows, such as a zero that is off, is left out: times a law it is a plain
-    law of that joint. So is what drives the effect itself: lost motion times the direction of approach is a zero that
-    is off, a wave times a law of the same position any law of it. An effect that is not installed is left out, too, as
-    a saved law could not be read.
-
-    Parameters
-    ----------
-    observations
-        Where columns and quantities are read from.
-    effects
-        In the settings that are to be tried; the whole library, each in its first setting, where absent.
+    Left out: effects whose response is the same in all rows, as times a law they are a plain law of that joint; what
+    drives the effect itself, as lost motion times the direction of approach is a zero that is off; an effect that is
+    not installed, as a saved law could not be read.
     """
     installed = library()
     offered = installed.values() if effects is None else effects
@@ -88,15 +80,7 @@ def _rows(parameter: Parameter) -> Iterator[Response]:
 
 
 def products(observations: Observations, kinds: Sequence[str]) -> list[Discovered]:
-    """Return laws of two quantities at once: 1, u, v and u·v, the first a condition of the place or a joint's position.
-
-    Parameters
-    ----------
-    observations
-        Where quantities are read from.
-    kinds
-        ``joint``, ``base``, ``tool``.
-    """
+    """Laws of two quantities at once: 1, u, v and u·v, the first a condition of the place or a joint's position."""
     robot, known = observations.robot, quantities(observations)
     turns = observations.campaign.measures == "pose"
     further = [name for name in (*robot.joint_names, *GRAVITY, *REACH) if name in known]
@@ -142,17 +126,10 @@ Site = tuple[str, str, str]
 
 @dataclass(frozen=True, eq=False)
 class Scanned:
-    """One candidate among many.
+    """One candidate among many and the log evidence that it gains over noise (Bayes information criterion).
 
-    Attributes
-    ----------
-    law
-        What it is.
-    gain
-        Log evidence that it gains over noise (Bayes information criterion).
-    tried
-        Among how many it was picked: the kinds of law, times the laws of its kind. One over it is its share of the
-        prior, and these shares sum to one over all that was tried.
+    ``tried``: the kinds of law, times the laws of its kind. One over it is its share of the prior; all shares sum to
+    one.
     """
 
     law: Discovered
@@ -209,23 +186,13 @@ class Seats:
 def scan(
     observations: Observations, targets: Sequence[Target], effects: Iterable[Effect] | None = None
 ) -> tuple[list[list[Scanned]], int]:
-    """Return, for every target, the candidates, best first; and how many laws were tried.
+    """Candidates of every target, best first by :attr:`Scanned.worth`, and how many laws were tried.
 
     Tried are a smooth and a straight law of each quantity at each place; a wave of any order in each joint; what each
     joint remembers of its moves; known effects whose size in one joint changes with a quantity; products of two
     quantities. A law at a segment has six components, so that only the quantities that gain most elsewhere are tried
-    there. Candidates are ordered by :attr:`Scanned.worth`, the leading ones by that of their best shape. Left out of
-    the answer are laws that are no better than what they contain: an effect that changes than the effect itself in that
-    joint, a product than one of its quantities.
-
-    Parameters
-    ----------
-    observations
-        Where the targets come from.
-    targets
-        Remainders of the gap.
-    effects
-        Known effects that may change, in their settings; the library where absent.
+    there. Left out are laws that are no better than what they contain: an effect that changes than the effect itself in
+    that joint, a product than one of its quantities.
     """
     seats = Seats(observations, targets)
     kinds = _candidates(seats, effects)

@@ -24,16 +24,8 @@ from thermal_robot.inference.gram import Gram
 class Search:
     """Evaluates combinations, each once, and keeps them all.
 
-    Parameters
-    ----------
-    gram
-        The problem.
-    log_prior
-        Log prior odds of each block.
-    exclusive
-        Pairs of blocks that must not be together.
-    containers
-        Blocks that can do all that a block of another effect can do.
+    ``exclusive`` are pairs of blocks that must not be together, ``containers`` blocks that can do all that one of
+    another effect can.
     """
 
     gram: Gram
@@ -58,18 +50,7 @@ class Search:
         return not any(self._apart.get(b, whole - whole) & whole for b in blocks)
 
     def evaluate(self, blocks: Sequence[int], start: Combination | None = None, wanted: float = -np.inf) -> Combination:
-        """Return the combination's evidence, computed once.
-
-        Parameters
-        ----------
-        blocks
-            That are in it.
-        start
-            A combination like it.
-        wanted
-            Log evidence of which what clearly stays below is not computed to its end; what is far below the best is
-            not in any case.
-        """
+        """Evidence of a combination, computed once; not to its end where clearly below ``wanted`` or the best."""
         key = tuple(sorted(blocks))
         known, floor = self.seen.get(key), max(wanted, self._most - settings.DETOUR_FROM)
         if known is None or not (known.exact or self._left_at.get(key, np.inf) <= floor):

@@ -21,14 +21,7 @@ from thermal_robot.observations import Observations
 class Thin:
     """As many rows of a fit as a scan needs: all of them, or some drawn at random where there are very many.
 
-    Attributes
-    ----------
-    observations
-        Of the corrected model, at these rows.
-    linear
-        The problem there.
-    changed
-        (M,) rows that were set aside and follow each other in time.
+    ``changed`` (M,): rows that were set aside and follow each other in time.
     """
 
     observations: Observations

@@ -23,22 +23,9 @@ Mask = NDArray[np.bool_]
 class Grown:
     """All rows so far, as a fit of the choice needs them.
 
-    Attributes
-    ----------
-    choice
-        What is held.
-    anchor
-        Where the rows in the sums are linearised.
-    sums, single
-        Rows that are not looked at again, and those kept one by one.
-    fitted
-        The fit to all rows.
-    batches
-        Every batch of rows: read only when the sums must be formed anew.
-    aside
-        Which of the last batch are set aside.
-    anew
-        Whether the last rows made it necessary to look at all of them.
+    ``sums`` are of rows that are not looked at again, linearised at ``anchor``, ``single`` those kept one by one,
+    ``fitted`` the fit to all; ``batches`` are read only when the sums must be formed anew; ``aside`` are those of the
+    last batch set aside; ``anew`` whether the last rows made it necessary to look at all of them.
     """
 
     choice: Choice

@@ -18,16 +18,10 @@ from thermal_robot.observations import Observations
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """Rows at a point.
+    """N rows at a point.
 
-    Attributes
-    ----------
-    campaign
-        The N rows.
-    stack
-        (N, m, K + 1) columns of the frames, of the chosen effects, of the rivals if they were asked for, and the gap.
-    names
-        What each column of the frames is.
+    ``stack`` (N, m, K + 1): columns of the frames (``names``), the chosen effects, the rivals if asked for, and the
+    gap.
     """
 
     campaign: Campaign

@@ -26,21 +26,10 @@ WHERE = "update(), rows"
 
 
 def received(old: Campaign, rows: Campaign | pd.DataFrame, needs: tuple[str, ...]) -> Campaign:
-    """Return new rows as a campaign that can be put to an old one.
+    """Return new rows, a campaign or a table of the old one's columns and units, as a campaign that can be put to it.
 
-    Parameters
-    ----------
-    old
-        The diagnosed campaign, whose units and declarations a table takes over.
-    rows
-        A campaign, or a table with the columns of the old one's file.
-    needs
-        Columns that the chosen effects read.
-
-    Raises
-    ------
-    CampaignError
-        If they are of another robot or kind, or lack a column that the chosen effects read.
+    Raises :class:`CampaignError` if they are of another robot or kind, or lack a column that the chosen effects read
+    (``needs``).
     """
     if not isinstance(rows, Campaign):
         import pandas as pd

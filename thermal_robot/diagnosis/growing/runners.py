@@ -19,16 +19,10 @@ from thermal_robot.inference.problem import Linear, Whitening, normal_equations
 
 @dataclass(frozen=True)
 class Runner:
-    """A combination of effects that may come first.
+    """A combination of effects that may come first, its log prior odds less those of the chosen one.
 
-    Attributes
-    ----------
-    blocks
-        Numbers among the chosen effects and the rivals of a :class:`~thermal_robot.diagnosis.growing.choice.Choice`.
-    log_prior
-        Log prior odds, those of the chosen combination taken off.
-    names
-        Its effects.
+    ``blocks`` are numbers among the chosen effects and the rivals of a
+    :class:`~thermal_robot.diagnosis.growing.choice.Choice`.
     """
 
     blocks: tuple[int, ...]

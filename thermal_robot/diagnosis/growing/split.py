@@ -37,23 +37,9 @@ def some(rows: Single, which: Rows) -> Single:
 
 
 def split(choice: Choice, rows: Single, begin: Begin) -> tuple[Sums, Rows]:
-    """Form the sums of many rows, linearised where a fit of them begins.
+    """Form the sums of many rows, linearised at a point near their fit, with its noise (``begin``).
 
-    Parameters
-    ----------
-    choice
-        What is held.
-    rows
-        All rows.
-    begin
-        A point near their fit, with its noise.
-
-    Returns
-    -------
-    sums
-        Of the rows that need not be looked at again.
-    kept
-        (n,) numbers of the others.
+    Returns them and the numbers (n,) of the rows that must be kept one by one.
     """
     rows, guard = _weighed(choice, rows, begin)
     total = Sums.empty(_width(choice, rows), choice.measures // 3)

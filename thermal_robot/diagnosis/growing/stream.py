@@ -31,21 +31,10 @@ from thermal_robot.prediction import Spread
 class Stream:
     """All rows of a diagnosis and since.
 
-    Attributes
-    ----------
-    fit
-        Of the diagnosis.
-    grown
-        The fit of its choice to all rows.
-    watch, runners
-        What new rows are compared with, and combinations that may come first.
-    agreement
-        Of the last rows.
-    rival, lead
-        The best of these combinations by all rows so far, and its log odds against the chosen one; −∞ where there is
-        none.
-    fallen
-        What new rows said against the choice, one sentence a reason, in the order in which they came; it stays.
+    ``fit`` is the diagnosis's, ``grown`` that of its choice to all rows, ``watch`` what new rows are compared with,
+    ``agreement`` that of the last rows. ``rival`` is the best combination of ``runners`` by all rows so far, ``lead``
+    its log odds against the chosen one, −∞ for none. ``fallen``: what new rows said against the choice, one sentence a
+    reason; it stays.
     """
 
     fit: Fit
@@ -61,10 +50,8 @@ class Stream:
     def of(cls, fit: Fit) -> Stream:
         """Begin with a diagnosis.
 
-        Raises
-        ------
-        EstimationError
-            If rows of one pose have something in common that is drawn anew for each: how much, is told by all rows.
+        Raises :class:`EstimationError` if rows of one pose have something in common that is drawn anew for each: all
+        rows tell how much.
         """
         if not can_grow(fit):
             raise EstimationError(

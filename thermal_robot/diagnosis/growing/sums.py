@@ -30,23 +30,11 @@ Mask = NDArray[np.bool_]
 class Guard:
     """How far parameters and limits may move while every row in the sums stays on its side of each limit.
 
-    Attributes
-    ----------
-    metric
-        A (k, k) of the columns of frames and chosen effects; positive.
-    reach
-        √(δᵀAδ) up to which steps are safe.
-    share, typical
-        How far a step of 1 moves a row, at most and in the root mean square, in units of the noise: of the median row,
-        and over all rows. Limits may move by as much beside.
-    sigma
-        (m,) noise in whose units distances are told.
-    medians
-        (G,) median distance of positions and of orientations.
-    bend
-        Distance from which on a row is in the tail.
-    quiet
-        Whether the medians bear on nothing: noise is stated, and clearly less than its slack remains.
+    Steps up to √(δᵀAδ) = ``reach`` are safe, A (k, k) the ``metric``, positive. ``share`` and ``typical``: how far a
+    step of 1 moves a row, at most and in the root mean square, in units of the noise, of the median row and over all;
+    limits may move by as much beside. ``sigma`` (m,): the unit of distances. ``medians`` (G,) and ``bend``: median
+    distance, and that from which on a row is in the tail. ``quiet``: noise is stated, and clearly less than its slack
+    remains, so that medians bear on nothing.
     """
 
     metric: Array
@@ -75,16 +63,9 @@ class Guard:
         return np.asarray(np.sqrt((within**2).sum(axis=(1, 2))))
 
     def holds(self, step: Array, sigma: Array, medians: Array, bend: float, rms: Array) -> bool:
-        """Tell whether a fit is within reach.
+        """Tell whether a fit is within reach, its step (k,), noise, and limits in units of it.
 
-        Parameters
-        ----------
-        step
-            (k,) of its parameters.
-        sigma, medians, bend
-            Its noise and limits, these in units of it.
-        rms
-            (G,) that remains per axis, m and rad.
+        ``rms`` (G,) is what remains per axis, m and rad.
         """
         far, ratio = float(np.sqrt(step @ self.metric @ step)), sigma[::3] / self.sigma[::3]
         within = far <= self.reach and bool(np.abs(bend * ratio - self.bend).max() <= self.share * self.reach)
@@ -98,19 +79,10 @@ class Guard:
 class Sums:
     """Products of rows, with what must be known of them beside.
 
-    Attributes
-    ----------
-    weighed
-        (G, K + 1, K + 1) of rows with weight, positions and orientations apart, in units of each row's own noise over
-        that of all. Columns and gap are those at the point of linearisation.
-    plain
-        (G, K + 1, K + 1) of rows that are not set aside, in m and rad.
-    rows, used, kept
-        How many rows there are, how many have weight, how many are not set aside.
-    below
-        (G,) how many are nearer than the median.
-    guard
-        How far it holds; ``None`` where rows keep their weights, or there are none.
+    ``weighed`` (G, K + 1, K + 1): of rows with weight, positions and orientations apart, in units of each row's own
+    noise over that of all, columns and gap at the point of linearisation; ``plain``: of rows not set aside, m and rad.
+    ``rows``, ``used`` and ``kept``: how many there are, have weight, are not set aside; ``below`` (G,): nearer than the
+    median. ``guard`` says how far it holds; ``None`` where rows keep their weights, or there are none.
     """
 
     weighed: Array

@@ -176,10 +176,7 @@ class Updated:
 def update(found: Diagnosed, rows: Campaign | pd.DataFrame) -> Updated:
     """Add rows to a diagnosis; see :meth:`Diagnosis.update <thermal_robot.Diagnosis.update>`.
 
-    Raises
-    ------
-    EstimationError
-        If the diagnosis says nothing of the robot, or was made without its fit.
+    Raises :class:`EstimationError` if it says nothing of the robot, or was made without its fit.
     """
     if not found.usable:
         raise EstimationError(f"{found.campaign}: nothing is known of the robot that rows could add to. {found.reason}")
