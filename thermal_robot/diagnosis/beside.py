@@ -134,8 +134,8 @@ def beside_steps(
 
     Where joints err anew in every pose, an effect with many parameters can fit a part of these errors. The fit takes
     them for normal; that they put the joint on an encoder's steps, or no longer do, is left out of its evidence. With
-    the odds P of an effect by the fit, and the Bayes factors B and B' of steps with it and without it, it stays while P
-    B > B'.
+    the odds P of an effect by the fit, and the Bayes factors B and B' of steps with it and without it, it stays while
+    P B > B'.
     """
     while hidden := {joint for joint, factor in chance.steps.items() if factor < 0.0}:
         rivals = []

@@ -24,8 +24,8 @@ class Place:
 
     ``share`` 0..1 of the effect's contribution enters here. ``values`` (n,) are the quantity's, SI, a few only where it
     is ``levels``. ``before``, ``after`` and ``spread`` (n,): error with the effect left in, without it, and one sigma
-    of noise of both, in ``unit``: rad or m at the place, ``m at the tool`` where it both shifts and turns. ``line`` (2,
-    k) is the fitted law. ``centred``: told less the mean, which unknown frames take up as well.
+    of noise of both, in ``unit``: rad or m at the place, ``m at the tool`` where it both shifts and turns. ``line``
+    (2, k) is the fitted law. ``centred``: told less the mean, which unknown frames take up as well.
     """
 
     kind: str

@@ -48,9 +48,9 @@ class Discovered(Fading):
 
     The functions φ_k belong to its shape (:mod:`thermal_robot.effects.shapes`), with the ``marks`` that it asks for. In
     a joint f is an angle (or a displacement); at the base, the tool or a segment (``link`` and the name of the joint at
-    its end) it is a twist, six such laws in the place's own frame. Expected size 0.3 mrad in a joint, 0.1 mm and 0.1
-    mrad elsewhere. ``quantity`` is a column, joint or derived quantity, ``origin`` and ``span`` those in the campaign
-    where it was found.
+    its end) it is a twist, six such laws in the place's own frame. Expected size 0.3 mrad in a joint, 0.1 mm and
+    0.1 mrad elsewhere. ``quantity`` is a column, joint or derived quantity, ``origin`` and ``span`` those in the
+    campaign where it was found.
 
     A law may depend on a second quantity y (``by``): then each φ_k stands beside φ_k·v with v = (y − by_origin) /
     by_span, so that a straight law holds 1, u, v and u·v. It may be the size of a known effect (``of``, with arguments

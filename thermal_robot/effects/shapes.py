@@ -53,8 +53,8 @@ class Shape:
     without. ``mark`` is ``sudden`` where moving it changes the functions only when it passes a row, ``gradual`` where
     smoothly, empty where it is not to be moved; ``width`` where the second mark is a width, to be refined, too.
     ``size`` is what the difference between its largest and its smallest value is called, ``noun`` a short name. ``of``
-    is what the functions are of: the (N,) ``quantity``; the (N, K) ``strains`` of elements of slips as marked; the (N,
-    1) time since the ``run`` began, or since each of the ``runs`` began, infinite in the others (N, R).
+    is what the functions are of: the (N,) ``quantity``; the (N, K) ``strains`` of elements of slips as marked; the
+    (N, 1) time since the ``run`` began, or since each of the ``runs`` began, infinite in the others (N, R).
     """
 
     functions: Functions

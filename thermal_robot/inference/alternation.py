@@ -76,9 +76,9 @@ def alternate(
 ) -> tuple[Array, Placed]:
     """Alternate the rigid alignment of the base with the linear fit of the target's place, robustly.
 
-    Targets (..., S, 3), m in the tool frame, are S starts; the columns of the campaign may have several in front (...,
-    N), which go side by side; ``poses`` (..., N, 4, 4) are the tool frame's in the rows ``some``. Returns (...) the
-    median distance that the nearest start leaves, m, and its frames.
+    Targets (..., S, 3), m in the tool frame, are S starts; the columns of the campaign may have several in front
+    (..., N), which go side by side; ``poses`` (..., N, 4, 4) are the tool frame's in the rows ``some``. Returns (...)
+    the median distance that the nearest start leaves, m, and its frames.
     """
     lead, many = campaign.q.shape[:-2], targets.shape[-2]
     measured, turns = np.asarray(campaign.position)[..., some, :], None
