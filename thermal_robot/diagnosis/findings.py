@@ -34,7 +34,8 @@ def random_findings(fit: Fit, chance: RandomGap) -> tuple[Finding, ...]:
 
 
 def _finding(fit: Fit, chance: RandomGap, effect: RandomEffect) -> Finding:
-    scatter, kind, own = chance.scatter, effect.component, chance.kept_of(effect.component)
+    scatter, kind = chance.scatter, effect.component
+    own = [k for k in chance.kept if k.component.kind == kind]
     if effect.needs and kind not in scatter.kinds:
         return Finding(effect.name, "not_testable", needs=effect.needs)
     probability = scatter.probability.get(kind, 0.0)

@@ -6,7 +6,7 @@ import json
 import warnings
 from collections.abc import Iterable, Mapping
 from functools import cache
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import entry_points
 from typing import TypeVar
 
 from thermal_robot.campaign.names import did_you_mean
@@ -90,7 +90,8 @@ def library() -> dict[str, Effect]:
     found: dict[str, Effect] = {kind.name: kind() for kind in _SYSTEMATIC}
     for point in entry_points(group="thermal_robot.effects"):
         try:
-            effect = _load(point)
+            loaded = point.load()
+            effect: Effect = loaded() if isinstance(loaded, type) else loaded
             _refuse(effect, found)
         except Exception as error:  # another package's code may raise anything
             reason = str(error) if isinstance(error, EffectError) else f"it raises {error!r}"
@@ -98,12 +99,6 @@ def library() -> dict[str, Effect]:
             continue
         found[effect.name] = effect
     return found
-
-
-def _load(point: EntryPoint) -> Effect:
-    loaded = point.load()
-    effect: Effect = loaded() if isinstance(loaded, type) else loaded
-    return effect
 
 
 def _refuse(effect: Effect, known: dict[str, Effect]) -> None:

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, ClassVar
 
-from thermal_robot.arrays import Array
 from thermal_robot.effects.arguments import Count, Positive
-from thermal_robot.effects.effect import Driver, Effect, Parameter
+from thermal_robot.effects.effect import Effect, Parameter
 from thermal_robot.effects.fading import OfPosition
-from thermal_robot.effects.quantities import position_of
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -65,10 +62,6 @@ class JointRipple(OfPosition):
     def at(self, place: str) -> Effect | None:
         """Waves have joints of their own."""
         return None
-
-    def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
-        """Return the joint's own position."""
-        return position_of(observations, parameters[0].place)
 
 
 def _of_motor(order: float, ratio: float | None) -> str:

@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 
-from thermal_robot.arrays import Array
 from thermal_robot.effects.arguments import Order
-from thermal_robot.effects.effect import SOURCED, Driver, Effect, Parameter
+from thermal_robot.effects.effect import SOURCED, Effect, Parameter
 from thermal_robot.effects.fading import OfPosition
-from thermal_robot.effects.quantities import position_of
 from thermal_robot.schema import word
 
 if TYPE_CHECKING:
@@ -73,10 +70,6 @@ class TransmissionError(OfPosition):
             every = itertools.product(turns, self.harmonics)
             found += [(joint, ratio * k, "", _amplitude(k, self.harmonics)) for ratio, k in every]
         return self.waves(observations, found)
-
-    def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
-        """Return the joint's own position."""
-        return position_of(observations, parameters[0].place)
 
 
 def _amplitude(order: int, harmonics: tuple[int, ...]) -> float:

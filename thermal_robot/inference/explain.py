@@ -244,7 +244,8 @@ def log_priors(effects: Sequence[Effect]) -> list[float]:
     for effect in effects:
         single[effect.name].update(effect.places if len(effect.places) == 1 else ())
     kin = [(e.name, frozenset(e.places if single[e.name] else ())) for e in effects]
-    own = [_weight(effect) for effect in effects]
+    # a constant that stands apart is as rare as an effect
+    own = [effect.weight * float(np.exp(log_odds() * effect.apart)) for effect in effects]
     alike: dict[tuple[str, frozenset[str]], float] = {}
     for key, weight in zip(kin, own, strict=True):
         alike[key] = alike.get(key, 0.0) + weight
@@ -263,11 +264,6 @@ def share_of_places(count: int, among: int) -> float:
     No places are all of them.
     """
     return settings.IN_ALL * settings.ONE_MORE ** max(count - 1, 0) / comb(max(among, count), count) if among else 1.0
-
-
-def _weight(effect: Effect) -> float:
-    """How probable a setting is beside others of its places: a constant that stands apart is as rare as an effect."""
-    return effect.weight * float(np.exp(log_odds() * effect.apart))
 
 
 def left_of(linear: Linear, whitening: Whitening, values: dict[int, tuple[Array, Array]]) -> Array:

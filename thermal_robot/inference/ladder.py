@@ -260,14 +260,11 @@ class Ladder:
         for ((form, tau), blocks), log in self._quick.items():
             if blocks == best.blocks and form >= 0:
                 peaks[form] = max(peaks.get(form, (-np.inf, 0.0)), (log, tau))
-        near = {form for form, (log, tau) in peaks.items() if tau > settings.TAUS[0] and self._close(log, best)}
+        least = best.log_evidence - settings.FORM_REACH
+        near = {form for form, (log, tau) in peaks.items() if tau > settings.TAUS[0] and log > least}
         single = [form for form in self.forms if not form.several]
         several = any(self.forms[k].several for k in near)
         return tuple(f for k, f in enumerate(single) if k in near or (several and f.anew))
-
-    @staticmethod
-    def _close(log_evidence: float, best: Combination) -> bool:
-        return log_evidence > best.log_evidence - settings.FORM_REACH
 
     def _beside_others(self, best: Combination) -> tuple[Rung, Combination] | None:
         """Weigh the neighbours beside all discrepancies that count; return what is better than the best, if any is."""

@@ -62,7 +62,9 @@ def laws(observations: Observations, kinds: Sequence[str], names: Iterable[str] 
 
 def law_of(observations: Observations, plain: Discovered, name: str, values: Array) -> Discovered:
     """Return a law as a smooth one of a quantity (N,), or one of its levels."""
-    law = replace(plain, quantity=name, unit=unit(observations.robot, name), labels=_labels(observations, name))
+    own = None if name in observations.covariates else observations.campaign.labels.get(name)
+    labels = () if own is None else tuple(np.unique(own).tolist())
+    law = replace(plain, quantity=name, unit=unit(observations.robot, name), labels=labels)
     return of_quantity(law, values)
 
 
@@ -75,12 +77,6 @@ def harmonics(observations: Observations, joint: str) -> tuple[float, ...]:
     """Return the harmonics tried in a joint: the first three, and the motor's where its ratio is stated."""
     ratio = observations.campaign.gears.get(joint)
     return settings.HARMONICS if ratio is None else (*settings.HARMONICS, float(ratio), 2.0 * float(ratio))
-
-
-def _labels(observations: Observations, name: str) -> tuple[str, ...]:
-    own = observations.campaign.labels.get(name)
-    recorded = own is not None and name not in observations.covariates
-    return tuple(np.unique(own).tolist()) if own is not None and recorded else ()
 
 
 def of_quantity(law: Discovered, values: Array, knots: int = settings.KNOTS) -> Discovered:
@@ -110,7 +106,9 @@ def shapes(
         return [law]
     law = replace(of_quantity(law, values), runs=(), starts=()) if law.starts else law
     if law.by:
-        return list(dict.fromkeys([law, *_of_two(law, values)]))
+        largest = float(np.abs(values).max())
+        product = [replace(law, shape="product", span=largest)] if largest > 0.0 else []
+        return list(dict.fromkeys([law, *product]))
     smooth = of_quantity(law, values)
     found = [law, smooth] if law.labels or len(smooth.marks) < 3 else [law, smooth, straight(law)]
     if law.labels and len(levels := np.unique(values)) > 2:
@@ -136,12 +134,6 @@ def _jumps(law: Discovered, middle: Array) -> list[Discovered]:
     found += [replace(law, shape="slide", marks=(float(m), settings.SLIDE_WIDTH * law.span)) for m in middle[::2]]
     widths = [w * law.span for w in settings.BUMP_WIDTHS]
     return found + [replace(law, shape="bump", marks=(float(m), w)) for m in middle[1:-1:2] for w in widths]
-
-
-def _of_two(law: Discovered, values: Array) -> list[Discovered]:
-    """Return a straight law of two quantities, 1, u, v and u·v, as one of their product (N,) alone."""
-    largest = float(np.abs(values).max())
-    return [replace(law, shape="product", span=largest)] if largest > 0.0 else []
 
 
 def hystereses(law: Discovered, values: Array) -> list[Discovered]:

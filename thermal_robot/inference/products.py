@@ -38,18 +38,15 @@ class Products:
         full, outer = np.zeros((ends[-1] + 1, ends[-1] + 1)), np.array([*range(flat), ends[-1]])
         full[np.ix_(outer, outer)] = self._own
         for k, (item, span) in enumerate(zip(blocks, spans, strict=True)):
-            self._add(item)
+            if item not in self._white:
+                self._white[item] = whitened_columns(item.columns, self._whitening)
+                self._beside[item] = self._flat.T @ self._white[item]
             full[outer, span] = self._beside[item]
             full[span, outer] = self._beside[item].T
             for other, there in zip(blocks[: k + 1], spans[: k + 1], strict=True):
                 full[there, span] = products = self._pair(other, item)
                 full[span, there] = products.T
         return linear, normal_equations(linear, self._whitening, full, len(self._flat))
-
-    def _add(self, item: Block) -> None:
-        if item not in self._white:
-            self._white[item] = whitened_columns(item.columns, self._whitening)
-            self._beside[item] = self._flat.T @ self._white[item]
 
     def _pair(self, one: Block, other: Block) -> Array:
         """Return the (P, Q) products of the columns of two blocks."""

@@ -178,10 +178,6 @@ class RandomGap:
         """Probability that what poses bring is due to such steps."""
         return stepped(self.seen, again=len(self.scatter.kinds) > 1)
 
-    def kept_of(self, kind: str) -> list[Kept]:
-        """Return the kept components of one kind."""
-        return [k for k in self.kept if k.component.kind == kind]
-
 
 def nothing_random(fit: Fit) -> RandomGap:
     """Return the random gap of which nothing can be said."""
