@@ -28,8 +28,8 @@ from thermal_robot.diagnosis.data_faults.misfit import another_motion, delivered
 from thermal_robot.diagnosis.deviations import as_remainder_says
 from thermal_robot.diagnosis.earned import worth_their_word
 from thermal_robot.diagnosis.examine import examine
-from thermal_robot.diagnosis.growing.begun import can_grow
 from thermal_robot.diagnosis.growing.settings import KEPT
+from thermal_robot.diagnosis.growing.stream import can_grow
 from thermal_robot.diagnosis.growing.updated import ready
 from thermal_robot.diagnosis.held_out import held_out
 from thermal_robot.diagnosis.not_executed import not_executed

@@ -18,7 +18,7 @@ from thermal_robot.diagnosis.data_faults import settings as faults
 from thermal_robot.diagnosis.data_faults.readings import Readings
 from thermal_robot.diagnosis.data_faults.struck import misfit, spread
 from thermal_robot.inference import settings
-from thermal_robot.inference.alternation import Placed
+from thermal_robot.inference.frames import Placed
 from thermal_robot.inference.rows import in_order
 
 Rows = NDArray[np.int64]

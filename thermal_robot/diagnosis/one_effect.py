@@ -20,7 +20,7 @@ from thermal_robot.diagnosis import settings
 from thermal_robot.diagnosis.explained import Explained, Place
 from thermal_robot.diagnosis.where import locate
 from thermal_robot.effects import Effect, Parameter
-from thermal_robot.effects.channel import by_place, sensitivity
+from thermal_robot.effects.apply import by_place, sensitivity
 from thermal_robot.effects.effect import Channel, Driver
 from thermal_robot.effects.gate import driver
 from thermal_robot.effects.quantities import quantities, unit

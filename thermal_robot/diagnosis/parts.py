@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from thermal_robot.arrays import Array
 from thermal_robot.campaign.plausible import in_another_unit
 from thermal_robot.effects.effect import in_words
-from thermal_robot.effects.law_size import Size
+from thermal_robot.effects.law_words import Size
 
 UNIT = 30.0
 """Times too long or too short that all links are where a unit is wrong, not the model: inches read as m are 39, cm a
@@ -374,3 +374,33 @@ class Sensitivity:
 
     smaller: float
     larger: float
+
+
+def gap_as_json(gap: Gap) -> dict[str, Any]:
+    """Return the object that stands in the JSON under ``gap``."""
+    orientation = None
+    if gap.orientation_before is not None:
+        orientation = {"rms_before": gap.orientation_before, "rms_after": gap.orientation_after}
+    return {
+        "rms_before": gap.rms_before,
+        "rms_after": gap.rms_after,
+        "noise_floor": gap.noise_floor,
+        "noise_source": gap.noise_source,
+        "orientation": orientation,
+        "held_out": asdict(gap.held_out),
+        "schemes": [asdict(scheme) for scheme in gap.schemes],
+        "hardest": None if gap.hardest is None else gap.hardest.name,
+    }
+
+
+def jsonable(value: Any) -> Any:
+    """Return what JSON can hold: lists for tuples, numbers of Python for those of NumPy, ``None`` for infinite ones."""
+    if isinstance(value, Mapping):
+        return {str(k): jsonable(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [jsonable(v) for v in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value

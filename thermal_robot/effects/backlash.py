@@ -12,8 +12,7 @@ from scipy.special import erf
 from thermal_robot.arrays import Array
 from thermal_robot.effects.arguments import NotNegative, Share
 from thermal_robot.effects.effect import Driver, Effect, Parameter, at_joint, at_segment
-from thermal_robot.effects.quantities import driving, unit
-from thermal_robot.effects.torque import torque_columns
+from thermal_robot.effects.quantities import driving, torque_columns, unit
 from thermal_robot.schema import word
 
 if TYPE_CHECKING:

@@ -11,8 +11,7 @@ import numpy as np
 from thermal_robot.arrays import Array
 from thermal_robot.effects.arguments import Index
 from thermal_robot.effects.effect import Driver, Effect, Parameter, at_joint
-from thermal_robot.effects.quantities import unit
-from thermal_robot.effects.torque import torque_columns
+from thermal_robot.effects.quantities import torque_columns, unit
 from thermal_robot.kinematics import static_regressor
 
 if TYPE_CHECKING:

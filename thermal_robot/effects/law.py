@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from pprint import pformat
+from textwrap import fill
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,13 +32,13 @@ from thermal_robot.effects.effect import (
     in_words,
 )
 from thermal_robot.effects.fading import Fading, ends, left_at
-from thermal_robot.effects.law_source import source
 from thermal_robot.effects.quantities import TURN, driving, quantity, strains, unit
 from thermal_robot.effects.shapes import SHAPES
 from thermal_robot.schema import word
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
+
 
 PREFIX = "discovered."
 _COMPONENTS = ("along x", "along y", "along z", "about x", "about y", "about z")
@@ -347,3 +349,37 @@ def _times(parameter: Parameter, function: Array, label: str) -> Parameter:
         for r in parameter.responses
     )
     return replace(parameter, label=f"{parameter.label}, {label}", responses=responses, positive=False)
+
+
+def source(arguments: Mapping[str, Any], what: str, values: Array, name: str) -> str:
+    """Text of a Python file with a law as an effect; the fitted values (P,), SI, stand in it as a comment."""
+    fields = {k: v for k, v in arguments.items() if k != "name"}
+    lines = "\n".join(f"    {key}: Any = {pformat(value, width=100)}" for key, value in fields.items())
+    title = "".join(part.capitalize() for part in name.split("_"))
+    found = fill(", ".join(f"{v:.4g}" for v in values), 100, initial_indent="    ", subsequent_indent="    ")
+    return _SOURCE.format(title=title, name=name, lines=lines, values=found, what=what[:1].upper() + what[1:])
+
+
+_SOURCE = '''"""{what}.
+
+Found in a campaign by thermal_robot, named by hand.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+from thermal_robot.effects.law import Discovered
+
+
+@dataclass(frozen=True)
+class {title}(Discovered):
+    """{what}.
+
+    In the campaign where it was found its values were, in SI:
+
+{values}
+    """
+
+    name: Any = "{name}"
+{lines}
+'''

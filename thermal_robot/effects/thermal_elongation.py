@@ -1,9 +1,10 @@
-"""Links that grow with temperature: the virtual prismatic joints of Kluz et al."""
+"""Links that grow with a temperature, or follow it: the virtual prismatic joints of Kluz et al."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -11,11 +12,64 @@ import numpy as np
 from thermal_robot.arrays import Array
 from thermal_robot.effects.arguments import Celsius, Instants, NotNegative
 from thermal_robot.effects.effect import Driver, Effect, Parameter, Response, at_segment
-from thermal_robot.effects.lagging import History
 from thermal_robot.effects.quantities import began, driving
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
+
+
+_POINTS = 500  # points of a history that are kept
+_FOLLOWED = 64  # histories and lags of which it is kept how far a body is behind: all settings ask for each
+
+
+@dataclass(frozen=True)
+class History:
+    """A temperature as it was recorded, straight between its points: increasing (K,) times, s, and temperatures, °C."""
+
+    times: tuple[float, ...]
+    temperatures: tuple[float, ...]
+
+    @classmethod
+    def of(cls, times: Array, temperatures: Array) -> History:
+        """Keep a record of rows in any order; rows of one instant count as their mean, a long one is thinned."""
+        instants, which = np.unique(times, return_inverse=True)
+        values = np.bincount(which, temperatures) / np.bincount(which)
+        kept = np.unique(np.linspace(0, len(instants) - 1, min(len(instants), _POINTS)).round().astype(int))
+        return cls(tuple(instants[kept].tolist()), tuple(values[kept].tolist()))
+
+    def followed(self, lag: float, times: Array, temperatures: Array) -> Array:
+        """(N,) temperature of a body that obeys dT/dt = (T_recorded − T) / lag, a first-order lag of ``lag`` s.
+
+        It is in balance at the first point. Between two points the solution is exact: T = u(t) − r·lag + (T_i − u_i +
+        r·lag) exp(−(t − t_i)/lag), where u runs at the rate r. Rows are asked for by times and temperatures (N,), s and
+        °C: beyond the record the row's own is taken to have held since its end; before it the body is in balance with
+        it.
+        """
+        t, u = np.array(self.times), np.array(self.temperatures)
+        rate = np.diff(u) / np.diff(t)
+        behind = _behind(self, lag)
+        i = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 1)
+        late = times >= t[-1]
+        rate = np.append(rate, 0.0)[i]
+        since = np.maximum(times - t[i], 0.0)
+        lagging = (behind[i] + rate * lag) * np.exp(-since / lag) - rate * lag
+        inside = u[i] + rate * since + lagging
+        after = temperatures + (u[-1] + behind[-1] - temperatures) * np.exp(-since / lag)
+        return np.where(times < t[0], temperatures, np.where(late, after, inside))
+
+
+@lru_cache(maxsize=_FOLLOWED)
+def _behind(history: History, lag: float) -> Array:
+    """(K,) by how much a body differs from the record at its points, K."""
+    t, u = np.array(history.times), np.array(history.temperatures)
+    gains = (np.diff(u) / np.diff(t) * lag).tolist()
+    behind = [0.0]
+    for gain, decay in zip(gains, np.exp(-np.diff(t) / lag).tolist(), strict=True):
+        behind.append((behind[-1] + gain) * decay - gain)
+    found = np.array(behind)
+    found.setflags(write=False)
+    return found
+
 
 _SIZE = 1.5e-5  # 1/K
 _MOST = 6e-5  # 1/K: zinc and magnesium alloys have 3e-5, and a link may warm twice as much as its sensor

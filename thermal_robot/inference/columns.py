@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.effects import Effect, Parameter
-from thermal_robot.effects.channel import column
+from thermal_robot.effects.apply import column
 from thermal_robot.effects.effect import UNSOURCED
 from thermal_robot.effects.gate import checked
 from thermal_robot.inference import settings

@@ -14,8 +14,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.effects import Effect
 from thermal_robot.inference import settings
 from thermal_robot.inference.discrepancy import Form
-from thermal_robot.inference.evidence import Combination
-from thermal_robot.inference.gram import Gram
+from thermal_robot.inference.evidence import Combination, Gram
 from thermal_robot.inference.ladder import PLAIN, Ladder, Rung
 from thermal_robot.inference.problem import Linear, Whitening, discrepancy_mean, frame_step, parameter_values
 from thermal_robot.inference.robust import Noise, distance_limit, first_whitening, reweigh

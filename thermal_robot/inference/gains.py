@@ -25,8 +25,7 @@ from scipy.special import erfcx, log_ndtr
 
 from thermal_robot.arrays import Array
 from thermal_robot.inference import settings
-from thermal_robot.inference.evidence import Combination
-from thermal_robot.inference.gram import Gram
+from thermal_robot.inference.evidence import Combination, Gram
 
 _Sides = tuple[NDArray[np.int64], Array, Array]
 _NO_SIDES: _Sides = np.zeros(0, dtype=int), np.zeros(0), np.zeros(0)

@@ -13,8 +13,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
 from thermal_robot.inference.discrepancy import Form, Smooth, Spectrum, decomposed
-from thermal_robot.inference.evidence import Combination, evidence
-from thermal_robot.inference.gram import Gram
+from thermal_robot.inference.evidence import Combination, Gram, evidence
 from thermal_robot.inference.problem import Linear, Whitening, contained, normal_equations, white_stack
 from thermal_robot.inference.search import Search
 from thermal_robot.inference.stack import Grouped, Stack

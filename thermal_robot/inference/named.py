@@ -23,8 +23,7 @@ from thermal_robot.inference.explain import Discrepancy, Explanation, left_of
 from thermal_robot.inference.fit import Fit, require_enough
 from thermal_robot.inference.frames import found_frames, frames_known, moved, refined_frames
 from thermal_robot.inference.gauss_newton import gauss_newton
-from thermal_robot.inference.problem import Linear, Whitening, frame_step, gram, parameter_values
-from thermal_robot.inference.products import Products
+from thermal_robot.inference.problem import Linear, Products, Whitening, frame_step, gram, parameter_values
 from thermal_robot.inference.refine import constants_moved, weighed
 from thermal_robot.inference.robust import Noise, first_whitening, reweigh
 from thermal_robot.inference.search import Search

@@ -11,11 +11,9 @@ from thermal_robot.arrays import Array
 from thermal_robot.effects import Effect, gate
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import Block, block
-from thermal_robot.inference.evidence import Combination
+from thermal_robot.inference.evidence import Combination, Gram
 from thermal_robot.inference.explain import Explanation, log_odds
-from thermal_robot.inference.gram import Gram
-from thermal_robot.inference.problem import Linear, Whitening, parameter_values
-from thermal_robot.inference.products import Products
+from thermal_robot.inference.problem import Linear, Products, Whitening, parameter_values
 from thermal_robot.inference.robust import tail_weight
 from thermal_robot.inference.search import Search
 from thermal_robot.observations import Observations

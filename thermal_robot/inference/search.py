@@ -15,9 +15,8 @@ import numpy as np
 from thermal_robot.arrays import Array
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
-from thermal_robot.inference.evidence import Combination, evidence
+from thermal_robot.inference.evidence import Combination, Gram, evidence
 from thermal_robot.inference.gains import gains
-from thermal_robot.inference.gram import Gram
 
 
 @dataclass(eq=False)

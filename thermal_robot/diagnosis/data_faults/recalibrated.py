@@ -13,7 +13,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.data_faults import settings
 from thermal_robot.diagnosis.data_faults.readings import Readings
 from thermal_robot.inference import settings as inference
-from thermal_robot.inference.alternation import middle, soft
+from thermal_robot.inference.frames import middle, soft
 from thermal_robot.kinematics import (
     ChainFrames,
     chain_frames,

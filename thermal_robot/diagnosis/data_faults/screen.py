@@ -19,7 +19,7 @@ from thermal_robot.diagnosis.data_faults import of_joints, of_measurements, of_p
 from thermal_robot.diagnosis.data_faults.kind import Fault, Kind, Offsets, Proposal
 from thermal_robot.diagnosis.data_faults.readings import Readings, stacked
 from thermal_robot.diagnosis.data_faults.struck import Struck, Tried, window
-from thermal_robot.inference.alternation import middle, soft
+from thermal_robot.inference.frames import middle, soft
 
 Chosen = list[tuple[Fault, Array, float]]
 """Faults, (3,) where the target then sits on the tool, m, and what is left at least, of what a robot at rest leaves."""

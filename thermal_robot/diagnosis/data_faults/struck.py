@@ -16,7 +16,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.data_faults import settings
 from thermal_robot.diagnosis.data_faults.kind import Fault, Kind, Proposal, repaired
 from thermal_robot.diagnosis.data_faults.readings import Readings, Rows, stacked
-from thermal_robot.inference.alternation import Placed, middle
+from thermal_robot.inference.frames import Placed, middle
 
 
 @dataclass(frozen=True, eq=False)

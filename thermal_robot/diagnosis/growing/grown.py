@@ -9,10 +9,9 @@ from numpy.typing import NDArray
 
 from thermal_robot.diagnosis.growing import settings
 from thermal_robot.diagnosis.growing.choice import Choice, Point
-from thermal_robot.diagnosis.growing.linearised import Seen, products
 from thermal_robot.diagnosis.growing.settled import Begin, Fitted, Single, settled
 from thermal_robot.diagnosis.growing.split import end_to_end, some, split
-from thermal_robot.diagnosis.growing.sums import Sums
+from thermal_robot.diagnosis.growing.sums import Seen, Sums, products
 from thermal_robot.inference import settings as chosen
 from thermal_robot.inference.algebra import whitener
 

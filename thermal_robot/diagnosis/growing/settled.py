@@ -17,13 +17,11 @@ from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis.growing import settings
 from thermal_robot.diagnosis.growing.choice import Choice, Point, together
-from thermal_robot.diagnosis.growing.linearised import Seen, carried, products
-from thermal_robot.diagnosis.growing.sums import Sums, bend
+from thermal_robot.diagnosis.growing.sums import Seen, Sums, bend, carried, products
 from thermal_robot.inference import settings as chosen
 from thermal_robot.inference.algebra import solve
-from thermal_robot.inference.evidence import Combination, evidence
+from thermal_robot.inference.evidence import Combination, Gram, evidence
 from thermal_robot.inference.frames import moved
-from thermal_robot.inference.gram import Gram
 from thermal_robot.inference.problem import Linear, Whitening, normal_equations, parameter_values
 from thermal_robot.inference.robust import distance_limit, far_scale, judged, tail_weight
 

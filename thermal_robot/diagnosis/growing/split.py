@@ -13,9 +13,8 @@ from thermal_robot.arrays import Array
 from thermal_robot.campaign.appended import appended
 from thermal_robot.diagnosis.growing import settings
 from thermal_robot.diagnosis.growing.choice import Choice, Point, together
-from thermal_robot.diagnosis.growing.linearised import Seen, frame_names, products
 from thermal_robot.diagnosis.growing.settled import Begin, Single, weighed
-from thermal_robot.diagnosis.growing.sums import Guard, Sums
+from thermal_robot.diagnosis.growing.sums import Guard, Seen, Sums, frame_names, products
 from thermal_robot.inference import settings as chosen
 from thermal_robot.inference.gauss_newton import corrected_observations
 

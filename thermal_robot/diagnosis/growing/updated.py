@@ -13,9 +13,8 @@ from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.diagnosis.growing.choice import together
-from thermal_robot.diagnosis.growing.linearised import frame_names
-from thermal_robot.diagnosis.growing.received import received
-from thermal_robot.diagnosis.growing.stream import Stream, expected_sizes
+from thermal_robot.diagnosis.growing.stream import Stream, expected_sizes, received
+from thermal_robot.diagnosis.growing.sums import frame_names
 from thermal_robot.diagnosis.growing.watched import Agreement
 from thermal_robot.diagnosis.parts import Unexplained
 from thermal_robot.diagnosis.settings import LOOSE

@@ -25,8 +25,8 @@ from scipy.special import betainc, fdtrc
 from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.growing.choice import together
 from thermal_robot.diagnosis.growing.grown import Grown
-from thermal_robot.diagnosis.growing.linearised import Seen
 from thermal_robot.diagnosis.growing.settled import Single
+from thermal_robot.diagnosis.growing.sums import Seen
 from thermal_robot.inference import settings as chosen
 from thermal_robot.inference.algebra import equations_of, whitener
 from thermal_robot.inference.columns import Block
