@@ -40,8 +40,7 @@ def criteria(fit: Fit, shrinkage: Shrinkage) -> Performance | None:
     """Criteria of ISO 9283 of a campaign with repeats, in the frames that the gap is told in; ``None`` without repeats.
 
     AP after the correction is of rows while they were held out: all repeats of a pose are held out together, so that no
-    figure is of a pose that the model was fitted to. Every cycle counts, those set aside as outliers, too, as the
-    standard has it.
+    figure is of a pose that the model was fitted to. Every cycle counts, those set aside, too, as the standard has it.
     """
     campaign = fit.campaign
     if not repeats(campaign)[0]:

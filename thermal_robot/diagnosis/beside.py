@@ -31,10 +31,9 @@ from thermal_robot.inference.robust import Noise
 def one_more_law(
     fit: Fit, number: int, progress: Callable[[str], None], happened: Sequence[Discovered] | None = None
 ) -> Fit | None:
-    """Let laws that nobody wrote down compete with all known effects for a place in the fit.
+    """Let laws that nobody wrote down compete with all known effects; ``None`` if none is worth its place.
 
-    Returns ``None`` if no law is worth its place. Events that ``happened`` are among the laws; they are looked for
-    where absent.
+    Events that ``happened`` are among them, and are looked for where absent.
     """
     progress(f"causes that nobody listed: scan {number}")
     laws = candidates(fit, number, happened)
@@ -65,8 +64,7 @@ def eventful(fit: Fit, progress: Callable[[str], None]) -> Fit:
 def as_laws_say(left: Unexplained, found: Sequence[Discovery], discrepancy: Discrepancy) -> Unexplained:
     """Return the residual of the known effects with the places and quantities of the laws that explain it.
 
-    Where no law does, and the discrepancy errs anew at one place in every pose or visit, that is the place, and nothing
-    that was recorded is followed.
+    Where none does, and the discrepancy errs anew at one place in every pose or visit, that is the place.
     """
     form = discrepancy.form
     if not found and left.flagged and form is not None and form.anew and form.place[0]:

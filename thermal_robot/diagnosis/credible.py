@@ -65,11 +65,7 @@ def cancelling(fit: Fit) -> tuple[Cancelling, ...]:
 
 
 def cancelling_within(fit: Fit) -> Iterator[tuple[str, float]]:
-    """Yield effects whose parameters cancel each other: name, and largest single contribution over the sum.
-
-    Such parameters have no meaning one by one. Over part of a turn, for example, harmonics of low order are nearly
-    collinear.
-    """
+    """Yield effects whose parameters cancel, as low harmonics over part of a turn: name, largest part over the sum."""
     for name, _, moved in _moved(fit):
         whole = float(np.linalg.norm(moved.sum(axis=1)))
         times = float(np.linalg.norm(moved, axis=0).max(initial=0.0)) / max(whole, settings.TINY)
@@ -78,10 +74,7 @@ def cancelling_within(fit: Fit) -> Iterator[tuple[str, float]]:
 
 
 def _moved(fit: Fit) -> Iterator[tuple[str, list[tuple[str, str]], Array]]:
-    """Yield each effect's name, kind and place of its P parameters, and (E, P) what each does to the target.
-
-    In units of the noise, with the unknown frames projected out.
-    """
+    """Yield each effect's name, kind and place of its P parameters, and (E, P) their moves in noise, without frames."""
     e = fit.explanation
     noise = np.broadcast_to(e.whitening.sigma() * e.best.noise, e.linear.gap.shape).reshape(-1, 1)
     basis = orthonormal(equations_of(e.linear.frames) / noise)

@@ -299,10 +299,7 @@ def _lack_of_fit(left: Remainder, again: Repeats | None) -> tuple[float, str]:
 
 
 def _in_a_row(fit: Fit) -> tuple[float, str]:
-    """Return the p-value that so many outliers are consecutive by chance, and the reason.
-
-    Gross errors are not consecutive. Rows after a change of the robot or the setup are.
-    """
+    """P-value that so many outliers are consecutive by chance, as rows after a change are and gross errors are not."""
     aside = fit.explanation.outliers[in_order(fit.campaign)]
     count, samples = int(aside.sum()), len(aside)
     if count < settings.FEW_ASIDE * samples:
@@ -315,10 +312,7 @@ def _in_a_row(fit: Fit) -> tuple[float, str]:
 
 
 def _neighbours(fit: Fit, left: Remainder) -> tuple[tuple[float, str], float]:
-    """Test whether residuals of neighbours, in joint space and in time, are correlated (permutation test).
-
-    Returns p-value and reason, and the largest correlation that is significant.
-    """
+    """Permutation test whether neighbours' residuals are correlated: p-value, reason, and the largest one that is."""
     q = fit.campaign.q[left.rows]
     spread = q.std(axis=0)
     used = spread > settings.ROUNDING
@@ -360,10 +354,7 @@ class _Tested:
 
 
 def _scan(fit: Fit, left: Remainder) -> tuple[tuple[float, str], tuple[Location, ...], tuple[Dependence, ...], float]:
-    """F tests of a smooth law of every quantity at every place, with Bonferroni correction.
-
-    Returns p-value and reason, places, quantities, and the share of the residual that the best law explains.
-    """
+    """F tests of smooth laws of quantities at places (Bonferroni): p-value, reason, places, quantities, share."""
     all_tests = _tests(fit.corrected, left.some(settings.ENOUGH_REMAINDER))
     tested = sorted((t for t in all_tests if np.isfinite(t.worth.gain)), key=lambda t: -t.worth.gain)
     if not tested:

@@ -248,10 +248,7 @@ def _hidden(fit: Fit, name: str, explained: Mapping[str, int]) -> tuple[str, ...
 
 
 def separates(found: Sequence[Finding]) -> tuple[tuple[str, ...], ...]:
-    """Return the groups of effects that the data cannot tell apart.
-
-    A group with an unknown frame is listed only if it is the only group.
-    """
+    """Return the groups of effects that the data cannot tell apart; one with an unknown frame only if it is alone."""
     groups = tuple(
         dict.fromkeys(tuple(sorted((f.name, *f.confounded_with))) for f in found if f.status == "confounded")
     )

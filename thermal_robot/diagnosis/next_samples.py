@@ -272,8 +272,7 @@ def _conditions(fit: Fit, leading: Sequence[Combination]) -> list[str]:
 class _Expected:
     """Predictive distribution of the candidates under one explanation, in units of the noise: N(mean, root root' + 1).
 
-    ``mean`` (K, m); ``root`` (K, m, p) of the covariance, ``frames`` (K, m, f) of the part from the frames, effects
-    known.
+    ``mean`` (K, m), ``root`` (K, m, p) of the covariance, ``frames`` (K, m, f) its part were the effects known.
     """
 
     mean: Array
@@ -345,11 +344,7 @@ class _Conditional:
 
 
 def _further(i: _Conditional, j: _Conditional, apart: Array, chosen: Sequence[int]) -> Array:
-    """(K,) increase of KL(i, j) by each candidate; ``apart`` is μ_i − μ_j.
-
-    The trace of C_j⁻¹ times C_i about B_j and the means' distance, as sums of products; what hangs on j alone is made
-    once.
-    """
+    """(K,) increase of KL(i, j) by each candidate, as sums of products; ``apart`` is μ_i − μ_j."""
     left = apart - j.gain @ apart[list(chosen)].ravel()
     trace = (j.inverse * i.own).sum(axis=(1, 2)) + ((j.inverse @ left[:, :, None])[:, :, 0] * left).sum(axis=1)
     if len(chosen):

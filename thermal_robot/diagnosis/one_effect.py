@@ -98,10 +98,7 @@ def _undetermined(frames: Array, direction: Array, error: Array) -> float:
 
 
 def _error(observations: Observations, parameters: list[tuple[Parameter, float]]) -> tuple[Array, Array, str]:
-    """Return (N,) the error at a place, (N, m) the displacement of the target per unit error, and the unit.
-
-    An error with several components is taken along its principal direction (first singular vector).
-    """
+    """(N,) error at a place along its first singular vector, (N, m) displacement of the target per unit, and unit."""
     measures = observations.gap.shape[1]
     samples = len(observations.q)
     parts: dict[tuple[Channel, int], Array] = {}

@@ -53,10 +53,7 @@ class Model:
 
     @classmethod
     def of(cls, explanation: Explanation, block: Labels, further: Mapping[int, float] | None = None) -> Model:
-        """Return the model of an explanation: its effects, prior scales, weights and noise; outliers do not judge it.
-
-        ``further`` blocks, with the scale of each, come after its own.
-        """
+        """Return the model of an explanation, not judged by outliers; ``further`` blocks with scales come last."""
         e = explanation
         own = {b: e.held(b) / e.linear.blocks[b].sizes for b in e.best.blocks}
         scales: dict[int, Array | float] = {**own, **(further or {})}
@@ -162,10 +159,7 @@ class Model:
         ).astype(np.int64)
 
     def fits(self, rows: Sequence[Rows], chosen: Sequence[int]) -> list[Array]:
-        """Fit the frames and some blocks to each set of rows: (k + 1,) each, −θ and 1.
-
-        What the blocks leave on all rows counts as noise against the priors.
-        """
+        """Fit frames and some blocks to each set of rows: (k + 1,) −θ and 1; what all rows leave is noise to priors."""
         picked = self.columns(chosen)
         tight = self.tight[picked[self.flat : -1] - self.flat]
         own = (slice(None), picked[:, None], picked)

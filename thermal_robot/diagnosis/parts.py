@@ -199,8 +199,7 @@ class HeldOut:
 
     ``rms_before`` is with the frames alone, ``rms_after`` with the effects, outliers left out; ``…_with_aside`` with
     the rows set aside, ``None`` where not asked. ``shrinkage`` is 1 − (rms_after / rms_before)², the sum of the shares
-    of the model's effects, with the interval in which it lies on fresh rows of the same kind with the model that is
-    saved.
+    of the model's effects, with the interval in which it lies on fresh rows of the same kind with the saved model.
     """
 
     scheme: str

@@ -72,10 +72,7 @@ def harmed(schemes: Sequence[FoldScheme]) -> FoldScheme | None:
 
 
 def worse_elsewhere(narrow: Fit, wider: Fit) -> bool:
-    """Tell whether a wider explanation is worse on held-out regions of joint space.
-
-    It then overfits: large contributions cancel where poses were measured and not between them.
-    """
+    """Tell whether a wider explanation overfits: whether it is worse on held-out regions of joint space."""
     kept = ~(narrow.explanation.outliers | wider.explanation.outliers)
     rows, tests = blocks(narrow.campaign), each(neighbourhoods(narrow.campaign, settings.FOLDS))
     left = []

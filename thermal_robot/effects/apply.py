@@ -75,8 +75,7 @@ def displacement(
     """Displacement of the chain's four channels by fitted values (P,) of effects, and of the measured point (N, 3), m.
 
     The latter stands in the measurement frame, ``None`` where no effect acts on the instrument. Raises
-    :class:`EffectError` if parameters break the contract, or are not as many as the values: the rows lack what the
-    effect reads.
+    :class:`EffectError` if parameters break the contract, or are not as many as values: rows lack what is read.
     """
     samples, robot = observations.campaign.samples, observations.robot
     joint = np.zeros((samples, robot.n))

@@ -127,10 +127,7 @@ def began(observations: Observations, clock: Array) -> dict[str, float]:
 
 
 def strains(observations: Observations, joint: str, slips: Sequence[float]) -> Array | None:
-    """Return (N, K) strains of a joint's elements as shares of what makes them slip, −1 to 1; ``None`` without order.
-
-    See :func:`thermal_robot.campaign.turning.since_turns`.
-    """
+    """(N, K) strains of a joint's elements over what makes them slip, −1 to 1 ; ``None`` without order."""
     past = observations.campaign.since_turn
     if joint not in past:
         return None

@@ -27,10 +27,7 @@ from thermal_robot.inference.thin import Thin
 
 @dataclass(frozen=True, eq=False)
 class Discovery:
-    """A law of a fit with the probability that one of its quantity at its place is at work, and its rivals.
-
-    ``places`` and ``quantities``: the posterior probability of each, most probable first.
-    """
+    """A law of a fit with its probability, and rival places and quantities with theirs, the most probable first."""
 
     law: Discovered
     probability: float
@@ -86,10 +83,7 @@ def _remainders(fit: Fit) -> Iterator[tuple[int, ...]]:
 
 
 def _offered(thin: Thin, target: Target, own: Sequence[Scanned]) -> list[Discovered]:
-    """Return the best laws of a remainder in their best shapes, each with the number that it was picked among.
-
-    The best shape at a segment is also tried in the joint behind it, which is simpler.
-    """
+    """Return a remainder's best laws, at a segment also in the joint behind it, with how many it was picked among."""
     first = [(item, shaped(thin.observations, target, item.law)) for item in _with_joints(own)]
     joints = thin.observations.robot.joint_names
     at_links = [(item, s) for item, s in first if s.law.kind == "link" and s.law.place in joints]

@@ -103,8 +103,7 @@ class Smooth:
     def taken(self, rows: NDArray[np.bool_], white: Callable[[Numbers], Array], floor: float) -> Array:
         """SᵀS − SᵀV⁻¹S over some of the n rows in use (n,), V their own covariance.
 
-        ``white`` gives the columns (r, m, K) of rows by number; directions of τ²BBᵀ with a variance below ``floor`` are
-        left out.
+        ``white`` gives columns (r, m, K) by row; directions of τ²BBᵀ with a variance below ``floor`` are left out.
         """
         return self.spectrum.taken(self.tau, rows, white, floor)
 
@@ -119,10 +118,7 @@ class Smooth:
         return self.spectrum.degrees(self.tau)
 
     def mean(self, left: Array) -> Array:
-        """(N, m) posterior mean of the discrepancy, in units of the noise.
-
-        Given the (E,) residual of the rows in use, whitened by weights and noise alone.
-        """
+        """(N, m) posterior mean of the discrepancy, in noise, of the (E,) residual in use, whitened as independent."""
         return self.spectrum.mean(self.tau, left)
 
 
@@ -325,10 +321,7 @@ def _at_one_place(observations: Observations, what: str, functions: Array, measu
 
 
 def _together(observations: Observations) -> list[Array]:
-    """(N, M) features of a squared exponential of all joint positions and conditions, for each length scale.
-
-    Low rank by Nyström's method with rows evenly drawn as landmarks.
-    """
+    """(N, M) features of a squared exponential of joints and conditions, by length scale (Nyström, even landmarks)."""
     campaign = observations.campaign
     varying = [observations.covariates[c] for c in observations.covariates if observations.varies(c)]
     inputs = np.column_stack([campaign.q[:, moving(campaign.q)], *varying])

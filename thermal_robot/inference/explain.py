@@ -100,8 +100,7 @@ def explain(
     Robust: rows further than noise allows are set aside, those in the tail weigh less (Huber). Rows not in ``rows``
     (N,) bear on nothing. Blocks of one family are settings that exclude each other and share its prior probability.
     ``starts`` and ``outliers`` are where the search starts, ``known`` the weights and noise; ``among`` is the number of
-    forms of which these are left, if they are not all; ``log_prior`` is by default :func:`log_priors` of the blocks'
-    effects.
+    forms of which these are left; ``log_prior`` is by default :func:`log_priors` of the blocks' effects.
     """
     samples = len(linear.gap)
     use = np.ones(samples, dtype=bool) if rows is None else rows
@@ -258,10 +257,7 @@ def log_priors(effects: Sequence[Effect]) -> list[float]:
 
 
 def share_of_places(count: int, among: int) -> float:
-    """Return the share of an effect's probability that it is in just so many given places; all of it where it has none.
-
-    No places are all of them.
-    """
+    """Prior probability that an effect acts in exactly so many given places, in all where 0; 1 where it has none."""
     return settings.IN_ALL * settings.ONE_MORE ** max(count - 1, 0) / comb(max(among, count), count) if among else 1.0
 
 

@@ -115,10 +115,9 @@ def refit(
     begin: Sequence[Effect],
     progress: Callable[[str], None] = lambda _: None,
 ) -> Fit:
-    """Fit again with other settings to choose from, such as laws that were discovered.
+    """Fit again with other settings to choose from, such as discovered laws; the search starts with ``begin``.
 
-    ``variants`` replace those of the fit by name, or join them (none takes the effect out); the search starts with
-    ``begin``.
+    ``variants`` replace those of the fit by name, or join them; none takes the effect out.
     """
     whole = {name: own for name, own in {**known.variants, **variants}.items() if own}
     settled = settle(known.nominal, whole, progress, begin=begin)

@@ -40,10 +40,9 @@ class Portion:
 
 
 def divided(fit: Fit, name: str) -> tuple[Portion, ...]:
-    """Divide an effect of a fit: first what is inside it and told there, the rest last.
+    """Divide an effect of a fit: first what is inside it and told there, the rest last; empty where nothing is.
 
-    All parts together move the target as the effect does, but for the unknown frames; empty where it is told in its own
-    parameters.
+    All parts together move the target as the effect does, but for the unknown frames.
     """
     number = next(k for k, (effect, _) in enumerate(fit.effects) if effect.name == name)
     effect, values = fit.effects[number]
@@ -124,10 +123,7 @@ def identified(spread: Array, prior: Array) -> NDArray[np.bool_]:
 
 
 def distinct(across: Array, within: NDArray[np.bool_], least: float = settings.DISTINCT) -> list[int]:
-    """Return the numbers of the columns that are independent of those before them, as many as there are rows.
-
-    ``least`` is the length that must be left of one beside those before it.
-    """
+    """Return the columns independent of those before them, as many as rows, ``least`` being the length to be left."""
     basis = np.zeros((len(across), 0))
     kept: list[int] = []
     for k in np.flatnonzero(within):

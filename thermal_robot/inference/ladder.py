@@ -27,9 +27,8 @@ PLAIN: Rung = (-1, 0.0)
 class Ladder:
     """Evaluates combinations of blocks beside discrepancies of several forms and sizes.
 
-    ``whitening`` is without a discrepancy; ``exclusive`` are pairs of blocks that must not be together, beside those of
-    which one contains the other; ``among`` is the number of forms of which these are left: each keeps its share of the
-    prior.
+    ``whitening`` is without a discrepancy; ``exclusive`` pairs of blocks must not be together, nor those of which one
+    contains the other; of ``among`` forms these are left, and keep their share of the prior.
     """
 
     linear: Linear

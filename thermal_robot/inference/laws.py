@@ -139,8 +139,7 @@ def _jumps(law: Discovered, middle: Array) -> list[Discovered]:
 def hystereses(law: Discovered, values: Array) -> list[Discovered]:
     """Return a law of a joint's memory as elements that slip: over the whole range, coarsely first, or some neighbours.
 
-    ``values`` (N,), rad or m from the last turning point, tell which slips show. One between two of the grid is nearly
-    their sum.
+    Which show, ``values`` (N,) tell, rad or m from the last turning point; one between two is nearly their sum.
     """
     least, most = (share * float(np.abs(values).max()) for share in settings.SLIP_SHARES)
     slips = tuple(r for r in SLIPS if least <= r <= most)

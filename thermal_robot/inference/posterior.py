@@ -54,8 +54,7 @@ class Posterior:
 
     Of a dropped column (``free`` (D,) False) zero, and its mean square. ``log_volume`` is the log of the posterior's
     volume over the prior's: −½ log|I + Λ G/s²|, and what the sides are worth; ``effective`` per block, how many of its
-    columns the data determine; ``fitted`` and ``determined`` the same, and |θ|²/λ², with the moments that the sides
-    leave.
+    columns the data determine; ``fitted`` and ``determined`` the same, and |θ|²/λ², by the sides' moments.
     """
 
     values: Array

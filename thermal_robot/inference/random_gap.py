@@ -47,10 +47,9 @@ def followed(errors: Array, weight: Array, recorded: Mapping[str, Array], pose: 
 
 @dataclass(frozen=True)
 class Steps:
-    """What errors say of steps of an encoder: their distance, rad or m, and the log Bayes factor of steps.
+    """What errors say of steps of an encoder: their distance, rad or m, and the log Bayes factor of steps over none.
 
-    Where none is seen the distance is what the errors' size implies; the factor is against errors without steps, 0
-    where it cannot be asked.
+    Where none is seen the distance is what the errors' size implies, and the factor 0 where it cannot be asked.
     """
 
     step: float

@@ -30,8 +30,7 @@ Rows = NDArray[np.bool_]
 def left_out(columns: Array, values: Array, flat: int, prior: Array, folds: Sequence[Rows]) -> float:
     """Cross-validation: sum of squares that fits to the other rows leave in each fold, in units of the noise.
 
-    Columns (N, m, K) are weighted, the first ``flat`` without a prior, ``prior`` (K − flat,) one over the others'
-    variances.
+    Columns (N, m, K) are weighted; the first ``flat`` have no prior, the others ``prior`` (K − flat,), 1/variance.
     """
     stack = np.concatenate([columns, values[:, :, None]], axis=2)
     whole = _products(equations_of(stack))

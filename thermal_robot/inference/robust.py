@@ -78,8 +78,7 @@ def reweigh(
 ) -> tuple[Whitening, NDArray[np.bool_]]:
     """Set gross errors aside, at most a quarter, and give the tail less weight (Huber 1964), at the remainder's noise.
 
-    ``leverage`` is the share of the equations that the explanation takes up. Returns weights with noise, and (N,) the
-    rows aside.
+    ``leverage`` is the share of the equations that was fitted. Returns the weighting, and (N,) the rows aside.
     """
     remainder = remainder if noise.relative is None else remainder / noise.relative
     sigma, held, distance2 = judged(remainder, robust_noise(remainder[use], leverage), noise, leverage, measures)

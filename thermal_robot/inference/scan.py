@@ -128,8 +128,7 @@ Site = tuple[str, str, str]
 class Scanned:
     """One candidate among many and the log evidence that it gains over noise (Bayes information criterion).
 
-    ``tried``: the kinds of law, times the laws of its kind. One over it is its share of the prior; all shares sum to
-    one.
+    One over ``tried``, the kinds of law times the laws of its kind, is its share of the prior; all sum to one.
     """
 
     law: Discovered

@@ -93,8 +93,7 @@ class Fitted:
 class Likelihood:
     """Restricted likelihood of rows; ``stated`` says for every three components whether the noise is stated.
 
-    ``tails`` are the degrees of freedom of Student's law in m dimensions (infinite: normal), scaled to the model's
-    covariance.
+    ``tails``: degrees of freedom of Student's law in m dimensions (infinite: normal), of the model's covariance.
     """
 
     rows: IndependentRows

@@ -23,8 +23,7 @@ from thermal_robot.inference.gains import gains
 class Search:
     """Evaluates combinations, each once, and keeps them all.
 
-    ``exclusive`` are pairs of blocks that must not be together, ``containers`` blocks that can do all that one of
-    another effect can.
+    ``exclusive`` pairs of blocks must not be together; ``containers`` can do all that a block of another effect can.
     """
 
     gram: Gram

@@ -71,8 +71,7 @@ def settle(
 ) -> Settled:
     """Choose effects, refine their constants, refit exactly, and choose again there, until the choice stays.
 
-    The first choice is linearised at ``start``; the search starts from a ``known`` explanation with its outliers, or
-    ``begin``.
+    The first choice is linearised at ``start``; the search starts from what is ``known``, or ``begin``.
     """
     campaign, observations, whole = start.campaign, start, dict(variants)
     whole.update({e.name: tuple(dict.fromkeys((*whole.get(e.name, ()), e))) for e in begin})

@@ -36,8 +36,7 @@ NOTHING = Worth(1.0, 0.0, -np.inf)
 class Target:
     """A remainder to be explained: the residual ``white`` (N·m,) of the gap after a fit of a design, in noise units.
 
-    ``root`` (N, m) is the square root of each row's weight, over the noise; ``basis`` (N·m, r) an orthonormal one of
-    the design.
+    ``root`` (N, m): square root of each weight over the noise; ``basis`` (N·m, r): an orthonormal one of the design.
     """
 
     white: Array

@@ -26,11 +26,7 @@ class Point:
 
 @dataclass(frozen=True, eq=False)
 class Judge:
-    """The model of a diagnosis (frames, parameters), by which new rows are weighed where old ones keep their weights.
-
-    ``sigma`` (m,) is one sigma of what it leaves, m and rad; a gross error is one that its ``rows`` do not show by
-    chance.
-    """
+    """The diagnosis's model, by which new rows are weighed: (m,) one sigma of what it leaves, m and rad, its rows."""
 
     point: Point
     sigma: Array
@@ -44,8 +40,7 @@ class Choice:
     ``blocks`` are without columns; ``rivals`` are further effects of combinations that were nearly as probable;
     ``measures`` is m, 3 for positions, 6 for poses; ``position`` and ``orientation`` the noise that the campaign
     states, m and rad. With a ``judge`` rows keep the weight that they had, and new ones get theirs by the model of the
-    diagnosis; without, every row is weighed by its distance from the model of the moment, as in a diagnosis of noise
-    alone.
+    diagnosis; without, every row is weighed by its distance from the model of the moment.
     """
 
     blocks: tuple[Block, ...]

@@ -36,10 +36,7 @@ def some(rows: Single, which: Rows) -> Single:
 
 
 def split(choice: Choice, rows: Single, begin: Begin) -> tuple[Sums, Rows]:
-    """Form the sums of many rows, linearised at a point near their fit, with its noise (``begin``).
-
-    Returns them and the numbers (n,) of the rows that must be kept one by one.
-    """
+    """Form the sums of many rows, linearised near their fit (``begin``); with the numbers (n,) of the other rows."""
     rows, guard = _weighed(choice, rows, begin)
     total = Sums.empty(_width(choice, rows), choice.measures // 3)
     total, scores = replace(total, guard=guard), []

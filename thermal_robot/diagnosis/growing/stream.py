@@ -181,11 +181,7 @@ def _point(fit: Fit) -> Point:
 
 @dataclass(frozen=True)
 class Runner:
-    """A combination of effects that may come first, its log prior odds less those of the chosen one.
-
-    ``blocks`` are numbers among the chosen effects and the rivals of a
-    :class:`~thermal_robot.diagnosis.growing.choice.Choice`.
-    """
+    """A combination that may come first: blocks of a :class:`Choice`, log prior odds less the chosen one's, names."""
 
     blocks: tuple[int, ...]
     log_prior: float
@@ -247,11 +243,7 @@ class Stream:
 
     @classmethod
     def of(cls, fit: Fit) -> Stream:
-        """Begin with a diagnosis.
-
-        Raises :class:`EstimationError` if rows of one pose have something in common that is drawn anew for each: all
-        rows tell how much.
-        """
+        """Begin with a diagnosis; :class:`EstimationError` if rows of a pose share what is drawn anew."""
         if not can_grow(fit):
             raise EstimationError(
                 f"{fit.campaign.name}: what remains is drawn anew in every pose or visit, and how rows count depends "
@@ -331,10 +323,7 @@ class Stream:
 
 
 def _behind(grown: Grown, listed: tuple[Runner, ...]) -> tuple[Runner, ...]:
-    """Return the combinations that are behind the chosen one by the rows of the diagnosis alone.
-
-    What it preferred to a more probable one for other reasons stays preferred.
-    """
+    """Return the combinations behind the chosen one by the diagnosis's rows: what was preferred stays preferred."""
     if not listed:
         return ()
     return tuple(runner for runner, gain in zip(listed, ahead(grown, listed), strict=True) if gain < 0.0)

@@ -32,11 +32,7 @@ from thermal_robot.observations import Observations
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """N rows at a point.
-
-    ``stack`` (N, m, K + 1): columns of the frames (``names``), the chosen effects, the rivals if asked for, and the
-    gap.
-    """
+    """N rows at a point: ``stack`` (N, m, K + 1) of the frames, chosen effects, rivals if asked for, and the gap."""
 
     campaign: Campaign
     stack: Array
@@ -145,10 +141,7 @@ class Guard:
         return np.asarray(np.sqrt((within**2).sum(axis=(1, 2))))
 
     def holds(self, step: Array, sigma: Array, medians: Array, bend: float, rms: Array) -> bool:
-        """Tell whether a fit is within reach, its step (k,), noise, and limits in units of it.
-
-        ``rms`` (G,) is what remains per axis, m and rad.
-        """
+        """Tell whether a fit is within reach: step (k,), noise, limits in its units, rms (G,) per axis, m and rad."""
         far, ratio = float(np.sqrt(step @ self.metric @ step)), sigma[::3] / self.sigma[::3]
         within = far <= self.reach and bool(np.abs(bend * ratio - self.bend).max() <= self.share * self.reach)
         if self.quiet:

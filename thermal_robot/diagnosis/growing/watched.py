@@ -152,10 +152,7 @@ class Watch:
 
 
 def scatter_of(left: Array, blocks: Sequence[NDArray[np.bool_]]) -> float:
-    """Variance of the sums of squares of blocks of rows over that of chi-square, at least 1.
-
-    ``left`` (N, m) in units of the noise, without gross errors; ``blocks`` (N,) rows of each.
-    """
+    """Variance of sums of squares of blocks (N,) of rows over that of chi-square, at least 1; ``left`` is (N, m)."""
     if len(blocks) < 2:
         return 1.0
     squares = (left**2).sum(axis=1)
