@@ -11,9 +11,9 @@ from scipy.special import expit
 
 from thermal_robot.arrays import Array
 from thermal_robot.diagnosis import settings as own
+from thermal_robot.diagnosis.held_out import schemes
 from thermal_robot.diagnosis.one_walk import Model, Walk
 from thermal_robot.diagnosis.parts import Refused
-from thermal_robot.diagnosis.schemes import schemes
 from thermal_robot.effects import gate
 from thermal_robot.effects.effect import UNSOURCED, Effect, in_words
 from thermal_robot.effects.law import PREFIX

@@ -31,10 +31,9 @@ from thermal_robot.diagnosis.examine import examine
 from thermal_robot.diagnosis.growing.settings import KEPT
 from thermal_robot.diagnosis.growing.stream import can_grow
 from thermal_robot.diagnosis.growing.updated import ready
-from thermal_robot.diagnosis.held_out import held_out
+from thermal_robot.diagnosis.held_out import held_out, worse_elsewhere
 from thermal_robot.diagnosis.not_executed import not_executed
 from thermal_robot.diagnosis.result import Diagnosis, told
-from thermal_robot.diagnosis.schemes import worse_elsewhere
 from thermal_robot.diagnosis.signs import as_counted
 from thermal_robot.diagnosis.where import without_laws
 from thermal_robot.effects import RANDOM, Effect, choose, library

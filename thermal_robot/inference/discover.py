@@ -19,10 +19,9 @@ from thermal_robot.inference.explain import explain, log_priors
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.problem import Linear
 from thermal_robot.inference.robust import Noise
-from thermal_robot.inference.scan import Scanned, Seats, scan, shaped
+from thermal_robot.inference.scan import Scanned, Seats, Thin, scan, shaped
 from thermal_robot.inference.settle import constant
 from thermal_robot.inference.target import Target
-from thermal_robot.inference.thin import Thin
 
 
 @dataclass(frozen=True, eq=False)

@@ -18,10 +18,9 @@ from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of, orthonormal, ridge, without
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.fit import Fit
-from thermal_robot.inference.periodogram import independent, orders, peak, periodogram
 from thermal_robot.inference.rows import blocks, each, neighbourhoods
+from thermal_robot.inference.scan import Thin, independent, orders, peak, periodogram
 from thermal_robot.inference.target import Target
-from thermal_robot.inference.thin import Thin
 from thermal_robot.observations import Observations
 
 Rows = NDArray[np.bool_]
