@@ -10,7 +10,7 @@ import numpy as np
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.effects import Effect
-from thermal_robot.effects.dependence import depends_on
+from thermal_robot.effects.apply import depends_on
 from thermal_robot.errors import CampaignError, EffectError
 from thermal_robot.observations import Observations, observe
 

@@ -20,7 +20,7 @@ from thermal_robot.diagnosis.result import Diagnosis
 from thermal_robot.diagnosis.wanted import wanted
 from thermal_robot.diagnosis.where import locate
 from thermal_robot.effects import Effect, gate, random_effects
-from thermal_robot.effects.dependence import depends_on
+from thermal_robot.effects.apply import depends_on
 from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.effects.quantities import unit
 from thermal_robot.inference.discover import Discovery

@@ -22,7 +22,7 @@ from thermal_robot.diagnosis.beside import (
     one_more_law,
     rippled,
 )
-from thermal_robot.diagnosis.cautions import usable
+from thermal_robot.diagnosis.cautions import not_executed, usable
 from thermal_robot.diagnosis.credible import credible, in_full
 from thermal_robot.diagnosis.data_faults.misfit import another_motion, delivered, frames_alone, unfit
 from thermal_robot.diagnosis.deviations import as_remainder_says
@@ -32,7 +32,6 @@ from thermal_robot.diagnosis.growing.settings import KEPT
 from thermal_robot.diagnosis.growing.stream import can_grow
 from thermal_robot.diagnosis.growing.updated import ready
 from thermal_robot.diagnosis.held_out import held_out, worse_elsewhere
-from thermal_robot.diagnosis.not_executed import not_executed
 from thermal_robot.diagnosis.result import Diagnosis, told
 from thermal_robot.diagnosis.signs import as_counted
 from thermal_robot.diagnosis.where import without_laws
