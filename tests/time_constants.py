@@ -8,8 +8,7 @@ from simulate import remaining, simulate
 
 from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.drift import Drift
-from thermal_robot.effects.lagging import History
-from thermal_robot.effects.thermal_elongation import ThermalElongation
+from thermal_robot.effects.thermal_elongation import History, ThermalElongation
 from thermal_robot.observations import Frames, observe
 
 NOISE = 25e-6  # m

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import thermal_robot as tr
-from thermal_robot.diagnosis.estimates import estimates, fitted_values, told_inside
+from thermal_robot.diagnosis.findings import estimates, fitted_values, told_inside
 from thermal_robot.effects import named
 from thermal_robot.inference.named import fit_named
 

@@ -5,8 +5,7 @@ import math
 
 import numpy as np
 
-from thermal_robot.diagnosis.parts import Gap
-from thermal_robot.diagnosis.plain import gap_as_json, jsonable
+from thermal_robot.diagnosis.parts import Gap, gap_as_json, jsonable
 
 
 def test_numbers_of_numpy_and_what_is_not_finite_become_plain():

@@ -9,8 +9,8 @@ from simulate import simulate
 
 from thermal_robot import simulate as simulated
 from thermal_robot.diagnosis.beside import eventful
+from thermal_robot.diagnosis.held_out import hardest, harmed, worse_elsewhere, worst_folds
 from thermal_robot.diagnosis.parts import FoldScheme, HeldOut
-from thermal_robot.diagnosis.schemes import hardest, harmed, worse_elsewhere, worst_folds
 from thermal_robot.effects import choose
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.fit import fit

@@ -7,7 +7,7 @@ import pytest
 from helpers import SAMPLES, commanded
 
 from thermal_robot.effects import Parameter, at_base, at_instrument, at_joint, at_segment, at_tool
-from thermal_robot.effects.channel import by_place, column, sensitivity
+from thermal_robot.effects.apply import by_place, column, sensitivity
 from thermal_robot.kinematics import Displacement, exp6, log3
 from thermal_robot.observations import Frames, observe
 

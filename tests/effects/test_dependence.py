@@ -8,7 +8,7 @@ import pytest
 
 from thermal_robot import observe, simulate
 from thermal_robot.effects import Backlash, Effect, JointCompliance, Parameter, ThermalElongation, at_joint
-from thermal_robot.effects.dependence import depends_on
+from thermal_robot.effects.apply import depends_on
 
 
 @pytest.fixture(scope="module")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from thermal_robot.effects.lagging import History
+from thermal_robot.effects.thermal_elongation import History
 
 
 @pytest.mark.parametrize("lag", [30.0, 600.0, 5000.0])

@@ -8,7 +8,7 @@ from helpers import commanded
 
 from thermal_robot.effects import Backlash, Geometric, TransmissionError
 from thermal_robot.effects.law import Discovered
-from thermal_robot.effects.law_size import in_joints, sizes
+from thermal_robot.effects.law_words import in_joints, sizes
 from thermal_robot.effects.shapes import SHAPES
 from thermal_robot.observations import observe
 

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from thermal_robot.effects.law import Discovered
-from thermal_robot.effects.law_source import source
+from thermal_robot.effects.law import Discovered, source
 
 
 def test_the_file_holds_the_law_its_values_and_what_it_is():

@@ -9,8 +9,7 @@ from helpers import SAMPLES, commanded
 
 from thermal_robot.effects import Backlash, library
 from thermal_robot.effects.law import Discovered
-from thermal_robot.effects.law_size import Size
-from thermal_robot.effects.law_words import TELLS, USUALLY, WHETHER, called, event, is_event, kind_of, usually
+from thermal_robot.effects.law_words import TELLS, USUALLY, WHETHER, Size, called, event, is_event, kind_of, usually
 from thermal_robot.effects.quantities import GRAVITY, REACH, TURN
 from thermal_robot.effects.shapes import SHAPES
 from thermal_robot.observations import observe

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from thermal_robot.effects.resolution import resolution, varies, without_twins
+from thermal_robot.effects.quantities import resolution, varies, without_twins
 
 RNG = np.random.default_rng(4)
 STILL = 0.7 + 7e-7 * RNG.uniform(-1.0, 1.0, 200)  # to 1.4 µrad, however many digits

@@ -9,8 +9,8 @@ from helpers import SAMPLES, commanded, tool_at, tool_with
 from simulate import simulate
 
 from thermal_robot.effects import ThermalElongation
-from thermal_robot.effects.channel import by_place
-from thermal_robot.effects.lagging import History
+from thermal_robot.effects.apply import by_place
+from thermal_robot.effects.thermal_elongation import History
 from thermal_robot.observations import observe
 
 on_arms = pytest.mark.parametrize("arm", ["rv_m2", "ur10", "panda"], indirect=True)

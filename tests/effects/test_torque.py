@@ -3,7 +3,7 @@
 import numpy as np
 from helpers import SAMPLES, commanded
 
-from thermal_robot.effects.torque import torque_columns
+from thermal_robot.effects.quantities import torque_columns
 from thermal_robot.observations import observe
 
 

@@ -12,7 +12,7 @@ from thermal_robot.effects.law import Discovered
 from thermal_robot.inference import settings
 from thermal_robot.inference.discover import candidates, discovered, listed, where, worthwhile
 from thermal_robot.inference.fit import fit, refit
-from thermal_robot.inference.thin import Thin
+from thermal_robot.inference.scan import Thin
 
 LISTED = ("joint_offset", "joint_gain", "backlash")
 STEP = Discovered(place="joint_3", quantity="time", shape="step", marks=(3600.0,))

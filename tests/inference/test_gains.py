@@ -7,9 +7,8 @@ import pytest
 from inference.problems import small_problem
 
 from thermal_robot.effects import Parameter
-from thermal_robot.inference.gains import gains
 from thermal_robot.inference.problem import Linear, gram
-from thermal_robot.inference.search import Search
+from thermal_robot.inference.search import Search, gains
 
 
 def gains_of(linear, whitening, beside):

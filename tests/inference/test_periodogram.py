@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from thermal_robot.inference.periodogram import independent, orders, peak, periodogram
+from thermal_robot.inference.scan import independent, orders, peak, periodogram
 from thermal_robot.inference.target import Target
 
 ROWS = 90

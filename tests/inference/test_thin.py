@@ -10,7 +10,7 @@ from thermal_robot.effects import choose
 from thermal_robot.inference import settings
 from thermal_robot.inference.fit import fit
 from thermal_robot.inference.rows import in_a_row
-from thermal_robot.inference.thin import Thin
+from thermal_robot.inference.scan import Thin
 
 
 @pytest.fixture(scope="module")

@@ -11,8 +11,7 @@ from simulate import simulate
 
 from thermal_robot import diagnose
 from thermal_robot.effects import Drift, ThermalElongation, TransmissionError, library
-from thermal_robot.effects.apply import displacement
-from thermal_robot.effects.channel import by_place
+from thermal_robot.effects.apply import by_place, displacement
 from thermal_robot.effects.gate import checked, driver
 from thermal_robot.effects.joint_ripple import JointRipple
 from thermal_robot.inference.columns import block, frame_columns

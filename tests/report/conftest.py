@@ -20,7 +20,7 @@ from thermal_robot.diagnosis.parts import (
     Where,
 )
 from thermal_robot.diagnosis.result import Diagnosis
-from thermal_robot.effects.law_size import Size
+from thermal_robot.effects.law_words import Size
 from thermal_robot.iso9283 import (
     Accuracy,
     AlongPath,

@@ -31,8 +31,7 @@ from thermal_robot.campaign.campaign import read_alike
 from thermal_robot.campaign.table import Table
 from thermal_robot.campaign.units import SI
 from thermal_robot.effects import Effect
-from thermal_robot.effects.apply import displacement
-from thermal_robot.effects.dependence import depends_on
+from thermal_robot.effects.apply import depends_on, displacement
 from thermal_robot.errors import CampaignError, EffectError, require
 from thermal_robot.files import write_text
 from thermal_robot.kinematics import (

@@ -13,15 +13,14 @@ from thermal_robot.diagnosis import settings
 from thermal_robot.diagnosis.cautions import cautions
 from thermal_robot.diagnosis.examine import Examined
 from thermal_robot.diagnosis.findings import by_share, findings, random_findings, separates, titled
-from thermal_robot.diagnosis.held_out import Shrinkage
+from thermal_robot.diagnosis.held_out import Shrinkage, hardest, harmed, worst_folds
 from thermal_robot.diagnosis.parts import Finding, Gap, Misfit, Refused, Rows, Sensitivity, Unexplained
 from thermal_robot.diagnosis.predictive import registered, uncertainty
 from thermal_robot.diagnosis.result import Diagnosis
-from thermal_robot.diagnosis.schemes import hardest, harmed, worst_folds
 from thermal_robot.diagnosis.wanted import wanted
 from thermal_robot.diagnosis.where import locate
 from thermal_robot.effects import Effect, gate, random_effects
-from thermal_robot.effects.dependence import depends_on
+from thermal_robot.effects.apply import depends_on
 from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.effects.quantities import unit
 from thermal_robot.inference.discover import Discovery
@@ -37,16 +36,10 @@ _HELD_OUT = "Corrected figures are of rows held out: the model was fitted withou
 
 
 def criteria(fit: Fit, shrinkage: Shrinkage) -> Performance | None:
-    """Compute the criteria of a campaign with repeats.
+    """Criteria of ISO 9283 of a campaign with repeats, in the frames that the gap is told in; ``None`` without repeats.
 
-    The frames are those that the gap is told in. AP after the correction is told of rows while they were held out: all
-    repeats of a pose are held out together, so that no figure is of a pose that the model was fitted to. Every cycle
-    counts, those set aside as outliers, too, as the standard has it.
-
-    Returns
-    -------
-    Performance
-        ``None`` where nothing is repeated.
+    AP after the correction is of rows while they were held out: all repeats of a pose are held out together, so that no
+    figure is of a pose that the model was fitted to. Every cycle counts, those set aside, too, as the standard has it.
     """
     campaign = fit.campaign
     if not repeats(campaign)[0]:
@@ -63,15 +56,7 @@ def criteria(fit: Fit, shrinkage: Shrinkage) -> Performance | None:
 
 
 def numbered(fit: Fit, shrinkage: Shrinkage, laws: Sequence[Discovery]) -> tuple[Fit, Shrinkage, tuple[Discovery, ...]]:
-    """Name the laws of a fit anew wherever their names stand, those that did not last after the others.
-
-    Parameters
-    ----------
-    fit, laws
-        The fit and its laws.
-    shrinkage
-        Its held-out shares: the largest is of ``discovered.1``.
-    """
+    """Name the laws of a fit anew wherever they stand: the largest held-out share first, those not lasting last."""
     held = {effect.name for effect, _ in fit.effects}
     names = [name for name in dict.fromkeys(fit.families) if name.startswith(PREFIX)]
     names.sort(key=lambda name: (name not in held, -shrinkage.shares.get(name, (0.0,))[0]))
@@ -120,26 +105,11 @@ def prior_sensitivity(fit: Fit) -> Sensitivity:
 
 @dataclass(frozen=True, eq=False)
 class Conclusion:
-    """The final fit and its residual.
+    """The final fit with its chosen effects and discovered ``laws``, and its residual.
 
-    Attributes
-    ----------
-    fit
-        The fit with the chosen effects and discovered laws.
-    laws
-        The discovered laws in that fit.
-    unexplained
-        The residual of the known effects alone. Where laws were discovered, they name its place and its quantity.
-    left
-        The residual of the whole fit, laws included.
-    chance
-        The random part of that residual that the instrument's noise does not account for.
-    refused
-        Effects that were taken out of the fit again.
-    misfit
-        Why nothing can be said of the robot; ``None`` where something can.
-    notes
-        What a reader must know of it beside, one sentence each.
+    ``unexplained`` is the residual of the known effects alone, with the place and quantity of the laws that explain it;
+    ``left`` that of the whole fit; ``chance`` its random part beyond the instrument's noise; ``refused`` effects that
+    were taken out again; ``misfit`` why nothing can be said of the robot.
     """
 
     fit: Fit
@@ -161,22 +131,10 @@ def answer(
     left_out: Sequence[str],
     notes: Sequence[str],
 ) -> Diagnosis:
-    """Put a diagnosis together.
+    """Put a diagnosis together of the last explanation and its held-out shrinkage.
 
-    Parameters
-    ----------
-    last
-        The last explanation.
-    shrinkage
-        Held-out shrinkage, overall and per effect.
-    candidates
-        Systematic effects that were considered.
-    asked
-        Tells whether the user asked for an effect of this name, systematic or random.
-    left_out
-        Names of the effects that the user left out.
-    notes
-        What was left out of the campaign, one sentence each.
+    ``asked`` tells whether the user asked for an effect of this name, systematic or random; ``left_out`` are the names
+    that were left out; ``notes`` say what was left out of the campaign, one sentence each.
     """
     fit, shrinkage, laws = numbered(last.fit, shrinkage, last.laws)
     last = replace(last, fit=fit, laws=laws)
@@ -261,15 +219,10 @@ def _gap(last: Conclusion, shrinkage: Shrinkage) -> Gap:
 
 
 def model_of(fit: Fit, floor: float | None) -> CorrectedModel:
-    """Return the model that predicts as a fit does.
+    """Model that predicts as a fit does.
 
-    Parameters
-    ----------
-    fit
-        The fit.
-    floor
-        One sigma per axis of the noise where the campaign states none, m; ``None`` where nobody is to be told how far
-        predictions may be off.
+    ``floor`` is one sigma per axis of the noise where the campaign states none, m; ``None`` where nobody is to be told
+    how far predictions may be off.
     """
     campaign = fit.campaign
     needs = tuple(dict.fromkeys(c for effect, _ in fit.effects for c in depends_on(effect, fit.nominal)))

@@ -31,10 +31,9 @@ from thermal_robot.inference.robust import Noise
 def one_more_law(
     fit: Fit, number: int, progress: Callable[[str], None], happened: Sequence[Discovered] | None = None
 ) -> Fit | None:
-    """Let laws that nobody wrote down compete with all known effects for a place in the fit.
+    """Let laws that nobody wrote down compete with all known effects; ``None`` if none is worth its place.
 
-    Returns ``None`` if no law is worth its place. Events that ``happened`` are among the laws; they are looked for
-    where absent.
+    Events that ``happened`` are among them, and are looked for where absent.
     """
     progress(f"causes that nobody listed: scan {number}")
     laws = candidates(fit, number, happened)
@@ -65,8 +64,7 @@ def eventful(fit: Fit, progress: Callable[[str], None]) -> Fit:
 def as_laws_say(left: Unexplained, found: Sequence[Discovery], discrepancy: Discrepancy) -> Unexplained:
     """Return the residual of the known effects with the places and quantities of the laws that explain it.
 
-    Where no law does, and the discrepancy errs anew at one place in every pose or visit, that is the place, and nothing
-    that was recorded is followed.
+    Where none does, and the discrepancy errs anew at one place in every pose or visit, that is the place.
     """
     form = discrepancy.form
     if not found and left.flagged and form is not None and form.anew and form.place[0]:
@@ -94,23 +92,9 @@ def as_laws_say(left: Unexplained, found: Sequence[Discovery], discrepancy: Disc
 def beside_scatter(
     fit: Fit, chance: RandomGap, refused: Mapping[str, Refused], progress: Callable[[str], None]
 ) -> Conclusion:
-    """Choose the systematic effects again, with the joints' scatter in the covariance of the noise.
+    """Choose the systematic effects again, with the joints' scatter (``chance``) in the covariance of the noise.
 
-    Parameters
-    ----------
-    fit
-        Fit whose effects were chosen with the instrument's noise alone.
-    chance
-        The scatter, which accounts for the residual of that fit.
-    refused
-        Effects that rows held out refused.
-    progress
-        Called with a few words at each stage.
-
-    Returns
-    -------
-    Conclusion
-        Effects and laws that the scatter had imitated are no longer in the fit.
+    Effects and laws that the scatter had imitated are then no longer in the fit.
     """
     e = fit.explanation
     scatter, sensitivity = chance.scatter, fit.corrected.joint_sensitivity
@@ -150,22 +134,6 @@ def beside_steps(
     them for normal; that they put the joint on an encoder's steps, or no longer do, is left out of its evidence. With
     the odds P of an effect by the fit, and the Bayes factors B and B' of steps with it and without it, it stays while
     P B > B'.
-
-    Parameters
-    ----------
-    fit
-        Fit of frames and systematic effects.
-    chance
-        The random part of its residual.
-    refused
-        Effects that were taken out before.
-    progress
-        Called with a few words at each stage.
-
-    Returns
-    -------
-    fit, chance, refused
-        Without the effects that steps speak against.
     """
     while hidden := {joint for joint, factor in chance.steps.items() if factor < 0.0}:
         rivals = []
@@ -195,15 +163,8 @@ def rippled(fit: Fit, progress: Callable[[str], None]) -> Fit:
     """Let waves of the joints join a fit, and leave it again, until they stay.
 
     What was fitted without them may have stood in for them, and hides others: the choice is made again beside the
-    waves, and these are looked for again beside the choice.
-
-    Parameters
-    ----------
-    fit
-        To which waves are added; one that was not to consider ripple comes back as it is, and one of so many rows that
-        each choice beside waves would take minutes. Beside very many rows it is made once.
-    progress
-        Called with a few words at each stage.
+    waves, and these are looked for again beside the choice; once where rows are very many, and not at all where each
+    choice would take minutes, or ripple was not to be considered.
     """
     name = JointRipple.name
     if name not in fit.variants or fit.campaign.samples > settings.RIPPLE_ROWS:

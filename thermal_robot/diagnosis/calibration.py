@@ -10,8 +10,8 @@ import numpy as np
 
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.diagnosis.deviations import as_remainder_says
-from thermal_robot.diagnosis.estimates import estimates, told_inside
 from thermal_robot.diagnosis.examine import Examined, examine
+from thermal_robot.diagnosis.findings import estimates, told_inside
 from thermal_robot.diagnosis.parts import Estimate
 from thermal_robot.inference.fit import Fit
 from thermal_robot.teller import registered
@@ -29,18 +29,10 @@ class Teller(Protocol):
 
 @dataclass(frozen=True)
 class Calibrated:
-    """One effect of a calibration.
+    """One effect of a calibration with its estimates; ``title`` is what it is in plain words.
 
-    Attributes
-    ----------
-    name, title
-        Its name, and what it is in plain words.
-    parameters
-        Its estimates.
-    unseen
-        Names of parameters that the data do not tell from those before them, or from the frames.
-    inside
-        Name of the larger effect that was fitted, of which this is a part or the rest; empty where it stands by itself.
+    ``unseen`` are parameters that the data do not tell from those before them, or from the frames; ``inside`` is the
+    larger effect that was fitted, of which this is a part or the rest.
     """
 
     name: str

@@ -11,9 +11,9 @@ from scipy.special import expit
 
 from thermal_robot.arrays import Array
 from thermal_robot.diagnosis import settings as own
+from thermal_robot.diagnosis.held_out import schemes
 from thermal_robot.diagnosis.one_walk import Model, Walk
 from thermal_robot.diagnosis.parts import Refused
-from thermal_robot.diagnosis.schemes import schemes
 from thermal_robot.effects import gate
 from thermal_robot.effects.effect import UNSOURCED, Effect, in_words
 from thermal_robot.effects.law import PREFIX
@@ -28,15 +28,8 @@ from thermal_robot.inference.rows import blocks
 class Cancelling:
     """Two effects of which a part of one undoes a part of the other.
 
-    Attributes
-    ----------
-    effects
-        Their names.
-    sites
-        Kind and place of the two parts.
-    times
-        What the smaller part does, over what both do together: rms over the rows, unknown frames projected out, in
-        units of the noise.
+    ``sites``: kind and place of both parts. ``times``: what the smaller part does, over what both do together: rms over
+    the rows, unknown frames projected out, in units of the noise.
     """
 
     effects: tuple[str, str]
@@ -72,11 +65,7 @@ def cancelling(fit: Fit) -> tuple[Cancelling, ...]:
 
 
 def cancelling_within(fit: Fit) -> Iterator[tuple[str, float]]:
-    """Yield effects whose parameters cancel each other: name, and largest single contribution over the sum.
-
-    Such parameters have no meaning one by one. Over part of a turn, for example, harmonics of low order are nearly
-    collinear.
-    """
+    """Yield effects whose parameters cancel, as low harmonics over part of a turn: name, largest part over the sum."""
     for name, _, moved in _moved(fit):
         whole = float(np.linalg.norm(moved.sum(axis=1)))
         times = float(np.linalg.norm(moved, axis=0).max(initial=0.0)) / max(whole, settings.TINY)
@@ -85,10 +74,7 @@ def cancelling_within(fit: Fit) -> Iterator[tuple[str, float]]:
 
 
 def _moved(fit: Fit) -> Iterator[tuple[str, list[tuple[str, str]], Array]]:
-    """Yield each effect's name, kind and place of its P parameters, and (E, P) what each does to the target.
-
-    In units of the noise, with the unknown frames projected out.
-    """
+    """Yield each effect's name, kind and place of its P parameters, and (E, P) their moves in noise, without frames."""
     e = fit.explanation
     noise = np.broadcast_to(e.whitening.sigma() * e.best.noise, e.linear.gap.shape).reshape(-1, 1)
     basis = orthonormal(equations_of(e.linear.frames) / noise)
@@ -100,18 +86,10 @@ def _moved(fit: Fit) -> Iterator[tuple[str, list[tuple[str, str]], Array]]:
 
 @dataclass(frozen=True)
 class Doubt:
-    """Parts of effects of which one should not be in the explanation.
+    """Parts of effects of which one should not be in the explanation; ``words`` say why, without a full stop.
 
-    Attributes
-    ----------
-    parts
-        Name of each effect, and the joint or link; empty where it is all of the effect.
-    words
-        Why, in a sentence without a full stop.
-    times
-        By how much they are in doubt, as a ratio.
-    impossible
-        Whether it is told, and nothing more: beyond what is physically possible.
+    ``parts``: effect, and joint or link (empty: all of it). ``times``: by how much they are in doubt, as a ratio. One
+    that is ``impossible`` is beyond what is physically possible: it is told, and nothing more.
     """
 
     parts: tuple[tuple[str, str], ...]
@@ -159,16 +137,9 @@ def credible(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, 
 
     A part is what an effect does in one joint or link. The explanation is chosen again without each part in doubt, and
     that one is left out without which rows held out are predicted best; none is where they are then predicted clearly
-    worse. Where rows are very many, only the worst doubt is weighed; of more still, the whole effect, which takes less
-    time.
-
-    Returns
-    -------
-    fit
-        With what is left.
-    refused
-        What was left out, by its name: the probability of a known effect all of which was, by the evidence of the two
-        explanations that keep one of a pair.
+    worse. Where rows are very many, only the worst doubt is weighed; of more still, the whole effect. Refused, by name:
+    the probability of a known effect all of which was left out, by the evidence of the two explanations that keep one
+    of a pair.
     """
     refused: dict[str, Refused] = {}
     weighed: set[tuple[tuple[str, str], ...]] = set()
@@ -213,17 +184,8 @@ def goes_astray(fit: Fit) -> float:
 def in_full(fit: Fit, progress: Callable[[str], None]) -> Fit:
     """Let fuller settings compete where a parameter is surely larger than 99 % of robots have.
 
-    Parameters
-    ----------
-    fit
-        Of at most as many rows as ripple is looked for in: further settings of more would take minutes.
-    progress
-        Called with a few words at each stage.
-
-    Returns
-    -------
-    Fit
-        The choice made again beside them, unless rows held out are then predicted clearly worse.
+    The choice beside them stays unless rows held out are then predicted clearly worse; of more rows than ripple is
+    looked for in, which would take minutes, nothing is asked.
     """
     if fit.campaign.samples > settings.RIPPLE_ROWS:
         return fit

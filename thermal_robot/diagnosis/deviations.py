@@ -42,13 +42,7 @@ Rows = NDArray[np.bool_]
 
 
 def as_remainder_says(fit: Fit) -> Fit:
-    """Widen the covariances of a fit to what its remainder may do to its parameters.
-
-    Returns
-    -------
-    Fit
-        The same values, with deviations that are the same or larger.
-    """
+    """Widen the covariances of a fit to what its remainder may do to its parameters; values stay."""
     e, campaign = fit.explanation, fit.campaign
     if not e.best.blocks:
         return fit
@@ -64,21 +58,10 @@ def as_remainder_says(fit: Fit) -> Fit:
 
 
 def exceeding(fit: Fit, linear: Linear, information: Array, axes: Array) -> Array:
-    """Tell how much more than of independent rows the variance of parameters is.
+    """(K,) factor, 1 or more, by which the variance of parameters exceeds that of independent rows.
 
-    Parameters
-    ----------
-    fit
-        The fit of a campaign.
-    linear
-        Its gap, frames and K parameters, held to one unit each.
-    information, axes
-        (K,) and (K, K) what independent rows would say, along its principal axes.
-
-    Returns
-    -------
-    ndarray
-        (K,) by what the information is to be divided along each axis, 1 or more.
+    ``information`` (K,) is what independent rows would say, along its principal ``axes`` (K, K), and is to be divided
+    by the factor; the K parameters of ``linear`` are held to one unit each.
     """
     e, campaign = fit.explanation, fit.campaign
     scales = (1.0,) * len(linear.blocks)

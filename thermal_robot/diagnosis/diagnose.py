@@ -22,19 +22,17 @@ from thermal_robot.diagnosis.beside import (
     one_more_law,
     rippled,
 )
-from thermal_robot.diagnosis.cautions import usable
+from thermal_robot.diagnosis.cautions import not_executed, usable
 from thermal_robot.diagnosis.credible import credible, in_full
 from thermal_robot.diagnosis.data_faults.misfit import another_motion, delivered, frames_alone, unfit
 from thermal_robot.diagnosis.deviations import as_remainder_says
 from thermal_robot.diagnosis.earned import worth_their_word
 from thermal_robot.diagnosis.examine import examine
-from thermal_robot.diagnosis.growing.begun import can_grow
 from thermal_robot.diagnosis.growing.settings import KEPT
+from thermal_robot.diagnosis.growing.stream import can_grow
 from thermal_robot.diagnosis.growing.updated import ready
-from thermal_robot.diagnosis.held_out import held_out
-from thermal_robot.diagnosis.not_executed import not_executed
+from thermal_robot.diagnosis.held_out import held_out, worse_elsewhere
 from thermal_robot.diagnosis.result import Diagnosis, told
-from thermal_robot.diagnosis.schemes import worse_elsewhere
 from thermal_robot.diagnosis.signs import as_counted
 from thermal_robot.diagnosis.where import without_laws
 from thermal_robot.effects import RANDOM, Effect, choose, library
@@ -210,13 +208,7 @@ def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
 
 
 def check_priors(campaign: Campaign, known: set[str]) -> None:
-    """Refuse a campaign that states the size of an effect that nobody knows.
-
-    Raises
-    ------
-    CampaignError
-        Naming it, and what was probably meant.
-    """
+    """Refuse a campaign that states the size of an effect that nobody knows, and say what was probably meant."""
     for name in campaign.priors:
         if name not in known:
             expected = "one of " + ", ".join(sorted(known))

@@ -10,10 +10,9 @@ from numpy.typing import NDArray
 from scipy.special import expit, stdtrit
 
 from thermal_robot.arrays import Array
-from thermal_robot.diagnosis.held_out import held_out
+from thermal_robot.diagnosis.held_out import held_out, schemes
 from thermal_robot.diagnosis.one_walk import Model, Walk
 from thermal_robot.diagnosis.parts import Refused
-from thermal_robot.diagnosis.schemes import schemes
 from thermal_robot.effects.law import PREFIX
 from thermal_robot.effects.law_words import is_event
 from thermal_robot.inference import settings
@@ -25,16 +24,9 @@ from thermal_robot.inference.rows import blocks
 
 @dataclass(frozen=True)
 class Gained:
-    """What one effect brings under one scheme of holding rows out.
+    """What one effect brings under one scheme of holding rows out (time, session, temperature, region, reach).
 
-    Attributes
-    ----------
-    scheme
-        ``time``, ``session``, ``temperature``, ``region`` or ``reach``.
-    share
-        1 − (rms with it / rms without it)² of the rows held out, noise included, in units of the instrument's noise.
-    interval
-        95 % interval of the share.
+    ``share`` is 1 − (rms with it / rms without it)² of the rows held out, noise included, with its 95 % ``interval``.
     """
 
     scheme: str
@@ -46,18 +38,10 @@ class Gained:
 class Earned:
     """What one effect of a fit brings on rows held out, all others fitted anew without it.
 
-    Attributes
-    ----------
-    blocked
-        Where blocks of consecutive rows are held out.
-    hardest
-        By the scheme of the smallest lower bound.
-    helps
-        Whether it is worth its word, as is asked of a law: the interval of ``blocked`` is above zero, and it does no
-        harm.
-    harms
-        Whether rows are predicted worse with it: the share of ``blocked`` is not above zero, or under one scheme the
-        whole interval is below zero. A known effect that others could nearly stand in for neither helps nor harms.
+    ``blocked``: blocks of consecutive rows held out; ``hardest``: the scheme of the smallest lower bound. It ``helps``
+    where the interval of ``blocked`` is above zero and it does no harm, as is asked of a law; it ``harms`` where the
+    share of ``blocked`` is not above zero, or under one scheme the whole interval is below. A known effect that others
+    could nearly stand in for does neither.
     """
 
     blocked: Gained
@@ -72,18 +56,12 @@ def earned(fit: Fit) -> dict[str, Earned]:
     The interval asks how far noise alone could have moved the gain, poses and conditions as they were. With r what is
     left of a held-out row with the effect, and r + m without it, the gain is Σ |m|² + 2 r·m. Its variance is that of
     the sums of 2 r·m over blocks of consecutive rows, and at least 4 s² Σ |m|², with s² the mean square of r. The
-    quantile is Student's.
+    quantile is Student's. Something that acts within one block alone cannot earn its word, as no other rows tell of it.
 
     An extrapolation to the coldest rows or to a region asks more than most true effects can give: their lower bound
     there is not above zero in one case of twenty (twice the noise, 75 rows). It therefore only refuses what does harm.
     An event says nothing of rows held out with all that it did, as a session or the warmest rows, and is asked in
     blocks of consecutive rows alone.
-
-    Returns
-    -------
-    dict
-        By name of the effect or law. Something that acts within one block of consecutive rows alone cannot earn its
-        word, as no other rows tell of it.
     """
     block = blocks(fit.campaign)
     model = Model.of(fit.explanation, block)
@@ -132,15 +110,8 @@ def worth_their_word(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, di
 
     A law stays if it predicts rows held out better (:func:`~thermal_robot.diagnosis.earned.earned`) and the interval of
     its share is above zero, which is not asked of an event, as that shows in few blocks of rows. A known effect stays
-    unless it predicts them worse, or is less than nine times as probable as nothing in its place.
-
-    Returns
-    -------
-    fit
-        With what is left of it.
-    refused
-        By name of a known effect: its probability by its prior and the rows held out alone, and its share there; of one
-        in question, its probability.
+    unless it predicts them worse, or is less than nine times as probable as nothing in its place. Refused, by name: its
+    probability by its prior and the rows held out alone, and its share there; of one in question, its probability.
     """
     refused: dict[str, Refused] = {}
     while True:

@@ -26,15 +26,7 @@ from thermal_robot.percents import percent
 
 @dataclass(frozen=True, eq=False)
 class Remainder:
-    """Residual of a fit, of the N rows that are not outliers.
-
-    Attributes
-    ----------
-    rows
-        Their numbers.
-    target
-        The residual in units of the estimated noise, with all fitted columns projected out.
-    """
+    """Residual of the rows that are no outliers, in units of the estimated noise, all fitted columns projected out."""
 
     rows: NDArray[np.int64]
     target: Target
@@ -214,16 +206,10 @@ def _asked(observations: Observations) -> dict[str, Array]:
 
 @dataclass(frozen=True)
 class Examined:
-    """Whether the residual is noise.
+    """Whether the residual is noise, and where it enters and what it follows.
 
-    Attributes
-    ----------
-    unexplained
-        The residual, with the place where it enters and the quantity that it follows.
-    floor
-        Noise floor: one sigma per axis of instrument and repeatability together, m.
-    source
-        Where the floor comes from: ``stated``, ``repeats``, ``scatter`` or ``remainder``.
+    ``floor``: one sigma per axis of instrument and repeatability together, m, by its ``source``: ``stated``,
+    ``repeats``, ``scatter`` or ``remainder``.
     """
 
     unexplained: Unexplained
@@ -313,10 +299,7 @@ def _lack_of_fit(left: Remainder, again: Repeats | None) -> tuple[float, str]:
 
 
 def _in_a_row(fit: Fit) -> tuple[float, str]:
-    """Return the p-value that so many outliers are consecutive by chance, and the reason.
-
-    Gross errors are not consecutive. Rows after a change of the robot or the setup are.
-    """
+    """P-value that so many outliers are consecutive by chance, as rows after a change are and gross errors are not."""
     aside = fit.explanation.outliers[in_order(fit.campaign)]
     count, samples = int(aside.sum()), len(aside)
     if count < settings.FEW_ASIDE * samples:
@@ -329,10 +312,7 @@ def _in_a_row(fit: Fit) -> tuple[float, str]:
 
 
 def _neighbours(fit: Fit, left: Remainder) -> tuple[tuple[float, str], float]:
-    """Test whether residuals of neighbours, in joint space and in time, are correlated (permutation test).
-
-    Returns p-value and reason, and the largest correlation that is significant.
-    """
+    """Permutation test whether neighbours' residuals are correlated: p-value, reason, and the largest one that is."""
     q = fit.campaign.q[left.rows]
     spread = q.std(axis=0)
     used = spread > settings.ROUNDING
@@ -374,10 +354,7 @@ class _Tested:
 
 
 def _scan(fit: Fit, left: Remainder) -> tuple[tuple[float, str], tuple[Location, ...], tuple[Dependence, ...], float]:
-    """F tests of a smooth law of every quantity at every place, with Bonferroni correction.
-
-    Returns p-value and reason, places, quantities, and the share of the residual that the best law explains.
-    """
+    """F tests of smooth laws of quantities at places (Bonferroni): p-value, reason, places, quantities, share."""
     all_tests = _tests(fit.corrected, left.some(settings.ENOUGH_REMAINDER))
     tested = sorted((t for t in all_tests if np.isfinite(t.worth.gain)), key=lambda t: -t.worth.gain)
     if not tested:

@@ -20,28 +20,12 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, eq=False)
 class Place:
-    """One place where an effect acts, n rows.
+    """One place where an effect acts: the error in n rows against the ``quantity`` that drives it.
 
-    Attributes
-    ----------
-    kind, name
-        ``joint`` and its name, and so on.
-    share
-        Share of the effect's contribution that enters here, 0..1.
-    quantity, quantity_unit
-        What drives the effect here.
-    values
-        (n,) of that quantity, SI.
-    levels
-        Whether it takes a few values only.
-    unit
-        Of the error: ``rad`` or ``m`` at the place; ``m at the tool`` where the error both shifts and turns.
-    before, after, spread
-        (n,) the error with the effect left in, without it, and one sigma of noise of both.
-    line
-        (2, k) the fitted law: quantity and error.
-    centred
-        Whether errors are told less their mean, which the unknown frames take up as well.
+    ``share`` 0..1 of the effect's contribution enters here. ``values`` (n,) are the quantity's, SI, a few only where it
+    is ``levels``. ``before``, ``after`` and ``spread`` (n,): error with the effect left in, without it, and one sigma
+    of noise of both, in ``unit``: rad or m at the place, ``m at the tool`` where it both shifts and turns. ``line``
+    (2, k) is the fitted law. ``centred``: told less the mean, which unknown frames take up as well.
     """
 
     kind: str
@@ -66,17 +50,7 @@ class Place:
 
 @dataclass(frozen=True, eq=False)
 class Explained:
-    """What one effect explains.
-
-    Attributes
-    ----------
-    effect
-        Its name.
-    places
-        Places with a share worth drawing, largest first.
-    left_out
-        Number of further places.
-    """
+    """What one effect explains: places with a share worth drawing, largest first, and how many more were left out."""
 
     effect: str
     places: tuple[Place, ...]
@@ -85,26 +59,12 @@ class Explained:
 
 @dataclass(frozen=True, eq=False)
 class Arm:
-    """L links of a chain in R postures.
+    """L links of a chain in R postures, with the shares 0..1 of the gap's mean square that enter at each place.
 
-    Attributes
-    ----------
-    links
-        L names, from the root frame to the tool frame.
-    link_shares
-        (L,) share 0..1 of the gap's mean square that enters in each.
-    poses
-        (R, L, 4, 4) of each in the root frame, as the model has it at what was commanded; m.
-    joints
-        Names of the J movable joints, those that mimic another too.
-    joint_shares
-        (J,) share that enters at each.
-    moves
-        (J,) which of the links each joint moves first.
-    hulls
-        What links look like; nothing of those without a shape.
-    base_share, tool_share, instrument_share
-        Share that enters where the robot stands, between tool frame and target, and at the instrument.
+    ``links`` are named from the root frame to the tool frame; ``poses`` (R, L, 4, 4) stand in the root frame, m, as the
+    model has them at what was commanded; ``joints`` are the J movable ones, those that mimic another too; ``moves``
+    (J,) is which link each moves first; ``hulls`` is what links look like, nothing of those without a shape. Besides
+    link and joint shares (L,) and (J,): where the robot stands, between tool frame and target, and at the instrument.
     """
 
     links: tuple[str, ...]

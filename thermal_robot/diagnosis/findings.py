@@ -3,45 +3,82 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any
 
 import numpy as np
 
-from thermal_robot.diagnosis.estimates import estimates, fitted_values, told_inside
+from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.parts import Estimate, Finding, Location, Refused, is_frame
-from thermal_robot.effects import Effect, gate, library, random_effects
+from thermal_robot.effects import Effect, Parameter, gate, library, random_effects
 from thermal_robot.effects.law import PREFIX, Discovered
-from thermal_robot.effects.law_size import Size, in_joints, sizes
-from thermal_robot.effects.law_words import called, event, usually
+from thermal_robot.effects.law_words import Size, called, event, in_joints, sizes, usually
 from thermal_robot.effects.quantities import unit
 from thermal_robot.effects.random_effect import RandomEffect
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of, orthonormal, without
 from thermal_robot.inference.fit import Fit
+from thermal_robot.inference.inside import divided, identified
 from thermal_robot.inference.random_gap import Kept, RandomGap
 
 
+@dataclass(frozen=True)
+class Inside:
+    """Estimates of an effect's part of one that was fitted (``container``), or the rest of that.
+
+    ``unseen`` are parameters that the data do not tell from those before them, or from the frames.
+    """
+
+    container: str
+    parameters: tuple[Estimate, ...]
+    unseen: tuple[str, ...]
+
+
+def told_inside(fit: Fit) -> dict[str, Inside]:
+    """Return by name the effects of the fit that are told in parts, and the parts."""
+    found = {}
+    for effect, _ in fit.effects:
+        for part in divided(fit, effect.name):
+            told = _estimates(part.parameters, part.values, part.spread, part.prior)
+            found[part.effect] = Inside(effect.name, told, tuple(p.name for p in part.unseen))
+    return found
+
+
+def estimates(fit: Fit, block: int) -> tuple[Estimate, ...]:
+    """Return the estimates of one block of the best combination, in its own parameters."""
+    e = fit.explanation
+    item = e.linear.blocks[block]
+    spread = np.sqrt(np.maximum(np.diag(e.values[block][1]), 0.0))
+    return _estimates(item.parameters, fitted_values(fit, block), spread, item.sizes * e.best.scales[block])
+
+
+def fitted_values(fit: Fit, block: int) -> Array:
+    """(P,) values of one block of the best combination, as they were refined, SI."""
+    return fit.effects[fit.explanation.best.blocks.index(block)][1]
+
+
+def _estimates(parameters: Iterable[Parameter], values: Array, spread: Array, prior: Array) -> tuple[Estimate, ...]:
+    known = identified(spread, prior)
+    return tuple(
+        Estimate(p.name, float(v) if k else None, float(s) if k else None, p.unit, bool(k))
+        for p, v, s, k in zip(parameters, values, spread, known, strict=True)
+    )
+
+
 def random_findings(fit: Fit, chance: RandomGap) -> tuple[Finding, ...]:
-    """Return a finding for every random effect.
+    """Return a finding for every random effect; none shrinks the gap, as a correction predicts a mean.
 
-    None shrinks the gap, as a correction predicts a mean and leaves scatter. Scatter between poses (encoder steps) and
-    scatter between visits (repeatability) are told apart by repeated poses. Without repeats, scatter between visits is
-    not testable, and scatter between poses is confounded with it unless the steps of the encoder are seen.
-
-    Parameters
-    ----------
-    fit
-        Fit of frames and systematic effects.
-    chance
-        The random part of its residual.
+    Scatter between poses (encoder steps) and scatter between visits (repeatability) are told apart by repeated poses.
+    Without repeats, scatter between visits is not testable, and scatter between poses is confounded with it unless the
+    steps of the encoder are seen.
     """
     return tuple(_finding(fit, chance, effect) for effect in random_effects())
 
 
 def _finding(fit: Fit, chance: RandomGap, effect: RandomEffect) -> Finding:
-    scatter, kind, own = chance.scatter, effect.component, chance.kept_of(effect.component)
+    scatter, kind = chance.scatter, effect.component
+    own = [k for k in chance.kept if k.component.kind == kind]
     if effect.needs and kind not in scatter.kinds:
         return Finding(effect.name, "not_testable", needs=effect.needs)
     probability = scatter.probability.get(kind, 0.0)
@@ -93,17 +130,10 @@ def within_frames(fit: Fit, block: int) -> bool:
 
 
 def rivals(fit: Fit, explained: Mapping[str, int]) -> dict[str, tuple[str, ...]]:
-    """Return by effect the effects that it is confounded with.
+    """By effect of the fit (with its block): the effects that it is confounded with.
 
-    An effect of the fit is confounded with a known one outside it where that one, fitted anew in its place, is nearly
-    as probable: by more than ``IN_ITS_PLACE`` it is at work and the effect is not, and nothing else joins it.
-
-    Parameters
-    ----------
-    fit
-        The fit.
-    explained
-        By effect of the fit: its block.
+    That is a known one outside the fit that, fitted anew in its place, is nearly as probable: by more than
+    ``IN_ITS_PLACE`` it is at work and the effect is not, and nothing else joins it.
     """
     best, found = frozenset(explained), dict[tuple[str, str], float]()
     for combination, p in zip(fit.explanation.combinations, fit.explanation.probabilities, strict=True):
@@ -131,18 +161,8 @@ def findings(
 ) -> tuple[Finding, ...]:
     """Return a finding for every candidate; those that are not testable come last.
 
-    Parameters
-    ----------
-    fit
-        The final fit.
-    shares
-        By effect: share of the gap on held-out rows, and its 95 % interval.
-    locations
-        By effect of the fit: its places.
-    laws
-        By discovered law of the fit: probability that what it follows, where, is right.
-    refused
-        Effects that were taken out of the fit again.
+    ``shares``: share of the gap on held-out rows with its 95 % interval, by effect; ``laws``: probability that what a
+    discovered law follows, where, is right.
     """
     explained = {effect.name: b for b, (effect, _) in zip(fit.explanation.best.blocks, fit.effects, strict=True)}
     known = {effect.name: effect for effect, _ in fit.effects}
@@ -228,10 +248,7 @@ def _hidden(fit: Fit, name: str, explained: Mapping[str, int]) -> tuple[str, ...
 
 
 def separates(found: Sequence[Finding]) -> tuple[tuple[str, ...], ...]:
-    """Return the groups of effects that the data cannot tell apart.
-
-    A group with an unknown frame is listed only if it is the only group.
-    """
+    """Return the groups of effects that the data cannot tell apart; one with an unknown frame only if it is alone."""
     groups = tuple(
         dict.fromkeys(tuple(sorted((f.name, *f.confounded_with))) for f in found if f.status == "confounded")
     )

@@ -1,8 +1,13 @@
-"""How far the gap shrinks, on rows that were not used for the fit."""
+"""How far the gap shrinks, on rows that were not used for the fit.
+
+Neighbouring rows are alike in time, temperature and place. Folds of consecutive rows therefore favour a fit that only
+follows the course of the campaign (Roberts et al., *Ecography* 40, 2017, on blocked cross-validation). Other schemes
+show whether it extrapolates.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
 from itertools import combinations
 from math import factorial
@@ -11,14 +16,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
-from thermal_robot.diagnosis.one_walk import Model, Squares, Walk, share
-from thermal_robot.diagnosis.parts import HeldOut
+from thermal_robot.campaign import Campaign
+from thermal_robot.diagnosis.one_walk import Model, Squares, Walk, deviation, share
+from thermal_robot.diagnosis.parts import FoldScheme, HeldOut
+from thermal_robot.effects.law_words import is_event
 from thermal_robot.errors import EstimationError
+from thermal_robot.inference import settings
+from thermal_robot.inference.columns import block
 from thermal_robot.inference.columns import block as columns
 from thermal_robot.inference.explain import Explanation
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.problem import Linear
-from thermal_robot.inference.rows import blocks, each
+from thermal_robot.inference.rows import blocks, each, neighbourhoods
 
 Labels = NDArray[np.int64]
 Share = tuple[float, tuple[float, float]]
@@ -28,20 +37,11 @@ Share = tuple[float, tuple[float, float]]
 class Shrinkage:
     """Held-out shrinkage of the gap, overall and per effect; all with the noise of the held-out rows in it.
 
-    Attributes
-    ----------
-    overall
-        Rms before and after on held-out rows; :func:`held_out` says what is fitted anew in each fold.
-    before, after
-        (N,) distance of each row while it was held out, m; NaN where it was set aside.
-    with_aside
-        Rms before and after, m, over all held-out rows: those set aside count, too.
-    shares
-        By effect: share of the gap's mean square with its 95 % interval. For an effect of the fit it is the Shapley
-        value, and these sum to the overall shrinkage; for another the gain from adding it to the fit.
-    left
-        (N, m) what the model left of each row while it was held out, root frame, m and rad; those set aside, too. NaN
-        where a row never was held out.
+    ``overall``: rms before and after; ``with_aside``: the same, m, over all rows, set aside or not. ``before`` and
+    ``after`` (N,): distance of each row while it was held out, m, NaN where set aside. ``shares`` of the gap's mean
+    square, with 95 % intervals: for an effect of the fit the Shapley value (these sum to the overall shrinkage), for
+    another the gain from adding it. ``left`` (N, m): what the model left of each row, root frame, m and rad, NaN where
+    never held out.
     """
 
     overall: HeldOut
@@ -59,15 +59,10 @@ def held_out(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Shri
     effects, the place and quantity of a law, refined constants, prior scales, the point of linearisation, noise, and
     which rows are set aside. Choosing anew in each fold was tried: as an estimate for the model that is saved it is off
     by more, not by less. The price is that an effect chosen by chance from noise alone seems worth a little;
-    :func:`~thermal_robot.diagnosis.earned.earned` asks for more than that.
-
-    The intervals are of what fresh rows of the same kind would say of the saved model, noise included: for the whole of
-    the mean squares after and before, for an effect of its Shapley value.
-
-    Raises
-    ------
-    EstimationError
-        If all rows repeat one pose, so that there is only one fold.
+    :func:`~thermal_robot.diagnosis.earned.earned` asks for more than that. The intervals are of what fresh rows of the
+    same kind would say of the saved model, noise included: for the whole of the mean squares after and before, for an
+    effect of its Shapley value. Raises :class:`EstimationError` if all rows repeat one pose, so that there is only one
+    fold.
     """
     block = blocks(fit.campaign)
     count = int(block.max()) + 1
@@ -79,18 +74,10 @@ def held_out(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Shri
 
 
 def shrinkage(explanation: Explanation, before: Linear, families: Sequence[str], block: Labels) -> Shrinkage:
-    """Cross-validate an explanation; see :func:`held_out`.
+    """Cross-validate an explanation, linearised at the corrected model; see :func:`held_out`.
 
-    Parameters
-    ----------
-    explanation
-        Linearised at the corrected model.
-    before
-        The problem at the nominal robot with the blocks of the explanation's best combination, in their order.
-    families
-        Name of the effect that each block of the explanation belongs to.
-    block
-        (N,) label 0..B−1 of each row: which are held out together.
+    ``before`` is the problem at the nominal robot with the blocks of the best combination, in their order; rows of one
+    ``block`` (N,) are held out together.
     """
     walks = _Walks.of(explanation, before, families, block)
     left = walks.residuals(walks.players)
@@ -107,17 +94,8 @@ def shrinkage(explanation: Explanation, before: Linear, families: Sequence[str],
 class _Walks:
     """What is left before and after: of the nominal robot, and of the model with some of its effects.
 
-    Attributes
-    ----------
-    before, after
-        The walks: of the nominal robot with a part of the model's effects, and of the model with every effect that is
-        asked about.
-    numbers
-        Per effect of the walk: its block in the explanation.
-    players
-        Those that are in the model.
-    seen
-        Sums of squares by the effects that are in.
+    ``before`` has a part of the model's effects, ``after`` every effect asked about; ``numbers`` are their blocks in
+    the explanation, ``players`` those in the model, ``seen`` sums of squares by the effects that are in.
     """
 
     before: Walk
@@ -184,3 +162,104 @@ def _shares(walks: _Walks, families: Sequence[str]) -> dict[str, Share]:
             gained = walks.gain(players, (outside[family],)) if family in outside else 0.0 * nothing
             shares[family] = share(gained, nothing)
     return shares
+
+
+Rows = NDArray[np.bool_]
+
+
+def worst_folds(fit: Fit) -> tuple[FoldScheme, ...]:
+    """Hold rows out by time, session, temperature, region and reach; the scheme of the largest rms after comes first.
+
+    Its shrinkage need not be the smallest, as the gap before may be larger on its rows, too. Every figure has the noise
+    of the held-out rows in it. A scheme is left out if the campaign lacks its column; a fold if its training rows do
+    not determine the frames.
+    """
+    model = Model.of(fit.explanation, blocks(fit.campaign))
+    plain = model.bare(fit.before)
+    known = events_known(fit, plain, model)
+    apart = {"time": (plain, model)}
+    found = [_judged(*apart.get(name, known), name, words, tests) for name, words, tests in schemes(fit)]
+    return tuple(sorted((f for f in found if f is not None), key=lambda f: -f.rms_after))
+
+
+def events_known(fit: Fit, plain: Model, model: Model) -> tuple[Model, Model]:
+    """Return the models of the frames alone and of a fit once what its events moved is taken out of the gap.
+
+    What stands elsewhere in a session is not told by the others, nor what stood elsewhere in all rows of a region:
+    whether the rest carries over to these can be asked only where that is known, as by registering anew.
+    """
+    e, held = fit.explanation, list(zip(fit.explanation.best.blocks, fit.effects, strict=True))
+    events = [(b, effect) for b, (effect, _) in held if is_event(effect)]
+    if not events:
+        return plain, model
+    before = fit.before.gap - sum(block(fit.nominal, effect).columns @ e.values[b][0] for b, effect in events)
+    after = e.linear.gap - sum(e.linear.contribution(b, e.values[b][0]) for b, _ in events)
+    rest = [k for k, (_, (effect, _)) in enumerate(held) if not is_event(effect)]
+    linear = Linear(after, e.linear.frames, tuple(model.linear.blocks[k] for k in rest))
+    bare = Linear(before, plain.linear.frames, ())
+    scales = tuple(model.scales[k] for k in rest)
+    return replace(plain, linear=bare, seen={}), replace(model, linear=linear, scales=scales, seen={})
+
+
+def hardest(schemes: Sequence[FoldScheme], average: HeldOut) -> FoldScheme | None:
+    """Return the least favourable scheme where it leaves clearly more than the average; ``None`` where it does not."""
+    return next((s for s in schemes[:1] if s.rms_after > settings.HARDER * average.rms_after), None)
+
+
+def harmed(schemes: Sequence[FoldScheme]) -> FoldScheme | None:
+    """Return the way of holding out by session or region that the correction harms; ``None`` where there is none."""
+    return next((s for s in schemes if s.name in ("session", "region") and s.shrinkage < 0.0), None)
+
+
+def worse_elsewhere(narrow: Fit, wider: Fit) -> bool:
+    """Tell whether a wider explanation overfits: whether it is worse on held-out regions of joint space."""
+    kept = ~(narrow.explanation.outliers | wider.explanation.outliers)
+    rows, tests = blocks(narrow.campaign), each(neighbourhoods(narrow.campaign, settings.FOLDS))
+    left = []
+    for fit in (narrow, wider):
+        walk = Walk.over(replace(Model.of(fit.explanation, rows), kept=kept), tests)
+        if not walk.tests:
+            return False
+        left.append(walk.squares(range(len(fit.effects))).total / walk.rows)
+    return left[1] > settings.WORSE_ELSEWHERE**2 * left[0]
+
+
+def schemes(fit: Fit) -> Iterator[tuple[str, str, list[Rows]]]:
+    """Yield name and description of each scheme, and a mask (N,) of the rows that each of its folds holds out."""
+    campaign = fit.campaign
+    yield "time", "blocks of consecutive rows", each(blocks(campaign))
+    session = campaign.labels.get("session")
+    if session is not None and len(set(session.tolist())) > 1:
+        yield "session", "one session after the other", each(np.unique(session, return_inverse=True)[1])
+    temperature = _temperature(campaign)
+    if temperature is not None and np.ptp(temperature) > settings.COLDEST:
+        cold, warm = (np.quantile(temperature, share) for share in (1.0 / settings.FOLDS, 1.0 - 1.0 / settings.FOLDS))
+        yield "temperature", "the coldest fifth, and the warmest", [temperature <= cold, temperature >= warm]
+    yield "region", "neighbourhoods of joint positions", each(neighbourhoods(campaign, settings.FOLDS))
+    reach = np.linalg.norm(fit.nominal.position, axis=1)
+    yield "reach", "the fifth that reaches out furthest", [reach >= np.quantile(reach, 1.0 - 1.0 / settings.FOLDS)]
+
+
+def _temperature(campaign: Campaign) -> Array | None:
+    """(N,) temperature of the robot, or the mean of its links, °C; ``None`` if not recorded."""
+    recorded = campaign.covariates
+    columns = ["temperature"] if "temperature" in recorded else [c for c in recorded if c.startswith("temperature.")]
+    return np.mean([recorded[c] for c in columns], axis=0) if columns else None
+
+
+def _judged(plain: Model, model: Model, name: str, held_out: str, tests: list[Rows]) -> FoldScheme | None:
+    walk = Walk.over(model, tests)
+    if not walk.tests:
+        return None
+    before = Walk(plain, walk.tests).squares(())
+    after = walk.squares(range(len(model.spans))) if model.spans else before
+    return FoldScheme(
+        name,
+        held_out,
+        len(walk.tests),
+        walk.rows,
+        float(np.sqrt(before.total / walk.rows)),
+        float(np.sqrt(after.total / walk.rows)),
+        1.0 - after.total / before.total if before.total > 0.0 else 0.0,
+        deviation(np.sqrt(after.without / np.maximum(walk.rows_without, 1.0))),
+    )

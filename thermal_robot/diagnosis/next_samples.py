@@ -44,24 +44,11 @@ if TYPE_CHECKING:
 def most_informative(
     root: Array, frames: Array, count: int, alike: NDArray[np.int64] | None = None
 ) -> tuple[list[int], list[float]]:
-    """Choose candidates greedily, those that tell most about the parameters.
+    """Choose candidates greedily, those that tell most about the parameters; with the information gained so far, nats.
 
-    Parameters
-    ----------
-    root, frames
-        (K, m, p) and (K, m, f): root of the covariance of what is expected of each candidate's m components, in units
-        of the noise, and of its part from the frames, were the parameters known.
-    count
-        How many are chosen.
-    alike
-        (K,) of those with the same number only one may be chosen; by default each has its own.
-
-    Returns
-    -------
-    chosen
-        Candidates, in the order in which they were chosen.
-    gains
-        Information of each and those before it, nats.
+    ``root`` (K, m, p) and ``frames`` (K, m, f): root of the covariance of what is expected of each candidate's m
+    components, in units of the noise, and of its part from the frames, were the parameters known. Of candidates with
+    the same number in ``alike`` (K,) only one is chosen.
     """
     alike = np.arange(len(root)) if alike is None else alike
     free = np.ones(len(root), dtype=bool)
@@ -166,30 +153,10 @@ class NextSamples:
 
 
 def next_samples(fit: Fit, count: int = 10, pool: int = 400, seed: int = 0, loads: Sequence[float] = ()) -> NextSamples:
-    """Choose the samples to measure next.
+    """Choose the samples to measure next; none where none would be informative.
 
-    Parameters
-    ----------
-    fit
-        The fit of the campaign so far.
-    count
-        Number of samples.
-    pool
-        Number of candidates from which they are chosen, see :func:`candidates`.
-    seed
-        Seed of the candidates; the same seed gives the same samples.
-    loads
-        Payloads beside none, kg, that candidates may carry where the campaign recorded none.
-
-    Returns
-    -------
-    NextSamples
-        Empty where no sample would be informative.
-
-    Raises
-    ------
-    CampaignError
-        If ``count`` is no whole number above 0.
+    They are drawn from a ``pool`` of :func:`candidates`; ``loads`` are payloads beside none, kg, that these may carry
+    where the campaign recorded none. Raises :class:`CampaignError` if ``count`` is no whole number above 0.
     """
     if not isinstance(count, (int, np.integer)) or count < 1:
         expected = "a whole number above 0"
@@ -305,12 +272,7 @@ def _conditions(fit: Fit, leading: Sequence[Combination]) -> list[str]:
 class _Expected:
     """Predictive distribution of the candidates under one explanation, in units of the noise: N(mean, root root' + 1).
 
-    Attributes
-    ----------
-    mean
-        (K, m).
-    root, frames
-        (K, m, p) and (K, m, f): root of the covariance, and of the part from the frames, were the effects known.
+    ``mean`` (K, m), ``root`` (K, m, p) of the covariance, ``frames`` (K, m, f) its part were the effects known.
     """
 
     mean: Array
@@ -382,11 +344,7 @@ class _Conditional:
 
 
 def _further(i: _Conditional, j: _Conditional, apart: Array, chosen: Sequence[int]) -> Array:
-    """(K,) increase of KL(i, j) by each candidate; ``apart`` is μ_i − μ_j.
-
-    The trace of C_j⁻¹ times C_i about B_j and the means' distance, as sums of products; what hangs on j alone is made
-    once.
-    """
+    """(K,) increase of KL(i, j) by each candidate, as sums of products; ``apart`` is μ_i − μ_j."""
     left = apart - j.gain @ apart[list(chosen)].ravel()
     trace = (j.inverse * i.own).sum(axis=(1, 2)) + ((j.inverse @ left[:, :, None])[:, :, 0] * left).sum(axis=1)
     if len(chosen):

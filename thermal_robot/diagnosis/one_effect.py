@@ -20,7 +20,7 @@ from thermal_robot.diagnosis import settings
 from thermal_robot.diagnosis.explained import Explained, Place
 from thermal_robot.diagnosis.where import locate
 from thermal_robot.effects import Effect, Parameter
-from thermal_robot.effects.channel import by_place, sensitivity
+from thermal_robot.effects.apply import by_place, sensitivity
 from thermal_robot.effects.effect import Channel, Driver
 from thermal_robot.effects.gate import driver
 from thermal_robot.effects.quantities import quantities, unit
@@ -33,20 +33,7 @@ from thermal_robot.observations import Observations
 
 
 def explained(fit: Fit, effect: str) -> Explained:
-    """Return what one effect of the fit explains at each place, without the outliers.
-
-    Parameters
-    ----------
-    fit
-        The fit.
-    effect
-        Name of an effect of the fit.
-
-    Raises
-    ------
-    EffectError
-        If the effect is not part of the fit.
-    """
+    """Tell what one effect of the fit explains at each place, outliers left out; :class:`EffectError` if not in it."""
     held = {e.name: (e, values) for e, values in fit.effects}
     if effect not in held:
         listed = ", ".join(held) or "no effect"
@@ -111,10 +98,7 @@ def _undetermined(frames: Array, direction: Array, error: Array) -> float:
 
 
 def _error(observations: Observations, parameters: list[tuple[Parameter, float]]) -> tuple[Array, Array, str]:
-    """Return (N,) the error at a place, (N, m) the displacement of the target per unit error, and the unit.
-
-    An error with several components is taken along its principal direction (first singular vector).
-    """
+    """(N,) error at a place along its first singular vector, (N, m) displacement of the target per unit, and unit."""
     measures = observations.gap.shape[1]
     samples = len(observations.q)
     parts: dict[tuple[Channel, int], Array] = {}

@@ -33,28 +33,13 @@ Rows = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A linear model whose frames and parameters can be fitted to any rows.
+    """A linear model whose frames and K parameters can be fitted to any rows.
 
-    Attributes
-    ----------
-    linear
-        Gap, frames and the blocks of the model, K columns in all.
-    scales
-        Per block: prior standard deviation of its parameters, in their expected sizes; one for all, or (P,) with next
-        to none where one is held at zero.
-    whitening
-        Weights and noise of all rows; a fit to some rows whitens those alone.
-    variance
-        Of the noise, in squares of the whitening noise: priors count against it.
-    kept
-        (N,) rows on which the model is judged.
-    block
-        (N,) block of consecutive rows that each belongs to, 0..B−1.
-    apart
-        Whether positions and orientations each count by what is left of them, as where frames are registered; not in
-        the ratio of their noise.
-    seen
-        Sums of products by the rows that they are over.
+    ``scales``: prior standard deviation of each block's parameters, in expected sizes; one for all, or (P,), next to
+    none where held at zero. ``variance`` of the noise in squares of the whitening noise, against which priors count; a
+    fit to some rows whitens those alone. ``kept`` (N,): rows on which it is judged; ``block`` (N,): block of
+    consecutive rows, 0..B−1. ``apart``: positions and orientations count by what is left of each, as where frames are
+    registered, not in the ratio of their noise. ``seen``: sums of products by their rows.
     """
 
     linear: Linear
@@ -68,10 +53,7 @@ class Model:
 
     @classmethod
     def of(cls, explanation: Explanation, block: Labels, further: Mapping[int, float] | None = None) -> Model:
-        """Return the model of an explanation: its effects, prior scales, weights and noise; outliers do not judge it.
-
-        ``further`` blocks, with the scale of each, come after its own.
-        """
+        """Return the model of an explanation, not judged by outliers; ``further`` blocks with scales come last."""
         e = explanation
         own = {b: e.held(b) / e.linear.blocks[b].sizes for b in e.best.blocks}
         scales: dict[int, Array | float] = {**own, **(further or {})}
@@ -177,10 +159,7 @@ class Model:
         ).astype(np.int64)
 
     def fits(self, rows: Sequence[Rows], chosen: Sequence[int]) -> list[Array]:
-        """Fit the frames and some blocks to each set of rows: (k + 1,) each, −θ and 1.
-
-        What the blocks leave on all rows counts as noise against the priors.
-        """
+        """Fit frames and some blocks to each set of rows: (k + 1,) −θ and 1; what all rows leave is noise to priors."""
         picked = self.columns(chosen)
         tight = self.tight[picked[self.flat : -1] - self.flat]
         own = (slice(None), picked[:, None], picked)
@@ -207,15 +186,7 @@ def _signed(products: Array, variance: Array, flat: int, tight: Array) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class Squares:
-    """Sums of squared distances of the rows held out, m².
-
-    Attributes
-    ----------
-    total
-        Over all of them.
-    without
-        (B,) of the walk that is repeated without each block.
-    """
+    """Sums of squared distances of rows held out, m²: over all, and (B,) of the walk repeated without each block."""
 
     total: float
     without: Array
@@ -235,15 +206,7 @@ class Squares:
 
 @dataclass(frozen=True, eq=False)
 class Walk:
-    """A model fitted without each fold, and what it leaves there.
-
-    Attributes
-    ----------
-    model
-        The model.
-    tests
-        Per fold: (N,) the rows that it holds out.
-    """
+    """A model fitted without each fold, and what it leaves there; ``tests`` are (N,) the rows that each holds out."""
 
     model: Model
     tests: tuple[Rows, ...]

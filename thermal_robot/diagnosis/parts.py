@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from typing import Literal
+from dataclasses import asdict, dataclass, field
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from thermal_robot.arrays import Array
 from thermal_robot.campaign.plausible import in_another_unit
 from thermal_robot.effects.effect import in_words
-from thermal_robot.effects.law_size import Size
+from thermal_robot.effects.law_words import Size
 
 UNIT = 30.0
 """Times too long or too short that all links are where a unit is wrong, not the model: inches read as m are 39, cm a
@@ -23,15 +23,9 @@ hundred, mm a thousand; sisters differ by three."""
 class AnotherModel:
     """The robot that was measured, as far as a table tells it from that of the URDF.
 
-    Attributes
-    ----------
-    factor
-        How many times as long as in the URDF its links are; ``None`` where they have no common factor.
-    joint, off
-        The joint that sits farthest from where the URDF has it, and how far, m.
-    fits, remains
-        A robot at hand that fits the table, as :func:`~thermal_robot.load_robot` takes it, and the median distance that
-        it leaves, m; ``None`` where none fits.
+    Its links are ``factor`` times as long, if all alike; ``joint`` sits farthest from where the URDF has it, ``off`` m.
+    A robot at hand that ``fits`` the table, as :func:`~thermal_robot.load_robot` takes it, leaves the median distance
+    ``remains``, m.
     """
 
     factor: float | None = None
@@ -159,17 +153,10 @@ class Refused:
 class DataFault:
     """A fault of the table, not of the robot, that alone makes robot and table fit.
 
-    Attributes
-    ----------
-    kinds
-        What kinds of faults it may be: those that the data cannot tell apart.
-    what, remedy
-        What is wrong and what to do about it, in plain words without a full stop; alternatives stand side by side.
-    rms_before, rms_after
-        Rms distance over the rows struck, once frames are registered, as they stand and mended, m. Where orientations
-        are measured their turns count in it.
-    rows
-        Numbers in the file of the rows that it struck; empty where it struck all.
+    ``kinds`` are those that the data cannot tell apart; ``what`` and ``remedy`` in plain words without a full stop.
+    ``rms_before`` and ``rms_after``: rms distance, m, over the rows struck once frames are registered, as they stand
+    and mended; where orientations are measured their turns count in it. ``rows``: numbers in the file, empty where it
+    struck all.
     """
 
     kinds: tuple[str, ...]
@@ -184,12 +171,8 @@ class DataFault:
 class Misfit:
     """Robot and table do not belong together, so that nothing is said of the robot.
 
-    Attributes
-    ----------
-    fault, model
-        The fault of the table that would mend it, or what is told of another robot; ``None`` where neither is.
-    away, turned
-        Where none does: rms distance, m, or rms turn, rad, that the best explanation leaves; ``None`` for what fits.
+    ``fault`` of the table that would mend it, or ``model``, another robot; where neither, ``away`` and ``turned``: rms
+    distance, m, or turn, rad, that the best explanation leaves, ``None`` for what fits.
     """
 
     fault: DataFault | None = None
@@ -214,17 +197,9 @@ class HeldOut:
     Frames and parameters are fitted anew without each fold. Candidates, the choice among them, the place and quantity
     of a law, refined constants, prior scales and outliers are those of all rows.
 
-    Attributes
-    ----------
-    scheme, folds
-        How rows are held out, and how many times.
-    rms_before, rms_after
-        With the frames alone, and with the effects; outliers left out.
-    shrinkage, shrinkage_ci95
-        1 − (rms_after / rms_before)², the sum of the shares of the model's effects; with the interval in which it lies
-        on fresh rows of the same kind with the model that is saved.
-    rms_before_with_aside, rms_after_with_aside
-        The same rms with the rows set aside in it; ``None`` where that was not asked.
+    ``rms_before`` is with the frames alone, ``rms_after`` with the effects, outliers left out; ``…_with_aside`` with
+    the rows set aside, ``None`` where not asked. ``shrinkage`` is 1 − (rms_after / rms_before)², the sum of the shares
+    of the model's effects, with the interval in which it lies on fresh rows of the same kind with the saved model.
     """
 
     scheme: str
@@ -239,22 +214,11 @@ class HeldOut:
 
 @dataclass(frozen=True)
 class FoldScheme:
-    """Shrinkage of the gap under one scheme of holding rows out.
+    """Shrinkage of the gap under one scheme: ``time``, ``session``, ``temperature``, ``region`` or ``reach``.
 
-    Attributes
-    ----------
-    name
-        ``time``, ``session``, ``temperature``, ``region`` or ``reach``.
-    held_out
-        What is held out at a time, in plain words.
-    folds, rows
-        How many folds could be fitted, and how many rows were held out in them.
-    rms_before, rms_after
-        Rms distances of these rows, m: with the frames alone, and with the effects.
-    shrinkage
-        1 − (rms_after / rms_before)².
-    uncertainty
-        Standard error of rms_after, m.
+    ``held_out`` says what is held out at a time; ``folds`` could be fitted, ``rows`` were held out in them. Rms
+    distances of these rows, m, with the frames alone and with the effects, and the standard ``uncertainty`` of the
+    latter, m; ``shrinkage`` is 1 − (rms_after / rms_before)².
     """
 
     name: str
@@ -317,15 +281,9 @@ class Where:
 
 @dataclass(frozen=True)
 class Dependence:
-    """A recorded quantity that the remainder follows.
+    """A recorded quantity that the remainder follows, with the p-value of an F test, corrected for all those tried.
 
-    Attributes
-    ----------
-    covariate
-        Its name.
-    p_value
-        Of an F test, after counting every quantity that was tried; where a discovered law follows it, the posterior
-        probability that it follows another one.
+    Where a discovered law follows it: the posterior probability that it follows another one.
     """
 
     covariate: str
@@ -334,23 +292,12 @@ class Dependence:
 
 @dataclass(frozen=True)
 class Unexplained:
-    """The residual beyond the noise.
+    """The residual beyond the noise; ``flagged`` where it is significantly larger or more structured than noise.
 
-    Attributes
-    ----------
-    flagged
-        Whether the residual is significantly larger or more structured than noise.
-    rms
-        Its rms distance, m. The noise is subtracted if it is stated or known from repeats. 0 if not flagged.
-    p_value
-        The smallest of all tests, with Bonferroni correction; where laws were found, at most the posterior probability
-        that there is none.
-    reasons
-        One sentence for each test that failed.
-    locations
-        Where it most probably enters.
-    depends_on
-        The quantities that it follows, most significant first.
+    ``rms`` distance, m, less the noise if that is stated or known from repeats, 0 if not flagged. ``p_value`` is the
+    smallest of all tests, with Bonferroni correction; where laws were found, at most the posterior probability that
+    there is none. ``reasons``: a sentence for each failed test; ``locations``: where it most probably enters;
+    ``depends_on``: what it follows, most significant first.
     """
 
     flagged: bool
@@ -365,21 +312,12 @@ class Unexplained:
 class Wanted:
     """The one thing that would help most.
 
-    Attributes
-    ----------
-    kind
-        ``column``: to be recorded; ``frame``: to be measured and declared known; ``pose``: to be measured; ``range``:
-        poses over the whole range of every joint; ``repeats``: poses repeated on another day.
-    name
-        Of the column (of repeats: that labels them), or of the frame as the campaign declares it; empty elsewhere.
-    apart
-        Effects that this tells apart.
-    untested, whether
-        Effects that could then be tested; and the cause that a column would show or rule out, in a word.
-    place, follows
-        Of a remainder that a column would tell of: where it enters, and what it follows; empty where not known.
-    position, conditions
-        Of a pose: joint positions by name, rad or m, and further columns, SI.
+    ``kind`` is ``column``: to be recorded; ``frame``: to be measured and declared known; ``pose``: to be measured;
+    ``range``: poses over the whole range of every joint; ``repeats``: poses repeated on another day. ``name`` is that
+    of the column (of repeats: that labels them) or frame. It tells effects ``apart``; ``untested`` could then be
+    tested, ``whether`` is the cause that a column would show or rule out. ``place`` and ``follows``, of a remainder
+    that a column would tell of, where known. ``position`` and ``conditions`` of a pose: by name, rad or m, and further
+    columns, SI.
     """
 
     kind: Literal["column", "frame", "pose", "range", "repeats"]
@@ -435,3 +373,33 @@ class Sensitivity:
 
     smaller: float
     larger: float
+
+
+def gap_as_json(gap: Gap) -> dict[str, Any]:
+    """Return the object that stands in the JSON under ``gap``."""
+    orientation = None
+    if gap.orientation_before is not None:
+        orientation = {"rms_before": gap.orientation_before, "rms_after": gap.orientation_after}
+    return {
+        "rms_before": gap.rms_before,
+        "rms_after": gap.rms_after,
+        "noise_floor": gap.noise_floor,
+        "noise_source": gap.noise_source,
+        "orientation": orientation,
+        "held_out": asdict(gap.held_out),
+        "schemes": [asdict(scheme) for scheme in gap.schemes],
+        "hardest": None if gap.hardest is None else gap.hardest.name,
+    }
+
+
+def jsonable(value: Any) -> Any:
+    """Return what JSON can hold: lists for tuples, numbers of Python for those of NumPy, ``None`` for infinite ones."""
+    if isinstance(value, Mapping):
+        return {str(k): jsonable(v) for k, v in value.items()}
+    if isinstance(value, (list, tuple)):
+        return [jsonable(v) for v in value]
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value

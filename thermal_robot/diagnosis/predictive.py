@@ -35,16 +35,9 @@ from thermal_robot.prediction import Spread, by_parameters, moves, sensitivity
 
 
 def uncertainty(fit: Fit, needs: tuple[str, ...], floor: float) -> Spread:
-    """Return what makes the predictions of a fit uncertain.
+    """Return what makes predictions of a fit uncertain; ``needs`` are the columns that its model reads.
 
-    Parameters
-    ----------
-    fit
-        The fit whose model predicts.
-    needs
-        Columns that it reads.
-    floor
-        One sigma per axis of the noise where the campaign states none, m.
+    ``floor`` is one sigma per axis of the noise where the campaign states none, m.
     """
     campaign, model = fit.campaign, Model.of(fit.explanation, blocks(fit.campaign))
     covariance, wider = _covariances(fit, model)
@@ -66,10 +59,7 @@ def uncertainty(fit: Fit, needs: tuple[str, ...], floor: float) -> Spread:
 
 
 def _between(fit: Fit, session: NDArray[np.str_] | None) -> Array | None:
-    """(3,) one sigma per axis by which sessions differ in what is left, measurement frame, m; ``None`` for one session.
-
-    The variance of their means less what the rows of each make it by chance.
-    """
+    """(3,) one sigma per axis by which sessions truly differ, measurement frame, m; ``None`` for one session."""
     kept = ~fit.explanation.outliers
     left = fit.corrected.gap[kept, :3] @ fit.corrected.frames.base[:3, :3].T
     runs = [] if session is None else [left[session[kept] == run] for run in np.unique(session[kept])]
@@ -142,10 +132,7 @@ def _symmetric(matrix: Array) -> Array:
 
 
 def _held_out(fit: Fit, model: Model) -> tuple[Array, NDArray[np.int64]]:
-    """(H, 3) what is left of rows while they are held out, measurement frame, m, and the number of each.
-
-    Where none can be held out, of all rows.
-    """
+    """(H, 3) what is left of rows held out, of all where none can be, measurement frame, m, and the number of each."""
     walk, base = Walk.over(model, each(model.block)), fit.corrected.frames.base[:3, :3]
     if not walk.tests:
         return fit.corrected.gap[:, :3] @ base.T, np.arange(fit.campaign.samples)

@@ -14,8 +14,19 @@ from typing import TYPE_CHECKING, Any, Protocol
 import numpy as np
 
 from thermal_robot.correction import CorrectedModel
-from thermal_robot.diagnosis.parts import Finding, Gap, Misfit, Rows, Sensitivity, Unexplained, Wanted, Where, is_frame
-from thermal_robot.diagnosis.plain import gap_as_json, jsonable
+from thermal_robot.diagnosis.parts import (
+    Finding,
+    Gap,
+    Misfit,
+    Rows,
+    Sensitivity,
+    Unexplained,
+    Wanted,
+    Where,
+    gap_as_json,
+    is_frame,
+    jsonable,
+)
 from thermal_robot.effects.catalogue import of_effect
 from thermal_robot.files import write_text
 from thermal_robot.teller import registered

@@ -48,15 +48,7 @@ STRAIGHT = (
 
 
 def as_counted(campaign: Campaign, own: Sequence[Effect] = ()) -> Campaign:
-    """Return a campaign that reads what counts the other way with the other sign, and says so first.
-
-    Parameters
-    ----------
-    campaign
-        With measurements.
-    own
-        Effects of the user's, considered beside those of the library.
-    """
+    """Read with the other sign what counts the other way, and say so first; ``own`` are the user's effects."""
     tried: set[str] = set()
     while (quantity := _against(campaign, own, tried)) is not None:
         tried.add(quantity)

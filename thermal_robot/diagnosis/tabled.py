@@ -25,11 +25,8 @@ _AXES = ("x", "y", "z", "rx", "ry", "rz")
 def parameters(findings: tuple[Finding, ...]) -> pd.DataFrame:
     """Return a row for each parameter that is told of an effect, in the order of the findings.
 
-    Returns
-    -------
-    DataFrame
-        Index (effect, parameter); columns ``status``, ``value``, ``std`` (one sigma), ``unit`` and ``identified``.
-        Values are NaN where the data do not identify the parameter.
+    Index (effect, parameter); columns ``status``, ``value``, ``std`` (one sigma), ``unit`` and ``identified``; NaN
+    where the data do not identify it.
     """
     found = estimates((finding.name, estimate) for finding in findings for estimate in finding.parameters)
     found.insert(0, "status", [finding.status for finding in findings for _ in finding.parameters])
@@ -53,23 +50,11 @@ def estimates(of_effects: Iterable[tuple[str, Estimate]]) -> pd.DataFrame:
 
 
 def covariance(fit: Fit, joint: Array) -> pd.DataFrame:
-    """Return the covariance of the identified parameters of the fit.
+    """Covariance of the identified parameters of the fit, by (effect, parameter), in the product of their SI units.
 
-    The deviations are those of :func:`parameters`, widened to what the remainder says of each effect
-    (:func:`~thermal_robot.diagnosis.deviations.as_remainder_says`); the correlations are those of the posterior of
-    all frames and parameters together, frames marginalised.
-
-    Parameters
-    ----------
-    fit
-        The fit.
-    joint
-        (K, K) covariance of frames and parameters together, those of the effects last, in the order of the fit.
-
-    Returns
-    -------
-    DataFrame
-        Index and columns (effect, parameter); entries in the product of the two parameters' SI units.
+    Deviations are those of :func:`parameters`, widened to what the remainder says of each effect
+    (:func:`~thermal_robot.diagnosis.deviations.as_remainder_says`); correlations those of the ``joint`` (K, K)
+    posterior of all frames and parameters, those of the effects last, frames marginalised.
     """
     import pandas as pd
 
@@ -90,14 +75,11 @@ def covariance(fit: Fit, joint: Array) -> pd.DataFrame:
 
 
 def fitted_frames(model: CorrectedModel) -> pd.DataFrame:
-    """Return where the robot stands and where the target sits, as they were declared or fitted.
+    """Where the robot stands and where the target sits, as they were declared or fitted.
 
-    Returns
-    -------
-    DataFrame
-        Index ``base`` (the root frame in the measurement frame) and ``tool`` (the target in the tool frame); columns
-        ``x`` ``y`` ``z`` in m, and ``roll`` ``pitch`` ``yaw`` in rad, as in a URDF. Those of a target of which
-        positions alone were measured are NaN: a point has no direction, unless the campaign declares one as known.
+    Index ``base`` (the root frame in the measurement frame) and ``tool`` (the target in the tool frame); columns ``x``
+    ``y`` ``z`` in m, and ``roll`` ``pitch`` ``yaw`` in rad, as in a URDF; NaN for a target of which positions alone
+    were measured, unless declared: a point has no direction.
     """
     import pandas as pd
 
@@ -110,15 +92,11 @@ def fitted_frames(model: CorrectedModel) -> pd.DataFrame:
 
 
 def residuals(rows: Rows) -> pd.DataFrame:
-    """Return the gap and the remainder, row by row.
+    """Gap and remainder by ``row``, the number in the file, in the root frame's axes.
 
-    Returns
-    -------
-    DataFrame
-        Index ``row``, the number in the file. Columns ``gap.x`` … and ``remainder.x`` … in m, of poses also ``.rx``
-        ``.ry`` ``.rz`` in rad, in the root frame's axes, the turn of several targets in those of their common frame;
-        ``held_out.before`` and ``held_out.after``, the distance in m of the row when it was held out (NaN where it was
-        set aside); ``set_aside``.
+    Columns ``gap.x`` … and ``remainder.x`` … in m, of poses also ``.rx`` ``.ry`` ``.rz`` in rad, the turn of several
+    targets in the axes of their common frame; ``held_out.before`` and ``held_out.after``, distance in m when held out
+    (NaN where set aside); ``set_aside``.
     """
     import pandas as pd
 

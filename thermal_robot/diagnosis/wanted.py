@@ -22,20 +22,10 @@ def wanted(
     laws: Unexplained,
     probability: float,
 ) -> Wanted | None:
-    """Return what would help most; ``None`` where the data determine the explanation.
+    """Return what would help most, by all findings; ``None`` where the data determine the explanation.
 
-    Parameters
-    ----------
-    fit
-        The final fit.
-    found
-        Every finding.
-    groups
-        Effects that the data cannot tell apart.
-    left, laws
-        What the whole fit leaves, and what the known effects leave, which laws may explain.
-    probability
-        Of the explanation.
+    ``groups``: effects that the data cannot tell apart; ``left`` and ``laws``: what the whole fit leaves, and what the
+    known effects leave, which laws may explain; ``probability`` of the explanation.
     """
     if groups:
         frame = next((need for name in groups[0] for need in _frames(found, name)), "")

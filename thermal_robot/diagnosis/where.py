@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.parts import Location, Unexplained, Where
-from thermal_robot.effects.channel import by_place, column
+from thermal_robot.effects.apply import by_place, column
 from thermal_robot.effects.law import PREFIX
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference.algebra import equations_of, orthonormal, without
@@ -52,22 +52,10 @@ def without_laws(fit: Fit, left: Unexplained) -> Unexplained:
 
 
 def locate(fit: Fit, shrinkage: dict[str, float]) -> tuple[Where, dict[str, tuple[Location, ...]]]:
-    """Attribute the gap to places.
+    """Attribute the gap to places: shares over axes, joints, links, base, tool, instrument, quantities; by effect.
 
-    Parameters
-    ----------
-    fit
-        The fit.
-    shrinkage
-        By effect of the fit: its share of the gap on held-out rows, which is divided among its places.
-
-    Returns
-    -------
-    where
-        Shares over axes, joints, links, base, tool and instrument, and quantities.
-    locations
-        By effect: its places, largest first. The share of a place is proportional to the mean square displacement that
-        its parameters cause, with the unknown frames projected out.
+    The ``shrinkage`` of an effect on held-out rows is divided among its places, largest first, in proportion to the
+    mean square displacement that its parameters there cause, with the unknown frames projected out.
     """
     e = fit.explanation
     rows = np.flatnonzero(~e.outliers)

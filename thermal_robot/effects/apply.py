@@ -1,45 +1,82 @@
-"""From values to displacement: what a set of fitted effects does to the robot."""
+"""From values to displacement: what an error in a channel moves, and what a set of fitted effects does to the robot."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 
 from thermal_robot.arrays import Array
-from thermal_robot.effects.effect import Effect, Parameter
-from thermal_robot.effects.gate import checked, missing
-from thermal_robot.errors import EffectError
+from thermal_robot.effects import gate
+from thermal_robot.effects.effect import Channel, Effect, Parameter, Response
+from thermal_robot.errors import EffectError, ThermalRobotError
 from thermal_robot.kinematics import Displacement
 
 if TYPE_CHECKING:
+    from thermal_robot.campaign import Campaign
     from thermal_robot.observations import Observations
+    from thermal_robot.robot import Robot
+
+
+def sensitivity(observations: Observations, channel: Channel, index: int) -> Array:
+    """Return (N, 6, k): twist of the target a unit of each of a channel's k components, root frame axes, m and rad.
+
+    One component in a joint (rad or m), six of a twist at a segment, the base and the tool (in the frame that
+    :class:`Response` states), three of a displacement of the measured point (measurement frame, m), which turns
+    nothing.
+    """
+    if channel == "joint":
+        return observations.joint_sensitivity[:, :, index, None]
+    if channel == "segment":
+        return observations.segment_sensitivity[:, :, index, :]
+    if channel == "base":
+        return observations.base_sensitivity
+    if channel == "tool":
+        return observations.tool_sensitivity
+    shifts = np.zeros((observations.campaign.samples, 6, 3))
+    shifts[:, :3] = observations.frames.base[:3, :3].T
+    return shifts
+
+
+def column(observations: Observations, response: Response, measures: int) -> Array:
+    """Return (N, m) change of the target's pose a unit of one response, root frame axes; m = ``measures``, 3 or 6."""
+    values = response.values
+    moves = sensitivity(observations, response.channel, response.index)[:, :measures]
+    if response.channel == "joint":
+        return np.asarray(moves[:, :, 0] * (values[:, None] if values.ndim else values))
+    if values.ndim == 1:
+        used = np.flatnonzero(values)  # most twists move along or about one axis
+        if len(used) == 1:
+            return np.asarray(moves[:, :, used[0]] * values[used[0]])
+        return np.asarray(moves[:, :, used] @ values[used])
+    return np.asarray(np.einsum("nrk,nk->nr", moves, values))
+
+
+def by_place(robot: Robot, parameter: Parameter) -> tuple[Parameter, ...]:
+    """Return a parameter place by place: itself where it has one, else a part for each place that it acts on.
+
+    A parameter without a place, such as one coefficient of expansion for all links, acts on all of them at once; the
+    part at a joint, link, base, tool or instrument has the responses there.
+    """
+    if parameter.place:
+        return (parameter,)
+    named = {"segment": tuple(s.parent_link for s in robot.segments), "joint": robot.joint_names}
+    parts: dict[str, tuple[Response, ...]] = {}
+    for r in parameter.responses:
+        place = named[r.channel][r.index] if r.channel in named else r.channel
+        parts[place] = (*parts.get(place, ()), r)
+    return tuple(replace(parameter, place=place, responses=responses) for place, responses in parts.items())
 
 
 def displacement(
     observations: Observations, effects: Sequence[tuple[Effect, Array]]
 ) -> tuple[Displacement, Array | None]:
-    """Return what a set of fitted values does: the displacement of the chain, and of the measured point.
+    """Displacement of the chain's four channels by fitted values (P,) of effects, and of the measured point (N, 3), m.
 
-    Parameters
-    ----------
-    observations
-        What the responses are read from.
-    effects
-        Each effect with the (P,) values of its parameters.
-
-    Returns
-    -------
-    displacement
-        The four channels.
-    instrument
-        (N, 3) in the measurement frame, m; ``None`` where no effect acts on the instrument.
-
-    Raises
-    ------
-    EffectError
-        If an effect's parameters break the contract, or are not as many as its values: the rows lack what it reads.
+    The latter stands in the measurement frame, ``None`` where no effect acts on the instrument. Raises
+    :class:`EffectError` if parameters break the contract, or are not as many as values: rows lack what is read.
     """
     samples, robot = observations.campaign.samples, observations.robot
     joint = np.zeros((samples, robot.n))
@@ -65,11 +102,50 @@ def displacement(
 
 def _as_many(effect: Effect, observations: Observations, values: int) -> tuple[Parameter, ...]:
     """Return the parameters of an effect that has so many values."""
-    found = checked(effect, observations)
+    found = gate.checked(effect, observations)
     if len(found) != values:
-        lacking = ", ".join(missing(effect, observations))
+        lacking = ", ".join(gate.missing(effect, observations))
         raise EffectError(
             f"effect {effect.name!r} was fitted with {values} parameters and has {len(found)} in these rows"
             + (f", which lack {lacking}" if lacking else "")
         )
     return found
+
+
+def depends_on(effect: Effect, observations: Observations) -> tuple[str, ...]:
+    """Columns of :func:`gate.reads` without which, or with other values of which, a fitted effect does something else.
+
+    A column counts where the effect's own parameters change as it is left out, or takes other values: one that equals
+    another column here need not do so elsewhere. Raises :class:`EffectError` if the effect breaks the contract.
+    """
+    campaign, own = observations.campaign, gate.checked(effect, observations)
+    read = gate.reads(effect, observations)
+
+    def same(columns: Sequence[str], other: Mapping[str, Array]) -> bool:
+        covariates = {name: values for name, values in campaign.covariates.items() if name not in columns}
+        try:
+            changed = replace(campaign, covariates={**covariates, **other})
+            return _alike(own, gate.checked(effect, replace(observations, campaign=changed)))
+        except ThermalRobotError:  # such rows cannot be: nothing says that they would not matter
+            return False
+
+    spare = [c for c in read if same([c], {}) and any(same([c], {c: other}) for other in _others(campaign, c))]
+    return tuple(c for c in read if c not in spare) if same(spare, {}) else read
+
+
+def _others(campaign: Campaign, column: str) -> tuple[Array, ...]:
+    """Return other values that a column may have: those of other rows, or one more and one less where all are one."""
+    values = campaign.covariates[column]
+    moved = np.roll(values, 1)
+    return (moved,) if np.any(moved != values) else (values - 1.0, values + 1.0)
+
+
+def _alike(some: Sequence[Parameter], others: Sequence[Parameter]) -> bool:
+    """Tell whether parameters have the same names and responses."""
+    if [(p.name, len(p.responses)) for p in some] != [(p.name, len(p.responses)) for p in others]:
+        return False
+    return all(
+        (a.channel, a.index) == (b.channel, b.index) and np.array_equal(a.values, b.values)
+        for p, q in zip(some, others, strict=True)
+        for a, b in zip(p.responses, q.responses, strict=True)
+    )

@@ -54,13 +54,7 @@ _PLAIN: dict[Any, Kind] = {
 
 
 def with_arguments(effect: type[Effect], arguments: Any, path: str) -> Effect:
-    """Return an effect with arguments that came from a file.
-
-    Raises
-    ------
-    MisfitError
-        An argument that it does not take, or that is not what the class says of it.
-    """
+    """Return an effect with arguments from a file; :class:`MisfitError` for one that its class does not take."""
     kinds = _kinds(effect)
     found = mapping(plain)(arguments, path) if kinds is None else record(kinds, may_lack=kinds)(arguments, path)
     made: Callable[..., Effect] = effect

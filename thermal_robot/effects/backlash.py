@@ -12,8 +12,7 @@ from scipy.special import erf
 from thermal_robot.arrays import Array
 from thermal_robot.effects.arguments import NotNegative, Share
 from thermal_robot.effects.effect import Driver, Effect, Parameter, at_joint, at_segment
-from thermal_robot.effects.quantities import driving, unit
-from thermal_robot.effects.torque import torque_columns
+from thermal_robot.effects.quantities import driving, torque_columns, unit
 from thermal_robot.schema import word
 
 if TYPE_CHECKING:
@@ -35,10 +34,10 @@ class Backlash(Effect):
 
     side is ``approach.<joint>``: +1 where the joint was increasing, −1 where it was decreasing, 0 where that is not
     known. Where gravity outweighs friction F_j = held · max|τ_j|, the joint hangs on its teeth, however it came: side
-    is the sign of the torque τ_j that holds it. Near |τ_j| = F_j it changes gradually, over a share of friction:
-    side = ½ (1 + a) erf((τ + F)/(soft F)) + ½ (1 − a) erf((τ − F)/(soft F)), a the approach. A joint that never carries
-    more than 2 % of the robot's largest torque never hangs. Expected size 0.5 mrad, two minutes of arc: catalogues
-    promise 0.3 mrad of cycloidal gears (1′), wear adds to it, and light arms show ten.
+    is the sign of the torque τ_j that holds it. Near |τ_j| = F_j it changes gradually, over a share of friction: side =
+    ½ (1 + a) erf((τ + F)/(soft F)) + ½ (1 − a) erf((τ − F)/(soft F)), a the approach. A joint that never carries more
+    than 2 % of the robot's largest torque never hangs. Expected size 0.5 mrad, two minutes of arc: catalogues promise
+    0.3 mrad of cycloidal gears (1′), wear adds to it, and light arms show ten.
 
     Friction in a loaded gear grows with the load, and holds the gear wound up on the side from which it came: lost
     motion is then b_j + h_j |τ_j|, with h_j in rad/(N·m), as the hysteresis of strain-wave gears widens with torque.
@@ -51,25 +50,12 @@ class Backlash(Effect):
     Only poses that are reached from both sides show it. Where torque decides always, it is nearly
     :class:`JointCompliance`, from which only a jump at zero torque tells it.
 
-    Attributes
-    ----------
-    held
-        Share of the joint's largest torque above which gravity wins; 0 where it never does. One for all joints, or one
-        for each joint of the chain, as each has its own friction.
-    largest
-        Each joint's largest torque in the campaign, N·m: a model goes by this, whatever it is asked to predict.
-    chain
-        Names of these joints.
-    soft
-        Share of friction over which teeth change sides; 0 where they do at once.
-    steady
-        Each joint's torque, N·m, that all but a tenth of the rows exceed, to one side; 0 where the side changes. With
-        less friction the joint always lies on that side: an offset, that is left to it.
-    grows
-        Whether lost motion grows with the torque.
-    carriage
-        Where the carriage of a slide sits that turns as it reverses: ``moving`` with the slide or ``staying``; empty
-        where none turns.
+    ``held``: share of the joint's ``largest`` torque in the campaign, N·m (a model goes by this, whatever it is asked
+    to predict), above which gravity wins, 0 never; one for all joints or one for each of the ``chain``. ``soft``: share
+    of friction over which teeth change sides, 0 at once. ``steady``: each joint's torque, N·m, that all but a tenth of
+    the rows exceed to one side; with less friction it always lies on that side: an offset, that is left to it.
+    ``grows``: lost motion grows with the torque. ``carriage`` of a slide sits ``moving`` with it or ``staying``; empty
+    where none turns.
     """
 
     held: Share | tuple[Share, ...] = 0.0

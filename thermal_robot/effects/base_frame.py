@@ -17,15 +17,10 @@ if TYPE_CHECKING:
 class BaseFrame(Effect):
     """The declared registration of the base is off by a constant twist in the root frame.
 
-    Expected size 2 mm and 2 mrad. Only where the campaign declares ``base = "known"``: an unknown base is fitted
-    before any effect is asked for. It is a twist of the first joint's placement, too, so that :class:`Geometric`
-    contains it. Where the first joint turns about an axis of the root frame, its zero offset is a turn of the base
-    about that axis alone, and no measurement of the tool tells which it is.
-
-    Attributes
-    ----------
-    alone
-        The one component that is off, by its name; empty where all are.
+    Expected size 2 mm and 2 mrad. Only where the campaign declares ``base = "known"``: an unknown base is fitted before
+    any effect is asked for. It is a twist of the first joint's placement, too, so that :class:`Geometric` contains it.
+    Where the first joint turns about an axis of the root frame, its zero offset is a turn of the base about that axis
+    alone, and no measurement of the tool tells which it is. ``alone`` names the one component that is off.
     """
 
     alone: str = ""

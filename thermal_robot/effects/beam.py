@@ -24,10 +24,7 @@ def beams(robot: Robot) -> tuple[int, ...]:
 
 
 def shafts(robot: Robot) -> tuple[int, ...]:
-    """Return the beams that lie along the axis of neither joint at their ends.
-
-    Along such an axis a beam that twists is a joint that yields.
-    """
+    """Return the beams along the axis of neither joint at their ends: along one, a twist is a joint that yields."""
     chain = robot.chain
 
     def turns(s: int) -> bool:

@@ -6,7 +6,7 @@ import json
 import warnings
 from collections.abc import Iterable, Mapping
 from functools import cache
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import entry_points
 from typing import TypeVar
 
 from thermal_robot.campaign.names import did_you_mean
@@ -90,7 +90,8 @@ def library() -> dict[str, Effect]:
     found: dict[str, Effect] = {kind.name: kind() for kind in _SYSTEMATIC}
     for point in entry_points(group="thermal_robot.effects"):
         try:
-            effect = _load(point)
+            loaded = point.load()
+            effect: Effect = loaded() if isinstance(loaded, type) else loaded
             _refuse(effect, found)
         except Exception as error:  # another package's code may raise anything
             reason = str(error) if isinstance(error, EffectError) else f"it raises {error!r}"
@@ -98,12 +99,6 @@ def library() -> dict[str, Effect]:
             continue
         found[effect.name] = effect
     return found
-
-
-def _load(point: EntryPoint) -> Effect:
-    loaded = point.load()
-    effect: Effect = loaded() if isinstance(loaded, type) else loaded
-    return effect
 
 
 def _refuse(effect: Effect, known: dict[str, Effect]) -> None:
@@ -118,13 +113,7 @@ def _refuse(effect: Effect, known: dict[str, Effect]) -> None:
 
 @cache
 def restored(name: str, arguments: str) -> Effect:
-    """Return an effect of the library by its name and its arguments, JSON text.
-
-    Raises
-    ------
-    EffectError
-        If no effect of that name is installed, or it does not take these arguments.
-    """
+    """Effect of the library by its name and its JSON arguments; :class:`EffectError` if not installed, or not taken."""
     known = library()
     if name not in known:
         raise EffectError(f"no effect is named {name!r} here")
@@ -161,20 +150,7 @@ def named(name: str) -> Effect:
 
 
 def of_effect(answers: Mapping[str, _Said], name: str) -> _Said:
-    """Return what an answer says of one effect.
-
-    Parameters
-    ----------
-    answers
-        By the names of those that were considered.
-    name
-        Of the effect.
-
-    Raises
-    ------
-    UnknownEffectError
-        If it was not considered; says which name was probably meant.
-    """
+    """Return what an answer says of one effect; :class:`UnknownEffectError` says which name was probably meant."""
     if name not in answers:
         meant = did_you_mean(str(name), answers) or f"; there are {', '.join(sorted(answers)) or 'none'}"
         raise UnknownEffectError(f"no effect named {name!r} was considered{meant}")

@@ -23,15 +23,9 @@ class Drift(Fading):
     """The base moves by a twist that grows with time from zero at the first measurement: exp(β(t)) T.
 
     Linear, β(t) = β (t − t₀)/span, or exponential, β(t) = β (1 − exp(−(t − t₀)/τ)) / (1 − exp(−span/τ)), so that β is
-    the displacement over the campaign in both. Expected size 0.1 mm and 0.1 mrad. ``order`` takes the place of
-    ``time`` where there is no time column. A model holds what it had become by the end of the campaign.
-
-    Attributes
-    ----------
-    origin, span
-        t₀ and the campaign's duration, in the unit of the column; taken from the campaign.
-    time_constant
-        τ as a share of the span; 0 is linear.
+    the displacement over the campaign in both. Expected size 0.1 mm and 0.1 mrad. ``order`` takes the place of ``time``
+    where there is no time column. A model holds what it had become by the end of the campaign. ``origin`` t₀ and
+    ``span``, in the column's unit, are the campaign's; ``time_constant`` is τ over the span, 0 linear.
     """
 
     origin: float = 0.0

@@ -17,8 +17,8 @@ import numpy as np
 
 from thermal_robot.arrays import Array
 from thermal_robot.effects import settings
-from thermal_robot.effects.effect import Effect, Parameter, at_base, at_joint, at_tool
-from thermal_robot.effects.quantities import unit
+from thermal_robot.effects.effect import Driver, Effect, Parameter, at_base, at_joint, at_tool
+from thermal_robot.effects.quantities import position_of, unit
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -28,18 +28,11 @@ _OF_A_MODEL = ("found", "means", "rests", "fades")
 
 @dataclass(frozen=True)
 class Fading(Effect):
-    """An effect with the range that it was found in.
+    """An effect with the range of its driver in which it was ``found``; empty where it is to have no end.
 
-    Attributes
-    ----------
-    found
-        Least and largest value of what drives it, where it was found; empty where it is to have no end.
-    means
-        Of each of its functions over the rows where it was found; zero where absent.
-    rests
-        Twists of the base (6) and of the tool (6) that frames take over of a unit of each parameter; empty for none.
-    fades
-        Whether it fades beyond, or keeps the value of the edge.
+    It ``fades`` beyond, or keeps the value of the edge. ``means``: of each of its functions over the rows where it was
+    found, zero where absent; ``rests``: twists of the base (6) and of the tool (6) that frames take over of a unit of
+    each parameter.
     """
 
     found: tuple[float, ...] = field(default=(), kw_only=True)
@@ -104,6 +97,10 @@ class OfPosition(Fading):
         if (slides and not order) or (not slides and turns >= 1.0 and not order % 1.0):
             return x, np.ones(len(x))
         return np.clip(x, low, high), left_at(x, low, high)
+
+    def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
+        """Return the joint's own position."""
+        return position_of(observations, parameters[0].place)
 
     def elsewhere(self, observations: Observations) -> Effect:
         """Return the functions without a range: another campaign has its own."""

@@ -34,18 +34,10 @@ _CONSTANT: WeakKeyDictionary[Robot, dict[Effect, tuple[Parameter, ...]]] = WeakK
 def checked(effect: Effect, observations: Observations) -> tuple[Parameter, ...]:
     """Return the parameters of an effect, once they are seen to keep the contract.
 
-    Returns
-    -------
-    tuple of Parameter
-        Read from the N rows of the observations, each with a name of its own, a known kind of place, a place of that
-        kind that the robot has (or none), a positive size, and responses of finite values in a channel and at an index
-        that the robot has, of that channel's shape (see :class:`Response`). Where the effect names ``places``, only
-        those there; none in places that are ``excluded``.
-
-    Raises
-    ------
-    EffectError
-        Otherwise, or if the effect raises anything: the effect, the parameter, what was found and what was expected.
+    Each has a name of its own, a known kind of place, a place of that kind that the robot has (or none), a positive
+    size, and responses of finite values in a channel and at an index that the robot has, of that channel's shape (see
+    :class:`Response`); only those in ``places``, none in ``excluded`` ones. Raises :class:`EffectError` otherwise, or
+    if the effect raises anything: the effect, the parameter, what was found and what was expected.
     """
     if not _is_what_it_holds(effect):
         return _kept(effect, _parameters(effect, observations), observations.robot)
@@ -60,13 +52,7 @@ def checked(effect: Effect, observations: Observations) -> tuple[Parameter, ...]
 
 
 def declared(effect: Effect, observations: Observations) -> tuple[Parameter, ...]:
-    """Return the parameters of an effect without a look at their responses, which may then be of any rows.
-
-    Raises
-    ------
-    EffectError
-        If they are no tuple of Parameter, or the effect raises anything.
-    """
+    """Return the parameters of an effect without a look at their responses, which may then be of any rows."""
     with np.errstate(all="ignore"):
         answer = _asked(effect, "parameters", observations)
     if not isinstance(answer, (tuple, list)) or not all(isinstance(parameter, Parameter) for parameter in answer):
@@ -106,13 +92,7 @@ def _parameters(effect: Effect, observations: Observations) -> tuple[Parameter, 
 
 
 def independent(effect: Effect, observations: Observations) -> tuple[Parameter, ...]:
-    """Return the parameters in which an effect is told (:meth:`Effect.independent`), once they keep the contract.
-
-    Raises
-    ------
-    EffectError
-        Otherwise; see :func:`checked`.
-    """
+    """Return the parameters in which an effect is told (:meth:`Effect.independent`), once they keep the contract."""
     return _seen(effect, _asked(effect, "independent", observations), observations)
 
 
@@ -134,13 +114,7 @@ def _seen(effect: Effect, answer: Any, observations: Observations) -> tuple[Para
 
 
 def driver(effect: Effect, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
-    """Return what drives an effect at a place (:meth:`Effect.driver`), once it is seen to keep the contract.
-
-    Raises
-    ------
-    EffectError
-        If it is not a name, a unit and (N,) finite values.
-    """
+    """Return what drives an effect at a place (:meth:`Effect.driver`): a name, a unit and (N,) finite values."""
     answer = _asked(effect, "driver", observations, parameters, error)
     if answer is None:
         return None
@@ -153,26 +127,14 @@ def driver(effect: Effect, observations: Observations, parameters: Sequence[Para
 
 
 def missing(effect: Effect, observations: Observations) -> tuple[str, ...]:
-    """Return what the campaign lacks for an effect (:meth:`Effect.missing`); its ``needs`` are checked, too.
-
-    Raises
-    ------
-    EffectError
-        If either is not a tuple of texts.
-    """
+    """Return what the campaign lacks for an effect (:meth:`Effect.missing`); it and ``needs`` are tuples of texts."""
     if isinstance(effect, Effect):
         _texts(effect, "needs is", effect.needs)
     return _texts(effect, "missing answers", _asked(effect, "missing", observations))
 
 
 def reads(effect: Effect, observations: Observations) -> tuple[str, ...]:
-    """Return the covariates that an effect reads (:meth:`Effect.reads`).
-
-    Raises
-    ------
-    EffectError
-        If they are not a tuple of names of columns that the campaign has.
-    """
+    """Return the covariates that an effect reads (:meth:`Effect.reads`), names of columns that the campaign has."""
     answer = _texts(effect, "reads answers", _asked(effect, "reads", observations))
     if any(column not in observations.covariates for column in answer):
         raise _broken(effect, f": reads answers {answer!r}, expected columns of the campaign")
@@ -180,13 +142,7 @@ def reads(effect: Effect, observations: Observations) -> tuple[str, ...]:
 
 
 def delivered(effect: Effect, observations: Observations) -> Effect:
-    """Return an effect as a model holds it (:meth:`Effect.delivered`).
-
-    Raises
-    ------
-    EffectError
-        If it is no effect of this one's name.
-    """
+    """Return an effect as a model holds it (:meth:`Effect.delivered`), one of the same name."""
     return _settings(effect, "delivered", (_asked(effect, "delivered", observations),))[0]
 
 
@@ -201,24 +157,12 @@ def unfaded(effect: Effect) -> Effect:
 
 
 def variants(effect: Effect, observations: Observations) -> tuple[Effect, ...]:
-    """Return the settings of an effect that are compared (:meth:`Effect.variants`).
-
-    Raises
-    ------
-    EffectError
-        If they are not a tuple of at least one effect, each of this one's name.
-    """
+    """Return the settings of an effect that are compared (:meth:`Effect.variants`), at least one, each of its name."""
     return _settings(effect, "variants", _asked(effect, "variants", observations))
 
 
 def nearby(effect: Effect, factor: float) -> tuple[Effect, ...]:
-    """Return settings near an effect's own (:meth:`Effect.nearby`).
-
-    Raises
-    ------
-    EffectError
-        If they are not a tuple of effects of this one's name, itself among them.
-    """
+    """Return settings near an effect's own (:meth:`Effect.nearby`), each of its name, itself among them."""
     answer = _settings(effect, "nearby", _asked(effect, "nearby", factor))
     if effect not in answer:
         raise _broken(effect, f": nearby answers {answer!r}, expected it to hold itself, {effect!r}")
@@ -226,37 +170,19 @@ def nearby(effect: Effect, factor: float) -> tuple[Effect, ...]:
 
 
 def at(effect: Effect, place: str, observations: Observations) -> Effect | None:
-    """Return an effect in one joint or link alone (:meth:`Effect.at`); ``None`` where it has no parameters there.
-
-    Raises
-    ------
-    EffectError
-        If it is something else than an effect of this one's name, or the effect breaks the contract otherwise.
-    """
+    """Return an effect in one joint or link alone (:meth:`Effect.at`); ``None`` where it has no parameters there."""
     return _one_setting(effect, "at", place) if place in places_of(checked(effect, observations)) else None
 
 
 def alone(effect: Effect, observations: Observations) -> tuple[Effect, ...]:
-    """Return the settings of an effect in each single joint or link; empty where it has parameters in one or none.
-
-    Raises
-    ------
-    EffectError
-        As :func:`at`.
-    """
+    """Return the settings of an effect in each single joint or link; empty where it has parameters in one or none."""
     places = places_of(checked(effect, observations))
     single = (_one_setting(effect, "at", place) for place in places)
     return tuple(setting for setting in single if setting is not None) if len(places) > 1 else ()
 
 
 def in_full(effect: Effect) -> Effect | None:
-    """Return an effect's setting of more parameters (:meth:`Effect.in_full`); ``None`` where there is none.
-
-    Raises
-    ------
-    EffectError
-        If it is something else than an effect of this one's name.
-    """
+    """Return an effect's setting of more parameters (:meth:`Effect.in_full`); ``None`` where there is none."""
     return _one_setting(effect, "in_full")
 
 
@@ -273,13 +199,7 @@ def _one_setting(effect: Effect, question: str, *about: Any) -> Effect | None:
 
 
 def arguments(effect: Effect) -> dict[str, Any]:
-    """Return the arguments of an effect, for saving (:meth:`Effect.arguments`).
-
-    Raises
-    ------
-    EffectError
-        If they are not values by name that JSON can hold.
-    """
+    """Return the arguments of an effect, for saving (:meth:`Effect.arguments`): values by name that JSON can hold."""
     answer = _asked(effect, "arguments")
     try:
         json.dumps(answer)

@@ -11,8 +11,7 @@ import numpy as np
 from thermal_robot.arrays import Array
 from thermal_robot.effects.arguments import Index
 from thermal_robot.effects.effect import Driver, Effect, Parameter, at_joint
-from thermal_robot.effects.quantities import unit
-from thermal_robot.effects.torque import torque_columns
+from thermal_robot.effects.quantities import torque_columns, unit
 from thermal_robot.kinematics import static_regressor
 
 if TYPE_CHECKING:
@@ -38,19 +37,14 @@ class JointCompliance(Effect):
     Where the URDF has no masses and no torque is reported, the weights are free. Holding torques are linear in the
     bodies' masses and first moments, so that c_j τ_j = Σ_k w_jk s_jk(q), with shapes s_jk known from the kinematics
     alone: the principal components of the static regressor's row of joint j over the robot's range, for bodies of one
-    weight with a centre 0.1 m about the next joint (Gautier and Khalil, *Direct calculation of minimum set of
-    inertial parameters*, 1990, on why few suffice). A unit of w_jk (rad) is a unit at the largest shape of any joint.
-    A recorded payload adds its own torque with c_j.
+    weight with a centre 0.1 m about the next joint (Gautier and Khalil, *Direct calculation of minimum set of inertial
+    parameters*, 1990, on why few suffice). A unit of w_jk (rad) is a unit at the largest shape of any joint. ``joints``
+    and ``weights`` are the joint of each of K shapes, and K·4n weights: what it takes of the mass and first moment of
+    each body. A recorded payload adds its own torque with c_j.
 
     A joint whose torque does not vary cannot be told from its offset. A free shape that goes with one joint's sine and
     cosine alone (one joint between the base and a heavy body) is :class:`TransmissionError` of order 1 in that joint;
     several joints with parallel axes tell the two apart.
-
-    Attributes
-    ----------
-    joints, weights
-        Joint of each of K shapes, and K·4n weights one after the other: what the shape takes of the mass and first
-        moment of each body. Empty where the torques are known.
     """
 
     joints: tuple[Index, ...] = ()

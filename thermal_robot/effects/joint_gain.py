@@ -2,14 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, ClassVar
 
-from thermal_robot.arrays import Array
-from thermal_robot.effects.effect import Driver, Parameter, at_joint
+from thermal_robot.effects.effect import Parameter, at_joint
 from thermal_robot.effects.fading import OfPosition
-from thermal_robot.effects.quantities import position_of
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -37,7 +34,3 @@ class JointGain(OfPosition):
             found.append(Parameter("gain error", "1", 5e-4, "joint", joint, (at_joint(j, values),)))
             parts.append(left)
         return self.registered(found, parts)
-
-    def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
-        """Return the joint's own position."""
-        return position_of(observations, parameters[0].place)

@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from typing import TYPE_CHECKING, ClassVar
 
-from thermal_robot.arrays import Array
 from thermal_robot.effects.arguments import Count, Positive
-from thermal_robot.effects.effect import Driver, Effect, Parameter
+from thermal_robot.effects.effect import Effect, Parameter
 from thermal_robot.effects.fading import OfPosition
-from thermal_robot.effects.quantities import position_of
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -28,19 +25,12 @@ class JointRipple(OfPosition):
     Teeth, balls and the motor's own wheel come round n times in a turn of the joint; n need be no whole number. Strain
     wave gears are rated for a transmission error of 1 to 2 minutes of arc peak to peak, most of it twice a turn of the
     motor; the waves of three UR robots have amplitudes of 0.02 to 0.33 mrad. Expected size 0.1 mrad. What comes round
-    once or twice in a turn is :class:`TransmissionError`.
+    once or twice in a turn is :class:`TransmissionError`. Where the campaign states a gear ratio, an order near a whole
+    or half multiple of it is said to be the motor's.
 
-    Where the campaign states a gear ratio, an order near a whole or half multiple of it is said to be the motor's.
-
-    Orders are no parameters: they are looked for in what remains, joint by joint, and join one after another
-    (:mod:`thermal_robot.inference.ripple`). Without waves the effect does nothing.
-
-    Attributes
-    ----------
-    joints, orders
-        Joint and order (rad per rad; rad/m where it slides) of each wave.
-    tried
-        Among how many waves all of these were picked: the product of the numbers for each.
+    ``orders`` (rad per rad; rad/m where the joint slides) are no parameters: they are looked for in what remains, joint
+    by joint, and join one after another (:mod:`thermal_robot.inference.ripple`); ``tried`` is among how many waves all
+    of these were picked, the product of the numbers for each. Without waves the effect does nothing.
     """
 
     joints: tuple[str, ...] = ()
@@ -72,10 +62,6 @@ class JointRipple(OfPosition):
     def at(self, place: str) -> Effect | None:
         """Waves have joints of their own."""
         return None
-
-    def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
-        """Return the joint's own position."""
-        return position_of(observations, parameters[0].place)
 
 
 def _of_motor(order: float, ratio: float | None) -> str:

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Annotated, ClassVar
+from pprint import pformat
+from textwrap import fill
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -30,13 +32,13 @@ from thermal_robot.effects.effect import (
     in_words,
 )
 from thermal_robot.effects.fading import Fading, ends, left_at
-from thermal_robot.effects.law_source import source
 from thermal_robot.effects.quantities import TURN, driving, quantity, strains, unit
 from thermal_robot.effects.shapes import SHAPES
 from thermal_robot.schema import word
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
+
 
 PREFIX = "discovered."
 _COMPONENTS = ("along x", "along y", "along z", "about x", "about y", "about z")
@@ -46,42 +48,21 @@ _COMPONENTS = ("along x", "along y", "along z", "about x", "about y", "about z")
 class Discovered(Fading):
     """An error enters at one place and follows one quantity x by a law f(x) = Σ_k c_k φ_k(x).
 
-    The functions φ_k belong to its shape (:mod:`thermal_robot.effects.shapes`). In a joint f is an angle (or a
-    displacement); at the base, the tool or a segment it is a twist, six such laws in the place's own frame. Expected
-    size 0.3 mrad in a joint, 0.1 mm and 0.1 mrad elsewhere.
+    The functions φ_k belong to its shape (:mod:`thermal_robot.effects.shapes`), with the ``marks`` that it asks for. In
+    a joint f is an angle (or a displacement); at the base, the tool or a segment (``link`` and the name of the joint at
+    its end) it is a twist, six such laws in the place's own frame. Expected size 0.3 mrad in a joint, 0.1 mm and
+    0.1 mrad elsewhere. ``quantity`` is a column, joint or derived quantity, ``origin`` and ``span`` those in the
+    campaign where it was found.
 
-    A law may depend on a second quantity y: then each φ_k stands beside φ_k·v with v = (y − by_origin) / by_span, so
-    that a straight law holds 1, u, v and u·v. It may be the size of a known effect that follows x: then the φ_k
-    multiply the unit response of each of the effect's parameters in that joint, of the effect's own expected size.
+    A law may depend on a second quantity y (``by``): then each φ_k stands beside φ_k·v with v = (y − by_origin) /
+    by_span, so that a straight law holds 1, u, v and u·v. It may be the size of a known effect (``of``, with arguments
+    as JSON text) that follows x: then the φ_k multiply the unit response of each of the effect's parameters in that
+    joint, of the effect's own expected size.
 
-    Attributes
-    ----------
-    name
-        ``discovered.1`` and so on.
-    kind, place
-        ``joint`` and its name; ``link`` and the name of the joint at the segment's end; ``base``; ``tool``.
-    quantity
-        Column, joint or derived quantity that it follows.
-    shape, marks
-        Name of the shape, and the marks that it asks for.
-    origin, span
-        Of the quantity in the campaign that it was found in.
-    unit
-        Of the quantity, for words; empty where it has none.
-    turns
-        Whether orientation was measured: without it a turn of the tool shows nothing.
-    labels
-        Names of the levels, where the quantity is a label such as the session.
-    runs
-        Sessions between which it steps in time, or in each of which it relaxes anew; empty elsewhere.
-    starts
-        When those began in which it relaxes, s; one start where there are no sessions.
-    by, by_origin, by_span
-        The second quantity, and what it is counted from and in; empty where there is none.
-    of, of_arguments
-        Name of the known effect that changes with the quantity, and its arguments as JSON text; empty where none does.
-    tried
-        Among how many laws it was picked.
+    ``turns``: orientation was measured: without it a turn of the tool shows nothing. ``labels``: names of the levels,
+    where the quantity is a label such as the session. ``runs``: sessions between which it steps in time, or in each of
+    which it relaxes anew; ``starts``: when those began in which it relaxes, s, one where there are no sessions.
+    ``tried``: among how many laws it was picked.
     """
 
     title: ClassVar[str] = "an unlisted law"
@@ -306,15 +287,7 @@ class Discovered(Fading):
         return driving(observations, self.quantity)
 
     def to_source(self, values: Array, name: str = "my_effect") -> str:
-        """Write the law as an effect file that can be named, kept and put under ``thermal_robot.effects``.
-
-        Parameters
-        ----------
-        values
-            What was fitted; stands in the file as a comment, as an effect holds no values.
-        name
-            Of the effect.
-        """
+        """Write the law as a file to be kept and put under ``thermal_robot.effects``; the values are a comment."""
         return source(self.arguments(), self.describe(), values, name)
 
     def describe(self) -> str:
@@ -376,3 +349,37 @@ def _times(parameter: Parameter, function: Array, label: str) -> Parameter:
         for r in parameter.responses
     )
     return replace(parameter, label=f"{parameter.label}, {label}", responses=responses, positive=False)
+
+
+def source(arguments: Mapping[str, Any], what: str, values: Array, name: str) -> str:
+    """Text of a Python file with a law as an effect; the fitted values (P,), SI, stand in it as a comment."""
+    fields = {k: v for k, v in arguments.items() if k != "name"}
+    lines = "\n".join(f"    {key}: Any = {pformat(value, width=100)}" for key, value in fields.items())
+    title = "".join(part.capitalize() for part in name.split("_"))
+    found = fill(", ".join(f"{v:.4g}" for v in values), 100, initial_indent="    ", subsequent_indent="    ")
+    return _SOURCE.format(title=title, name=name, lines=lines, values=found, what=what[:1].upper() + what[1:])
+
+
+_SOURCE = '''"""{what}.
+
+Found in a campaign by thermal_robot, named by hand.
+"""
+
+from dataclasses import dataclass
+from typing import Any
+
+from thermal_robot.effects.law import Discovered
+
+
+@dataclass(frozen=True)
+class {title}(Discovered):
+    """{what}.
+
+    In the campaign where it was found its values were, in SI:
+
+{values}
+    """
+
+    name: Any = "{name}"
+{lines}
+'''

@@ -45,15 +45,9 @@ class LinkCompliance(Effect):
 
     Where inclinometers on links were read (``tilt.<link>.x``, ``tilt.<link>.y``), a link turns about the origin of its
     frame by the reading ω_k less that of the last one before it in the chain, both in the link's frame, times a gain:
-    1 where it stands where the link does. What is before, or the base, carries the link with it.
-
-    Attributes
-    ----------
-    twist
-        Whether segments twist, too. It is not tried by itself: on a real arm whose joints yield, twisting links took
-        their place, each ten times softer than a tube.
-    tilt
-        Whether the turns are those that were measured.
+    1 where it stands where the link does (``tilt``). What is before, or the base, carries the link with it.
+    ``twist`` is not tried by itself: on a real arm whose joints yield, twisting links took their place, each ten times
+    softer than a tube.
     """
 
     twist: bool = False

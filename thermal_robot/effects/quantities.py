@@ -1,8 +1,8 @@
-"""What an error may follow: everything recorded, and what anybody can compute from it."""
+"""What an error may follow: what is recorded or computed from it, and varies by more than it is read to."""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -13,11 +13,52 @@ from thermal_robot.campaign.turning import strained
 from thermal_robot.campaign.units import SI, unit_of
 from thermal_robot.effects import settings
 from thermal_robot.effects.effect import Driver
-from thermal_robot.effects.resolution import resolution, varies, without_twins
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
     from thermal_robot.robot import Robot
+
+
+_ROUNDING = 1e-9  # relative: how far sums of floats are off
+
+
+def resolution(values: Array, unit: str) -> float:
+    """Return the smallest step of a quantity that means something, in its unit.
+
+    It is the smallest step between two of its values (N,), as far as that is what an instrument of this kind reads to:
+    digits beyond that say nothing, and two values that are further apart were meant. 0 for what is no reading, such as
+    a payload, a label or a direction of approach.
+    """
+    if unit not in settings.READS_TO:
+        return 0.0
+    levels = np.unique(values)
+    step = float(np.diff(levels).min(initial=np.inf))
+    return float(np.clip(step, *settings.READS_TO[unit]))
+
+
+def varies(values: Array, least: float = 0.0) -> bool:
+    """Tell whether values (N,) differ by more than a resolution."""
+    return bool(np.ptp(values) > least * (1.0 + _ROUNDING)) if len(values) else False
+
+
+def without_twins(readings: Mapping[str, Array], joints: tuple[str, ...]) -> dict[str, Array]:
+    """Leave out readings of what another quantity says already: the coarser one stays.
+
+    An encoder's reading goes where it says what was commanded, the temperature of a link where it is that of the robot.
+    """
+    return {name: v for name, v in readings.items() if not _twin(v, readings.get(_said_by(name, joints)))}
+
+
+def _said_by(name: str, joints: tuple[str, ...]) -> str:
+    column, _, place = name.partition(".")
+    if column == "encoder" and place in joints:
+        return place
+    return "temperature" if column == "temperature" and place else ""
+
+
+def _twin(values: Array, other: Array | None) -> bool:
+    return other is not None and float(np.std(values - other)) < settings.TWIN * float(np.std(other))
+
 
 GRAVITY = ("gravity.x", "gravity.y", "gravity.z")
 """Components of gravity's direction in the tool frame."""
@@ -35,7 +76,7 @@ def unit(robot: Robot, name: str) -> str:
 def quantities(observations: Observations) -> dict[str, Array]:
     """Return what a remainder might follow, by name, (N,) each; only what varies by more than it is read to.
 
-    Of two readings of the same the coarser one stands for both (:mod:`thermal_robot.effects.resolution`). Recorded
+    Of two readings of the same the coarser one stands for both (:mod:`thermal_robot.effects.quantities`). Recorded
     covariates come first, the row's number where neither time nor order is recorded, the session as its number in the
     alphabet, then each joint's position, gravity's direction in the tool frame and the tool's place. What a joint
     remembers (:data:`TURN`) is not among them: it bears on that joint alone.
@@ -86,10 +127,7 @@ def began(observations: Observations, clock: Array) -> dict[str, float]:
 
 
 def strains(observations: Observations, joint: str, slips: Sequence[float]) -> Array | None:
-    """Return (N, K) strains of a joint's elements as shares of what makes them slip, −1 to 1; ``None`` without order.
-
-    See :func:`thermal_robot.campaign.turning.since_turns`.
-    """
+    """(N, K) strains of a joint's elements over what makes them slip, −1 to 1 ; ``None`` without order."""
     past = observations.campaign.since_turn
     if joint not in past:
         return None
@@ -108,3 +146,11 @@ def position_of(observations: Observations, joint: str) -> Driver:
     """Return a joint's commanded position as what drives an effect: name, unit and (N,) values, rad or m."""
     robot = observations.robot
     return f"position of {joint}", unit(robot, joint), observations.q[:, robot.joint_names.index(joint)]
+
+
+def torque_columns(observations: Observations) -> tuple[str, ...]:
+    """Return the torques of the chain's joints that were recorded, and the payload where one was not."""
+    columns = tuple(f"torque.{joint}" for joint in observations.robot.joint_names)
+    recorded = tuple(column for column in columns if column in observations.covariates)
+    computed = ("payload",) if "payload" in observations.covariates and recorded != columns else ()
+    return (*computed, *recorded)

@@ -40,23 +40,9 @@ class RandomEffect(Effect):
         return tuple(j for j in chain if j in (self.places or chain) and j not in self.excluded)
 
     def drawn(self, command: Array, pose: NDArray[np.int64], size: float, rng: np.random.Generator) -> Array:
-        """Return one draw of a joint's deviations: normal, with the standard deviation that the parameter says.
+        """Draw (N,) deviations of a joint from its commands, rad or m: normal, of the standard deviation ``size``.
 
-        Parameters
-        ----------
-        command
-            (N,) of the joint, rad or m.
-        pose
-            (N,) number of the commanded pose that each row is a visit to.
-        size
-            The parameter, rad or m.
-        rng
-            Source of chance.
-
-        Returns
-        -------
-        ndarray
-            (N,) where the joint stands less its command, rad or m.
+        ``pose`` (N,) is the number of the commanded pose that each row is a visit to.
         """
         which = np.arange(len(pose)) if self.component == "visit" else np.unique(pose, return_inverse=True)[1]
         return np.asarray(size / self.factor * rng.normal(size=len(pose))[which])

@@ -46,29 +46,15 @@ Functions = Callable[[Array, tuple[float, ...], float, float], Array]
 
 @dataclass(frozen=True)
 class Shape:
-    """One shape of a law.
+    """One shape of a law: its functions φ of the table above, and its words.
 
-    Attributes
-    ----------
-    functions
-        The φ of the table above.
-    labels
-        A name for each, but for those that belong to one of the marks each; ``{start}`` and ``{range}`` stand for its
-        origin and its span, in the quantity's unit.
-    words
-        The shape in a sentence; ``{mark}`` stands for its first mark with the quantity's unit, ``{order}`` without.
-    mark
-        What the first mark is for whoever refines it: ``sudden`` where moving it changes the functions only when it
-        passes a row, ``gradual`` where they change smoothly; empty where it is not to be moved.
-    width
-        Whether the second mark is a width, to be refined, too.
-    each
-        Whether there is a function for each mark, after those that ``labels`` names.
-    size, noun
-        What the difference between its largest and its smallest value is called; and what the law is, in a short name.
-    of
-        What the functions are of: the (N,) ``quantity``; the (N, K) ``strains`` of elements of slips as marked; the
-        (N, 1) time since the ``run`` began, or since each of the ``runs`` began, infinite in the others (N, R).
+    ``labels`` name those that do not belong to one of the marks ``each``; ``{start}`` and ``{range}`` stand for origin
+    and span, in the quantity's unit; in ``words`` ``{mark}`` stands for its first mark with the unit, ``{order}``
+    without. ``mark`` is ``sudden`` where moving it changes the functions only when it passes a row, ``gradual`` where
+    smoothly, empty where it is not to be moved; ``width`` where the second mark is a width, to be refined, too.
+    ``size`` is what the difference between its largest and its smallest value is called, ``noun`` a short name. ``of``
+    is what the functions are of: the (N,) ``quantity``; the (N, K) ``strains`` of elements of slips as marked; the
+    (N, 1) time since the ``run`` began, or since each of the ``runs`` began, infinite in the others (N, R).
     """
 
     functions: Functions

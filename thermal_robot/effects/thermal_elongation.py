@@ -1,9 +1,10 @@
-"""Links that grow with temperature: the virtual prismatic joints of Kluz et al."""
+"""Links that grow with a temperature, or follow it: the virtual prismatic joints of Kluz et al."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from typing import TYPE_CHECKING, ClassVar
 
 import numpy as np
@@ -11,11 +12,64 @@ import numpy as np
 from thermal_robot.arrays import Array
 from thermal_robot.effects.arguments import Celsius, Instants, NotNegative
 from thermal_robot.effects.effect import Driver, Effect, Parameter, Response, at_segment
-from thermal_robot.effects.lagging import History
 from thermal_robot.effects.quantities import began, driving
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
+
+
+_POINTS = 500  # points of a history that are kept
+_FOLLOWED = 64  # histories and lags of which it is kept how far a body is behind: all settings ask for each
+
+
+@dataclass(frozen=True)
+class History:
+    """A temperature as it was recorded, straight between its points: increasing (K,) times, s, and temperatures, °C."""
+
+    times: tuple[float, ...]
+    temperatures: tuple[float, ...]
+
+    @classmethod
+    def of(cls, times: Array, temperatures: Array) -> History:
+        """Keep a record of rows in any order; rows of one instant count as their mean, a long one is thinned."""
+        instants, which = np.unique(times, return_inverse=True)
+        values = np.bincount(which, temperatures) / np.bincount(which)
+        kept = np.unique(np.linspace(0, len(instants) - 1, min(len(instants), _POINTS)).round().astype(int))
+        return cls(tuple(instants[kept].tolist()), tuple(values[kept].tolist()))
+
+    def followed(self, lag: float, times: Array, temperatures: Array) -> Array:
+        """(N,) temperature of a body that obeys dT/dt = (T_recorded − T) / lag, a first-order lag of ``lag`` s.
+
+        It is in balance at the first point. Between two points the solution is exact: T = u(t) − r·lag + (T_i − u_i +
+        r·lag) exp(−(t − t_i)/lag), where u runs at the rate r. Rows are asked for by times and temperatures (N,), s and
+        °C: beyond the record the row's own is taken to have held since its end; before it the body is in balance with
+        it.
+        """
+        t, u = np.array(self.times), np.array(self.temperatures)
+        rate = np.diff(u) / np.diff(t)
+        behind = _behind(self, lag)
+        i = np.clip(np.searchsorted(t, times, side="right") - 1, 0, len(t) - 1)
+        late = times >= t[-1]
+        rate = np.append(rate, 0.0)[i]
+        since = np.maximum(times - t[i], 0.0)
+        lagging = (behind[i] + rate * lag) * np.exp(-since / lag) - rate * lag
+        inside = u[i] + rate * since + lagging
+        after = temperatures + (u[-1] + behind[-1] - temperatures) * np.exp(-since / lag)
+        return np.where(times < t[0], temperatures, np.where(late, after, inside))
+
+
+@lru_cache(maxsize=_FOLLOWED)
+def _behind(history: History, lag: float) -> Array:
+    """(K,) by how much a body differs from the record at its points, K."""
+    t, u = np.array(history.times), np.array(history.temperatures)
+    gains = (np.diff(u) / np.diff(t) * lag).tolist()
+    behind = [0.0]
+    for gain, decay in zip(gains, np.exp(-np.diff(t) / lag).tolist(), strict=True):
+        behind.append((behind[-1] + gain) * decay - gain)
+    found = np.array(behind)
+    found.setflags(write=False)
+    return found
+
 
 _SIZE = 1.5e-5  # 1/K
 _MOST = 6e-5  # 1/K: zinc and magnesium alloys have 3e-5, and a link may warm twice as much as its sensor
@@ -29,36 +83,22 @@ _SPREAD = 0.3  # of the common coefficient: steel and aluminium lie 30 % below a
 class ThermalElongation(Effect):
     """Every segment lengthens with its link's temperature: Δl_s = α_s l_s (T_link − T_reference).
 
-    Equation 5 of Kluz et al. (2018) with a coefficient of its own for each segment, a common one for all, or a common
-    one with a smaller deviation above it for each (partial pooling), along the virtual prismatic joint of their Eqs
-    6-8. No link shrinks when it becomes warmer: none of them is negative.
-    Expected size 1.5e-5 /K (steel 1.2e-5, aluminium 2.3e-5), at most 6e-5 /K (zinc, where it warms twice as much as
-    its sensor); of a polymer ``[priors]`` says more. Where one sensor reads the air or a place on the robot,
+    Equation 5 of Kluz et al. (2018) with a coefficient of its own for each segment, a ``common`` one for all, or a
+    common one with a smaller deviation above it for each (partial pooling; ``spread``: its expected size, 0 for none),
+    along the virtual prismatic joint of their Eqs 6-8. No link shrinks when it becomes warmer: none of them is
+    negative. Expected size 1.5e-5 /K (steel 1.2e-5, aluminium 2.3e-5), at most 6e-5 /K (zinc, where it warms twice as
+    much as its sensor); of a polymer ``[priors]`` says more. Where one sensor reads the air or a place on the robot,
     the links follow it with a time constant: dT_link/dt = (T_recorded − T_link) / lag, minutes to an hour for a cast
     link (mass · heat capacity / surface · film coefficient: 600 to 3600 s).
 
-    Where the temperature rises steadily with time it resembles :class:`Drift`, but moves the tool by an amount
-    that depends on the pose; at constant temperature it is contained in :class:`Geometric`. A lag shows only where the
+    Where the temperature rises steadily with time it resembles :class:`Drift`, but moves the tool by an amount that
+    depends on the pose; at constant temperature it is contained in :class:`Geometric`. A lag shows only where the
     temperature turns or jumps within the campaign: of a steady rise it merely takes off a constant.
 
-    Attributes
-    ----------
-    common
-        Whether all segments have one coefficient, which few data can tell better than one each.
-    spread
-        Of the common coefficient, the least of all: expected deviation of each segment's own above it; 0 where they do
-        not deviate.
-    lag
-        Time constant, s; 0 for a link that has the recorded temperature.
-    times, temperatures
-        The campaign's record, s and °C, from which the link's temperature follows; kept where there is a lag, as
-        a later sample knows only its own instant.
-    starts
-        Instants, s, from which the record holds: the first row, and the first of each session, as nobody reads the
-        sensor in between.
-    balanced
-        Whether the links are then as warm as the record lets expect. Else they differ by some kelvin, of which
-        exp(−(t − start) / lag) is left at t.
+    ``times`` and ``temperatures``: the campaign's record, s and °C, kept where there is a ``lag``, s, as a later sample
+    knows only its own instant. ``starts``: instants, s, from which it holds: the first row, and the first of each
+    session, as nobody reads the sensor in between. ``balanced``: the links are then as warm as the record lets expect;
+    else they differ by some kelvin, of which exp(−(t − start) / lag) is left at t.
     """
 
     common: bool = False

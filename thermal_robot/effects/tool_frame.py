@@ -18,16 +18,10 @@ class ToolFrame(Effect):
     """The declared place of the target is off by a constant twist in the tool frame.
 
     Expected size 2 mm and 2 mrad; a campaign of positions shows the three translations only. Only where the campaign
-    declares ``tool = "known"``: an unknown tool is fitted before any effect is asked for.
-
-    Attributes
-    ----------
-    turns
-        Whether the three rotations are parameters, too; ``None`` asks the campaign. A model keeps what it was fitted
-        with, as commands to be predicted carry no measured orientation.
-    alone
-        The one component that is off, by its name; empty where all are. Turned about the last joint's axis, the tool is
-        where that joint's zero offset would put it.
+    declares ``tool = "known"``: an unknown tool is fitted before any effect is asked for. ``turns``: the three
+    rotations are parameters, too; ``None`` asks the campaign, while a model keeps what it was fitted with, as commands
+    to be predicted carry no measured orientation. ``alone`` names the one component that is off. Turned about the last
+    joint's axis, the tool is where that joint's zero offset would put it.
     """
 
     turns: bool | None = None

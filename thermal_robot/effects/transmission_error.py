@@ -3,17 +3,14 @@
 from __future__ import annotations
 
 import itertools
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Annotated, ClassVar
 
 import numpy as np
 
-from thermal_robot.arrays import Array
 from thermal_robot.effects.arguments import Order
-from thermal_robot.effects.effect import SOURCED, Driver, Effect, Parameter
+from thermal_robot.effects.effect import SOURCED, Effect, Parameter
 from thermal_robot.effects.fading import OfPosition
-from thermal_robot.effects.quantities import position_of
 from thermal_robot.schema import word
 
 if TYPE_CHECKING:
@@ -29,21 +26,14 @@ _NOT_LEARNT = 0.05  # of the logarithm of its size: a curve that could grow woul
 class TransmissionError(OfPosition):
     """Every joint deviates periodically: q_actual = q_command + Σ_k a_k sin(k q) + b_k cos(k q).
 
-    An eccentric wheel or encoder disc on the joint's side gives order 1, an oval one order 2; where the campaign
-    states a gear ratio (``[gears]``), those of the motor's side give the ratio and twice that. Expected size 0.3 mrad,
-    one minute of arc: catalogues of strain-wave gears state 1 to 2′ from peak to peak.
+    An eccentric wheel or encoder disc on the joint's side gives order 1, an oval one order 2; where the campaign states
+    a gear ratio (``[gears]``), those of the motor's ``side`` give the ratio and twice that. Expected size 0.3 mrad, one
+    minute of arc: catalogues of strain-wave gears state 1 to 2′ from peak to peak.
 
     Over part of a turn orders 1 and 2 are nearly a line and a parabola. Where a joint errs by neither, they come out
     many times too large (4 mrad in a UR10, for 0.3 mrad over 2 rad). Its error curve has all orders from 1 to 8, above
     2 of sizes that fall as one over the order, and all together as large as one wave. It could take any shape: its size
-    is that of the source, not learnt.
-
-    Attributes
-    ----------
-    harmonics
-        Orders a turn of the wheel, on either side.
-    side
-        Whose wheels err: ``joint``, ``motor``, or ``both``.
+    is that of the source, not learnt. ``harmonics`` are orders a turn of the wheel, on either side.
     """
 
     harmonics: tuple[Order, ...] = (1, 2)
@@ -80,10 +70,6 @@ class TransmissionError(OfPosition):
             every = itertools.product(turns, self.harmonics)
             found += [(joint, ratio * k, "", _amplitude(k, self.harmonics)) for ratio, k in every]
         return self.waves(observations, found)
-
-    def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
-        """Return the joint's own position."""
-        return position_of(observations, parameters[0].place)
 
 
 def _amplitude(order: int, harmonics: tuple[int, ...]) -> float:

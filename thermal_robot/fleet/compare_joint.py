@@ -20,8 +20,7 @@ from thermal_robot.fleet import compare_settings
 from thermal_robot.fleet.compare_effects import Candidate
 from thermal_robot.fleet.compare_problem import Part, Problem
 from thermal_robot.fleet.compare_sums import Sums
-from thermal_robot.inference.evidence import Combination
-from thermal_robot.inference.gram import Gram
+from thermal_robot.inference.evidence import Combination, Gram
 from thermal_robot.inference.search import Search
 
 

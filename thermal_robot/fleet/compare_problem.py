@@ -19,10 +19,9 @@ from thermal_robot.fleet import compare_settings
 from thermal_robot.fleet.compare_effects import Candidate
 from thermal_robot.fleet.compare_sums import Sums
 from thermal_robot.inference import settings
-from thermal_robot.inference.evidence import Combination, evidence
+from thermal_robot.inference.evidence import Combination, Gram, evidence
 from thermal_robot.inference.explain import log_odds, share_of_places
-from thermal_robot.inference.gains import gains
-from thermal_robot.inference.gram import Gram
+from thermal_robot.inference.search import gains
 
 Places = Mapping[tuple[str, str], Sequence[int]]
 

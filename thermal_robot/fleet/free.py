@@ -22,9 +22,9 @@ import numpy as np
 from thermal_robot.effects import choose, gate
 from thermal_robot.fleet import settings
 from thermal_robot.inference.columns import Block, block
+from thermal_robot.inference.evidence import Gram
 from thermal_robot.inference.explain import Explanation
 from thermal_robot.inference.fit import Fit
-from thermal_robot.inference.gram import Gram
 from thermal_robot.inference.problem import Linear, contained, gram
 
 

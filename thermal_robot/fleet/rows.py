@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from thermal_robot.diagnosis import Diagnosis, Finding
-from thermal_robot.diagnosis.plain import jsonable
+from thermal_robot.diagnosis.parts import jsonable
 from thermal_robot.files import whole
 from thermal_robot.fleet import settings
 from thermal_robot.fleet.extra import needed

@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from thermal_robot.diagnosis.plain import jsonable
+from thermal_robot.diagnosis.parts import jsonable
 from thermal_robot.fleet.counted import Case, Count, Gathered, counted
 from thermal_robot.fleet.shared import Apart, Shared, shared
 from thermal_robot.fleet.table import overview

@@ -50,16 +50,10 @@ def without(columns: Array, basis: Array) -> Array:
 
 
 def ridge(products: Array, flat: int, prior: Array) -> Array:
-    """Return the (K,) posterior mean of a linear fit with normal priors, from its sums of products alone.
+    """(K,) posterior mean of a linear fit with normal priors (ridge regression), from products (K + 1, K + 1) alone.
 
-    Parameters
-    ----------
-    products
-        (K + 1, K + 1) products of K columns and the values, summed over the rows.
-    flat
-        Number of leading columns without a prior. Those that nothing determines stay at zero.
-    prior
-        (K − flat,) one over the prior variance of each other column, in the units of ``products``.
+    The last column is the values. The first ``flat`` have no prior and stay at zero where nothing determines them;
+    ``prior`` (K − flat,) is one over the variance of the others.
     """
     matrix = products[:-1, :-1].copy()
     own = np.diag(matrix)[:flat]

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.effects import Effect, Parameter
-from thermal_robot.effects.channel import column
+from thermal_robot.effects.apply import column
 from thermal_robot.effects.effect import UNSOURCED
 from thermal_robot.effects.gate import checked
 from thermal_robot.inference import settings
@@ -20,23 +20,12 @@ from thermal_robot.observations import Observations
 
 @dataclass(frozen=True, eq=False)
 class Block:
-    """The parameters of one effect (in one setting of its nonlinear arguments) as columns.
+    """The P parameters of one effect, in one setting of its nonlinear arguments, as columns (N, m, P).
 
-    Attributes
-    ----------
-    effect
-        The effect, its arguments set.
-    bare
-        Its P parameters, without their responses.
-    source
-        Where parameters and columns are computed whenever they are asked for, as those of all settings together would
-        fill the memory; or (N, m, P) the columns themselves.
-    sizes
-        (P,) expected size of each parameter, the campaign's ``[priors]`` applied.
-    spread
-        Standard deviation of the logarithm of their common factor.
-    largest_scale
-        That factor, at most.
+    ``source`` is the columns, or the observations from which they are computed whenever asked for, as those of all
+    settings would fill the memory. ``bare`` are the parameters without responses, ``sizes`` (P,) their expected sizes
+    with the campaign's ``[priors]``, ``spread`` the standard deviation of the logarithm of their common factor, at most
+    ``largest_scale``.
     """
 
     effect: Effect
@@ -81,13 +70,7 @@ class Block:
 
 
 def block(observations: Observations, effect: Effect) -> Block:
-    """Return an effect's columns at the observations' place.
-
-    Raises
-    ------
-    EffectError
-        If its parameters break the contract.
-    """
+    """Columns of an effect at the observations' place; :class:`EffectError` where it breaks the contract."""
     campaign = observations.campaign
     parameters = checked(effect, observations)
     sizes = np.array([parameter.size for parameter in parameters])

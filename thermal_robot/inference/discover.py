@@ -19,27 +19,14 @@ from thermal_robot.inference.explain import explain, log_priors
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.problem import Linear
 from thermal_robot.inference.robust import Noise
-from thermal_robot.inference.scan import Scanned, Seats, scan, shaped
+from thermal_robot.inference.scan import Scanned, Seats, Thin, scan, shaped
 from thermal_robot.inference.settle import constant
 from thermal_robot.inference.target import Target
-from thermal_robot.inference.thin import Thin
 
 
 @dataclass(frozen=True, eq=False)
 class Discovery:
-    """A law of a fit, with its rivals.
-
-    Attributes
-    ----------
-    law
-        What it is.
-    probability
-        That a law of this quantity at this place is at work.
-    places
-        (kind, name) with the posterior probability of each, most probable first.
-    quantities
-        The same of what is followed.
-    """
+    """A law of a fit with its probability, and rival places and quantities with theirs, the most probable first."""
 
     law: Discovered
     probability: float
@@ -48,20 +35,10 @@ class Discovery:
 
 
 def candidates(fit: Fit, number: int, happened: Sequence[Discovered] | None = None) -> tuple[Discovered, ...]:
-    """Return the laws that may be worth their place, best first.
+    """Laws that may be worth their place, best first, the events that may have happened before all others.
 
-    Several remainders are scanned: that of the explanation, and unless one effect leaves but noise, that of the laws
-    alone and that without each of the effects. Known effects may have absorbed an unlisted cause, which then shows only
-    where they are left out.
-
-    Parameters
-    ----------
-    fit
-        An explanation.
-    number
-        Of the law: it is called ``discovered.<number>``.
-    happened
-        Events that may have happened, which come first; they are looked for where absent.
+    Scanned are the remainders of the explanation and, unless one effect leaves but noise, of the laws alone and without
+    each effect: known effects may have absorbed an unlisted cause. A law is called ``discovered.<number>``.
     """
     thin = Thin.of(fit)
     remainders = list(dict.fromkeys(_remainders(fit)))
@@ -105,10 +82,7 @@ def _remainders(fit: Fit) -> Iterator[tuple[int, ...]]:
 
 
 def _offered(thin: Thin, target: Target, own: Sequence[Scanned]) -> list[Discovered]:
-    """Return the best laws of a remainder in their best shapes, each with the number that it was picked among.
-
-    The best shape at a segment is also tried in the joint behind it, which is simpler.
-    """
+    """Return a remainder's best laws, at a segment also in the joint behind it, with how many it was picked among."""
     first = [(item, shaped(thin.observations, target, item.law)) for item in _with_joints(own)]
     joints = thin.observations.robot.joint_names
     at_links = [(item, s) for item, s in first if s.law.kind == "link" and s.law.place in joints]

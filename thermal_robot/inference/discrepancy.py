@@ -39,22 +39,10 @@ Numbers = NDArray[np.int64]
 class Form:
     """One form of the discrepancy: K = B Bᵀ over all rows, B the products of functions and moves.
 
-    Attributes
-    ----------
-    name
-        Which one, such as ``tool`` with its length scale, or ``poses`` with a joint.
-    anew
-        Whether each pose or visit brings its own, so that nothing is smooth.
-    place
-        Kind and name of the place where it enters, the first of several joints; empty where it may be anywhere.
-    further
-        Names of the joints that err beside the first.
-    functions
-        (N, k) smooth functions of what is commanded and recorded; of a form that is anew, (N,) the number of the pose
-        or visit.
-    moves
-        (N, m, c) how far a unit of each of c components moves the target, root frame axes, m and rad; (m, c) where that
-        is the same for all rows: K is then a product of one matrix of the rows and one of the components.
+    ``functions`` (N, k) are smooth in what is commanded and recorded; of a form that is ``anew`` (N,) the number of
+    each pose or visit. ``moves`` (N, m, c) or, the same for all rows, (m, c): displacement of the target by each
+    component, root frame axes, m and rad. ``place`` is where it enters, the first of several joints (``further``);
+    empty where it may be anywhere.
     """
 
     name: str
@@ -99,15 +87,7 @@ class Form:
 
 @dataclass(frozen=True, eq=False)
 class Smooth:
-    """The correlated part of the rows' covariance, in units of the noise: 1 + τ²BBᵀ on the rows in use.
-
-    Attributes
-    ----------
-    spectrum
-        The form, on the rows in use.
-    tau
-        τ.
-    """
+    """The correlated part of the rows' covariance, in units of the noise: 1 + τ²BBᵀ on the rows in use."""
 
     spectrum: Spectrum | Grouped
     tau: float
@@ -121,16 +101,9 @@ class Smooth:
         return self.spectrum.whitened(self.tau, stack)
 
     def taken(self, rows: NDArray[np.bool_], white: Callable[[Numbers], Array], floor: float) -> Array:
-        """Return SᵀS − SᵀV⁻¹S over some of the n rows in use, V their own covariance.
+        """SᵀS − SᵀV⁻¹S over some of the n rows in use (n,), V their own covariance.
 
-        Parameters
-        ----------
-        rows
-            (n,) which.
-        white
-            Gives the columns (r, m, K) of rows by their numbers.
-        floor
-            Directions of τ²BBᵀ over all rows in use whose variance lies below it are left out.
+        ``white`` gives columns (r, m, K) by row; directions of τ²BBᵀ with a variance below ``floor`` are left out.
         """
         return self.spectrum.taken(self.tau, rows, white, floor)
 
@@ -145,10 +118,7 @@ class Smooth:
         return self.spectrum.degrees(self.tau)
 
     def mean(self, left: Array) -> Array:
-        """(N, m) posterior mean of the discrepancy, in units of the noise.
-
-        Given the (E,) residual of the rows in use, whitened by weights and noise alone.
-        """
+        """(N, m) posterior mean of the discrepancy, in noise, of the (E,) residual in use, whitened as independent."""
         return self.spectrum.mean(self.tau, left)
 
 
@@ -156,17 +126,10 @@ class Smooth:
 class Spectrum:
     """One form on the rows in use, ready for every size τ: one Cholesky factor a size, and no (E, M) array.
 
-    With S the columns of the problem: where B has fewer columns than rows, by Woodbury's identity,
-    Sᵀ(1 + τ²BBᵀ)⁻¹S = SᵀS − τ² (BᵀS)ᵀ (1 + τ²BᵀB)⁻¹ BᵀS, and log|1 + τ²BBᵀ| = log|1 + τ²BᵀB|.
-
-    Attributes
-    ----------
-    axes
-        (m, m) orthonormal: components in which the parts are apart; one part has all of them where moves differ by row.
-    parts, everywhere
-        B on the rows in use, and on all rows without weights; one for each component, or one for all.
-    own
-        Of each part: :meth:`Part.own`.
+    With S the columns of the problem: where B has fewer columns than rows, by Woodbury's identity, Sᵀ(1 + τ²BBᵀ)⁻¹S =
+    SᵀS − τ² (BᵀS)ᵀ (1 + τ²BᵀB)⁻¹ BᵀS, and log|1 + τ²BBᵀ| = log|1 + τ²BᵀB|. The (m, m) orthonormal ``axes`` are
+    components in which the ``parts`` are apart (one part where moves differ by row); ``everywhere`` are the parts on
+    all rows, without weights.
     """
 
     axes: Array
@@ -358,10 +321,7 @@ def _at_one_place(observations: Observations, what: str, functions: Array, measu
 
 
 def _together(observations: Observations) -> list[Array]:
-    """(N, M) features of a squared exponential of all joint positions and conditions, for each length scale.
-
-    Low rank by Nyström's method with rows evenly drawn as landmarks.
-    """
+    """(N, M) features of a squared exponential of joints and conditions, by length scale (Nyström, even landmarks)."""
     campaign = observations.campaign
     varying = [observations.covariates[c] for c in observations.covariates if observations.varies(c)]
     inputs = np.column_stack([campaign.q[:, moving(campaign.q)], *varying])

@@ -77,10 +77,6 @@ class _Sums:
         gain = 0.5 * freedom * np.log(total / rest) - 0.5 * rank * np.log(freedom)
         return np.where((rank == 0) | (freedom - rank < settings.FEWEST_LEFT), -np.inf, gain)
 
-    def of_runs(self, runs: Runs) -> Array:
-        """Return (C,) log evidence gained by a move of each run."""
-        return self.gains(self.summed[runs[:, 1]] - self.summed[runs[:, 0]])
-
     def of_rows(self, rows: Rows) -> float:
         """Return the log evidence gained by a move of rows (N,), and by it in all but the few that are farthest off.
 
@@ -97,22 +93,12 @@ class _Sums:
 
 
 def events(fit: Fit) -> tuple[Discovered, ...]:
-    """Return the events that may be at work in a fit, the plainest first, one a place; none where none is worth it.
-
-    Parameters
-    ----------
-    fit
-        An explanation, with rows that it has set aside.
-
-    Returns
-    -------
-    tuple of Discovered
-        Steps in time, runs, and sessions that are apart, each with the number of laws among which it was picked.
-    """
+    """Events that may be at work in a fit: steps in time, runs, and sessions apart; the plainest first, one a place."""
     if fit.campaign.samples > settings.RIPPLE_ROWS or fit.campaign.samples < settings.FEWEST_WITH_EVENTS:
         return ()
     observations = fit.corrected
-    order, sessions = in_order(fit.campaign), _sessions(fit.campaign.labels.get("session"))
+    order, labels = in_order(fit.campaign), fit.campaign.labels.get("session")
+    sessions = {} if labels is None else {str(label): labels == label for label in np.unique(labels)}
     found: dict[tuple[str, str], tuple[float, Discovered]] = {}
     places = list(_places(observations))
     moves = [block(observations, place).columns for place in places]
@@ -208,7 +194,7 @@ def _grid(rows: int, fewest: int) -> Runs:
 
 def _plainest(sums: _Sums, runs: Runs) -> Runs | None:
     """Return (2,) the run that gains most; ``None`` where there is none."""
-    return runs[int(np.argmax(sums.of_runs(runs)))] if len(runs) else None
+    return runs[int(np.argmax(sums.gains(sums.summed[runs[:, 1]] - sums.summed[runs[:, 0]])))] if len(runs) else None
 
 
 def _worth(gain: float, tried: float) -> float:
@@ -236,8 +222,3 @@ def _told(
     law = replace(place, quantity=name, shape="step" if len(ends) == 1 else "run", marks=tuple(map(float, ends)))
     law = replace(law, origin=float(clock.min()), span=float(np.ptp(clock)), unit=unit(observations.robot, name))
     yield worth, replace(law, tried=tried)
-
-
-def _sessions(labels: NDArray[np.str_] | None) -> dict[str, Rows]:
-    """Return (N,) the rows of each session by its label; empty where none was recorded."""
-    return {} if labels is None else {str(label): labels == label for label in np.unique(labels)}

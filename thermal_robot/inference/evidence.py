@@ -14,39 +14,74 @@ ln λ is integrated out by Laplace's method, s held. Parameters that cannot be n
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
-from thermal_robot.inference.gram import Gram
 from thermal_robot.inference.posterior import UNDETERMINED, Columns, Posterior
+
+
+@dataclass(frozen=True, eq=False)
+class Gram:
+    """Normal equations of a linear problem after the frames are projected out, whitened, in units of prior sizes.
+
+    G (D, D), b (D,) and y'y are ``matrix``, ``vector`` and ``total``; each block, reduced to what the data see of it
+    (``ranks``), has D_b columns (``slices``), of which ``bases`` (P_b, D_b) are the parameter values. ``positive`` (D,)
+    cannot be negative: each is then a parameter. ``spreads`` (B,): prior standard deviation of ln λ; ``most`` (B,): λ
+    at most. ``equations`` n is less the rank of the frames; ``noise_dof`` holds the whitening noise, 0 where it is not
+    known; ``offset`` is the log evidence that all combinations share: −½ log of the determinants of the rows'
+    covariance and of the frames, and the log prior of that covariance.
+    """
+
+    matrix: Array
+    vector: Array
+    total: float
+    slices: tuple[slice, ...]
+    bases: tuple[Array, ...]
+    positive: NDArray[np.bool_]
+    ranks: tuple[int, ...]
+    spreads: Array
+    equations: float
+    noise_dof: float
+    offset: float = 0.0
+    most: Array | None = None
+
+    def columns_of(self, blocks: Sequence[int]) -> NDArray[np.int64]:
+        """(D_γ,) numbers of the reduced columns of some blocks."""
+        return np.array([k for b in blocks for k in range(self.slices[b].start, self.slices[b].stop)], dtype=int)
+
+    def some(self, blocks: Sequence[int]) -> Gram:
+        """Return the problem of some of the blocks alone."""
+        widths = [self.bases[b].shape[1] for b in blocks]
+        ends = np.cumsum([0, *widths])
+        own = self.columns_of(blocks)
+        return replace(
+            self,
+            matrix=self.matrix[own[:, None], own],
+            vector=self.vector[own],
+            slices=tuple(slice(a, b) for a, b in pairwise(ends.tolist())),
+            bases=tuple(self.bases[b] for b in blocks),
+            positive=self.positive[own],
+            ranks=tuple(self.ranks[b] for b in blocks),
+            spreads=self.spreads[list(blocks)],
+            most=None if self.most is None else self.most[list(blocks)],
+        )
 
 
 @dataclass(frozen=True, eq=False)
 class Combination:
     """One combination of blocks, its scales at their most probable values.
 
-    Attributes
-    ----------
-    blocks
-        Numbers of the blocks that are in.
-    log_evidence
-        Log marginal likelihood with log prior odds.
-    noise
-        s, in units of the whitening noise.
-    scales
-        λ of each block.
-    values
-        Posterior mode of the reduced columns, block after block; zero for those that would be negative and cannot.
-    covariance
-        Their posterior covariance.
-    effective
-        How many parameters the data determine.
-    exact
-        Whether all scales are at their most probable values; else at most those of one block are.
+    ``log_evidence`` is the log marginal likelihood with log prior odds; ``noise`` s, in units of the whitening noise;
+    ``scales`` λ of each block; ``values`` and ``covariance`` the posterior mode of the reduced columns, block after
+    block, zero for those that would be negative and cannot; ``effective`` the number of determined parameters;
+    ``exact`` whether all scales are converged, else at most those of one block are.
     """
 
     blocks: tuple[int, ...]
@@ -67,22 +102,10 @@ def evidence(
     floor: float = -np.inf,
     settled: float = settings.EVIDENCE_SETTLED,
 ) -> Combination:
-    """Return one combination with noise and scales at their most probable values.
+    """Log evidence of one combination with noise and scales at their most probable values (empirical Bayes).
 
-    Parameters
-    ----------
-    gram
-        The problem.
-    blocks
-        That are in it.
-    prior
-        Their log prior odds.
-    start
-        A combination like it, from whose noise and scales the iteration starts.
-    floor
-        Log evidence that is of interest: where it is clear that this is not reached, the iteration ends.
-    settled
-        By how much the logarithms of noise and scales still move when they are found.
+    The iteration starts at the noise and scales of ``start``, ends once their logarithms move less than ``settled``,
+    and early where it is clear that the log evidence ``floor`` is not reached.
     """
     used = gram.columns_of(blocks)
     owner = np.repeat(np.arange(len(blocks)), [gram.slices[b].stop - gram.slices[b].start for b in blocks])

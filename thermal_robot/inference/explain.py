@@ -14,8 +14,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.effects import Effect
 from thermal_robot.inference import settings
 from thermal_robot.inference.discrepancy import Form
-from thermal_robot.inference.evidence import Combination
-from thermal_robot.inference.gram import Gram
+from thermal_robot.inference.evidence import Combination, Gram
 from thermal_robot.inference.ladder import PLAIN, Ladder, Rung
 from thermal_robot.inference.problem import Linear, Whitening, discrepancy_mean, frame_step, parameter_values
 from thermal_robot.inference.robust import Noise, distance_limit, first_whitening, reweigh
@@ -26,18 +25,10 @@ NOTHING = np.zeros(0)
 
 @dataclass(frozen=True)
 class Discrepancy:
-    """What no effect accounts for.
+    """What no effect accounts for: the probability that there is any, and of each form by its name.
 
-    Attributes
-    ----------
-    form, tau
-        Beside the best combination: which, and its rms over the noise; ``None`` and 0 where there is none.
-    probability
-        That there is any.
-    forms
-        Probability of each form by its name, those of the forms that are not in question left out.
-    noise
-        Beside it, in units of the whitening noise.
+    Beside the best combination: ``form`` and ``tau``, its rms over the noise (``None`` and 0 where there is none), and
+    ``noise`` in units of the whitening noise.
     """
 
     form: Form | None
@@ -51,26 +42,10 @@ class Discrepancy:
 class Explanation:
     """The most probable combination of effects, with its outliers and noise, and the probability of each rival.
 
-    Attributes
-    ----------
-    linear, whitening, problem
-        The linear problem, and the final weights and noise; ``problem`` is its Gram matrix.
-    best
-        The most probable combination.
-    combinations, probabilities
-        All that were compared, most probable first, without their values.
-    values
-        Per block of the best combination: mean and covariance of its parameters.
-    remainder
-        (N, m) residual: gap less effects and frames, for all rows, used or not.
-    smooth
-        (N, m) posterior mean of the discrepancy, a part of the residual.
-    outliers
-        (N,) True for rows set aside.
-    discrepancy
-        What no effect accounts for.
-    forms
-        Of the discrepancy that were considered.
+    ``problem`` is the Gram matrix of the ``linear`` problem at the final ``whitening``; ``combinations`` all that were
+    compared, most probable first, without values; ``values`` mean and covariance per block of the best; ``remainder``
+    (N, m) the residual of all rows, gap less effects and frames; ``smooth`` (N, m) the discrepancy's posterior mean,
+    part of it; ``outliers`` (N,) rows set aside.
     """
 
     linear: Linear
@@ -122,33 +97,10 @@ def explain(
 ) -> Explanation:
     """Find the most probable combination of blocks together with outliers, noise and what no block accounts for.
 
-    Parameters
-    ----------
-    linear
-        The problem.
-    noise
-        As the campaign states it.
-    rows
-        (N,) rows to use; all where absent. The others are held out: they bear on nothing.
-    families
-        Name of the effect that each block belongs to: blocks of one effect are settings that exclude each other and
-        share its prior probability.
-    starts, outliers
-        Where the search starts: combinations of blocks, and rows set aside.
-    known
-        Weights and noise to start with, where an explanation like this one is known.
-    forms
-        Of the discrepancy that is considered; none where nothing but noise may remain.
-    among
-        Number of forms of which these are left, if they are not all.
-    log_prior
-        Log prior odds of each block; see :func:`log_priors`, by which those of the blocks' effects are taken if absent.
-
-    Returns
-    -------
-    Explanation
-        Robust: rows further than noise allows from the explanation are set aside, and rows in the tail weigh less
-        (Huber).
+    Robust: rows further than noise allows are set aside, those in the tail weigh less (Huber). Rows not in ``rows``
+    (N,) bear on nothing. Blocks of one family are settings that exclude each other and share its prior probability.
+    ``starts`` and ``outliers`` are where the search starts, ``known`` the weights and noise; ``among`` is the number of
+    forms of which these are left; ``log_prior`` is by default :func:`log_priors` of the blocks' effects.
     """
     samples = len(linear.gap)
     use = np.ones(samples, dtype=bool) if rows is None else rows
@@ -290,7 +242,8 @@ def log_priors(effects: Sequence[Effect]) -> list[float]:
     for effect in effects:
         single[effect.name].update(effect.places if len(effect.places) == 1 else ())
     kin = [(e.name, frozenset(e.places if single[e.name] else ())) for e in effects]
-    own = [_weight(effect) for effect in effects]
+    # a constant that stands apart is as rare as an effect
+    own = [effect.weight * float(np.exp(log_odds() * effect.apart)) for effect in effects]
     alike: dict[tuple[str, frozenset[str]], float] = {}
     for key, weight in zip(kin, own, strict=True):
         alike[key] = alike.get(key, 0.0) + weight
@@ -304,16 +257,8 @@ def log_priors(effects: Sequence[Effect]) -> list[float]:
 
 
 def share_of_places(count: int, among: int) -> float:
-    """Return the share of an effect's probability that it is in just so many given places; all of it where it has none.
-
-    No places are all of them.
-    """
+    """Prior probability that an effect acts in exactly so many given places, in all where 0; 1 where it has none."""
     return settings.IN_ALL * settings.ONE_MORE ** max(count - 1, 0) / comb(max(among, count), count) if among else 1.0
-
-
-def _weight(effect: Effect) -> float:
-    """How probable a setting is beside others of its places: a constant that stands apart is as rare as an effect."""
-    return effect.weight * float(np.exp(log_odds() * effect.apart))
 
 
 def left_of(linear: Linear, whitening: Whitening, values: dict[int, tuple[Array, Array]]) -> Array:

@@ -26,26 +26,10 @@ from thermal_robot.observations import Observations, observe
 class Fit:
     """What was fitted, at the two places that a diagnosis compares.
 
-    Attributes
-    ----------
-    campaign
-        The data.
-    nominal
-        Observations of the nominal robot with its unknown frames fitted and nothing else.
-    before
-        Linear problem there.
-    corrected
-        Observations of the corrected model.
-    explanation
-        Effects, outliers, noise; linearised at the corrected model.
-    effects
-        Each effect of the explanation with its (P,) values.
-    families
-        Name of the effect that each block of the explanation belongs to.
-    needs
-        Effects that cannot be tested, and what they would need.
-    variants
-        By name: the variants of each effect that were compared.
+    ``nominal`` are the observations of the nominal robot with its unknown frames fitted, ``before`` the linear problem
+    there; ``corrected`` those of the corrected model, where ``explanation`` is linearised. ``effects`` have their (P,)
+    values, ``families`` names the effect of each block, ``needs`` says what effects that cannot be tested lack,
+    ``variants`` by name which settings were compared.
     """
 
     campaign: Campaign
@@ -82,26 +66,9 @@ class Fit:
 
 
 def fit(campaign: Campaign, effects: Sequence[Effect], progress: Callable[[str], None] = lambda _: None) -> Fit:
-    """Fit frames, choose effects, refit the choice exactly.
+    """Fit frames, choose effects and refit the choice exactly, until a Gauss-Newton step moves nothing measurable.
 
-    Parameters
-    ----------
-    campaign
-        With measurements.
-    effects
-        Candidates.
-    progress
-        Called with a few words at each stage.
-
-    Returns
-    -------
-    Fit
-        Converged: another Gauss-Newton step would move nothing that can be measured.
-
-    Raises
-    ------
-    EstimationError
-        If there are too few different poses for the unknown frames.
+    Raises :class:`EstimationError` if there are too few different poses for the unknown frames.
     """
     progress("unknown frames")
     require_enough(campaign)
@@ -148,18 +115,9 @@ def refit(
     begin: Sequence[Effect],
     progress: Callable[[str], None] = lambda _: None,
 ) -> Fit:
-    """Fit again with other settings to choose from, such as laws that were discovered.
+    """Fit again with other settings to choose from, such as discovered laws; the search starts with ``begin``.
 
-    Parameters
-    ----------
-    known
-        The fit that left a remainder.
-    variants
-        By name: settings that replace those of the fit, or join them; none takes the effect out.
-    begin
-        Settings with which the search starts.
-    progress
-        Called with a few words at each stage.
+    ``variants`` replace those of the fit by name, or join them; none takes the effect out.
     """
     whole = {name: own for name, own in {**known.variants, **variants}.items() if own}
     settled = settle(known.nominal, whole, progress, begin=begin)

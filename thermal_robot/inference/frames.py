@@ -1,6 +1,13 @@
-"""Unknown frames, fitted exactly before any effect: the tracker may stand anywhere, turned by any angle."""
+"""Unknown frames, fitted exactly before any effect: the tracker may stand anywhere, turned by any angle.
+
+From nothing, the rigid alignment of the base and the place of the target go by turns: each of the two is linear while
+the other is held, and a third of the rows may be grossly wrong. Starts go side by side, each until its own median
+distance settles: what one start finds does not depend on the others.
+"""
 
 from __future__ import annotations
+
+from typing import NamedTuple, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -10,36 +17,180 @@ from thermal_robot.campaign import Campaign
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of, solve
-from thermal_robot.inference.alternation import alternate, middle, soft, starts
 from thermal_robot.inference.columns import frame_columns
-from thermal_robot.kinematics import exp6
+from thermal_robot.kinematics import align, exp6, quaternion_to_rotation, tool_poses
 from thermal_robot.observations import Frames, observe
+from thermal_robot.robot import Robot
+
+
+class Placed(NamedTuple):
+    """Where the robot stands and the target sits: (..., 4, 4) each, for columns side by side."""
+
+    base: Array
+    tool: Array
+
+
+class Paired(Protocol):
+    """Commands paired with measurements, as a campaign holds them; see :class:`~thermal_robot.campaign.Campaign`."""
+
+    @property
+    def robot(self) -> Robot: ...  # noqa: D102
+    @property
+    def q(self) -> Array: ...  # noqa: D102
+    @property
+    def position(self) -> Array | None: ...  # noqa: D102
+    @property
+    def orientation(self) -> Array | None: ...  # noqa: D102
+    @property
+    def simulated_position(self) -> Array | None: ...  # noqa: D102
+    @property
+    def base_known(self) -> bool: ...  # noqa: D102
+    @property
+    def tool_known(self) -> bool: ...  # noqa: D102
+
+
+def starts(campaign: Paired) -> Array:
+    """(S, 3) shifts of the target, m, from which :func:`alternate` begins; the first is none."""
+    fixed = campaign.tool_known or campaign.simulated_position is not None
+    return settings.TARGET_STARTS[:1] if fixed else settings.TARGET_STARTS
+
+
+def soft(distance: Array) -> Array:
+    """Cauchy weights of distances (..., N) at the scale of their median: a third of the rows may be grossly wrong."""
+    return _soft(distance, middle(distance))
+
+
+def _soft(distance: Array, scale: Array) -> Array:
+    return np.asarray(1.0 / (1.0 + (distance / (settings.CAUCHY_SCALE * scale[..., None] + settings.NO_DISTANCE)) ** 2))
+
+
+def middle(values: Array) -> Array:
+    """(...) median along the last axis of finite values (..., N), as NumPy's, which spends most of its time on NaN."""
+    half, odd = divmod(values.shape[-1], 2)
+    parted = np.partition(values, half if odd else (half - 1, half), axis=-1)
+    return np.asarray(parted[..., half] if odd else 0.5 * (parted[..., half - 1] + parted[..., half]))
+
+
+def alternate(
+    campaign: Paired,
+    declared: Frames,
+    targets: Array,
+    rounds: int = settings.START_ROUNDS,
+    some: NDArray[np.int64] | slice = slice(None),
+    poses: Array | None = None,
+) -> tuple[Array, Placed]:
+    """Alternate the rigid alignment of the base with the linear fit of the target's place, robustly.
+
+    Targets (..., S, 3), m in the tool frame, are S starts; the columns of the campaign may have several in front
+    (..., N), which go side by side; ``poses`` (..., N, 4, 4) are the tool frame's in the rows ``some``. Returns (...)
+    the median distance that the nearest start leaves, m, and its frames.
+    """
+    lead, many = campaign.q.shape[:-2], targets.shape[-2]
+    measured, turns = np.asarray(campaign.position)[..., some, :], None
+    if campaign.simulated_position is not None:
+        origin = campaign.simulated_position[..., some, :]
+    else:
+        poses = tool_poses(campaign.robot, campaign.q[some]) if poses is None else poses
+        origin, turns = poses[..., :3, 3], poses[..., :3, :3]
+    begun = declared.tool[:3, 3] if campaign.tool_known else targets
+    begun = np.array(np.broadcast_to(begun, (*lead, many, 3))).reshape(-1, 3)
+    repeated = _repeated(measured, lead, many), _repeated(origin, lead, many)
+    several = None if turns is None else _repeated(turns, lead, many, 3)
+    state = Alternating(*repeated, several, campaign.base_known, campaign.tool_known, declared.base, begun)
+    state.run(rounds)
+    best = np.arange(0, len(begun), many) + state.cost.reshape(-1, many).argmin(axis=1)
+    base = state.base[best].reshape(*lead, 4, 4)
+    tool = np.repeat(declared.tool[None], len(best), axis=0).reshape(*lead, 4, 4)
+    tool[..., :3, 3] = state.place[best].reshape(*lead, 3)
+    if campaign.orientation is not None and turns is not None and not campaign.tool_known:
+        weights = state.weights[best].reshape(*lead, -1)
+        tool[..., :3, :3] = turned(turns, base, quaternion_to_rotation(campaign.orientation[..., some, :]), weights)
+    return state.cost[best].reshape(lead)[()], Placed(base, tool)
+
+
+def _repeated(own: Array, lead: tuple[int, ...], times: int, axes: int = 2) -> Array:
+    """(S·times, ...) columns side by side, each so many times; as they are where there are none in front."""
+    if not lead:
+        return own
+    shape = own.shape[own.ndim - axes :]
+    return np.repeat(np.broadcast_to(own, (*lead, *shape)).reshape(-1, *shape), times, axis=0)
+
+
+def turned(turns: Array, base: Array, measured: Array, weights: Array) -> Array:
+    """(..., 3, 3) turn of the target on the tool frame: the weighted mean (..., N) of what each row says."""
+    seen = turns.swapaxes(-1, -2) @ base[..., None, :3, :3].swapaxes(-1, -2) @ measured
+    u, _, vt = np.linalg.svd(np.einsum("...n,...nij->...ij", weights, seen))
+    upright = np.ones(u.shape[:-1])
+    upright[..., 2] = np.linalg.det(u @ vt)
+    return np.asarray((u * upright[..., None, :]) @ vt)
+
+
+class Alternating:
+    """S alternations side by side: bases (S, 4, 4), places (S, 3), weights (S, N), medians (S,), and who moves.
+
+    Measured points and origins (N, 3) and turns (N, 3, 3) are those of all, or have the S in front.
+    """
+
+    def __init__(
+        self,
+        measured: Array,
+        origin: Array,
+        turns: Array | None,
+        base_known: bool,
+        tool_known: bool,
+        base: Array,
+        place: Array,
+    ) -> None:
+        self._measured, self._origin, self._turns = measured, origin, turns
+        self._base_known, self._tool_known = base_known, tool_known
+        self.base = np.repeat(base[None], len(place), axis=0)
+        self.place, self.cost = place, np.full(len(place), np.inf)
+        self.weights = np.ones((len(place), measured.shape[-2]))
+        self._moving = np.arange(len(place))
+
+    def run(self, rounds: int) -> None:
+        """Alternate so many times at most."""
+        for _ in range(rounds):
+            if self.step():
+                break
+
+    def step(self) -> bool:
+        """Take one alternation of those that still move; tell whether none is left."""
+        moving = self._moving
+        base, place, weights = self.base[moving], self.place[moving], self.weights[moving]
+        measured, origin = (own if own.ndim == 2 else own[moving] for own in (self._measured, self._origin))
+        turns = self._turns if self._turns is None or self._turns.ndim == 3 else self._turns[moving]
+        predicted = _predicted(origin, turns, place)
+        if not self._base_known:
+            base = align(predicted, measured, weights)
+        turned, shift = base[:, :3, :3], base[:, None, :3, 3]
+        if turns is not None and not self._tool_known:
+            # (measured in the root frame − origin) = R t: the mean over rows of Rᵀ(…), since each R is orthogonal
+            local = np.einsum("...nji,...nj->...ni", turns, (measured - shift) @ turned - origin)
+            place = (weights[:, None] @ local)[:, 0] / weights.sum(axis=1)[:, None]
+            predicted = _predicted(origin, turns, place)
+        away = measured - predicted @ turned.transpose(0, 2, 1) - shift
+        distance = np.sqrt((away * away).sum(axis=2))
+        before, cost = self.cost[moving], middle(distance)
+        self.base[moving], self.place[moving], self.cost[moving] = base, place, cost
+        self.weights[moving] = _soft(distance, cost)
+        self._moving = moving[~(np.abs(before - cost) < settings.START_SETTLED * cost)]
+        return not len(self._moving)
+
+
+def _predicted(origin: Array, turns: Array | None, place: Array) -> Array:
+    """(S, N, 3) origin and place in the root frame, or what the simulator says."""
+    if turns is None:
+        return np.broadcast_to(origin, (len(place), *origin.shape[-2:]))
+    return np.asarray(origin + (turns @ place[:, None, :, None])[..., 0])
 
 
 def register(campaign: Campaign, keep: NDArray[np.bool_] | None = None) -> Frames:
-    """Fit the unknown frames to the nominal robot, and nothing else.
+    """Fit the unknown frames to the nominal robot, and nothing else; known ones stay as declared.
 
     Alternates the rigid alignment of the base with the linear fit of the target's place, from several starts (the
-    target may sit 0.3 m from the tool frame), on a sample of the rows and with weights that let gross errors go; then
-    Gauss-Newton on all rows.
-
-    Parameters
-    ----------
-    campaign
-        With measurements.
-    keep
-        (N,) True for the rows to fit by least squares, False for those set aside; where absent all are fitted,
-        robustly.
-
-    Returns
-    -------
-    Frames
-        Known frames as declared, unknown ones fitted.
-
-    Raises
-    ------
-    EstimationError
-        If fewer than three rows have weight.
+    target may sit 0.3 m from the tool frame), on a sample of the rows, robustly; then Gauss-Newton on all rows, or by
+    least squares on those of ``keep`` (N,). Raises :class:`EstimationError` if fewer than three rows have weight.
     """
     if frames_known(campaign):
         return Frames.declared(campaign)
@@ -53,13 +204,7 @@ def frames_known(campaign: Campaign) -> bool:
 
 
 def found_frames(campaign: Campaign) -> Frames:
-    """Find the unknown frames to where they are nearly linear: known ones as declared.
-
-    Raises
-    ------
-    EstimationError
-        If there are fewer than three rows.
-    """
+    """Find the unknown frames to where they are nearly linear; :class:`EstimationError` below three rows."""
     frames, rows = Frames.declared(campaign), campaign.samples
     if rows < 3:
         raise EstimationError("at least three rows are needed to fit the unknown frames")

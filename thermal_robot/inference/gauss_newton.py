@@ -28,31 +28,10 @@ def gauss_newton(
     settled: float,
     since: Sequence[tuple[Effect, Array]] | None = None,
 ) -> tuple[Observations, list[tuple[Effect, Array]]]:
-    """Refit frames and the explanation's parameters with the exact model, the priors held at their scales.
+    """Refit frames and parameters with the exact model by Gauss-Newton, the priors held at their scales.
 
-    It begins at values of a linear fit. Where these are so far off that it ends worse than what they were linearised
-    about, it begins there.
-
-    Parameters
-    ----------
-    campaign, frames
-        The data, and where the frames are so far.
-    explanation
-        Weights, noise and prior scales.
-    held
-        Its effects, or some of them, with their (P,) values so far.
-    settled
-        Step at which it ends, in standard deviations.
-    since
-        About which the explanation was linearised, with these frames: effects with their values; ``None`` where that
-        is what ``held`` has.
-
-    Returns
-    -------
-    observations
-        Of the corrected model.
-    held
-        The effects with their values.
+    It begins at the (P,) values of a linear fit (``held``); where it then ends worse than ``since``, about which the
+    explanation was linearised, it begins there. It ends at a step of ``settled`` standard deviations.
     """
     observations, found, cost = _descended(campaign, frames, explanation, held, settled, settings.FIT_STEPS)
     if since is not None:

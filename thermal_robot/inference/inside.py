@@ -27,16 +27,8 @@ from thermal_robot.inference.problem import Linear, gram
 class Portion:
     """What one effect does of all that a larger one was found to do, or the larger one's rest.
 
-    Attributes
-    ----------
-    effect
-        Name of the effect.
-    parameters
-        The k of them that are told.
-    values, spread, prior
-        (k,) value and posterior and prior standard deviation of each, in its unit.
-    unseen
-        Parameters that the data do not tell from those before them, or from the frames.
+    (k,) value, posterior (``spread``) and ``prior`` standard deviation of each parameter, in its unit; ``unseen`` are
+    those that the data do not tell from the ones before, or from the frames.
     """
 
     effect: str
@@ -48,20 +40,9 @@ class Portion:
 
 
 def divided(fit: Fit, name: str) -> tuple[Portion, ...]:
-    """Divide an effect of a fit: first what is inside it and told there, the rest last.
+    """Divide an effect of a fit: first what is inside it and told there, the rest last; empty where nothing is.
 
-    Parameters
-    ----------
-    fit
-        The fit.
-    name
-        Of an effect of the fit.
-
-    Returns
-    -------
-    tuple of Portion
-        Empty where the effect is told in its own parameters. All parts together move the target as the effect does, but
-        for the unknown frames.
+    All parts together move the target as the effect does, but for the unknown frames.
     """
     number = next(k for k, (effect, _) in enumerate(fit.effects) if effect.name == name)
     effect, values = fit.effects[number]
@@ -142,10 +123,7 @@ def identified(spread: Array, prior: Array) -> NDArray[np.bool_]:
 
 
 def distinct(across: Array, within: NDArray[np.bool_], least: float = settings.DISTINCT) -> list[int]:
-    """Return the numbers of the columns that are independent of those before them, as many as there are rows.
-
-    ``least`` is the length that must be left of one beside those before it.
-    """
+    """Return the columns independent of those before them, as many as rows, ``least`` being the length to be left."""
     basis = np.zeros((len(across), 0))
     kept: list[int] = []
     for k in np.flatnonzero(within):

@@ -13,8 +13,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
 from thermal_robot.inference.discrepancy import Form, Smooth, Spectrum, decomposed
-from thermal_robot.inference.evidence import Combination, evidence
-from thermal_robot.inference.gram import Gram
+from thermal_robot.inference.evidence import Combination, Gram, evidence
 from thermal_robot.inference.problem import Linear, Whitening, contained, normal_equations, white_stack
 from thermal_robot.inference.search import Search
 from thermal_robot.inference.stack import Grouped, Stack
@@ -28,20 +27,8 @@ PLAIN: Rung = (-1, 0.0)
 class Ladder:
     """Evaluates combinations of blocks beside discrepancies of several forms and sizes.
 
-    Parameters
-    ----------
-    linear, whitening
-        The problem; its whitening without a discrepancy.
-    forms
-        Of the discrepancy; none where none is to be considered.
-    log_prior
-        Log prior odds of each block.
-    exclusive
-        Pairs of blocks that must not be together, beside those of which one contains the other.
-    among
-        Number of forms of which these are left, if they are not all: each keeps its share of the prior.
-    stack
-        The problem's columns, where they are known already.
+    ``whitening`` is without a discrepancy; ``exclusive`` pairs of blocks must not be together, nor those of which one
+    contains the other; of ``among`` forms these are left, and keep their share of the prior.
     """
 
     linear: Linear
@@ -271,14 +258,11 @@ class Ladder:
         for ((form, tau), blocks), log in self._quick.items():
             if blocks == best.blocks and form >= 0:
                 peaks[form] = max(peaks.get(form, (-np.inf, 0.0)), (log, tau))
-        near = {form for form, (log, tau) in peaks.items() if tau > settings.TAUS[0] and self._close(log, best)}
+        least = best.log_evidence - settings.FORM_REACH
+        near = {form for form, (log, tau) in peaks.items() if tau > settings.TAUS[0] and log > least}
         single = [form for form in self.forms if not form.several]
         several = any(self.forms[k].several for k in near)
         return tuple(f for k, f in enumerate(single) if k in near or (several and f.anew))
-
-    @staticmethod
-    def _close(log_evidence: float, best: Combination) -> bool:
-        return log_evidence > best.log_evidence - settings.FORM_REACH
 
     def _beside_others(self, best: Combination) -> tuple[Rung, Combination] | None:
         """Weigh the neighbours beside all discrepancies that count; return what is better than the best, if any is."""

@@ -30,17 +30,7 @@ __all__ = [
 
 
 def laws(observations: Observations, kinds: Sequence[str], names: Iterable[str] | None = None) -> list[Discovered]:
-    """Return a smooth law of each quantity at each place of the given kinds, and at a segment a constant one, too.
-
-    Parameters
-    ----------
-    observations
-        Where quantities are read from.
-    kinds
-        ``joint``, ``base``, ``tool``, ``link``.
-    names
-        Of the quantities; all where absent.
-    """
+    """Smooth laws of each quantity at each place of the given kinds, and at a segment constant ones, too."""
     turns = observations.campaign.measures == "pose"
     robot = observations.robot
     places = {
@@ -72,7 +62,9 @@ def laws(observations: Observations, kinds: Sequence[str], names: Iterable[str] 
 
 def law_of(observations: Observations, plain: Discovered, name: str, values: Array) -> Discovered:
     """Return a law as a smooth one of a quantity (N,), or one of its levels."""
-    law = replace(plain, quantity=name, unit=unit(observations.robot, name), labels=_labels(observations, name))
+    own = None if name in observations.covariates else observations.campaign.labels.get(name)
+    labels = () if own is None else tuple(np.unique(own).tolist())
+    law = replace(plain, quantity=name, unit=unit(observations.robot, name), labels=labels)
     return of_quantity(law, values)
 
 
@@ -85,12 +77,6 @@ def harmonics(observations: Observations, joint: str) -> tuple[float, ...]:
     """Return the harmonics tried in a joint: the first three, and the motor's where its ratio is stated."""
     ratio = observations.campaign.gears.get(joint)
     return settings.HARMONICS if ratio is None else (*settings.HARMONICS, float(ratio), 2.0 * float(ratio))
-
-
-def _labels(observations: Observations, name: str) -> tuple[str, ...]:
-    own = observations.campaign.labels.get(name)
-    recorded = own is not None and name not in observations.covariates
-    return tuple(np.unique(own).tolist()) if own is not None and recorded else ()
 
 
 def of_quantity(law: Discovered, values: Array, knots: int = settings.KNOTS) -> Discovered:
@@ -120,7 +106,9 @@ def shapes(
         return [law]
     law = replace(of_quantity(law, values), runs=(), starts=()) if law.starts else law
     if law.by:
-        return list(dict.fromkeys([law, *_of_two(law, values)]))
+        largest = float(np.abs(values).max())
+        product = [replace(law, shape="product", span=largest)] if largest > 0.0 else []
+        return list(dict.fromkeys([law, *product]))
     smooth = of_quantity(law, values)
     found = [law, smooth] if law.labels or len(smooth.marks) < 3 else [law, smooth, straight(law)]
     if law.labels and len(levels := np.unique(values)) > 2:
@@ -148,23 +136,10 @@ def _jumps(law: Discovered, middle: Array) -> list[Discovered]:
     return found + [replace(law, shape="bump", marks=(float(m), w)) for m in middle[1:-1:2] for w in widths]
 
 
-def _of_two(law: Discovered, values: Array) -> list[Discovered]:
-    """Return a straight law of two quantities, 1, u, v and u·v, as one of their product (N,) alone."""
-    largest = float(np.abs(values).max())
-    return [replace(law, shape="product", span=largest)] if largest > 0.0 else []
-
-
 def hystereses(law: Discovered, values: Array) -> list[Discovered]:
     """Return a law of a joint's memory as elements that slip: over the whole range, coarsely first, or some neighbours.
 
-    One that slips between two of the grid is nearly a sum of these two.
-
-    Parameters
-    ----------
-    law
-        Of the distance (N,) from the joint's last turning point.
-    values
-        That distance, rad or m: which slips show, it tells.
+    Which show, ``values`` (N,) tell, rad or m from the last turning point; one between two is nearly their sum.
     """
     least, most = (share * float(np.abs(values).max()) for share in settings.SLIP_SHARES)
     slips = tuple(r for r in SLIPS if least <= r <= most)

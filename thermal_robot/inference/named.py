@@ -23,8 +23,7 @@ from thermal_robot.inference.explain import Discrepancy, Explanation, left_of
 from thermal_robot.inference.fit import Fit, require_enough
 from thermal_robot.inference.frames import found_frames, frames_known, moved, refined_frames
 from thermal_robot.inference.gauss_newton import gauss_newton
-from thermal_robot.inference.problem import Linear, Whitening, frame_step, gram, parameter_values
-from thermal_robot.inference.products import Products
+from thermal_robot.inference.problem import Linear, Products, Whitening, frame_step, gram, parameter_values
 from thermal_robot.inference.refine import constants_moved, weighed
 from thermal_robot.inference.robust import Noise, first_whitening, reweigh
 from thermal_robot.inference.search import Search
@@ -35,32 +34,13 @@ Held = list[tuple[Effect, Array]]
 
 
 def fit_named(campaign: Campaign, effects: Sequence[Effect], progress: Callable[[str], None] = lambda _: None) -> Fit:
-    """Fit the unknown frames and all of these effects.
+    """Fit the unknown frames and all of these effects, each of another name: one combination, of probability 1.
 
-    An effect that lies in another one of them and is told inside it (:attr:`Effect.told_inside`) is not fitted beside
-    it: it stands in the fit's variants, where :func:`~thermal_robot.inference.inside.divided` finds it.
-
-    Parameters
-    ----------
-    campaign
-        With measurements.
-    effects
-        At least one, each of another name. Of one with constants that are no linear parameters the most probable
-        setting in all its places is taken, and the constants are moved from there.
-    progress
-        Called with a few words at each stage.
-
-    Returns
-    -------
-    Fit
-        With one combination of effects, of probability 1.
-
-    Raises
-    ------
-    EffectError
-        If the campaign lacks what an effect needs, or one breaks the contract.
-    EstimationError
-        If there are too few different poses for the unknown frames, or nothing is determined.
+    One that lies in another and is told inside it (:attr:`Effect.told_inside`) is not fitted beside it: it stands in
+    the fit's variants, where :func:`~thermal_robot.inference.inside.divided` finds it. Constants that are no linear
+    parameters start at the most probable setting in all places. Raises :class:`EffectError` where the campaign lacks
+    what an effect needs, or one breaks the contract; :class:`EstimationError` where poses are too few for the frames,
+    or nothing is determined.
     """
     progress("unknown frames")
     require_enough(campaign)

@@ -50,20 +50,11 @@ class Columns:
 
 @dataclass(frozen=True, eq=False)
 class Posterior:
-    """Parameters of one combination at given scales and noise.
+    """Parameters of one combination at given scales and noise: posterior mode and covariance about it.
 
-    Attributes
-    ----------
-    values, covariance
-        Posterior mode and covariance about it; of a dropped column zero, and its mean square.
-    free
-        (D,) False for columns that are dropped.
-    log_volume
-        Log of the posterior's volume over the prior's: −½ log|I + Λ G/s²|, and what the sides are worth.
-    effective
-        Per block: how many of its columns the data determine.
-    fitted, determined
-        The same, and |θ|²/λ², with the moments that the sides leave.
+    Of a dropped column (``free`` (D,) False) zero, and its mean square. ``log_volume`` is the log of the posterior's
+    volume over the prior's: −½ log|I + Λ G/s²|, and what the sides are worth; ``effective`` per block, how many of its
+    columns the data determine; ``fitted`` and ``determined`` the same, and |θ|²/λ², by the sides' moments.
     """
 
     values: Array
@@ -78,10 +69,7 @@ class Posterior:
     def at(cls, columns: Columns, scale: Array, variance: float, free: Mask | None = None) -> Posterior:
         """Solve (G/s² + Λ⁻¹) θ = b/s² with θ ≥ 0 where that is asked; ``free`` is a guess of what is not dropped.
 
-        Raises
-        ------
-        EstimationError
-            If rounding hides what the columns bring.
+        Raises :class:`EstimationError` if rounding hides what the columns bring.
         """
         size, count = len(columns.vector), len(scale)
         free = np.ones(size, dtype=bool) if free is None else free

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 from itertools import pairwise
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,23 +17,15 @@ from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of, solve, whitener
 from thermal_robot.inference.columns import Block
 from thermal_robot.inference.discrepancy import Smooth
-from thermal_robot.inference.evidence import Combination
-from thermal_robot.inference.gram import Gram
+from thermal_robot.inference.evidence import Combination, Gram
 from thermal_robot.inference.stack import Stack
 
 
 @dataclass(frozen=True, eq=False)
 class Linear:
-    """gap ≈ F f + Σ_b X_b θ_b + noise, in the root frame's axes.
+    """gap ≈ F f + Σ_b X_b θ_b + noise, in the root frame's axes: gap (N, m), m and rad, frames F (N, m, f).
 
-    Attributes
-    ----------
-    gap
-        (N, m) m and rad, with the contribution of values already applied added back, so that θ is the whole value.
-    frames
-        (N, m, f) columns of the unknown frames.
-    blocks
-        The effects' columns.
+    Values that were already applied are added back to the gap, so that θ is the whole value.
     """
 
     gap: Array
@@ -72,20 +65,10 @@ class Linear:
 
 @dataclass(frozen=True, eq=False)
 class Whitening:
-    """Weight of each row and noise of each component.
+    """Weight of each row (N,), 0 where it is not used, else up to 1, and noise (m,) of each component, m and rad.
 
-    Attributes
-    ----------
-    weights
-        (N,) 0 for rows that are not used, else up to 1.
-    noise
-        (m,) one sigma: m for the first three, rad for the rest.
-    held
-        Degrees of freedom of the prior on the noise; 0 where none is stated.
-    smooth
-        The correlated part of the rows' covariance, where there is a discrepancy.
-    relative
-        (N, m) noise of each figure of a row over that of its component; ``None`` where all rows are alike.
+    ``held``: degrees of freedom of the noise's prior, 0 where none is stated. ``smooth``: the correlated part of the
+    rows' covariance. ``relative`` (N, m): noise of each figure over that of its component.
     """
 
     weights: Array
@@ -117,18 +100,9 @@ def white_stack(stack: Stack, whitening: Whitening) -> Stack:
 def normal_equations(
     linear: Linear, whitening: Whitening, full: Array, equations: int, like: Gram | None = None
 ) -> Gram:
-    """Project the frames out of the products of all columns, and reduce each block.
+    """Project the frames out of the products of all columns, and reduce each block, or take the reduction of ``like``.
 
-    Parameters
-    ----------
-    linear, whitening
-        The problem.
-    full
-        (f + P + 1, f + P + 1) products of the whitened columns.
-    equations
-        Number of whitened rows.
-    like
-        A problem whose reduction of the blocks is taken over; each block is reduced anew where there is none.
+    ``full`` (f + P + 1, f + P + 1) are the products of the whitened columns.
     """
     flat = linear.frames.shape[2]
     sizes = np.concatenate([*(b.sizes for b in linear.blocks), [1.0]])
@@ -282,18 +256,9 @@ def discrepancy_mean(whitening: Whitening, remainder: Array) -> Array:
 
 
 def generalised(linear: Linear, covariance: Array, noise: Array) -> Linear:
-    """Return the problem with each row multiplied by diag(noise) L⁻¹, where L Lᵀ is its covariance (Aitken 1935).
+    """Generalised least squares: each row times diag(noise) L⁻¹, where L Lᵀ is its covariance (Aitken 1935).
 
-    All rows then have the covariance diag(noise²).
-
-    Parameters
-    ----------
-    linear
-        The problem, N rows of m components.
-    covariance
-        (N, m, m) of the residual of each row: m², m rad, rad².
-    noise
-        (m,) one sigma of each component of the result: m, rad.
+    The residual's ``covariance`` (N, m, m) is then diag(noise²) in all rows; noise (m,), m and rad.
     """
     root = np.linalg.cholesky(covariance)
 
@@ -305,3 +270,48 @@ def generalised(linear: Linear, covariance: Array, noise: Array) -> Linear:
         white(linear.frames),
         tuple(replace(block, source=white(block.columns)) for block in linear.blocks),
     )
+
+
+class Products:
+    """Gram matrices of many selections of blocks with the same gap, frames and whitening.
+
+    A block that takes the place of another costs its own columns and their products with the others. What is kept of a
+    block goes with it.
+    """
+
+    def __init__(self, linear: Linear, whitening: Whitening) -> None:
+        self._gap, self._frames, self._whitening = linear.gap, linear.frames, whitening
+        both = np.concatenate([linear.frames, linear.gap[:, :, None]], axis=2)
+        self._flat = whitened_columns(both, whitening)
+        self._own = self._flat.T @ self._flat
+        self._white: WeakKeyDictionary[Block, Array] = WeakKeyDictionary()
+        self._beside: WeakKeyDictionary[Block, Array] = WeakKeyDictionary()
+        self._pairs: WeakKeyDictionary[Block, WeakKeyDictionary[Block, Array]] = WeakKeyDictionary()
+
+    def problem(self, blocks: Sequence[Block]) -> tuple[Linear, Gram]:
+        """Return the linear problem of some blocks and its normal equations, as ``gram`` forms them."""
+        linear, flat = Linear(self._gap, self._frames, tuple(blocks)), self._frames.shape[2]
+        ends = np.cumsum([flat, *(len(item.sizes) for item in blocks)]).tolist()
+        spans = [slice(a, b) for a, b in pairwise(ends)]
+        full, outer = np.zeros((ends[-1] + 1, ends[-1] + 1)), np.array([*range(flat), ends[-1]])
+        full[np.ix_(outer, outer)] = self._own
+        for k, (item, span) in enumerate(zip(blocks, spans, strict=True)):
+            if item not in self._white:
+                self._white[item] = whitened_columns(item.columns, self._whitening)
+                self._beside[item] = self._flat.T @ self._white[item]
+            full[outer, span] = self._beside[item]
+            full[span, outer] = self._beside[item].T
+            for other, there in zip(blocks[: k + 1], spans[: k + 1], strict=True):
+                full[there, span] = products = self._pair(other, item)
+                full[span, there] = products.T
+        return linear, normal_equations(linear, self._whitening, full, len(self._flat))
+
+    def _pair(self, one: Block, other: Block) -> Array:
+        """Return the (P, Q) products of the columns of two blocks."""
+        for first, second in ((one, other), (other, one)):
+            known = self._pairs[first].get(second) if first in self._pairs else None
+            if known is not None:
+                return known if first is one else np.asarray(known.T)
+        found = self._white[one].T @ self._white[other]
+        self._pairs.setdefault(one, WeakKeyDictionary())[other] = found
+        return np.asarray(found)

@@ -24,19 +24,11 @@ from thermal_robot.inference.target import Target
 
 
 def followed(errors: Array, weight: Array, recorded: Mapping[str, Array], pose: NDArray[np.int64] | None = None) -> str:
-    """Name the quantity that errors follow smoothly; empty where none does.
+    """Name the quantity that errors (K,) of weight 1/variance follow smoothly; empty where none does.
 
-    Each quantity has an F test, its p-value multiplied by the number of quantities (Bonferroni). A law must
-    also explain a good part of the errors.
-
-    Parameters
-    ----------
-    errors, weight
-        (K,) errors, and one over the variance of each.
-    recorded
-        (K,) values of each quantity, by name.
-    pose
-        (K,) number of each row's pose, where errors are those within a pose: the mean of each was taken out of them.
+    Each ``recorded`` quantity has an F test, its p-value multiplied by their number (Bonferroni); a law must also
+    explain a good part of the errors. ``pose`` (K,): where errors are those within a pose, the mean of each was taken
+    out of them.
     """
     best, follows = settings.LEVEL, ""
     root = np.sqrt(weight)
@@ -55,15 +47,9 @@ def followed(errors: Array, weight: Array, recorded: Mapping[str, Array], pose: 
 
 @dataclass(frozen=True)
 class Steps:
-    """What errors say of steps.
+    """What errors say of steps of an encoder: their distance, rad or m, and the log Bayes factor of steps over none.
 
-    Attributes
-    ----------
-    step
-        Distance of the positions at which the joint stands, rad or m; where none is seen, that which the errors' size
-        implies.
-    log_factor
-        Natural logarithm of the Bayes factor of steps against errors without any; 0 where it cannot be asked.
+    Where none is seen the distance is what the errors' size implies, and the factor 0 where it cannot be asked.
     """
 
     step: float
@@ -74,20 +60,11 @@ def period(errors: Array, variance: Array, command: Array, step: float) -> Steps
     """Look for the distance of the only positions at which a joint stands, where an encoder counts in steps.
 
     The joint stands at the multiple of the step s, from a first position φ on, that is nearest to its command. Its
-    error is then a sawtooth of the command, u s with u from -½ to ½, and is seen with its variance v and a slack of the
+    error (K,) is then a sawtooth of the command, u s with u from -½ to ½, seen with its variance v and a slack of the
     steps; without steps it is normal with the variance v + s²/12. The Bayes factor is the ratio of these likelihoods,
-    its mean over φ, over slacks, and over the frequencies 1/s near that which the size of the errors implies. The
-    logarithm of a row's likelihood is periodic in φ less the command: by its Fourier series the sum over rows is one
-    of waves exp(2π i k command/s).
-
-    Parameters
-    ----------
-    errors, variance
-        (K,) errors, rad or m, and the variance of each from everything but steps.
-    command
-        (K,) commanded position of the joint, rad or m.
-    step
-        That the size of the errors implies, rad or m.
+    its mean over φ, over slacks, and over the frequencies 1/s near that which the size of the errors implies (``step``,
+    rad or m). The logarithm of a row's likelihood is periodic in φ less the command: by its Fourier series the sum over
+    rows is one of waves exp(2π i k command/s).
     """
     some = np.linspace(0.0, len(errors) - 1.0, min(len(errors), settings.STEP_POSES)).round().astype(np.int64)
     errors, variance, command = errors[some] / step, variance[some] / step**2, (command - command.mean())[some] / step
@@ -157,14 +134,9 @@ def seen(log_factors: Sequence[float]) -> float:
 
 
 def stepped(factor: float, *, again: bool) -> float:
-    """Return the probability that joints which err anew from pose to pose do so by the steps of their encoders.
+    """Probability that joints which err anew from pose to pose do so by their encoders' steps, by the log Bayes factor.
 
-    Parameters
-    ----------
-    factor
-        What steps say, of all these joints: see :func:`seen`.
-    again
-        Whether later visits of a pose find the same error, so that wear is none.
+    ``again``: whether later visits of a pose find the same error, so that wear is none.
     """
     return float(expit(factor - np.log(settings.RIVALS_AGAIN if again else settings.RIVALS_ONCE)))
 
@@ -179,25 +151,12 @@ class Kept:
 
 @dataclass(frozen=True, eq=False)
 class RandomGap:
-    """What is random in the gap beyond the instrument.
+    """What is random in the gap beyond the instrument, by the variances of ``scatter``.
 
-    Attributes
-    ----------
-    kept
-        The components of the scatter that are scatter.
-    explains_size
-        Whether scatter explains the size of the remainder: no more is left than instrument and scatter allow. What
-        poses bring counts where it is more probably an encoder's than not.
-    p_value
-        Of the χ² test that no more is left.
-    scatter
-        The variances behind it.
-    steps
-        By joint: logarithm of the Bayes factor of steps of the command against errors that follow nothing.
-    laws
-        By joint: the quantity that its errors follow, so that they are no scatter but what no known effect explains.
-    note
-        What limits the answer, one plain sentence; empty where nothing does.
+    ``kept`` are its components that are scatter. ``explains_size``: no more is left than instrument and scatter allow,
+    by a χ² test (``p_value``); what poses bring counts where it is more probably an encoder's. By joint: ``steps``, the
+    log Bayes factor of steps of the command against errors that follow nothing, and ``laws``, the quantity that its
+    errors follow, so that they are no scatter. ``note`` says what limits the answer.
     """
 
     kept: tuple[Kept, ...]
@@ -218,10 +177,6 @@ class RandomGap:
         """Probability that what poses bring is due to such steps."""
         return stepped(self.seen, again=len(self.scatter.kinds) > 1)
 
-    def kept_of(self, kind: str) -> list[Kept]:
-        """Return the kept components of one kind."""
-        return [k for k in self.kept if k.component.kind == kind]
-
 
 def nothing_random(fit: Fit) -> RandomGap:
     """Return the random gap of which nothing can be said."""
@@ -229,21 +184,10 @@ def nothing_random(fit: Fit) -> RandomGap:
 
 
 def random_gap(fit: Fit) -> RandomGap:
-    """Say which joints scatter beyond the instrument, anew at each visit or once a pose.
+    """Say which joints scatter beyond the instrument, anew at each visit or once a pose; without repeats these are one.
 
-    What a systematic effect leaves may look like scatter of a joint. If a joint's errors follow a smooth law of a
-    recorded quantity, they are no scatter. Errors of an encoder are a sawtooth of the command with the period √12 σ.
-    Without repeats only that period separates an encoder's steps from wear.
-
-    Parameters
-    ----------
-    fit
-        Frames and systematic effects, fitted.
-
-    Returns
-    -------
-    RandomGap
-        Without repeats the two kinds are one.
+    If a joint's errors follow a smooth law of a recorded quantity, they are no scatter. Errors of an encoder are a
+    sawtooth of the command with the period √12 σ; without repeats only that separates its steps from wear.
     """
     e, observed = fit.explanation, fit.corrected
     m = observed.gap.shape[1]
@@ -296,8 +240,7 @@ def _stands(
 ) -> tuple[Scatter, NDArray[np.bool_], list[int]]:
     """Ask whether scatter is seen without the few rows that speak most for it; scatter is in all rows.
 
-    Returns the scatter and the rows that count, and the joints of which a few rows had told it: the scatter is then
-    that of the other rows.
+    Returns it, the rows that count, and the joints of which a few rows had told it: it is then that of the other rows.
     """
     chosen = [c for c in scatter.components if c.chosen]
     if not chosen:

@@ -11,38 +11,22 @@ from thermal_robot.arrays import Array
 from thermal_robot.effects import Effect, gate
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import Block, block
-from thermal_robot.inference.evidence import Combination
+from thermal_robot.inference.evidence import Combination, Gram
 from thermal_robot.inference.explain import Explanation, log_odds
-from thermal_robot.inference.gram import Gram
-from thermal_robot.inference.problem import Linear, Whitening, parameter_values
-from thermal_robot.inference.products import Products
+from thermal_robot.inference.problem import Linear, Products, Whitening, parameter_values
 from thermal_robot.inference.robust import tail_weight
 from thermal_robot.inference.search import Search
 from thermal_robot.observations import Observations
 
 
 def refined(explanation: Explanation, observations: Observations, factor: float) -> list[tuple[Effect, Array]]:
-    """Move the constants of chosen effects to where the evidence is largest, one effect after another.
+    """Move the constants of chosen effects to where the evidence is largest, by coordinate search.
 
-    An effect's settings nearby are tried. Where none is better by 0.1 nat they move closer, the logarithm of their
-    factor halved, until a parabola through them promises no more. Weights and other effects stay; rows set aside are
-    heard, with the weight of their distance, as a constant that is off puts aside just the rows that tell of it. At
-    last each effect is left out in turn while the constants of the others move: one that only paid for a constant that
-    was a little off goes.
-
-    Parameters
-    ----------
-    explanation
-        What was chosen.
-    observations
-        Where it was linearised.
-    factor
-        By which constants are changed first; above 1.
-
-    Returns
-    -------
-    list
-        The chosen effects that stay, in their order, their constants moved, with their (P,) values, SI.
+    Of one effect after another settings nearby are tried. Where none is better by 0.1 nat they move closer, the
+    logarithm of ``factor`` (above 1) halved, until a parabola through them promises no more. Rows set aside are heard
+    with the weight of their distance, as a constant that is off puts aside just the rows that tell of it. At last each
+    effect is left out in turn while the others move: one that only paid for a constant that was a little off goes.
+    Returns those that stay with their (P,) values.
     """
     kept = Products(explanation.linear, heard(explanation))
     blocks = [explanation.linear.blocks[b].held for b in explanation.best.blocks]

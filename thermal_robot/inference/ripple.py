@@ -18,30 +18,18 @@ from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of, orthonormal, ridge, without
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.fit import Fit
-from thermal_robot.inference.periodogram import independent, orders, peak, periodogram
 from thermal_robot.inference.rows import blocks, each, neighbourhoods
+from thermal_robot.inference.scan import Thin, independent, orders, peak, periodogram
 from thermal_robot.inference.target import Target
-from thermal_robot.inference.thin import Thin
 from thermal_robot.observations import Observations
 
 Rows = NDArray[np.bool_]
 
 
 def left_out(columns: Array, values: Array, flat: int, prior: Array, folds: Sequence[Rows]) -> float:
-    """Return the sum of squares that fits to the other rows leave in each fold, in units of the noise.
+    """Cross-validation: sum of squares that fits to the other rows leave in each fold, in units of the noise.
 
-    Parameters
-    ----------
-    columns
-        (N, m, K) weighted, in units of the noise.
-    values
-        (N, m) the same of what is fitted.
-    flat
-        Number of leading columns without a prior.
-    prior
-        (K − flat,) one over the prior variance of each other column.
-    folds
-        (N,) rows of each fold.
+    Columns (N, m, K) are weighted; the first ``flat`` have no prior, the others ``prior`` (K − flat,), 1/variance.
     """
     stack = np.concatenate([columns, values[:, :, None]], axis=2)
     whole = _products(equations_of(stack))
@@ -90,24 +78,11 @@ class _Wave:
 
 @dataclass(frozen=True, eq=False)
 class _Pursuit:
-    """Waves that are found one after another.
+    """Waves that are found one after another (matching pursuit), at the rows that are looked at.
 
-    Attributes
-    ----------
-    observations
-        Of the corrected model, at the rows that are looked at.
-    gap
-        (N, m) what all effects and waves have to explain.
-    design, flat
-        (N, m, K) columns of the frames and the other effects; how many are the frames'.
-    prior
-        (K − flat,) one over the prior variance of each column but the first, ``flat`` ones.
-    grids
-        By joint: the orders that are tried.
-    folds
-        By scheme: the rows (N,) of each fold.
-    changed
-        (N,) rows that weigh fully, however far they are.
+    ``gap`` (N, m) is what all effects and waves explain; ``design`` (N, m, K) the columns of ``flat`` frame parameters
+    and the other effects, ``prior`` (K − flat,) one over their prior variances; ``grids`` the orders tried by joint,
+    ``folds`` the rows (N,) of each fold by scheme; rows that are ``changed`` (N,) weigh fully, however far they are.
     """
 
     observations: Observations

@@ -76,27 +76,9 @@ def first_whitening(linear: Linear, noise: Noise, use: NDArray[np.bool_]) -> Whi
 def reweigh(
     remainder: Array, noise: Noise, use: NDArray[np.bool_], leverage: float, measures: int
 ) -> tuple[Whitening, NDArray[np.bool_]]:
-    """Set gross errors aside and give the tail less weight (Huber 1964), at the noise of the remainder.
+    """Set gross errors aside, at most a quarter, and give the tail less weight (Huber 1964), at the remainder's noise.
 
-    Parameters
-    ----------
-    remainder
-        (N, m) what an explanation leaves.
-    noise
-        As stated.
-    use
-        (N,) rows that may be used; no more than a quarter of them is set aside.
-    leverage
-        Of the explanation: the share of the equations that it takes up.
-    measures
-        m.
-
-    Returns
-    -------
-    whitening
-        Weights and noise.
-    aside
-        (N,) rows set aside.
+    ``leverage`` is the share of the equations that was fitted. Returns the weighting, and (N,) the rows aside.
     """
     remainder = remainder if noise.relative is None else remainder / noise.relative
     sigma, held, distance2 = judged(remainder, robust_noise(remainder[use], leverage), noise, leverage, measures)

@@ -7,9 +7,11 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import CLOCK
+from thermal_robot.campaign.settings import STILL
 from thermal_robot.campaign.turning import moves
 from thermal_robot.effects import Effect, Parameter, Response, gate, library
 from thermal_robot.effects.law import Discovered
@@ -17,10 +19,157 @@ from thermal_robot.effects.quantities import GRAVITY, REACH, TURN, quantities, u
 from thermal_robot.effects.shapes import SHAPES
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block
+from thermal_robot.inference.fit import Fit
+from thermal_robot.inference.gauss_newton import corrected_observations
 from thermal_robot.inference.laws import harmonics, hystereses, law_of, laws, relaxing, shapes, straight
-from thermal_robot.inference.periodogram import independent, orders, peak
+from thermal_robot.inference.problem import Linear
+from thermal_robot.inference.rows import in_a_row
 from thermal_robot.inference.target import Alike, Seat, Target
 from thermal_robot.observations import Observations
+
+
+def orders(q: Array, slides: bool = False) -> Array:
+    """Return the (K,) orders that are looked at in a joint, rad per rad, or rad/m where it slides.
+
+    They stand an eighth of a peak's width apart, and end where the positions (N,) could no longer tell an order from
+    its alias: positions on a lattice of spacing d know no order above π/d (Shannon). A joint of very many turns is
+    looked at up to :data:`settings.MOST_ORDERS` of them.
+    """
+    if not moves(q):
+        return np.zeros(0)
+    reach = float(np.ptp(q))
+    lowest = np.pi / reach if slides else settings.LOWEST_ORDER
+    highest = 2.0 * np.pi / settings.SHORTEST_PERIOD if slides else settings.HIGHEST_ORDER
+    step = settings.ORDER_STEP * 2.0 * np.pi / reach
+    return np.arange(lowest, min(highest, _nyquist(q), lowest + settings.MOST_ORDERS * step), step)
+
+
+def independent(grid: Array) -> float:
+    """Return how many of the orders of :func:`orders` are independent: one for each width of a peak (Baluev 2008)."""
+    return max(len(grid) * settings.ORDER_STEP, 1.0) if len(grid) else 0.0
+
+
+def periodogram(seat: Seat, q: Array, at: Array) -> Array:
+    """(K,) log evidence that a wave of each order gains: 1, sin kq and cos kq by least squares.
+
+    The least-squares periodogram with a floating mean (Zechmeister and Kuerster, *The generalised Lomb-Scargle
+    periodogram*, 2009), of many equations a row, the design projected out. Positions q (N,), rad or m; orders in equal
+    steps (K,). Gains are those of :meth:`~thermal_robot.inference.target.Seat.gains`; orders that the design can do, or
+    whose sine and cosine the positions cannot tell apart, gain −∞.
+    """
+    found = [_chunk(seat, q, at[k : k + settings.ORDER_CHUNK]) for k in range(0, len(at), settings.ORDER_CHUNK)]
+    return np.concatenate([*found, np.zeros(0)])
+
+
+def peak(seat: Seat, q: Array, grid: Array) -> float:
+    """Return the order that gains most, refined from the grid (K,) of at least one order to its peak."""
+    best = float(grid[np.argmax(periodogram(seat, q, grid))])
+    step = settings.ORDER_STEP * 2.0 * np.pi / float(np.ptp(q))
+    for _ in range(settings.ORDER_ZOOMS):
+        near = best + step * np.linspace(-1.0, 1.0, 17)
+        best, step = float(near[np.argmax(periodogram(seat, q, near))]), step / 8
+    return best
+
+
+def _chunk(seat: Seat, q: Array, at: Array) -> Array:
+    weight, design, remainder = seat.weight[:, 0, 0], seat.design[:, 0], seat.remainder[:, 0]
+    # equal steps: e^(i k q) of the first, times powers of one step
+    wave = _waves(q, at)
+    both = np.concatenate([wave.real, wave.imag], axis=1)
+    count = len(at)
+    inside = design @ both
+    twice = weight @ wave**2
+    whole = float(weight.sum())
+    squares = 0.5 * np.concatenate([whole + twice.real, whole - twice.real]) - np.einsum("rk,rk->k", inside, inside)
+    cross = 0.5 * twice.imag - np.einsum("rk,rk->k", inside[:, :count], inside[:, count:])
+    values = remainder @ both
+    constant = design.sum(axis=1)
+    left = whole - float(constant @ constant)
+    explained, rank = 0.0, 2.0
+    if left > settings.ALIAS * whole:
+        shared = weight @ both - constant @ inside
+        mean = float(remainder.sum()) / left
+        values = values - shared * mean
+        squares = squares - shared**2 / left
+        cross = cross - shared[:count] * shared[count:] / left
+        explained, rank = mean**2 * left, 3.0
+    first, second = np.split(squares, 2)
+    apart = first * second - cross**2
+    seen = (np.minimum(first, second) > settings.ALIAS * whole) & (apart > settings.LAW_FLOOR * first * second)
+    a, b = np.split(values, 2)
+    part = (second * a**2 - 2.0 * cross * a * b + first * b**2) / np.where(seen, apart, 1.0)
+    rest = np.maximum(seat.total - explained - part, settings.TINY)
+    gain = 0.5 * seat.freedom * np.log(seat.total / rest) - 0.5 * rank * np.log(seat.freedom)
+    return np.where(seen & (seat.freedom - rank >= settings.FEWEST_LEFT), gain, -np.inf)
+
+
+def _waves(q: Array, at: Array) -> NDArray[np.complex128]:
+    """(N, K) e^(i k q) of orders in equal steps: a table of roots, multiplied."""
+    fine = int(np.ceil(np.sqrt(len(at))))
+    step = at[1] - at[0] if len(at) > 1 else 0.0
+    small = np.exp(1j * np.outer(q, step * np.arange(fine)))
+    large = np.exp(1j * np.outer(q, at[::fine]))
+    return np.asarray((large[:, :, None] * small[:, None, :]).reshape(len(q), -1)[:, : len(at)])
+
+
+def _nyquist(q: Array) -> float:
+    """Return the order above which positions on a lattice repeat themselves; infinite where they lie on none."""
+    levels = np.unique(q)
+    gaps = np.diff(levels)
+    gaps = gaps[gaps > STILL]
+    if not len(gaps):
+        return np.inf
+    spacing = float(levels[-1] - levels[0]) / float(np.round(gaps / gaps.min()).sum())
+    steps = (levels - levels[0]) / spacing
+    return np.pi / spacing if np.abs(steps - np.round(steps)).max() < settings.LATTICE else np.inf
+
+
+@dataclass(frozen=True, eq=False)
+class Thin:
+    """As many rows of a fit as a scan needs: all of them, or some drawn at random where there are very many.
+
+    ``changed`` (M,): rows that were set aside and follow each other in time.
+    """
+
+    observations: Observations
+    linear: Linear
+    changed: NDArray[np.bool_]
+
+    @classmethod
+    def of(cls, fit: Fit) -> Thin:
+        """Return the rows of a fit."""
+        e = fit.explanation
+        if fit.campaign.samples <= settings.ENOUGH_ROWS:
+            return cls(fit.corrected, e.linear, in_a_row(fit.campaign, e.outliers))
+        drawn = np.random.default_rng(settings.DRAW_SEED).choice(
+            fit.campaign.samples, settings.ENOUGH_ROWS, replace=False
+        )
+        rows = np.sort(drawn)
+        return cls(
+            corrected_observations(fit.campaign.take(rows), fit.corrected.frames, fit.effects),
+            Linear(
+                e.linear.gap[rows],
+                e.linear.frames[rows],
+                tuple(replace(b, source=b.columns[rows]) for b in e.linear.blocks),
+            ),
+            in_a_row(fit.campaign, e.outliers)[rows],
+        )
+
+    def target(self, blocks: Iterable[int], *, sound: bool = False) -> Target:
+        """Return the residual once the frames and some blocks are projected out.
+
+        Rows far from the rest weigh little, unless they follow each other, or all but the farthest few are taken for
+        ``sound``: what is large in few rows looks like gross errors until its law is known.
+        """
+        columns = [self.linear.blocks[b].columns for b in blocks]
+        design = np.concatenate([self.linear.frames, *columns], axis=2)
+        relative = self.observations.campaign.relative_noise
+        first = Target.of(self.linear.gap, design, self.changed, relative)
+        if not sound:
+            return first
+        distance = np.linalg.norm(first.white.reshape(first.root.shape) / first.root, axis=1)
+        near = distance <= np.quantile(distance, 1.0 - settings.FEW_ASIDE)
+        return Target.of(self.linear.gap, design, near | self.changed, relative)
 
 
 def conditions(observations: Observations, joint: str = "") -> list[str]:
@@ -35,19 +184,11 @@ def conditions(observations: Observations, joint: str = "") -> list[str]:
 
 
 def modulated(observations: Observations, effects: Iterable[Effect] | None = None) -> list[Discovered]:
-    """Return laws of known effects whose size in one joint changes with a condition or with the joint's position.
+    """Laws of known effects (by default the library) whose size in one joint changes with a condition or position.
 
-    An effect whose response is the same in all rows, such as a zero that is off, is left out: times a law it is a plain
-    law of that joint. So is what drives the effect itself: lost motion times the direction of approach is a zero that
-    is off, a wave times a law of the same position any law of it. An effect that is not installed is left out, too, as
-    a saved law could not be read.
-
-    Parameters
-    ----------
-    observations
-        Where columns and quantities are read from.
-    effects
-        In the settings that are to be tried; the whole library, each in its first setting, where absent.
+    Left out: effects whose response is the same in all rows, as times a law they are a plain law of that joint; what
+    drives the effect itself, as lost motion times the direction of approach is a zero that is off; an effect that is
+    not installed, as a saved law could not be read.
     """
     installed = library()
     offered = installed.values() if effects is None else effects
@@ -88,15 +229,7 @@ def _rows(parameter: Parameter) -> Iterator[Response]:
 
 
 def products(observations: Observations, kinds: Sequence[str]) -> list[Discovered]:
-    """Return laws of two quantities at once: 1, u, v and u·v, the first a condition of the place or a joint's position.
-
-    Parameters
-    ----------
-    observations
-        Where quantities are read from.
-    kinds
-        ``joint``, ``base``, ``tool``.
-    """
+    """Laws of two quantities at once: 1, u, v and u·v, the first a condition of the place or a joint's position."""
     robot, known = observations.robot, quantities(observations)
     turns = observations.campaign.measures == "pose"
     further = [name for name in (*robot.joint_names, *GRAVITY, *REACH) if name in known]
@@ -142,17 +275,9 @@ Site = tuple[str, str, str]
 
 @dataclass(frozen=True, eq=False)
 class Scanned:
-    """One candidate among many.
+    """One candidate among many and the log evidence that it gains over noise (Bayes information criterion).
 
-    Attributes
-    ----------
-    law
-        What it is.
-    gain
-        Log evidence that it gains over noise (Bayes information criterion).
-    tried
-        Among how many it was picked: the kinds of law, times the laws of its kind. One over it is its share of the
-        prior, and these shares sum to one over all that was tried.
+    One over ``tried``, the kinds of law times the laws of its kind, is its share of the prior; all sum to one.
     """
 
     law: Discovered
@@ -209,23 +334,13 @@ class Seats:
 def scan(
     observations: Observations, targets: Sequence[Target], effects: Iterable[Effect] | None = None
 ) -> tuple[list[list[Scanned]], int]:
-    """Return, for every target, the candidates, best first; and how many laws were tried.
+    """Candidates of every target, best first by :attr:`Scanned.worth`, and how many laws were tried.
 
     Tried are a smooth and a straight law of each quantity at each place; a wave of any order in each joint; what each
     joint remembers of its moves; known effects whose size in one joint changes with a quantity; products of two
     quantities. A law at a segment has six components, so that only the quantities that gain most elsewhere are tried
-    there. Candidates are ordered by :attr:`Scanned.worth`, the leading ones by that of their best shape. Left out of
-    the answer are laws that are no better than what they contain: an effect that changes than the effect itself in that
-    joint, a product than one of its quantities.
-
-    Parameters
-    ----------
-    observations
-        Where the targets come from.
-    targets
-        Remainders of the gap.
-    effects
-        Known effects that may change, in their settings; the library where absent.
+    there. Left out are laws that are no better than what they contain: an effect that changes than the effect itself in
+    that joint, a product than one of its quantities.
     """
     seats = Seats(observations, targets)
     kinds = _candidates(seats, effects)

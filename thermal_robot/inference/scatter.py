@@ -22,20 +22,10 @@ _LOWEST, _HIGHEST = settings.LOG_VARIANCE
 
 @dataclass(frozen=True, eq=False)
 class IndependentRows:
-    """Remainder as independent rows, everything in units of the noise.
+    """Remainder as R independent rows: contrasts within each pose and √k times its mean; in units of the noise.
 
-    Attributes
-    ----------
-    values
-        (R, m) contrasts within each pose, and √k times its mean.
-    columns
-        (R, m, n) effect of each joint, of unit mean square per component.
-    repeats
-        (R,) k for the mean of a pose measured k times, 0 for a contrast.
-    weights
-        (R,) of the row's log likelihood.
-    lever
-        (n,) what the columns were divided by: variances of the joints are those of the columns over its square.
+    ``columns`` (R, m, n) are the effects of the joints, of unit mean square by division by ``lever`` (n,); ``repeats``
+    (R,) is k for a mean, 0 for a contrast; ``weights`` (R,) those of the log likelihood.
     """
 
     values: Array
@@ -86,19 +76,11 @@ def independent_rows(
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """The likeliest variances of one set of components.
+    """The likeliest variances of one set of components, and the log posterior density there (``value``).
 
-    Attributes
-    ----------
-    logs
-        Logarithms of the variances in squares of the noise: instrument (one for every three components), what poses
-        have in common from no joint (where there are repeats), then the components.
-    value
-        Logarithm of the posterior density there.
-    covariance
-        (R, m, m) of each row.
-    spread
-        Covariance of the logarithms.
+    ``logs``: of variances over squares of the noise: instrument (one for every three components), what poses have in
+    common from no joint (where there are repeats), then the components; ``spread`` is their covariance. ``covariance``
+    (R, m, m) of each row.
     """
 
     logs: Array
@@ -109,17 +91,9 @@ class Fitted:
 
 @dataclass(frozen=True, eq=False)
 class Likelihood:
-    """Restricted likelihood of rows.
+    """Restricted likelihood of rows; ``stated`` says for every three components whether the noise is stated.
 
-    Attributes
-    ----------
-    rows
-        The data.
-    stated
-        For every three components, whether the noise is stated.
-    tails
-        Degrees of freedom of Student's law in m dimensions; infinite for the normal law. Its scale is such that its
-        covariance is the model's.
+    ``tails``: degrees of freedom of Student's law in m dimensions (infinite: normal), of the model's covariance.
     """
 
     rows: IndependentRows
@@ -300,21 +274,10 @@ class Likelihood:
 
 @dataclass(frozen=True)
 class JointScatter:
-    """One component: what one joint scatters.
+    """One component: what one joint scatters ``visit`` by visit, or once a commanded ``pose``, the same at its repeats.
 
-    Attributes
-    ----------
-    kind
-        ``visit``: anew at each visit; ``pose``: once a commanded pose, the same at its repeats.
-    joint
-        Its number.
-    sigma, lower, upper
-        Standard deviation and its 95 % interval (profile likelihood), rad or m; ``upper`` is infinite for a joint that
-        moves nothing.
-    log_bayes_factor
-        Natural logarithm of the odds that the data alone give for it, beside the chosen ones.
-    chosen
-        Whether it belongs to the most probable set.
+    ``sigma`` with its 95 % interval (profile likelihood), rad or m, ``upper`` infinite for a joint that moves nothing;
+    ``log_bayes_factor`` of the data alone, beside the chosen ones; ``chosen`` if in the most probable set.
     """
 
     kind: str
@@ -328,26 +291,13 @@ class JointScatter:
 
 @dataclass(frozen=True, eq=False)
 class Scatter:
-    """The variance components of a remainder; see :func:`variance_components`.
+    """Variance components of a remainder; see :func:`variance_components`.
 
-    Attributes
-    ----------
-    kinds
-        Kinds that could be asked for: without repeats ``pose`` alone, which then stands for the sum of both.
-    components
-        Every joint of every kind.
-    probability
-        By kind: posterior probability that any joint scatters so; the prior's where nothing can be said.
-    noise
-        (m,) one sigma of the instrument, as estimated, m and rad.
-    common
-        Standard deviation of what repeats of a pose have in common from no joint, in units of the stated noise.
-    log_evidence_noise_only
-        Of the model without any joint, natural logarithm; values in units of the noise.
-    tails
-        Degrees of freedom of the law that fits: 4, or infinite for the normal one.
-    note
-        Why nothing, or not everything, could be said; empty otherwise.
+    ``kinds`` that could be asked for (without repeats ``pose`` alone, the sum of both); ``probability`` of each that
+    any joint scatters so, the prior's where nothing can be said; ``noise`` (m,) of the instrument as estimated, m and
+    rad; ``common``, standard deviation of what repeats of a pose share from no joint, in units of the stated noise;
+    ``log_evidence_noise_only``, values in units of the noise; ``tails``, degrees of freedom of the law that fits: 4, or
+    infinite; ``note``, why not everything could be said.
     """
 
     kinds: tuple[str, ...]
@@ -388,44 +338,22 @@ def variance_components(
     weights: Array | None = None,
     start: Sequence[Component] = (),
 ) -> Scatter:
-    """Estimate variance components: how much each joint scatters, and how much the instrument.
+    """Estimate variance components (REML): how much each joint scatters, and how much the instrument.
 
     Row i of pose p is r_i = e_i + J_i (u_p + v_i): e is the instrument's noise, v (``visit``) comes anew at each visit
     and u (``pose``) once a commanded pose. Variances are those of largest restricted likelihood, as far as a common
     factor can restrict it. Evidence of a component is Laplace's in the logarithm of its standard deviation, which
     beforehand is anything between a tenth and a hundred times the noise, so that the bound at zero is infinitely far
     (Kass and Raftery, *Bayes Factors*, 1995, §4.1); BIC would count a joint that hardly moves the target as fully as
-    others. Joints are added one by one while the posterior grows; whatever was compared shares the probability.
+    others. Joints are added one by one while the posterior grows; whatever was compared shares the probability. Without
+    repeats u and v cannot be told apart: only ``pose`` is asked for. Above 1500 rows, whole poses drawn at random stand
+    for all.
 
-    Parameters
-    ----------
-    remainder
-        (N, m) what a systematic explanation left, m and rad; m = 3 or 6.
-    sensitivity
-        (N, m or 6, n) Jacobian of the joints at the target, in the same axes.
-    noise
-        (m,) the instrument's one sigma.
-    pose
-        (N,) number of the commanded pose; ``None`` where none was repeated.
-    stated
-        Whether the noise is stated, and then held near that, or free; one for all or one for every three components.
-    freedom
-        Number of parameters that were fitted before.
-    weights
-        (N,) of each row, 0 for rows to leave out.
-    start
-        Components with which the search begins a second time; those that are not asked for are left out.
-
-    Returns
-    -------
-    Scatter
-        Without repeats u and v cannot be told apart: only ``pose`` is asked for. Above 1500 rows, whole poses drawn
-        at random stand for all.
-
-    Raises
-    ------
-    EstimationError
-        If shapes do not fit, values are not finite, or a noise is not positive.
+    ``remainder`` (N, m), m and rad, m = 3 or 6; ``sensitivity`` (N, m or 6, n), Jacobian of the joints at the target,
+    in the same axes; ``noise`` (m,), held near that where ``stated``, for all or for every three components; ``pose``
+    (N,), number of the commanded pose; ``freedom``, number of parameters fitted before; ``weights`` (N,), 0 for rows to
+    leave out; ``start``, components with which the search begins a second time. Raises :class:`EstimationError` if
+    shapes do not fit, values are not finite, or a noise is not positive.
     """
     remainder, sensitivity, noise = (np.asarray(a, dtype=float) for a in (remainder, sensitivity, noise))
     parts = _checked(remainder, sensitivity, noise)

@@ -25,18 +25,9 @@ from thermal_robot.observations import Observations
 
 @dataclass(frozen=True, eq=False)
 class Settled:
-    """An explanation and the exact model at which it was found.
+    """An explanation, linearised at the exact model at which it was found, its effects with their (P,) values.
 
-    Attributes
-    ----------
-    observations
-        Of the corrected model.
-    explanation
-        Linearised there.
-    held
-        Its effects with their (P,) values.
-    families
-        Name of the effect that each block belongs to.
+    ``families`` names the effect that each block belongs to.
     """
 
     observations: Observations
@@ -80,18 +71,7 @@ def settle(
 ) -> Settled:
     """Choose effects, refine their constants, refit exactly, and choose again there, until the choice stays.
 
-    Parameters
-    ----------
-    start
-        Where the first choice is linearised.
-    variants
-        By name: settings of each effect among which to choose.
-    progress
-        Called with a few words at each stage.
-    known
-        An explanation from which to start, with its outliers.
-    begin
-        Settings of effects with which the search starts, where none is known.
+    The first choice is linearised at ``start``; the search starts from what is ``known``, or ``begin``.
     """
     campaign, observations, whole = start.campaign, start, dict(variants)
     whole.update({e.name: tuple(dict.fromkeys((*whole.get(e.name, ()), e))) for e in begin})

@@ -18,20 +18,10 @@ Numbers = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class Stack:
-    """K columns over E = n·m equations, n rows of m components.
+    """K columns over E = n·m equations, n rows of m components, those that settings of an effect share kept once.
 
-    The settings of one effect share most of their columns: of all settings together a third are different.
-
-    Attributes
-    ----------
-    different
-        U arrays (N, m): the columns that differ, of all rows.
-    number
-        (K,) which of these each column is.
-    used
-        (n,) the rows in use.
-    root
-        (n, m) by which these are multiplied.
+    ``different`` are U arrays (N, m) of all rows, ``number`` (K,) which of them each column is, ``used`` (n,) the rows
+    in use, ``root`` (n, m) by what they are multiplied.
     """
 
     different: tuple[Array, ...]
@@ -105,16 +95,9 @@ def chunks(rows: int) -> Iterator[slice]:
 
 @dataclass(frozen=True, eq=False)
 class Part:
-    """B = functions × moves of the rows in use.
+    """B = functions (N, k) × moves (N, m, c) of the rows in use (n,), times the square ``root`` (n,) of their weights.
 
-    Attributes
-    ----------
-    functions
-        (N, k) of all rows.
-    moves
-        (N, m, c) of all rows, in units of the noise; (m, c) where all rows have the same.
-    used, root
-        (n,) the rows in use, and the square roots of their weights.
+    Moves are in units of the noise; (m, c) where all rows have the same.
     """
 
     functions: Array
@@ -174,19 +157,10 @@ Labels = NDArray[np.int64]
 class Grouped:
     """1 + τ²BBᵀ where B has c columns for each of G groups of rows: all is done group by group.
 
-    With M_g = Σ over the group's rows of their movesᵀ moves (c, c), by Woodbury's identity
-    Sᵀ(1 + τ²BBᵀ)⁻¹S = SᵀS − τ² Σ_g (BᵀS)_gᵀ (1 + τ²M_g)⁻¹ (BᵀS)_g, and log|1 + τ²BBᵀ| = Σ_g log|1 + τ²M_g|.
-
-    Attributes
-    ----------
-    moves
-        (n, m, c) of the rows in use, in units of the noise, square roots of the weights included.
-    group
-        (n,) number of the group of each row in use.
-    everywhere, groups
-        (N, m, c) without weights, and (N,), of all rows.
-    value, vector
-        (G, c) and (G, c, c): eigenvalues and vectors of every M_g.
+    With M_g = Σ over the group's rows of their movesᵀ moves (c, c), by Woodbury's identity Sᵀ(1 + τ²BBᵀ)⁻¹S = SᵀS − τ²
+    Σ_g (BᵀS)_gᵀ (1 + τ²M_g)⁻¹ (BᵀS)_g, and log|1 + τ²BBᵀ| = Σ_g log|1 + τ²M_g|. ``moves`` (n, m, c) are in units of the
+    noise with the square roots of the weights, ``everywhere`` (N, m, c) without weights; ``value`` (G, c) and
+    ``vector`` (G, c, c) are the eigensystem of every M_g.
     """
 
     moves: Array

@@ -17,17 +17,11 @@ from thermal_robot.inference.robust import robust_noise
 
 @dataclass(frozen=True)
 class Worth:
-    """How much further columns explain beyond what was fitted.
+    """How much further columns explain beyond what was fitted: p-value of their F test, share, and gain.
 
-    Attributes
-    ----------
-    p_value
-        Of the F test that the columns explain nothing.
-    share
-        Share of the residual mean square that they explain, adjusted for their number; below zero by chance.
-    gain
-        Log evidence gained, by the Bayes information criterion: ½ ν ln(S₀/S₁) − ½ k ln ν, with S₀ and S₁ the residual
-        sums of squares without and with the k columns, and ν the residual degrees of freedom.
+    ``share`` of the residual mean square, adjusted for their number; ``gain`` of log evidence by the Bayes information
+    criterion: ½ ν ln(S₀/S₁) − ½ k ln ν, S₀ and S₁ the residual sums of squares without and with the k columns, ν the
+    degrees of freedom.
     """
 
     p_value: float
@@ -40,16 +34,9 @@ NOTHING = Worth(1.0, 0.0, -np.inf)
 
 @dataclass(frozen=True, eq=False)
 class Target:
-    """A remainder to be explained: the residual of the gap after a fit of a design.
+    """A remainder to be explained: the residual ``white`` (N·m,) of the gap after a fit of a design, in noise units.
 
-    Attributes
-    ----------
-    white
-        (N·m,) residual, weighted and in units of the noise.
-    root
-        (N, m) square root of each row's weight, over the noise: further columns are multiplied by it.
-    basis
-        (N·m, r) orthonormal basis of the design.
+    ``root`` (N, m): square root of each weight over the noise; ``basis`` (N·m, r): an orthonormal one of the design.
     """
 
     white: Array
@@ -126,15 +113,7 @@ class Target:
 
 @dataclass(frozen=True, eq=False)
 class Alike:
-    """Functions of laws, those of as many functions together: what all targets ask of them is computed once.
-
-    Attributes
-    ----------
-    laws
-        How many there are.
-    stacks
-        Which C laws have K functions each, these (C, N, K), and their products (C, N, K, K).
-    """
+    """C laws of K functions each (C, N, K) with their products (C, N, K, K), computed once for all targets."""
 
     laws: int
     stacks: tuple[tuple[list[int], Array, Array], ...]
@@ -155,18 +134,9 @@ class Seat:
     """A target seen from one place: what many laws there need, summed over the components of a row once.
 
     A law's columns are the products of the place's d components with K functions of a quantity. Their Gram matrix
-    without the design is then Σ_n φ_k φ_l W_n less that of their part in the design.
-
-    Attributes
-    ----------
-    weight
-        (N, d, d) sum of products of the components, in units of the noise.
-    design
-        (r, d, N) the same with the design's orthonormal basis.
-    remainder
-        (N, d) the same with the residual.
-    total, freedom
-        The residual's sum of squares and degrees of freedom.
+    without the design is then Σ_n φ_k φ_l W_n less that of their part in the design. In units of the noise: ``weight``
+    (N, d, d) products of the components, ``design`` (r, d, N) and ``remainder`` (N, d) those with the basis and the
+    residual; ``total`` and ``freedom`` of the residual.
     """
 
     weight: Array

@@ -5,7 +5,7 @@ import pytest
 from growing_cases import ALL, OLD, measured
 
 import thermal_robot as tr
-from thermal_robot.diagnosis.growing.begun import begun
+from thermal_robot.diagnosis.growing.stream import begun
 
 ASKED = ["joint_offset", "backlash", "joint_gain"]
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from thermal_robot.diagnosis.growing.begun import begun, can_grow, rivals
+from thermal_robot.diagnosis.growing.stream import begun, can_grow, rivals
 
 
 @pytest.mark.parametrize("which", ["found", "fresh"])

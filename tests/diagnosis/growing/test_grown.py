@@ -8,11 +8,10 @@ from growing_cases import ALL, OLD, far, in_full
 
 from thermal_robot.diagnosis.growing import grown as module
 from thermal_robot.diagnosis.growing import settings
-from thermal_robot.diagnosis.growing.begun import begun
 from thermal_robot.diagnosis.growing.choice import Judge
 from thermal_robot.diagnosis.growing.grown import Grown
-from thermal_robot.diagnosis.growing.received import weighed
 from thermal_robot.diagnosis.growing.settled import Begin, Single
+from thermal_robot.diagnosis.growing.stream import begun, weighed
 
 PROMISED = 1e-6
 

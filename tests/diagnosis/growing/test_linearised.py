@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from thermal_robot.diagnosis.growing.choice import Point
-from thermal_robot.diagnosis.growing.linearised import Seen, carried, frame_names, products
+from thermal_robot.diagnosis.growing.sums import Seen, carried, frame_names, products
 from thermal_robot.inference.frames import moved
 
 

@@ -8,7 +8,7 @@ from growing_cases import OLD, measured
 
 import thermal_robot as tr
 from thermal_robot.diagnosis.growing.choice import Judge
-from thermal_robot.diagnosis.growing.received import received, weighed
+from thermal_robot.diagnosis.growing.stream import received, weighed
 from thermal_robot.errors import CampaignError
 
 

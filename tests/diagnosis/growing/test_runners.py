@@ -7,8 +7,7 @@ import pytest
 from growing_cases import EFFECTS, in_full, measured
 
 import thermal_robot as tr
-from thermal_robot.diagnosis.growing.begun import begun
-from thermal_robot.diagnosis.growing.runners import ahead, runners
+from thermal_robot.diagnosis.growing.stream import ahead, begun, runners
 
 
 @pytest.fixture(scope="module")

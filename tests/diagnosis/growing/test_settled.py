@@ -7,10 +7,10 @@ import pytest
 from growing_cases import far, in_full, measured
 
 import thermal_robot as tr
-from thermal_robot.diagnosis.growing.begun import begun
 from thermal_robot.diagnosis.growing.choice import Point
-from thermal_robot.diagnosis.growing.linearised import Seen
 from thermal_robot.diagnosis.growing.settled import Begin, settled
+from thermal_robot.diagnosis.growing.stream import begun
+from thermal_robot.diagnosis.growing.sums import Seen
 from thermal_robot.inference.frames import moved
 
 

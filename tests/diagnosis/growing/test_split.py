@@ -5,9 +5,9 @@ import pytest
 from growing_cases import in_full
 
 from thermal_robot.diagnosis.growing import settings
-from thermal_robot.diagnosis.growing.linearised import Seen, products
+from thermal_robot.diagnosis.growing.grown import end_to_end, some, split
 from thermal_robot.diagnosis.growing.settled import Begin
-from thermal_robot.diagnosis.growing.split import end_to_end, some, split
+from thermal_robot.diagnosis.growing.sums import Seen, products
 
 
 @pytest.fixture

@@ -40,7 +40,7 @@ from thermal_robot.diagnosis.data_faults.kind import (
 )
 from thermal_robot.diagnosis.data_faults.readings import Readings, Rows, rms, stacked
 from thermal_robot.diagnosis.parts import DataFault
-from thermal_robot.inference.alternation import Placed, middle, soft
+from thermal_robot.inference.frames import Placed, middle, soft
 
 
 @dataclass(frozen=True, eq=False)

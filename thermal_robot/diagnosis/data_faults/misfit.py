@@ -30,8 +30,8 @@ from thermal_robot.diagnosis.parts import AnotherModel, Misfit
 from thermal_robot.effects import Effect
 from thermal_robot.errors import RobotError
 from thermal_robot.inference import settings as inference
-from thermal_robot.inference.alternation import middle, soft
 from thermal_robot.inference.fit import Fit, fit
+from thermal_robot.inference.frames import middle, soft
 from thermal_robot.inference.random_gap import nothing_random
 from thermal_robot.kinematics import (
     ChainFrames,

@@ -14,7 +14,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis.data_faults.settings import COARSE_ROUNDS, FEWEST_RELAXED, LEAST_GAP, RIDGE, STRAY
 from thermal_robot.inference import settings
-from thermal_robot.inference.alternation import Placed, alternate, middle, starts
+from thermal_robot.inference.frames import Placed, alternate, middle, starts
 from thermal_robot.kinematics import log3, quaternion_to_rotation, tool_poses
 from thermal_robot.observations import Frames
 from thermal_robot.robot import Robot

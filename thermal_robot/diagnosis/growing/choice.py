@@ -26,17 +26,7 @@ class Point:
 
 @dataclass(frozen=True, eq=False)
 class Judge:
-    """The model of a diagnosis, by which new rows are weighed where old ones keep their weights.
-
-    Attributes
-    ----------
-    point
-        Its frames and parameters.
-    sigma
-        (m,) one sigma of what it leaves, m and rad.
-    rows
-        How many rows it had: a gross error is one that so many do not show by chance.
-    """
+    """The diagnosis's model, by which new rows are weighed: (m,) one sigma of what it leaves, m and rad, its rows."""
 
     point: Point
     sigma: Array
@@ -47,19 +37,10 @@ class Judge:
 class Choice:
     """Effects with their prior sizes; what would be asked of a fresh fit that chooses nothing.
 
-    Attributes
-    ----------
-    blocks
-        The chosen effects as a model holds them, with sizes, spreads and sides of their parameters; no columns.
-    rivals
-        Further effects of combinations that were nearly as probable.
-    measures
-        m: 3 for positions, 6 for poses.
-    position, orientation
-        Noise that the campaign states, m and rad; ``None`` where none is.
-    judge
-        ``None`` where every row is weighed by its distance from the model of the moment, as in a diagnosis of noise
-        alone. Otherwise rows keep the weight that they had, and new ones get theirs by the model of the diagnosis.
+    ``blocks`` are without columns; ``rivals`` are further effects of combinations that were nearly as probable;
+    ``measures`` is m, 3 for positions, 6 for poses; ``position`` and ``orientation`` the noise that the campaign
+    states, m and rad. With a ``judge`` rows keep the weight that they had, and new ones get theirs by the model of the
+    diagnosis; without, every row is weighed by its distance from the model of the moment.
     """
 
     blocks: tuple[Block, ...]

@@ -17,13 +17,11 @@ from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis.growing import settings
 from thermal_robot.diagnosis.growing.choice import Choice, Point, together
-from thermal_robot.diagnosis.growing.linearised import Seen, carried, products
-from thermal_robot.diagnosis.growing.sums import Sums, bend
+from thermal_robot.diagnosis.growing.sums import Seen, Sums, bend, carried, products
 from thermal_robot.inference import settings as chosen
 from thermal_robot.inference.algebra import solve
-from thermal_robot.inference.evidence import Combination, evidence
+from thermal_robot.inference.evidence import Combination, Gram, evidence
 from thermal_robot.inference.frames import moved
-from thermal_robot.inference.gram import Gram
 from thermal_robot.inference.problem import Linear, Whitening, normal_equations, parameter_values
 from thermal_robot.inference.robust import distance_limit, far_scale, judged, tail_weight
 
@@ -32,15 +30,7 @@ Mask = NDArray[np.bool_]
 
 @dataclass(frozen=True, eq=False)
 class Single:
-    """Rows that are kept one by one.
-
-    Attributes
-    ----------
-    campaign
-        The n rows.
-    weights, aside
-        (n,) weight of each row, 0 where it is set aside; which are. Where rows are judged they are found anew.
-    """
+    """Rows (n,) that are kept one by one, their weights, 0 where set aside, and which are; found anew where judged."""
 
     campaign: Campaign
     weights: Array
@@ -49,32 +39,14 @@ class Single:
 
 @dataclass(frozen=True, eq=False)
 class Fitted:
-    """A choice fitted to all rows.
+    """A choice fitted to all rows: frames and parameters (``point``) and, per chosen effect, mean and covariance.
 
-    Attributes
-    ----------
-    point
-        Frames and parameters.
-    step
-        (k,) from the point where the sums were linearised, frames first.
-    best, gram
-        Prior scales and noise, and the normal equations, of the chosen effects.
-    values
-        Per chosen effect: mean and covariance of its parameters.
-    sigma, held
-        (m,) whitening noise, and the degrees of freedom of its prior.
-    leverage
-        Share of the equations that effects and frames take up.
-    single
-        The rows that are kept one by one, with their weights.
-    medians, bend
-        (G,) median distance of rows, and that from which on a row counts less, in units of ``sigma``.
-    products
-        (k + 1, k + 1) of all rows, in units of ``sigma``; the gap at the point.
-    squares, count
-        (G,) sum of squares, m² and rad², over so many rows that are not set aside.
-    steady
-        Whether it came to rest, and no median left the rows that are kept one by one.
+    ``step`` (k,) is from where the sums were linearised, frames first; ``best`` and ``gram`` are prior scales and
+    noise, and the normal equations; ``sigma`` (m,) and ``held`` the whitening noise and its prior's degrees of freedom;
+    ``leverage`` the share of equations taken up. ``medians`` and ``bend`` (G,), in units of ``sigma``: median distance
+    of rows, and that from which on one counts less. ``products`` (k + 1, k + 1) in units of ``sigma``, the gap at the
+    point. ``squares`` and ``count`` (G,): sum of squares, m² and rad², over so many rows not set aside. ``steady``: at
+    rest, with no median outside the single rows.
     """
 
     point: Point
@@ -117,19 +89,7 @@ class Begin:
 
 
 def settled(choice: Choice, sums: Sums, single: Single, begin: Begin) -> Fitted:
-    """Fit a choice to the rows in the sums and those kept one by one.
-
-    Parameters
-    ----------
-    choice
-        What is held.
-    sums
-        Of rows that are not looked at again.
-    single
-        The other rows.
-    begin
-        Near which it ends; where, does not depend on it.
-    """
+    """Fit a choice to the rows in the sums and those kept one by one; where it ends does not depend on ``begin``."""
     state = begin
     for _ in range(settings.STEPS):
         found, size = _round(choice, sums, single, state)

@@ -13,9 +13,8 @@ from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.diagnosis.growing.choice import together
-from thermal_robot.diagnosis.growing.linearised import frame_names
-from thermal_robot.diagnosis.growing.received import received
-from thermal_robot.diagnosis.growing.stream import Stream, expected_sizes
+from thermal_robot.diagnosis.growing.stream import Stream, expected_sizes, received
+from thermal_robot.diagnosis.growing.sums import frame_names
 from thermal_robot.diagnosis.growing.watched import Agreement
 from thermal_robot.diagnosis.parts import Unexplained
 from thermal_robot.diagnosis.settings import LOOSE
@@ -176,10 +175,7 @@ class Updated:
 def update(found: Diagnosed, rows: Campaign | pd.DataFrame) -> Updated:
     """Add rows to a diagnosis; see :meth:`Diagnosis.update <thermal_robot.Diagnosis.update>`.
 
-    Raises
-    ------
-    EstimationError
-        If the diagnosis says nothing of the robot, or was made without its fit.
+    Raises :class:`EstimationError` if it says nothing of the robot, or was made without its fit.
     """
     if not found.usable:
         raise EstimationError(f"{found.campaign}: nothing is known of the robot that rows could add to. {found.reason}")

@@ -25,8 +25,8 @@ from scipy.special import betainc, fdtrc
 from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.growing.choice import together
 from thermal_robot.diagnosis.growing.grown import Grown
-from thermal_robot.diagnosis.growing.linearised import Seen
 from thermal_robot.diagnosis.growing.settled import Single
+from thermal_robot.diagnosis.growing.sums import Seen
 from thermal_robot.inference import settings as chosen
 from thermal_robot.inference.algebra import equations_of, whitener
 from thermal_robot.inference.columns import Block
@@ -67,16 +67,10 @@ class Agreement:
 
 @dataclass(frozen=True, eq=False)
 class Watch:
-    """What new rows are compared with.
+    """What new rows are compared with: ``tested`` are the effects of which a change is looked for, without columns.
 
-    Attributes
-    ----------
-    tested
-        Effects of which a change is looked for, as blocks without columns.
-    scatter
-        Times the variance of chi-square by which the mean square of blocks of the diagnosed rows scatters, at least 1.
-    aside, rows
-        Gross errors among the diagnosed rows, and how many these are.
+    ``scatter`` is times the variance of chi-square by which the mean square of blocks of the diagnosed rows scatters,
+    at least 1; ``aside`` of the diagnosed ``rows`` were gross errors.
     """
 
     tested: tuple[Block, ...]
@@ -158,15 +152,7 @@ class Watch:
 
 
 def scatter_of(left: Array, blocks: Sequence[NDArray[np.bool_]]) -> float:
-    """Return by how much the sums of squares of blocks of rows scatter, over what chi-square says; at least 1.
-
-    Parameters
-    ----------
-    left
-        (N, m) what remains, in units of the noise; without gross errors.
-    blocks
-        (N,) rows of each block.
-    """
+    """Variance of sums of squares of blocks (N,) of rows over that of chi-square, at least 1; ``left`` is (N, m)."""
     if len(blocks) < 2:
         return 1.0
     squares = (left**2).sum(axis=1)
