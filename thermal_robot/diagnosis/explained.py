@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.effects.effect import in_words
-from thermal_robot.shapes.visuals import Hull
+from thermal_robot.shapes.visuals import Solid
 
 
 @dataclass(frozen=True, eq=False)
@@ -107,7 +107,7 @@ class Arm:
     joints: tuple[str, ...]
     joint_shares: Array
     moves: NDArray[np.int64]
-    hulls: tuple[Hull, ...]
+    hulls: tuple[Solid, ...]
     base_share: float = 0.0
     tool_share: float = 0.0
     instrument_share: float = 0.0
