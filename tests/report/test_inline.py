@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 import pytest
 
 from thermal_robot.report.drawing import BEFORE, INK, Drawing
-from thermal_robot.report.inline import svg
+from thermal_robot.report.html_parts import svg
 
 
 def figure(bend=1.0, width=4.0):

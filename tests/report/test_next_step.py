@@ -6,8 +6,8 @@ import pytest
 
 from thermal_robot.diagnosis.another_model import AnotherModel
 from thermal_robot.diagnosis.parts import DataFault, Misfit, Wanted
-from thermal_robot.report.next_step import advice
 from thermal_robot.report.plain_text import text
+from thermal_robot.report.words import advice
 
 
 def said(diagnosis, *wanted, **known):

@@ -5,7 +5,7 @@ from dataclasses import replace
 from html import unescape
 
 from thermal_robot.report import html, html_parts
-from thermal_robot.report.page_criteria import criteria_section
+from thermal_robot.report.page import criteria_section
 
 
 def tables(page):
