@@ -5,10 +5,9 @@ import pytest
 
 from thermal_robot.effects import library
 from thermal_robot.effects.effect import Parameter
-from thermal_robot.fleet.compare_effects import Candidate
+from thermal_robot.fleet.compare import judged
 from thermal_robot.fleet.compare_joint import joint
-from thermal_robot.fleet.compare_names import judged
-from thermal_robot.fleet.compare_sums import Sums
+from thermal_robot.fleet.compare_sums import Candidate, Sums
 
 SURE = 1e4
 """Information of each campaign on each parameter: deviations of a hundredth of the expected size."""

@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import lstsq
 
 from thermal_robot.effects import Parameter
-from thermal_robot.fleet.compare_parameters import equal, parameters
+from thermal_robot.fleet.compare import equal, parameters
 from thermal_robot.fleet.compare_sums import Sums
 
 

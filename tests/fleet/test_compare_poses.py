@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from compared import FRAMES, OFFSETS, diagnosed, moved
 
-from thermal_robot.fleet.compare_poses import predicted
+from thermal_robot.fleet.compare import predicted
 from thermal_robot.observations import Frames
 
 

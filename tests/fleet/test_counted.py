@@ -3,8 +3,8 @@
 import numpy as np
 from fleet.robots import told_rows, write_told
 
-from thermal_robot.fleet.counted import counted
-from thermal_robot.fleet.table import overview
+from thermal_robot.fleet.rows import overview
+from thermal_robot.fleet.summary import counted
 
 
 def table(path, chance, robots=60, halls=3, gathered=None):

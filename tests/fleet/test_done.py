@@ -10,7 +10,7 @@ import pytest
 from fleet.robots import write_robot
 
 from thermal_robot.errors import CampaignError
-from thermal_robot.fleet.done import fingerprint, opened
+from thermal_robot.fleet.many import fingerprint, opened
 
 ROWS = [{"outcome": "diagnosed", "rms_before": 0.1 + 0.2, "summary": "µm – \ud800"}, {"effect": "drift"}]
 
@@ -52,7 +52,8 @@ def test_a_file_of_another_kind_is_left_alone(tmp_path):
 KILLED = """
 import os, signal, sys, time
 from pathlib import Path
-from thermal_robot.fleet import done, settings
+from thermal_robot.fleet import many as done
+from thermal_robot.fleet import settings
 settings.WRITTEN_EVERY = 0.0
 with done.opened(Path(sys.argv[1])) as known:
     for k in range(5):

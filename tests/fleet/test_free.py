@@ -6,7 +6,7 @@ from fleet.robots import ONLY
 
 import thermal_robot as tr
 from thermal_robot.fleet import settings
-from thermal_robot.fleet.free import free
+from thermal_robot.fleet.rows import free
 
 
 def diagnosed(robot, effects, seed, **options):

@@ -5,7 +5,7 @@ import re
 import pytest
 
 import thermal_robot as tr
-from thermal_robot.fleet.same_robot import require_same_robot
+from thermal_robot.fleet.compare import require_same_robot
 
 
 @pytest.fixture(scope="module")

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from fleet.robots import deviations, scattered, told_rows, write_told
 
-from thermal_robot.fleet.shared import shared
-from thermal_robot.fleet.table import overview
+from thermal_robot.fleet.rows import overview
+from thermal_robot.fleet.summary import shared
 
 NAMES = [f"joint_{k}" for k in range(6)]
 

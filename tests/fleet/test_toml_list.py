@@ -3,7 +3,7 @@
 import pytest
 
 from thermal_robot.errors import CampaignError
-from thermal_robot.fleet.toml_list import read_toml
+from thermal_robot.fleet.listed import read_toml
 
 
 def test_a_label_that_a_campaign_does_not_have_is_empty(tmp_path):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from thermal_robot import CampaignError
-from thermal_robot.fleet.wear_dates import days_since, in_words, moment
+from thermal_robot.fleet.wear import days_since, in_words, moment
 
 
 @pytest.mark.parametrize(

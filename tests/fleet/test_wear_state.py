@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from wear_cases import columns, jumping, measured, series_of
 
-from thermal_robot.fleet.wear_moves import Grid, Move
-from thermal_robot.fleet.wear_state import State, fieller
+from thermal_robot.fleet.wear_moves import Grid, Move, State, fieller
 
 
 def test_values_of_each_campaign_are_those_of_least_squares_with_all_else_constant():

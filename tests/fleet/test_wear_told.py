@@ -7,9 +7,9 @@ import pytest
 from wear_cases import columns, jumping, measured, series_of
 
 from thermal_robot.effects import Parameter
+from thermal_robot.fleet.wear import Told, comparable
+from thermal_robot.fleet.wear_moves import explanations
 from thermal_robot.fleet.wear_problem import Problem
-from thermal_robot.fleet.wear_search import explanations
-from thermal_robot.fleet.wear_told import Told, comparable
 
 SIZE = 1e-3
 FIRST = datetime(2026, 1, 1)

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from thermal_robot.diagnosis.result import Diagnosis
-    from thermal_robot.fleet.compare_model import Known
+    from thermal_robot.fleet.compare_sums import Known
 
 SCHEMA = "thermal-robot/comparison/1"
 Status = Literal["shared", "changed", "contradicts", "not_needed", "not_compared", "absent"]

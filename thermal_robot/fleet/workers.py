@@ -19,11 +19,29 @@ import time
 import warnings
 from collections.abc import Callable, Generator, Iterator
 from contextlib import contextmanager
+from importlib import import_module
 from typing import Any
 
 from thermal_robot.errors import ThermalRobotError
 from thermal_robot.fleet import settings
-from thermal_robot.fleet.extra import needed
+
+
+def needed(module: str) -> Any:
+    """Return a module of the extra ``fleet``.
+
+    Raises
+    ------
+    ThermalRobotError
+        If it is not installed; says how to.
+    """
+    try:
+        return import_module(module)
+    except ImportError as error:
+        package = module.partition(".")[0]
+        raise ThermalRobotError(
+            f"a fleet needs {package}, which cannot be loaded ({error}); pip install 'thermal-robot[fleet]'"
+        ) from error
+
 
 LOCAL = "127.0.0.1"
 KILLED = "the process that diagnosed it was ended twice, the second time with nothing else to do: by the system, for \
