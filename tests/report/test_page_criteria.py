@@ -32,7 +32,7 @@ def test_the_tables_are_those_that_are_printed(case):
 
 
 def test_the_section_has_a_heading_and_stands_with_repeats_alone(case, monkeypatch):
-    monkeypatch.setattr(html_parts, "svg", lambda drawn, label: "<svg></svg>")
+    monkeypatch.setattr(html_parts, "_svg", lambda drawn, label: "<svg></svg>")
     assert "<h2>ISO 9283</h2>" in html(case("repeated"))
     assert "ISO 9283" not in html(case("found"))
     assert list(criteria_section(case("found"))) == []

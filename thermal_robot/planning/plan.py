@@ -26,7 +26,7 @@ from thermal_robot.campaign import Campaign, Units
 from thermal_robot.campaign.write import write_commands, write_planned
 from thermal_robot.diagnosis import settings as design
 from thermal_robot.diagnosis.optimal_design import most_informative
-from thermal_robot.effects import Effect, Parameter, choose, gate
+from thermal_robot.effects import Effect, choose, gate
 from thermal_robot.effects.catalogue import of_effect
 from thermal_robot.errors import CampaignError, require
 from thermal_robot.inference import settings
@@ -185,15 +185,11 @@ def expectations(columns: Columns) -> tuple[Expected, ...]:
             if other != b and told.any():
                 both = _left(precision, np.concatenate([frames, own[b], own[other]]))[flat : flat + len(own[b])]
                 lost += [rival.effect.name] if (told & (both >= settings.DETERMINED)).any() else []
-        pairs = zip(item.bare, item.sizes, alone, whole[own[b]], strict=True)
-        parameters = tuple(_parameter(*each) for each in pairs)
+        figures = np.column_stack([item.sizes, item.sizes * alone, item.sizes * whole[own[b]]]).tolist()
+        known = zip(item.bare, figures, strict=True)
+        parameters = tuple(ExpectedParameter(p.label, p.place, p.unit, *each) for p, each in known)
         found.append(Expected(item.effect.name, item.effect.title, parameters, tuple(lost)))
     return tuple(found)
-
-
-def _parameter(bare: Parameter, size: float, alone: float, beside: float) -> ExpectedParameter:
-    size = float(size)
-    return ExpectedParameter(bare.label, bare.place, bare.unit, size, size * float(alone), size * float(beside))
 
 
 def _left(precision: Array, which: NDArray[np.int64]) -> Array:

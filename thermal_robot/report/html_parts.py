@@ -55,7 +55,7 @@ def css(name: str) -> str:
 
 def figure(drawn: Figure, label: str) -> str:
     """Return a figure as HTML; ``label`` says what it shows, for those who cannot see it."""
-    return f"<figure>{wide(svg(drawn, label), label)}</figure>"
+    return f"<figure>{wide(_svg(drawn, label), label)}</figure>"
 
 
 def wide(content: str, label: str) -> str:
@@ -113,18 +113,13 @@ def checksums(files: Mapping[str, str]) -> str:
 
 def signature(generated: str | None) -> str:
     """Say, as plain text, which program made a page, on which libraries, and when if that is to be told."""
-    told = ", ".join(filter(None, (_MADE_BY[0] + _version(_MADE_BY[0]), *map(_named, _MADE_BY[1:]))))
+    told = ", ".join(filter(None, (_version(_MADE_BY[0]) or _MADE_BY[0], *map(_version, _MADE_BY[1:]))))
     return f"{told}, {generated}" if generated else told
-
-
-def _named(package: str) -> str:
-    found = _version(package)
-    return package + found if found else ""
 
 
 def _version(package: str) -> str:
     try:
-        return f" {version(package)}"
+        return f"{package} {version(package)}"
     except PackageNotFoundError:  # run from a source tree that is not installed
         return ""
 
@@ -141,21 +136,8 @@ _NAMES = {
 }
 
 
-def svg(figure: Figure, label: str) -> str:
-    """Return a figure as an ``<svg>`` element for an HTML page.
-
-    Parameters
-    ----------
-    figure
-        The figure; its own background is left out.
-    label
-        What it shows, for those who cannot see it.
-
-    Returns
-    -------
-    str
-        Equal for equal figures; no identifier clashes with that of another figure on the page.
-    """
+def _svg(figure: Figure, label: str) -> str:
+    """Return a figure as an ``<svg>``, the same for equal figures; no identifier clashes with another figure's."""
     stream = StringIO()
     figure.savefig(stream, format="svg", transparent=True, dpi=200, metadata={"Date": None})
     text = stream.getvalue()

@@ -39,26 +39,17 @@ from thermal_robot.report.plots import (
 from thermal_robot.report.words import (
     STATUS,
     by_status,
-    campaign,
+    described,
     details,
+    facts,
     hardest,
-    in_joints,
-    law,
     laws,
-    left_out,
     needs,
     noise_of,
     one_sigma,
-    parameters,
-    places,
-    rivals,
-    rows_used,
     sentences,
-    set_aside,
-    struck,
     told_as,
     turned,
-    verdict,
     with_aside,
 )
 
@@ -175,11 +166,7 @@ def _of_the_robot(diagnosis: Diagnosis, arm: str) -> Iterator[str]:
 
 
 def _facts(diagnosis: Diagnosis) -> str:
-    facts = {"Verdict": verdict(diagnosis), "Campaign": campaign(diagnosis)}
-    if diagnosis.usable:
-        facts |= {"Set aside": set_aside(diagnosis), "Rows used": rows_used(diagnosis), "Left out": left_out(diagnosis)}
-    facts["Struck"] = struck(diagnosis)
-    return f"<dl>{''.join(f'<dt>{k}</dt><dd>{escape(v)}</dd>' for k, v in facts.items() if v)}</dl>"
+    return f"<dl>{''.join(f'<dt>{k}</dt><dd>{escape(v)}</dd>' for k, v in facts(diagnosis).items())}</dl>"
 
 
 def _unexplained(diagnosis: Diagnosis) -> Iterator[str]:
@@ -294,25 +281,11 @@ def _span(name: str, found: bool) -> str:
 
 
 def _known(finding: Finding, diagnosis: Diagnosis) -> Iterator[str]:
-    if told := rivals(finding, diagnosis):
-        yield _line(told)
-    if described := law(finding):
-        yield _line(described)
-    if finding.locations:
-        yield _line(f"where: {places(finding)}")
-    if sized := in_joints(finding):
-        yield _line(sized)
-    known = parameters(finding)
-    if known.heading:
-        yield _line(known.heading)
-    if known.shown:
-        yield f"<table><tbody>{''.join(row(map(escape, r), words=len(r)) for r in known.shown)}</tbody></table>"
-    if known.more:
-        yield _line(f"and {known.more} more, listed in the JSON")
-    if known.undetermined:
-        yield _line(f"not determined by these data: {known.undetermined}")
-    if known.unseen:
-        yield _line(known.unseen)
+    before, shown, after = described(finding, diagnosis)
+    yield from (_line(told) for told, _ in before)
+    if shown:
+        yield f"<table><tbody>{''.join(row(map(escape, r), words=len(r)) for r in shown)}</tbody></table>"
+    yield from (_line(told) for told, _ in after)
 
 
 def _line(sentence: str) -> str:

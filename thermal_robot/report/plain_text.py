@@ -11,27 +11,19 @@ from thermal_robot.report.words import (
     NO_BREAK,
     STATUS,
     bound,
-    campaign,
+    described,
     details,
+    facts,
     hardest,
-    in_joints,
     in_words,
-    law,
-    left_out,
     more,
     needs,
     noise,
     one_sigma,
-    parameters,
-    places,
-    rivals,
     rows_used,
     sentences,
-    set_aside,
-    struck,
     told_as,
     turned,
-    verdict,
     with_aside,
 )
 
@@ -79,12 +71,7 @@ def text(diagnosis: Diagnosis) -> str:
 def _unusable(diagnosis: Diagnosis) -> Iterator[list[str]]:
     """Say what is wrong with the table, and nothing of the robot."""
     yield [_wrap(diagnosis.summary, "")]
-    told = struck(diagnosis)
-    yield [
-        _wrap(verdict(diagnosis), f"{'verdict':11}"),
-        _wrap(campaign(diagnosis), f"{'campaign':11}"),
-        *([_wrap(told, f"{'struck':11}")] if told else []),
-    ]
+    yield list(_facts(diagnosis))
     yield ["NEXT", _wrap(diagnosis.advice)]
     if diagnosis.warnings:
         yield ["WARNINGS", *(_wrap(w, "  - ") for w in diagnosis.warnings)]
@@ -98,11 +85,9 @@ def _wrap(sentence: str, indent: str = "  ", hang: int = 0) -> str:
 
 
 def _facts(diagnosis: Diagnosis) -> Iterator[str]:
-    yield _wrap(verdict(diagnosis), f"{'verdict':11}")
-    yield _wrap(campaign(diagnosis), f"{'campaign':11}")
-    yield _wrap(set_aside(diagnosis), f"{'set aside':11}")
-    if told := left_out(diagnosis):
-        yield _wrap(told, f"{'left out':11}")
+    for heading, said in facts(diagnosis).items():
+        if heading != "Rows used":  # told beside the gap
+            yield _wrap(said, f"{heading.lower():11}")
 
 
 def _how_far(diagnosis: Diagnosis) -> Iterator[str]:
@@ -168,26 +153,12 @@ def _share(finding: Finding) -> str:
 def _at_length(finding: Finding, wide: int, diagnosis: Diagnosis) -> Iterator[str]:
     inner = " " * 6
     yield f"    {finding.name:{wide}}{units.probability(finding.probability):>13}   {_share(finding)}"
-    if told := rivals(finding, diagnosis):
-        yield _wrap(told, inner)
-    if described := law(finding):
-        yield _wrap(described, inner)
-    if finding.locations:
-        yield _wrap(f"where: {places(finding)}", inner, hang=7)
-    if sized := in_joints(finding):
-        yield _wrap(sized, inner, hang=2)
-    known = parameters(finding)
-    if known.heading:
-        yield f"{inner}{known.heading}"
-    column = max([len(name) for name, _ in known.shown], default=0)
-    for name, value in known.shown:
+    before, shown, after = described(finding, diagnosis)
+    yield from (_wrap(told, inner, hang) for told, hang in before)
+    column = max([len(name) for name, _ in shown], default=0)
+    for name, value in shown:
         yield f"{inner}{name:{column}}  {value}"
-    if known.more:
-        yield f"{inner}and {known.more} more, listed in the JSON"
-    if known.undetermined:
-        yield _wrap(f"not determined by these data: {known.undetermined}", inner, hang=2)
-    if known.unseen:
-        yield _wrap(known.unseen, inner, hang=2)
+    yield from (_wrap(told, inner, hang) for told, hang in after)
 
 
 def _in_short(finding: Finding, wide: int, joints: Sequence[str]) -> str:

@@ -64,41 +64,24 @@ def plot_how_far(diagnosis: Diagnosis) -> Figure:
     draw_how_far(panels[0], diagnosis)
     title(panels[0], "Position: measured against predicted")
     if pose:
-        _draw_orientation(panels[1], diagnosis)
+        draw_how_far(panels[1], diagnosis, turned=True)
         title(panels[1], "Orientation: measured against predicted")
     return figure
 
 
-def draw_how_far(axes: Axes, diagnosis: Diagnosis) -> None:
-    """Draw the distances of the position into a panel."""
-    rows, gap = diagnosis.rows, diagnosis.gap
-    used = ~rows.outliers
-    said = units.together((gap.rms_before, gap.rms_after, gap.held_out.rms_after, gap.noise_floor), "m")
-    best = units.scale("m", gap.rms_before)
-    _draw_distances(
-        axes,
-        np.linalg.norm(rows.gap[used, :3], axis=1) * best.factor,
-        np.linalg.norm(rows.remainder[used, :3], axis=1) * best.factor,
-        rows.held_out_after[np.isfinite(rows.held_out_after)] * best.factor,
-        said,
-        gap.noise_floor * best.factor,
-    )
-    axes.set_xlabel(f"distance between measured and predicted position ({best.unit})")
-
-
-def _draw_orientation(axes: Axes, diagnosis: Diagnosis) -> None:
-    rows, gap = diagnosis.rows, diagnosis.gap
-    used = ~rows.outliers
-    best = units.scale("rad", gap.orientation_before or 0.0)
-    _draw_distances(
-        axes,
-        np.linalg.norm(rows.gap[used, 3:6], axis=1) * best.factor,
-        np.linalg.norm(rows.remainder[used, 3:6], axis=1) * best.factor,
-        np.zeros(0),
-        units.together((gap.orientation_before, gap.orientation_after), "rad"),
-        0.0,
-    )
-    axes.set_xlabel(f"angle between measured and predicted orientation ({best.unit})")
+def draw_how_far(axes: Axes, diagnosis: Diagnosis, turned: bool = False) -> None:
+    """Draw the distances of the position into a panel, or the angles of the orientation if ``turned``."""
+    rows, gap, used = diagnosis.rows, diagnosis.gap, ~diagnosis.rows.outliers
+    held, floor = rows.held_out_after[np.isfinite(rows.held_out_after)], gap.noise_floor
+    sizes: list[float | None] = [gap.rms_before, gap.rms_after, gap.held_out.rms_after, floor]
+    what, unit, part = "distance between measured and predicted position", "m", slice(0, 3)
+    if turned:
+        held, floor, sizes = np.zeros(0), 0.0, [gap.orientation_before, gap.orientation_after]
+        what, unit, part = "angle between measured and predicted orientation", "rad", slice(3, 6)
+    best = units.scale(unit, sizes[0] or 0.0)
+    before, after = (np.linalg.norm(of[used, part], axis=1) * best.factor for of in (rows.gap, rows.remainder))
+    _draw_distances(axes, before, after, held * best.factor, units.together(sizes, unit), floor * best.factor)
+    axes.set_xlabel(f"{what} ({best.unit})")
 
 
 def _draw_distances(axes: Axes, before: Array, after: Array, held_out: Array, said: list[str], floor: float) -> None:

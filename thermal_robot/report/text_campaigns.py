@@ -7,7 +7,7 @@ from textwrap import fill
 from typing import Any
 
 from thermal_robot.report import units
-from thermal_robot.report.words import listed
+from thermal_robot.report.words import capitalised, listed
 
 Plain = Mapping[str, Any]
 STATUS = {
@@ -29,23 +29,19 @@ def comparison_headline(comparison: Plain) -> str:
     kept = [c for c in comparison["changes"] if _status(comparison, c["effect"]) != "contradicts"]
     told = []
     if kept:
-        told.append(f"{_upper(listed([change_in_short(c) for c in kept[:3]]))}{_and_more(len(kept) - 3)}.")
+        told.append(f"{capitalised(listed([change_in_short(c) for c in kept[:3]]))}{_and_more(len(kept) - 3)}.")
     elif not lost:
         what = "What differs" if comparison["changes"] else "Nothing changed"
         told.append(f"{what} between {listed(names)}{' has no name' * bool(comparison['changes'])}.")
     if same:
         told.append(f"They share {listed(same)}." if not kept else f"The same in all: {listed(same)}.")
     if lost:
-        told.append(f"{_upper(listed(lost))} {'loses its' if len(lost) == 1 else 'lose their'} name.")
+        told.append(f"{capitalised(listed(lost))} {'loses its' if len(lost) == 1 else 'lose their'} name.")
     return " ".join(told)
 
 
 def _status(comparison: Plain, name: str) -> str:
     return next((str(e["status"]) for e in comparison["effects"] if e["name"] == name), "")
-
-
-def _upper(text: str) -> str:
-    return text[:1].upper() + text[1:]
 
 
 def _and_more(count: int) -> str:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from thermal_robot.report import units
 
 if TYPE_CHECKING:
-    from thermal_robot.diagnosis.parts import AnotherModel, Estimate, Finding, Misfit, Unexplained, Wanted
+    from thermal_robot.diagnosis.parts import AnotherModel, Finding, Misfit, Unexplained, Wanted
     from thermal_robot.diagnosis.result import Diagnosis
 
 
@@ -35,12 +35,10 @@ def headline(diagnosis: Diagnosis) -> str:
     It names at most three causes, the largest shares first, and counts the others. Of what there is to say of them the
     fullest wording is taken that fits; the rest is left to :mod:`thermal_robot.report.words`.
     """
-    return next((text for text in _wordings(diagnosis) if len(text.split()) <= MOST_WORDS), "") or _cut(
-        list(_wordings(diagnosis))[-1]
-    )
-
-
-def _cut(text: str) -> str:
+    text = ""
+    for text in _wordings(diagnosis):
+        if len(text.split()) <= MOST_WORDS:
+            return text
     return " ".join(text.split()[:MOST_WORDS]).rstrip(".,;:") + "."
 
 
@@ -160,7 +158,7 @@ def _sure(diagnosis: Diagnosis) -> str:
 def _causes(diagnosis: Diagnosis, causes: Sequence[Finding], most: int, beside: bool) -> str:
     """Name the first few, each with what the data cannot tell it from, and count the others."""
     named = weighty(causes, most)
-    names = [_name(diagnosis, f) + (_doubt(diagnosis, f) if beside else " (in doubt)" * _doubted(f)) for f in named]
+    names = [_name(diagnosis, f) + _doubt(diagnosis, f, beside) for f in named]
     fewer = len(causes) - len(named)
     return listed([*names, *(["a smaller one"] if fewer == 1 else [f"{fewer} smaller ones"] if fewer else [])])
 
@@ -170,13 +168,10 @@ def _name(diagnosis: Diagnosis, finding: Finding) -> str:
     return " ".join(words) if len(words) <= _MOST_OF_A_NAME else " ".join(words[:_MOST_OF_A_NAME]).rstrip(",;") + "…"
 
 
-def _doubted(finding: Finding) -> bool:
-    return bool(finding.confounded_with)
-
-
-def _doubt(diagnosis: Diagnosis, finding: Finding) -> str:
+def _doubt(diagnosis: Diagnosis, finding: Finding, beside: bool) -> str:
     rivals = [diagnosis.title(name) for name in finding.confounded_with]
-    return f" (or {rivals[0] if len(rivals) == 1 else 'others'})" if rivals else ""
+    told = f"or {rivals[0] if len(rivals) == 1 else 'others'}" if beside else "in doubt"
+    return f" ({told})" if rivals else ""
 
 
 def _how_far(diagnosis: Diagnosis, remaining: Unexplained, several: bool) -> Iterator[str]:
@@ -322,9 +317,9 @@ class Shown:
 def parameters(finding: Finding) -> Shown:
     """Choose the parameters to print: all of a few in the order of the chain, else the most significant."""
     known = [p for p in finding.parameters if p.identified and p.value is not None]
-    chosen, heading = known, ""
+    chosen, heading, hidden = known, "", finding.unseen
     if len(known) > _ALL_UP_TO:
-        chosen = sorted(known, key=lambda p: -_significance(p))[:_MOST]
+        chosen = sorted(known, key=lambda p: -abs(p.value or 0.0) / max(p.std or 0.0, 1e-300))[:_MOST]
         heading = f"the {_MOST} most significant of {len(known)} parameters:"
     # where there is a size, it says what is known; a constant that the frames can take up is no news
     undetermined = [] if finding.size else [p.name for p in finding.parameters if p not in known]
@@ -333,18 +328,8 @@ def parameters(finding: Finding) -> Shown:
         tuple((p.name, units.estimate(p, chosen)) for p in chosen),
         len(known) - len(chosen),
         in_words(undetermined, most=4, between="; "),  # names hold commas
-        _unseen(finding.unseen),
+        f"{len(hidden)} not seen apart from the others or the frames: {in_words(hidden, 6, '; ')}" if hidden else "",
     )
-
-
-def _unseen(names: Sequence[str]) -> str:
-    """Say how many parameters are not seen and which; empty where there are none."""
-    listed = in_words(names, most=6, between="; ")
-    return f"{len(names)} not seen apart from the others or the frames: {listed}" if names else ""
-
-
-def _significance(parameter: Estimate) -> float:
-    return abs(parameter.value or 0.0) / max(parameter.std or 0.0, 1e-300)
 
 
 def in_words(names: Sequence[str], most: int = 10, between: str = ", ") -> str:
@@ -375,6 +360,15 @@ def struck(diagnosis: Diagnosis) -> str:
     """Say which rows a fault of the table struck; empty where it struck all, or there is none."""
     fault = diagnosis.misfit.fault if diagnosis.misfit else None
     return rows_in_words(fault.rows) if fault and fault.rows else ""
+
+
+def facts(diagnosis: Diagnosis) -> dict[str, str]:
+    """Return what stands above all else, by its heading: verdict, campaign, and which rows and effects count."""
+    told = {"Verdict": verdict(diagnosis), "Campaign": campaign(diagnosis)}
+    if diagnosis.usable:
+        told |= {"Set aside": set_aside(diagnosis), "Rows used": rows_used(diagnosis), "Left out": left_out(diagnosis)}
+    told["Struck"] = struck(diagnosis)
+    return {heading: said for heading, said in told.items() if said}
 
 
 def rows_used(diagnosis: Diagnosis) -> str:
@@ -499,6 +493,19 @@ def rivals(finding: Finding, diagnosis: Diagnosis) -> str:
     return f"{said}; --without {finding.name} shows what would then stand in its place"
 
 
+def described(
+    finding: Finding, diagnosis: Diagnosis
+) -> tuple[list[tuple[str, int]], tuple[tuple[str, str], ...], list[tuple[str, int]]]:
+    """Return what is said of an effect before its parameters, these, and what after: lines with how far they hang."""
+    known = parameters(finding)
+    where = f"where: {places(finding)}" if finding.locations else ""
+    more = f"and {known.more} more, listed in the JSON" if known.more else ""
+    free = f"not determined by these data: {known.undetermined}" if known.undetermined else ""
+    before = (rivals(finding, diagnosis), 0), (law(finding), 0), (where, 7), (in_joints(finding), 2), (known.heading, 0)
+    after = (more, 0), (free, 2), (known.unseen, 2)
+    return [line for line in before if line[0]], known.shown, [line for line in after if line[0]]
+
+
 def left_out(diagnosis: Diagnosis) -> str:
     """Say which effects the user left out, and how he asked for that; empty where he did not."""
     out, kept = diagnosis.left_out, [f.name for f in diagnosis.effects if f.quantity is None]
@@ -535,7 +542,7 @@ def sentences(diagnosis: Diagnosis) -> Iterator[str]:
     size = f"{units.quantity(left.rms, 'm')} rms{known}" if left.rms > 0 else "a remainder"
     yield f"The known effects leave {size} that chance does not explain ({units.p_value(left.p_value)})."
     for reason in left.reasons:
-        yield f"{reason[:1].upper()}{reason[1:].rstrip('.')}."
+        yield f"{capitalised(reason).rstrip('.')}."
     if left.locations:
         likely = [p for p in left.locations if p.share >= _UNLIKELY][:3] or left.locations[:1]
         spots = [f"{p.words} ({units.probability(p.share)})" for p in likely]
@@ -575,7 +582,7 @@ def details(diagnosis: Diagnosis) -> Iterator[str]:
     for f in causes:
         if f.confounded_with:
             rivals = " or ".join(map(diagnosis.title, f.confounded_with))
-            yield f"{_upper(diagnosis.title(f.name))} cannot be told apart from {rivals}."
+            yield f"{capitalised(diagnosis.title(f.name))} cannot be told apart from {rivals}."
     if unsized := [diagnosis.title(f.name) for f in causes if not sized(f)]:
         yield f"How large it is these data do not determine: {listed(unsized)}."
     yield from _beside(diagnosis)
@@ -602,7 +609,8 @@ def _beside(diagnosis: Diagnosis) -> Iterator[str]:
     yield f"{told_apart}: the rest is others{beside}."
 
 
-def _upper(words: str) -> str:
+def capitalised(words: str) -> str:
+    """Begin a sentence with a capital letter."""
     return words[:1].upper() + words[1:]
 
 
@@ -622,7 +630,7 @@ def advice(diagnosis: Diagnosis) -> str:
     wanted = diagnosis.wanted
     if diagnosis.misfit is not None:
         fault, model = diagnosis.misfit.fault, diagnosis.misfit.model
-        first = f"{fault.remedy[:1].upper()}{fault.remedy[1:]}" if fault else "Mend the table"
+        first = capitalised(fault.remedy) if fault else "Mend the table"
         if fault and fault.what not in headline(diagnosis):
             first = f"All of these do the same: {fault.what}. {first}"
         if model is not None and model.in_another_unit:
