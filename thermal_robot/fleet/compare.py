@@ -136,7 +136,7 @@ def compare(
     called = _called(found, names)
     found = [replace(d, campaign=name) if isinstance(d, Known) else d for d, name in zip(found, called, strict=True)]
     fits = _usable(found, called)
-    require_same_robot([one.model.robot for one in found], called)
+    _require_same_robot([one.model.robot for one in found], called)
     with threadpool_limits(1):
         return _compared(found, fits, called, progress)
 
@@ -204,7 +204,7 @@ def _compared(
         tool_frame=found[0].tool_frame,
         effects=tuple(effects),
         changes=_changes(listed, owners, together, names),
-        predicted=predicted(found, names),
+        predicted=_predicted(found, names),
         not_told=tuple(
             f"{listed[effect].name}: {listed[effect].told[k].name}"
             for number, (effect, k) in enumerate(every)
@@ -226,15 +226,15 @@ def _effects(
     listed: Sequence[Candidate], owners: Owners, together: Joint, said: Sequence[Sums], names: Sequence[str]
 ) -> list[Compared]:
     """Return what is compared of each effect, beside those at work or named."""
-    status = {n: judged(n, item, owners, together, said, names) for n, item in enumerate(listed)}
+    status = {n: _judged(n, item, owners, together, said, names) for n, item in enumerate(listed)}
     beside = {n for n in status if status[n][0] != "absent"}
     result = []
     for number, item in enumerate(listed):
         kept = [k for k, (effect, _) in enumerate(owners) if effect in beside | {number}]
         some, own = [one.some(kept) for one in said], [k for k, at in enumerate(kept) if owners[at][0] == number]
         which = [owners[kept[k]][1] for k in own]
-        chi2, degrees, p_value = equal(some, own) if own else (0.0, 0, 1.0)
-        one_by_one = parameters([item.told[p] for p in which], item.sizes[which], some, own, names)
+        chi2, degrees, p_value = _equal(some, own) if own else (0.0, 0, 1.0)
+        one_by_one = _parameters([item.told[p] for p in which], item.sizes[which], some, own, names)
         named = tuple(name for name, yes in zip(names, item.named, strict=True) if yes)
         result.append(
             Compared(
@@ -297,7 +297,7 @@ def _since(groups: Sequence[Sequence[int]], names: Sequence[str]) -> str:
     return names[min(groups[1])]
 
 
-def judged(
+def _judged(
     number: int,
     item: Candidate,
     owners: Sequence[tuple[int, int]],
@@ -305,21 +305,7 @@ def judged(
     said: Sequence[Sums],
     names: Sequence[str],
 ) -> tuple[Status, str]:
-    """Return the status of an effect, and the reason where it loses its name or is not compared.
-
-    Parameters
-    ----------
-    number, item
-        Which effect.
-    owners
-        Per parameter that is compared: number of its effect, and of the parameter within that.
-    found
-        The joint fit.
-    said
-        What each campaign says.
-    names
-        What the campaigns are called.
-    """
+    """Return the status of an effect, and the reason where it loses its name or is not compared."""
     own = [k for k, (effect, _) in enumerate(owners) if effect == number]
     tell = [c for c, one in enumerate(said) if np.diag(one.matrix)[own].max(initial=0.0) > settings.INFORMATION_FLOOR]
     if len(tell) < 2:
@@ -394,24 +380,10 @@ def _listed(names: Sequence[str]) -> str:
     return names[0] if len(names) == 1 else f"{', '.join(names[:-1])} and {names[-1]}"
 
 
-def parameters(
+def _parameters(
     told: Sequence[Told], sizes: Array, said: Sequence[Sums], numbers: Sequence[int], names: Sequence[str]
 ) -> tuple[Parameter, ...]:
-    """Return some parameters in every campaign.
-
-    Parameters
-    ----------
-    told
-        What they are.
-    sizes
-        (p,) the unit of each, its expected size.
-    said
-        What each campaign says of all parameters of the effects at work.
-    numbers
-        Which of these they are.
-    names
-        What the campaigns are called.
-    """
+    """Return parameters as each campaign alone has them; ``numbers`` says where they stand in ``said``."""
     values, stds = np.full((len(said), len(told)), np.nan), np.full((len(said), len(told)), np.nan)
     for c, one in enumerate(said):
         covariance, seen = one.inverse
@@ -451,7 +423,7 @@ def _parameter(told: Told, values: Array, stds: Array, names: Sequence[str]) -> 
     )
 
 
-def equal(said: Sequence[Sums], numbers: Sequence[int]) -> tuple[float, int, float]:
+def _equal(said: Sequence[Sums], numbers: Sequence[int]) -> tuple[float, int, float]:
     """Return χ², degrees of freedom and probability by chance of some parameters being the same in all campaigns."""
     own = list(numbers)
     others = [k for k in range(len(said[0].vector)) if k not in set(own)]
@@ -477,16 +449,8 @@ def _quadratic(matrix: Array, vector: Array, longest: float) -> tuple[float, int
     return float((along**2 / value[seen]).sum()), int(seen.sum())
 
 
-def predicted(found: Sequence[Diagnosis | Known], names: Sequence[str]) -> tuple[Predicted, ...]:
-    """Compare the models of every two campaigns.
-
-    Parameters
-    ----------
-    found
-        Their diagnoses, or models.
-    names
-        What the campaigns are called.
-    """
+def _predicted(found: Sequence[Diagnosis | Known], names: Sequence[str]) -> tuple[Predicted, ...]:
+    """Cross-validate the models of every two campaigns."""
     pairs = combinations(range(len(found)), 2)
     return tuple(_pair(found[a], found[b], (names[a], names[b])) for a, b in pairs)
 
@@ -497,10 +461,12 @@ def _pair(a: Diagnosis | Known, b: Diagnosis | Known, names: tuple[str, str]) ->
         return replace(nothing, note="predictions of a simulator stand in the place of the model's own")
     if a.model.spread is None or b.model.spread is None:
         return replace(nothing, note="a model does not state how far its predictions may be off")
-    q = _measured(a, b)
     common = _common(a.model, b.model)
-    joints = a.model.robot.joint_names
-    low, high = (np.array([common[name][end] for name in joints]) for end in (0, 1))
+    low, high = np.array([common[name] for name in a.model.robot.joint_names]).T
+    rows = [_some(found.rows.q) for found in (a, b) if not isinstance(found, Known)]
+    q = np.concatenate(rows) if rows else np.zeros((0, len(low)))
+    if not rows and (low <= high).all():  # neither has its rows
+        q = poses(a.model.robot, common)
     q = q[((q >= low - STILL) & (q <= high + STILL)).all(axis=1)]
     if len(q) < compare_settings.TRIED:
         return replace(nothing, note="the two did not measure a common part of the workspace")
@@ -512,16 +478,6 @@ def _pair(a: Diagnosis | Known, b: Diagnosis | Known, names: tuple[str, str]) ->
     rms, deviation = float(np.sqrt((distance**2).mean())), float(np.sqrt((stated**2).mean()))
     far = float((distance > compare_settings.TWICE * stated).mean())
     return Predicted(names, len(q), rms, deviation, far, rms <= compare_settings.TWICE * deviation)
-
-
-def _measured(a: Diagnosis | Known, b: Diagnosis | Known) -> Array:
-    """(N, n) poses: those that were measured; where neither has its rows, poses in the ranges that both measured."""
-    rows = [_some(found.rows.q) for found in (a, b) if not isinstance(found, Known)]
-    if rows:
-        return np.concatenate(rows)
-    common = _common(a.model, b.model)
-    low, high = (np.array([common[name][end] for name in a.model.robot.joint_names]) for end in (0, 1))
-    return poses(a.model.robot, common) if (low <= high).all() else np.zeros((0, len(low)))
 
 
 def _some(q: Array) -> Array:
@@ -580,21 +536,8 @@ def _variance(model: CorrectedModel, at: Observations, gauge: Array) -> Array:
     return np.asarray(np.maximum(told, 0.0) + beyond)
 
 
-def require_same_robot(robots: Sequence[Robot], names: Sequence[str]) -> None:
-    """Refuse to compare campaigns of different robots.
-
-    Parameters
-    ----------
-    robots
-        Of each campaign.
-    names
-        What the campaigns are called.
-
-    Raises
-    ------
-    CampaignError
-        Their joints differ, or the same joints put the tool frame elsewhere.
-    """
+def _require_same_robot(robots: Sequence[Robot], names: Sequence[str]) -> None:
+    """Refuse to compare campaigns whose joints differ, or whose same joints put the tool frame elsewhere."""
     first = robots[0]
     low, high = (
         np.where(np.isfinite(end), end, sign) for end, sign in zip(joint_range(first), (-1.0, 1.0), strict=True)

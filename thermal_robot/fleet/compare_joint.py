@@ -106,7 +106,9 @@ class Problem:
                 kept.append(part)
                 bases.append(basis)
                 positive.append((held @ basis).astype(bool))
-        spreads = np.array([_spread(listed[p.effect], p) for p in kept])
+        spreads = np.array(
+            [listed[p.effect].effect.size_spread if p.shared else compare_settings.CHANGE_SPREAD for p in kept]
+        )
         total = sum(float(one.vector @ one.inverse[0] @ one.vector) for one in said)
         equations = float(sum(np.linalg.matrix_rank(one.matrix, hermitian=True) for one in said))
         return cls(tuple(kept), said, tuple(bases), tuple(positive), spreads, total, equations)
@@ -277,11 +279,6 @@ def _exclude(a: Part, b: Part) -> bool:
     return a.shared or not set(a.where).isdisjoint(b.where)
 
 
-def _spread(item: Candidate, part: Part) -> float:
-    """Return how well the size of a part is known beforehand: deviation of its logarithm."""
-    return item.effect.size_spread if part.shared else compare_settings.CHANGE_SPREAD
-
-
 @dataclass(frozen=True, eq=False)
 class Change:
     """A part that differs: its chi-square, degrees of freedom, probability by chance, and posterior probability."""
@@ -356,7 +353,9 @@ def _searched(problem: Problem, named: Sequence[bool]) -> tuple[tuple[Part, ...]
     every = range(len(problem.parts))
     few = len(every) <= compare_settings.AT_ONCE
     held = [k for k in every if few or problem.parts[k].shared]
-    starts: list[Sequence[int]] = [[], [n for n, k in enumerate(held) if _is_begun(problem.parts[k], named)]]
+    # a search begins with nothing, and with the effects that a diagnosis names, shared
+    begun = [p.shared and not p.place[1] and named[p.effect] for p in (problem.parts[k] for k in held)]
+    starts: list[Sequence[int]] = [[], np.flatnonzero(begun).tolist()]
     known: dict[tuple[int, ...], Combination] = {}
     while True:
         parts = tuple(problem.parts[k] for k in held)
@@ -377,11 +376,6 @@ def _searched(problem: Problem, named: Sequence[bool]) -> tuple[tuple[Part, ...]
         # what joins comes behind the others, so that these keep their numbers
         held, starts = [*held, *more], [best.blocks]
         known = {blocks: c for blocks, c in search.seen.items() if c.exact}
-
-
-def _is_begun(part: Part, named: Sequence[bool]) -> bool:
-    """Whether a search begins with a part: an effect that a diagnosis names, shared."""
-    return part.shared and not part.place[1] and named[part.effect]
 
 
 def _standing(

@@ -113,7 +113,7 @@ def _folders(root: Path) -> Iterator[str]:
 
 def _of_list(path: Path) -> Listed:
     """Read a list: rows of text by column, and where each stands."""
-    columns, rows = read_toml(path) if path.suffix.lower() == ".toml" else _csv(path)
+    columns, rows = _read_toml(path) if path.suffix.lower() == ".toml" else _csv(path)
     if CAMPAIGN not in columns:
         problem = f"has no column {CAMPAIGN!r}{did_you_mean(CAMPAIGN, columns)}"
         raise CampaignError(str(path), problem, expected="the paths of the campaigns in it, labels in the others")
@@ -150,19 +150,8 @@ def _checked(file: str, labels: Iterable[str]) -> tuple[str, ...]:
 SECTION = "campaigns"
 
 
-def read_toml(path: Path) -> tuple[dict[str, list[str]], list[int]]:
-    """Read a list.
-
-    Returns
-    -------
-    tuple
-        Columns of text by name, empty where a campaign does not have the label; and the number of each campaign.
-
-    Raises
-    ------
-    CampaignError
-        What cannot be read, holds anything but ``[[campaigns]]``, or a value that is no text.
-    """
+def _read_toml(path: Path) -> tuple[dict[str, list[str]], list[int]]:
+    """Return columns of text by name, empty where a campaign lacks a label, and the number of each campaign."""
     try:
         data: dict[str, Any] = tomllib.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:

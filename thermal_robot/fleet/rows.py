@@ -18,6 +18,8 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
+from importlib import import_module
+from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -27,9 +29,9 @@ from numpy.typing import NDArray
 from thermal_robot.diagnosis import Diagnosis, Finding
 from thermal_robot.diagnosis.plain import jsonable
 from thermal_robot.effects import choose, gate
+from thermal_robot.errors import ThermalRobotError
 from thermal_robot.files import whole
 from thermal_robot.fleet import settings
-from thermal_robot.fleet.workers import needed
 from thermal_robot.inference.columns import Block, block
 from thermal_robot.inference.explain import Explanation
 from thermal_robot.inference.fit import Fit
@@ -79,6 +81,23 @@ OWN = ("campaign", *_OF_CAMPAIGN, *_OF_EFFECT)
 """Columns that no label may be called; ``robot`` is one."""
 
 
+def needed(module: str) -> Any:
+    """Return a module of the extra ``fleet``.
+
+    Raises
+    ------
+    ThermalRobotError
+        If it is not installed; says how to.
+    """
+    try:
+        return import_module(module)
+    except ImportError as error:
+        package = module.partition(".")[0]
+        raise ThermalRobotError(
+            f"a fleet needs {package}, which cannot be loaded ({error}); pip install 'thermal-robot[fleet]'"
+        ) from error
+
+
 def rows_of(found: Diagnosis) -> list[dict[str, Any]]:
     """Return the rows of a diagnosis, without the campaign's name and its labels.
 
@@ -86,7 +105,7 @@ def rows_of(found: Diagnosis) -> list[dict[str, Any]]:
     -------
     list of dict
         One for each effect, in the diagnosis's order; one without an effect where it is not usable. ``parameters`` are
-        those that the diagnosis tells and the data identify, ``free`` those of :func:`~thermal_robot.fleet.rows.free`.
+        those that the diagnosis tells and the data identify, ``free`` those of :func:`_free`.
     """
     campaign = {
         "model": found.robot,
@@ -105,28 +124,21 @@ def rows_of(found: Diagnosis) -> list[dict[str, Any]]:
     if not found.usable:
         return [dict(jsonable(campaign))]
     refused = [f.name for f in found.effects if f.status == "not_found"]
-    alone = {} if found.fit is None else free(found.fit, refused)
+    alone = {} if found.fit is None else _free(found.fit, refused)
     return [dict(jsonable({**campaign, **_of_effect(f, alone.get(f.name, ()))})) for f in found.effects]
 
 
 def _of_effect(finding: Finding, alone: Sequence[Free]) -> dict[str, Any]:
     low, high = finding.shrinkage_ci95 or (None, None)
-    told = [
-        {"name": p.name, "value": p.value, "std": p.std, "unit": p.unit} for p in finding.parameters if p.identified
-    ]
+    alike = ("status", "probability", "shrinkage", "quantity", "shape", "needs", "confounded_with")
+    known = [p for p in finding.parameters if p.identified]
     return {
+        **{name: getattr(finding, name) for name in alike},
         "effect": finding.name,
-        "status": finding.status,
-        "probability": finding.probability,
-        "shrinkage": finding.shrinkage,
         "shrinkage_low": low,
         "shrinkage_high": high,
-        "quantity": finding.quantity,
-        "shape": finding.shape,
-        "needs": finding.needs,
-        "confounded_with": finding.confounded_with,
         "places": [asdict(place) for place in finding.locations],
-        "parameters": told,
+        "parameters": [{name: getattr(p, name) for name in ("name", "value", "std", "unit")} for p in known],
         "free": [asdict(parameter) for parameter in alone],
     }
 
@@ -157,22 +169,11 @@ def write_rows(path: Path, labels: Sequence[str], rows: Iterable[dict[str, Any]]
     OSError
         As :func:`~thermal_robot.files.whole`.
     """
-    pa, columns = needed("pyarrow"), schema(labels)
+    pa, columns, left = needed("pyarrow"), schema(labels), iter(rows)
     parquet = needed("pyarrow.parquet")
     with whole(path) as place, parquet.ParquetWriter(place, columns, compression="zstd") as writer:
-        for some in _batches(rows):
+        while some := list(islice(left, settings.ROWS_AT_ONCE)):
             writer.write_table(pa.Table.from_pylist(some, schema=columns))
-
-
-def _batches(rows: Iterable[dict[str, Any]]) -> Iterator[list[dict[str, Any]]]:
-    batch: list[dict[str, Any]] = []
-    for row in rows:
-        batch.append(row)
-        if len(batch) == settings.ROWS_AT_ONCE:
-            yield batch
-            batch = []
-    if batch:
-        yield batch
 
 
 @dataclass(frozen=True)
@@ -185,21 +186,11 @@ class Free:
     unit: str
 
 
-def free(fit: Fit, names: Iterable[str] = ()) -> dict[str, tuple[Free, ...]]:
-    """Return by effect its parameters as the data alone tell them, beside the other effects that are or may be at work.
+def _free(fit: Fit, names: Iterable[str] = ()) -> dict[str, tuple[Free, ...]]:
+    """Return by effect its parameters as the data alone tell them, beside the others that are or may be at work.
 
-    Parameters
-    ----------
-    fit
-        The fit of a campaign.
-    names
-        Of effects of the library that were tried, but taken out again: they are told, too.
-
-    Returns
-    -------
-    dict
-        Of every effect that was tried, in the setting that is first looked for, in all its places. Of its parameters
-        those alone of which the data know more than the expected size says.
+    Of every effect that was tried, also of ``names`` that were taken out again, in all its places; of its parameters
+    those alone of which the data know more than the expected size says.
     """
     e, likely = fit.explanation, _likely(fit)
     own = {name: _everywhere(fit, name) for name in dict.fromkeys(fit.families)}

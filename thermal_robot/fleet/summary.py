@@ -103,21 +103,8 @@ class _Tally:
         self.testable, self.found, self.alone = (np.zeros(self.robots, dtype=bool) for _ in range(3))
 
 
-def counted(table: Path, known: Overview) -> tuple[tuple[Count, ...], tuple[Gathered, ...], tuple[Case, ...]]:
-    """Count the effects of a table.
-
-    Parameters
-    ----------
-    table
-        The file.
-    known
-        Its campaigns.
-
-    Returns
-    -------
-    tuple
-        Counts; what gathers in a group; what was found in the campaigns with the largest gaps.
-    """
+def _counted(table: Path, known: Overview) -> tuple[tuple[Count, ...], tuple[Gathered, ...], tuple[Case, ...]]:
+    """Return how often each effect was found, what gathers in a group, and the campaigns with the largest gaps."""
     names, robot_of = list(known.robots.values), known.robot_of()
     tallies: dict[str, _Tally] = {}
     worst: list[tuple[float, int, int, Case]] = []
@@ -259,27 +246,10 @@ class Apart:
     probability: float
 
 
-def shared(
+def _shared(
     table: Path, known: Overview, effects: Sequence[str], progress: Callable[[str, int, int], None] = lambda *_: None
 ) -> tuple[tuple[Shared, ...], tuple[Apart, ...], int]:
-    """Compare the parameters of the robots of a table.
-
-    Parameters
-    ----------
-    table
-        The file.
-    known
-        Its campaigns.
-    effects
-        Whose parameters are compared.
-    progress
-        Called with a stage, how many effects are compared, and how many there are.
-
-    Returns
-    -------
-    tuple
-        What is shared, most certain first; who stands out, most probable first; how many parameters were compared.
-    """
+    """Return what robots share, who stands out, the surest first each, and how many parameters were compared."""
     robots, labels = known.robot_of(), {name: known.label_of(name) for name in known.labels}
     together, apart = [], []
     for k, effect in enumerate(effects):
@@ -410,8 +380,8 @@ def summarise(
         Called with a stage, how many effects are compared, and how many there are.
     """
     known = overview(table, labels)
-    effects, gathered, found = counted(table, known)
-    together, apart, parameters = shared(table, known, [e.effect for e in effects if e.parameters], progress)
+    effects, gathered, found = _counted(table, known)
+    together, apart, parameters = _shared(table, known, [e.effect for e in effects if e.parameters], progress)
     return Summary(
         campaigns=len(known.numbers),
         robots=len(known.robots.values),

@@ -138,9 +138,9 @@ def of_fits(
     """
     require_alike(fits)
     whole = problem(fits)
-    times = days_since(moments) if moments else np.arange(float(len(fits)))
+    times = _days_since(moments) if moments else np.arange(float(len(fits)))
     series = Series(whole.matrices, whole.vectors, times, np.ones(len(whole.keys), dtype=bool))
-    series = replace(series, followed=comparable(whole, series))
+    series = replace(series, followed=_comparable(whole, series))
     found = explanations(series)
     told = Told(whole, found, moments[0] if moments else None, limits or {}, false_alarm)
     nothing = sum(float(p) for m, p in zip(found.moves, found.probabilities, strict=True) if not m)
@@ -187,7 +187,7 @@ def _members(campaigns: Any, dates: Sequence[Any] | None) -> list[_Member]:
             "wear", "some campaigns have dates, others not", column="dates",
             found=f"{undated} of {len(pairs)} without one", expected="dates for all, or for none",
         )  # fmt: skip
-    members = [_Member(_opened(given), None if date is None else moment(date)) for date, given in pairs]
+    members = [_Member(_opened(given), None if date is None else _moment(date)) for date, given in pairs]
     return members if undated else sorted(members, key=lambda m: m.date or datetime.min)
 
 
@@ -265,19 +265,8 @@ DAY = 86400.0
 _A_DATE = "a date such as 2026-03-01, with an hour if need be, such as 2026-03-01T14:30"
 
 
-def moment(given: Any) -> datetime:
-    """Return a date as a moment: midnight where it has no hour, UTC where it has a time zone.
-
-    Parameters
-    ----------
-    given
-        ISO 8601 text, or a ``date`` or ``datetime``.
-
-    Raises
-    ------
-    CampaignError
-        If it is no date.
-    """
+def _moment(given: Any) -> datetime:
+    """Return a date as a moment: midnight where it has no hour, UTC where it has a time zone."""
     if isinstance(given, str):
         try:
             given = datetime.fromisoformat(given.strip())
@@ -290,13 +279,13 @@ def moment(given: Any) -> datetime:
     return given if given.tzinfo is None else given.astimezone(timezone.utc).replace(tzinfo=None)
 
 
-def days_since(moments: Sequence[datetime]) -> NDArray[np.float64]:
+def _days_since(moments: Sequence[datetime]) -> NDArray[np.float64]:
     """(K,) days of moments since the first of them."""
     first = min(moments)
     return np.array([(each - first).total_seconds() / DAY for each in moments])
 
 
-def in_words(first: datetime, day: float) -> str:
+def _in_words(first: datetime, day: float) -> str:
     """Return the date of so many days after the first, rounded to a day; an hour is more than is known."""
     try:
         return (first + timedelta(days=round(day, 6))).date().isoformat()
@@ -349,7 +338,7 @@ class Told:
         moves = self._beside(parameter, move)
         state = State.of(series, self.found.grid, moves)
         fitted, _ = state.over_time(parameter)
-        values, stds = State.free(series, self.found.grid, moves, parameter).over_time(parameter)
+        values, stds = State.of(series, self.found.grid, moves, free=parameter).over_time(parameter)
         change, change_std = self._change(state, move, fitted)
         few = int(self.problem.has[:, parameter].sum()) < 2
         seen = self.problem.has[:, parameter] & comparable
@@ -431,7 +420,8 @@ class Told:
             return Crossing(limit, "never")
         last = float(self.found.series.times[-1])
         day, low, high = last + reached[0], last + reached[1], None if reached[2] is None else last + reached[2]
-        dates = in_words(self.first, day), in_words(self.first, low), "" if high is None else in_words(self.first, high)
+        first = self.first
+        dates = _in_words(first, day), _in_words(first, low), "" if high is None else _in_words(first, high)
         return Crossing(limit, "expected", day, low, high, dates)
 
     def _alike(self, parameter: int) -> tuple[str, ...]:
@@ -445,7 +435,7 @@ class Told:
         return tuple(self.problem.keys[p][1] for p in others)
 
 
-def comparable(problem: Problem, series: Series) -> NDArray[np.bool_]:
+def _comparable(problem: Problem, series: Series) -> NDArray[np.bool_]:
     """(P,) which parameters campaigns can be compared in: a change of the expected size would be seen at all."""
     middle = np.arange(len(problem.keys)) * series.count + (series.count - 2) // 2
     known = np.maximum(np.diag(series.information)[middle], 0.0)

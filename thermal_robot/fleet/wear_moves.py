@@ -133,10 +133,11 @@ class Series:
             return list(range(first, first + self.count - 1))
         return [first + (move.after if move.kind == "jump" else self.count - 1)]
 
-    def shares(self, move: Move) -> Array:
-        """Return the prior variance of each of a move's columns, over the common one."""
-        gaps = np.diff(self.times) / self.span
-        return np.maximum(gaps, 1e-6) if move.kind == "walk" else np.ones(1)
+    def made_of(self, moves: Sequence[Move]) -> tuple[list[int], Array]:
+        """Return the columns of some moves, and the prior variance of each over the common one."""
+        walk = np.maximum(np.diff(self.times) / self.span, 1e-6)
+        shares = [walk if move.kind == "walk" else np.ones(1) for move in moves]
+        return [c for move in moves for c in self.spans(move)], np.concatenate([*shares, np.zeros(0)])
 
 
 @dataclass(frozen=True, eq=False)
@@ -197,8 +198,8 @@ class Beside:
     @classmethod
     def of(cls, series: Series, grid: Grid, moves: Sequence[Move]) -> Beside:
         """Solve for some moves."""
-        columns = np.array([c for move in moves for c in series.spans(move)], dtype=np.int64)
-        share = np.concatenate([*(series.shares(move) for move in moves), np.zeros(0)])
+        listed, share = series.made_of(moves)
+        columns = np.array(listed, dtype=np.int64)
         own, pull = series.information[np.ix_(columns, columns)], series.pull[columns]
         deviation = np.sqrt(grid.variance[:, None] * share)
         inside = own * deviation[:, :, None] * deviation[:, None, :] / grid.inflation[:, None, None]
@@ -316,33 +317,21 @@ class State:
     covariance: Array
 
     @classmethod
-    def of(cls, series: Series, grid: Grid, moves: Sequence[Move]) -> State:
-        """Solve for moves, at the most probable scale and scatter."""
+    def of(cls, series: Series, grid: Grid, moves: Sequence[Move], free: int | None = None) -> State:
+        """Solve for moves at the most probable scale and scatter, one parameter ``free`` as each campaign has it."""
         point = int(np.argmax(Beside.of(series, grid, moves).log_likelihood))
-        columns = [c for move in moves for c in series.spans(move)]
-        share = np.concatenate([*(series.shares(move) for move in moves), np.zeros(0)])
-        return cls._solved(series, columns, grid.variance[point] * share, float(grid.inflation[point]))
-
-    @classmethod
-    def free(cls, series: Series, grid: Grid, moves: Sequence[Move], parameter: int) -> State:
-        """Solve with one parameter as each campaign alone has it, beside the moves of the others."""
-        rest = [move for move in moves if move.parameter != parameter]
-        point = int(np.argmax(Beside.of(series, grid, moves).log_likelihood))
-        columns = [c for move in rest for c in series.spans(move)]
-        share = np.concatenate([*(series.shares(move) for move in rest), np.zeros(0)])
-        steps = series.spans(Move(parameter, "walk"))
+        inflation = float(grid.inflation[point])
+        columns, share = series.made_of([move for move in moves if move.parameter != free])
+        steps = [] if free is None else series.spans(Move(free, "walk"))
         variance = np.concatenate([grid.variance[point] * share, np.full(len(steps), settings.WIDE**2)])
-        return cls._solved(series, [*columns, *steps], variance, float(grid.inflation[point]))
-
-    @classmethod
-    def _solved(cls, series: Series, columns: list[int], variance: Array, inflation: float) -> State:
+        columns += steps
         own = series.information[np.ix_(columns, columns)] / inflation + np.diag(1.0 / variance)
-        moves = np.linalg.inv(own)
-        amounts = moves @ series.pull[columns] / inflation
+        inner = np.linalg.inv(own)
+        amounts = inner @ series.pull[columns] / inflation
         carried = series.constants @ series.crossed[columns].T
         mean = series.constants @ series.vectors.sum(axis=0) - carried @ amounts
-        across = -carried @ moves
-        whole = np.block([[inflation * series.constants - across @ carried.T, across], [across.T, moves]])
+        across = -carried @ inner
+        whole = np.block([[inflation * series.constants - across @ carried.T, across], [across.T, inner]])
         return cls(series, tuple(columns), np.concatenate([mean, amounts]), whole)
 
     def over_time(self, parameter: int) -> tuple[Array, Array]:
