@@ -7,8 +7,7 @@ import numpy as np
 import thermal_robot as tr
 from thermal_robot.effects import ThermalElongation, library
 from thermal_robot.effects.effect import Parameter
-from thermal_robot.fleet.compare_effects import Candidate
-from thermal_robot.fleet.compare_sums import Sums
+from thermal_robot.fleet.compare_sums import Candidate, Sums
 from thermal_robot.kinematics import exp6
 from thermal_robot.observations import observe
 

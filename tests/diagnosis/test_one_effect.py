@@ -17,7 +17,7 @@ from thermal_robot.errors import EffectError
 from thermal_robot.inference.fit import fit
 from thermal_robot.inference.frames import register
 from thermal_robot.observations import observe
-from thermal_robot.report.plots_explain import explain_figure
+from thermal_robot.report.plots import explain_figure
 
 MRAD = 1e3
 
@@ -233,7 +233,7 @@ def test_an_effect_without_a_material_place_gives_an_empty_figure():
 
 
 def test_the_report_does_not_load_the_diagnosis():
-    import thermal_robot.report.plots_explain as module
+    import thermal_robot.report.plots as module
 
     text = Path(module.__file__).read_text(encoding="utf-8")
     assert "import pyplot" not in text

@@ -11,8 +11,8 @@ import numpy as np
 from threadpoolctl import threadpool_info
 
 import thermal_robot as tr
+from thermal_robot.fleet.many import limited
 from thermal_robot.fleet.rows import write_rows
-from thermal_robot.fleet.workers import limited
 
 ROWS, NOISE = 40, 20e-6
 ONLY = ("backlash", "joint_offset")

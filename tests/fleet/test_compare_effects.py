@@ -3,7 +3,7 @@
 import numpy as np
 from compared import diagnosed, lagging_days
 
-from thermal_robot.fleet.compare_effects import candidates
+from thermal_robot.fleet.compare_sums import candidates
 
 
 def test_zeros_are_always_compared_and_come_first():

@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from compared import JOINTS, listed, said
 
-from thermal_robot.fleet.compare_joint import joint
-from thermal_robot.fleet.compare_problem import some_of
+from thermal_robot.fleet.compare_joint import joint, some_of
 from thermal_robot.inference.algebra import solve
 
 

@@ -7,7 +7,7 @@ import pytest
 from compared import NOISE, OFFSETS, campaign, diagnosed, moved
 
 import thermal_robot as tr
-from thermal_robot.fleet.compare_model import is_model, known, poses
+from thermal_robot.fleet.compare_sums import is_model, known, poses
 from thermal_robot.report import comparison_html, comparison_schema
 
 STEP = 4e-4  # rad: some eight deviations of the difference

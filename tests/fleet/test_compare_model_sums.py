@@ -7,10 +7,7 @@ import pytest
 from compared import NOISE, diagnosed
 
 import thermal_robot as tr
-from thermal_robot.fleet.compare_effects import _parameters, candidates
-from thermal_robot.fleet.compare_model import known
-from thermal_robot.fleet.compare_model_sums import sums_of_model
-from thermal_robot.fleet.compare_sums import sums
+from thermal_robot.fleet.compare_sums import _parameters, candidates, known, sums, sums_of_model
 
 
 def said(found, other):

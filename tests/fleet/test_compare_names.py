@@ -5,10 +5,9 @@ import pytest
 
 from thermal_robot.effects import library
 from thermal_robot.effects.effect import Parameter
-from thermal_robot.fleet.compare_effects import Candidate
+from thermal_robot.fleet.compare import _judged
 from thermal_robot.fleet.compare_joint import joint
-from thermal_robot.fleet.compare_names import judged
-from thermal_robot.fleet.compare_sums import Sums
+from thermal_robot.fleet.compare_sums import Candidate, Sums
 
 SURE = 1e4
 """Information of each campaign on each parameter: deviations of a hundredth of the expected size."""
@@ -22,7 +21,7 @@ def verdict(values, named=None, blind=()):
     item = Candidate("own", "own", library()["joint_offset"], told, np.ones(2), (told,) * len(values), named)
     said = [Sums(SURE * np.eye(2) * (k not in blind), SURE * row * (k not in blind)) for k, row in enumerate(values)]
     owners = [(0, 0), (0, 1)]
-    return judged(0, item, owners, joint([item], owners, said), said, ["a", "b", "c", "d"][: len(values)])
+    return _judged(0, item, owners, joint([item], owners, said), said, ["a", "b", "c", "d"][: len(values)])
 
 
 @pytest.mark.parametrize(

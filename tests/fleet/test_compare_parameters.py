@@ -5,7 +5,7 @@ import pytest
 from scipy.linalg import lstsq
 
 from thermal_robot.effects import Parameter
-from thermal_robot.fleet.compare_parameters import equal, parameters
+from thermal_robot.fleet.compare import _equal, _parameters
 from thermal_robot.fleet.compare_sums import Sums
 
 
@@ -45,7 +45,7 @@ def test_equal_is_what_is_lost_by_sharing(seed, blind):
     own = [0, 2]
     apart = sum(squares(x, y) for x, y in data)
     together, rank = shared(data, own)
-    chi2, degrees, p_value = equal(said, own)
+    chi2, degrees, p_value = _equal(said, own)
     assert chi2 == pytest.approx(together - apart, rel=1e-6)
     assert degrees == sum(np.linalg.matrix_rank(x) for x, _ in data) - rank
     assert 0.0 <= p_value <= 1.0
@@ -55,7 +55,7 @@ def test_values_are_least_squares_and_what_is_not_seen_is_no_number():
     data = rows(5, campaigns=2, blind=(1,))
     said = [Sums(x.T @ x, x.T @ y) for x, y in data]
     told = [Parameter(f"p{k}", "rad", 1e-3, "joint", "", ()) for k in range(5)]
-    found = parameters(told, np.full(5, 1e-3), said, range(5), ["a", "b"])
+    found = _parameters(told, np.full(5, 1e-3), said, range(5), ["a", "b"])
     first = lstsq(*data[0])[0] * 1e-3
     spread = np.sqrt(np.diag(np.linalg.inv(data[0][0].T @ data[0][0]))) * 1e-3
     np.testing.assert_allclose([p.values[0] for p in found], first, rtol=1e-8)
@@ -75,6 +75,6 @@ def test_equal_follows_the_law_of_chi_square():
     truth, drawn = rng.normal(size=5), []
     for _ in range(300):
         said = [Sums(x.T @ x, x.T @ (x @ truth + rng.normal(size=len(x)))) for x, _ in data]
-        drawn.append(equal(said, [1, 3])[2])
+        drawn.append(_equal(said, [1, 3])[2])
     # p values are even between 0 and 1: Kolmogorov's distance of 300 of them is below 0.094 in 99 % of cases
     assert np.abs(np.sort(drawn) - (np.arange(300) + 0.5) / 300).max() < 0.094

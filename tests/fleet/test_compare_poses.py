@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from compared import FRAMES, OFFSETS, diagnosed, moved
 
-from thermal_robot.fleet.compare_poses import predicted
+from thermal_robot.fleet.compare import _predicted
 from thermal_robot.observations import Frames
 
 
@@ -23,7 +23,7 @@ def test_another_place_of_base_and_target_is_no_difference(one):
     spread = replace(one.model.spread, beyond=np.full(3, one.model.spread.beyond.mean()))
     model = replace(one.model, spread=spread)
     other = replace(one, model=replace(model, frames=frames))
-    (found,) = predicted([replace(one, model=model), other], ["a", "b"])
+    (found,) = _predicted([replace(one, model=model), other], ["a", "b"])
     assert found.rms < 2e-8
     assert found.agrees
     assert found.beyond == 0.0
@@ -39,7 +39,7 @@ def test_a_changed_zero_shows_as_the_arm_would_move(one):
     changed = values.copy()
     changed[places.index(names[2])] += step
     other = replace(one, model=replace(one.model, effects=((effect, changed), *rest)))
-    (found,) = predicted([one, other], ["a", "b"])
+    (found,) = _predicted([one, other], ["a", "b"])
     assert not found.agrees
     assert found.beyond > 0.9
     robot, q = one.model.robot, one.rows.q
@@ -70,13 +70,13 @@ def test_a_joint_that_is_held_is_the_same_to_the_jitter_of_its_encoder(one):
         return replace(one, model=model, rows=replace(rows, q=q))
 
     for apart, common in ((0.0, True), (2e-6, True), (-2e-6, True), (0.1, False)):
-        (found,) = predicted([held(0.3, one.rows), held(0.3 + apart, one.rows)], ["a", "b"])
+        (found,) = _predicted([held(0.3, one.rows), held(0.3 + apart, one.rows)], ["a", "b"])
         assert bool(found.note) != common
 
 
 def test_every_pair_is_compared(one):
     days = [one, diagnosed(2, frame="there"), diagnosed(3, moved(4e-4))]
-    found = predicted(days, ["a", "b", "c"])
+    found = _predicted(days, ["a", "b", "c"])
     assert [p.campaigns for p in found] == [("a", "b"), ("a", "c"), ("b", "c")]
     assert found[1].rms > 2.0 * found[0].rms
     assert len(OFFSETS) == one.model.robot.n
@@ -84,6 +84,6 @@ def test_every_pair_is_compared(one):
 
 def test_without_deviations_nothing_is_said(one):
     bare = replace(one, model=replace(one.model, spread=None))
-    (found,) = predicted([one, bare], ["a", "b"])
+    (found,) = _predicted([one, bare], ["a", "b"])
     assert found.poses == 0
     assert "does not state" in found.note

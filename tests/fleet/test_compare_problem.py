@@ -5,8 +5,7 @@ import pytest
 from compared import JOINTS, listed, said
 
 from thermal_robot.fleet import compare_settings
-from thermal_robot.fleet.compare_joint import joint
-from thermal_robot.fleet.compare_problem import Problem, some_of
+from thermal_robot.fleet.compare_joint import Problem, joint, some_of
 from thermal_robot.inference.search import Search
 
 OWNERS = [(0, k) for k in range(4)]

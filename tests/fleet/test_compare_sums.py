@@ -7,8 +7,7 @@ from coupled import joint, link, urdf
 
 import thermal_robot as tr
 from thermal_robot.effects import named
-from thermal_robot.fleet.compare_effects import candidates
-from thermal_robot.fleet.compare_sums import Sums, sums, told
+from thermal_robot.fleet.compare_sums import Sums, candidates, sums, told
 from thermal_robot.observations import observe
 from thermal_robot.robot import load_robot
 

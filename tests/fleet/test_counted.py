@@ -3,8 +3,8 @@
 import numpy as np
 from fleet.robots import told_rows, write_told
 
-from thermal_robot.fleet.counted import counted
-from thermal_robot.fleet.table import overview
+from thermal_robot.fleet.rows import overview
+from thermal_robot.fleet.summary import _counted
 
 
 def table(path, chance, robots=60, halls=3, gathered=None):
@@ -24,7 +24,7 @@ def test_counts_places_and_the_largest_gaps(tmp_path, monkeypatch):
     monkeypatch.setattr("thermal_robot.fleet.settings.MOST_LISTED", 3)
     file = table(tmp_path, 1, gathered="hall 0")
     known = overview(file, ("hall",))
-    (count,), _, cases = counted(file, known)
+    (count,), _, cases = _counted(file, known)
     assert (count.effect, count.testable, count.parameters) == ("backlash", 60, True)
     assert count.found == sum(count.places.values())
     assert [c.rms_before for c in cases] == sorted((c.rms_before for c in cases), reverse=True)
@@ -33,14 +33,14 @@ def test_counts_places_and_the_largest_gaps(tmp_path, monkeypatch):
 
 def test_what_gathers_in_a_hall_is_told_and_what_does_not_is_not(tmp_path):
     file = table(tmp_path, 1, gathered="hall 2")
-    (found,) = counted(file, overview(file, ("hall",)))[1]
+    (found,) = _counted(file, overview(file, ("hall",)))[1]
     assert (found.label, found.group, found.robots, found.robots_elsewhere) == ("hall", "hall 2", 20, 40)
     assert found.found > 12
     assert found.p_value < 1e-4
     false = 0
     for chance in range(60):
         file = table(tmp_path, [2, chance])
-        false += bool(counted(file, overview(file, ("hall",)))[1])
+        false += bool(_counted(file, overview(file, ("hall",)))[1])
     assert false <= 3
 
 
@@ -49,7 +49,7 @@ def test_several_campaigns_of_a_robot_count_once_and_laws_by_what_they_follow(tm
     for row in (row for some in rows for row in some):
         row["quantity"] = "time"
     file = write_told(tmp_path / "t.parquet", rows, ("robot",))
-    (count,), gathered, cases = counted(file, overview(file, ("robot",)))
+    (count,), gathered, cases = _counted(file, overview(file, ("robot",)))
     assert (count.effect, count.found, count.testable, count.places) == ("a law of time", 1, 1, {"joint_3": 1})
     assert not count.parameters
     assert gathered == ()
@@ -68,7 +68,7 @@ def test_every_robot_with_a_gap_is_listed_what_is_in_doubt_or_unexplained_too(tm
     for row in rows["strange"]:
         row["unexplained"] = True
     file = write_told(tmp_path / "t.parquet", rows.values(), ())
-    counts, _, cases = counted(file, overview(file, ()))
+    counts, _, cases = _counted(file, overview(file, ()))
     told = [(case.robot, case.effect, case.confounded_with) for case in cases]
     assert told[:2] == [("doubtful", "backlash", ("drift",)), ("strange", "", ())]
     assert {case[0] for case in told[2:]} == {"sure"}

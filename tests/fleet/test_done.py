@@ -10,16 +10,16 @@ import pytest
 from fleet.robots import write_robot
 
 from thermal_robot.errors import CampaignError
-from thermal_robot.fleet.done import fingerprint, opened
+from thermal_robot.fleet.many import _fingerprint, _opened
 
 ROWS = [{"outcome": "diagnosed", "rms_before": 0.1 + 0.2, "summary": "µm – \ud800"}, {"effect": "drift"}]
 
 
 def test_what_was_put_is_there_in_the_next_run_in_the_order_of_its_list(tmp_path):
-    with opened(tmp_path / "done") as done:
+    with _opened(tmp_path / "done") as done:
         done.put("a", ROWS)
         done.put("b", [{"effect": "backlash"}])
-    with opened(tmp_path / "done") as done:
+    with _opened(tmp_path / "done") as done:
         assert "a" in done
         assert "c" not in done
         for number, key in enumerate("bab"):
@@ -28,23 +28,23 @@ def test_what_was_put_is_there_in_the_next_run_in_the_order_of_its_list(tmp_path
 
 
 def test_what_may_be_otherwise_next_time_is_forgotten(tmp_path):
-    with opened(tmp_path / "done") as done:
+    with _opened(tmp_path / "done") as done:
         done.put("a", ROWS, again=True)
         done.name(0, "a")
         assert list(done.in_order()) == [(0, ROWS)]
-    with opened(tmp_path / "done") as done:
+    with _opened(tmp_path / "done") as done:
         assert "a" not in done
         assert list(done.in_order()) == []
 
 
 def test_two_runs_in_one_folder_are_one_too_many(tmp_path):
-    with opened(tmp_path / "done"), pytest.raises(CampaignError, match="no other run"), opened(tmp_path / "done"):
+    with _opened(tmp_path / "done"), pytest.raises(CampaignError, match="no other run"), _opened(tmp_path / "done"):
         pass
 
 
 def test_a_file_of_another_kind_is_left_alone(tmp_path):
     (tmp_path / "done").write_text("a diary, which is longer than the header of a database would be" * 20)
-    with pytest.raises(CampaignError, match="is not what a fleet has written"), opened(tmp_path / "done"):
+    with pytest.raises(CampaignError, match="is not what a fleet has written"), _opened(tmp_path / "done"):
         pass
     assert (tmp_path / "done").read_text().startswith("a diary")
 
@@ -52,9 +52,10 @@ def test_a_file_of_another_kind_is_left_alone(tmp_path):
 KILLED = """
 import os, signal, sys, time
 from pathlib import Path
-from thermal_robot.fleet import done, settings
+from thermal_robot.fleet import many as done
+from thermal_robot.fleet import settings
 settings.WRITTEN_EVERY = 0.0
-with done.opened(Path(sys.argv[1])) as known:
+with done._opened(Path(sys.argv[1])) as known:
     for k in range(5):
         known.put(str(k), [{"effect": str(k)}])
     os.kill(os.getpid(), signal.SIGKILL)
@@ -66,30 +67,30 @@ def test_a_process_that_is_killed_leaves_what_it_had_put(tmp_path):
     run = [sys.executable, "-c", KILLED, str(tmp_path / "done")]
     ended = subprocess.run(run, env={**os.environ, "PYTHONPATH": str(root)}, check=False)
     assert ended.returncode == -signal.SIGKILL
-    with opened(tmp_path / "done") as done:
+    with _opened(tmp_path / "done") as done:
         assert all(str(k) in done for k in range(5))
 
 
 def test_a_fingerprint_follows_content_and_options_and_nothing_else(rv_m2, tmp_path):
     folder = write_robot(rv_m2, tmp_path / "a")
-    known = fingerprint(str(folder), [["drift"], []])
-    assert fingerprint(str(folder / "campaign.toml"), [["drift"], []]) == known
-    assert fingerprint(str(folder), [[], ["drift"]]) != known
+    known = _fingerprint(str(folder), [["drift"], []])
+    assert _fingerprint(str(folder / "campaign.toml"), [["drift"], []]) == known
+    assert _fingerprint(str(folder), [[], ["drift"]]) != known
     moved = tmp_path / "elsewhere"
     moved.mkdir()
     folder.rename(moved / "a")
     os.utime(moved / "a" / "measurements.csv", (1e9, 1e9))
-    assert fingerprint(str(moved / "a"), [["drift"], []]) == known
+    assert _fingerprint(str(moved / "a"), [["drift"], []]) == known
     for file in ("campaign.toml", "measurements.csv", "robot.urdf"):
         before = (moved / "a" / file).read_bytes()
         (moved / "a" / file).write_bytes(before + b"\n")
-        assert fingerprint(str(moved / "a"), [["drift"], []]) != known, file
+        assert _fingerprint(str(moved / "a"), [["drift"], []]) != known, file
         (moved / "a" / file).write_bytes(before)
-    assert fingerprint(str(moved / "a"), [["drift"], []]) == known
+    assert _fingerprint(str(moved / "a"), [["drift"], []]) == known
 
 
 def test_another_version_of_the_program_may_say_something_else(rv_m2, tmp_path, monkeypatch):
     folder = str(write_robot(rv_m2, tmp_path / "a"))
-    known = fingerprint(folder, [])
+    known = _fingerprint(folder, [])
     monkeypatch.setattr("thermal_robot.__version__", "99.0")
-    assert fingerprint(folder, []) != known
+    assert _fingerprint(folder, []) != known

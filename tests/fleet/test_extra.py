@@ -5,7 +5,7 @@ import sys
 import pytest
 
 from thermal_robot.errors import ThermalRobotError
-from thermal_robot.fleet.extra import needed
+from thermal_robot.fleet.rows import needed
 
 
 def test_a_module_that_is_missing_says_how_to_get_it(monkeypatch):

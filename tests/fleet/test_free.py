@@ -6,7 +6,7 @@ from fleet.robots import ONLY
 
 import thermal_robot as tr
 from thermal_robot.fleet import settings
-from thermal_robot.fleet.free import free
+from thermal_robot.fleet.rows import _free
 
 
 def diagnosed(robot, effects, seed, **options):
@@ -38,7 +38,7 @@ def test_it_is_least_squares_beside_what_was_found(rv_m2, effects):
     answer = size * (inverse @ np.append(gap, np.zeros(len(prior))))
     spread = size * np.sqrt((inverse**2).sum(axis=1))
     names = [p.name for p in blocks[0].parameters]
-    found = free(fit)[name]
+    found = _free(fit)[name]
     assert found
     for parameter in found:
         k = flat + names.index(parameter.name)
@@ -52,7 +52,7 @@ def test_it_scatters_about_the_truth_by_its_deviation(rv_m2, size):
     for seed in range(24):
         diagnosis = diagnosed(rv_m2, {"backlash": {"joint_2": size}}, seed)
         found.append("backlash" in diagnosis.verdict)
-        for parameter in free(diagnosis.fit, ["backlash"])["backlash"]:
+        for parameter in _free(diagnosis.fit, ["backlash"])["backlash"]:
             true = size if parameter.name == "lost motion, joint_2" else 0.0
             off.append((parameter.value - true) / parameter.std)
     assert any(found) == (size > 0.0)
@@ -64,7 +64,7 @@ def test_it_scatters_about_the_truth_by_its_deviation(rv_m2, size):
 
 def test_what_the_data_do_not_see_has_no_value(rv_m2):
     """The zero of joint 1 is the direction of the base."""
-    found = free(diagnosed(rv_m2, {}, 0).fit)["joint_offset"]
+    found = _free(diagnosed(rv_m2, {}, 0).fit)["joint_offset"]
     assert found
     assert "zero offset, joint_1" not in [parameter.name for parameter in found]
 
@@ -73,7 +73,7 @@ def test_an_effect_that_was_found_in_one_joint_is_told_in_all(rv_m2):
     """Else no robot could stand out by a fault of its own of the kind that all have."""
     found = diagnosed(rv_m2, {"backlash": {"joint_2": 6e-4}}, 4)
     assert {place.name for place in found.finding("backlash").locations if place.share > 0.0} == {"joint_2"}
-    told = {p.name: p for p in free(found.fit)["backlash"]}
+    told = {p.name: p for p in _free(found.fit)["backlash"]}
     others = [p for name, p in told.items() if "joint_2" not in name]
     assert len(others) >= 3
     assert abs(told["lost motion, joint_2"].value - 6e-4) < 4.0 * told["lost motion, joint_2"].std

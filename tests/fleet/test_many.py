@@ -80,7 +80,7 @@ def test_what_is_done_is_not_done_again(fleet, fleet_folder, tmp_path, monkeypat
     def nobody(*_):
         raise AssertionError("somebody works")
 
-    monkeypatch.setattr(many.processes, "client", nobody)
+    monkeypatch.setattr(many, "_client", nobody)
     seen = []
     again = tr.diagnose_many(
         fleet_folder, fleet.table.parent, labels=["hall", "robot"], only=ONLY, progress=lambda *s: seen.append(s)

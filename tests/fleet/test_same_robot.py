@@ -5,7 +5,7 @@ import re
 import pytest
 
 import thermal_robot as tr
-from thermal_robot.fleet.same_robot import require_same_robot
+from thermal_robot.fleet.compare import _require_same_robot
 
 
 @pytest.fixture(scope="module")
@@ -14,13 +14,13 @@ def arm():
 
 
 def test_one_robot_is_the_same_wherever_it_was_loaded(arm):
-    require_same_robot([arm, tr.load_robot(arm.urdf, "tool0")], ["a", "b"])
+    _require_same_robot([arm, tr.load_robot(arm.urdf, "tool0")], ["a", "b"])
 
 
 def test_other_joints_are_told_by_name(arm):
     other = tr.load_robot("example-robot-data:ur5", "tool0")
     with pytest.raises(tr.CampaignError, match=r"b: is of another robot than a.*shoulder_pan_joint.*joint_1"):
-        require_same_robot([arm, other], ["a", "b"])
+        _require_same_robot([arm, other], ["a", "b"])
 
 
 def test_other_lengths_are_told_in_millimetres(arm):
@@ -31,4 +31,4 @@ def test_other_lengths_are_told_in_millimetres(arm):
         other = tr.load_robot(arm.urdf.replace(own, moved), "tool0")
         assert number == 0
     with pytest.raises(tr.CampaignError, match=r"another nominal model than a.*up to (1|0\.99\d*) mm away"):
-        require_same_robot([arm, other], ["a", "b"])
+        _require_same_robot([arm, other], ["a", "b"])

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from fleet.robots import deviations, scattered, told_rows, write_told
 
-from thermal_robot.fleet.shared import shared
-from thermal_robot.fleet.table import overview
+from thermal_robot.fleet.rows import overview
+from thermal_robot.fleet.summary import _shared
 
 NAMES = [f"joint_{k}" for k in range(6)]
 
@@ -27,7 +27,7 @@ def fleet(path, seed, change=lambda values, halls: None, robots=40, campaigns=1)
 
 
 def compared(file):
-    return shared(file, overview(file, ("hall", "robot")), ["offset"])
+    return _shared(file, overview(file, ("hall", "robot")), ["offset"])
 
 
 def test_a_fault_of_all_is_found_with_its_mean_and_spread(tmp_path):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from fleet.robots import told_rows, write_told
 
-from thermal_robot.fleet.table import findings, overview, told
+from thermal_robot.fleet.rows import findings, overview, told
 
 
 @pytest.fixture(scope="module")

@@ -3,13 +3,13 @@
 import pytest
 
 from thermal_robot.errors import CampaignError
-from thermal_robot.fleet.toml_list import read_toml
+from thermal_robot.fleet.listed import _read_toml
 
 
 def test_a_label_that_a_campaign_does_not_have_is_empty(tmp_path):
     file = tmp_path / "list.toml"
     file.write_text('[[campaigns]]\ncampaign = "a"\n[[campaigns]]\ncampaign = "b"\nhall = "2"\n')
-    assert read_toml(file) == ({"campaign": ["a", "b"], "hall": ["", "2"]}, [1, 2])
+    assert _read_toml(file) == ({"campaign": ["a", "b"], "hall": ["", "2"]}, [1, 2])
 
 
 @pytest.mark.parametrize(
@@ -26,4 +26,4 @@ def test_what_is_no_list_says_what_is_expected(tmp_path, text, said):
     file = tmp_path / "list.toml"
     file.write_text(text)
     with pytest.raises(CampaignError, match=said):
-        read_toml(file)
+        _read_toml(file)

@@ -5,8 +5,7 @@ import pytest
 from scipy.stats import binom
 from wear_cases import columns, jumping, measured, series_of
 
-from thermal_robot.fleet.wear_chance import chances, scatter
-from thermal_robot.fleet.wear_moves import Grid, Move
+from thermal_robot.fleet.wear_moves import Grid, Move, chances, scatter
 
 
 def without_change(seed, campaigns=10, parameters=4, noise=1.0):

@@ -6,8 +6,7 @@ import numpy as np
 import pytest
 from wear_cases import columns, jumping, measured, series_of
 
-from thermal_robot.fleet.wear_moves import Move
-from thermal_robot.fleet.wear_search import explanations
+from thermal_robot.fleet.wear_moves import Move, explanations
 
 
 def of_states(states, times, seed):

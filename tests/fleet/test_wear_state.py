@@ -4,8 +4,7 @@ import numpy as np
 import pytest
 from wear_cases import columns, jumping, measured, series_of
 
-from thermal_robot.fleet.wear_moves import Grid, Move
-from thermal_robot.fleet.wear_state import State, fieller
+from thermal_robot.fleet.wear_moves import Grid, Move, State, fieller
 
 
 def test_values_of_each_campaign_are_those_of_least_squares_with_all_else_constant():
@@ -15,7 +14,7 @@ def test_values_of_each_campaign_are_those_of_least_squares_with_all_else_consta
     values = measured(design, states, rng)
     series = series_of(design, values, np.arange(5.0))
     grid = Grid(np.array([1.0]), np.array([1.0]), np.zeros(1))
-    found, std = State.free(series, grid, (), 1).over_time(1)
+    found, std = State.of(series, grid, (), free=1).over_time(1)
     rows = design.shape[1]
     whole = np.zeros((5 * rows, 2 + 5))
     whole[:, :2] = design[:, :, [0, 2]].reshape(-1, 2)

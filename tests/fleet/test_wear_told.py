@@ -7,9 +7,9 @@ import pytest
 from wear_cases import columns, jumping, measured, series_of
 
 from thermal_robot.effects import Parameter
+from thermal_robot.fleet.wear import Told, _comparable
+from thermal_robot.fleet.wear_moves import explanations
 from thermal_robot.fleet.wear_problem import Problem
-from thermal_robot.fleet.wear_search import explanations
-from thermal_robot.fleet.wear_told import Told, comparable
 
 SIZE = 1e-3
 FIRST = datetime(2026, 1, 1)
@@ -88,4 +88,4 @@ def test_what_is_hidden_or_rarely_seen_is_not_compared():
     has[1:, 2] = False
     design[1:, :, 2] = 0.0
     series = series_of(design, measured(design, np.zeros((6, 3)), rng), np.arange(6.0))
-    assert comparable(problem_of(series, has), series).tolist() == [False, True, False]
+    assert _comparable(problem_of(series, has), series).tolist() == [False, True, False]

@@ -6,7 +6,7 @@ import pytest
 from golden.record import REAL, campaign, diagnosed, differences, golden, names
 from golden.unchanged import TOLERANCE, unchanged
 
-from thermal_robot.report.sentence import MOST_WORDS
+from thermal_robot.report.words import MOST_WORDS
 
 QUICK = ("demo", "open_cases/case_000", "open_cases/case_007", "open_cases/case_016")
 measured = pytest.mark.skipif(

@@ -6,7 +6,7 @@ import pytest
 from golden.record import diagnosed
 from golden.unchanged import shrinks, unchanged
 
-from thermal_robot.report.sentence import MOST_WORDS
+from thermal_robot.report.words import MOST_WORDS
 
 pytestmark = [
     pytest.mark.slow,

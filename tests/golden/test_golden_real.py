@@ -8,7 +8,7 @@ from golden.record import REAL, campaign, diagnosed
 from golden.unchanged import shrinks, unchanged
 
 from thermal_robot import CorrectedModel
-from thermal_robot.report.sentence import MOST_WORDS
+from thermal_robot.report.words import MOST_WORDS
 
 POSITIONS = [name for name in REAL if name != "ipa_ur10_d"]
 pytestmark = [

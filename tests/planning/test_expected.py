@@ -9,7 +9,7 @@ from thermal_robot.effects.apply import displacement
 from thermal_robot.kinematics import exp3
 from thermal_robot.observations import Frames
 from thermal_robot.planning import plan
-from thermal_robot.planning.expected import FRAMES
+from thermal_robot.planning.plan import FRAMES
 
 TARGET = (0.05, 0.03, 0.1)
 NOISE = 20e-6

@@ -8,7 +8,7 @@ import pytest
 from thermal_robot import CampaignError, EffectError, load_robot, observe
 from thermal_robot.effects import library
 from thermal_robot.planning import plan
-from thermal_robot.planning.expected import Columns, expectations
+from thermal_robot.planning.plan import Columns, expectations
 from thermal_robot.robot import joint_range
 from thermal_robot.simulation.schedule import approaches
 

@@ -2,7 +2,7 @@
 
 import pytest
 
-from thermal_robot.report import comparison_words as words
+from thermal_robot.report import text_campaigns as words
 
 
 def change(**more):
@@ -19,19 +19,20 @@ def comparison(changes=(), statuses=("shared",), lost=None):
 
 
 def test_nothing_changed_is_said():
-    assert words.headline(comparison()) == "Nothing changed between april and may. They share what is shared."
+    said = words.comparison_headline(comparison())
+    assert said == "Nothing changed between april and may. They share what is shared."
 
 
 def test_a_change_and_a_lost_name_are_said():
-    said = words.headline(comparison([change()], ("shared", "contradicts")))
+    said = words.comparison_headline(comparison([change()], ("shared", "contradicts")))
     assert said.startswith("Joint zero offsets at elbow changed since may.")
     assert said.endswith("What is contradicts loses its name.")
-    both = words.headline(comparison([], ("contradicts", "not_needed")))
+    both = words.comparison_headline(comparison([], ("contradicts", "not_needed")))
     assert both == "What is contradicts and what is not_needed lose their name."
 
 
 def test_what_no_diagnosis_named_has_no_name_to_lose():
-    said = words.headline(comparison([change(effect="contradicts")], ("contradicts",), lost=[]))
+    said = words.comparison_headline(comparison([change(effect="contradicts")], ("contradicts",), lost=[]))
     assert said == "What differs between april and may has no name."
     row = {"name": "own", "status": "contradicts", "reason": "april alone needs it", "degrees": 0, "p_value": 1.0}
     for named, status in ((["april"], "loses its name"), ([], "not at work")):

@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 
 from thermal_robot.diagnosis.parts import Finding, FoldScheme, Misfit
-from thermal_robot.report.details import details
+from thermal_robot.report.words import details
 
 
 def test_a_plain_diagnosis_needs_no_details(case):

@@ -2,22 +2,22 @@
 
 from report.fleets import EMPTY, SUMMARY
 
-from thermal_robot.report.fleet_words import (
+from thermal_robot.report.text_campaigns import (
     SECTIONS,
     apart,
     cases,
     differs,
     failures,
+    fleet_headline,
     found,
     gathered,
-    headline,
     shared,
 )
 
 
 def test_the_headline_counts():
-    assert headline(SUMMARY) == "30 campaigns of 29 robots: 28 diagnosed, 1 failed, 1 unusable."
-    assert headline({**SUMMARY, "campaigns": 1, "robots": 1}).startswith("1 campaign of 1 robot:")
+    assert fleet_headline(SUMMARY) == "30 campaigns of 29 robots: 28 diagnosed, 1 failed, 1 unusable."
+    assert fleet_headline({**SUMMARY, "campaigns": 1, "robots": 1}).startswith("1 campaign of 1 robot:")
 
 
 def test_what_was_never_found_is_left_out():

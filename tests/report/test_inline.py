@@ -6,7 +6,7 @@ from xml.etree import ElementTree
 import pytest
 
 from thermal_robot.report.drawing import BEFORE, INK, Drawing
-from thermal_robot.report.inline import svg
+from thermal_robot.report.html_parts import _svg
 
 
 def figure(bend=1.0, width=4.0):
@@ -19,7 +19,7 @@ def figure(bend=1.0, width=4.0):
 
 @pytest.fixture(scope="module")
 def text():
-    return svg(figure(), 'a bend & "more" <b>')
+    return _svg(figure(), 'a bend & "more" <b>')
 
 
 def identifiers(text):
@@ -34,11 +34,11 @@ def test_it_is_one_element_that_is_closed(text):
 
 
 def test_equal_figures_give_equal_text(text):
-    assert svg(figure(), 'a bend & "more" <b>') == text
+    assert _svg(figure(), 'a bend & "more" <b>') == text
 
 
 def test_identifiers_of_two_figures_on_a_page_do_not_clash(text):
-    other = svg(figure(bend=2.0), "another bend")
+    other = _svg(figure(bend=2.0), "another bend")
     assert identifiers(text)
     assert not identifiers(text) & identifiers(other)
 
@@ -62,5 +62,5 @@ def test_colours_are_the_pages_with_their_own_as_a_reserve(text):
 
 
 def test_a_broader_figure_is_shown_broader():
-    widths = [int(re.search(r"max-width:(\d+)px", svg(figure(width=w), ""))[1]) for w in (4.0, 8.0)]
+    widths = [int(re.search(r"max-width:(\d+)px", _svg(figure(width=w), ""))[1]) for w in (4.0, 8.0)]
     assert widths[1] == 2 * widths[0]

@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 
 from thermal_robot.diagnosis.parts import AnotherModel, DataFault, Misfit, Wanted
-from thermal_robot.report.next_step import advice
 from thermal_robot.report.plain_text import text
+from thermal_robot.report.words import advice
 
 
 def said(diagnosis, *wanted, **known):

@@ -72,7 +72,7 @@ def write(request):
 @pytest.fixture
 def no_drawing(monkeypatch):
     """Leave the figures out, where a test is about the words."""
-    monkeypatch.setattr(html_parts, "svg", lambda drawn, label: "<svg></svg>")
+    monkeypatch.setattr(html_parts, "_svg", lambda drawn, label: "<svg></svg>")
 
 
 def ugly(base):

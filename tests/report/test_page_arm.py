@@ -9,7 +9,7 @@ import pytest
 
 import thermal_robot as tr
 from thermal_robot.report import html
-from thermal_robot.report.page_arm import arm_figure, as_data, script
+from thermal_robot.report.page import arm_figure, as_data, script
 
 
 @pytest.fixture(scope="module")

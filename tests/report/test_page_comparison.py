@@ -7,7 +7,7 @@ from compared import diagnosed, moved
 
 import thermal_robot as tr
 from thermal_robot.report import comparison_fragment, comparison_html
-from thermal_robot.report.page_comparison import plot_differences
+from thermal_robot.report.page_campaigns import plot_differences
 
 
 @pytest.fixture(scope="module")

@@ -5,7 +5,7 @@ from dataclasses import replace
 from html import unescape
 
 from thermal_robot.report import html, html_parts
-from thermal_robot.report.page_criteria import criteria_section
+from thermal_robot.report.page import criteria_section
 
 
 def tables(page):
@@ -32,7 +32,7 @@ def test_the_tables_are_those_that_are_printed(case):
 
 
 def test_the_section_has_a_heading_and_stands_with_repeats_alone(case, monkeypatch):
-    monkeypatch.setattr(html_parts, "svg", lambda drawn, label: "<svg></svg>")
+    monkeypatch.setattr(html_parts, "_svg", lambda drawn, label: "<svg></svg>")
     assert "<h2>ISO 9283</h2>" in html(case("repeated"))
     assert "ISO 9283" not in html(case("found"))
     assert list(criteria_section(case("found"))) == []

@@ -6,7 +6,7 @@ from report.fleets import EMPTY, SUMMARY
 from report.looking import outside, overlapping, texts
 
 from thermal_robot.report import fleet_html
-from thermal_robot.report.page_fleet import plot_fleet
+from thermal_robot.report.page_campaigns import plot_fleet
 
 
 def test_it_holds_every_line_and_escapes_names():

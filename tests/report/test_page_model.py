@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import thermal_robot as tr
-from thermal_robot.report.page_model import correlations_table, frames_table, model_section
+from thermal_robot.report.page import correlations_table, frames_table, model_section
 
 
 @pytest.fixture(scope="module")

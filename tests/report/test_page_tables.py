@@ -7,7 +7,7 @@ from html import unescape
 import numpy as np
 import pytest
 
-from thermal_robot.report.page_tables import effects_table, extremes_table, numbers, outliers_table
+from thermal_robot.report.page import effects_table, extremes_table, numbers, outliers_table
 
 
 def cells(table):

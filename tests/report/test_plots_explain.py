@@ -9,7 +9,8 @@ import pytest
 from report.looking import line, outside, overlapping, texts
 
 from thermal_robot.diagnosis.explained import Explained, Place
-from thermal_robot.report import explain_figure, plots_explain
+from thermal_robot.report import explain_figure
+from thermal_robot.report import plots as plots_explain
 from thermal_robot.report.drawing import BEFORE
 
 SLOPE = 8e-6  # m/K

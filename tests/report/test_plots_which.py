@@ -8,7 +8,7 @@ from report.looking import lines_of, tick_labels, written
 
 from thermal_robot.report import plot_which
 from thermal_robot.report.drawing import Drawing
-from thermal_robot.report.plots_which import draw_which
+from thermal_robot.report.plots import draw_which
 
 
 def test_which_draws_share_interval_and_probability(case):

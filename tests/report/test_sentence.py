@@ -18,9 +18,7 @@ from thermal_robot.diagnosis.parts import (
     Unexplained,
 )
 from thermal_robot.effects import library
-from thermal_robot.report.details import details
-from thermal_robot.report.next_step import advice
-from thermal_robot.report.sentence import MOST_WORDS, headline, length, listed
+from thermal_robot.report.words import MOST_WORDS, advice, details, headline, length, listed
 
 
 def said(diagnosis, **held):

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from thermal_robot.viewer import panel
+from thermal_robot.viewer import window as panel
 
 
 def test_a_row_is_told_with_its_gap_and_what_is_left(found, scene):
@@ -28,13 +28,13 @@ def test_places_stand_largest_first_with_their_shares(scene):
     at = [told.index(name) for (_, name), share in scene.shares.items() if share >= 0.005]
     assert at == sorted(at)
     assert f"{100 * max(scene.shares.values()):.1f} %" in told
-    assert set(panel.names(scene)) == {place for place, share in scene.shares.items() if share >= 0.005}
+    assert set(panel.names_of_places(scene)) == {place for place, share in scene.shares.items() if share >= 0.005}
 
 
 def test_what_was_not_diagnosed_is_not_told(scene):
     bare = replace(scene, remainder=None, shares={}, aside=np.zeros_like(scene.aside))
     assert panel.of_places(bare) == ""
-    assert panel.names(bare) == {}
+    assert panel.names_of_places(bare) == {}
     assert "after correction" not in panel.of_row(bare, 0, 1.0) + panel.of_arrows(bare)
     assert "set aside" not in panel.of_arrows(bare)
 

@@ -8,9 +8,9 @@ import pytest
 from scene_nodes import Nodes
 
 from thermal_robot.kinematics import quaternion_to_rotation
-from thermal_robot.viewer import panel
+from thermal_robot.viewer import window as panel
 from thermal_robot.viewer.settings import NO_SHARE, colours
-from thermal_robot.viewer.solids import Puppet, solids
+from thermal_robot.viewer.window import Puppet, solids
 
 
 @pytest.fixture
@@ -47,7 +47,7 @@ def test_places_have_the_colours_of_their_shares(puppet, nodes, scene):
 
 def test_names_are_at_their_places_and_can_be_hidden(puppet, nodes, scene):
     labels = {name: node for name, node in nodes.added.items() if hasattr(node, "text")}
-    assert sorted(label.text for label in labels.values()) == sorted(panel.names(scene).values())
+    assert sorted(label.text for label in labels.values()) == sorted(panel.names_of_places(scene).values())
     joint = next(name for kind, name in scene.shares if kind == "joint")
     assert labels[f"/joints/{scene.robot.joint_names.index(joint)}/name_joint"].text.startswith(joint)
     for shown in (False, True):

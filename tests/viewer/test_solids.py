@@ -10,7 +10,7 @@ from conftest import load_arm
 
 from thermal_robot.errors import Note, RobotError
 from thermal_robot.kinematics import link_poses
-from thermal_robot.viewer.solids import ring, rod, solids
+from thermal_robot.viewer.window import ring, rod, solids
 
 SHAPES = """<robot name="shapes">
   <link name="box"><visual><origin xyz="1 0 0" rpy="0 0 1.5707963267948966"/>
@@ -28,8 +28,8 @@ SHAPES = """<robot name="shapes">
 
 
 def bounds(solid):
-    assert solid.faces.max() < len(solid.vertices)
-    return np.array([solid.vertices.min(axis=0), solid.vertices.max(axis=0)])
+    assert solid.faces.max() < len(solid.corners)
+    return np.array([solid.corners.min(axis=0), solid.corners.max(axis=0)])
 
 
 @pytest.fixture
@@ -58,7 +58,7 @@ def test_a_robot_without_shapes_is_sticks_that_meet(configurations):
     assert set(found) == set(robot.urdf_links)
     for poses in link_poses(robot, configurations(robot, 4)):
         placed = dict(zip(robot.urdf_links, poses, strict=True))
-        clouds = {k: s.vertices @ placed[k][:3, :3].T + placed[k][:3, 3] for k, s in found.items()}
+        clouds = {k: s.corners @ placed[k][:3, :3].T + placed[k][:3, 3] for k, s in found.items()}
         for k, parent in enumerate(robot.chain.parent_links):
             joint = placed[parent][:3, :3] @ robot.chain.translations[k] + placed[parent][:3, 3]
             # the rod of the parent ends there, as thick as it is

@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from thermal_robot.viewer.solids import solids
+from thermal_robot.viewer.window import solids
 
 pytest.importorskip("viser", reason="the viewer needs viser, which is in the extra viewer")
 

@@ -37,7 +37,7 @@ def run(options: argparse.Namespace) -> None:
     """Compare campaigns, print the result and write what is asked for."""
     from thermal_robot.campaign.document import read_declaration
     from thermal_robot.fleet.compare import compare
-    from thermal_robot.fleet.compare_model import is_model
+    from thermal_robot.fleet.compare_sums import is_model
     from thermal_robot.report import comparison_html
 
     files: list[Path] = []

@@ -44,8 +44,7 @@ def run(options: argparse.Namespace) -> None:
         import viser  # noqa: F401
     except ImportError as error:
         raise CampaignError("view", "the viewer needs viser, which is not installed", expected=WITH_VIEWER) from error
-    from thermal_robot.viewer.solids import solids
-    from thermal_robot.viewer.window import Window
+    from thermal_robot.viewer.window import Window, solids
 
     scene = _scene(options)
     robot = scene.robot

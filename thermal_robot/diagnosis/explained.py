@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike, NDArray
 from thermal_robot.arrays import Array
 from thermal_robot.effects.effect import in_words
 from thermal_robot.kinematics import link_poses
-from thermal_robot.shapes.visuals import Hull, hulls
+from thermal_robot.shapes.visuals import Solid, hulls
 
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.parts import Where
@@ -73,7 +73,7 @@ class Arm:
     joints: tuple[str, ...]
     joint_shares: Array
     moves: NDArray[np.int64]
-    hulls: tuple[Hull, ...]
+    hulls: tuple[Solid, ...]
     base_share: float = 0.0
     tool_share: float = 0.0
     instrument_share: float = 0.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import asdict, dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal, Protocol
+from typing import TYPE_CHECKING, Any, Literal
 
 from thermal_robot.diagnosis.parts import jsonable
 from thermal_robot.files import write_text
@@ -15,28 +15,10 @@ if TYPE_CHECKING:
     import pandas as pd
 
     from thermal_robot.diagnosis.result import Diagnosis
-    from thermal_robot.fleet.compare_model import Known
+    from thermal_robot.fleet.compare_sums import Known
 
 SCHEMA = "thermal-robot/comparison/1"
 Status = Literal["shared", "changed", "contradicts", "not_needed", "not_compared", "absent"]
-
-
-class Teller(Protocol):
-    """Who puts a comparison into words and draws it, from what :meth:`Comparison.to_dict` returns."""
-
-    def comparison_text(self, comparison: dict[str, Any]) -> str:
-        """Return all of it as plain text."""
-
-    def comparison_headline(self, comparison: dict[str, Any]) -> str:
-        """Return what stayed and what changed in one plain sentence."""
-
-    def comparison_fragment(self, comparison: dict[str, Any]) -> str:
-        """Return all of it as HTML without a page around it."""
-
-
-def _teller() -> Teller:
-    found: Teller = registered()
-    return found
 
 
 @dataclass(frozen=True)
@@ -232,7 +214,7 @@ class Comparison:
     @property
     def summary(self) -> str:
         """What stayed and what changed in one plain sentence."""
-        return _teller().comparison_headline(self._plain())
+        return str(registered().comparison_headline(self._plain()))
 
     @property
     def parameters(self) -> pd.DataFrame:
@@ -264,7 +246,7 @@ class Comparison:
     def to_dict(self) -> dict[str, Any]:
         """Return the JSON object of the format ``thermal-robot/comparison/1``; SI throughout."""
         plain = self._plain()
-        return {**plain, "summary": _teller().comparison_headline(plain)}
+        return {**plain, "summary": registered().comparison_headline(plain)}
 
     def _plain(self) -> dict[str, Any]:
         told = zip(self.campaigns, self.samples, self.diagnoses, strict=True)
@@ -291,7 +273,7 @@ class Comparison:
         return f"Comparison({', '.join(self.campaigns)}: {changed} changed)"
 
     def __str__(self) -> str:
-        return _teller().comparison_text(self.to_dict())
+        return str(registered().comparison_text(self.to_dict()))
 
     def _repr_html_(self) -> str:
-        return _teller().comparison_fragment(self.to_dict())
+        return str(registered().comparison_fragment(self.to_dict()))

@@ -3,19 +3,27 @@
 from __future__ import annotations
 
 import os
+import re
+import sys
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 from thermal_robot.campaign import read_table
 from thermal_robot.campaign.document import FILE_NAME
 from thermal_robot.campaign.names import did_you_mean, listed
 from thermal_robot.errors import CampaignError, require
 from thermal_robot.files import is_file, is_folder
-from thermal_robot.fleet.toml_list import read_toml
+from thermal_robot.fleet.rows import CAMPAIGN, OWN
+from thermal_robot.schema import fitted, text
 
-CAMPAIGN, ROBOT = "campaign", "robot"
-"""The column of a list that holds the paths, and the label that says which campaigns are of one robot."""
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+
 LEVEL = "level_"
 _LISTS = (".csv", ".toml")
 
@@ -105,7 +113,7 @@ def _folders(root: Path) -> Iterator[str]:
 
 def _of_list(path: Path) -> Listed:
     """Read a list: rows of text by column, and where each stands."""
-    columns, rows = read_toml(path) if path.suffix.lower() == ".toml" else _csv(path)
+    columns, rows = _read_toml(path) if path.suffix.lower() == ".toml" else _csv(path)
     if CAMPAIGN not in columns:
         problem = f"has no column {CAMPAIGN!r}{did_you_mean(CAMPAIGN, columns)}"
         raise CampaignError(str(path), problem, expected="the paths of the campaigns in it, labels in the others")
@@ -129,8 +137,6 @@ def _csv(path: Path) -> tuple[dict[str, list[str]], list[int]]:
 
 def _checked(file: str, labels: Iterable[str]) -> tuple[str, ...]:
     """Refuse a label that the table has a column for, or that stands twice."""
-    from thermal_robot.fleet.rows import OWN
-
     names = tuple(labels)
     for name in names:
         if name in OWN or not name.strip():
@@ -139,3 +145,32 @@ def _checked(file: str, labels: Iterable[str]) -> tuple[str, ...]:
         if names.count(name) > 1:
             raise CampaignError(file, "a label stands twice", column=name, expected="each once")
     return names
+
+
+SECTION = "campaigns"
+
+
+def _read_toml(path: Path) -> tuple[dict[str, list[str]], list[int]]:
+    """Return columns of text by name, empty where a campaign lacks a label, and the number of each campaign."""
+    try:
+        data: dict[str, Any] = tomllib.loads(path.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise CampaignError(str(path), f"cannot be read: {error.strerror}") from error
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as error:
+        line = re.search(r"at line (\d+)", str(error))
+        raise CampaignError(str(path), f"not valid TOML: {error}", row=int(line[1]) if line else None) from error
+    items = data.get(SECTION)
+    if set(data) != {SECTION} or not isinstance(items, list) or not all(isinstance(item, dict) for item in items):
+        found = ", ".join(data) or "nothing"
+        raise CampaignError(
+            str(path), "is no list of campaigns", found=found, expected=f"[[{SECTION}]] and nothing else"
+        )
+    if not items:
+        raise CampaignError(str(path), "lists no campaign", expected=f"a [[{SECTION}]] for each")
+    names = dict.fromkeys(name for item in items for name in item)
+    word = text(empty=True)
+    columns = {
+        name: [fitted(word, item.get(name, ""), str(path), f"{SECTION}[{k}].{name}") for k, item in enumerate(items)]
+        for name in names
+    }
+    return columns, list(range(1, len(items) + 1))

@@ -1,33 +1,53 @@
-"""Many campaigns go in; a table, and what they have in common, come out."""
+"""Many campaigns go in; a table, and what they have in common, come out.
+
+What is done already, the rows of each campaign by its fingerprint, is a database of SQLite: a process that is killed
+leaves what it has written, and nothing half. Only the process that runs the fleet opens it; a second one is refused.
+
+Who does the work: processes of Dask, on this machine or behind the scheduler of a cluster. No engine of our own.
+
+On one machine a ``LocalCluster`` is started: a process a core, started anew by its nanny when it ends or outgrows its
+share of the memory. It listens on 127.0.0.1 alone, behind TLS with a certificate of its own that lasts as long as it
+does, so that no other user of the machine can hand it work, and serves no page. A cluster's scheduler is named by its
+address; its TLS is that of Dask's own configuration.
+
+As much is handed out at a time as there are threads, so that a process that is killed had one campaign. Dask would
+hand that to others again and again, and count whatever else lay on them as suspicious, too: here it waits until the end
+and is done then by itself, once. If that process is killed as well, it was this campaign.
+"""
 
 from __future__ import annotations
 
+import faulthandler
 import gc
+import hashlib
 import json
 import math
 import os
+import sqlite3
+import time
 import warnings
-from collections.abc import Callable, Iterable, Iterator, Sequence
+import zlib
+from collections.abc import Callable, Generator, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from thermal_robot.campaign.document import read_declaration
 from thermal_robot.diagnosis import diagnose
 from thermal_robot.effects.catalogue import choose
 from thermal_robot.errors import CampaignError, ThermalRobotError
-from thermal_robot.files import is_file, write_one
+from thermal_robot.files import checksum, is_file, write_one
 from thermal_robot.fleet import settings
-from thermal_robot.fleet import workers as processes
-from thermal_robot.fleet.done import Done, fingerprint, opened
-from thermal_robot.fleet.extra import needed
 from thermal_robot.fleet.listed import Listed, campaigns
-from thermal_robot.fleet.rows import failed, rows_of, write_rows
+from thermal_robot.fleet.rows import failed, needed, rows_of, write_rows
 from thermal_robot.fleet.summary import Summary, summarise
 from thermal_robot.teller import registered
 
 if TYPE_CHECKING:
     import pandas as pd
+
 
 TABLE, DONE = "fleet.parquet", "done.sqlite"
 
@@ -145,7 +165,7 @@ def diagnose_many(
         needed(module)
     found, folder = campaigns(source, labels), _made(out)
     table = folder / TABLE
-    with opened(folder / DONE) as done:
+    with _opened(folder / DONE) as done:
         _diagnosed(found, options, done, workers or os.cpu_count() or 1, scheduler, time_limit, progress)
         write_one(str(table), lambda path: write_rows(path, found.names, _whole(found, done)))
     return Fleet(table, summarise(table, found.names, progress))
@@ -213,22 +233,16 @@ def _diagnosed(
         progress("campaigns", finished, total)
 
     under_way: set[str] = set()
-    tasks = _tasks(found, options, done, told, under_way)
+    tasks = _tasks(found, options, done, time_limit, told, under_way)
     first = next(tasks, None)
     if first is None:
         return
-    with processes.client(min(workers, total), scheduler) as client:
-        for key, reply, reason in processes.answers(client, _in_time, _limited(time_limit, chain([first], tasks))):
+    with _client(min(workers, total), scheduler) as cluster:
+        for key, reply, reason in _answers(cluster, _in_time, chain([first], tasks)):
             rows, again = (json.loads(reply[0]), reply[1]) if reply is not None else (failed(reason), True)
             done.put(key, rows, again)
             under_way.discard(key)
             told(1)
-
-
-def _limited(time_limit: float, tasks: Iterator[processes.Task]) -> Iterator[processes.Task]:
-    """Yield tasks as :func:`_in_time` takes them."""
-    for key, arguments in tasks:
-        yield key, (time_limit, *arguments)
 
 
 def _in_time(time_limit: float, *campaign: Any) -> tuple[str, bool]:
@@ -237,7 +251,7 @@ def _in_time(time_limit: float, *campaign: Any) -> tuple[str, bool]:
     What a diagnosis leaves refers to itself, and would stay for hundreds of campaigns; what was there after the first,
     modules above all, is not looked through again.
     """
-    with processes.limited(time_limit):
+    with limited(time_limit):
         found = diagnosed(*campaign)
     gc.collect()
     if not gc.get_freeze_count():
@@ -249,14 +263,15 @@ def _tasks(
     found: Listed,
     options: tuple[list[str], list[str]],
     done: Done,
+    time_limit: float,
     told: Callable[[int], None],
     under_way: set[str],
-) -> Iterator[processes.Task]:
-    """Yield what is to be done, in the order of the list; what is alike is done once."""
+) -> Iterator[Task]:
+    """Yield what :func:`_in_time` is to do, in the order of the list; what is alike is done once."""
     for number, (name, _) in enumerate(found.campaigns):
         folder = found.folder(name)
         try:
-            key = fingerprint(folder, options)
+            key = _fingerprint(folder, options)
         except (ThermalRobotError, OSError) as error:
             key = f"unread {number}"
             done.put(key, failed(_without_place(str(error), folder)), again=True)
@@ -265,7 +280,7 @@ def _tasks(
             told(1)
         else:
             under_way.add(key)
-            yield key, (folder, *options)
+            yield key, (time_limit, folder, *options)
 
 
 def _whole(found: Listed, done: Done) -> Iterator[dict[str, Any]]:
@@ -280,3 +295,201 @@ def _without_place(message: str, folder: str) -> str:
     """Return a message without the folder that its table names anyway, and that differs from machine to machine."""
     place = folder if not is_file(Path(folder)) else os.path.dirname(folder)
     return " ".join(message.replace(place + os.sep, "").split())
+
+
+Rows = list[dict[str, Any]]
+
+
+def _fingerprint(folder: str, options: Sequence[object]) -> str:
+    """Return what the rows of a campaign follow from: name, content of its files, version of the program, options."""
+    from thermal_robot import __version__
+
+    declaration = read_declaration(Path(folder))
+    robot = declaration.robot
+    files = [declaration.file, declaration.table, *([robot] if isinstance(robot, Path) else [])]
+    name = Path(os.path.abspath(declaration.file)).parts[-2:]  # it stands in messages
+    told = json.dumps([name, __version__, list(options), [checksum(file) for file in files]])
+    return hashlib.sha256(told.encode()).hexdigest()
+
+
+class Done:
+    """The rows that are known, by fingerprint, and which campaign has which. Use :func:`opened`."""
+
+    def __init__(self, database: sqlite3.Connection) -> None:
+        self._database, self._written = database, time.monotonic()
+
+    def __contains__(self, key: str) -> bool:
+        return self._database.execute("SELECT 1 FROM done WHERE key = ?", (key,)).fetchone() is not None
+
+    def name(self, number: int, key: str) -> None:
+        """Say which fingerprint a campaign has, by its number in the list."""
+        self._database.execute("INSERT INTO listed VALUES (?, ?)", (number, key))
+
+    def put(self, key: str, rows: Rows, again: bool = False) -> None:
+        """Keep the rows of a campaign, on disk within a second; ``again`` until the next run, which does it again."""
+        packed = zlib.compress(json.dumps(rows).encode())
+        self._database.execute("INSERT OR REPLACE INTO done VALUES (?, ?, ?)", (key, packed, again))
+        if time.monotonic() - self._written > settings.WRITTEN_EVERY:
+            self._database.commit()
+            self._written = time.monotonic()
+
+    def in_order(self) -> Iterator[tuple[int, Rows]]:
+        """Yield number and rows of every campaign, in the order of the list, one at a time."""
+        found = self._database.execute("SELECT number, rows FROM listed JOIN done USING (key) ORDER BY number")
+        for number, packed in found:
+            yield number, json.loads(zlib.decompress(packed))
+
+
+@contextmanager
+def _opened(file: Path) -> Iterator[Done]:
+    """Open what is done, or begin it; whatever happens, what was put there is on disk afterwards."""
+    database = sqlite3.connect(file, timeout=settings.WAIT_FOR_OTHERS)
+    try:
+        database.execute("PRAGMA locking_mode = EXCLUSIVE")
+        database.execute("BEGIN EXCLUSIVE")
+        database.execute("CREATE TABLE IF NOT EXISTS done (key TEXT PRIMARY KEY, rows BLOB, again INTEGER)")
+        database.execute("CREATE TABLE IF NOT EXISTS listed (number INTEGER PRIMARY KEY, key TEXT)")
+        database.execute("DELETE FROM listed")
+        database.execute("DELETE FROM done WHERE again")
+        database.commit()
+    except sqlite3.OperationalError as error:
+        database.close()
+        raise CampaignError(str(file), "cannot be used", found=str(error), expected="no other run with it") from error
+    except sqlite3.DatabaseError as error:
+        database.close()
+        raise CampaignError(
+            str(file), "is not what a fleet has written", expected="another folder for --out"
+        ) from error
+    try:
+        yield Done(database)
+    finally:
+        database.commit()
+        database.close()
+
+
+LOCAL = "127.0.0.1"
+KILLED = "the process that diagnosed it was ended twice, the second time with nothing else to do: by the system, for \
+memory, by a crash, or because it took longer than the time limit"
+
+Task = tuple[str, tuple[Any, ...]]
+"""Key, and the arguments of the work."""
+
+
+@contextmanager
+def _client(workers: int, scheduler: str | None = None) -> Iterator[Any]:
+    """Give a Dask client: of so many processes that are started on this machine, or of the scheduler at an address."""
+    dask, distributed = needed("dask"), needed("distributed")
+    if scheduler is None:
+        with dask.config.set(_UNSERVED), _local(distributed, workers) as cluster, distributed.Client(cluster) as found:
+            yield found
+        return
+    try:
+        found = distributed.Client(scheduler, timeout=settings.ANSWERS_WITHIN)
+    except (OSError, ValueError, TypeError) as error:
+        raise ThermalRobotError(
+            f"the scheduler {scheduler} does not answer: {error}; is it running, and do its TLS files stand in Dask's "
+            "configuration (distributed.comm.tls)?"
+        ) from error
+    with found:
+        yield found
+
+
+_UNSERVED = {
+    "distributed.scheduler.http.routes": [],
+    "distributed.worker.http.routes": [],
+    "distributed.worker.profile.enabled": False,
+    "distributed.scheduler.allowed-failures": 0,
+    "distributed.admin.large-graph-warning-threshold": "1GB",
+}
+"""Nothing is served beside the work itself, nor kept of how it goes on, which grows by a megabyte a campaign; and a
+campaign whose process was killed comes back at once."""
+
+
+@contextmanager
+def _local(distributed: Any, workers: int) -> Iterator[Any]:
+    needed("cryptography")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")  # of a port that is taken, of a page that cannot be served
+        cluster = distributed.LocalCluster(
+            n_workers=workers,
+            threads_per_worker=1,
+            processes=True,
+            host=LOCAL,
+            dashboard_address=f"{LOCAL}:0",
+            worker_dashboard_address=f"{LOCAL}:0",
+            security=distributed.Security.temporary(),
+            silence_logs=50,
+        )
+    with cluster:
+        yield cluster
+
+
+def _answers(
+    client: Any, work: Callable[..., Any], tasks: Iterator[Task]
+) -> Generator[tuple[str, Any, str], None, None]:
+    """Have tasks worked on, a few at a time: yield each key once, with its answer, or with why there is none."""
+    distributed = needed("distributed")
+    ended: list[Task] = []
+    try:
+        for task, reply, error in _flow(client, work, tasks, distributed, _threads(client)):
+            if isinstance(error, distributed.KilledWorker):
+                ended.append(task)
+            else:
+                yield task[0], reply, _said(error)
+        for task, reply, error in _flow(client, work, iter(ended), distributed, lambda: 1):
+            killed = isinstance(error, distributed.KilledWorker)
+            yield task[0], reply, KILLED if killed else _said(error)
+    except (distributed.comm.core.CommClosedError, distributed.CancelledError, OSError) as error:
+        raise ThermalRobotError(f"the scheduler was lost: {error}; the same command continues") from error
+
+
+@contextmanager
+def limited(seconds: float) -> Iterator[None]:
+    """End this whole process where what is done within takes longer, even where it hangs outside Python."""
+    with open(os.devnull, "w", encoding="utf-8") as nowhere:
+        faulthandler.dump_traceback_later(seconds, exit=True, file=nowhere)
+        try:
+            yield
+        finally:
+            faulthandler.cancel_dump_traceback_later()
+
+
+def _threads(client: Any) -> Callable[[], int]:
+    """Return what tells how many threads there are, asked again now and then: workers come and go."""
+    known = [-math.inf, 1.0]
+
+    def threads() -> int:
+        if time.monotonic() - known[0] > settings.ASKED_EVERY:
+            known[:] = time.monotonic(), max(sum(client.nthreads().values()), 1)
+        return int(known[1])
+
+    return threads
+
+
+def _said(error: BaseException | None) -> str:
+    return "" if error is None else f"{type(error).__name__}: {error}"
+
+
+def _flow(
+    client: Any, work: Callable[..., Any], tasks: Iterator[Task], distributed: Any, most: Callable[[], int]
+) -> Iterator[tuple[Task, Any, BaseException | None]]:
+    """Yield each task with its answer or its error; so many are under way at a time."""
+    under_way: dict[Any, Task] = {}
+    finished = distributed.as_completed(with_results=True, raise_errors=False)
+
+    def begin() -> None:
+        while len(under_way) < most() and (task := next(tasks, None)) is not None:
+            future = client.submit(work, *task[1], key=f"thermal-robot-{task[0]}", pure=False)
+            under_way[future.key] = task
+            finished.add(future)
+
+    begin()
+    while under_way:
+        future, reply = next(finished)
+        task = under_way.pop(future.key)
+        if future.status == "cancelled":
+            raise distributed.CancelledError(task[0])
+        error = reply[1] if future.status == "error" else None
+        future.release()
+        begin()
+        yield task, None if error is not None else reply, error

@@ -1,7 +1,5 @@
 """The first campaign, before anything was measured: what to command, and how well each effect will be known."""
 
-from thermal_robot.planning.expected import Expected, ExpectedParameter
-from thermal_robot.planning.plan import Plan, plan
-from thermal_robot.planning.text import text, write_plan
+from thermal_robot.planning.plan import Expected, ExpectedParameter, Plan, plan, text, write_plan
 
 __all__ = ["Expected", "ExpectedParameter", "Plan", "plan", "text", "write_plan"]

@@ -3,12 +3,19 @@
 Candidates for each place in the order are drawn at random; of these the engine of ``next_samples`` chooses greedily
 what tells most about the parameters of all effects together, with the frames unknown. Collisions and the line of sight
 of the instrument are not checked.
+
+How well a campaign will know each effect: posterior standard deviations of the linear Gaussian model.
+
+All effects are y = F f + Σ_b X_b θ_b + e, θ ~ N(0, S²) with S the expected sizes, the frames f unknown. The covariance
+of θ is (1 + S G S)⁻¹, scaled by S, with G the whitened products: it does not depend on what will be measured.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from itertools import pairwise
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -16,16 +23,189 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign, Units
+from thermal_robot.campaign.write import write_commands, write_planned
+from thermal_robot.diagnosis import settings as design
 from thermal_robot.diagnosis.next_samples import most_informative
 from thermal_robot.effects import Effect, choose, gate
 from thermal_robot.effects.catalogue import of_effect
 from thermal_robot.errors import CampaignError, require
-from thermal_robot.observations import observe
-from thermal_robot.planning import settings
-from thermal_robot.planning.expected import Columns, Expected, expectations
+from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import equations_of
+from thermal_robot.inference.columns import Block, block, frame_columns
+from thermal_robot.inference.problem import Linear, Whitening, whitened
+from thermal_robot.observations import Observations, observe
 from thermal_robot.robot import Robot, joint_range
 from thermal_robot.simulation import schedule
 from thermal_robot.simulation.schedule import RISE
+
+FRAMES = "unknown frames"
+
+
+@dataclass(frozen=True)
+class ExpectedParameter:
+    """How well one parameter will be known.
+
+    Attributes
+    ----------
+    label, place, unit
+        What it is, where, and its unit.
+    size
+        Expected size: its standard deviation before anything is measured.
+    sigma, beside
+        Its standard deviation afterwards, with the frames unknown: were this effect the only one at work, and were all
+        of them.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> from thermal_robot.planning import plan
+    >>> found = plan(tr.load_robot("builtin:rv_m2", "tool0"), rows=12, effects=["joint_gain"])
+    >>> known = found.effect("joint_gain").parameters[1]
+    >>> known.place, known.told, known.sigma < known.size
+    ('joint_2', True, True)
+    """
+
+    label: str
+    place: str
+    unit: str
+    size: float
+    sigma: float
+    beside: float
+
+    @property
+    def told(self) -> bool:
+        """Whether it will be known, alone, to less than half its size."""
+        return self.sigma < settings.DETERMINED * self.size
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values, ready for JSON."""
+        return {**vars(self), "told": self.told}
+
+
+@dataclass(frozen=True)
+class Expected:
+    """How well one effect will be known.
+
+    Attributes
+    ----------
+    name, title
+        The effect.
+    parameters
+        Its parameters.
+    confounded
+        What takes the knowledge of at least one of its parameters away: other effects by name, each beside it alone,
+        and ``"unknown frames"``.
+    lacks
+        What the campaign would have to record for it to be testable; it then has no parameters.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> from thermal_robot.planning import plan
+    >>> found = plan(tr.load_robot("builtin:rv_m2", "tool0"), rows=12, effects=["joint_gain", "tracking_lag"])
+    >>> found.effect("tracking_lag").lacks[0]
+    'velocity.joint_1'
+    """
+
+    name: str
+    title: str
+    parameters: tuple[ExpectedParameter, ...]
+    confounded: tuple[str, ...] = ()
+    lacks: tuple[str, ...] = ()
+
+    @property
+    def told(self) -> bool:
+        """Whether at least one of its parameters will be known to less than half its size."""
+        return any(parameter.told for parameter in self.parameters)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values, ready for JSON."""
+        parameters = [parameter.to_dict() for parameter in self.parameters]
+        return {**vars(self), "confounded": list(self.confounded), "lacks": list(self.lacks), "parameters": parameters}
+
+
+@dataclass(frozen=True, eq=False)
+class Columns:
+    """What unit errors do to the rows, in units of the noise; a parameter's unit is its expected size.
+
+    Attributes
+    ----------
+    frames, effects
+        (N, m, f) and (N, m, P).
+    blocks
+        The effects, in the order of their columns.
+    """
+
+    frames: Array
+    effects: Array
+    blocks: tuple[Block, ...]
+
+    @classmethod
+    def of(cls, observations: Observations, effects: Sequence[Effect], noise: Array) -> Columns:
+        """Return the columns of effects in rows whose components have the noise (m,), m and rad."""
+        items = tuple(block(observations, effect) for effect in effects)
+        frames = frame_columns(observations)[0] * design.LOOSE
+        rows, measures, flat = frames.shape
+        linear = Linear(np.zeros((rows, measures)), frames, items)
+        stack = whitened(linear, Whitening(np.ones(rows), noise, 0.0)).reshape(rows, measures, -1)
+        sizes = np.concatenate([*(item.sizes for item in items), np.zeros(0)])
+        return cls(stack[:, :, :flat], stack[:, :, flat:-1] * sizes, items)
+
+    @property
+    def root(self) -> Array:
+        """(N, m, f + P) all columns."""
+        return np.concatenate([self.frames, self.effects], axis=2)
+
+    @property
+    def information(self) -> float:
+        """Of all rows about the effects' parameters, nats."""
+        flat, precision = self.frames.shape[2], self.precision
+        whole, known = (np.linalg.slogdet(part)[1] for part in (precision, precision[:flat, :flat]))
+        return float(0.5 * (whole - known))
+
+    @property
+    def precision(self) -> Array:
+        """(f + P, f + P) of the posterior, in units of the expected sizes."""
+        flat = equations_of(self.root)
+        return np.asarray(flat.T @ flat + np.eye(flat.shape[1]))
+
+
+def expectations(columns: Columns) -> tuple[Expected, ...]:
+    """Return how well each effect of the columns will be known."""
+    flat, precision = columns.frames.shape[2], columns.precision
+    ends = np.cumsum([flat, *(len(item.sizes) for item in columns.blocks)])
+    own = [np.arange(a, b) for a, b in pairwise(ends)]
+    frames, whole = np.arange(flat), _left(precision, np.arange(len(precision)))
+    found = []
+    for b, item in enumerate(columns.blocks):
+        alone = _left(precision, np.concatenate([frames, own[b]]))[flat:]
+        told = alone < settings.DETERMINED
+        lost = [FRAMES] if (~told & (_left(precision, own[b]) < settings.DETERMINED)).any() else []
+        for other, rival in enumerate(columns.blocks):
+            if other != b and told.any():
+                both = _left(precision, np.concatenate([frames, own[b], own[other]]))[flat : flat + len(own[b])]
+                lost += [rival.effect.name] if (told & (both >= settings.DETERMINED)).any() else []
+        figures = np.column_stack([item.sizes, item.sizes * alone, item.sizes * whole[own[b]]]).tolist()
+        known = zip(item.bare, figures, strict=True)
+        parameters = tuple(ExpectedParameter(p.label, p.place, p.unit, *each) for p, each in known)
+        found.append(Expected(item.effect.name, item.effect.title, parameters, tuple(lost)))
+    return tuple(found)
+
+
+def _left(precision: Array, which: NDArray[np.int64]) -> Array:
+    """(k,) standard deviations, as shares of the expected sizes, were no other parameters at work."""
+    return np.asarray(np.sqrt(np.diag(np.linalg.inv(precision[np.ix_(which, which)]))))
+
+
+NOISE, NOISE_TURN = 20e-6, 1e-4
+"""m and rad, one sigma per axis: a laser tracker at a few metres, and the turn of its target with three reflectors."""
+CHOICES, MOST_CANDIDATES, FEWEST_CHOICES = 60, 4000, 4
+"""Poses among which each place in the order is filled, but no more rows of all together than this, nor fewer poses
+than that."""
+FEWEST_ROWS, MOST_ROWS = 6, 1000
+"""Rows that a plan may have: with fewer not even the frames are known, more are not planned but measured."""
+ORDERS = 16
+"""Orders of the poses that are compared, each balanced first."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -98,9 +278,9 @@ def plan(
     effects: str | Iterable[str] | None = None,
     *,
     repeats: int = 1,
-    noise: float = settings.NOISE,
+    noise: float = NOISE,
     orientation: bool = False,
-    noise_orientation: float = settings.NOISE_TURN,
+    noise_orientation: float = NOISE_TURN,
     target: Sequence[float] = (0.0, 0.0, 0.0),
     loads: Sequence[float] = (),
     rise: float = RISE,
@@ -213,7 +393,7 @@ class _Draft:
 def _planned(draft: _Draft, kinds: Sequence[Effect], rng: np.random.Generator) -> Plan:
     """Choose poses, then their order."""
     poses, places = draft.places.shape
-    each = max(settings.FEWEST_CHOICES, min(settings.CHOICES, settings.MOST_CANDIDATES // (poses * places)))
+    each = max(FEWEST_CHOICES, min(CHOICES, MOST_CANDIDATES // (poses * places)))
     place = np.repeat(np.arange(poses), each)
     robot = draft.empty.robot
     offered = rng.uniform(*joint_range(robot), (len(place), robot.n))
@@ -240,7 +420,7 @@ def _best_order(
 ) -> tuple[Campaign, Columns, float]:
     """Return the balanced order of poses that tells most, its columns and what it tells."""
     best: tuple[Campaign, Columns, float] | None = None
-    for k in range(settings.ORDERS):
+    for k in range(ORDERS):
         start = np.arange(len(poses)) if k == 0 else rng.permutation(len(poses))
         mixed = poses[start]
         campaign = draft.ordered(mixed[schedule.balanced(mixed, draft.places, rng)])
@@ -264,7 +444,7 @@ def _check(
     def refuse(column: str, found: object, expected: str) -> None:
         raise CampaignError("plan", "cannot be planned", column=column, found=repr(found), expected=expected)
 
-    least, most = settings.FEWEST_ROWS, settings.MOST_ROWS
+    least, most = FEWEST_ROWS, MOST_ROWS
     if not isinstance(rows, (int, np.integer)) or not least <= rows <= most:
         refuse("rows", rows, f"a whole number from {least} to {most}")
     if not isinstance(repeats, (int, np.integer)) or not 1 <= repeats <= rows // 2 or rows % repeats:
@@ -279,3 +459,118 @@ def _check(
     for joint, low, high in zip(robot.joint_names, *joint_range(robot), strict=True):
         if not np.isfinite(high - low):
             refuse(joint, "no limits", "a <limit> in the URDF for a joint that slides")
+
+
+_HEAD = ("effect", "unit", "expected size", "1 sigma", "worst", "beside all", "told", "confounded with")
+_NUMBERS = range(2, 7)
+
+
+def text(plan: Plan) -> str:
+    """Return the plan in words: how many rows, the approaches, and a line for each effect and unit.
+
+    ``1 sigma`` and ``worst`` are the median and the largest over the parameters that are told, else over all, were the
+    effect alone at work; ``beside all`` is the median were all of them; ``told`` counts the parameters known to less
+    than half their expected size.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> from thermal_robot.planning import plan, text
+    >>> print(text(plan(tr.load_robot("builtin:rv_m2", "tool0"), rows=12, effects=["joint_gain"])))
+    12 rows: 12 poses. Joints come from below in ...
+    ...
+    joint_gain ...
+    """
+    rows = [_HEAD, *(line for expected in plan.effects for line in _lines(expected))]
+    widths = [max(len(row[k]) for row in rows) for k in range(len(_HEAD))]
+    table = [_row(row, widths) for row in rows]
+    lacking = [f"{e.name} {_why(e)}" for e in plan.effects if not e.parameters]
+    return "\n".join([_opening(plan), "", *table, *(["", *lacking] if lacking else [])])
+
+
+def _opening(plan: Plan) -> str:
+    commands = plan.commands
+    names = commands.robot.joint_names
+    shares = [float((commands.covariates[f"approach.{name}"] > 0.0).mean()) for name in names]
+    poses = commands.samples // plan.repeats
+    each = f", each {plan.repeats} times" if plan.repeats > 1 else ""
+    return (
+        f"{commands.samples} rows: {poses} poses{each}. Joints come from below in {100 * min(shares):.0f} to "
+        f"{100 * max(shares):.0f} % of rows, if the robot goes direct from row to row."
+    )
+
+
+def _row(cells: tuple[str, ...], widths: list[int]) -> str:
+    aligned = (c.rjust(w) if k in _NUMBERS else c.ljust(w) for k, (c, w) in enumerate(zip(cells, widths, strict=True)))
+    return "  ".join(aligned).rstrip()
+
+
+def _lines(expected: Expected) -> Iterator[tuple[str, ...]]:
+    units = dict.fromkeys(parameter.unit for parameter in expected.parameters)
+    for k, unit in enumerate(units):
+        own = [parameter for parameter in expected.parameters if parameter.unit == unit]
+        yield expected.name if k == 0 else "", *_figures(unit, own), ", ".join(expected.confounded) if k == 0 else ""
+
+
+def _figures(unit: str, own: list[ExpectedParameter]) -> tuple[str, ...]:
+    told = [parameter for parameter in own if parameter.told]
+    meant = told or own
+    figures = (
+        np.median([p.size for p in own]),
+        np.median([p.sigma for p in meant]),
+        max(p.sigma for p in meant),
+        np.median([p.beside for p in meant]),
+    )
+    return unit, *(f"{figure:.2g}" for figure in figures), f"{len(told)} of {len(own)}"
+
+
+def _why(expected: Expected) -> str:
+    """Say why nothing can be said of an effect."""
+    lacks = expected.lacks
+    if not lacks:
+        return "has no columns before there are data: it is looked for in what is measured"
+    return f"is not planned for: it needs {lacks[0]}{f' and {len(lacks) - 1} more' if len(lacks) > 1 else ''}"
+
+
+TABLE = ".csv"
+COMMENTS = (
+    "Planned, not yet measured: go direct from row to row in this order, and fill in measurements.csv: time in s, "
+    "temperature in °C as recorded, and the target's place.",
+    "plan.csv holds the temperatures that were planned; a column that will not be recorded is taken out.",
+)
+
+
+def write_plan(plan: Plan, path: str | Path) -> Path:
+    """Write a plan: a table where the name ends in ``.csv``, else a folder that is made if need be.
+
+    Parameters
+    ----------
+    plan
+        What to write, in the units of its commands. Approaches are left out: they follow from the order of the rows.
+    path
+        The table, or the folder: campaign.toml, plan.csv, measurements.csv with empty cells for what is measured, and
+        the robot.
+
+    Returns
+    -------
+    Path
+        The table or the campaign.toml.
+
+    Raises
+    ------
+    CampaignError
+        What cannot be written; a folder that holds a campaign already.
+
+    Examples
+    --------
+    >>> import thermal_robot as tr
+    >>> from thermal_robot.planning import plan, write_plan
+    >>> found = plan(tr.load_robot("builtin:rv_m2", "tool0"), rows=12, effects=["joint_gain"])
+    >>> sorted(path.name for path in write_plan(found, "hall_3").parent.iterdir())
+    ['campaign.toml', 'measurements.csv', 'plan.csv', 'robot.urdf']
+    """
+    derived = [name for name in plan.commands.covariates if name.startswith("approach.")]
+    if Path(path).suffix.lower() != TABLE:
+        return write_planned(plan.commands, path, comments=COMMENTS, derived=derived)
+    write_commands(plan.commands, path, derived=derived)
+    return Path(path)

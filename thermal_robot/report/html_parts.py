@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import re
 from base64 import b64encode
 from collections.abc import Iterable, Mapping
 from hashlib import sha256
 from html import escape
 from importlib.metadata import PackageNotFoundError, version
 from importlib.resources import files
+from io import StringIO
 from typing import TYPE_CHECKING
 
-from thermal_robot.report.inline import svg
+from thermal_robot.report.drawing import AFTER, BEFORE, FAINT, INK, MUTED, PAPER, THIRD
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
@@ -53,7 +55,7 @@ def css(name: str) -> str:
 
 def figure(drawn: Figure, label: str) -> str:
     """Return a figure as HTML; ``label`` says what it shows, for those who cannot see it."""
-    return f"<figure>{wide(svg(drawn, label), label)}</figure>"
+    return f"<figure>{wide(_svg(drawn, label), label)}</figure>"
 
 
 def wide(content: str, label: str) -> str:
@@ -111,17 +113,50 @@ def checksums(files: Mapping[str, str]) -> str:
 
 def signature(generated: str | None) -> str:
     """Say, as plain text, which program made a page, on which libraries, and when if that is to be told."""
-    told = ", ".join(filter(None, (_MADE_BY[0] + _version(_MADE_BY[0]), *map(_named, _MADE_BY[1:]))))
+    told = ", ".join(filter(None, (_version(_MADE_BY[0]) or _MADE_BY[0], *map(_version, _MADE_BY[1:]))))
     return f"{told}, {generated}" if generated else told
-
-
-def _named(package: str) -> str:
-    found = _version(package)
-    return package + found if found else ""
 
 
 def _version(package: str) -> str:
     try:
-        return f" {version(package)}"
+        return f"{package} {version(package)}"
     except PackageNotFoundError:  # run from a source tree that is not installed
         return ""
+
+
+_PIXELS = 106.0  # per inch at most, so that letters are equally large in all figures of a page
+_NAMES = {
+    INK: "ink",
+    MUTED: "muted",
+    FAINT: "faint",
+    PAPER: "paper",
+    BEFORE: "before",
+    AFTER: "after",
+    THIRD: "third",
+}
+
+
+def _svg(figure: Figure, label: str) -> str:
+    """Return a figure as an ``<svg>``, the same for equal figures; no identifier clashes with another figure's."""
+    stream = StringIO()
+    figure.savefig(stream, format="svg", transparent=True, dpi=200, metadata={"Date": None})
+    text = stream.getvalue()
+    text = text[text.index("<svg") :]
+    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    # HTML knows these two namespaces by itself; without their addresses the page holds no address at all
+    text = re.sub(r'\sxmlns(:xlink)?="[^"]*"', "", text)
+    text = re.sub(r"\s*\n\s*", "\n", text)
+    for colour, name in _NAMES.items():
+        text = text.replace(colour, f"var(--tr-{name},{colour})")
+    width = f"max-width:{figure.get_figwidth() * _PIXELS:.0f}px"
+    shown = f'<svg role="img" aria-label="{escape(label)}" class="tr-figure" style="{width}"'
+    return _own_names(text).replace("<svg", shown, 1).strip()
+
+
+def _own_names(text: str) -> str:
+    """Replace identifiers, which Matplotlib draws at random, by the content's hash and a number."""
+    found = list(dict.fromkeys(re.findall(r'\bid="([^"]+)"', text)))
+    numbers = {name: str(k) for k, name in enumerate(found)}
+    pattern = re.compile(r'(\bid="|href="#|url\(#)([^")]+)')
+    text = pattern.sub(lambda m: m[1] + "@" + numbers.get(m[2], m[2]), text)
+    return text.replace("@", f"f{sha256(text.encode()).hexdigest()[:8]}-")

@@ -7,36 +7,31 @@ from textwrap import fill
 from typing import TYPE_CHECKING
 
 from thermal_robot.report import units
-from thermal_robot.report.details import details
 from thermal_robot.report.words import (
     NO_BREAK,
     STATUS,
     bound,
-    campaign,
+    described,
+    details,
+    facts,
     hardest,
-    in_joints,
-    law,
-    left_out,
+    in_words,
     more,
     needs,
     noise,
     one_sigma,
-    parameters,
-    places,
-    rivals,
     rows_used,
     sentences,
-    set_aside,
-    struck,
     told_as,
     turned,
-    verdict,
     with_aside,
 )
 
 if TYPE_CHECKING:
+    from thermal_robot.diagnosis.calibration import Calibrated, Calibration
     from thermal_robot.diagnosis.parts import Finding
     from thermal_robot.diagnosis.result import Diagnosis
+
 
 WIDTH = 96
 _BAR = 24
@@ -76,12 +71,7 @@ def text(diagnosis: Diagnosis) -> str:
 def _unusable(diagnosis: Diagnosis) -> Iterator[list[str]]:
     """Say what is wrong with the table, and nothing of the robot."""
     yield [_wrap(diagnosis.summary, "")]
-    told = struck(diagnosis)
-    yield [
-        _wrap(verdict(diagnosis), f"{'verdict':11}"),
-        _wrap(campaign(diagnosis), f"{'campaign':11}"),
-        *([_wrap(told, f"{'struck':11}")] if told else []),
-    ]
+    yield list(_facts(diagnosis))
     yield ["NEXT", _wrap(diagnosis.advice)]
     if diagnosis.warnings:
         yield ["WARNINGS", *(_wrap(w, "  - ") for w in diagnosis.warnings)]
@@ -95,11 +85,9 @@ def _wrap(sentence: str, indent: str = "  ", hang: int = 0) -> str:
 
 
 def _facts(diagnosis: Diagnosis) -> Iterator[str]:
-    yield _wrap(verdict(diagnosis), f"{'verdict':11}")
-    yield _wrap(campaign(diagnosis), f"{'campaign':11}")
-    yield _wrap(set_aside(diagnosis), f"{'set aside':11}")
-    if told := left_out(diagnosis):
-        yield _wrap(told, f"{'left out':11}")
+    for heading, said in facts(diagnosis).items():
+        if heading != "Rows used":  # told beside the gap
+            yield _wrap(said, f"{heading.lower():11}")
 
 
 def _how_far(diagnosis: Diagnosis) -> Iterator[str]:
@@ -165,26 +153,12 @@ def _share(finding: Finding) -> str:
 def _at_length(finding: Finding, wide: int, diagnosis: Diagnosis) -> Iterator[str]:
     inner = " " * 6
     yield f"    {finding.name:{wide}}{units.probability(finding.probability):>13}   {_share(finding)}"
-    if told := rivals(finding, diagnosis):
-        yield _wrap(told, inner)
-    if described := law(finding):
-        yield _wrap(described, inner)
-    if finding.locations:
-        yield _wrap(f"where: {places(finding)}", inner, hang=7)
-    if sized := in_joints(finding):
-        yield _wrap(sized, inner, hang=2)
-    known = parameters(finding)
-    if known.heading:
-        yield f"{inner}{known.heading}"
-    column = max([len(name) for name, _ in known.shown], default=0)
-    for name, value in known.shown:
+    before, shown, after = described(finding, diagnosis)
+    yield from (_wrap(told, inner, hang) for told, hang in before)
+    column = max([len(name) for name, _ in shown], default=0)
+    for name, value in shown:
         yield f"{inner}{name:{column}}  {value}"
-    if known.more:
-        yield f"{inner}and {known.more} more, listed in the JSON"
-    if known.undetermined:
-        yield _wrap(f"not determined by these data: {known.undetermined}", inner, hang=2)
-    if known.unseen:
-        yield _wrap(known.unseen, inner, hang=2)
+    yield from (_wrap(told, inner, hang) for told, hang in after)
 
 
 def _in_short(finding: Finding, wide: int, joints: Sequence[str]) -> str:
@@ -254,3 +228,60 @@ def _next(diagnosis: Diagnosis) -> Iterator[str]:
         yield _wrap(diagnosis.advice)
     for group in diagnosis.separates:
         yield _wrap(f"to tell apart: {', '.join(group)}", "  - ")
+
+
+def calibration_text(calibration: Calibration) -> str:
+    """Write a calibration for the person who measured.
+
+    Parameters
+    ----------
+    calibration
+        The result.
+
+    Returns
+    -------
+    str
+        Plain text without a newline at the end: how far the gap shrinks on the rows that were fitted, every parameter
+        with one standard deviation, and what the data do not tell.
+    """
+    return "\n".join(_lines(calibration))
+
+
+def _lines(found: Calibration) -> Iterator[str]:
+    yield fill(
+        f"{found.robot}, {found.tool_frame}: {found.samples} samples of {found.measures}, {len(found.outliers)} set "
+        f"aside. Fitted as asked, not chosen: {in_words([effect.title for effect in found.effects])}.",
+        WIDTH,
+    )
+    yield _shrunk("gap, rms", found.rms_before, found.rms_after, "m")
+    if found.turned_before is not None and found.turned_after is not None:
+        yield _shrunk("turn, rms", found.turned_before, found.turned_after, "rad")
+    yield f"noise, per axis {units.quantity(found.noise, 'm')}"
+    if found.unexplained:
+        yield fill(
+            "What is left is not noise: something else is at work, and deviations are widened by what it may do. "
+            "diagnose() says what it may be.",
+            WIDTH,
+        )
+    for effect in found.effects:
+        yield ""
+        yield from _effect(effect)
+    for warning in found.warnings:
+        yield fill(f"Note: {warning}", WIDTH)
+
+
+def _shrunk(name: str, before: float, after: float, unit: str) -> str:
+    return f"{name:<16}{' → '.join(units.together([before, after], unit))} on the rows that were fitted"
+
+
+def _effect(effect: Calibrated) -> Iterator[str]:
+    part = f", a part of {effect.inside}" if effect.inside not in ("", effect.name) else ""
+    yield f"{effect.title} ({effect.name}{part}), ± one standard deviation"
+    known = [p for p in effect.parameters if p.identified]
+    width = max((len(p.name) for p in known), default=0)
+    for p in known:
+        yield f"  {p.name:<{width}}  {units.estimate(p, known)}"
+    hidden = [p.name for p in effect.parameters if not p.identified]
+    for label, names in (("not determined", hidden), ("not seen apart from the others or the frames", effect.unseen)):
+        if names:
+            yield fill(f"{label}: {in_words(names, between='; ')}", WIDTH, initial_indent="  ", subsequent_indent="  ")

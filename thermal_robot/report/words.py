@@ -5,13 +5,252 @@ from __future__ import annotations
 import re
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import TYPE_CHECKING
 
 from thermal_robot.report import units
 
 if TYPE_CHECKING:
-    from thermal_robot.diagnosis.parts import Estimate, Finding
+    from thermal_robot.diagnosis.parts import AnotherModel, Finding, Misfit, Unexplained, Wanted
     from thermal_robot.diagnosis.result import Diagnosis
+
+
+MOST_WORDS = 45
+"""Of a headline."""
+_MOST_CAUSES = 3  # that a headline names; the others are counted
+_MOST_OF_A_NAME = 9  # words: of a longer title the headline says the beginning
+_WEIGHTY = 0.01  # of the gap on held-out rows: an effect with less is counted among the smaller ones
+_CARRIES = 1.5  # times what is left of the fitted rows: more on held-out rows is not called noise
+_UNKNOWN = ", which may or may not be noise: the campaign states none"
+_SURE = 0.995  # a probability above it would be rounded to 100 %, which is never claimed
+_OR = ", or "  # between what is wrong with a table and what may be instead
+_NOTHING = 0.9995e-9  # m: what is less rounds to no nanometre
+# m: from which length on it is read times so much in which unit; what rounds to 1 mm is never written as 1e+03 µm
+_LENGTHS = ((0.9995, 1.0, "m"), (0.9995e-3, 1e3, "mm"), (0.0, 1e6, "µm"))
+
+
+def headline(diagnosis: Diagnosis) -> str:
+    """Return the verdict as one sentence of at most 45 words.
+
+    It names at most three causes, the largest shares first, and counts the others. Of what there is to say of them the
+    fullest wording is taken that fits; the rest is left to :mod:`thermal_robot.report.words`.
+    """
+    text = ""
+    for text in _wordings(diagnosis):
+        if len(text.split()) <= MOST_WORDS:
+            return text
+    return " ".join(text.split()[:MOST_WORDS]).rstrip(".,;:") + "."
+
+
+def _wordings(diagnosis: Diagnosis) -> Iterator[str]:
+    """Yield the sentence in all its wordings, the fullest first."""
+    size, left = length(diagnosis.gap.rms_before), diagnosis.unexplained
+    remaining = diagnosis.remaining or left
+    if diagnosis.misfit is not None:
+        yield from _misfit(diagnosis.misfit, diagnosis.reach)
+    elif not diagnosis.verdict and not left.flagged:
+        floor = length(diagnosis.gap.noise_floor)
+        if diagnosis.gap.noise_known:
+            yield f"No gap beyond the noise: the {size} between model and robot is what noise alone leaves ({floor})."
+        else:
+            yield (
+                f"No effect was found, and no pattern in the gap of {size}: whether it is noise cannot be told, as the "
+                "campaign states none and repeats no command."
+            )
+    elif not diagnosis.verdict:
+        which = "none of the effects that were considered" if diagnosis.narrowed else "no known effect"
+        for place in (_place(left), ""):
+            yield f"The gap of {size} is explained by {which}{place}."
+    elif not (causes := systematic(diagnosis)):
+        gap = diagnosis.gap
+        rest = _unexplained(diagnosis, remaining, gap.rms_before, gap.held_out.rms_before_with_aside)
+        names = listed([_name(diagnosis, f) for f in scattering(diagnosis)])
+        yield f"The gap of {size} is scatter: {names} ({_sure(diagnosis)}){rest}; no correction removes scatter."
+    else:
+        first, rivals = (_MOST_CAUSES, 2, 1), (True, False)
+        worse, the = _worse(diagnosis), "the" if diagnosis.gap.worse else "The"
+        for most, beside in product(first, rivals):
+            names = _causes(diagnosis, causes, most, beside)
+            for told in _how_far(diagnosis, remaining, len(causes) > 1):
+                yield f"{worse}{the} gap of {size} comes from {names} ({_sure(diagnosis)}); {told}."
+
+
+def systematic(diagnosis: Diagnosis) -> list[Finding]:
+    """Return the causes that a correction can remove, the largest share first."""
+    return [f for f in map(diagnosis.finding, diagnosis.verdict) if not f.random]
+
+
+def scattering(diagnosis: Diagnosis) -> list[Finding]:
+    """Return the causes that no correction can remove."""
+    return [f for f in map(diagnosis.finding, diagnosis.verdict) if f.random]
+
+
+def weighty(causes: Sequence[Finding], most: int = _MOST_CAUSES) -> list[Finding]:
+    """Return the causes that a headline names: those of some weight and size, at most so many, but always one."""
+    known = [f for f in causes if sized(f)]
+    return [f for f in known if (f.shrinkage or 0.0) >= _WEIGHTY][:most] or (known or list(causes))[:1]
+
+
+def sized(finding: Finding) -> bool:
+    """Whether the data determine any parameter of an effect: one without is not named first.
+
+    Of a law values before and after may be free while their difference is not.
+    """
+    return bool(finding.quantity) or not finding.parameters or any(p.identified for p in finding.parameters)
+
+
+def unnamed(diagnosis: Diagnosis) -> list[Finding]:
+    """Return the causes that the headline counts without naming them."""
+    text = headline(diagnosis)
+    return [f for f in systematic(diagnosis) if _name(diagnosis, f) not in text]
+
+
+def _worse(diagnosis: Diagnosis) -> str:
+    """Begin with where the correction does harm: of another session or region the rest is not to be believed."""
+    scheme = diagnosis.gap.worse
+    if scheme is None:
+        return ""
+    pair = f"{length(scheme.rms_after)} with it, {length(scheme.rms_before)} without"
+    return f"Correcting harms rows held out by {scheme.name} ({pair}): "
+
+
+def _misfit(misfit: Misfit, reach: float) -> Iterator[str]:
+    fault, model = misfit.fault, misfit.model
+    if model is not None:
+        yield _another_model(model)
+    elif fault is None:
+        left = f"{misfit.turned:.2g} rad" if misfit.away is None else f"{length(misfit.away)} of {length(reach)}"
+        yield (
+            f"Robot and table do not describe the same motion ({left} remain): check units, signs and order of the "
+            "joints, axes of the instrument, order of the quaternion, and that all rows belong to one set-up and the "
+            "URDF to this robot."
+        )
+    else:
+        struck = f" in {len(fault.rows)} rows" if fault.rows else ""
+        fall = f"Mended, the gap falls from {length(fault.rms_before)} to {length(fault.rms_after)}."
+        ways = fault.what.split(_OR)
+        others = "", ", or another fault alike", f", or {len(ways) - 1} other faults alike"
+        for what, rest in product((fault.what, ways[0] + others[min(len(ways), 3) - 1]), (f" {fall}", "")):
+            yield f"The table is at fault{struck}, not the robot: {what}{'' if what.endswith('?') else '.'}{rest}"
+
+
+def _another_model(model: AnotherModel) -> str:
+    """Say in what the robot that was measured differs from the URDF, and which one it may be."""
+    factor, known = model.factor, ""
+    if model.in_another_unit:
+        return f"Robot and table do not describe the same motion: {model.unit}."
+    if factor is not None:
+        what = f"the links are about {factor:.2g} times as long as in the URDF"
+    elif model.joint:
+        what = f"{model.joint} would have to sit {length(model.off)} from where the URDF has it"
+    else:
+        what = "the URDF is of another robot"
+    if model.fits is not None:
+        known = f" {model.fits} fits: {length(model.remains)} remain."
+    return f"Robot and table do not describe the same motion: {what}. Is it another model of the family?{known}"
+
+
+def _sure(diagnosis: Diagnosis) -> str:
+    probability = diagnosis.probability
+    return f"{units.percent(probability, 0)} sure" if probability < _SURE else "more than 99 % sure"
+
+
+def _causes(diagnosis: Diagnosis, causes: Sequence[Finding], most: int, beside: bool) -> str:
+    """Name the first few, each with what the data cannot tell it from, and count the others."""
+    named = weighty(causes, most)
+    names = [_name(diagnosis, f) + _doubt(diagnosis, f, beside) for f in named]
+    fewer = len(causes) - len(named)
+    return listed([*names, *(["a smaller one"] if fewer == 1 else [f"{fewer} smaller ones"] if fewer else [])])
+
+
+def _name(diagnosis: Diagnosis, finding: Finding) -> str:
+    words = diagnosis.title(finding.name).split()
+    return " ".join(words) if len(words) <= _MOST_OF_A_NAME else " ".join(words[:_MOST_OF_A_NAME]).rstrip(",;") + "…"
+
+
+def _doubt(diagnosis: Diagnosis, finding: Finding, beside: bool) -> str:
+    rivals = [diagnosis.title(name) for name in finding.confounded_with]
+    told = f"or {rivals[0] if len(rivals) == 1 else 'others'}" if beside else "in doubt"
+    return f" ({told})" if rivals else ""
+
+
+def _how_far(diagnosis: Diagnosis, remaining: Unexplained, several: bool) -> Iterator[str]:
+    """Yield what correcting does, the fullest wording first; that it leaves more or harms elsewhere is always said."""
+    gap, held = diagnosis.gap, diagnosis.gap.held_out
+    it = "them" if several else "it"
+    if held.shrinkage < 0.0:
+        pair = f"{length(held.rms_after)} with it and {length(held.rms_before)} without"
+        yield f"correcting for {it} does not carry over to held-out data: their gap is {pair}"
+        yield f"correcting harms held-out data: {pair}"
+        return
+    leaves, hard = length(held.rms_after), ""
+    if gap.worse is not None:
+        hard = ""  # said first
+    elif gap.hardest is not None and gap.hardest.shrinkage < 0.0:
+        hard = f"; but it harms rows held out by {gap.hardest.name}"
+    elif gap.hardest is not None:
+        hard = f"; held out by {gap.hardest.name}, {length(gap.hardest.rms_after)}"
+    full = f"correcting for {it} removes {units.percent(held.shrinkage)} of its mean square on held-out data"
+    scatter = "; there is also scatter" * bool(scattering(diagnosis))
+    yield f"{full} and leaves {leaves}{_rest(diagnosis, remaining)}{hard}{scatter}"
+    yield f"{full} and leaves {leaves}{_rest(diagnosis, remaining)}{hard}"
+    short = f"correcting removes {units.percent(held.shrinkage)} on held-out data and leaves {leaves}"
+    yield f"{short}{_rest(diagnosis, remaining)}{hard}"
+    apart = remaining.flagged and remaining.rms > held.rms_after  # of rows set aside: the others are not called more
+    more = (", outliers left out" if apart else ", more than noise") if remaining.flagged else ""
+    yield f"{short}{more}{hard}"
+    yield f"correcting leaves {leaves} on held-out data{more}{hard}"
+
+
+def _rest(diagnosis: Diagnosis, remaining: Unexplained) -> str:
+    gap, floor = diagnosis.gap, length(diagnosis.gap.noise_floor)
+    if not remaining.flagged:
+        if gap.held_out.rms_after < _CARRIES * max(gap.rms_after, gap.noise_floor):
+            return f", which is noise ({floor})" if gap.noise_known else _UNKNOWN
+        told = floor if gap.noise_known else "not stated"
+        return f", while {length(gap.rms_after)} is left on the rows it was fitted to (noise: {told})"
+    held = gap.held_out
+    return _unexplained(diagnosis, remaining, held.rms_after, held.rms_after_with_aside) or ", which is more than noise"
+
+
+def _unexplained(diagnosis: Diagnosis, remaining: Unexplained, of: float, with_aside: float | None) -> str:
+    """Say how much of a size is not explained; empty where nothing is, or nobody knows how much.
+
+    Where rows set aside are unexplained, too, they count in what remains but not in the size: it is told with them.
+    """
+    if not remaining.flagged or remaining.rms == 0.0:
+        return ""
+    if remaining.rms > of:
+        count = len(diagnosis.outliers)
+        if with_aside is None or not count:
+            return ""
+        aside = "the row" if count == 1 else f"the {count} rows"
+        return f", or {length(with_aside)} with {aside} set aside in it, which nothing explains"
+    return f", of which {length(remaining.rms)} is not explained" if diagnosis.gap.noise_known else ""
+
+
+def length(metres: float) -> str:
+    """Return a length in the unit that a metrologist would use; what no instrument sees is not told in figures."""
+    if metres < _NOTHING:
+        return "less than 1 nm"
+    factor, unit = next((f, u) for least, f, u in _LENGTHS if metres >= least)
+    return f"{metres * factor:.3g} {unit}"
+
+
+def listed(names: Sequence[str]) -> str:
+    """Put names one after the other: ``a, b and c``."""
+    return "".join(names) if len(names) < 2 else ", ".join(names[:-1]) + " and " + names[-1]
+
+
+def _place(unexplained: Unexplained) -> str:
+    parts = []
+    if unexplained.locations and unexplained.depends_on:
+        place = unexplained.locations[0]
+        parts.append(f"enters most likely at {place.name if place.kind == 'joint' else 'the ' + place.kind}")
+    if unexplained.depends_on:
+        parts.append(f"follows {unexplained.depends_on[0].covariate}")
+    return "; it " + " and ".join(parts) if parts else ""
+
 
 STATUS = {
     "found": "found",
@@ -78,9 +317,9 @@ class Shown:
 def parameters(finding: Finding) -> Shown:
     """Choose the parameters to print: all of a few in the order of the chain, else the most significant."""
     known = [p for p in finding.parameters if p.identified and p.value is not None]
-    chosen, heading = known, ""
+    chosen, heading, hidden = known, "", finding.unseen
     if len(known) > _ALL_UP_TO:
-        chosen = sorted(known, key=lambda p: -_significance(p))[:_MOST]
+        chosen = sorted(known, key=lambda p: -abs(p.value or 0.0) / max(p.std or 0.0, 1e-300))[:_MOST]
         heading = f"the {_MOST} most significant of {len(known)} parameters:"
     # where there is a size, it says what is known; a constant that the frames can take up is no news
     undetermined = [] if finding.size else [p.name for p in finding.parameters if p not in known]
@@ -89,18 +328,8 @@ def parameters(finding: Finding) -> Shown:
         tuple((p.name, units.estimate(p, chosen)) for p in chosen),
         len(known) - len(chosen),
         in_words(undetermined, most=4, between="; "),  # names hold commas
-        _unseen(finding.unseen),
+        f"{len(hidden)} not seen apart from the others or the frames: {in_words(hidden, 6, '; ')}" if hidden else "",
     )
-
-
-def _unseen(names: Sequence[str]) -> str:
-    """Say how many parameters are not seen and which; empty where there are none."""
-    listed = in_words(names, most=6, between="; ")
-    return f"{len(names)} not seen apart from the others or the frames: {listed}" if names else ""
-
-
-def _significance(parameter: Estimate) -> float:
-    return abs(parameter.value or 0.0) / max(parameter.std or 0.0, 1e-300)
 
 
 def in_words(names: Sequence[str], most: int = 10, between: str = ", ") -> str:
@@ -131,6 +360,15 @@ def struck(diagnosis: Diagnosis) -> str:
     """Say which rows a fault of the table struck; empty where it struck all, or there is none."""
     fault = diagnosis.misfit.fault if diagnosis.misfit else None
     return rows_in_words(fault.rows) if fault and fault.rows else ""
+
+
+def facts(diagnosis: Diagnosis) -> dict[str, str]:
+    """Return what stands above all else, by its heading: verdict, campaign, and which rows and effects count."""
+    told = {"Verdict": verdict(diagnosis), "Campaign": campaign(diagnosis)}
+    if diagnosis.usable:
+        told |= {"Set aside": set_aside(diagnosis), "Rows used": rows_used(diagnosis), "Left out": left_out(diagnosis)}
+    told["Struck"] = struck(diagnosis)
+    return {heading: said for heading, said in told.items() if said}
 
 
 def rows_used(diagnosis: Diagnosis) -> str:
@@ -255,6 +493,19 @@ def rivals(finding: Finding, diagnosis: Diagnosis) -> str:
     return f"{said}; --without {finding.name} shows what would then stand in its place"
 
 
+def described(
+    finding: Finding, diagnosis: Diagnosis
+) -> tuple[list[tuple[str, int]], tuple[tuple[str, str], ...], list[tuple[str, int]]]:
+    """Return what is said of an effect before its parameters, these, and what after: lines with how far they hang."""
+    known = parameters(finding)
+    where = f"where: {places(finding)}" if finding.locations else ""
+    more = f"and {known.more} more, listed in the JSON" if known.more else ""
+    free = f"not determined by these data: {known.undetermined}" if known.undetermined else ""
+    before = (rivals(finding, diagnosis), 0), (law(finding), 0), (where, 7), (in_joints(finding), 2), (known.heading, 0)
+    after = (more, 0), (free, 2), (known.unseen, 2)
+    return [line for line in before if line[0]], known.shown, [line for line in after if line[0]]
+
+
 def left_out(diagnosis: Diagnosis) -> str:
     """Say which effects the user left out, and how he asked for that; empty where he did not."""
     out, kept = diagnosis.left_out, [f.name for f in diagnosis.effects if f.quantity is None]
@@ -291,7 +542,7 @@ def sentences(diagnosis: Diagnosis) -> Iterator[str]:
     size = f"{units.quantity(left.rms, 'm')} rms{known}" if left.rms > 0 else "a remainder"
     yield f"The known effects leave {size} that chance does not explain ({units.p_value(left.p_value)})."
     for reason in left.reasons:
-        yield f"{reason[:1].upper()}{reason[1:].rstrip('.')}."
+        yield f"{capitalised(reason).rstrip('.')}."
     if left.locations:
         likely = [p for p in left.locations if p.share >= _UNLIKELY][:3] or left.locations[:1]
         spots = [f"{p.words} ({units.probability(p.share)})" for p in likely]
@@ -309,3 +560,139 @@ def one_of(items: Sequence[str]) -> str:
     if len(items) < 2:
         return "".join(items)
     return f"{', '.join(items[:-1])} or {items[-1]}"
+
+
+_SURER = 0.05  # by which a single effect is surer than all together, so that a reader asks why
+_TOLD, _MOST_OTHERS = (
+    0.01,
+    3,
+)  # probability from which another effect is told that may be at work, too, and how many are
+
+if TYPE_CHECKING:
+    from thermal_robot.diagnosis.result import Diagnosis
+
+
+def details(diagnosis: Diagnosis) -> Iterator[str]:
+    """Yield a sentence for each thing that the headline leaves out and no table says."""
+    if not diagnosis.usable:
+        return
+    causes, chance = systematic(diagnosis), scattering(diagnosis)
+    if slight := [diagnosis.title(f.name) for f in unnamed(diagnosis)]:
+        yield f"{'The smaller one is' if len(slight) == 1 else 'The smaller ones are'} {listed(slight)}."
+    for f in causes:
+        if f.confounded_with:
+            rivals = " or ".join(map(diagnosis.title, f.confounded_with))
+            yield f"{capitalised(diagnosis.title(f.name))} cannot be told apart from {rivals}."
+    if unsized := [diagnosis.title(f.name) for f in causes if not sized(f)]:
+        yield f"How large it is these data do not determine: {listed(unsized)}."
+    yield from _beside(diagnosis)
+    if causes and chance:
+        names = listed([diagnosis.title(f.name) for f in chance])
+        yield f"There is also scatter, which no correction removes: {names}."
+    if laws := sum(f.quantity is not None for f in causes):
+        which = "None of the effects that were considered" if diagnosis.narrowed else "No known effect"
+        shapes = "the shape of the law that was" if laws == 1 else f"the shapes of the {laws} laws that were"
+        yield f"{which} has {shapes} found."
+    yield from _elsewhere(diagnosis)
+
+
+def _beside(diagnosis: Diagnosis) -> Iterator[str]:
+    """Say what else may be at work, where each effect is surer by itself than that there is no other."""
+    joint, own = diagnosis.probability, [diagnosis.finding(name).probability or 0.0 for name in diagnosis.verdict]
+    if not own or min(own) - joint < _SURER:
+        return
+    told = {f.name: f.probability for f in diagnosis.effects if f.probability and f.status == "not_found"}
+    others = sorted((name for name in told if told[name] >= _TOLD), key=lambda name: -told[name])[:_MOST_OTHERS]
+    named = listed([f"{diagnosis.title(name)} ({units.probability(told[name])})" for name in others])
+    beside = f", most probably {named}" if others else ""
+    told_apart = f"That nothing else is at work is {units.percent(joint)} sure, less than each by itself"
+    yield f"{told_apart}: the rest is others{beside}."
+
+
+def capitalised(words: str) -> str:
+    """Begin a sentence with a capital letter."""
+    return words[:1].upper() + words[1:]
+
+
+def _elsewhere(diagnosis: Diagnosis) -> Iterator[str]:
+    """Yield the ways of holding rows out in which the correction does harm."""
+    for scheme in diagnosis.gap.schemes if diagnosis.verdict else ():
+        if scheme.shrinkage < 0.0:
+            before, after = units.together((scheme.rms_before, scheme.rms_after), "m")
+            yield f"Held out by {scheme.name} ({scheme.held_out}), the correction does harm: {before} → {after}."
+
+
+_MOST_UNTESTED = 2  # effects that are named with the column that they need
+
+
+def advice(diagnosis: Diagnosis) -> str:
+    """Return what to do or to measure next in one sentence; empty where nothing is needed."""
+    wanted = diagnosis.wanted
+    if diagnosis.misfit is not None:
+        fault, model = diagnosis.misfit.fault, diagnosis.misfit.model
+        first = capitalised(fault.remedy) if fault else "Mend the table"
+        if fault and fault.what not in headline(diagnosis):
+            first = f"All of these do the same: {fault.what}. {first}"
+        if model is not None and model.in_another_unit:
+            first = "Write the lengths of the URDF in m"
+        elif model is not None:
+            first = f"Take the URDF of the robot that was measured{f', such as {model.fits}' if model.fits else ''}"
+        return f"{first}; then diagnose again."
+    if wanted is None:
+        return ""
+    told = _shows(diagnosis, wanted)
+    if wanted.kind == "frame":
+        declared = f" ({wanted.name})" if wanted.name else ""
+        return f"A frame measured on its own, and declared known{declared}, would {told}."
+    if wanted.kind == "range":
+        return f"More poses over the whole range of every joint would {told}."
+    if wanted.kind == "pose":
+        return f"The pose that would best {told}: {_pose(diagnosis, wanted)}."
+    if wanted.kind == "repeats" and wanted.apart:
+        return f"Repeat some poses, and label them in a column {wanted.name}: this would {told}."
+    if wanted.kind == "repeats":
+        return "Repeat a few poses in another order and on another day: this shows how much of the remainder repeats."
+    if wanted.apart:
+        return f"Repeat some poses with another load, and record {wanted.name}: this would {told}."
+    return f"Record {wanted.name}: {_remainder(wanted)}, and {_why(diagnosis, wanted)}."
+
+
+def _shows(diagnosis: Diagnosis, wanted: Wanted) -> str:
+    names = _titles(diagnosis, wanted.apart[:2])
+    if len(names) == 1:
+        return f"show whether to believe in {names[0]}"
+    return f"tell {' from '.join(names)}" if names else "tell the leading explanations apart"
+
+
+def _remainder(wanted: Wanted) -> str:
+    own = wanted.follows and wanted.place.endswith(wanted.follows)
+    enters = f" enters at {wanted.place}" if wanted.place else ""
+    follows = f" follows {'its position' if own else wanted.follows}" if wanted.follows else ""
+    return "a remainder" + (" and".join(part for part in (enters, follows) if part) or " is unexplained")
+
+
+def _why(diagnosis: Diagnosis, wanted: Wanted) -> str:
+    if wanted.whether:
+        return f"this would show whether {wanted.whether} causes it"
+    untested = _titles(diagnosis, wanted.untested[:_MOST_UNTESTED])
+    if len(wanted.untested) > _MOST_UNTESTED:
+        untested.append(f"{len(wanted.untested) - _MOST_UNTESTED} more")
+    return f"{listed(untested)} could not be tested" if untested else "this may be what it follows"
+
+
+def _titles(diagnosis: Diagnosis, names: Sequence[str]) -> list[str]:
+    return [diagnosis.title(name) for name in names]
+
+
+def _pose(diagnosis: Diagnosis, wanted: Wanted) -> str:
+    known = diagnosis.rows.units
+    by_unit: dict[str, list[str]] = {}
+    for name in wanted.position:
+        by_unit.setdefault(known.get(name, ""), []).append(name)
+    said = {
+        name: value
+        for unit, names in by_unit.items()
+        for name, value in zip(names, units.together([wanted.position[n] for n in names], unit), strict=True)
+    }
+    said |= {name: units.quantity(value, known.get(name, "")) for name, value in wanted.conditions.items()}
+    return ", ".join(f"{name} {value}" for name, value in said.items()).replace("-", "−")

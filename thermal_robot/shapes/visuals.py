@@ -74,8 +74,8 @@ _CORNERS = 80
 
 
 @dataclass(frozen=True, eq=False)
-class Hull:
-    """A convex body fixed to a link.
+class Solid:
+    """A body fixed to a link.
 
     Attributes
     ----------
@@ -92,7 +92,7 @@ class Hull:
     faces: NDArray[np.int64]
 
 
-def hulls(robot: Robot) -> tuple[Hull, ...]:
+def hulls(robot: Robot) -> tuple[Solid, ...]:
     """Return the convex hulls of the visual shapes of the links between root frame and tool frame.
 
     Parameters
@@ -102,7 +102,7 @@ def hulls(robot: Robot) -> tuple[Hull, ...]:
 
     Returns
     -------
-    tuple of Hull
+    tuple of Solid
         In the order of the chain; none of a shape whose mesh is not there or cannot be read, or that is flat.
     """
     try:
@@ -111,7 +111,7 @@ def hulls(robot: Robot) -> tuple[Hull, ...]:
         return ()
     on_chain = (*dict.fromkeys(robot.chain.parent_links), robot.tool_frame)
     found = ((link, hull(np.asarray(mesh.vertices, dtype=float))) for link in on_chain for mesh in drawn.get(link, ()))
-    return tuple(Hull(link, *shape) for link, shape in found if shape is not None)
+    return tuple(Solid(link, *shape) for link, shape in found if shape is not None)
 
 
 def hull(points: Array) -> tuple[Array, NDArray[np.int64]] | None:
