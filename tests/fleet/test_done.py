@@ -92,5 +92,5 @@ def test_a_fingerprint_follows_content_and_options_and_nothing_else(rv_m2, tmp_p
 def test_another_version_of_the_program_may_say_something_else(rv_m2, tmp_path, monkeypatch):
     folder = str(write_robot(rv_m2, tmp_path / "a"))
     known = _fingerprint(folder, [])
-    monkeypatch.setattr("thermal_robot.__version__", "99.0")
+    monkeypatch.setattr("importlib.metadata.version", lambda _: "99.0")
     assert _fingerprint(folder, []) != known

@@ -302,13 +302,13 @@ Rows = list[dict[str, Any]]
 
 def _fingerprint(folder: str, options: Sequence[object]) -> str:
     """Return what the rows of a campaign follow from: name, content of its files, version of the program, options."""
-    from thermal_robot import __version__
+    from importlib.metadata import version
 
     declaration = read_declaration(Path(folder))
     robot = declaration.robot
     files = [declaration.file, declaration.table, *([robot] if isinstance(robot, Path) else [])]
     name = Path(os.path.abspath(declaration.file)).parts[-2:]  # it stands in messages
-    told = json.dumps([name, __version__, list(options), [checksum(file) for file in files]])
+    told = json.dumps([name, version("thermal-robot"), list(options), [checksum(file) for file in files]])
     return hashlib.sha256(told.encode()).hexdigest()
 
 
