@@ -75,6 +75,6 @@ def test_a_law_leaves_no_more_than_registration_far_away(rv_m2):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("arm", ["rv_m2", "ur10", "panda"])
-def test_laws_of_many_arms_leave_no_more_than_registration_far_away(arm, request):
-    judged(request.getfixturevalue(arm), range(200, 216))
+@pytest.mark.parametrize("arm", ["rv_m2", "ur10", "panda"], indirect=True)
+def test_laws_of_many_arms_leave_no_more_than_registration_far_away(arm):
+    judged(arm, range(200, 216))
