@@ -38,6 +38,7 @@ def test_geometry_shrinks_the_gap_of_real_arms(name, least):
     assert least < overall.shrinkage < 1.0
 
 
+@pytest.mark.slow
 def test_wam_keeps_a_millimetre_that_nothing_explains():
     found = diagnose(FOLDER / "wam_jacobi")
     assert found.unexplained.flagged

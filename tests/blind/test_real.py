@@ -196,6 +196,7 @@ BESIDE = ["geometric", "transmission_error", "backlash", "drift"]
 LOST = {"parts": {"backlash": {"places": [ELBOW], "size": 1e-3}}}
 
 
+@pytest.mark.slow
 def test_lost_motion_among_a_hundred_rows_of_a_real_arm_is_named_and_measured(ur5):
     campaign = with_lost_motion(ur5.take(np.arange(100)))
     found = diagnose(campaign, only=["geometric", "backlash"]).to_dict()

@@ -92,6 +92,7 @@ def test_an_offset_of_six_degrees_is_still_an_offset(arm):
     assert right.count(("joint_offset",)) >= 2
 
 
+@pytest.mark.slow
 def test_exactness_does_not_add_effects_that_are_not_at_work(rv_m2):
     """At 10 nm, a thousandth of a laser tracker's noise.
 

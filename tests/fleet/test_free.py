@@ -46,6 +46,7 @@ def test_it_is_least_squares_beside_what_was_found(rv_m2, effects):
         assert parameter.std == pytest.approx(spread[k], rel=1e-4)
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size", [0.0, 6e-5], ids=["absent", "found in some"])
 def test_it_scatters_about_the_truth_by_its_deviation(rv_m2, size):
     off, found = [], []

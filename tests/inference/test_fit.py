@@ -89,6 +89,7 @@ def unlike(data, times, seed):
     return replace(data, position=data.position + further, noise_position=None, noise_of_rows=sigmas)
 
 
+@pytest.mark.slow
 def test_rows_of_unlike_noise_count_by_it(rv_m2):
     """Parameters are off by what is said of them, and by far less than where all rows count alike."""
     off, said, alike = [], [], []

@@ -37,6 +37,7 @@ def test_the_period_of_a_sawtooth_is_found(rows, noise):
         assert found.step == pytest.approx(STEP, rel=1e-3)
 
 
+@pytest.mark.slow
 def test_normal_errors_have_no_steps_and_are_refuted():
     for seed in range(100):
         rng, command = np.random.default_rng(seed), commands(seed, 200, reach=0.3)
@@ -45,6 +46,7 @@ def test_normal_errors_have_no_steps_and_are_refuted():
         assert found.log_factor < np.log(1e-4)
 
 
+@pytest.mark.slow
 def test_a_bayes_factor_is_as_often_right_as_it_says():
     """Of errors that have steps or have none, as often: of those called 80 % probable to have steps, 80 % have."""
     rng, said, true = np.random.default_rng(0), [], []
@@ -61,6 +63,7 @@ def test_a_bayes_factor_is_as_often_right_as_it_says():
     assert found.error < 0.07  # of perfect probabilities in ten bins of sixty: 0.03
 
 
+@pytest.mark.slow
 def test_where_steps_would_not_be_seen_nothing_is_said():
     """Errors of which most are the instrument's."""
     for seed in range(200):

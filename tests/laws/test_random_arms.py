@@ -98,6 +98,7 @@ def test_a_model_survives_its_file(urdf, seed):
         checks.model(Path(name))
 
 
+@pytest.mark.slow
 def test_arms_of_every_kind_are_drawn():
     seen, sizes = set(), set()
 
