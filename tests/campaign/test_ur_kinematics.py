@@ -56,6 +56,7 @@ def test_another_model_or_convention_is_refused(tmp_path):
     smaller = ur_arm.yaml(ur_arm.figures((0.16, -0.43, -0.39, 0.13, -0.1, 0.1)))
     assert "kinematics.shoulder: is of another model than 'arm'" in refused(tmp_path, smaller)
     assert "20.0 mm and 0 rad from the origin" in refused(tmp_path, smaller)
+    pytest.importorskip("example_robot_data")
     older = load_robot("example-robot-data:ur5", "tool0")
     assert "no shoulder_lift_joint that turns about its z axis" in refused(tmp_path, smaller, older)
     assert "no shoulder_pan_joint" in refused(tmp_path, smaller, load_robot("builtin:rv_m2", "tool0"))

@@ -54,6 +54,7 @@ def rapid(kind: str, moves: str = "") -> str:
 
 
 def run(folder, format, *arguments):
+    pytest.importorskip("example_robot_data")
     named = [str(folder / a) if (folder / a).exists() else a for a in arguments]
     robot = ("--robot", ROBOT[0], "--tool", ROBOT[1])
     return cli.main(["import", format, *named, *robot, "-o", str(folder / "made")])
