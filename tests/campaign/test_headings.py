@@ -116,3 +116,4 @@ def test_corrected_commands_stand_under_their_header_and_in_its_unit() -> None:
     samples = pd.DataFrame([[10.0] * 6 + [1.0]], columns=[*(f"A{k} [deg]" for k in range(1, 7)), "X [mm]"])
     given = with_commands(samples, robot, [[0.1] * 6], [[0.0] * 3], [[]], [0.0], Units("rad", "m"))
     np.testing.assert_allclose(given[samples.columns[:6]].to_numpy(), np.rad2deg(0.1))
+    assert "X [mm]" not in given  # what was measured belongs to the old commands

@@ -229,7 +229,9 @@ def with_commands(
         if joint in commanded:
             own[name] = commanded[joint] / ((LENGTH_UNITS | ANGLE_UNITS)[unit] if unit else scales[joint])
     missed = {names.MISSED: np.asarray(direction) / units.angle_scale}
-    return _beside(samples.assign(**own), {**_known(std, outside, units), **missed})
+    measured = {column for column, (name, _) in called.items() if name in names.MEASURED or names.target_of(name)}
+    kept = samples[[name for name in samples.columns if str(name).strip() not in measured]]
+    return _beside(kept.assign(**own), {**_known(std, outside, units), **missed})
 
 
 def _known(std: ArrayLike, outside: Sequence[Sequence[str]], units: Units) -> dict[str, Any]:

@@ -210,3 +210,18 @@ def test_a_coupling_is_told_with_its_sign(sound, joint, other, sign):
     assert "coupled joints" in found.kinds
     names, word = sound.robot.joint_names, "plus" if sign > 0 else "minus"
     assert f"{names[joint]} holds {names[joint]} {word} {names[other]}" in found.what
+    assert ("Fanuc" in found.what) == ((joint, other, sign) == (2, 1, -1.0))
+
+
+@pytest.mark.parametrize(("by", "own"), [(-1, "x y z w"), (1, "w x y z")])
+def test_quaternions_under_headers_of_another_order_are_told_either_way(sound, by, own):
+    found = data_fault(replace(sound, orientation=np.roll(sound.orientation, by, axis=1)))
+    assert "quaternion order" in found.kinds
+    assert f"in the order {own}" in found.what
+    assert found.rms_after < 20.0 * NOISE
+
+
+def test_a_pair_of_faults_is_told_once(sound):
+    shifted = np.array(sound.q) + np.array([0.0, 0.0, np.pi, np.pi / 2, 0.0, 0.0])
+    pairs = data_fault(replace(sound, q=shifted)).what.split(", or ")
+    assert len({frozenset(pair.split(" and ")) for pair in pairs}) == len(pairs)

@@ -447,6 +447,7 @@ def _best(screen: Screen, tried: Sequence[Tried], before: float) -> list[Tried]:
         return []
     said = [_log_likelihood(t, scale) * struck.count for t in full]
     alike = [t for t, own in zip(full, said, strict=True) if own > max(said) - settings.TIE]
+    alike = [*{frozenset((p.kind.name, p.place) for p in t.fault): t for t in reversed(alike)}.values()][::-1]
     return sorted((t for t in alike if not any(_says_more(t, other) for other in alike)), key=_usual)
 
 

@@ -126,7 +126,8 @@ def _coupled(readings: Readings) -> Iterator[tuple[str, Repair]]:
     for j, k in permutations(range(len(names)), 2):
         if abs(j - k) == 1 and readings.robot.joint_types[j] != "prismatic" != readings.robot.joint_types[k]:
             for word, sign in (("minus", 1.0), ("plus", -1.0)):
-                place = f"{names[j]} holds {names[j]} {word} {names[k]}"
+                usual = ", as on a Fanuc's pendant" if (j, k, word) == (2, 1, "minus") else ""
+                place = f"{names[j]} holds {names[j]} {word} {names[k]} (coupled{usual})"
                 yield place, _changed([j, k], lambda two, s=sign: two + two[..., 1:] * [s, 0.0])  # type: ignore[misc]
 
 
@@ -158,7 +159,7 @@ JOINT_KINDS = (
         partial(_reversed, several=False),
     ),
     Kind("reversed joints", "{}", "change the sign of their columns", partial(_reversed, several=True)),
-    Kind("coupled joints", "the column of {} (coupled, as on a Fanuc's pendant)", "undo the coupling", _coupled),
+    Kind("coupled joints", "the column of {}", "undo the coupling", _coupled),
     Kind("exchanged joints", "the columns of {} are exchanged", "exchange their headers", _exchanged),
     Kind("degrees read as rad", "degrees are read as rad in {}", "convert them", partial(_scaled, factor=np.pi / 180)),
     Kind("rad read as degrees", "rad are read as degrees in {}", "convert them", partial(_scaled, factor=180 / np.pi)),
@@ -214,8 +215,10 @@ _CONJUGATE = np.array([1.0, -1.0, -1.0, -1.0])
 
 def _ordered(readings: Readings) -> Iterator[tuple[str, Repair]]:
     if readings.orientation is not None:
-        yield "x y z w", _turns_changed(lambda wxyz: np.roll(wxyz, 1, axis=-1))
-        yield "x y z w and conjugate", _turns_changed(lambda wxyz: np.roll(wxyz, 1, axis=-1) * _CONJUGATE)
+        for by, own, headed in ((1, "x y z w", "w x y z"), (-1, "w x y z", "x y z w")):
+            for also, sign in (("", np.ones(4)), (" and conjugate", _CONJUGATE)):
+                place = f"{own}{also} under headers in the order {headed}"
+                yield place, _turns_changed(lambda q, by=by, sign=sign: np.roll(q, by, axis=-1) * sign)  # type: ignore[misc]
 
 
 def _conjugate(readings: Readings) -> Iterator[tuple[str, Repair]]:
@@ -224,12 +227,12 @@ def _conjugate(readings: Readings) -> Iterator[tuple[str, Repair]]:
 
 
 ANGLES = {
-    "xyz": "rotations about fixed x, y, z",
-    "zyx": "rotations about fixed z, y, x",
-    "zyz": "rotations about fixed z, y, z",
-    "XYZ": "rotations about turning x, y, z",
-    "ZYX": "rotations about turning z, y, x",
-    "ZYZ": "rotations about turning z, y, z",
+    "xyz": "rotations about fixed x y z",
+    "zyx": "rotations about fixed z y x",
+    "zyz": "rotations about fixed z y z",
+    "XYZ": "rotations about turning x y z",
+    "ZYX": "rotations about turning z y x",
+    "ZYZ": "rotations about turning z y z",
     "rotvec": "a rotation vector",
 }
 """Three numbers that tell a turn, as SciPy names them, and in words."""
@@ -271,7 +274,7 @@ AXES = (
     Kind("mirrored axis", "the instrument's axis {} is mirrored", "change its sign", _mirrored),
 )
 TURNS = (
-    Kind("quaternion order", "quaternions stand in the order {}", "put the scalar first", _ordered),
+    Kind("quaternion order", "quaternions stand in the order {}", "set the headers right", _ordered),
     Kind(
         "conjugate quaternion",
         "quaternions turn the measurement frame into the target's, not back",
