@@ -54,3 +54,9 @@ def test_what_places_must_have_counts(run):
 def test_what_cannot_be_mapped_is_one_line(run, more, message):
     said = run(*more, status=2).err
     assert message in said.splitlines()[-1]
+
+
+def test_an_ending_that_is_no_picture_is_refused_before_the_map_is_made(run, tmp_path):
+    said = run(*LINE, "--figure", str(tmp_path / "q.xyz"), status=2).err
+    assert "q.xyz: is no picture by its ending; found .xyz, expected" in said
+    assert not (tmp_path / "map.parquet").exists()

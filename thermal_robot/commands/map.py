@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import re
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from thermal_robot.commands.shared import deliver
@@ -61,6 +62,7 @@ def run(options: argparse.Namespace) -> None:
     from thermal_robot.maps.figures import larger_is_better
     from thermal_robot.robot import load_robot
 
+    _require_picture(options.figure)
     robot = load_robot(options.robot, options.tool, root_frame=options.root)
     within = dict(_rule(rule) for rule in options.where)
     with counted(options.loudness) as show:
@@ -75,6 +77,16 @@ def run(options: argparse.Namespace) -> None:
         outputs.append((options.figure, lambda path: figure.savefig(path, dpi=150)))
     shown = _text(found, robot, best, options)
     deliver(options, outputs, shown, shown.partition("\n")[0])
+
+
+def _require_picture(figure: str | None) -> None:
+    """Refuse an ending that is no picture's, before anything is computed."""
+    from matplotlib.backend_bases import FigureCanvasBase
+
+    known = FigureCanvasBase.get_supported_filetypes()
+    ending = Path(figure or "").suffix.lower().removeprefix(".")
+    if ending and ending not in known:
+        raise CampaignError(str(figure), "is no picture by its ending", found=f".{ending}", expected=", ".join(known))
 
 
 def _over(options: argparse.Namespace) -> Any:
