@@ -20,6 +20,7 @@ from thermal_robot.campaign import (
     write_table,
 )
 from thermal_robot.errors import CampaignError
+from thermal_robot.robot import load_robot
 
 
 @pytest.mark.parametrize(
@@ -58,15 +59,15 @@ def test_samples_are_no_campaign_but_have_a_table(tmp_path: Path) -> None:
 def predicted(positions, orientations=None, units=None, outside=(), samples=None):
     rows = len(positions)
     frame = pd.DataFrame({"joint_1": np.arange(rows)}) if samples is None else samples
-    return with_prediction(
-        frame, positions, orientations, np.full((rows, 3), 1e-5), outside or [()] * rows, units or Units()
-    )
+    robot, std = load_robot("builtin:rv_m2", "tool0"), np.full((rows, 3), 1e-5)
+    return with_prediction(frame, robot, positions, orientations, std, outside or [()] * rows, units or Units())
 
 
 @pytest.mark.parametrize("ending", ["csv", "parquet"])
 def test_predictions(tmp_path: Path, ending: str) -> None:
     file, read = tmp_path / f"predicted.{ending}", pd.read_csv if ending == "csv" else pd.read_parquet
     samples = pd.DataFrame({"joint_1": ["0.10", "0.2"], "x": [9.0, 9.0], "note": ["a", "b, c"], " qw ": [1, 1]})
+    samples["Y [mm]"] = 9.0  # measured, too, by its header
     outside = [(), ("joint_1", "payload")]
     write_predictions(file, predicted([[1.0, 0.1, -0.25], [0, 0, 1]], None, Units("rad", "mm"), outside, samples))
     frame = read(file)

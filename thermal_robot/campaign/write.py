@@ -166,6 +166,7 @@ def write_table(campaign: Campaign, path: str | Path) -> None:
 
 def with_prediction(
     samples: pd.DataFrame,
+    robot: Robot,
     position: ArrayLike,
     orientation: ArrayLike | None,
     std: ArrayLike,
@@ -177,7 +178,9 @@ def with_prediction(
     Parameters
     ----------
     samples
-        N rows; their columns are kept as they stand, but for those of what is predicted.
+        N rows; their other columns are kept as they stand, but for those of measurements.
+    robot
+        Whose table it is.
     position, std
         (N, 3) m: of the target, and one standard deviation per axis.
     orientation
@@ -189,7 +192,7 @@ def with_prediction(
     """
     place = dict(zip(names.POSITION, np.asarray(position).T / units.length_scale, strict=True))
     turn = {} if orientation is None else dict(zip(names.ORIENTATION, np.asarray(orientation).T, strict=True))
-    return _beside(samples, {**place, **turn, **_known(std, outside, units)})
+    return _beside(samples, robot, {**place, **turn, **_known(std, outside, units)})
 
 
 def with_commands(
@@ -229,9 +232,7 @@ def with_commands(
         if joint in commanded:
             own[name] = commanded[joint] / ((LENGTH_UNITS | ANGLE_UNITS)[unit] if unit else scales[joint])
     missed = {names.MISSED: np.asarray(direction) / units.angle_scale}
-    measured = {column for column, (name, _) in called.items() if name in names.MEASURED or names.target_of(name)}
-    kept = samples[[name for name in samples.columns if str(name).strip() not in measured]]
-    return _beside(kept.assign(**own), {**_known(std, outside, units), **missed})
+    return _beside(samples.assign(**own), robot, {**_known(std, outside, units), **missed})
 
 
 def _known(std: ArrayLike, outside: Sequence[Sequence[str]], units: Units) -> dict[str, Any]:
@@ -240,10 +241,15 @@ def _known(std: ArrayLike, outside: Sequence[Sequence[str]], units: Units) -> di
     return {**columns, names.OUTSIDE: [" ".join(left) for left in outside]}
 
 
-def _beside(samples: pd.DataFrame, columns: dict[str, Any]) -> pd.DataFrame:
-    """Return samples with further columns; theirs of these names, and measured ones, are left out."""
-    taken = {*names.POSITION, *names.ORIENTATION, *columns}
-    return samples[[name for name in samples.columns if str(name).strip() not in taken]].assign(**columns)
+def _beside(samples: pd.DataFrame, robot: Robot, columns: dict[str, Any]) -> pd.DataFrame:
+    """Return samples with further columns; theirs of these names, and measured ones, whatever they are called, go."""
+    called = {heading.column: name for name, heading in headings(samples.columns, robot).items()}
+
+    def goes(column: str) -> bool:
+        name = called.get(column, column)
+        return name in names.MEASURED or names.target_of(name) is not None or column in columns
+
+    return samples[[name for name in samples.columns if not goes(str(name).strip())]].assign(**columns)
 
 
 def write_predictions(path: str | Path, predictions: pd.DataFrame) -> None:

@@ -372,7 +372,7 @@ class CorrectedModel:
         >>> list(model.predicted(table, model.prediction(table)).columns[-7:])
         ['x', 'y', 'z', 'std.x', 'std.y', 'std.z', 'outside']
         """
-        return with_prediction(samples, *prediction, self.settings.units)
+        return with_prediction(samples, self.robot, *prediction, self.settings.units)
 
     def prediction(self, samples: Campaign | str | Path | pd.DataFrame, *, noise: bool = False) -> Prediction:
         """Predict what the instrument would measure, and how far that may be off.
