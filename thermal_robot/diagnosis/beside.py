@@ -1,4 +1,7 @@
-"""Choose the systematic effects again where joints scatter, as scatter can be mistaken for a systematic effect."""
+"""Backward elimination and further terms beside the effects that were chosen: laws, events of rows, ripple.
+
+Effects are chosen again where joints scatter or encoders step, as either can be mistaken for a systematic effect.
+"""
 
 from __future__ import annotations
 

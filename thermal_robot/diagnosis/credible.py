@@ -184,6 +184,10 @@ def goes_astray(fit: Fit) -> float:
 def in_full(fit: Fit, progress: Callable[[str], None]) -> Fit:
     """Let fuller settings compete where a parameter is surely larger than 99 % of robots have.
 
+    Over part of its range two smooth shapes are nearly alike: where what a robot does is neither, their difference
+    follows it with amplitudes that no robot has. A setting of more shapes, none of which may be large, then explains
+    the same, and as much of the rows held out.
+
     The choice beside them stays unless rows held out are then predicted clearly worse; of more rows than ripple is
     looked for in, which would take minutes, nothing is asked.
     """

@@ -44,7 +44,10 @@ if TYPE_CHECKING:
 def most_informative(
     root: Array, frames: Array, count: int, alike: NDArray[np.int64] | None = None
 ) -> tuple[list[int], list[float]]:
-    """Choose candidates greedily, those that tell most about the parameters; with the information gained so far, nats.
+    """Greedy D-optimal Bayesian design beside unknown frames (Chaloner and Verdinelli, *Statistical Science* 10, 1995).
+
+    Each choice maximises I(y; θ) = I(y; θ, f) − I(y; f | θ), f the frames: half the difference of two log determinants,
+    given those before. Returned are the candidates, and the information gained so far, nats.
 
     ``root`` (K, m, p) and ``frames`` (K, m, f): root of the covariance of what is expected of each candidate's m
     components, in units of the noise, and of its part from the frames, were the parameters known. Of candidates with
