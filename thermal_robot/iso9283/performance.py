@@ -5,7 +5,7 @@ Tables are in mm and mrad, the poses below each other; their cells are texts, fo
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import asdict, dataclass
 from math import floor, isfinite, log10
 from textwrap import fill
@@ -82,13 +82,7 @@ def poses(found: Sequence[PoseCriteria]) -> Table:
 
 def turns(found: Sequence[PoseCriteria]) -> Table:
     """AP and RP of orientations; nothing where only positions are known."""
-    rows: list[list[Cell]] = [
-        [p.pose, *_of(p.accuracy.angles if p.accuracy else None), *_of(p.repeatability.angles)]
-        for p in found
-        if p.repeatability.angles is not None
-    ]
-    head = ["pose", "AP_a", "AP_b", "AP_c", "±RP_a", "±RP_b", "±RP_c"]
-    return _table("POSES: angles about the axes of the base, in mrad", head, rows)
+    return _turns("pose", "AP", "RP", ((p.pose, p) for p in found))
 
 
 def variations(found: Sequence[PoseCriteria]) -> Table:
@@ -129,13 +123,17 @@ def paths(found: Sequence[PathCriteria]) -> Table:
 
 def path_turns(found: Sequence[PathCriteria]) -> Table:
     """AT and RT of orientations; nothing where only positions are known."""
+    return _turns("path", "AT", "RT", ((p.path, p) for p in found))
+
+
+def _turns(what: str, accuracy: str, again: str, found: Iterable[tuple[str, PoseCriteria | PathCriteria]]) -> Table:
     rows: list[list[Cell]] = [
-        [p.path, *_of(p.accuracy.angles if p.accuracy else None), *_of(p.repeatability.angles)]
-        for p in found
+        [name, *_of(p.accuracy.angles if p.accuracy else None), *_of(p.repeatability.angles)]
+        for name, p in found
         if p.repeatability.angles is not None
     ]
-    head = ["path", "AT_a", "AT_b", "AT_c", "±RT_a", "±RT_b", "±RT_c"]
-    return _table("PATHS: angles about the axes of the base, in mrad", head, rows)
+    head = [what, *(f"{accuracy}_{axis}" for axis in "abc"), *(f"±{again}_{axis}" for axis in "abc")]
+    return _table(f"{what.upper()}S: angles about the axes of the base, in mrad", head, rows)
 
 
 def wrapped(sentence: str, indent: str) -> str:
