@@ -6,7 +6,6 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.diagnosis import settings
@@ -23,6 +22,7 @@ from thermal_robot.effects import Effect, gate, random_effects
 from thermal_robot.effects.apply import depends_on
 from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.effects.quantities import unit
+from thermal_robot.inference.algebra import rms
 from thermal_robot.inference.discover import Discovery
 from thermal_robot.inference.explain import log_priors
 from thermal_robot.inference.fit import Fit
@@ -199,9 +199,6 @@ def _gap(last: Conclusion, shrinkage: Shrinkage) -> Gap:
     fit = last.fit
     kept = ~fit.explanation.outliers
     before, after = fit.nominal.gap[kept], fit.corrected.gap[kept]
-
-    def rms(rows: NDArray[np.float64]) -> float:
-        return float(np.sqrt((rows**2).sum(axis=1).mean()))
 
     turned, schemes = before.shape[1] == 6, worst_folds(fit)
     return Gap(

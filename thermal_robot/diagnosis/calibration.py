@@ -13,6 +13,7 @@ from thermal_robot.diagnosis.deviations import as_remainder_says
 from thermal_robot.diagnosis.examine import Examined, examine
 from thermal_robot.diagnosis.findings import estimates, told_inside
 from thermal_robot.diagnosis.parts import Estimate
+from thermal_robot.inference.algebra import rms
 from thermal_robot.inference.fit import Fit
 from thermal_robot.teller import registered
 
@@ -182,5 +183,4 @@ def of_fit(fit: Fit, names: tuple[str, ...], warnings: tuple[str, ...]) -> Calib
 
 def _rms(gap: np.ndarray[tuple[int, ...], np.dtype[np.float64]]) -> tuple[float, float | None]:
     """Return the rms of the lengths of positions, and of turns where there are any."""
-    parts = [float(np.sqrt((gap[:, k : k + 3] ** 2).sum(axis=1).mean())) for k in range(0, gap.shape[1], 3)]
-    return parts[0], parts[1] if len(parts) > 1 else None
+    return rms(gap[:, :3]), rms(gap[:, 3:]) if gap.shape[1] > 3 else None

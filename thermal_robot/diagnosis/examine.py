@@ -107,7 +107,7 @@ def nearest(points: Array, count: int) -> tuple[Array, NDArray[np.int64]]:
 
 
 def too_many(fit: Fit, left: Remainder) -> tuple[float, str]:
-    """Return the p-value that so many rows are gross errors, and the reason.
+    """Return the p-value that so many rows are gross errors, which are few and do not care for pose or load; and why.
 
     Instruments spoil :data:`~thermal_robot.inference.settings.SPOILT` of the rows at most. Where the tails of the other
     rows are heavier than normal, the share that Student's law sets aside is added.

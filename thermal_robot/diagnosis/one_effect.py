@@ -25,7 +25,7 @@ from thermal_robot.effects.effect import Channel, Driver
 from thermal_robot.effects.gate import driver
 from thermal_robot.effects.quantities import quantities, unit
 from thermal_robot.errors import EffectError
-from thermal_robot.inference.algebra import orthonormal, without
+from thermal_robot.inference.algebra import orthonormal, rms, without
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.settings import FEW_LEVELS, TINY
@@ -128,7 +128,7 @@ def _error(observations: Observations, parameters: list[tuple[Parameter, float]]
         shift, turn = np.linalg.norm(main[:3]), np.linalg.norm(main[3:])
         if min(shift, turn) < settings.PURE:
             return twists @ main, direction, "m" if shift > turn else "rad"
-    size = float(np.sqrt((direction[:, :3] ** 2).sum(axis=1).mean()))
+    size = rms(direction[:, :3])
     return twists @ main * size, direction / max(size, 1e-300), "m at the tool"
 
 

@@ -17,6 +17,11 @@ def equations_of(columns: Array) -> Array:
     return columns.reshape(columns.shape[0] * columns.shape[1], columns.shape[2])
 
 
+def rms(vectors: Array) -> float:
+    """Root mean square of the lengths of vectors (N, k)."""
+    return float(np.sqrt((vectors**2).sum(axis=1).mean()))
+
+
 def whitener(gram: Array, floor: float = settings.SEEN) -> Array:
     """Return R (D, r) with Rᵀ G R = 1: it makes columns with the Gram matrix G (D, D) orthonormal.
 

@@ -30,6 +30,7 @@ from thermal_robot.diagnosis.parts import AnotherModel, Misfit
 from thermal_robot.effects import Effect
 from thermal_robot.errors import RobotError
 from thermal_robot.inference import settings as inference
+from thermal_robot.inference.algebra import rms
 from thermal_robot.inference.fit import Fit, fit
 from thermal_robot.inference.frames import middle, soft
 from thermal_robot.inference.random_gap import nothing_random
@@ -401,8 +402,7 @@ def _leaves(other: Misfit) -> float:
 def another_motion(fitted: Fit) -> Misfit | None:
     """Tell whether a fit leaves more than any robot errs: robot and table then do not describe the same motion."""
     left = fitted.corrected.gap[~fitted.explanation.outliers]
-    away = float(np.sqrt((left[:, :3] ** 2).sum(axis=1).mean()))
-    turned = float(np.sqrt((left[:, 3:] ** 2).sum(axis=1).mean()))
+    away, turned = rms(left[:, :3]), rms(left[:, 3:])
     if away > settings.ANOTHER_MOTION * fitted.campaign.reach:
         return Misfit(away=away)
     return Misfit(turned=turned) if turned > settings.ANOTHER_TURN else None
@@ -428,7 +428,7 @@ def unsettled(fit: Fit) -> str:
     elsewhere, as with errors so large that nothing is linear, their figures are not those of the model that is saved.
     """
     kept = ~fit.explanation.outliers
-    exact, linear = _rms(fit.corrected.gap[kept]), _rms(fit.explanation.remainder[kept])
+    exact, linear = rms(fit.corrected.gap[kept, :3]), rms(fit.explanation.remainder[kept, :3])
     if not fit.effects or exact <= diagnosis_settings.UNSETTLED * max(linear, inference.ROUNDING):
         return ""
     names = ", ".join(effect.name for effect, _ in fit.effects)
@@ -436,7 +436,3 @@ def unsettled(fit: Fit) -> str:
         f"the fit of {names} did not settle: its exact model leaves {exact:.3g} m where {linear:.3g} m were expected; "
         "nothing of it is told, and the model holds the frames alone"
     )
-
-
-def _rms(gap: Array) -> float:
-    return float(np.sqrt((gap[:, :3] ** 2).sum(axis=1).mean()))
