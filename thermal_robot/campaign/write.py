@@ -16,7 +16,7 @@ from thermal_robot.campaign import names
 from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.describe import described_html
 from thermal_robot.campaign.document import FILE_NAME
-from thermal_robot.campaign.recognise import headings
+from thermal_robot.campaign.recognise import Heading, headings
 from thermal_robot.campaign.table import NO_PARQUET, PARQUET, WITH_PARQUET
 from thermal_robot.campaign.targets import of_a_point
 from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS, Units, covariate_scale
@@ -192,7 +192,7 @@ def with_prediction(
     """
     place = dict(zip(names.POSITION, np.asarray(position).T / units.length_scale, strict=True))
     turn = {} if orientation is None else dict(zip(names.ORIENTATION, np.asarray(orientation).T, strict=True))
-    return _beside(samples, robot, {**place, **turn, **_known(std, outside, units)})
+    return _beside(samples, headings(samples.columns, robot), {**place, **turn, **_known(std, outside, units)})
 
 
 def with_commands(
@@ -224,7 +224,8 @@ def with_commands(
         Of the table's joints and lengths.
     """
     commanded = dict(zip(robot.joint_names, np.asarray(q).T, strict=True))
-    called = {heading.column: (joint, heading.unit) for joint, heading in headings(samples.columns, robot).items()}
+    found = headings(samples.columns, robot)
+    called = {heading.column: (joint, heading.unit) for joint, heading in found.items()}
     scales = {j: units.joint_scale(kind) for j, kind in zip(robot.joint_names, robot.joint_types, strict=True)}
     own = {}
     for name in map(str, samples.columns):
@@ -232,7 +233,7 @@ def with_commands(
         if joint in commanded:
             own[name] = commanded[joint] / ((LENGTH_UNITS | ANGLE_UNITS)[unit] if unit else scales[joint])
     missed = {names.MISSED: np.asarray(direction) / units.angle_scale}
-    return _beside(samples.assign(**own), robot, {**_known(std, outside, units), **missed})
+    return _beside(samples.assign(**own), found, {**_known(std, outside, units), **missed})
 
 
 def _known(std: ArrayLike, outside: Sequence[Sequence[str]], units: Units) -> dict[str, Any]:
@@ -241,9 +242,9 @@ def _known(std: ArrayLike, outside: Sequence[Sequence[str]], units: Units) -> di
     return {**columns, names.OUTSIDE: [" ".join(left) for left in outside]}
 
 
-def _beside(samples: pd.DataFrame, robot: Robot, columns: dict[str, Any]) -> pd.DataFrame:
+def _beside(samples: pd.DataFrame, found: Mapping[str, Heading], columns: dict[str, Any]) -> pd.DataFrame:
     """Return samples with further columns; theirs of these names, and measured ones, whatever they are called, go."""
-    called = {heading.column: name for name, heading in headings(samples.columns, robot).items()}
+    called = {heading.column: name for name, heading in found.items()}
 
     def goes(column: str) -> bool:
         name = called.get(column, column)
