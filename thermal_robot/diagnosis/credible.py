@@ -125,11 +125,10 @@ def _part(name: str, kind: str, place: str) -> tuple[str, str]:
 
 
 def _doubts(fit: Fit) -> Iterator[Doubt]:
-    large = outsized(fit)
     for pair in cancelling(fit):
         parts = (_part(name, *site) for name, site in zip(pair.effects, pair.sites, strict=True))
         yield Doubt(tuple(parts), pair.words, pair.times)
-    yield from (doubt for doubt in large if not doubt.impossible)
+    yield from (doubt for doubt in outsized(fit) if not doubt.impossible)
 
 
 def credible(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, Refused]]:
@@ -145,9 +144,8 @@ def credible(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, 
     weighed: set[tuple[tuple[str, str], ...]] = set()
     whole = fit.campaign.samples > settings.RIPPLE_ROWS
     most = settings.MOST_DOUBTS if fit.campaign.samples <= settings.ENOUGH_ROWS else 1
-    while most and (doubt := next((d for d in _doubts(fit) if d.parts not in weighed), None)):
+    while len(weighed) < most and (doubt := next((d for d in _doubts(fit) if d.parts not in weighed), None)):
         weighed.add(doubt.parts)
-        most -= 1
         progress(doubt.words)
         others = {part: less(fit, part[0], progress, "" if whole else part[1]) for part in doubt.parts}
         left = {part: goes_astray(other) for part, other in others.items()}
