@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 from scipy.special import expit, stdtrit
 
 from thermal_robot.arrays import Array
-from thermal_robot.diagnosis.held_out import held_out, schemes
+from thermal_robot.diagnosis.deviations import as_remainder_says
+from thermal_robot.diagnosis.held_out import schemes
 from thermal_robot.diagnosis.one_walk import Model, Walk
 from thermal_robot.diagnosis.parts import Refused
 from thermal_robot.effects.law import PREFIX
@@ -18,7 +19,7 @@ from thermal_robot.effects.law_words import is_event
 from thermal_robot.inference import settings
 from thermal_robot.inference.discover import discovered
 from thermal_robot.inference.explain import log_odds
-from thermal_robot.inference.fit import Fit, less
+from thermal_robot.inference.fit import Fit, less, refit
 from thermal_robot.inference.rows import blocks
 
 
@@ -105,44 +106,66 @@ def _earned(found: list[Gained]) -> Earned:
     return Earned(blocked, hardest, blocked.interval[0] > 0.0 and not harms, harms)
 
 
-def worth_their_word(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, Refused]]:
-    """Take effects and laws out of a fit one after another, the worst first, until all that stay earn their word.
+def pruned(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, Refused]]:
+    """Backward elimination by cross-validation: take terms out one after another, until all that stay obey one rule.
 
-    A law stays if it predicts rows held out better (:func:`~thermal_robot.diagnosis.earned.earned`) and the interval of
-    its share is above zero, which is not asked of an event, as that shows in few blocks of rows. A known effect stays
-    unless it predicts them worse, or is less than nine times as probable as nothing in its place. Refused, by name: its
-    probability by its prior and the rows held out alone, and its share there; of one in question, its probability.
+    An effect or a law stays where it is nine times as probable as nothing in its place, predicts rows held out no worse
+    (a law, but an event: better, by the interval of its gain), and something of it is determined. Of those that do not,
+    the one goes first that brings rows held out least. Refused, by name: its probability, and its share where rows held
+    out speak against it.
     """
     refused: dict[str, Refused] = {}
+    exact = True
     while True:
-        judged = {name: e for name, e in earned(fit).items() if e.harms or (name.startswith(PREFIX) and not e.helps)}
-        laws = {law.name for law, _ in fit.effects if law.name.startswith(PREFIX) and not is_event(law)}
-        if not judged and laws:
-            shares = held_out(fit).shares
-            judged = {name: e for name, e in earned(fit).items() if name in laws and shares[name][1][0] <= 0.0}
-        faint = {} if judged else in_question(fit)
-        if not judged and not faint:
+        out = _failing(fit, progress) if fit.effects else None
+        if out is None and exact:
             return fit, refused
-        if judged:
-            worst = min(judged, key=lambda name: judged[name].blocked.share)
-            progress(f"rows held out refuse {worst}")
-        else:
-            worst = min(faint, key=lambda name: faint[name])
-            progress(f"{worst} stays in question")
-        if not worst.startswith(PREFIX):
-            refused[worst] = _refused(fit, judged[worst]) if judged else Refused(fit.probability(worst))
-        fit = less(fit, worst, progress)
+        if out is None:
+            fit, exact = refit(fit, {}, (), progress), True
+            continue
+        name, why = out
+        if not name.startswith(PREFIX):
+            refused[name] = why
+        fit, exact = less(fit, name), False
 
 
-def in_question(fit: Fit) -> dict[str, float]:
-    """Return by name the effects and laws of a fit that are little more probable than nothing in their place: the odds.
+def _failing(fit: Fit, progress: Callable[[str], None]) -> tuple[str, Refused] | None:
+    """Return the term that goes first, of those that do not obey the rule, and what speaks against it."""
+    table, odds, sure = earned(fit), in_place(fit), determined(fit)
+    laws = {law.name for law, _ in fit.effects if law.name.startswith(PREFIX) and not is_event(law)}
+    poor = {name for name, e in table.items() if e.harms or (name in laws and not e.helps)}
+    out = poor | {name for name in table if odds[name] < settings.NAMING_ODDS or name not in sure}
+    if not out:
+        return None
+    worst = min(out, key=lambda name: table[name].blocked.share)
+    why = "rows held out refuse" if worst in poor else "in question:" if worst in sure else "nothing determines"
+    progress(f"{why} {worst}")
+    return worst, _refused(fit, table[worst]) if worst in poor else Refused(fit.probability(worst))
 
-    What others could do in its place does not count here: two of which one is at work are told as confounded. A law
-    goes, too, that is far less probable than those that follow something else, or elsewhere.
+
+def in_place(fit: Fit) -> dict[str, float]:
+    """Return by name the odds of each effect and law against nothing in its place; of a law also against its rivals.
+
+    What others could do in its place does not count: two of which one is at work are told as confounded. A law says
+    what it follows, and where: it is no surer than that.
     """
     odds = {name: fit.odds(name) for name in fit.names_of(fit.explanation.best)}
-    unlikely = {d.law.name: d.probability for d in discovered(fit) if d.probability * settings.NAMING_ODDS < 1.0}
-    return {name: own for name, own in odds.items() if own < settings.NAMING_ODDS} | unlikely
+    told = {d.law.name: d.probability for d in discovered(fit)}
+    return {name: min(own, settings.NAMING_ODDS**2 * told.get(name, 1.0)) for name, own in odds.items()}
+
+
+def determined(fit: Fit) -> set[str]:
+    """Return the effects and laws of a fit of which the data determine something, whatever the remainder is.
+
+    Along one principal axis of its posterior at least, less than half of the prior's standard deviation is left.
+    """
+    e, found = as_remainder_says(fit).explanation, set()
+    for b in e.best.blocks:
+        prior = e.linear.blocks[b].sizes * e.best.scales[b]
+        least = np.linalg.eigvalsh(e.values[b][1] / np.outer(prior, prior))[0]
+        if least < settings.DETERMINED**2:
+            found.add(fit.families[b])
+    return found
 
 
 def _refused(fit: Fit, judged: Earned) -> Refused:

@@ -33,6 +33,9 @@ LANDMARKS = 100
 """Rows that stand for all in a discrepancy of very many (Nyström): smooth functions need no more."""
 NYSTROM_FLOOR, SMOOTH_FLOOR = 1e-6, 1e-9
 """Of the largest eigenvalue, and of the noise's variance: directions of a discrepancy below are rounding."""
+NO_BACKGROUND = ("approach", "torque", "velocity", "acceleration", "order", "time", "temperature")
+"""Quantities that drive known effects of a joint, by how their names begin: a function of one is that effect, no
+background. Positions and conditions stay, as what nobody listed follows them."""
 COSINES = 5
 """Functions of each quantity in the discrepancy of places: with amplitudes 1/k² further ones bring 1 %."""
 ERROR_AT_JOINT, ERROR_ELSEWHERE = 3e-4, 1e-4
@@ -139,6 +142,8 @@ FIT_STEPS = 12
 """Gauss-Newton steps at most: quadratic convergence needs four."""
 STEP_PARTS = tuple(0.25**k for k in range(4))
 """Of a Gauss-Newton step: how much of it is taken, the first that betters the fit; where none does, it ends there."""
+SELECTIONS = 3
+"""Choices among all terms that one diagnosis makes: of known effects, then with what nobody listed, once more beside it."""
 REVISIONS = 3
 """Times that a choice is made again at its own exact fit."""
 MANY_ROWS = 500
