@@ -53,7 +53,9 @@ def _ripple(fit: Fit) -> JointRipple | None:
     if JointRipple.name not in fit.variants or fit.campaign.samples > settings.RIPPLE_ROWS:
         return None
     found = waves(fit)
-    return None if alike(found, next((e for e, _ in fit.effects if isinstance(e, JointRipple)), JointRipple())) else found
+    return (
+        None if alike(found, next((e for e, _ in fit.effects if isinstance(e, JointRipple)), JointRipple())) else found
+    )
 
 
 def as_laws_say(left: Unexplained, found: Sequence[Discovery], discrepancy: Discrepancy) -> Unexplained:

@@ -164,7 +164,7 @@ def _concluded(
 
 
 def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
-    """Let terms that nobody listed join the known effects, prune all by one rule, then ask what of the rest is random."""
+    """Let terms that nobody listed join the known effects, prune by one rule, then ask what is random."""
     fit = known
     for number in range(1, settings.SELECTIONS):
         wider = grown(fit, number, progress)

@@ -211,19 +211,6 @@ def harmed(schemes: Sequence[FoldScheme]) -> FoldScheme | None:
     return next((s for s in schemes if s.name in ("session", "region") and s.shrinkage < 0.0), None)
 
 
-def worse_elsewhere(narrow: Fit, wider: Fit) -> bool:
-    """Tell whether a wider explanation overfits: whether it is worse on held-out regions of joint space."""
-    kept = ~(narrow.explanation.outliers | wider.explanation.outliers)
-    rows, tests = blocks(narrow.campaign), each(neighbourhoods(narrow.campaign, settings.FOLDS))
-    left = []
-    for fit in (narrow, wider):
-        walk = Walk.over(replace(Model.of(fit.explanation, rows), kept=kept), tests)
-        if not walk.tests:
-            return False
-        left.append(walk.squares(range(len(fit.effects))).total / walk.rows)
-    return left[1] > settings.WORSE_ELSEWHERE**2 * left[0]
-
-
 def schemes(fit: Fit) -> Iterator[tuple[str, str, list[Rows]]]:
     """Yield name and description of each scheme, and a mask (N,) of the rows that each of its folds holds out."""
     campaign = fit.campaign

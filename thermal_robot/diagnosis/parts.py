@@ -139,14 +139,11 @@ class Finding:
 class Refused:
     """An effect that was taken out of the fit again: its probability, and what it brings rows held out as a share.
 
-    The share is ``None`` where it is the scatter of joints that had feigned it, or where another effect stands for it;
-    ``reason`` is a sentence that tells a reader why, or empty; ``place`` is where only that one of it was taken out.
+    The share is ``None`` where the scatter of joints had feigned it, or where it stayed in question.
     """
 
     probability: float
     share: float | None = None
-    reason: str = ""
-    place: str = ""
 
 
 @dataclass(frozen=True)

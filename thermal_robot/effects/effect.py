@@ -24,7 +24,7 @@ A new effect is a file like this one::
 Register it under the entry point group ``thermal_robot.effects`` or pass it to :func:`thermal_robot.diagnose`. What
 others want to know of it stands in the same class, each with a default: ``title`` (in plain words), ``size_spread``
 (how well its sizes are known), ``frame`` and ``contained_in`` (what it cannot be told from), ``missing`` and ``reads``
-(columns), ``variants``, ``nearby`` and ``in_full`` (settings), ``driver`` (what it is drawn against), ``sized_as``
+(columns), ``variants`` and ``nearby`` (settings), ``driver`` (what it is drawn against), ``sized_as``
 (whether what it does in each joint is told), ``unfaded`` (where it is not known to go on). Every effect has the
 arguments ``places`` and ``excluded`` besides its own: only the parameters in these joints or links, or not in those,
 are kept, by the gate.
@@ -307,13 +307,6 @@ class Effect(ABC):
         appear here stays where :meth:`variants` put it.
         """
         return (self,)
-
-    def in_full(self) -> Effect | None:
-        """Return a setting of more parameters, each held to its expected size; ``None`` where there is none.
-
-        It is tried where a parameter comes out larger than nearly all robots have, as one that stands in for others.
-        """
-        return None
 
     def at(self, place: str) -> Effect | None:
         """Return the effect in one joint or link alone; ``None`` where it is to have no such setting.

@@ -8,7 +8,6 @@ from itertools import islice
 
 import numpy as np
 
-from thermal_robot.effects import Effect
 from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of, orthonormal, without

@@ -121,9 +121,7 @@ def refit(
     whole = {name: own for name, own in {**known.variants, **variants}.items() if own}
     own = [effect for effect, _ in known.effects if effect.name in whole]
     begun = [list(one) for one in starts] or [own]
-    settled = settle(
-        known.corrected, whole, progress, held=known.effects, before=known.explanation, starts=begun
-    )
+    settled = settle(known.corrected, whole, progress, held=known.effects, before=known.explanation, starts=begun)
     return _fitted(known.campaign, settled, known.needs, whole)
 
 

@@ -31,7 +31,7 @@ from scipy.special import erfcx, log_ndtr
 from thermal_robot.arrays import Array
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
-from thermal_robot.inference.evidence import Combination, Gram, evidence
+from thermal_robot.inference.evidence import Combination, Gram, beside, evidence
 
 _Sides = tuple[NDArray[np.int64], Array, Array]
 _NO_SIDES: _Sides = np.zeros(0, dtype=int), np.zeros(0), np.zeros(0)
@@ -64,6 +64,8 @@ def gains(gram: Gram, base: Combination, blocks: Sequence[int]) -> list[tuple[in
     freedom = gram.equations + gram.noise_dof
     rest = (gram.noise_dof + gram.total - float(gram.vector[used] @ values)) / freedom
     rest = max(rest, settings.LEAST_VARIANCE * base.noise**2)
+    held = list(base.blocks)
+    scales = np.log([base.scales[b] for b in held])
     result = []
     for alike in _padded([_beside(gram, base, own, used, left, covariance) for own in _by_width(gram, blocks)]):
         left_over = np.full((len(alike.blocks), len(log_scale)), rest)
@@ -73,9 +75,9 @@ def gains(gram: Gram, base: Combination, blocks: Sequence[int]) -> list[tuple[in
             np.add(left_over[:, :, None], seen, out=part)
             taken = np.divide(told, part, out=part).sum(axis=2) / freedom
             left_over = np.maximum(rest - taken, settings.LEAST_VARIANCE * rest)
-        spread = gram.spreads[alike.blocks][:, None]
+        about, spread = beside(gram.spreads[held], scales, gram.spreads[alike.blocks][:, None])
         log = -0.5 * np.log1p(np.divide(seen, left_over[:, :, None], out=part), out=part).sum(axis=2)
-        log -= 0.5 * (log_scale / spread) ** 2 + np.log(np.sqrt(2.0 * np.pi) * spread / step)
+        log -= 0.5 * ((log_scale - about) / spread) ** 2 + np.log(np.sqrt(2.0 * np.pi) * spread / step)
         log -= 0.5 * freedom * np.log(left_over / rest)
         if gram.most is not None:
             log[log_scale > np.log(gram.most[alike.blocks])[:, None]] = -np.inf
@@ -398,7 +400,9 @@ class Search:
         best = self.evaluate(blocks)
         while True:
             names = {families[b]: b for b in best.blocks}
-            swaps = [(names[f], b) for b, f in enumerate(families) if f in names and b != names[f] and b not in self.out]
+            swaps = [
+                (names[f], b) for b, f in enumerate(families) if f in names and b != names[f] and b not in self.out
+            ]
             tried = [tuple(sorted((set(best.blocks) - {old}) | {new})) for old, new in swaps]
             near = (self.evaluate(c, best) for c in tried if self.allowed(c))
             found = max(near, key=lambda c: c.log_evidence, default=best)

@@ -9,6 +9,9 @@ import numpy as np
 
 PRIOR_PROBABILITY = 1.0 / 6.0
 """That an effect is at work, random ones too: two or three of sixteen; a probe named 2 to 5 on nine real robots."""
+COARSENESS = 1.0
+"""Standard deviation of ln κ, the factor that all expected sizes of one robot share: an arm that is three times as coarse
+as catalogues say in one respect is in the others, as servo arms and series elastic ones are, and fine arms are fine."""
 IN_ALL, ONE_MORE = 1.0 / 3.0, 0.5
 """Share of an effect's probability that it is in all its places, and that it is in one; each further one halves it, so
 that all shares sum to one."""
@@ -143,7 +146,7 @@ FIT_STEPS = 12
 STEP_PARTS = tuple(0.25**k for k in range(4))
 """Of a Gauss-Newton step: how much of it is taken, the first that betters the fit; where none does, it ends there."""
 SELECTIONS = 3
-"""Choices among all terms that one diagnosis makes: of known effects, then with what nobody listed, once more beside it."""
+"""Choices among all terms that one diagnosis makes: of the known effects, then twice with what nobody listed."""
 REVISIONS = 3
 """Times that a choice is made again at its own exact fit."""
 MANY_ROWS = 500
@@ -211,8 +214,6 @@ LINK_QUANTITIES = 6
 SHAPED, LEFT_OUT, COMPARED_LAWS = 6, 4, 8
 """Candidates of each remainder whose shape is looked at; effects of an explanation, up to which a law is looked for in
 the remainder without each of them; and candidates that are compared jointly with the known effects."""
-MOST_LAWS = 4
-"""Laws of one campaign: a fifth no longer helps anybody to find the cause."""
 FEWEST_LEFT = 5
 """Equations that must be left beside a law for a test of it."""
 LAW_FLOOR = 1e-6
@@ -230,9 +231,9 @@ LATTICE = 1e-3
 """Of their spacing: positions that lie on a lattice to within this cannot tell an order from its alias."""
 LOWEST_RIPPLE = 2.5
 """Orders a turn from which a wave is ripple: what comes round once or twice is an eccentric or oval wheel."""
-RIPPLE_ROWS, MOST_WAVES, WAVES_REFUSED, RIPPLE_ROUNDS = 5000, 30, 2, 3
+RIPPLE_ROWS, MOST_WAVES, WAVES_REFUSED = 5000, 30, 2
 """Rows up to which ripple is looked for: 12 000 took nine minutes and 5.6 GiB; waves of one robot, five a joint; waves
-of each joint that may do harm in rows held out before none is tried any more; times that all is chosen, at most."""
+of each joint that may do harm in rows held out before none is tried any more."""
 SAME_ORDER = 0.05
 """Orders that differ by less are one: over a whole turn 0.3 rad of phase, a few hundredths of the wave's square."""
 SLIP_SHARES = (0.03, 1.0)
@@ -352,8 +353,6 @@ STEP_BANDS, STEP_PHASES, STEP_HARMONICS = 12, 32, 8
 """Bands of frequency, 5 % each, in which errors count in one step; phases; harmonics that such a slack leaves."""
 STEP_POSES, MOST_ANGLES = 200, 100_000_000
 """Poses of a search for steps, more only say it more surely, and poses times frequencies: some seconds of time."""
-STEPS_REACH = 12.0
-"""Log odds above which an effect is not tried again without it: steps would have to be plain in several joints."""
 FLAT = 12.0
 """Square of a step over the variance of the errors that rounding to it makes: those of an even distribution."""
 
@@ -385,14 +384,8 @@ FRAME_DETERMINED = 1e-9
 """Of the strongest direction of the frames: weaker ones are not determined without the rows held out."""
 FRAME_PRIOR = 1e-12
 """Of a frame's own information, added to it, so that what nothing determines stays where it is."""
-CANCELLING, CANCELLING_PAIR = 5.0, 10.0
-"""Times the sum of an effect's parts: single ones that are larger cancel each other; and of two effects' parts, which
-may well oppose each other, as gears that run out and a link that bends do."""
 FRAGILE = 1e-3
 """Probability of the verdict with other prior sizes, below which that is said: nobody knows them to a factor of 3."""
-OUTSIDE, MOST_DOUBTS = 30.0, 8
-"""Times an expected size that stands on sources: seven deviations of its logarithm, as no robot is known to be. Parts
-of effects weighed against a choice without them, one above ENOUGH_ROWS: each takes tens of seconds from 1000 rows."""
 CONTRADICTED, AGAINST_GRAVITY = 0.01, -0.5
 """rad or m: no settled servo is as far from its command. Correlation of torque and weight that a wrong sign makes."""
 STATED_TOO_LARGE = 0.5

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.effects import Effect, gate
@@ -138,9 +137,7 @@ def _explanation(
     )
 
 
-def at_exact_model(
-    observations: Observations, blocks: Sequence[Block], held: Sequence[tuple[Effect, Array]]
-) -> Linear:
+def at_exact_model(observations: Observations, blocks: Sequence[Block], held: Sequence[tuple[Effect, Array]]) -> Linear:
     """Return the linear problem at the exact model: its gap, and what the effects that it holds have moved."""
     moved = (block(observations, effect).columns @ values for effect, values in held)
     gap = observations.gap + sum(moved, np.zeros_like(observations.gap))
