@@ -45,6 +45,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import numpy as np
 
 from thermal_robot.arrays import Array
+from thermal_robot.effects.settings import SIZE_MOST
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -234,7 +235,7 @@ class Effect(ABC):
     size_spread: ClassVar[float] = SOURCED
     """How firmly the expected sizes of its parameters are known: standard deviation of the logarithm of their common
     factor, which is learnt from the data."""
-    size_most: ClassVar[float] = float("inf")
+    size_most: ClassVar[float] = SIZE_MOST
     """Times the expected sizes, to which that factor may grow: what no robot reaches is as improbable then as it is."""
     random: ClassVar[bool] = False
     """Whether it scatters: no mean follows from it; see :class:`thermal_robot.effects.random_effect.RandomEffect`."""

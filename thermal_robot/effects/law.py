@@ -67,7 +67,6 @@ class Discovered(Fading):
 
     title: ClassVar[str] = "an unlisted law"
     size_spread: ClassVar[float] = UNSOURCED
-    size_most: ClassVar[float] = settings.LAW_MOST
     name: str = PREFIX + "1"  # type: ignore[misc]
     kind: Annotated[str, word(("joint", "link", "base", "tool"))] = "joint"
     place: str = ""

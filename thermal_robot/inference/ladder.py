@@ -76,8 +76,9 @@ class Ladder:
         found._priors, found._sizes = dict(self._priors), dict(self._sizes)
         found._quick = {key: log for key, log in self._quick.items() if not out & set(key[1])}
         found._settled = {key: own for key, own in self._settled.items() if not out & set(key[1])}
-        found._out = out
-        found.searches = {rung: search.without(out) for rung, search in self.searches.items()}
+        found._out = self._out | out
+        left = {rung: search.without(out) for rung, search in self.searches.items()}
+        found.searches = {rung: search for rung, search in left.items() if search.seen or rung == PLAIN}
         return found
 
     def _consider(self, form: Form, log_prior: float) -> int:
