@@ -89,3 +89,7 @@ def test_what_a_campaign_lacks_is_said(campaign):
         fit_named(bare, [named("thermal_elongation")])
     with pytest.raises(EstimationError, match="different poses are too few"):
         fit_named(campaign.take(np.arange(4)), [JointOffset()])
+    two = np.arange(campaign.samples) % 2
+    held = replace(campaign, q=campaign.q[two] + 1e-4 * np.sin(campaign.q), labels={"pose": two.astype(str)})
+    with pytest.raises(EstimationError, match=r"^2 different poses are too few"):
+        fit_named(held, [JointOffset()])

@@ -1,5 +1,7 @@
 """What errors of a joint follow: steps of their command, a recorded quantity, or nothing."""
 
+import tracemalloc
+
 import numpy as np
 import pytest
 
@@ -122,6 +124,11 @@ def test_too_many_steps_say_nothing_and_one_command_has_one_error():
     assert (fine.step, fine.log_factor) == (1e-7, 0.0)
     still = period(sawtooth(command), variances(0.0, 150), np.full(150, 0.3), STEP)
     assert still.log_factor < np.log(1e-4)
+    # 1.6 million steps between seven commands: their frequencies would take 2.5 GB
+    tracemalloc.start()
+    assert period(sawtooth(command[:7] * 1e3), variances(1e-4, 7), command[:7] * 1e3, STEP).log_factor == 0.0
+    assert tracemalloc.get_traced_memory()[1] < 1e8
+    tracemalloc.stop()
 
 
 def test_steps_do_not_depend_on_where_commands_begin_nor_on_the_unit():

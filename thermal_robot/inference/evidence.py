@@ -11,8 +11,8 @@ the stated noise, and log-normal about the stated sizes, with a factor κ that a
 
     ln λ_b ~ N(ln κ, σ_b²) ,  ln κ ~ N(0, σ_κ²) ,  so that  ln λ ~ N(0, C) ,  C = diag(σ_b²) + σ_κ² 11ᵀ ,
 
-cut off where no robot reaches; ln λ is integrated out by Laplace's method, s held. Parameters that cannot be negative have half a normal prior
-(:mod:`thermal_robot.inference.posterior`).
+cut off where no robot reaches; ln λ is integrated out by Laplace's method, s held. Parameters that cannot be negative
+have half a normal prior (:mod:`thermal_robot.inference.posterior`).
 """
 
 from __future__ import annotations
@@ -37,8 +37,8 @@ class Gram:
     G (D, D), b (D,) and y'y are ``matrix``, ``vector`` and ``total``; each block, reduced to what the data see of it
     (``ranks``), has D_b columns (``slices``), of which ``bases`` (P_b, D_b) are the parameter values. ``positive`` (D,)
     cannot be negative: each is then a parameter. ``spreads`` (B,): prior standard deviation of ln λ − ln κ; ``most``
-    (B,): λ at most. ``equations`` n is less the rank of the frames; ``noise_dof`` holds the whitening noise, 0 where it is not
-    known; ``offset`` is the log evidence that all combinations share: −½ log of the determinants of the rows'
+    (B,): λ at most. ``equations`` n is less the rank of the frames; ``noise_dof`` holds the whitening noise, 0 where it
+    is not known; ``offset`` is the log evidence that all combinations share: −½ log of the determinants of the rows'
     covariance and of the frames, and the log prior of that covariance.
     """
 
@@ -133,7 +133,7 @@ def evidence(
 
 @dataclass(frozen=True, eq=False)
 class Alike:
-    """Prior N(0, C) of B logarithms of scales that have the factor κ in common: C⁻¹ (``tight``), and R with C = R Rᵀ."""
+    """Prior N(0, C) of B logarithms of scales that share the factor κ: C⁻¹ (``tight``), and R with C = R Rᵀ."""
 
     tight: Array
     root: Array
@@ -146,7 +146,7 @@ class Alike:
 
 
 def beside(spread: Array, log_scale: Array, own: Array) -> tuple[float, Array]:
-    """Return mean, and standard deviations, of ln λ of further blocks beside B known ones: N(0, C) conditioned on these.
+    """Return mean and standard deviations of ln λ of further blocks: N(0, C) given those of B known ones.
 
     ``spread`` and ``log_scale`` (B,) are those of the known blocks, ``own`` (K,) the spreads of the further ones.
     """

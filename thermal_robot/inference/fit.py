@@ -9,7 +9,6 @@ import numpy as np
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
-from thermal_robot.campaign.settings import STILL
 from thermal_robot.effects import Effect, gate
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
@@ -19,6 +18,7 @@ from thermal_robot.inference.explain import Explanation
 from thermal_robot.inference.frames import register
 from thermal_robot.inference.gauss_newton import gauss_newton
 from thermal_robot.inference.problem import Linear
+from thermal_robot.inference.rows import near_repeats
 from thermal_robot.inference.settle import Settled, settle
 from thermal_robot.observations import Observations, observe
 
@@ -140,7 +140,7 @@ def _fitted(
 
 def require_enough(campaign: Campaign) -> None:
     """Refuse a campaign that leaves nothing to tell effects by once the frames are fitted and a fold is held out."""
-    poses = len(np.unique(np.round(campaign.q / STILL), axis=0))
+    poses = len(np.unique(near_repeats(campaign)))  # rows of one label are one, however a held joint jitters
     unknown, measures = len(unknown_frames(campaign)), campaign.orientation is not None
     fewest = -(-(unknown + settings.SPARE_EQUATIONS) // (6 if measures else 3)) + 2
     if poses < fewest:

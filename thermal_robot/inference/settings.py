@@ -10,8 +10,8 @@ import numpy as np
 PRIOR_PROBABILITY = 1.0 / 6.0
 """That an effect is at work, random ones too: two or three of sixteen; a probe named 2 to 5 on nine real robots."""
 COARSENESS = 1.0
-"""Standard deviation of ln κ, the factor that all expected sizes of one robot share: an arm that is three times as coarse
-as catalogues say in one respect is in the others, as servo arms and series elastic ones are, and fine arms are fine."""
+"""Standard deviation of ln κ, the factor that all expected sizes of one robot share: an arm three times as coarse as
+catalogues say in one respect is so in the others, as servo arms and series elastic ones are, and fine arms are fine."""
 IN_ALL, ONE_MORE = 1.0 / 3.0, 0.5
 """Share of an effect's probability that it is in all its places, and that it is in one; each further one halves it, so
 that all shares sum to one."""
@@ -352,7 +352,8 @@ STEP_SLACKS = (0.05, 0.1, 0.2)
 STEP_BANDS, STEP_PHASES, STEP_HARMONICS = 12, 32, 8
 """Bands of frequency, 5 % each, in which errors count in one step; phases; harmonics that such a slack leaves."""
 STEP_POSES, MOST_ANGLES = 200, 100_000_000
-"""Poses of a search for steps, more only say it more surely, and poses times frequencies: some seconds of time."""
+"""Poses of a search for steps, more only say it more surely; and that many, fewer or not, times frequencies: some
+seconds of time, and 0.2 GB for so many frequencies."""
 FLAT = 12.0
 """Square of a step over the variance of the errors that rounding to it makes: those of an even distribution."""
 
