@@ -10,7 +10,6 @@ from numpy.typing import NDArray
 from scipy.special import expit, stdtrit
 
 from thermal_robot.arrays import Array
-from thermal_robot.diagnosis.deviations import as_remainder_says
 from thermal_robot.diagnosis.held_out import schemes
 from thermal_robot.diagnosis.one_walk import Model, Walk
 from thermal_robot.diagnosis.parts import Refused
@@ -155,11 +154,11 @@ def in_place(fit: Fit) -> dict[str, float]:
 
 
 def determined(fit: Fit) -> set[str]:
-    """Return the effects and laws of a fit of which the data determine something, whatever the remainder is.
+    """Return the effects and laws of a fit of which the data determine something.
 
     Along one principal axis of its posterior at least, less than half of the prior's standard deviation is left.
     """
-    e, found = as_remainder_says(fit).explanation, set()
+    e, found = fit.explanation, set()
     for b in e.best.blocks:
         prior = e.linear.blocks[b].sizes * e.best.scales[b]
         least = np.linalg.eigvalsh(e.values[b][1] / np.outer(prior, prior))[0]

@@ -141,10 +141,11 @@ FIRST_ROUNDS = 5
 """Rounds of choice, outliers and noise at most: they settle after two or three."""
 MOST_LEVERAGE = 0.999
 """Largest leverage, the share of the equations that a fit takes up, with which its residual tells the noise."""
-FIT_STEPS = 12
-"""Gauss-Newton steps at most: quadratic convergence needs four."""
-STEP_PARTS = tuple(0.25**k for k in range(4))
-"""Of a Gauss-Newton step: how much of it is taken, the first that betters the fit; where none does, it ends there."""
+FIT_STEPS = 30
+"""Gauss-Newton steps at most: quadratic convergence needs four, a curved valley of a robot with large errors many."""
+DAMPINGS = (0.0, 1e-4, 1e-3, 1e-2, 1e-1, 1.0)
+"""Of a step's information, added to it (Marquardt, *J. SIAM* 11, 1963): the first that betters the fit is taken; where
+none does, it ends there."""
 SELECTIONS = 3
 """Choices among all terms that one diagnosis makes: of the known effects, then twice with what nobody listed."""
 REVISIONS = 3
