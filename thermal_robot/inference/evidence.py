@@ -142,7 +142,7 @@ class Alike:
     def of(cls, spread: Array) -> Alike:
         """Return it for scales that have the standard deviations ``spread`` (B,) about κ."""
         covariance = np.diag(spread**2) + settings.COARSENESS**2
-        return cls(np.asarray(np.linalg.inv(covariance)), np.linalg.cholesky(covariance))
+        return cls(np.asarray(np.linalg.inv(covariance)), np.asarray(np.linalg.cholesky(covariance)))
 
 
 def beside(spread: Array, log_scale: Array, own: Array) -> tuple[float, Array]:
