@@ -340,10 +340,9 @@ SCATTER_LAW_SHARE = 0.15
 """Of a scatter that a smooth law must explain to make it none."""
 STEPS_HIDDEN = 0.05
 """Chance that steps stay hidden where they should show, as another joint errs too: nothing speaks e³ against them."""
-RIVALS_ONCE, RIVALS_AGAIN = 2.0, 0.1
-"""Prior odds of other causes against an encoder, in a joint that errs anew from pose to pose: of poses measured once,
-wear and what nobody recorded, each as probable; of what later visits find again, a ripple of the gear too fine for its
-period to be looked for."""
+RIVALS = 2.0
+"""Prior odds of other causes against an encoder, in a joint that errs anew from pose to pose: wear or a ripple too fine
+for its period to be looked for, and what nobody recorded, each as probable."""
 STEP_SURE = 3.0
 """Logarithm of a Bayes factor, 20 to 1, from which a step is measured by its period, no more by the errors' size."""
 BAND = 1.35
