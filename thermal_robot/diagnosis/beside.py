@@ -28,22 +28,22 @@ from thermal_robot.inference.robust import Noise
 def grown(fit: Fit, number: int, progress: Callable[[str], None]) -> Fit | None:
     """Forward selection: let terms that nobody listed compete with all known effects; ``None`` if none pays.
 
-    Terms are generated from what the fit leaves: events, and where there are none, waves of the joints and laws of any
-    quantity at any place. One law more joins a fit at a time, as ``discovered.<number>``.
+    Terms are generated from what the fit leaves: events, waves of the joints, and laws of any quantity at any place. One
+    event or law more joins a fit at a time, as ``discovered.<number>``.
     """
     progress(f"causes that nobody listed: scan {number}")
     held = [effect for effect, _ in fit.effects]
     laws = candidates(fit, number, events(fit))
     offered: dict[str, tuple[Effect, ...]] = {f"{PREFIX}{number}": laws} if laws else {}
-    waved, wave = held, _ripple(fit)
+    bases, wave = [held], _ripple(fit)
     if wave is not None:
+        others = [effect for effect in held if not isinstance(effect, JointRipple)]
         offered[wave.name] = (wave,) if wave.orders else ()
-        waved = [effect for effect in held if effect.name != wave.name] + [wave] * bool(wave.orders)
+        bases = [[*others, wave], others] if wave.orders else [others]
     if not offered:
         return None
-    bases = list(dict.fromkeys((tuple(waved), tuple(e for e in held if not isinstance(e, JointRipple) or e in waved))))
-    before = [effect for effect in waved if effect.name.startswith(PREFIX)]
-    starts = [*bases, *((*base, law) for base in bases for law in laws), *((*before, law) for law in laws)]
+    before = [effect for effect in bases[0] if effect.name.startswith(PREFIX)]
+    starts = [*bases, *([*base, law] for base in (*bases, before) for law in laws)]
     wider = refit(fit, offered, starts, progress)
     return wider if any(effect.name in offered for effect, _ in wider.effects) else None
 
@@ -53,9 +53,8 @@ def _ripple(fit: Fit) -> JointRipple | None:
     if JointRipple.name not in fit.variants or fit.campaign.samples > settings.RIPPLE_ROWS:
         return None
     found = waves(fit)
-    return (
-        None if alike(found, next((e for e, _ in fit.effects if isinstance(e, JointRipple)), JointRipple())) else found
-    )
+    held = next((effect for effect, _ in fit.effects if isinstance(effect, JointRipple)), JointRipple())
+    return None if alike(found, held) else found
 
 
 def as_laws_say(left: Unexplained, found: Sequence[Discovery], discrepancy: Discrepancy) -> Unexplained:
