@@ -29,7 +29,7 @@ from thermal_robot.campaign.settings import ABSOLUTE_ZERO
 from thermal_robot.diagnosis import settings
 from thermal_robot.effects import gate
 from thermal_robot.errors import CampaignError
-from thermal_robot.inference.algebra import equations_of
+from thermal_robot.inference.algebra import equations_of, solve
 from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.evidence import Combination
 from thermal_robot.inference.fit import Fit
@@ -305,7 +305,7 @@ def _expected(fit: Fit, offered: Observations, leading: Sequence[Combination]) -
             [np.full(flat, settings.LOOSE), *(items[k].sizes * combination.scales[index[k]] for k in mine)]
         )
         precision = gram[np.ix_(picked, picked)] * np.outer(size, size) + np.eye(len(size))
-        mean = size * np.linalg.solve(precision, gram[picked, -1] * size)
+        mean = size * solve(precision, gram[picked, -1] * size)
         design = asked[:, :, picked]
         scaled = design * size
         found.append(
