@@ -28,7 +28,7 @@ from thermal_robot.inference.robust import Noise
 def grown(fit: Fit, number: int, progress: Callable[[str], None]) -> Fit | None:
     """Forward selection: let terms that nobody listed compete with all known effects; ``None`` if none pays.
 
-    Terms are generated from what the fit leaves: events, waves of the joints, and laws of any quantity at any place. One
+    Terms are generated from what the fit leaves: events, waves of the joints, laws of any quantity at any place. One
     event or law more joins a fit at a time, as ``discovered.<number>``.
     """
     progress(f"causes that nobody listed: scan {number}")

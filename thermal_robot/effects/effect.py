@@ -165,9 +165,6 @@ class Parameter:
         What one unit does in the channels.
     positive
         Whether it cannot be negative, as no joint is stiffer than rigid: its prior is half a normal one.
-    most
-        Largest value that is physically possible, in that unit; one that is surely larger is no part of a diagnosis.
-        What a campaign states to be expected raises it in proportion.
     """
 
     label: str
@@ -177,7 +174,6 @@ class Parameter:
     place: str
     responses: tuple[Response, ...]
     positive: bool = False
-    most: float = np.inf
 
     @property
     def name(self) -> str:
@@ -187,7 +183,7 @@ class Parameter:
     @cached_property
     def bare(self) -> Parameter:
         """It without its responses, which may be large."""
-        return Parameter(self.label, self.unit, self.size, self.kind, self.place, (), self.positive, self.most)
+        return Parameter(self.label, self.unit, self.size, self.kind, self.place, (), self.positive)
 
 
 @dataclass(frozen=True)

@@ -28,12 +28,13 @@ class InstrumentScale(Effect):
     name: ClassVar[str] = "instrument_scale"
     title: ClassVar[str] = "a scale error of the instrument"
     size_spread: ClassVar[float] = UNSOURCED
+    size_most: ClassVar[float] = 5.0  # 1e-3 is two sigma
     contained_in: ClassVar[tuple[str, ...]] = ("geometric",)
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """One scale error; dimensionless."""
         response = at_instrument(observations.predicted_position)
-        return (Parameter("scale error", "1", 1e-4, "instrument", "instrument", (response,), most=1e-3),)
+        return (Parameter("scale error", "1", 1e-4, "instrument", "instrument", (response,)),)
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
         """Return the distance from the instrument."""

@@ -119,9 +119,9 @@ def refit(
     of the ``starts``, by default from the effects of the fit.
     """
     whole = {name: own for name, own in {**known.variants, **variants}.items() if own}
-    own = [effect for effect, _ in known.effects if effect.name in whole]
-    begun = [list(one) for one in starts] or [own]
-    settled = settle(known.corrected, whole, progress, held=known.effects, before=known.explanation, starts=begun)
+    # rows that were set aside are judged anew beside what joins: they may be what it explains
+    before = None if starts and known.explanation.outliers.any() else known.explanation
+    settled = settle(known.corrected, whole, progress, held=known.effects, before=before, starts=starts)
     return _fitted(known.campaign, settled, known.needs, whole)
 
 

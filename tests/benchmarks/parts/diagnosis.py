@@ -17,6 +17,7 @@ from thermal_robot.diagnosis.held_out import held_out, worst_folds
 from thermal_robot.diagnosis.next_samples import next_samples
 from thermal_robot.effects import choose
 from thermal_robot.inference.discover import candidates
+from thermal_robot.inference.events import events
 from thermal_robot.inference.fit import fit
 
 SCRIPT = Path(__file__).resolve().parents[1] / "bench_diagnosis.py"
@@ -79,7 +80,7 @@ def _shares(effort):
     calls = {
         "whole": lambda: diagnose(campaign, only=only or None),
         "choice and fit": lambda: fit(campaign, choose(only)),
-        "scan for laws": lambda: candidates(found, 1),
+        "scan for laws": lambda: candidates(found, 1, events(found)),
         "effects on rows held out": lambda: earned(found),
         "held-out figures": lambda: held_out(found),
         "worst ways of holding out": lambda: worst_folds(found),
