@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 class InstrumentScale(Effect):
     """Measured = (1 + s) · true, about the instrument's origin.
 
-    Expected size 1e-4, at most 1e-3: a tracker whose refraction is corrected with a wrong temperature errs by 1e-6 per
+    Expected size 1e-4: a tracker whose refraction is corrected with a wrong temperature errs by 1e-6 per
     kelvin, a camera or a photogrammetric scale bar by a hundred times that. All link lengths wrong by the same share
     look exactly alike, so :class:`Geometric` contains it, unless a joint slides or the target stands off a known tool
     frame; with an unknown base the place of the origin does not matter.
@@ -28,7 +28,6 @@ class InstrumentScale(Effect):
     name: ClassVar[str] = "instrument_scale"
     title: ClassVar[str] = "a scale error of the instrument"
     size_spread: ClassVar[float] = UNSOURCED
-    size_most: ClassVar[float] = 5.0  # 1e-3 is two sigma
     contained_in: ClassVar[tuple[str, ...]] = ("geometric",)
 
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:

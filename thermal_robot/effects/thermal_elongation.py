@@ -72,7 +72,6 @@ def _behind(history: History, lag: float) -> Array:
 
 
 _SIZE = 1.5e-5  # 1/K
-_MOST = 6e-5  # 1/K, two sigma: zinc and magnesium alloys have 3e-5, and a link may warm twice as much as its sensor
 _LAGS = (600.0, 1500.0, 3600.0)
 _SHORTEST, _LONGEST = 300.0, 10800.0  # s: walls of 2 mm, and castings of 20 mm in still air
 _START = 3.0  # K between a link and what its sensor lets expect, at switching on: half of what motors of 100 W bring
@@ -112,7 +111,6 @@ class ThermalElongation(Effect):
     name: ClassVar[str] = "thermal_elongation"
     title: ClassVar[str] = "thermal elongation of the links"
     sided_by: ClassVar[tuple[str, ...]] = ("temperature",)
-    size_most: ClassVar[float] = 0.5 * _MOST / _SIZE
 
     def missing(self, observations: Observations) -> tuple[str, ...]:
         """Return ``temperature`` unless a temperature that applies to a segment varies."""
