@@ -77,7 +77,7 @@ def diagnose(
     >>> found
     Diagnosis('demo': thermal_elongation, backlash)
     >>> print(found.summary)
-    The gap of 62.6 µm comes from thermal elongation of the links and lost motion in the joints (90 % sure); ...
+    The gap of 62.6 µm comes from thermal elongation of the links and lost motion in the joints (91 % sure); ...
     """
     expected = "a campaign, or the path of one; campaign_from_table makes one of a DataFrame"
     require("diagnose()", campaign, (Campaign, str, os.PathLike), expected)

@@ -85,7 +85,7 @@ class ThermalElongation(Effect):
     Equation 5 of Kluz et al. (2018) with a coefficient of its own for each segment, a ``common`` one for all, or a
     common one with a smaller deviation above it for each (partial pooling; ``spread``: its expected size, 0 for none),
     along the virtual prismatic joint of their Eqs 6-8. No link shrinks when it becomes warmer: none of them is
-    negative. Expected size 1.5e-5 /K (steel 1.2e-5, aluminium 2.3e-5), at most 6e-5 /K (zinc, where it warms twice as
+    negative. Expected size 1.5e-5 /K (steel 1.2e-5, aluminium 2.3e-5; zinc 3e-5, twice that where it warms twice as
     much as its sensor); of a polymer ``[priors]`` says more. Where one sensor reads the air or a place on the robot,
     the links follow it with a time constant: dT_link/dt = (T_recorded − T_link) / lag, minutes to an hour for a cast
     link (mass · heat capacity / surface · film coefficient: 600 to 3600 s).

@@ -71,7 +71,7 @@ class Ladder:
     def without(self, out: frozenset[int]) -> Ladder:
         """Return the same without some blocks: what was evaluated of the others stays known."""
         found = copy(self)
-        found.forms, found._joined = list(self.forms), False
+        found.forms, found._joined = list(self.forms), any(form.several for form in self.forms)
         found._spectra, found._along = list(self._spectra), list(self._along)
         found._priors, found._sizes = dict(self._priors), dict(self._sizes)
         found._quick = {key: log for key, log in self._quick.items() if not out & set(key[1])}
