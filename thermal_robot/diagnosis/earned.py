@@ -139,7 +139,10 @@ def _failing(fit: Fit, progress: Callable[[str], None]) -> tuple[str, Refused] |
     worst = min(out, key=lambda name: table[name].blocked.share)
     why = "rows held out refuse" if worst in poor else "in question:" if worst in sure else "nothing determines"
     progress(f"{why} {worst}")
-    return worst, _refused(fit, table[worst]) if worst in poor else Refused(fit.probability(worst))
+    if worst in poor:
+        return worst, _refused(fit, table[worst])
+    # of one that nothing determines no more is known than before the data
+    return worst, Refused(min(fit.probability(worst), 1.0 if worst in sure else settings.PRIOR_PROBABILITY))
 
 
 def in_place(fit: Fit) -> dict[str, float]:
