@@ -41,7 +41,7 @@ def scattering(robot, *, repeats=1, poses=120, stepped=False, sigma=SIGMA, seed=
 def single(rv_m2):
     """Each pose once, where steps are too many to be looked for: what comes at each visit and with a pose are one."""
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(settings, "MOST_ANGLES", 0)
+        patch.setattr(settings, "MOST_FREQUENCIES", 0)
         return scattering(rv_m2, poses=40, sigma=7e-5)
 
 

@@ -62,7 +62,8 @@ def run(options: argparse.Namespace) -> None:
     from thermal_robot.maps.figures import larger_is_better
     from thermal_robot.robot import load_robot
 
-    _require_picture(options.figure)
+    if options.figure:
+        _require_picture(options.figure)
     robot = load_robot(options.robot, options.tool, root_frame=options.root)
     within = dict(_rule(rule) for rule in options.where)
     with counted(options.loudness) as show:
@@ -79,14 +80,14 @@ def run(options: argparse.Namespace) -> None:
     deliver(options, outputs, shown, shown.partition("\n")[0])
 
 
-def _require_picture(figure: str | None) -> None:
+def _require_picture(figure: str) -> None:
     """Refuse an ending that is no picture's, before anything is computed."""
     from matplotlib.backend_bases import FigureCanvasBase
 
     known = FigureCanvasBase.get_supported_filetypes()
-    ending = Path(figure or "").suffix.lower().removeprefix(".")
+    ending = Path(figure).suffix.lower().removeprefix(".")
     if ending and ending not in known:
-        raise CampaignError(str(figure), "is no picture by its ending", found=f".{ending}", expected=", ".join(known))
+        raise CampaignError(figure, "is no picture by its ending", found=f".{ending}", expected=", ".join(known))
 
 
 def _over(options: argparse.Namespace) -> Any:

@@ -9,6 +9,7 @@ import numpy as np
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
+from thermal_robot.campaign.settings import STILL
 from thermal_robot.effects import Effect, gate
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
@@ -140,7 +141,8 @@ def _fitted(
 
 def require_enough(campaign: Campaign) -> None:
     """Refuse a campaign that leaves nothing to tell effects by once the frames are fitted and a fold is held out."""
-    poses = len(np.unique(near_repeats(campaign)))  # rows of one label are one, however a held joint jitters
+    still = np.unique(np.round(campaign.q / STILL), axis=0)  # an encoder's jitter makes no other pose
+    poses = min(len(still), len(np.unique(near_repeats(campaign))))  # nor do rows of one label
     unknown, measures = len(unknown_frames(campaign)), campaign.orientation is not None
     fewest = -(-(unknown + settings.SPARE_EQUATIONS) // (6 if measures else 3)) + 2
     if poses < fewest:

@@ -86,7 +86,7 @@ def _tried(errors: Array, variance: Array, command: Array, slack: float) -> tupl
     known = variance + slack**2
     width = 1.0 / (max(float(command.std()), 1.0) * np.sqrt(max(float((1.0 / known).sum()), (2.0 * np.pi) ** 2)))
     bands = np.geomspace(1.0 / settings.BAND, settings.BAND, settings.STEP_BANDS + 1)
-    if (bands[-1] - bands[0]) / width * max(len(errors), settings.STEP_POSES) > settings.MOST_ANGLES:
+    if (bands[-1] - bands[0]) / width > settings.MOST_FREQUENCIES:
         return np.zeros(0), np.zeros(0)
     frequencies, likelihoods = [], []
     for low, high in pairwise(bands):

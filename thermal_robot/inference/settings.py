@@ -351,9 +351,8 @@ STEP_SLACKS = (0.05, 0.1, 0.2)
 """Of a step: how even an encoder's positions are, as interpolated ones, and how much of the errors is of others."""
 STEP_BANDS, STEP_PHASES, STEP_HARMONICS = 12, 32, 8
 """Bands of frequency, 5 % each, in which errors count in one step; phases; harmonics that such a slack leaves."""
-STEP_POSES, MOST_ANGLES = 200, 100_000_000
-"""Poses of a search for steps, more only say it more surely; and that many, fewer or not, times frequencies: some
-seconds of time, and 0.2 GB for so many frequencies."""
+STEP_POSES, MOST_FREQUENCIES = 200, 500_000
+"""Poses of a search for steps, more only say it more surely; and frequencies: some seconds of time, and 0.2 GB."""
 FLAT = 12.0
 """Square of a step over the variance of the errors that rounding to it makes: those of an even distribution."""
 
