@@ -211,7 +211,7 @@ class HeldOut:
 
 @dataclass(frozen=True)
 class FoldScheme:
-    """Shrinkage of the gap under one scheme: ``time``, ``session``, ``temperature``, ``region`` or ``reach``.
+    """Shrinkage of the gap under one scheme: ``time``, ``session``, ``temperature``, ``region``, ``reach``, ``range``.
 
     ``held_out`` says what is held out at a time; ``folds`` could be fitted, ``rows`` were held out in them. Rms
     distances of these rows, m, with the frames alone and with the effects, and the standard ``uncertainty`` of the

@@ -94,17 +94,17 @@ def _settings(effect: Effect, observations: Observations) -> tuple[Effect, ...]:
     return tuple(dict.fromkeys((*known, *gate.alone(known[0], observations))))
 
 
-def less(known: Fit, name: str) -> Fit:
-    """Backward elimination: a fit without one effect, the others chosen anew in the same linear problem.
+def less(known: Fit, *names: str) -> Fit:
+    """Backward elimination: a fit without some effects, the others chosen anew in the same linear problem.
 
     Weights and all that was weighed stay; the choice is fitted exactly.
     """
-    explanation = known.explanation.without(known.blocks_of(name))
+    explanation = known.explanation.without([b for name in names for b in known.blocks_of(name)])
     linear = [(explanation.linear.blocks[b].effect, explanation.values[b][0]) for b in explanation.best.blocks]
     corrected, held = gauss_newton(
         known.campaign, known.corrected.frames, explanation, linear, settings.SETTLED_BETWEEN, known.effects
     )
-    variants = {other: own for other, own in known.variants.items() if other != name}
+    variants = {other: own for other, own in known.variants.items() if other not in names}
     return replace(known, explanation=explanation, corrected=corrected, effects=tuple(held), variants=variants)
 
 
