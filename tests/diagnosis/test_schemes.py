@@ -65,7 +65,7 @@ def test_schemes_come_in_order_and_say_what_they_are(warm):
         for schemes in pair:
             after = [s.rms_after for s in schemes.values()]
             assert after == sorted(after, reverse=True)
-            assert set(schemes) == {"time", "session", "temperature", "region", "reach"}
+            assert set(schemes) == {"time", "session", "temperature", "region", "reach", "range"}
             for s in schemes.values():
                 assert s.shrinkage == pytest.approx(1.0 - (s.rms_after / s.rms_before) ** 2)
             assert (schemes["session"].folds, schemes["time"].folds, schemes["temperature"].folds) == (4, 20, 2)
@@ -118,7 +118,7 @@ def test_a_column_that_is_not_there_makes_no_scheme(rv_m2):
     campaign, _, _ = simulate(rv_m2, ["joint_offset"], seed=1)
     bare = replace(campaign, covariates={})
     schemes = worst_folds(fit(bare, choose(("joint_offset",), (), ())))
-    assert {s.name for s in schemes} == {"time", "region", "reach"}
+    assert {s.name for s in schemes} == {"time", "region", "reach", "range"}
 
 
 def test_without_an_effect_nothing_shrinks(rv_m2):

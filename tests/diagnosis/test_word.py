@@ -95,35 +95,37 @@ def test_the_worst_goes_first_and_what_is_at_work_stays(rv_m2):
         beside = forced(forced(known, geometry(known)), block(known.corrected, SPURIOUS[1]))
         found = earned(beside)
         assert set(found) == {"thermal_elongation", "geometric", "discovered.1"}
-        judged = [n for n, e in found.items() if e.harms or (n == "discovered.1" and not e.helps)]
-        assert judged
+        clear = [n for n, e in found.items() if e.clearly]
+        poor = [n for n, e in found.items() if e.harms or (n == "discovered.1" and not e.helps)]
+        judged = clear or [min(poor, key=lambda n: found[n].blocked.nats)]
         heard = []
         left, refused = pruned(beside, heard.append)
-        assert heard[0] == f"rows held out refuse {min(judged, key=lambda n: found[n].blocked.share)}"
+        assert heard[0] == f"rows held out refuse {', '.join(judged)}"
         assert "thermal_elongation" in names(left)
         assert set(refused) <= {"geometric"}
 
 
 def test_blocks_that_speak_for_an_effect_do_not_outweigh_a_region_that_refuses_it(rv_m2, monkeypatch):
     known = fit(simulate(rv_m2, ["drift"], seed=3)[0], choose(("drift",), (), ()))
-    for_it, against = Gained("time", 0.2, (0.1, 0.3)), Gained("region", -0.5, (-0.8, -0.2))
-    said = [{"drift": Earned(for_it, against, helps=False, harms=True)}, {}]
+    for_it, against = Gained("time", 0.2, 5.0, (1.0, 9.0)), Gained("region", -0.5, -9.0, (-15.0, -3.0))
+    said = [{"drift": Earned(for_it, against)}, {}]
     monkeypatch.setattr(word, "earned", lambda _: said.pop(0))
     left, refused = pruned(known, lambda _: None)
     assert left.effects == ()
-    assert refused["drift"].probability == pytest.approx(settings.PRIOR_PROBABILITY)
+    assert refused["drift"].share == against.share
+    odds = settings.PRIOR_PROBABILITY / (1.0 - settings.PRIOR_PROBABILITY) * np.exp(-9.0)
+    assert refused["drift"].probability == pytest.approx(odds / (1.0 + odds))
 
 
 def test_the_more_rows_held_out_suffer_the_less_probable_it_is(rv_m2, monkeypatch):
     known = fit(simulate(rv_m2, ["drift"], seed=3)[0], choose(("drift",), (), ()))
     said = []
-    for share in (-0.001, -0.01, -0.05):
-        gained = Gained("time", share, (share - 0.1, share + 0.1))
-        answers = [{"drift": Earned(gained, gained, helps=False, harms=True)}, {}]
+    for nats in (-0.1, -1.0, -8.0):
+        gained = Gained("time", nats / 100.0, nats, (nats - 10.0, nats + 10.0))
+        answers = [{"drift": Earned(gained, gained)}, {}]
         monkeypatch.setattr(word, "earned", lambda _, answers=answers: answers.pop(0))
         said.append(pruned(known, lambda _: None)[1]["drift"].probability)
     assert said == sorted(said, reverse=True)
-    # a twentieth of the mean square over some three hundred equations: eight nats less than its prior odds
     assert said[2] < 1e-3 * settings.PRIOR_PROBABILITY
     assert np.isfinite(said).all()
 
@@ -196,8 +198,8 @@ def test_what_nothing_is_known_of_goes_whatever_rows_held_out_say(rv_m2, monkeyp
     item = block(known.corrected, choose(("geometric",), (), ())[0])
     unseen = forced(known, replace(item, sizes=1e-3 * NOISE / np.sqrt((item.columns**2).mean(axis=(0, 1))) / 50.0))
     assert determined(unseen) == {"thermal_elongation"}
-    good = Gained("time", 0.2, (0.1, 0.3))
-    said = {name: Earned(good, good, helps=True, harms=False) for name in names(unseen)}
+    good = Gained("time", 0.2, 5.0, (1.0, 9.0))
+    said = {name: Earned(good, good) for name in names(unseen)}
     monkeypatch.setattr(word, "earned", lambda own: {name: said[name] for name in names(own)})
     heard = []
     left, refused = pruned(unseen, heard.append)
