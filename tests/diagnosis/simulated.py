@@ -9,13 +9,15 @@ import numpy as np
 from thermal_robot.diagnosis.one_walk import Model
 from thermal_robot.inference.columns import Block
 from thermal_robot.inference.explain import explain, log_odds
-from thermal_robot.inference.problem import Linear, gram, parameter_values
+from thermal_robot.inference.problem import Linear
 from thermal_robot.inference.robust import Noise
-from thermal_robot.inference.search import Search
 
 WIDTHS = (1, 1, 2, 3, 5, 6, 12)
 FRESH = 30
 """Fresh rows for each row of the campaign: what they say is then known six times better than what is claimed."""
+
+CERTAIN = 1e4
+"""Log prior odds that no evidence outweighs."""
 
 
 def drawn(rng, rows, sizes=(0.5, 60.0), most=3):
@@ -69,18 +71,13 @@ def on_fresh(explanation, block, fresh):
 
 
 def forced(known, item):
-    """The same fit, said to hold one block more and no discrepancy, whatever the evidence: it alone was compared."""
+    """The same fit, said to hold one block more and no discrepancy: no evidence speaks against what a prior knows."""
     e, white = known.explanation, replace(known.explanation.whitening, smooth=None)
     linear = replace(e.linear, blocks=(*(e.linear.blocks[b] for b in e.best.blocks), item))
-    problem = gram(linear, white)
-    best = Search(problem, [0.0] * len(linear.blocks)).evaluate(range(len(linear.blocks)))
-    effects = (*known.effects, (item.effect, np.zeros(item.columns.shape[2])))
-    given = {
-        "values": parameter_values(linear, problem, best),
-        "linear": linear,
-        "whitening": white,
-        "problem": problem,
-        "best": best,
-    }
-    said = replace(e, **given, combinations=[best], probabilities=np.ones(1))
-    return replace(known, explanation=said, effects=effects, families=tuple(b.effect.name for b in linear.blocks))
+    families = tuple(b.effect.name for b in linear.blocks)
+    every, noise = range(len(families)), Noise.of(known.campaign)
+    how = {"families": families, "starts": [every], "outliers": e.outliers, "known": white}
+    said = explain(linear, noise, log_prior=[CERTAIN] * len(families), **how)
+    assert said.best.blocks == tuple(every)
+    effects = tuple((b.effect, said.values[k][0]) for k, b in enumerate(linear.blocks))
+    return replace(known, explanation=said, effects=effects, families=families)

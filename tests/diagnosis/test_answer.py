@@ -20,7 +20,7 @@ def test_the_parts_agree_with_each_other(hall):
     assert hall.probability <= min(*inside, 1.0 - max(outside)) + 1e-9
     assert hall.outliers == tuple(hall.rows.rows[hall.rows.outliers])
     assert set(hall.model.needs) == {"temperature", *(f"approach.{j}" for j in hall.joint_names)}
-    assert {s.name for s in hall.gap.schemes} >= {"time", "region", "reach"}
+    assert {s.name for s in hall.gap.schemes} >= {"time", "region", "reach", "range"}
     assert hall.remaining is hall.unexplained or hall.remaining == hall.unexplained
     assert hall.reach == pytest.approx(np.linalg.norm(np.ptp(hall.fit.campaign.position, axis=0)))
 

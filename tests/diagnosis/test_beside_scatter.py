@@ -16,6 +16,7 @@ from thermal_robot.inference.frames import register
 from thermal_robot.inference.random_gap import random_gap
 from thermal_robot.kinematics import Displacement
 from thermal_robot.observations import Frames, observe
+from thermal_robot.robot import load_robot
 
 NOISE, SIGMA = 20e-6, 4e-4  # m, rad
 
@@ -33,6 +34,22 @@ def test_steps_of_an_encoder_feign_no_systematic_effect(rv_m2):
         assert found.gap.noise_source == "scatter"
         names.append(found.verdict)
     assert names.count(("encoder_resolution",)) >= 11, names
+
+
+@pytest.mark.slow
+def test_steps_of_two_joints_are_the_whole_verdict():
+    """Twenty-six poses, each visited three times."""
+    robot, verdicts = load_robot("example-robot-data:ur10", "tool0"), []
+    for seed in range(8):
+        once = simulate(robot, samples=26, seed=seed, noise=25e-6)[0]
+        plain = replace(once.take(np.tile(np.arange(26), 3)), rows=np.arange(2, 80), noise_position=25e-6)
+        error = np.zeros_like(plain.q)
+        for joint, step in ((0, 4e-4), (3, 1.5e-3)):
+            error[:, joint] = np.round(plain.q[:, joint] / step) * step - plain.q[:, joint]
+        moved = observe(plain, Frames.declared(plain), displacement=Displacement(joint=error)).predicted_position
+        noise = 25e-6 * np.random.default_rng(seed).normal(size=moved.shape)
+        verdicts.append(diagnose(replace(plain, position=moved + noise)).verdict)
+    assert verdicts.count(("encoder_resolution",)) >= 7, verdicts
 
 
 def scattering(robot, effects=()):

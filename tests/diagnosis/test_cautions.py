@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers import NOISE
 from simulate import simulate
 
 from thermal_robot import diagnose
@@ -12,8 +11,6 @@ from thermal_robot.diagnosis.cautions import cautions, contradicted, usable
 from thermal_robot.diagnosis.parts import Refused, Sensitivity
 from thermal_robot.effects import choose
 from thermal_robot.inference.fit import fit
-from thermal_robot.kinematics import Displacement
-from thermal_robot.observations import Frames, observe
 
 
 def test_a_table_pasted_twice_is_not_taken_for_repeats(clean):
@@ -83,23 +80,6 @@ def test_encoders_that_are_off_throughout_have_another_zero(rv_m2, away, said):
     assert bool(notes) == bool(said)
 
 
-def test_parameters_that_cancel_each_other_are_remarked(rv_m2):
-    """Near zero 4 sin q − 2 sin 2q is 2 q³: two large waves that leave little."""
-    plain = simulate(rv_m2, seed=2, noise=NOISE)[0]
-    q = plain.q.copy()
-    q[:, 1] = 0.6 * (q[:, 1] - q[:, 1].mean()) / np.ptp(q[:, 1])
-    narrow, error = replace(plain, q=q), np.zeros_like(q)
-    error[:, 1] = 0.05 * (4.0 * np.sin(q[:, 1]) - 2.0 * np.sin(2.0 * q[:, 1]))
-    true = observe(narrow, Frames.declared(narrow), displacement=Displacement(joint=error)).predicted_position
-    noisy = replace(narrow, position=true + NOISE * np.random.default_rng(2).normal(size=true.shape), priors={})
-    wheel = fit(noisy, choose(("transmission_error",), (), ()))
-    (note,) = (n for n in cautions(wheel) if "cancel" in n)
-    assert note.startswith("parameters of transmission_error cancel each other")
-    whole = fit(simulate(rv_m2, ["joint_offset"], seed=2)[0], choose(("joint_offset",), (), ()))
-    assert whole.effects
-    assert not any("cancel" in n for n in cautions(whole))
-
-
 def test_what_was_refused_is_said(rv_m2):
     known = fit(simulate(rv_m2, seed=2)[0], choose(("drift",), (), ()))
     assert cautions(known) == ()
@@ -113,8 +93,3 @@ def test_a_verdict_that_hangs_on_the_stated_sizes_says_so(rv_m2):
     (said,) = cautions(known, sensitivity=Sensitivity(4e-5, 0.9))
     assert said.startswith("with a third of the expected sizes")
     assert len(cautions(known, sensitivity=Sensitivity(4e-5, 1e-9))) == 2
-
-
-def test_why_an_effect_was_left_out_is_said(rv_m2):
-    known = fit(simulate(rv_m2, seed=2)[0], choose(("drift",), (), ()))
-    assert cautions(known, {"joint_gain": Refused(0.2, reason="the two cancel")}) == ("the two cancel",)

@@ -51,8 +51,9 @@ def test_an_effect_of_twice_the_noise_helps(rv_m2, name):
         assert not said.harms
         assert said.blocked.scheme == "time"
         low, high = said.blocked.interval
-        assert 0.0 < low < said.blocked.share < high
-        assert said.hardest.interval[0] <= low
+        assert 0.0 < low < said.blocked.nats < high
+        assert 0.0 < said.blocked.share < 1.0
+        assert said.hardest.interval[1] <= high
 
 
 @pytest.mark.slow

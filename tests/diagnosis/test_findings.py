@@ -90,15 +90,15 @@ def test_a_known_effect_is_as_probable_as_the_evidence_says(offsets):
 def test_a_law_is_as_probable_as_its_place_and_quantity(rv_m2):
     law = Discovered("discovered.1", "joint", "joint_3", "temperature", "step", (22.0,), 1.0)
     known = fit(with_law(rv_m2, law, [-2e-4, 2e-4], seed=3)[0], choose(("drift",), (), ()))
-    known = refit(known, {law.name: (law,)}, [law])
+    known = refit(known, {law.name: (law,)}, [[law]])
     found = said(known, {law.name: 0.7})
     assert (found[law.name].status, found[law.name].probability) == ("found", 0.7)
     assert (found[law.name].quantity, found[law.name].shape) == ("temperature", "step")
     assert found[law.name].describes == law.describe()
     # a law that did not last was never a candidate of anybody's
-    assert set(said(refit(known, {law.name: (law,)}, []), {})) - {law.name} == {"drift"}
+    assert set(said(refit(known, {law.name: (law,)}, [[]]), {})) - {law.name} == {"drift"}
     bare = fit(with_law(rv_m2, law, [0.0, 0.0], seed=3)[0], choose(("drift",), (), ()))
-    assert set(said(refit(bare, {law.name: (law,)}, []))) == {"drift"}
+    assert set(said(refit(bare, {law.name: (law,)}, [[]]))) == {"drift"}
 
 
 def test_what_rows_held_out_refused_is_not_found_with_its_probability(offsets):

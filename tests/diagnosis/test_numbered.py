@@ -29,7 +29,7 @@ def found(rv_m2):
     moved, _ = displacement(here, [(SMALL, np.array([-2e-4, 2e-4]))])
     shift = observe(data, here.frames, displacement=moved).predicted_position - here.predicted_position
     known = fit(replace(data, position=data.position + shift), choose(("drift",), (), ()))
-    return refit(known, {law.name: (law,) for law in (GONE, SMALL, LARGE)}, [SMALL, LARGE])
+    return refit(known, {law.name: (law,) for law in (GONE, SMALL, LARGE)}, [[SMALL, LARGE]])
 
 
 def test_the_largest_share_is_the_first(found):

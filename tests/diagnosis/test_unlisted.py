@@ -11,7 +11,7 @@ from helpers import NOISE, with_law
 from simulate import simulate
 
 from thermal_robot import CorrectedModel, diagnose
-from thermal_robot.diagnosis.beside import as_laws_say, one_more_law
+from thermal_robot.diagnosis.beside import as_laws_say, grown
 from thermal_robot.diagnosis.examine import examine
 from thermal_robot.diagnosis.parts import Dependence, Location, Unexplained
 from thermal_robot.effects import choose
@@ -228,8 +228,8 @@ def test_one_eccentric_wheel_is_no_unlisted_cause(rv_m2):
 def test_noise_is_not_worth_a_law(rv_m2):
     known = fit(simulate(rv_m2, seed=2, noise=NOISE)[0], choose(("backlash",), (), ()))
     heard = []
-    assert one_more_law(known, 1, heard.append) is None
-    assert heard == ["causes that nobody listed: scan 1"]
+    assert grown(known, 1, heard.append) is None
+    assert heard[0] == "causes that nobody listed: scan 1"
 
 
 def test_a_law_joins_the_fit_and_takes_its_remainder(rv_m2):
@@ -237,7 +237,7 @@ def test_a_law_joins_the_fit_and_takes_its_remainder(rv_m2):
     known = fit(with_law(rv_m2, law, values, seed=3)[0], choose(("joint_offset",), (), ()))
     before = examine(known).unexplained
     assert before.flagged
-    after = one_more_law(known, 2, lambda _: None)
+    after = grown(known, 2, lambda _: None)
     (own,) = [effect for effect, _ in after.effects if isinstance(effect, Discovered)]
     assert (own.name, own.place, own.quantity) == ("discovered.2", law.place, law.quantity)
     assert "discovered.2" in after.families
@@ -258,8 +258,8 @@ def test_a_second_law_is_looked_for_beside_the_first(rv_m2):
     moved, _ = displacement(here, [(second, np.array(two))])
     shift = observe(data, here.frames, displacement=moved).predicted_position - here.predicted_position
     known = fit(replace(data, position=data.position + shift), choose(("joint_offset",), (), ()))
-    alone = one_more_law(known, 1, lambda _: None)
-    both = one_more_law(alone, 2, lambda _: None)
+    alone = grown(known, 1, lambda _: None)
+    both = grown(alone, 2, lambda _: None)
     laws = {effect.name: effect.place for effect, _ in both.effects if isinstance(effect, Discovered)}
     assert set(laws) == {"discovered.1", "discovered.2"}
     assert set(laws.values()) == {first.place, second.place}

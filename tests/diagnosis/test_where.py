@@ -96,7 +96,7 @@ def test_what_the_known_effects_leave_has_what_the_laws_take_in_it(rv_m2):
     law = Discovered("discovered.1", "joint", "joint_3", "temperature", "step", (22.0,), 1.0)
     data = with_law(rv_m2, law, [-4e-4, 4e-4], seed=3)[0]
     known = fit(data, ())
-    with_it = refit(known, {law.name: (law,)}, [law])
+    with_it = refit(known, {law.name: (law,)}, [[law]])
     left = Unexplained(False, 0.0, 0.6)
     said = without_laws(with_it, left)
     whole = float(np.sqrt((known.nominal.gap**2).sum(axis=1).mean()))

@@ -210,7 +210,6 @@ ASK = {
     "variants": lambda effect, seen: gate.variants(effect, seen),
     "nearby": lambda effect, seen: gate.nearby(effect, 1.6),
     "at": lambda effect, seen: gate.at(effect, "joint_2", seen),
-    "in_full": lambda effect, seen: gate.in_full(effect),
     "delivered": lambda effect, seen: gate.delivered(effect, seen),
     "elsewhere": lambda effect, seen: gate.elsewhere(effect, seen),
     "driver": lambda effect, seen: driver(effect, seen, (GOOD,), np.zeros(SAMPLES)),
@@ -253,8 +252,6 @@ def test_whatever_an_effect_raises_names_it_and_what_was_asked(observations, mem
         ("at", "joint_2", "at answers 'joint_2', expected None or an effect named 'mine'"),
         ("at", JointOffset(), "at answers JointOffset"),
         ("at", (), r"at answers \(\)"),
-        ("in_full", (), r"in_full answers \(\)"),
-        ("in_full", JointOffset(), "in_full answers JointOffset.*, expected None or an effect named 'mine'"),
         ("delivered", None, r"delivered answers \(None,\), expected a tuple of effects named 'mine'"),
         ("elsewhere", JointOffset(), "elsewhere answers .*JointOffset"),
         ("arguments", None, "arguments answers None, expected numbers, texts and tuples of them by name"),
@@ -281,8 +278,6 @@ def test_right_answers_pass_as_they_are(rv_m2, observations):
     assert gate.at(effect, "joint_3", observations) is None
     assert gate.at(spoilt("at", other), "joint_2", observations) is other
     assert gate.at(spoilt("at", None), "joint_2", observations) is None
-    assert gate.in_full(effect) is None
-    assert gate.in_full(spoilt("in_full", other)) is other
     assert gate.arguments(JointOffset()) == {}
     assert gate.arguments(Mine(("a", 1.0))) == {"share": ("a", 1.0)}
     assert gate.arguments(JointOffset(places=("joint_2",))) == {"places": ("joint_2",)}

@@ -69,17 +69,3 @@ def test_wheels_of_either_side_and_single_orders_are_settings(rv_m2):
     found = [orders(e, geared) for e in TransmissionError().variants(geared)]
     both = ((1, 2, 50, 100), (1, 2), (50, 100), (1,), (2,), (50,), (100,))
     assert found == [frozenset(own) for own in both]
-
-
-def test_its_error_curve_has_more_orders_and_no_larger_sizes(rv_m2):
-    here = observe(commanded(rv_m2))
-    curve = TransmissionError().in_full()
-    own = [p for p in checked(curve, here) if p.place == "joint_3"]
-    assert sorted({int(p.label.split()[-1]) for p in own}) == list(range(1, 9))
-    sizes = np.array([p.size for p in own])
-    assert (np.diff(sizes) <= 0.0).all()
-    # wherever the joint stands, the curve is as large as a wave of one minute of arc
-    responses = np.column_stack([p.responses[0].values for p in own])
-    np.testing.assert_allclose(np.linalg.norm(responses * sizes, axis=1), 3e-4, rtol=1e-9)
-    assert curve.size_spread < TransmissionError().size_spread
-    assert curve.in_full() is None

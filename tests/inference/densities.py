@@ -4,6 +4,8 @@ import numpy as np
 from scipy.linalg import null_space
 from scipy.stats import multivariate_normal
 
+from thermal_robot.inference import settings
+
 
 def away_of(linear, whitening):
     """Orthonormal basis of what the frames do not take up of the rows in use, and the factor that whitens each row."""
@@ -19,6 +21,11 @@ def seen_of(linear, whitening, blocks, noise=1.0):
     gap = away.T @ (linear.gap[used][:, :, None] * root).ravel()
     items = (linear.blocks[b] for b in blocks)
     return gap / noise, [away.T @ (i.columns[used] * root * i.sizes).reshape(used.sum() * 3, -1) / noise for i in items]
+
+
+def alike(linear, found):
+    """(B, B) prior covariance of the logarithms of all scales, of which each is a robot's coarseness and its own."""
+    return np.diag([linear.blocks[b].spread ** 2 for b in found.blocks]) + settings.COARSENESS**2
 
 
 def direct(linear, whitening, found, log_prior, scales=None, noise=None, beside=None):
@@ -38,11 +45,8 @@ def direct(linear, whitening, found, log_prior, scales=None, noise=None, beside=
         covariance += scales[b] ** 2 * own @ own.T
     density = multivariate_normal(cov=covariance).logpdf(gap)
     density -= 0.5 * whitening.held * (np.log(noise**2) + 1.0 / noise**2)
-    return (
-        density
-        - 0.5 * sum((np.log(s) / linear.blocks[b].spread) ** 2 for b, s in scales.items())
-        + sum(log_prior[b] for b in found.blocks)
-    )
+    log = np.log([scales[b] for b in found.blocks])
+    return density - 0.5 * log @ np.linalg.solve(alike(linear, found), log) + sum(log_prior[b] for b in found.blocks)
 
 
 def volume(linear, whitening, found, beside=None):
@@ -65,8 +69,8 @@ def volume(linear, whitening, found, beside=None):
     bend = np.array([[0.25 * (along(a + b) - along(a - b)) / step**2 for b in axes] for a in axes]).reshape(
         count, count
     )
-    spread = [linear.blocks[b].spread for b in found.blocks]
-    curvature = np.linalg.eigvalsh(bend * np.outer(spread, spread))
+    root = np.linalg.cholesky(alike(linear, found))
+    curvature = np.linalg.eigvalsh(root.T @ bend @ root)
     return -0.5 * np.log(curvature).sum() if (curvature > 0.0).all() else np.nan
 
 

@@ -7,10 +7,12 @@ import pytest
 from helpers import NOISE, with_law
 from simulate import simulate
 
+from thermal_robot.diagnosis.beside import grown
 from thermal_robot.effects import choose
 from thermal_robot.effects.law import Discovered
 from thermal_robot.inference import settings
-from thermal_robot.inference.discover import candidates, discovered, listed, where, worthwhile
+from thermal_robot.inference.discover import candidates, discovered, listed, where
+from thermal_robot.inference.events import events
 from thermal_robot.inference.fit import fit, refit
 from thermal_robot.inference.scan import Thin
 
@@ -25,9 +27,7 @@ def known(campaign, effects=LISTED):
 
 def lawful(own, number=1):
     """The fit with a law among its effects, where one is worth its place; else the fit itself."""
-    laws = candidates(own, number)
-    best = worthwhile(own, laws)
-    return own if best is None else refit(own, {f"discovered.{number}": laws}, best)
+    return grown(own, number, lambda _: None) or own
 
 
 @pytest.fixture(scope="module")
@@ -38,7 +38,7 @@ def stepped(rv_m2):
 
 @pytest.fixture(scope="module")
 def offered(stepped):
-    return candidates(stepped, 2)
+    return candidates(stepped, 2, events(stepped))
 
 
 @pytest.fixture(scope="module")
@@ -64,18 +64,10 @@ def test_a_law_pays_for_all_places_quantities_and_shapes_among_which_it_was_pick
         assert law.share == pytest.approx(1.0 / law.tried)
 
 
-def test_what_is_worth_its_place_is_a_combination_with_a_law_in_it(stepped, offered):
-    best = worthwhile(stepped, offered)
-    laws = [effect for effect in best if effect in offered]
-    assert [law.place for law in laws] == ["joint_3"]
-    assert [effect.name for effect in best if effect not in laws] == []
-    # the same whatever else is offered first
-    again = worthwhile(stepped, offered[::-1])
-    assert [e for e in again if isinstance(e, Discovered)] == laws
-
-
-def test_without_a_law_to_compare_there_is_none(stepped):
-    assert worthwhile(stepped, ()) is None
+def test_in_which_order_laws_are_offered_does_not_matter(stepped, offered):
+    for laws in (offered, offered[::-1]):
+        ((law, _),) = refit(stepped, {"discovered.2": laws}, [[law] for law in laws]).effects
+        assert (law.place, law.quantity) == ("joint_3", "time")
 
 
 def test_place_and_quantity_have_probabilities(found):
@@ -122,9 +114,9 @@ def test_noise_makes_no_law(rv_m2):
     worth = []
     for seed in range(30):
         own = known(simulate(rv_m2, samples=80, seed=seed, noise=NOISE)[0], ("joint_offset",))
-        best = worthwhile(own, candidates(own, 1))
-        if best is not None:
-            worth.append((seed, [e.name for e in best]))
+        wider = grown(own, 1, lambda _: None)
+        if wider is not None:
+            worth.append((seed, [e.name for e, _ in wider.effects]))
     assert worth == []
 
 
@@ -137,9 +129,9 @@ def test_repeats_of_few_poses_make_no_law_of_what_a_pose_brings(rv_m2):
         shared = np.repeat(2.0 * NOISE * rng.normal(size=(40, 3)), 3, axis=0)
         single = plain.position + shared + NOISE * rng.normal(size=(120, 3))
         own = known(replace(plain, position=single, rows=np.arange(2, 122)), ("joint_offset",))
-        best = worthwhile(own, candidates(own, 1))
-        if best is not None:
-            worth.append((seed, [(e.name, getattr(e, "quantity", "")) for e in best]))
+        wider = grown(own, 1, lambda _: None)
+        if wider is not None:
+            worth.append((seed, [(e.name, getattr(e, "quantity", "")) for e, _ in wider.effects]))
     assert worth == []
 
 
@@ -163,7 +155,7 @@ def test_a_known_effect_that_is_at_work_in_several_joints_leaves_nothing_to_find
     assert len(truth["parts"]["backlash"]["values"]) > 1
     own = known(campaign)
     assert [effect.name for effect, _ in own.effects] == ["backlash"]
-    assert worthwhile(own, candidates(own, 1)) is None
+    assert grown(own, 1, lambda _: None) is None
 
 
 def test_an_effect_of_one_joint_is_that_effect_in_that_joint_and_no_law(rv_m2):
@@ -172,7 +164,7 @@ def test_an_effect_of_one_joint_is_that_effect_in_that_joint_and_no_law(rv_m2):
     own = known(campaign)
     ((effect, _),) = own.effects
     assert (effect.name, effect.places) == ("backlash", ("joint_5",))
-    assert worthwhile(own, candidates(own, 1)) is None
+    assert grown(own, 1, lambda _: None) is None
 
 
 @pytest.mark.parametrize("seed", [1, 3])

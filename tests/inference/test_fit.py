@@ -12,8 +12,9 @@ from simulate import simulate
 from time_constants import DRIFT, LAG, NOISE, campaign
 
 from thermal_robot import diagnose
-from thermal_robot.effects import choose, gate
-from thermal_robot.inference.fit import fit, less
+from thermal_robot.effects import choose
+from thermal_robot.inference.fit import fit, less, refit
+from thermal_robot.inference.gauss_newton import corrected_observations
 
 
 def constant_of(effects, kind):
@@ -38,17 +39,20 @@ def test_what_was_chosen_is_what_was_fitted():
     assert [b.effect for b in blocks] == [effect for effect, _ in known.effects]
 
 
-@pytest.mark.parametrize(("name", "place"), [("link_compliance", "upper_arm"), ("thermal_elongation", "upper_arm")])
-def test_a_place_is_left_out_of_every_setting_though_one_reads_other_places(rv_m2, name, place):
-    """The setting that follows an inclinometer, or a single sensor, has parameters in its link alone."""
-    data = simulate(rv_m2, ["joint_offset"], seed=2, samples=50)[0]
-    wave = np.sin(np.arange(50.0))
-    columns = {"tilt.forearm.x": 1e-3 * wave, "tilt.forearm.y": 2e-3 * wave[::-1], "temperature.forearm": 20.0 + wave}
-    known = fit(replace(data, covariates={**data.covariates, **columns}), choose([name], (), ()))
-    rest = less(known, name, place=place)
-    for effect in rest.variants[name]:
-        assert place not in {p.place for p in gate.checked(effect, rest.nominal)}
-    assert {p.place for effect in rest.variants[name] for p in gate.checked(effect, rest.nominal)}
+def test_a_fit_without_an_effect_is_the_one_that_never_had_it_to_choose(rv_m2):
+    """Whether what was weighed is asked, or all is chosen again without it."""
+    names = ["joint_gain", "joint_offset", "backlash"]
+    data = simulate(rv_m2, names[:2], seed=2, samples=60)[0]
+    known = fit(data, choose(names, (), ()))
+    assert {effect.name for effect, _ in known.effects} == set(names[:2])
+    rest, again = less(known, "joint_gain"), refit(known, {"joint_gain": ()})
+    for one in (rest, again):
+        assert "joint_gain" not in {*one.variants, *(effect.name for effect, _ in one.effects)}
+        assert one.probability_of_just(one.names_of(one.explanation.best)) > 0.5
+        np.testing.assert_allclose(
+            one.corrected.gap, corrected_observations(data, one.corrected.frames, one.effects).gap, atol=1e-12
+        )
+    assert [effect for effect, _ in rest.effects] == [effect for effect, _ in again.effects]
 
 
 def test_effects_and_sets_of_effects_share_one_probability(rv_m2):

@@ -200,6 +200,33 @@ def test_form_and_size_of_a_discrepancy_are_told(which):
     assert 2.0 < np.nanmedian(sizes) < 8.0
 
 
+@pytest.mark.parametrize("tau", [0.0, 3.0])
+def test_without_a_block_it_is_the_ladder_that_never_had_it(tau):
+    """The best, and what is probable beside it, whatever was weighed before."""
+    for seed in range(4):
+        _, _, ladder = drawn(seed, present=(1, 2), tau=tau, which=seed % 2)
+        _, _, fresh = drawn(seed, present=(1, 2), tau=tau, which=seed % 2)
+        ladder.run()
+        found, never = ladder.without(frozenset({1})), fresh.without(frozenset({1}))
+        best, other = found.run()[1], never.run()[1]
+        assert best.blocks == other.blocks
+        assert best.log_evidence == pytest.approx(other.log_evidence, abs=1e-2)
+        chances = [one.probabilities() for one in (found, never)]
+        for b in range(3):
+            one, two = (sum(p for c, p in zip(*own, strict=True) if b in c.blocks) for own in chances)
+            assert one == pytest.approx(two, abs=0.04)
+            assert b != 1 or one == 0.0
+        assert belief(found) == pytest.approx(belief(never), abs=0.04)
+        # the evidence is that of the problem of the other blocks alone
+        alone = Ladder(
+            replace(ladder.linear, blocks=(ladder.linear.blocks[0], ladder.linear.blocks[2])),
+            ladder.whitening,
+            ladder.forms[:2],
+            (PRIOR[0], PRIOR[2]),
+        )
+        assert best.log_evidence == pytest.approx(alone.run()[1].log_evidence, abs=1e-2)
+
+
 def test_without_forms_it_is_a_search_without_a_discrepancy():
     linear, whitening = small_problem(2, rows=24, present=(1,))
     ladder = Ladder(linear, whitening, [], PRIOR)
@@ -332,3 +359,27 @@ def test_an_evidence_beside_several_joints_is_that_of_their_joined_covariance():
     assert len(off) > 0.8 * 3 * len(CHOSEN)
     assert np.mean(np.abs(off - np.median(off)) < 1e-5) > 0.9
     assert (off - np.median(off)).max() < 0.6
+
+
+def test_joints_that_scatter_stay_told_without_a_block():
+    """Left out a block that is not at work, nothing else changes: not the joints, their size, or their odds."""
+    for seed in range(3):
+        ladder = scattering(SCATTERED, seed, present=(1,))
+        rung, best = ladder.run()
+        less = ladder.without(frozenset({0}))
+        again, found = less.run([best.blocks])
+        assert (less.forms[again[0]].name, again[1]) == (ladder.forms[rung[0]].name, rung[1])
+        assert found.blocks == best.blocks
+        assert found.log_evidence == pytest.approx(best.log_evidence, abs=1e-2)
+
+
+def test_joints_are_as_probable_however_often_blocks_are_left_out():
+    """Weaker than the noise, so that one joint, the other and both are in question."""
+    ladder, odds = scattering(SCATTERED, 1, tau=0.7, present=(1,)), []
+    ladder.run()
+    for _ in range(3):
+        ladder = ladder.without(frozenset({0}))
+        ladder.run([(1,)])
+        odds.append(ladder.forms_in_question())
+    for again in odds[1:]:
+        assert {name: again.get(name, 0.0) for name in odds[0]} == pytest.approx(odds[0], abs=0.05)

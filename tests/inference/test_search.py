@@ -7,14 +7,17 @@ import numpy as np
 import pytest
 from inference.problems import columns_of, small_problem
 
+from thermal_robot.inference import settings
 from thermal_robot.inference.problem import Linear, Whitening, contained, gram
 from thermal_robot.inference.search import Search
 
+NEAR = 3.0 * settings.EVIDENCE_SETTLED  # to so much the scales of a few blocks are found
 
-def best_of_all(search, most=3):
-    """Log evidence of the best of all allowed combinations, each computed from scratch."""
+
+def best_of_all(search, most=3, out=()):
+    """Log evidence of the best of all allowed combinations without some blocks, each computed from scratch."""
     alone = Search(search.gram, search.log_prior, search.exclusive)
-    every = range(len(search.gram.slices))
+    every = [b for b in range(len(search.gram.slices)) if b not in out]
     chosen = (c for size in range(most + 1) for c in combinations(every, size))
     return max(alone.evaluate(c).log_evidence for c in chosen if alone.allowed(c))
 
@@ -36,7 +39,7 @@ def test_the_search_finds_the_best_of_all_combinations():
         linear, whitening = small_problem(seed, present=((), (0,), (0, 2), (0, 1, 2))[seed % 4])
         search = Search(gram(linear, whitening), (-2.2,) * 3)
         best = search.run()
-        assert best.log_evidence == pytest.approx(best_of_all(search), abs=1e-3)
+        assert best.log_evidence == pytest.approx(best_of_all(search), abs=NEAR)
 
 
 def test_neighbours_that_come_near_the_best_are_computed_exactly():
@@ -120,6 +123,19 @@ def test_the_best_settings_of_the_same_effects_are_found():
         assert best.log_evidence >= max(c.log_evidence for c in same) - 1e-2
         assert best.log_evidence >= search.evaluate((0, 3)).log_evidence
         assert best.log_evidence <= max(every) + 1e-9
+
+
+def test_without_some_blocks_it_is_the_search_that_never_had_them():
+    for seed in range(20):
+        search = alike(seed)
+        whole = search.run().blocks
+        out = frozenset({*whole[:1], 6})
+        less, never = search.without(out), alike(seed).without(out)
+        best = less.run([b for b in whole if b not in out]).log_evidence
+        assert best == pytest.approx(never.run().log_evidence, abs=NEAR)
+        assert best == pytest.approx(best_of_all(search, 4, out), abs=NEAR)
+        assert not any(out & set(blocks) for blocks in less.seen)
+        assert any(out & set(blocks) for blocks in search.seen)  # that of which they were left out keeps them
 
 
 def test_what_rounding_hides_has_nothing_added_to_it():

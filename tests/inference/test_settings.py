@@ -72,9 +72,10 @@ def test_every_setting_is_used():
 
 
 @pytest.mark.parametrize(("package", "name"), sorted({(package, name) for package, name, _ in OWN}))
-def test_a_setting_is_a_number_or_an_array_of_numbers(package, name):
+def test_a_setting_is_a_number_an_array_of_numbers_or_words(package, name):
     value = getattr(import_module(f"thermal_robot.{package}.settings"), name)
-    assert np.isfinite(np.asarray(value, dtype=float)).all()
+    words = isinstance(value, tuple) and all(isinstance(word, str) and word for word in value)
+    assert words or np.isfinite(np.asarray(value, dtype=float)).all()
 
 
 @pytest.mark.parametrize("path", JUDGING, ids=[str(p.relative_to(ROOT)) for p in JUDGING])

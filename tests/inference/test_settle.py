@@ -63,7 +63,7 @@ def test_where_it_starts_does_not_matter(gained):
     campaign, found, _ = gained
     start = observe(campaign, register(campaign))
     begin = [choose((name,), (), ())[0].variants(start)[0] for name in ("joint_offset", "drift")]
-    for told in ({"begin": begin}, {"known": found}):
+    for told in ({"starts": [begin]}, {"held": found.held, "before": found.explanation}):
         again, _ = settled(campaign, **told)
         assert again.names == found.names
         np.testing.assert_allclose(again.held[0][1], found.held[0][1], rtol=0, atol=1e-6)

@@ -181,7 +181,7 @@ def answer(
 def _probability(last: Conclusion, gap: Gap) -> float:
     """Return how probable exactly the effects of the fit are; with what was refused at work they are not all."""
     exactly = last.fit.probability_of_just({effect.name for effect, _ in last.fit.effects})
-    exactly = min([exactly, *(1.0 - refused.probability for refused in last.refused.values() if not refused.place)])
+    exactly = min([exactly, *(1.0 - refused.probability for refused in last.refused.values())])
     return exactly if gap.worse is None else min(exactly, settings.SUREST_IF_WORSE)
 
 

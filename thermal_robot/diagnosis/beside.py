@@ -1,67 +1,60 @@
-"""Backward elimination and further terms beside the effects that were chosen: laws, events of rows, ripple.
-
-Effects are chosen again where joints scatter or encoders step, as either can be mistaken for a systematic effect.
-"""
+"""Forward selection of terms that nobody listed: events of rows, ripple, laws; and the choice beside scatter."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
-from operator import itemgetter
 
 import numpy as np
-from scipy.special import expit
 
 from thermal_robot.diagnosis.answer import Conclusion
 from thermal_robot.diagnosis.examine import Examined, examine
 from thermal_robot.diagnosis.parts import Dependence, Location, Refused, Unexplained
 from thermal_robot.diagnosis.where import without_laws
-from thermal_robot.effects import Effect, gate
+from thermal_robot.effects import Effect
 from thermal_robot.effects.joint_ripple import JointRipple
-from thermal_robot.effects.law import PREFIX, Discovered
-from thermal_robot.effects.law_words import is_event
+from thermal_robot.effects.law import PREFIX
 from thermal_robot.inference import settings
-from thermal_robot.inference.discover import Discovery, candidates, discovered, worthwhile
+from thermal_robot.inference.discover import Discovery, candidates, discovered
 from thermal_robot.inference.events import events
 from thermal_robot.inference.explain import Discrepancy, explain
-from thermal_robot.inference.fit import Fit, less, refit
+from thermal_robot.inference.fit import Fit, refit
 from thermal_robot.inference.problem import generalised
 from thermal_robot.inference.random_gap import RandomGap, random_gap
 from thermal_robot.inference.ripple import alike, waves
 from thermal_robot.inference.robust import Noise
 
 
-def one_more_law(
-    fit: Fit, number: int, progress: Callable[[str], None], happened: Sequence[Discovered] | None = None
-) -> Fit | None:
-    """Let laws that nobody wrote down compete with all known effects; ``None`` if none is worth its place.
+def grown(fit: Fit, number: int, progress: Callable[[str], None]) -> Fit | None:
+    """Forward selection: let terms that nobody listed compete with all known effects; ``None`` if none pays.
 
-    Events that ``happened`` are among them, and are looked for where absent.
+    Terms are generated from what the fit leaves: events, waves of the joints, laws of any quantity at any place. One
+    event or law more joins a fit at a time, as ``discovered.<number>``.
     """
     progress(f"causes that nobody listed: scan {number}")
-    laws = candidates(fit, number, happened)
-    begin = worthwhile(fit, laws) if laws else None
-    if begin is None:
+    held = [effect for effect, _ in fit.effects]
+    laws = candidates(fit, number, events(fit))
+    offered: dict[str, tuple[Effect, ...]] = {f"{PREFIX}{number}": laws} if laws else {}
+    bases, wave = [held], _ripple(fit)
+    if wave is not None:
+        others = [effect for effect in held if not isinstance(effect, JointRipple)]
+        offered[wave.name] = (wave,) if wave.orders else ()
+        bases = [[*others, wave], others] if wave.orders else [others]
+    if not offered:
         return None
-    name = f"{PREFIX}{number}"
-    wider = refit(fit, {name: laws}, begin, progress)
-    return wider if any(effect.name == name for effect, _ in wider.effects) else None
+    before = [effect for effect in bases[0] if effect.name.startswith(PREFIX)]
+    starts = [*bases, *([*base, law] for base in (*bases, before) for law in laws)]
+    wider = refit(fit, offered, starts, progress)
+    return wider if any(effect.name in offered for effect, _ in wider.effects) else None
 
 
-def eventful(fit: Fit, progress: Callable[[str], None]) -> Fit:
-    """Let events join a fit as long as there are any, before what they do is taken for something else.
-
-    Rows that were set aside, and effects that stood in for an event, are judged anew beside it. A law of another kind
-    that says more than the event does leaves the fit as it is: it has its turn later.
-    """
-    progress("events: from row to row, from session to session")
-    for number in range(1, settings.MOST_LAWS + 1):
-        happened = events(fit)
-        wider = one_more_law(fit, number, progress, happened) if happened else None
-        if wider is None or not any(is_event(law) and law.name == f"{PREFIX}{number}" for law, _ in wider.effects):
-            return fit
-        fit = wider
-    return fit
+def _ripple(fit: Fit) -> JointRipple | None:
+    """Return the ripple that a fit shows, if it is considered and not the one that it holds."""
+    if JointRipple.name not in fit.variants or fit.campaign.samples > settings.RIPPLE_ROWS:
+        return None
+    found = waves(fit)
+    held = next((effect for effect, _ in fit.effects if isinstance(effect, JointRipple)), JointRipple())
+    return None if alike(found, held) else found
 
 
 def as_laws_say(left: Unexplained, found: Sequence[Discovery], discrepancy: Discrepancy) -> Unexplained:
@@ -115,7 +108,7 @@ def beside_scatter(
     own = {name: [b for b, family in enumerate(families) if family == name] for name in feigned}
     chances = {n: again.probability(blocks) if blocks else fit.probability(n) for n, blocks in own.items()}
     refused = {**refused, **{name: Refused(probability) for name, probability in chances.items()}}
-    fit = refit(fit, feigned, [linear.blocks[b].effect for b in again.best.blocks], progress)
+    fit = refit(fit, feigned, [[linear.blocks[b].effect for b in again.best.blocks]], progress)
     chance = random_gap(fit)
     sigma = replace(fit.explanation.whitening, noise=chance.scatter.noise).sigma()
     covariance = chance.scatter.covariance(fit.corrected.joint_sensitivity, sigma)[:, :3, :3]
@@ -126,59 +119,3 @@ def beside_scatter(
     laws = discovered(fit)
     unexplained = as_laws_say(without_laws(fit, left), laws, fit.explanation.discrepancy)
     return Conclusion(fit, laws, unexplained, Examined(left, floor, "scatter"), chance, refused)
-
-
-def beside_steps(
-    fit: Fit, chance: RandomGap, refused: dict[str, Refused], progress: Callable[[str], None]
-) -> tuple[Fit, RandomGap, dict[str, Refused]]:
-    """Take out effects without which encoders show their steps, the one that hides most of them first.
-
-    Where joints err anew in every pose, an effect with many parameters can fit a part of these errors. The fit takes
-    them for normal; that they put the joint on an encoder's steps, or no longer do, is left out of its evidence. With
-    the odds P of an effect by the fit, and the Bayes factors B and B' of steps with it and without it, it stays while
-    P B > B'.
-    """
-    while hidden := {joint for joint, factor in chance.steps.items() if factor < 0.0}:
-        rivals = []
-        for name in (effect.name for effect, _ in fit.effects if _moves(fit, effect) & hidden):
-            log_odds = float(np.log(max(fit.odds(name), settings.TINY)))
-            if log_odds <= settings.STEPS_REACH:
-                other = less(fit, name, progress)
-                left = random_gap(other)
-                rivals.append((left.seen - chance.seen - log_odds, name, other, left))
-        best = max(rivals, key=itemgetter(0), default=None)
-        if best is None or best[0] <= 0.0:
-            break
-        gain, name, fit, chance = best
-        progress(f"steps of encoders speak against {name}")
-        refused = {**refused, name: Refused(float(expit(-gain)))}
-    return fit, chance, refused
-
-
-def _moves(fit: Fit, effect: Effect) -> set[str]:
-    """Return the joints that parameters of a known effect sit in."""
-    if effect.name.startswith(PREFIX):
-        return set()
-    return {p.place for p in gate.checked(effect, fit.corrected) if p.kind == "joint"}
-
-
-def rippled(fit: Fit, progress: Callable[[str], None]) -> Fit:
-    """Let waves of the joints join a fit, and leave it again, until they stay.
-
-    What was fitted without them may have stood in for them, and hides others: the choice is made again beside the
-    waves, and these are looked for again beside the choice; once where rows are very many, and not at all where each
-    choice would take minutes, or ripple was not to be considered.
-    """
-    name = JointRipple.name
-    if name not in fit.variants or fit.campaign.samples > settings.RIPPLE_ROWS:
-        return fit
-    many = fit.campaign.samples > settings.ENOUGH_ROWS
-    for _ in range(1 if many else settings.RIPPLE_ROUNDS):
-        progress("ripple of the gears")
-        held = next((e for e, _ in fit.effects if isinstance(e, JointRipple)), JointRipple())
-        found = waves(fit)
-        if alike(found, held):
-            break
-        others = [effect for effect, _ in fit.effects if effect.name != name]
-        fit = refit(fit, {name: (found,)}, [*others, *((found,) if found.orders else ())], progress)
-    return fit

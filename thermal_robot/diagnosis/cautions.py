@@ -18,7 +18,6 @@ from numpy.typing import NDArray
 from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.plausible import copies, marks
 from thermal_robot.campaign.table import told_rows
-from thermal_robot.diagnosis.credible import cancelling, cancelling_within, outsized
 from thermal_robot.diagnosis.data_faults import settings as faults
 from thermal_robot.diagnosis.data_faults.find import misfit, spread
 from thermal_robot.diagnosis.data_faults.readings import Readings
@@ -147,19 +146,10 @@ def cautions(
             "directions of approach were not recorded: they follow from the order of the rows, as of a robot that goes "
             'straight from pose to pose; if it does not, write moves = "unknown" under [robot]'
         )
-    notes += [f"{one.words}: it may stand in for something else" for one in outsized(fitted)]
-    for name, times in cancelling_within(fitted):
-        notes.append(
-            f"parameters of {name} cancel each other: single ones do up to {times:.0f} times what all do together"
-        )
-    for pair in cancelling(fitted):
-        notes.append(f"{pair.words}; both are kept, and neither is to be believed by itself")
     for name, why in refused.items():
         if why.share is not None:
             share = percent(why.share)
             notes.append(f"rows held out are predicted no better with {name} (share {share}): not reported as found")
-        if why.reason:
-            notes.append(why.reason)
     notes += _fragile(sensitivity)
     return tuple(notes)
 

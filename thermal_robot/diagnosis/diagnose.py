@@ -14,29 +14,20 @@ from threadpoolctl import threadpool_limits
 from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.campaign.names import did_you_mean
 from thermal_robot.diagnosis.answer import Conclusion, answer
-from thermal_robot.diagnosis.beside import (
-    as_laws_say,
-    beside_scatter,
-    beside_steps,
-    eventful,
-    one_more_law,
-    rippled,
-)
+from thermal_robot.diagnosis.beside import as_laws_say, beside_scatter, grown
 from thermal_robot.diagnosis.cautions import not_executed, usable
-from thermal_robot.diagnosis.credible import credible, in_full
 from thermal_robot.diagnosis.data_faults.misfit import another_motion, delivered, frames_alone, unfit
 from thermal_robot.diagnosis.deviations import as_remainder_says
-from thermal_robot.diagnosis.earned import worth_their_word
+from thermal_robot.diagnosis.earned import pruned
 from thermal_robot.diagnosis.examine import examine
 from thermal_robot.diagnosis.growing.settings import KEPT
 from thermal_robot.diagnosis.growing.stream import can_grow
 from thermal_robot.diagnosis.growing.updated import ready
-from thermal_robot.diagnosis.held_out import held_out, worse_elsewhere
+from thermal_robot.diagnosis.held_out import held_out
 from thermal_robot.diagnosis.result import Diagnosis, told
 from thermal_robot.diagnosis.signs import as_counted
 from thermal_robot.diagnosis.where import without_laws
 from thermal_robot.effects import RANDOM, Effect, choose, library
-from thermal_robot.effects.law import PREFIX
 from thermal_robot.errors import CampaignError, EstimationError, require
 from thermal_robot.inference import settings
 from thermal_robot.inference.discover import discovered
@@ -86,7 +77,7 @@ def diagnose(
     >>> found
     Diagnosis('demo': thermal_elongation, backlash)
     >>> print(found.summary)
-    The gap of 62.6 µm comes from thermal elongation of the links and lost motion in the joints (90 % sure); ...
+    The gap of 62.6 µm comes from thermal elongation of the links and lost motion in the joints (91 % sure); ...
     """
     expected = "a campaign, or the path of one; campaign_from_table makes one of a DataFrame"
     require("diagnose()", campaign, (Campaign, str, os.PathLike), expected)
@@ -173,30 +164,15 @@ def _concluded(
 
 
 def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
-    """Let laws that nobody wrote down compete with the known effects, then ask what of the rest is random.
-
-    Events come first: what happened once, from one row to another, is no error of the robot.
-    One law after another joins the explanation, while each is worth its place and regions held out do not get worse.
-    Of effects that cancel each other one is kept; one of a size that no robot reaches is not.
-    """
-    known, cancelled = credible(in_full(rippled(eventful(known, progress), progress), progress), progress)
-    stages, happened = [known], sum(name.startswith(PREFIX) for name in known.variants)
-    most = settings.MOST_LAWS if known.campaign.samples < settings.MANY_ROWS else 1
-    while len(stages) <= most:
-        wider = one_more_law(stages[-1], happened + len(stages), progress)
+    """Let terms that nobody listed join the known effects, prune by one rule, then ask what is random."""
+    fit = known
+    for number in range(1, settings.SELECTIONS):
+        wider = grown(fit, number, progress)
         if wider is None:
             break
-        stages.append(wider)
-        if len(wider.effects) == 1 and wider.explanation.discrepancy.probability < settings.SMOOTH_PRIOR:
-            break  # one law says it all, and its rivals were compared with it
-    # the first of several laws may go astray between the places that were measured, and the others set it right
-    while len(stages) > 1 and worse_elsewhere(known, stages[-1]):
-        stages.pop()
-    # what no law has joined was weighed already
-    again = len(stages) > 1 and known.campaign.samples <= settings.ENOUGH_ROWS
-    fit, more = credible(stages[-1], progress) if again else (stages[-1], {})
-    fit, refused = worth_their_word(fit, progress)
-    fit, chance, refused = beside_steps(fit, random_gap(fit), {**cancelled, **more, **refused}, progress)
+        fit = wider
+    fit, refused = pruned(fit, progress)
+    chance = random_gap(fit)
     if chance.explains_size:
         return beside_scatter(fit, chance, refused, progress)
     left = examine(fit, progress)

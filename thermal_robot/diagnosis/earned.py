@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.special import expit, stdtrit
 
 from thermal_robot.arrays import Array
-from thermal_robot.diagnosis.held_out import held_out, schemes
+from thermal_robot.diagnosis.held_out import schemes
 from thermal_robot.diagnosis.one_walk import Model, Walk
 from thermal_robot.diagnosis.parts import Refused
 from thermal_robot.effects.law import PREFIX
@@ -18,19 +18,21 @@ from thermal_robot.effects.law_words import is_event
 from thermal_robot.inference import settings
 from thermal_robot.inference.discover import discovered
 from thermal_robot.inference.explain import log_odds
-from thermal_robot.inference.fit import Fit, less
+from thermal_robot.inference.fit import Fit, less, refit
 from thermal_robot.inference.rows import blocks
 
 
 @dataclass(frozen=True)
 class Gained:
-    """What one effect brings under one scheme of holding rows out (time, session, temperature, region, reach).
+    """Held-out log predictive density that one effect brings under one scheme of holding rows out.
 
-    ``share`` is 1 − (rms with it / rms without it)² of the rows held out, noise included, with its 95 % ``interval``.
+    ``nats`` is its gain over all rows held out, with its 95 % ``interval``; ``share`` is 1 − (rms with it / rms without
+    it)² of these rows, noise included.
     """
 
     scheme: str
     share: float
+    nats: float
     interval: tuple[float, float]
 
 
@@ -38,30 +40,40 @@ class Gained:
 class Earned:
     """What one effect of a fit brings on rows held out, all others fitted anew without it.
 
-    ``blocked``: blocks of consecutive rows held out; ``hardest``: the scheme of the smallest lower bound. It ``helps``
-    where the interval of ``blocked`` is above zero and it does no harm, as is asked of a law; it ``harms`` where the
-    share of ``blocked`` is not above zero, or under one scheme the whole interval is below. A known effect that others
-    could nearly stand in for does neither.
+    ``blocked``: blocks of consecutive rows held out; ``hardest``: the scheme with the smallest upper bound.
     """
 
     blocked: Gained
     hardest: Gained
-    helps: bool
-    harms: bool
+
+    @property
+    def clearly(self) -> bool:
+        """Whether rows held out are clearly worse with it."""
+        return self.hardest.interval[1] < 0.0
+
+    @property
+    def harms(self) -> bool:
+        """Whether rows held out are no better with it."""
+        return self.blocked.nats <= 0.0 or self.clearly
+
+    @property
+    def helps(self) -> bool:
+        """Whether rows held out are clearly better with it."""
+        return self.blocked.interval[0] > 0.0 and not self.harms
 
 
 def earned(fit: Fit) -> dict[str, Earned]:
-    """Judge every effect and law of a fit by rows that were held out.
+    """Cross-validate every effect and law of a fit: paired differences of log predictive densities of rows held out.
 
-    The interval asks how far noise alone could have moved the gain, poses and conditions as they were. With r what is
-    left of a held-out row with the effect, and r + m without it, the gain is Σ |m|² + 2 r·m. Its variance is that of
-    the sums of 2 r·m over blocks of consecutive rows, and at least 4 s² Σ |m|², with s² the mean square of r. The
-    quantile is Student's. Something that acts within one block alone cannot earn its word, as no other rows tell of it.
+    The density of a row is Student's with ν degrees of freedom, −½ (ν + m) log(1 + |r|²/ν), r what is left of its m
+    components in units of the noise (Vehtari, Gelman and Gabry, *Statistics and Computing* 27, 2017, on elpd and its
+    standard error): no few rows decide. The standard error is that of the sums over blocks of consecutive rows, the
+    quantile Student's. Something that acts within one block alone cannot earn its word, as no other rows tell of it.
 
-    An extrapolation to the coldest rows or to a region asks more than most true effects can give: their lower bound
-    there is not above zero in one case of twenty (twice the noise, 75 rows). It therefore only refuses what does harm.
-    An event says nothing of rows held out with all that it did, as a session or the warmest rows, and is asked in
-    blocks of consecutive rows alone.
+    Beside blocks, rows are held out by condition, by region, and at the ends of each joint's range. There, effects that
+    compensate each other over the range measured fall apart: of four series of one robot, gains and periodic errors of
+    ten times the size of the others carried over to no other. An event says nothing of rows held out with all that it
+    did, as a session or the warmest rows, and is asked in blocks of consecutive rows alone.
     """
     block = blocks(fit.campaign)
     model = Model.of(fit.explanation, block)
@@ -73,84 +85,98 @@ def earned(fit: Fit) -> dict[str, Earned]:
             continue
         judged = model.kept[walk.numbers]
         number = walk.numbers[judged]
-        noise = model.whitening.sigma(number)
+        noise = model.whitening.sigma(number) * fit.explanation.best.noise
         left = walk.residuals(every)[judged] / noise
         for k, (effect, _) in enumerate(fit.effects):
             if name != "time" and is_event(effect):
                 continue
             without = walk.residuals([b for b in every if b != k])[judged] / noise
-            found[effect.name].append(_gained(name, left, without - left, block[number]))
-    return {name: _earned(schemes) for name, schemes in found.items()}
+            found[effect.name].append(_gained(name, left, without, block[number]))
+    return {name: Earned(own[0], min(own, key=lambda g: g.interval[1])) for name, own in found.items()}
 
 
-def _gained(scheme: str, left: Array, moved: Array, block: NDArray[np.int64]) -> Gained:
-    total = float(((left + moved) ** 2).sum())
-    gain = total - float((left**2).sum())
-    by_chance = np.bincount(block, 2.0 * (left * moved).sum(axis=1))[np.unique(block)]
-    count = len(by_chance)
-    if count < 2 or total <= 0.0:
-        return Gained(scheme, 0.0 if total <= 0.0 else gain / total, (-np.inf, 1.0))
-    variance = max(
-        float(((by_chance - by_chance.mean()) ** 2).sum()) * count / (count - 1),
-        float((left**2).mean()) * float(((2.0 * moved) ** 2).sum()),
+def _gained(scheme: str, left: Array, without: Array, block: NDArray[np.int64]) -> Gained:
+    after, before = (left**2).sum(axis=1), (without**2).sum(axis=1)
+    total = float(before.sum())
+    share = 1.0 - float(after.sum()) / total if total > 0.0 else 0.0
+    density = (
+        0.5 * (settings.TAILS + left.shape[1]) * (np.log1p(before / settings.TAILS) - np.log1p(after / settings.TAILS))
     )
-    half = float(stdtrit(count - 1, settings.INTERVAL[1]) * np.sqrt(variance)) / total
-    return Gained(scheme, gain / total, (gain / total - half, gain / total + half))
+    parts = np.bincount(block, density)[np.unique(block)]
+    nats, count = float(parts.sum()), len(parts)
+    if count < 2:
+        return Gained(scheme, share, nats, (-np.inf, np.inf))
+    half = float(stdtrit(count - 1, settings.INTERVAL[1]) * np.sqrt(count * parts.var(ddof=1)))
+    return Gained(scheme, share, nats, (nats - half, nats + half))
 
 
-def _earned(found: list[Gained]) -> Earned:
-    blocked = found[0]
-    hardest = min(found, key=lambda gained: gained.interval[0])
-    harms = blocked.share <= 0.0 or any(gained.interval[1] < 0.0 for gained in found)
-    return Earned(blocked, hardest, blocked.interval[0] > 0.0 and not harms, harms)
+def pruned(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, Refused]]:
+    """Backward elimination by cross-validation: take terms out until all that stay obey one rule.
 
-
-def worth_their_word(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, Refused]]:
-    """Take effects and laws out of a fit one after another, the worst first, until all that stay earn their word.
-
-    A law stays if it predicts rows held out better (:func:`~thermal_robot.diagnosis.earned.earned`) and the interval of
-    its share is above zero, which is not asked of an event, as that shows in few blocks of rows. A known effect stays
-    unless it predicts them worse, or is less than nine times as probable as nothing in its place. Refused, by name: its
-    probability by its prior and the rows held out alone, and its share there; of one in question, its probability.
+    An effect or a law stays where it is nine times as probable as nothing in its place, predicts rows held out no worse
+    (a law, but an event: clearly better), and something of it is determined. All that clearly harm go at once, as they
+    may compensate each other; of the rest that do not obey, one after another, the one goes first that brings rows held
+    out least. Refused, by name: its probability, and its share where rows held out speak against it.
     """
     refused: dict[str, Refused] = {}
+    exact = True
     while True:
-        judged = {name: e for name, e in earned(fit).items() if e.harms or (name.startswith(PREFIX) and not e.helps)}
-        laws = {law.name for law, _ in fit.effects if law.name.startswith(PREFIX) and not is_event(law)}
-        if not judged and laws:
-            shares = held_out(fit).shares
-            judged = {name: e for name, e in earned(fit).items() if name in laws and shares[name][1][0] <= 0.0}
-        faint = {} if judged else in_question(fit)
-        if not judged and not faint:
+        out = _failing(fit, progress) if fit.effects else {}
+        if out:
+            refused |= {name: why for name, why in out.items() if not name.startswith(PREFIX)}
+            fit, exact = less(fit, *out), False
+        elif exact:
             return fit, refused
-        if judged:
-            worst = min(judged, key=lambda name: judged[name].blocked.share)
-            progress(f"rows held out refuse {worst}")
         else:
-            worst = min(faint, key=lambda name: faint[name])
-            progress(f"{worst} stays in question")
-        if not worst.startswith(PREFIX):
-            refused[worst] = _refused(fit, judged[worst]) if judged else Refused(fit.probability(worst))
-        fit = less(fit, worst, progress)
+            fit, exact = refit(fit, {}, (), progress), True
 
 
-def in_question(fit: Fit) -> dict[str, float]:
-    """Return by name the effects and laws of a fit that are little more probable than nothing in their place: the odds.
+def _failing(fit: Fit, progress: Callable[[str], None]) -> dict[str, Refused]:
+    """Return the terms that go next, of those that do not obey the rule, and what speaks against each."""
+    table, odds, sure = earned(fit), in_place(fit), determined(fit)
+    if harmful := {name: _refused(e) for name, e in table.items() if e.clearly}:
+        progress(f"rows held out refuse {', '.join(harmful)}")
+        return harmful
+    laws = {law.name for law, _ in fit.effects if law.name.startswith(PREFIX) and not is_event(law)}
+    poor = {name for name, e in table.items() if e.harms or (name in laws and not e.helps)}
+    out = poor | {name for name in table if odds[name] < settings.NAMING_ODDS or name not in sure}
+    if not out:
+        return {}
+    worst = min(out, key=lambda name: table[name].blocked.nats)
+    why = "rows held out refuse" if worst in poor else "in question:" if worst in sure else "nothing determines"
+    progress(f"{why} {worst}")
+    if worst in poor:
+        return {worst: _refused(table[worst])}
+    # of one that nothing determines no more is known than before the data
+    return {worst: Refused(min(fit.probability(worst), 1.0 if worst in sure else settings.PRIOR_PROBABILITY))}
 
-    What others could do in its place does not count here: two of which one is at work are told as confounded. A law
-    goes, too, that is far less probable than those that follow something else, or elsewhere.
+
+def in_place(fit: Fit) -> dict[str, float]:
+    """Return by name the odds of each effect and law against nothing in its place; of a law also against its rivals.
+
+    What others could do in its place does not count: two of which one is at work are told as confounded. A law says
+    what it follows, and where: it is no surer than that.
     """
     odds = {name: fit.odds(name) for name in fit.names_of(fit.explanation.best)}
-    unlikely = {d.law.name: d.probability for d in discovered(fit) if d.probability * settings.NAMING_ODDS < 1.0}
-    return {name: own for name, own in odds.items() if own < settings.NAMING_ODDS} | unlikely
+    told = {d.law.name: d.probability for d in discovered(fit)}
+    return {name: min(own, settings.NAMING_ODDS**2 * told.get(name, 1.0)) for name, own in odds.items()}
 
 
-def _refused(fit: Fit, judged: Earned) -> Refused:
-    """Return what rows held out say of an effect: its probability, from its prior and their likelihood, and its share.
+def determined(fit: Fit) -> set[str]:
+    """Return the effects and laws of a fit of which the data determine something.
 
-    The probability is at most the prior's: blocks of rows that speak for an effect do not outweigh what refuses it.
+    Along one principal axis of its posterior at least, less than half of the prior's standard deviation is left.
     """
-    equations = fit.explanation.problem.equations
-    against = min(judged.blocked.share, 0.0)
-    said = judged.blocked if judged.blocked.share <= 0.0 else judged.hardest
-    return Refused(float(expit(log_odds() - 0.5 * equations * np.log1p(-against))), said.share)
+    e, found = fit.explanation, set()
+    for b in e.best.blocks:
+        prior = e.linear.blocks[b].sizes * e.best.scales[b]
+        least = np.linalg.eigvalsh(e.values[b][1] / np.outer(prior, prior))[0]
+        if least < settings.DETERMINED**2:
+            found.add(fit.families[b])
+    return found
+
+
+def _refused(judged: Earned) -> Refused:
+    """Return what rows held out say of an effect: its probability, from its prior and their density, and its share."""
+    said = judged.hardest if judged.clearly else judged.blocked
+    return Refused(float(expit(log_odds() + min(said.nats, 0.0))), said.share)

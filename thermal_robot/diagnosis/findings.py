@@ -194,9 +194,7 @@ def findings(
             found = replace(found, status="confounded", confounded_with=others)
         result.append(found)
     result += [
-        Finding(name, "not_found", r.probability, *shares.get(name, (0.0, (0.0, 0.0))))
-        for name, r in refused.items()
-        if not r.place
+        Finding(name, "not_found", r.probability, *shares.get(name, (0.0, (0.0, 0.0)))) for name, r in refused.items()
     ]
     result += [Finding(name, "not_testable", needs=needs) for name, needs in fit.needs.items()]
     return tuple(result)

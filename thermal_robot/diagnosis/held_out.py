@@ -17,6 +17,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
+from thermal_robot.campaign.settings import STILL
 from thermal_robot.diagnosis.one_walk import Model, Squares, Walk, deviation, share
 from thermal_robot.diagnosis.parts import FoldScheme, HeldOut
 from thermal_robot.effects.law_words import is_event
@@ -168,7 +169,7 @@ Rows = NDArray[np.bool_]
 
 
 def worst_folds(fit: Fit) -> tuple[FoldScheme, ...]:
-    """Hold rows out by time, session, temperature, region and reach; the scheme of the largest rms after comes first.
+    """Hold rows out by time, session, temperature, region, reach and range; the largest rms after comes first.
 
     Its shrinkage need not be the smallest, as the gap before may be larger on its rows, too. Every figure has the noise
     of the held-out rows in it. A scheme is left out if the campaign lacks its column; a fold if its training rows do
@@ -211,19 +212,6 @@ def harmed(schemes: Sequence[FoldScheme]) -> FoldScheme | None:
     return next((s for s in schemes if s.name in ("session", "region") and s.shrinkage < 0.0), None)
 
 
-def worse_elsewhere(narrow: Fit, wider: Fit) -> bool:
-    """Tell whether a wider explanation overfits: whether it is worse on held-out regions of joint space."""
-    kept = ~(narrow.explanation.outliers | wider.explanation.outliers)
-    rows, tests = blocks(narrow.campaign), each(neighbourhoods(narrow.campaign, settings.FOLDS))
-    left = []
-    for fit in (narrow, wider):
-        walk = Walk.over(replace(Model.of(fit.explanation, rows), kept=kept), tests)
-        if not walk.tests:
-            return False
-        left.append(walk.squares(range(len(fit.effects))).total / walk.rows)
-    return left[1] > settings.WORSE_ELSEWHERE**2 * left[0]
-
-
 def schemes(fit: Fit) -> Iterator[tuple[str, str, list[Rows]]]:
     """Yield name and description of each scheme, and a mask (N,) of the rows that each of its folds holds out."""
     campaign = fit.campaign
@@ -238,6 +226,15 @@ def schemes(fit: Fit) -> Iterator[tuple[str, str, list[Rows]]]:
     yield "region", "neighbourhoods of joint positions", each(neighbourhoods(campaign, settings.FOLDS))
     reach = np.linalg.norm(fit.nominal.position, axis=1)
     yield "reach", "the fifth that reaches out furthest", [reach >= np.quantile(reach, 1.0 - 1.0 / settings.FOLDS)]
+    yield "range", "the lowest and the highest fifth of a joint's positions", list(_ends(campaign.q))
+
+
+def _ends(q: Array) -> Iterator[Rows]:
+    """Yield a mask (N,) of the rows at either end of the range of each joint that moves."""
+    for position in q.T[np.ptp(q, axis=0) > STILL]:
+        low, high = np.quantile(position, (1.0 / settings.FOLDS, 1.0 - 1.0 / settings.FOLDS))
+        # where few positions repeat, an end may hold most of the rows
+        yield from (end for end in (position <= low, position >= high) if end.mean() < 0.5)
 
 
 def _temperature(campaign: Campaign) -> Array | None:

@@ -139,14 +139,11 @@ class Finding:
 class Refused:
     """An effect that was taken out of the fit again: its probability, and what it brings rows held out as a share.
 
-    The share is ``None`` where it is the scatter of joints that had feigned it, or where another effect stands for it;
-    ``reason`` is a sentence that tells a reader why, or empty; ``place`` is where only that one of it was taken out.
+    The share is ``None`` where the scatter of joints had feigned it, or where it stayed in question.
     """
 
     probability: float
     share: float | None = None
-    reason: str = ""
-    place: str = ""
 
 
 @dataclass(frozen=True)
@@ -214,7 +211,7 @@ class HeldOut:
 
 @dataclass(frozen=True)
 class FoldScheme:
-    """Shrinkage of the gap under one scheme: ``time``, ``session``, ``temperature``, ``region`` or ``reach``.
+    """Shrinkage of the gap under one scheme: ``time``, ``session``, ``temperature``, ``region``, ``reach``, ``range``.
 
     ``held_out`` says what is held out at a time; ``folds`` could be fitted, ``rows`` were held out in them. Rms
     distances of these rows, m, with the frames alone and with the effects, and the standard ``uncertainty`` of the

@@ -32,8 +32,6 @@ ROWS_ALIKE = 8
 """Rows that are taken together when asking whether an error follows a quantity."""
 PURE = 1e-6
 """Of a unit twist, m or rad: with less of one kind it is all of the other."""
-NEARLY_ALL = 2.576
-"""Standard deviations of the logarithm of an effect's size between which 99 % of robots are."""
 UNSETTLED = 1.5
 """Times what the linear model leaves: an exact one that leaves more is another model. They agree to a thousandth where
 errors are those of robots."""

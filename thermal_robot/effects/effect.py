@@ -24,7 +24,7 @@ A new effect is a file like this one::
 Register it under the entry point group ``thermal_robot.effects`` or pass it to :func:`thermal_robot.diagnose`. What
 others want to know of it stands in the same class, each with a default: ``title`` (in plain words), ``size_spread``
 (how well its sizes are known), ``frame`` and ``contained_in`` (what it cannot be told from), ``missing`` and ``reads``
-(columns), ``variants``, ``nearby`` and ``in_full`` (settings), ``driver`` (what it is drawn against), ``sized_as``
+(columns), ``variants`` and ``nearby`` (settings), ``driver`` (what it is drawn against), ``sized_as``
 (whether what it does in each joint is told), ``unfaded`` (where it is not known to go on). Every effect has the
 arguments ``places`` and ``excluded`` besides its own: only the parameters in these joints or links, or not in those,
 are kept, by the gate.
@@ -45,6 +45,7 @@ from typing import TYPE_CHECKING, Any, ClassVar, Literal
 import numpy as np
 
 from thermal_robot.arrays import Array
+from thermal_robot.effects.settings import SIZE_MOST
 
 if TYPE_CHECKING:
     from thermal_robot.observations import Observations
@@ -164,9 +165,6 @@ class Parameter:
         What one unit does in the channels.
     positive
         Whether it cannot be negative, as no joint is stiffer than rigid: its prior is half a normal one.
-    most
-        Largest value that is physically possible, in that unit; one that is surely larger is no part of a diagnosis.
-        What a campaign states to be expected raises it in proportion.
     """
 
     label: str
@@ -176,7 +174,6 @@ class Parameter:
     place: str
     responses: tuple[Response, ...]
     positive: bool = False
-    most: float = np.inf
 
     @property
     def name(self) -> str:
@@ -186,7 +183,7 @@ class Parameter:
     @cached_property
     def bare(self) -> Parameter:
         """It without its responses, which may be large."""
-        return Parameter(self.label, self.unit, self.size, self.kind, self.place, (), self.positive, self.most)
+        return Parameter(self.label, self.unit, self.size, self.kind, self.place, (), self.positive)
 
 
 @dataclass(frozen=True)
@@ -234,7 +231,7 @@ class Effect(ABC):
     size_spread: ClassVar[float] = SOURCED
     """How firmly the expected sizes of its parameters are known: standard deviation of the logarithm of their common
     factor, which is learnt from the data."""
-    size_most: ClassVar[float] = float("inf")
+    size_most: ClassVar[float] = SIZE_MOST
     """Times the expected sizes, to which that factor may grow: what no robot reaches is as improbable then as it is."""
     random: ClassVar[bool] = False
     """Whether it scatters: no mean follows from it; see :class:`thermal_robot.effects.random_effect.RandomEffect`."""
@@ -307,13 +304,6 @@ class Effect(ABC):
         appear here stays where :meth:`variants` put it.
         """
         return (self,)
-
-    def in_full(self) -> Effect | None:
-        """Return a setting of more parameters, each held to its expected size; ``None`` where there is none.
-
-        It is tried where a parameter comes out larger than nearly all robots have, as one that stands in for others.
-        """
-        return None
 
     def at(self, place: str) -> Effect | None:
         """Return the effect in one joint or link alone; ``None`` where it is to have no such setting.

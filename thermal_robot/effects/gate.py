@@ -181,11 +181,6 @@ def alone(effect: Effect, observations: Observations) -> tuple[Effect, ...]:
     return tuple(setting for setting in single if setting is not None) if len(places) > 1 else ()
 
 
-def in_full(effect: Effect) -> Effect | None:
-    """Return an effect's setting of more parameters (:meth:`Effect.in_full`); ``None`` where there is none."""
-    return _one_setting(effect, "in_full")
-
-
 def places_of(parameters: Sequence[Parameter]) -> tuple[str, ...]:
     """Return the joints and links that parameters sit in, in their order, each once."""
     return tuple(dict.fromkeys(p.place for p in parameters if p.kind in ("joint", "link") and p.place))

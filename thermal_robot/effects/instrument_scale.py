@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 class InstrumentScale(Effect):
     """Measured = (1 + s) · true, about the instrument's origin.
 
-    Expected size 1e-4, at most 1e-3: a tracker whose refraction is corrected with a wrong temperature errs by 1e-6 per
+    Expected size 1e-4: a tracker whose refraction is corrected with a wrong temperature errs by 1e-6 per
     kelvin, a camera or a photogrammetric scale bar by a hundred times that. All link lengths wrong by the same share
     look exactly alike, so :class:`Geometric` contains it, unless a joint slides or the target stands off a known tool
     frame; with an unknown base the place of the origin does not matter.
@@ -33,7 +33,7 @@ class InstrumentScale(Effect):
     def parameters(self, observations: Observations) -> tuple[Parameter, ...]:
         """One scale error; dimensionless."""
         response = at_instrument(observations.predicted_position)
-        return (Parameter("scale error", "1", 1e-4, "instrument", "instrument", (response,), most=1e-3),)
+        return (Parameter("scale error", "1", 1e-4, "instrument", "instrument", (response,)),)
 
     def driver(self, observations: Observations, parameters: Sequence[Parameter], error: Array) -> Driver | None:
         """Return the distance from the instrument."""

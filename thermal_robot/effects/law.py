@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import CLOCK
 from thermal_robot.campaign.units import SI
-from thermal_robot.effects import gate, settings
+from thermal_robot.effects import gate
 from thermal_robot.effects.arguments import Count, NotNegative
 from thermal_robot.effects.catalogue import restored
 from thermal_robot.effects.effect import (
@@ -67,7 +67,6 @@ class Discovered(Fading):
 
     title: ClassVar[str] = "an unlisted law"
     size_spread: ClassVar[float] = UNSOURCED
-    size_most: ClassVar[float] = settings.LAW_MOST
     name: str = PREFIX + "1"  # type: ignore[misc]
     kind: Annotated[str, word(("joint", "link", "base", "tool"))] = "joint"
     place: str = ""

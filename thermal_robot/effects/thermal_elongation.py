@@ -72,7 +72,6 @@ def _behind(history: History, lag: float) -> Array:
 
 
 _SIZE = 1.5e-5  # 1/K
-_MOST = 6e-5  # 1/K: zinc and magnesium alloys have 3e-5, and a link may warm twice as much as its sensor
 _LAGS = (600.0, 1500.0, 3600.0)
 _SHORTEST, _LONGEST = 300.0, 10800.0  # s: walls of 2 mm, and castings of 20 mm in still air
 _START = 3.0  # K between a link and what its sensor lets expect, at switching on: half of what motors of 100 W bring
@@ -86,7 +85,7 @@ class ThermalElongation(Effect):
     Equation 5 of Kluz et al. (2018) with a coefficient of its own for each segment, a ``common`` one for all, or a
     common one with a smaller deviation above it for each (partial pooling; ``spread``: its expected size, 0 for none),
     along the virtual prismatic joint of their Eqs 6-8. No link shrinks when it becomes warmer: none of them is
-    negative. Expected size 1.5e-5 /K (steel 1.2e-5, aluminium 2.3e-5), at most 6e-5 /K (zinc, where it warms twice as
+    negative. Expected size 1.5e-5 /K (steel 1.2e-5, aluminium 2.3e-5; zinc 3e-5, twice that where it warms twice as
     much as its sensor); of a polymer ``[priors]`` says more. Where one sensor reads the air or a place on the robot,
     the links follow it with a time constant: dT_link/dt = (T_recorded − T_link) / lag, minutes to an hour for a cast
     link (mass · heat capacity / surface · film coefficient: 600 to 3600 s).
@@ -171,7 +170,7 @@ class ThermalElongation(Effect):
                 continue
             responses[s] = _grown(observations, s, temperature - observations.campaign.reference_temperature)
         whole = tuple(responses.values())
-        one = (Parameter("strain per kelvin", "1/K", _SIZE, "link", "", whole, True, _MOST),)
+        one = (Parameter("strain per kelvin", "1/K", _SIZE, "link", "", whole, True),)
         began = () if self.balanced or not self.lag else self._began(observations, tuple(responses))
         if self.common and not self.spread:
             return (*one, *began)
@@ -185,7 +184,6 @@ class ThermalElongation(Effect):
                 segments[s].parent_link,
                 (response,),
                 positive=True,
-                most=_MOST,
             )
             for s, response in responses.items()
         )

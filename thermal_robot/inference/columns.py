@@ -55,11 +55,6 @@ class Block:
         return np.array([p.positive for p in self.bare] or [False] * len(self.sizes), dtype=bool)
 
     @property
-    def most(self) -> Array:
-        """(P,) largest value of each parameter that is physically possible; more where the campaign expects more."""
-        return np.array([p.most * max(size / p.size, 1.0) for p, size in zip(self.bare, self.sizes, strict=True)])
-
-    @property
     def held(self) -> Block:
         """The block with its columns, for who asks for them again and again."""
         return replace(self, source=self.columns)

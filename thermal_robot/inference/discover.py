@@ -8,17 +8,11 @@ from itertools import islice
 
 import numpy as np
 
-from thermal_robot.effects import Effect
 from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of, orthonormal, without
 from thermal_robot.inference.columns import block
-from thermal_robot.inference.discrepancy import forms
-from thermal_robot.inference.events import events
-from thermal_robot.inference.explain import explain, log_priors
 from thermal_robot.inference.fit import Fit
-from thermal_robot.inference.problem import Linear
-from thermal_robot.inference.robust import Noise
 from thermal_robot.inference.scan import Scanned, Seats, Thin, scan, shaped
 from thermal_robot.inference.settle import constant
 from thermal_robot.inference.target import Target
@@ -34,7 +28,7 @@ class Discovery:
     quantities: tuple[tuple[str, float], ...]
 
 
-def candidates(fit: Fit, number: int, happened: Sequence[Discovered] | None = None) -> tuple[Discovered, ...]:
+def candidates(fit: Fit, number: int, happened: Sequence[Discovered]) -> tuple[Discovered, ...]:
     """Laws that may be worth their place, best first, the events that may have happened before all others.
 
     Scanned are the remainders of the explanation and, unless one effect leaves but noise, of the laws alone and without
@@ -47,7 +41,7 @@ def candidates(fit: Fit, number: int, happened: Sequence[Discovered] | None = No
         targets += [thin.target(blocks, sound=True) for blocks in remainders[:2]]
     found, _ = scan(thin.observations, targets, [effect for own in fit.variants.values() for effect in own[:1]])
     offered = [_offered(thin, target, own) for target, own in zip(targets, found, strict=True)]
-    chosen = list((events(fit) if happened is None else happened)[: settings.LIKELY_EVENTS])
+    chosen = list(happened[: settings.LIKELY_EVENTS])
     for k in range(max(map(len, offered), default=0)):  # the first of each remainder, in turn
         chosen += [own[k] for own in offered if k < len(own)]
     named = dict.fromkeys(replace(law, name=f"{PREFIX}{number}") for law in chosen)
@@ -105,31 +99,6 @@ def _with_joints(own: Sequence[Scanned]) -> list[Scanned]:
     return first + [
         i for i in own[settings.SHAPED :] if i.law.kind == "joint" and (i.law.place, i.law.follows) in simpler
     ]
-
-
-def worthwhile(fit: Fit, laws: Sequence[Discovered]) -> tuple[Effect, ...] | None:
-    """Compare laws with the known effects where the fit is linear; return what is then the best, with a law in it.
-
-    ``None`` where no law is worth its place. The search starts from the explanation, from the explanation with each of
-    the laws, and from each law alone.
-    """
-    thin = Thin.of(fit)
-    blocks = (*thin.linear.blocks, *(block(thin.observations, law) for law in laws))
-    linear = Linear(thin.linear.gap, thin.linear.frames, blocks)
-    known, best = len(thin.linear.blocks), fit.explanation.best.blocks
-    before = tuple(b for b in best if fit.families[b].startswith(PREFIX))
-    new = range(known, len(blocks))
-    found = explain(
-        linear,
-        Noise.of(thin.observations.campaign),
-        families=[b.effect.name for b in blocks],
-        log_prior=log_priors([b.effect for b in blocks]),
-        starts=[best, *((*best, k) for k in new), *((*before, k) for k in new)],
-        forms=forms(thin.observations),
-    )
-    if not set(found.best.blocks) & set(new):
-        return None
-    return tuple(blocks[b].effect for b in found.best.blocks)
 
 
 def discovered(fit: Fit) -> tuple[Discovery, ...]:

@@ -298,7 +298,8 @@ def forms(observations: Observations) -> tuple[Form, ...]:
     units = np.diag([settings.LEVER] * 3 + [1.0] * 3)[:measures, :measures]
     lengths = zip(settings.LENGTHS, _together(observations), strict=True)
     found = [Form(f"tool, {length:g}", functions, units) for length, functions in lengths]
-    functions = np.concatenate([_spectral(values) for values in quantities(observations).values()], axis=1)
+    smooth = [v for name, v in quantities(observations).items() if not name.startswith(settings.NO_BACKGROUND)]
+    functions = np.concatenate([_spectral(values) for values in smooth], axis=1)
     found.append(Form("places", functions, _moves(observations, measures)))
     found += _at_one_place(observations, "places", functions, measures, anew=False)
     pose = repeated_poses(observations.campaign)

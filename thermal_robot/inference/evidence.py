@@ -7,9 +7,12 @@ blocks that are in the combination. F is projected out first. For a combination 
 
 with G = X'X and b = X'y restricted to γ. Noise s and scales λ_b are found at their most probable values, s by MacKay's
 fixed point (*Neural Computation* 4, 1992), ln λ_b by Newton's steps; their priors are scaled inverse chi-square about
-the stated noise, and log-normal about the stated sizes, cut off where no robot reaches;
-ln λ is integrated out by Laplace's method, s held. Parameters that cannot be negative have half a normal prior
-(:mod:`thermal_robot.inference.posterior`).
+the stated noise, and log-normal about the stated sizes, with a factor κ that all of one robot share,
+
+    ln λ_b ~ N(ln κ, σ_b²) ,  ln κ ~ N(0, σ_κ²) ,  so that  ln λ ~ N(0, C) ,  C = diag(σ_b²) + σ_κ² 11ᵀ ,
+
+cut off where no robot reaches; ln λ is integrated out by Laplace's method, s held. Parameters that cannot be negative
+have half a normal prior (:mod:`thermal_robot.inference.posterior`).
 """
 
 from __future__ import annotations
@@ -33,9 +36,9 @@ class Gram:
 
     G (D, D), b (D,) and y'y are ``matrix``, ``vector`` and ``total``; each block, reduced to what the data see of it
     (``ranks``), has D_b columns (``slices``), of which ``bases`` (P_b, D_b) are the parameter values. ``positive`` (D,)
-    cannot be negative: each is then a parameter. ``spreads`` (B,): prior standard deviation of ln λ; ``most`` (B,): λ
-    at most. ``equations`` n is less the rank of the frames; ``noise_dof`` holds the whitening noise, 0 where it is not
-    known; ``offset`` is the log evidence that all combinations share: −½ log of the determinants of the rows'
+    cannot be negative: each is then a parameter. ``spreads`` (B,): prior standard deviation of ln λ − ln κ; ``most``
+    (B,): λ at most. ``equations`` n is less the rank of the frames; ``noise_dof`` holds the whitening noise, 0 where it
+    is not known; ``offset`` is the log evidence that all combinations share: −½ log of the determinants of the rows'
     covariance and of the frames, and the log prior of that covariance.
     """
 
@@ -112,12 +115,12 @@ def evidence(
     columns = Columns(gram.matrix[used[:, None], used], gram.vector[used], owner, gram.positive[used])
     scale = np.array([start.scales.get(b, 1.0) if start else 1.0 for b in blocks])
     variance = start.noise**2 if start else (gram.noise_dof + gram.total) / (gram.noise_dof + gram.equations)
-    variance, spread = max(variance, settings.LEAST_VARIANCE), gram.spreads[list(blocks)]
+    variance, alike = max(variance, settings.LEAST_VARIANCE), Alike.of(gram.spreads[list(blocks)])
     known = prior + gram.offset
     most = np.full(len(scale), np.inf) if gram.most is None else gram.most[list(blocks)]
-    peak = _most_probable(gram, columns, np.minimum(scale, most), spread, most, variance, floor - known, settled)
+    peak = _most_probable(gram, columns, np.minimum(scale, most), alike, most, variance, floor - known, settled)
     found, scale, variance = peak.posterior, peak.scale, peak.variance
-    log_evidence = known + _log_joint(gram, columns, found, scale, spread, variance) + _log_volume(peak.bend, spread)
+    log_evidence = known + _log_joint(gram, columns, found, scale, alike, variance) + _log_volume(peak.bend, alike)
     log_evidence += peak.promised or 0.0
     if not np.isfinite(log_evidence):
         raise EstimationError(UNDETERMINED)
@@ -126,6 +129,29 @@ def evidence(
     exact = peak.promised is None
     noise = float(np.sqrt(variance))
     return Combination(blocks, log_evidence, noise, scales, found.values, found.covariance, effective, exact)
+
+
+@dataclass(frozen=True, eq=False)
+class Alike:
+    """Prior N(0, C) of B logarithms of scales that share the factor κ: C⁻¹ (``tight``), and R with C = R Rᵀ."""
+
+    tight: Array
+    root: Array
+
+    @classmethod
+    def of(cls, spread: Array) -> Alike:
+        """Return it for scales that have the standard deviations ``spread`` (B,) about κ."""
+        covariance = np.diag(spread**2) + settings.COARSENESS**2
+        return cls(np.asarray(np.linalg.inv(covariance)), np.asarray(np.linalg.cholesky(covariance)))
+
+
+def beside(spread: Array, log_scale: Array, own: Array) -> tuple[float, Array]:
+    """Return mean and standard deviations of ln λ of further blocks: N(0, C) given those of B known ones.
+
+    ``spread`` and ``log_scale`` (B,) are those of the known blocks, ``own`` (K,) the spreads of the further ones.
+    """
+    known = 1.0 / (settings.COARSENESS**-2.0 + float((spread**-2.0).sum()))
+    return known * float((log_scale / spread**2).sum()), np.sqrt(own**2 + known)
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,7 +169,7 @@ def _most_probable(
     gram: Gram,
     columns: Columns,
     scale: Array,
-    spread: Array,
+    alike: Alike,
     most: Array,
     variance: float,
     floor: float,
@@ -154,8 +180,8 @@ def _most_probable(
     before, reach, free = np.zeros(len(scale)), 1.0, np.ones(len(columns.vector), dtype=bool)
     for last in [*(False,) * settings.EVIDENCE_STEPS, True]:
         found = Posterior.at(columns, scale, variance, free)
-        bend = found.bend(columns.owner, scale, spread)
-        step, gain = found.step(bend, scale, spread)
+        bend = found.bend(columns.owner, scale, alike.tight)
+        step, gain = found.step(bend, scale, alike.tight)
         if (found.free != free).any() and step @ before < -settings.TAKEN_BACK * (before @ before):
             reach *= 0.5  # to and fro between two sets of dropped columns: the mode lies where they meet
         free, before, step = found.free, step, np.minimum(reach * step, np.log(most / scale))
@@ -166,25 +192,26 @@ def _most_probable(
             break
         if np.isfinite(floor):
             gain += 0.5 * (gram.equations + held) * (target / variance - 1.0 - np.log(target / variance))
-            reached = _log_joint(gram, columns, found, scale, spread, variance)
+            reached = _log_joint(gram, columns, found, scale, alike, variance)
             if reached + settings.CLEARLY * gain < floor:
                 return _Peak(found, bend, scale, variance, gain)
         variance, scale = target, scale * np.exp(step)
     return _Peak(found, bend, scale, variance)
 
 
-def _log_joint(gram: Gram, columns: Columns, found: Posterior, scale: Array, spread: Array, variance: float) -> float:
+def _log_joint(gram: Gram, columns: Columns, found: Posterior, scale: Array, alike: Alike, variance: float) -> float:
     """Return log p(y, s, λ) of one combination, up to what is common to all."""
     held = gram.noise_dof
     quadratic = gram.total - columns.vector @ found.values
     fit = -0.5 * ((gram.equations + held) * np.log(variance) + (held + quadratic) / variance)
-    return float(fit + found.log_volume - 0.5 * ((np.log(scale) / spread) ** 2).sum())
+    log = np.log(scale)
+    return float(fit + found.log_volume - 0.5 * log @ alike.tight @ log)
 
 
-def _log_volume(bend: Array, spread: Array) -> float:
-    """Return −½ log|σ H σ|: the volume of the peak over all ln λ against that of their priors N(0, σ_b²).
+def _log_volume(bend: Array, alike: Alike) -> float:
+    """Return −½ log|Rᵀ H R|, C = R Rᵀ: the volume of the peak over all ln λ against that of their prior N(0, C).
 
     H leaves out that s follows λ, and what is not parabolic: both within about 0.1 for blocks that are well seen.
     """
-    peak = np.linalg.eigvalsh(bend * np.outer(spread, spread))
+    peak = np.linalg.eigvalsh(alike.root.T @ bend @ alike.root)
     return -0.5 * float(np.log(np.maximum(peak, settings.FLATTEST_PEAK)).sum())

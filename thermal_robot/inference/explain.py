@@ -45,7 +45,7 @@ class Explanation:
     ``problem`` is the Gram matrix of the ``linear`` problem at the final ``whitening``; ``combinations`` all that were
     compared, most probable first, without values; ``values`` mean and covariance per block of the best; ``remainder``
     (N, m) the residual of all rows, gap less effects and frames; ``smooth`` (N, m) the discrepancy's posterior mean,
-    part of it; ``outliers`` (N,) rows set aside.
+    part of it; ``outliers`` (N,) rows set aside; ``searched`` holds all that was weighed.
     """
 
     linear: Linear
@@ -60,6 +60,13 @@ class Explanation:
     outliers: NDArray[np.bool_]
     discrepancy: Discrepancy
     forms: Sequence[Form]
+    searched: _Round | None = None
+
+    def without(self, out: Sequence[int]) -> Explanation:
+        """Return the best explanation without some blocks, at the same weights, from all that was weighed before."""
+        if self.searched is None:
+            raise ValueError("what was weighed for this explanation is no longer known")
+        return self.searched.without(frozenset(out)).told(self.outliers)
 
     def block_of(self, effect: Effect) -> int:
         """Return the block of the best combination that is this effect, in whatever setting."""
@@ -157,6 +164,14 @@ class _Round:
         cls, asked: _Asked, whitening: Whitening, beside: Sequence[Form], seeds: Sequence[tuple[int, ...]]
     ) -> _Round:
         ladder = Ladder(asked.linear, whitening, list(beside), asked.log_prior, asked.rivals, asked.forms, asked.stack)
+        return cls._on(asked, ladder, seeds)
+
+    def without(self, out: frozenset[int]) -> _Round:
+        """Return the round without some blocks, started from the best of what was weighed without them."""
+        return self._on(self.asked, self.ladder.without(out), [tuple(b for b in self.best.blocks if b not in out)])
+
+    @classmethod
+    def _on(cls, asked: _Asked, ladder: Ladder, seeds: Sequence[tuple[int, ...]]) -> _Round:
         ladder.run(seeds)
         rung, best = ladder.consensus(asked.families)
         white = ladder.whitened_at(rung)
@@ -217,6 +232,7 @@ class _Round:
             aside,
             Discrepancy(self.form, self.rung[1], 1.0 - odds.get("", 0.0), odds, self.best.noise),
             ladder.in_question(self.best),
+            self,
         )
 
 

@@ -17,6 +17,7 @@ from thermal_robot.inference.columns import frame_columns, unknown_frames
 from thermal_robot.inference.evidence import Combination
 from thermal_robot.inference.explain import Explanation
 from thermal_robot.inference.frames import register
+from thermal_robot.inference.gauss_newton import gauss_newton
 from thermal_robot.inference.problem import Linear
 from thermal_robot.inference.rows import near_repeats
 from thermal_robot.inference.settle import Settled, settle
@@ -82,7 +83,7 @@ def fit(campaign: Campaign, effects: Sequence[Effect], progress: Callable[[str],
         inside = {n: v for n, v in variants.items() if n not in settled.containers}
         apart = settle(nominal, inside, progress)
         if apart.noise <= settings.NO_WORSE * settled.noise:
-            again = settle(apart.observations, variants, progress, apart)
+            again = settle(apart.observations, variants, progress, held=apart.held, before=apart.explanation)
             settled = settled if set(again.names) & settled.containers else again
     return _fitted(campaign, settled, needs, variants)
 
@@ -93,35 +94,35 @@ def _settings(effect: Effect, observations: Observations) -> tuple[Effect, ...]:
     return tuple(dict.fromkeys((*known, *gate.alone(known[0], observations))))
 
 
-def less(known: Fit, name: str, progress: Callable[[str], None] = lambda _: None, place: str = "") -> Fit:
-    """Fit again without one effect; with a place, without it in that joint or link alone."""
+def less(known: Fit, *names: str) -> Fit:
+    """Backward elimination: a fit without some effects, the others chosen anew in the same linear problem.
 
-    def rest(effect: Effect) -> Effect | None:
-        if effect.name != name:
-            return effect
-        left = tuple(other for other in effect.places if other != place)
-        if not place or (effect.places and not left):
-            return None
-        cut = replace(effect, places=left, excluded=(*effect.excluded, place))
-        return cut if gate.checked(cut, known.corrected) else None
-
-    others = tuple(dict.fromkeys(cut for effect in known.variants.get(name, ()) if (cut := rest(effect))))
-    begin = [cut for effect, _ in known.effects if (cut := rest(effect))]
-    return refit(known, {name: others}, begin, progress)
+    Weights and all that was weighed stay; the choice is fitted exactly.
+    """
+    explanation = known.explanation.without([b for name in names for b in known.blocks_of(name)])
+    linear = [(explanation.linear.blocks[b].effect, explanation.values[b][0]) for b in explanation.best.blocks]
+    corrected, held = gauss_newton(
+        known.campaign, known.corrected.frames, explanation, linear, settings.SETTLED_BETWEEN, known.effects
+    )
+    variants = {other: own for other, own in known.variants.items() if other not in names}
+    return replace(known, explanation=explanation, corrected=corrected, effects=tuple(held), variants=variants)
 
 
 def refit(
     known: Fit,
     variants: Mapping[str, tuple[Effect, ...]],
-    begin: Sequence[Effect],
+    starts: Sequence[Sequence[Effect]] = (),
     progress: Callable[[str], None] = lambda _: None,
 ) -> Fit:
-    """Fit again with other settings to choose from, such as discovered laws; the search starts with ``begin``.
+    """Choose again at the exact model of a fit, with other settings to choose from, such as discovered laws.
 
-    ``variants`` replace those of the fit by name, or join them; none takes the effect out.
+    ``variants`` replace those of the fit by name, or join them; none takes the effect out. The search starts from each
+    of the ``starts``, by default from the effects of the fit.
     """
     whole = {name: own for name, own in {**known.variants, **variants}.items() if own}
-    settled = settle(known.nominal, whole, progress, begin=begin)
+    # rows that were set aside are judged anew beside what joins: they may be what it explains
+    before = None if starts and known.explanation.outliers.any() else known.explanation
+    settled = settle(known.corrected, whole, progress, held=known.effects, before=before, starts=starts)
     return _fitted(known.campaign, settled, known.needs, whole)
 
 

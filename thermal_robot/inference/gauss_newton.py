@@ -1,4 +1,4 @@
-"""The exact model of an explanation: Gauss-Newton over frames and parameters, the priors held at their scales."""
+"""The exact model of an explanation: Levenberg-Marquardt over frames and parameters, priors held at their scales."""
 
 from __future__ import annotations
 
@@ -74,10 +74,9 @@ def _descended(
         flat, names = frame_columns(observations)
         items = tuple(block(observations, effect) for effect in effects)
         stack = whitened(Linear(observations.gap, flat, items), beside)
-        step, size = _step_inside(stack[:, :-1], stack[:, -1], state, prior, least)
-        for part in settings.STEP_PARTS:
-            ahead = np.maximum(state + part * step[len(names) :], least)
-            tried = moved(frames, part * step[: len(names)], names), ahead
+        for damping in settings.DAMPINGS:
+            step, size = _step_inside(stack[:, :-1], stack[:, -1], state, prior, least, damping)
+            tried = moved(frames, step[: len(names)], names), np.maximum(state + step[len(names) :], least)
             there = corrected_observations(campaign, tried[0], pairs(tried[1]))
             if (after := left(there, tried[1])) <= cost or size < settled:
                 break
@@ -89,18 +88,20 @@ def _descended(
     return observations, pairs(state), cost
 
 
-def _step_inside(design: Array, gap: Array, state: Array, prior: Array, least: Array) -> tuple[Array, float]:
-    """Return the ridge step after which nothing is below its least, 0 or −∞: what would be is held at zero."""
+def _step_inside(
+    design: Array, gap: Array, state: Array, prior: Array, least: Array, damping: float
+) -> tuple[Array, float]:
+    """Return the damped ridge step after which nothing is below its least, 0 or −∞: what would be is held at zero."""
     flat, held = design.shape[1] - len(prior), np.zeros(len(prior), dtype=bool)
     while True:
-        step, size = _ridge_step(design, gap, state, np.where(held, settings.LEAST_HELD * prior, prior))
+        step, size = _ridge_step(design, gap, state, np.where(held, settings.LEAST_HELD * prior, prior), damping)
         below = ~held & (state + step[flat:] < least)
         if not below.any():
             return step, size
         held |= below
 
 
-def _ridge_step(design: Array, gap: Array, state: Array, prior: Array) -> tuple[Array, float]:
+def _ridge_step(design: Array, gap: Array, state: Array, prior: Array, damping: float) -> tuple[Array, float]:
     """Return the step that minimises |gap − design step|² + |(state + step)/prior|², and what it moves, in noise.
 
     The first columns have no prior. Directions that nothing determines are not moved. A step along directions that do
@@ -110,6 +111,7 @@ def _ridge_step(design: Array, gap: Array, state: Array, prior: Array) -> tuple[
     matrix, vector = design.T @ design, design.T @ gap
     matrix[np.arange(flat, len(matrix)), np.arange(flat, len(matrix))] += 1.0 / prior**2
     vector[flat:] -= state / prior**2
+    matrix.ravel()[:: len(matrix) + 1] *= 1.0 + damping  # Levenberg and Marquardt
     root = whitener(matrix, settings.STEP_FLOOR)
     along = root.T @ vector
     return np.asarray(root @ along), float(np.linalg.norm(along))

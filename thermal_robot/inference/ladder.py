@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
+from copy import copy
 from dataclasses import dataclass, field, replace
 from itertools import combinations, pairwise
 
@@ -57,6 +58,7 @@ class Ladder:
         self._settled: dict[tuple[int, tuple[int, ...]], Combination] = {}
         self._priors = {PLAIN: float(np.log1p(-share))}
         self._joined = False
+        self._out: frozenset[int] = frozenset()
         self._sizes: dict[int, float] = {}
         given, self.forms = self.forms, []
         self._spectra: list[Spectrum | Grouped] = []
@@ -65,6 +67,19 @@ class Ladder:
         for form in given:
             self._consider(form, float(np.log(share / max(self.among, len(given)))))
         self.searches[PLAIN] = self._search(PLAIN, plain)
+
+    def without(self, out: frozenset[int]) -> Ladder:
+        """Return the same without some blocks: what was evaluated of the others stays known."""
+        found = copy(self)
+        found.forms, found._joined = list(self.forms), any(form.several for form in self.forms)
+        found._spectra, found._along = list(self._spectra), list(self._along)
+        found._priors, found._sizes = dict(self._priors), dict(self._sizes)
+        found._quick = {key: log for key, log in self._quick.items() if not out & set(key[1])}
+        found._settled = {key: own for key, own in self._settled.items() if not out & set(key[1])}
+        found._out = self._out | out
+        left = {rung: search.without(out) for rung, search in self.searches.items()}
+        found.searches = {rung: search for rung, search in left.items() if search.seen or rung == PLAIN}
+        return found
 
     def _consider(self, form: Form, log_prior: float) -> int:
         """Add a form, which shares its prior among all sizes; return its number.
@@ -106,7 +121,8 @@ class Ladder:
 
     def _search(self, rung: Rung, problem: Gram) -> Search:
         offset = problem.offset + self._priors[rung]
-        return Search(replace(problem, offset=offset), self.log_prior, self._pairs, self._containers)
+        found = Search(replace(problem, offset=offset), self.log_prior, self._pairs, self._containers)
+        return found.without(self._out) if self._out else found
 
     def run(self, starts: Sequence[tuple[int, ...]] = ()) -> tuple[Rung, Combination]:
         """Climb over combinations and discrepancies until neither betters the other, from several starts."""

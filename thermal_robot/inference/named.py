@@ -127,7 +127,7 @@ def _explained(
     campaign = observations.campaign
     noise, use = Noise.of(campaign), np.ones(campaign.samples, dtype=bool)
     blocks = tuple(block(observations, effect).held for effect in effects)
-    linear = at_exact_model(observations, blocks, range(len(held)), held)
+    linear = at_exact_model(observations, blocks, held)
     # effects that are far off, and gross errors, are settled first, beside a noise that is free
     whitening = before.whitening if before else replace(first_whitening(linear, noise, use), held=0.0)
     aside, seen, known = before.outliers if before else ~use, 0, before is not None

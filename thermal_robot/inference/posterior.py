@@ -108,11 +108,11 @@ class Posterior:
             _by_block(columns, 1.0 - (second - first**2) * tight, count),
         )
 
-    def bend(self, owner: NDArray[np.int64], scale: Array, spread: Array) -> Array:
+    def bend(self, owner: NDArray[np.int64], scale: Array, tight: Array) -> Array:
         """Return minus the second derivative of the log integrand after ln λ, (B, B).
 
-        With m and C mode and covariance of the values, priors N(0, σ_b²) of ln λ and s held, it is
-        H_bc = δ_bc (2 (m_bᵀm_b + tr C_bb)/λ_b² + 1/σ_b²) − (4 m_bᵀ C_bc m_c + 2 tr C_bc C_cb)/(λ_b λ_c)².
+        With m and C mode and covariance of the values, a prior N(0, P⁻¹) of ln λ (P is ``tight``) and s held, it is
+        H_bc = δ_bc 2 (m_bᵀm_b + tr C_bb)/λ_b² + P_bc − (4 m_bᵀ C_bc m_c + 2 tr C_bc C_cb)/(λ_b λ_c)².
         """
         each = np.zeros((len(scale), len(owner)))
         each[owner, np.arange(len(owner))] = scale[owner] ** -2.0
@@ -120,19 +120,19 @@ class Posterior:
         moment += self.covariance
         moment *= self.covariance
         bend = -2.0 * (each @ moment @ each.T)
-        own = 2.0 * (each @ (self.values**2 + self.covariance.diagonal())) + spread**-2.0
-        bend.ravel()[:: len(scale) + 1] += own
+        bend += tight
+        bend.ravel()[:: len(scale) + 1] += 2.0 * (each @ (self.values**2 + self.covariance.diagonal()))
         return np.asarray(bend)
 
-    def step(self, bend: Array, scale: Array, spread: Array) -> tuple[Array, float]:
+    def step(self, bend: Array, scale: Array, tight: Array) -> tuple[Array, float]:
         """Return the Newton step of ln λ, each at most one, and what it gains if the log integrand is parabolic.
 
         Where that is not convex, the step is of each scale for itself.
         """
-        slope = self.fitted - self.determined - np.log(scale) / spread**2
+        slope = self.fitted - self.determined - tight @ np.log(scale)
         _, step, failed = dposv(bend, slope) if len(scale) else (None, slope, 0)
         if failed:
-            step = slope / (self.fitted + self.determined + spread**-2.0)
+            step = slope / (self.fitted + self.determined + tight.diagonal())
         return np.minimum(np.maximum(step, -1.0), 1.0), float(0.5 * slope @ step)
 
 

@@ -133,12 +133,12 @@ def seen(log_factors: Sequence[float]) -> float:
     return float(np.logaddexp(np.log1p(-settings.STEPS_HIDDEN) + np.asarray(log_factors, dtype=float), hidden).sum())
 
 
-def stepped(factor: float, *, again: bool) -> float:
+def stepped(factor: float) -> float:
     """Probability that joints which err anew from pose to pose do so by their encoders' steps, by the log Bayes factor.
 
-    ``again``: whether later visits of a pose find the same error, so that wear is none.
+    Steps are a claim about the count of one joint: that later visits of a pose find the same error does not tell them.
     """
-    return float(expit(factor - np.log(settings.RIVALS_AGAIN if again else settings.RIVALS_ONCE)))
+    return float(expit(factor - np.log(settings.RIVALS)))
 
 
 @dataclass(frozen=True)
@@ -175,7 +175,7 @@ class RandomGap:
     @property
     def stepped(self) -> float:
         """Probability that what poses bring is due to such steps."""
-        return stepped(self.seen, again=len(self.scatter.kinds) > 1)
+        return stepped(self.seen)
 
 
 def nothing_random(fit: Fit) -> RandomGap:
@@ -220,7 +220,7 @@ def random_gap(fit: Fit) -> RandomGap:
         used = within & asked
     scatter, used, carried = _stands(scatter, gap, sensitivity, noise, pose, held, freedom, used)
     laws, steps, kept = _judge(fit, scatter, gap[used], sensitivity[used], pose, used, noise, freedom)
-    likely = stepped(seen(tuple(steps.values())), again=len(scatter.kinds) > 1)
+    likely = stepped(seen(tuple(steps.values())))
     real = tuple(k.component for k in kept if k.component.kind == "visit" or likely >= settings.SCATTER_SURE)
     p_value, explains = _chance_of_size(scatter, real, gap[used], sensitivity[used], noise, held, freedom)
     few = ", ".join(fit.campaign.robot.joint_names[j] for j in carried)

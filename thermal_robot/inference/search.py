@@ -31,7 +31,7 @@ from scipy.special import erfcx, log_ndtr
 from thermal_robot.arrays import Array
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
-from thermal_robot.inference.evidence import Combination, Gram, evidence
+from thermal_robot.inference.evidence import Combination, Gram, beside, evidence
 
 _Sides = tuple[NDArray[np.int64], Array, Array]
 _NO_SIDES: _Sides = np.zeros(0, dtype=int), np.zeros(0), np.zeros(0)
@@ -64,6 +64,8 @@ def gains(gram: Gram, base: Combination, blocks: Sequence[int]) -> list[tuple[in
     freedom = gram.equations + gram.noise_dof
     rest = (gram.noise_dof + gram.total - float(gram.vector[used] @ values)) / freedom
     rest = max(rest, settings.LEAST_VARIANCE * base.noise**2)
+    held = list(base.blocks)
+    scales = np.log([base.scales[b] for b in held])
     result = []
     for alike in _padded([_beside(gram, base, own, used, left, covariance) for own in _by_width(gram, blocks)]):
         left_over = np.full((len(alike.blocks), len(log_scale)), rest)
@@ -73,9 +75,9 @@ def gains(gram: Gram, base: Combination, blocks: Sequence[int]) -> list[tuple[in
             np.add(left_over[:, :, None], seen, out=part)
             taken = np.divide(told, part, out=part).sum(axis=2) / freedom
             left_over = np.maximum(rest - taken, settings.LEAST_VARIANCE * rest)
-        spread = gram.spreads[alike.blocks][:, None]
+        about, spread = beside(gram.spreads[held], scales, gram.spreads[alike.blocks][:, None])
         log = -0.5 * np.log1p(np.divide(seen, left_over[:, :, None], out=part), out=part).sum(axis=2)
-        log -= 0.5 * (log_scale / spread) ** 2 + np.log(np.sqrt(2.0 * np.pi) * spread / step)
+        log -= 0.5 * ((log_scale - about) / spread) ** 2 + np.log(np.sqrt(2.0 * np.pi) * spread / step)
         log -= 0.5 * freedom * np.log(left_over / rest)
         if gram.most is not None:
             log[log_scale > np.log(gram.most[alike.blocks])[:, None]] = -np.inf
@@ -169,7 +171,8 @@ def _by_width(gram: Gram, blocks: Sequence[int]) -> list[list[int]]:
 class Search:
     """Evaluates combinations, each once, and keeps them all.
 
-    ``exclusive`` pairs of blocks must not be together; ``containers`` can do all that a block of another effect can.
+    ``exclusive`` pairs of blocks must not be together; ``containers`` can do all that a block of another effect can;
+    those that are ``out`` are in no combination.
     """
 
     gram: Gram
@@ -177,6 +180,7 @@ class Search:
     exclusive: frozenset[frozenset[int]] = frozenset()
     containers: frozenset[int] = frozenset()
     seen: dict[tuple[int, ...], Combination] = field(default_factory=dict)
+    out: frozenset[int] = frozenset()
 
     def __post_init__(self) -> None:
         """List what each block excludes."""
@@ -187,6 +191,11 @@ class Search:
         for a, b in self.exclusive:
             self._apart.setdefault(a, set()).add(b)
             self._apart.setdefault(b, set()).add(a)
+
+    def without(self, out: frozenset[int]) -> Search:
+        """Return the search without some blocks, with all that was evaluated without them."""
+        seen = {key: found for key, found in self.seen.items() if not out & set(key)}
+        return replace(self, seen=seen, out=self.out | out)
 
     def allowed(self, blocks: Sequence[int]) -> bool:
         """Tell whether no two of the blocks exclude each other."""
@@ -297,7 +306,7 @@ class Search:
         A setting that does more, such as in one joint more, is worth its price only once what it replaces is gone.
         """
         for b in best.blocks:
-            for setting in self._apart.get(b, ()):
+            for setting in self._apart.get(b, set()) - self.out:
                 # what it contains goes with the one that it replaces
                 others = [c for c in best.blocks if c != b and c not in self._apart[setting]]
                 key = tuple(sorted((*others, setting)))
@@ -368,7 +377,8 @@ class Search:
     def _with_one_more(self, base: Combination, best: Combination) -> list[Combination]:
         if not np.isfinite(base.log_evidence):  # rounding hides what it leaves
             return []
-        others = [b for b in range(len(self.gram.slices)) if b not in best.blocks and b not in base.blocks]
+        known = {*best.blocks, *base.blocks, *self.out}
+        others = [b for b in range(len(self.gram.slices)) if b not in known]
         keys = {b: tuple(sorted((*base.blocks, b))) for b in others}
         barred = set().union(*(self._apart.get(b, ()) for b in base.blocks))
         new = [b for b in others if b not in barred and keys[b] not in self.seen]
@@ -390,7 +400,9 @@ class Search:
         best = self.evaluate(blocks)
         while True:
             names = {families[b]: b for b in best.blocks}
-            swaps = [(names[f], b) for b, f in enumerate(families) if f in names and b != names[f]]
+            swaps = [
+                (names[f], b) for b, f in enumerate(families) if f in names and b != names[f] and b not in self.out
+            ]
             tried = [tuple(sorted((set(best.blocks) - {old}) | {new})) for old, new in swaps]
             near = (self.evaluate(c, best) for c in tried if self.allowed(c))
             found = max(near, key=lambda c: c.log_evidence, default=best)

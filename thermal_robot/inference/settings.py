@@ -9,6 +9,9 @@ import numpy as np
 
 PRIOR_PROBABILITY = 1.0 / 6.0
 """That an effect is at work, random ones too: two or three of sixteen; a probe named 2 to 5 on nine real robots."""
+COARSENESS = 1.0
+"""Standard deviation of ln κ, the factor that all expected sizes of one robot share: an arm three times as coarse as
+catalogues say in one respect is so in the others, as servo arms and series elastic ones are, and fine arms are fine."""
 IN_ALL, ONE_MORE = 1.0 / 3.0, 0.5
 """Share of an effect's probability that it is in all its places, and that it is in one; each further one halves it, so
 that all shares sum to one."""
@@ -33,6 +36,9 @@ LANDMARKS = 100
 """Rows that stand for all in a discrepancy of very many (Nyström): smooth functions need no more."""
 NYSTROM_FLOOR, SMOOTH_FLOOR = 1e-6, 1e-9
 """Of the largest eigenvalue, and of the noise's variance: directions of a discrepancy below are rounding."""
+NO_BACKGROUND = ("approach", "torque", "velocity", "acceleration", "order", "time", "temperature")
+"""Quantities that drive known effects of a joint, by how their names begin: a function of one is that effect, no
+background. Positions and conditions stay, as what nobody listed follows them."""
 COSINES = 5
 """Functions of each quantity in the discrepancy of places: with amplitudes 1/k² further ones bring 1 %."""
 ERROR_AT_JOINT, ERROR_ELSEWHERE = 3e-4, 1e-4
@@ -135,10 +141,13 @@ FIRST_ROUNDS = 5
 """Rounds of choice, outliers and noise at most: they settle after two or three."""
 MOST_LEVERAGE = 0.999
 """Largest leverage, the share of the equations that a fit takes up, with which its residual tells the noise."""
-FIT_STEPS = 12
-"""Gauss-Newton steps at most: quadratic convergence needs four."""
-STEP_PARTS = tuple(0.25**k for k in range(4))
-"""Of a Gauss-Newton step: how much of it is taken, the first that betters the fit; where none does, it ends there."""
+FIT_STEPS = 30
+"""Gauss-Newton steps at most: quadratic convergence needs four, a curved valley of a robot with large errors many."""
+DAMPINGS = (0.0, 1e-4, 1e-3, 1e-2, 1e-1, 1.0)
+"""Of a step's information, added to it (Marquardt, *J. SIAM* 11, 1963): the first that betters the fit is taken; where
+none does, it ends there."""
+SELECTIONS = 3
+"""Choices among all terms that one diagnosis makes: of the known effects, then twice with what nobody listed."""
 REVISIONS = 3
 """Times that a choice is made again at its own exact fit."""
 MANY_ROWS = 500
@@ -206,8 +215,6 @@ LINK_QUANTITIES = 6
 SHAPED, LEFT_OUT, COMPARED_LAWS = 6, 4, 8
 """Candidates of each remainder whose shape is looked at; effects of an explanation, up to which a law is looked for in
 the remainder without each of them; and candidates that are compared jointly with the known effects."""
-MOST_LAWS = 4
-"""Laws of one campaign: a fifth no longer helps anybody to find the cause."""
 FEWEST_LEFT = 5
 """Equations that must be left beside a law for a test of it."""
 LAW_FLOOR = 1e-6
@@ -225,9 +232,9 @@ LATTICE = 1e-3
 """Of their spacing: positions that lie on a lattice to within this cannot tell an order from its alias."""
 LOWEST_RIPPLE = 2.5
 """Orders a turn from which a wave is ripple: what comes round once or twice is an eccentric or oval wheel."""
-RIPPLE_ROWS, MOST_WAVES, WAVES_REFUSED, RIPPLE_ROUNDS = 5000, 30, 2, 3
+RIPPLE_ROWS, MOST_WAVES, WAVES_REFUSED = 5000, 30, 2
 """Rows up to which ripple is looked for: 12 000 took nine minutes and 5.6 GiB; waves of one robot, five a joint; waves
-of each joint that may do harm in rows held out before none is tried any more; times that all is chosen, at most."""
+of each joint that may do harm in rows held out before none is tried any more."""
 SAME_ORDER = 0.05
 """Orders that differ by less are one: over a whole turn 0.3 rad of phase, a few hundredths of the wave's square."""
 SLIP_SHARES = (0.03, 1.0)
@@ -333,10 +340,9 @@ SCATTER_LAW_SHARE = 0.15
 """Of a scatter that a smooth law must explain to make it none."""
 STEPS_HIDDEN = 0.05
 """Chance that steps stay hidden where they should show, as another joint errs too: nothing speaks e³ against them."""
-RIVALS_ONCE, RIVALS_AGAIN = 2.0, 0.1
-"""Prior odds of other causes against an encoder, in a joint that errs anew from pose to pose: of poses measured once,
-wear and what nobody recorded, each as probable; of what later visits find again, a ripple of the gear too fine for its
-period to be looked for."""
+RIVALS = 2.0
+"""Prior odds of other causes against an encoder, in a joint that errs anew from pose to pose: wear or a ripple too fine
+for its period to be looked for, and what nobody recorded, each as probable."""
 STEP_SURE = 3.0
 """Logarithm of a Bayes factor, 20 to 1, from which a step is measured by its period, no more by the errors' size."""
 BAND = 1.35
@@ -347,8 +353,6 @@ STEP_BANDS, STEP_PHASES, STEP_HARMONICS = 12, 32, 8
 """Bands of frequency, 5 % each, in which errors count in one step; phases; harmonics that such a slack leaves."""
 STEP_POSES, MOST_FREQUENCIES = 200, 500_000
 """Poses of a search for steps, more only say it more surely; and frequencies: some seconds of time, and 0.2 GB."""
-STEPS_REACH = 12.0
-"""Log odds above which an effect is not tried again without it: steps would have to be plain in several joints."""
 FLAT = 12.0
 """Square of a step over the variance of the errors that rounding to it makes: those of an even distribution."""
 
@@ -380,14 +384,8 @@ FRAME_DETERMINED = 1e-9
 """Of the strongest direction of the frames: weaker ones are not determined without the rows held out."""
 FRAME_PRIOR = 1e-12
 """Of a frame's own information, added to it, so that what nothing determines stays where it is."""
-CANCELLING, CANCELLING_PAIR = 5.0, 10.0
-"""Times the sum of an effect's parts: single ones that are larger cancel each other; and of two effects' parts, which
-may well oppose each other, as gears that run out and a link that bends do."""
 FRAGILE = 1e-3
 """Probability of the verdict with other prior sizes, below which that is said: nobody knows them to a factor of 3."""
-OUTSIDE, MOST_DOUBTS = 30.0, 8
-"""Times an expected size that stands on sources: seven deviations of its logarithm, as no robot is known to be. Parts
-of effects weighed against a choice without them, one above ENOUGH_ROWS: each takes tens of seconds from 1000 rows."""
 CONTRADICTED, AGAINST_GRAVITY = 0.01, -0.5
 """rad or m: no settled servo is as far from its command. Correlation of torque and weight that a wrong sign makes."""
 STATED_TOO_LARGE = 0.5

@@ -6,7 +6,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.effects import Effect, gate
@@ -66,38 +65,43 @@ def settle(
     start: Observations,
     variants: dict[str, tuple[Effect, ...]],
     progress: Callable[[str], None],
-    known: Settled | None = None,
-    begin: Sequence[Effect] = (),
+    *,
+    held: Sequence[tuple[Effect, Array]] = (),
+    before: Explanation | None = None,
+    starts: Sequence[Sequence[Effect]] = (),
 ) -> Settled:
-    """Choose effects, refine their constants, refit exactly, and choose again there, until the choice stays.
+    """Model selection at the exact fit: choose effects, refine their constants, refit, until the choice stays.
 
-    The first choice is linearised at ``start``; the search starts from what is ``known``, or ``begin``.
+    It begins at ``start``, the exact model of effects that are ``held`` with their values, and with the weights that
+    were found there ``before``. The first search starts from each of the ``starts``, by default from what is held.
     """
-    campaign, observations, whole = start.campaign, start, dict(variants)
-    whole.update({e.name: tuple(dict.fromkeys((*whole.get(e.name, ()), e))) for e in begin})
+    campaign, observations, held = start.campaign, start, list(held)
+    begun = list(dict.fromkeys(effect for one in starts for effect in one))
+    whole = dict(variants)
+    whole.update({e.name: tuple(dict.fromkeys((*whole[e.name], e))) for e in begun})
     variants = dict(whole)
+    for effect, _ in held:
+        if effect.name in variants:
+            rivals = _others(effect, start, whole[effect.name])
+            variants[effect.name] = tuple(dict.fromkeys((*variants[effect.name], effect, *rivals)))
     noise = Noise.of(campaign)
-    held: list[tuple[Effect, Array]] = []
-    before: Explanation | None = None
-    outliers = known.explanation.outliers if known else None
-    if known is not None:
-        held = list(known.held)
-        variants.update({effect.name: (effect,) for effect, _ in held})
     many = campaign.samples > settings.MANY_ROWS
     revisions = 1 if many else settings.REVISIONS
     for revision in range(revisions + 1):
         progress("combinations of effects" if revision == 0 else f"exact fit, revision {revision}")
-        blocks = tuple(_listed(variants, observations, (*begin, *(effect for effect, _ in held))))
+        listed = [effect for effect, _ in held if effect.name in variants]
+        blocks = tuple(_listed(variants, observations, (*begun, *listed)))
         candidates, families = [b.effect for b in blocks], tuple(b.effect.name for b in blocks)
-        chosen = [candidates.index(effect) for effect, _ in held]
-        start_at = chosen if revision or not begin else [candidates.index(effect) for effect in begin]
-        linear = at_exact_model(observations, blocks, chosen, held)
-        explanation = _explanation(linear, noise, families, tuple(start_at), forms(observations), before, outliers)
+        chosen = [candidates.index(effect) for effect in listed]
+        seeds = [chosen] if revision or not starts else [[candidates.index(e) for e in one] for one in starts]
+        linear = at_exact_model(observations, blocks, held)
+        explanation = _explanation(linear, noise, families, seeds, forms(observations), before)
         factor, since = settings.REFINEMENT ** (1 / 2**revision), held
         held = [(candidates[b], explanation.values[b][0]) for b in explanation.best.blocks]
         finer = refined(explanation, observations, factor) if revision < revisions else held
         stays = [e for e, _ in finer] == [e for e, _ in held] and set(explanation.best.blocks) == set(chosen)
-        held, last = finer, revision == revisions or (revision > 0 and stays)
+        known = revision > 0 or before is not None
+        held, last = finer, revision == revisions or (known and stays)
         least = settings.SETTLED_BETWEEN if many and not last else settings.SETTLED
         observations, held = gauss_newton(campaign, observations.frames, explanation, held, least, since)
         if last:
@@ -115,10 +119,9 @@ def _explanation(
     linear: Linear,
     noise: Noise,
     families: Sequence[str],
-    start: tuple[int, ...],
+    starts: Sequence[Sequence[int]],
     every: Sequence[Form],
     before: Explanation | None,
-    outliers: NDArray[np.bool_] | None,
 ) -> Explanation:
     """Explain a problem: where one like it was explained before, from its weights, beside what it left in question."""
     alive = {form.name for form in before.forms} if before else {form.name for form in every}
@@ -126,19 +129,17 @@ def _explanation(
         linear,
         noise,
         families=families,
-        starts=[start],
-        outliers=before.outliers if before else outliers,
+        starts=starts,
+        outliers=before.outliers if before else None,
         known=replace(before.whitening, smooth=None) if before else None,
         forms=[form for form in every if form.name in alive],
         among=len(every),
     )
 
 
-def at_exact_model(
-    observations: Observations, blocks: Sequence[Block], chosen: Sequence[int], held: Sequence[tuple[Effect, Array]]
-) -> Linear:
+def at_exact_model(observations: Observations, blocks: Sequence[Block], held: Sequence[tuple[Effect, Array]]) -> Linear:
     """Return the linear problem at the exact model: its gap, and what the effects that it holds have moved."""
-    moved = (blocks[b].columns @ values for b, (_, values) in zip(chosen, held, strict=True))
+    moved = (block(observations, effect).columns @ values for effect, values in held)
     gap = observations.gap + sum(moved, np.zeros_like(observations.gap))
     return Linear(gap, frame_columns(observations)[0], tuple(blocks))
 

@@ -8,6 +8,8 @@ from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from thermal_robot.report import units
 
 if TYPE_CHECKING:
@@ -19,7 +21,7 @@ MOST_WORDS = 45
 """Of a headline."""
 _MOST_CAUSES = 3  # that a headline names; the others are counted
 _MOST_OF_A_NAME = 9  # words: of a longer title the headline says the beginning
-_WEIGHTY = 0.01  # of the gap on held-out rows: an effect with less is counted among the smaller ones
+_WEIGHTY = 0.95  # of what all causes together explain: the fewest that hold it are named, the others counted
 _CARRIES = 1.5  # times what is left of the fitted rows: more on held-out rows is not called noise
 _UNKNOWN = ", which may or may not be noise: the campaign states none"
 _SURE = 0.995  # a probability above it would be rounded to 100 %, which is never claimed
@@ -86,9 +88,10 @@ def scattering(diagnosis: Diagnosis) -> list[Finding]:
 
 
 def weighty(causes: Sequence[Finding], most: int = _MOST_CAUSES) -> list[Finding]:
-    """Return the causes that a headline names: those of some weight and size, at most so many, but always one."""
-    known = [f for f in causes if sized(f)]
-    return [f for f in known if (f.shrinkage or 0.0) >= _WEIGHTY][:most] or (known or list(causes))[:1]
+    """Return the causes that a headline names: the fewest that hold most of what is explained, at most so many."""
+    known = sorted(filter(sized, causes), key=lambda f: -(f.shrinkage or 0.0)) or list(causes)
+    held = np.cumsum([max(f.shrinkage or 0.0, 0.0) for f in known])
+    return known[: min(int(np.searchsorted(held, _WEIGHTY * held[-1])) + 1, most)]
 
 
 def sized(finding: Finding) -> bool:

@@ -17,6 +17,7 @@ from thermal_robot.diagnosis.held_out import held_out, worst_folds
 from thermal_robot.diagnosis.next_samples import next_samples
 from thermal_robot.effects import choose
 from thermal_robot.inference.discover import candidates
+from thermal_robot.inference.events import events
 from thermal_robot.inference.fit import fit
 
 SCRIPT = Path(__file__).resolve().parents[1] / "bench_diagnosis.py"
@@ -37,11 +38,11 @@ TEXT = (
     "the start of Python. Shares are of a UR10 with 100 rows and two effects.\n\n"
     "**Missed.** Asked were 0.15 s for 100 rows, 0.6 s with an unlisted cause, 4 s for the UR5, 8 s and 0.8 GB for the "
     "UR10. Since that was asked a diagnosis weighs discrepancies of every form and size beside the effects, looks for "
-    "waves of gears, refines constants, and doubts what it found by fitting again without it: each such question costs "
-    "two or more choices among all combinations. Tried: neighbours foretold with their sides, so that a fifth of the "
-    "exact evidences is left; evidences left early where they stay behind; sizes of discrepancies begun where they "
-    "were found last; products in chunks; and, in vain, to begin a further fit at the exact model of the last one "
-    "(constants move all the same, and a second choice follows). What remains is spread over some hundred functions, "
+    "waves of gears and refines constants. It chooses among all combinations three times at most; what is taken out "
+    "again is a query to what was weighed. Tried: neighbours foretold with their sides, so that a fifth of the exact "
+    "evidences is left; evidences left early where they stay behind; sizes of discrepancies begun where they were "
+    "found last; products in chunks; further choices begun at the exact model of the last one, which halves their "
+    "number. What remains is spread over some hundred functions, "
     "none of which by itself takes more than 8 % of 100 rows."
 )
 
@@ -79,7 +80,7 @@ def _shares(effort):
     calls = {
         "whole": lambda: diagnose(campaign, only=only or None),
         "choice and fit": lambda: fit(campaign, choose(only)),
-        "scan for laws": lambda: candidates(found, 1),
+        "scan for laws": lambda: candidates(found, 1, events(found)),
         "effects on rows held out": lambda: earned(found),
         "held-out figures": lambda: held_out(found),
         "worst ways of holding out": lambda: worst_folds(found),
