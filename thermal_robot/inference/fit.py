@@ -78,13 +78,6 @@ def fit(campaign: Campaign, effects: Sequence[Effect], progress: Callable[[str],
     needs = {e.name: missing for e in effects if (missing := gate.missing(e, nominal))}
     variants = {e.name: _settings(e, nominal) for e in effects if e.name not in needs}
     settled = settle(nominal, variants, progress)
-    if settled.second_order:
-        # a container fits large errors of the effects inside it before they are linear: let those try without it
-        inside = {n: v for n, v in variants.items() if n not in settled.containers}
-        apart = settle(nominal, inside, progress)
-        if apart.noise <= settings.NO_WORSE * settled.noise:
-            again = settle(apart.observations, variants, progress, held=apart.held, before=apart.explanation)
-            settled = settled if set(again.names) & settled.containers else again
     return _fitted(campaign, settled, needs, variants)
 
 

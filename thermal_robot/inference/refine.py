@@ -24,14 +24,13 @@ def refined(explanation: Explanation, observations: Observations, factor: float)
 
     Of one effect after another settings nearby are tried. Where none is better by 0.1 nat they move closer, the
     logarithm of ``factor`` (above 1) halved, until a parabola through them promises no more. Rows set aside are heard
-    with the weight of their distance, as a constant that is off puts aside just the rows that tell of it. At last each
-    effect is left out in turn while the others move: one that only paid for a constant that was a little off goes.
-    Returns those that stay with their (P,) values.
+    with the weight of their distance, as a constant that is off puts aside just the rows that tell of it. Returns
+    the effects with their (P,) values.
     """
     kept = Products(explanation.linear, heard(explanation))
     blocks = [explanation.linear.blocks[b].held for b in explanation.best.blocks]
     values = [explanation.values[b][0] for b in explanation.best.blocks]
-    moved = _fewer(kept, observations, constants_moved(kept, observations, blocks, factor), factor)
+    moved = constants_moved(kept, observations, blocks, factor)
     if moved != blocks:
         linear, problem, found = _evaluated(kept, moved)
         values = [mean for mean, _ in parameter_values(linear, problem, found).values()]
@@ -45,26 +44,6 @@ def constants_moved(kept: Products, observations: Observations, blocks: Sequence
         if _movable(item, factor):
             moved[place] = _moved(kept, observations, moved, place, factor)
     return moved
-
-
-def _fewer(kept: Products, observations: Observations, blocks: list[Block], factor: float) -> list[Block]:
-    """Return the blocks less those that only pay for a constant that is a little off.
-
-    Beside such an effect the constant stays where the two are best together, and no step leads away. So each is left
-    out in turn while the constants move.
-    """
-    best = weighed(kept, blocks)
-    while len(blocks) > 1:
-        rivals = []
-        for k in range(len(blocks)):
-            others = [*blocks[:k], *blocks[k + 1 :]]
-            if any(_movable(item, factor) for item in others):
-                rivals.append(constants_moved(kept, observations, others, factor))
-        scores = [weighed(kept, rival) for rival in rivals]
-        if not scores or max(scores) <= best:
-            break
-        blocks, best = rivals[int(np.argmax(scores))], max(scores)
-    return blocks
 
 
 def _movable(item: Block, factor: float) -> bool:

@@ -164,10 +164,6 @@ REFINED_GAIN, REFINED_TRIES = 0.1, 16
 and how often its neighbours are tried: a factor of 1.6 is then halved to 1.0001."""
 REFINED_FLAT = 8.0 * REFINED_GAIN
 """Natural logarithms lost on both sides, below which the vertex of their parabola is no more than that higher."""
-LARGE = 0.02
-"""rad or m: products of parameters this large show beside noise of tens of micrometres."""
-NO_WORSE = 1.02
-"""Times the noise of a fit with an effect that contains others: a fit without it that leaves no more is preferred."""
 ENOUGH_ROWS, ENOUGH_REMAINDER = 1500, 2000
 """Rows that are scanned for laws, of very many: a law that explains a hundredth of the remainder is then seen; and the
 same for the tests of the remainder."""

@@ -9,14 +9,13 @@ import numpy as np
 
 from thermal_robot.arrays import Array
 from thermal_robot.effects import Effect, gate
-from thermal_robot.effects.apply import displacement
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of, orthonormal, without
 from thermal_robot.inference.columns import Block, block, frame_columns
 from thermal_robot.inference.discrepancy import Form, forms
 from thermal_robot.inference.explain import Explanation, explain
 from thermal_robot.inference.gauss_newton import gauss_newton
-from thermal_robot.inference.problem import Linear, contained
+from thermal_robot.inference.problem import Linear
 from thermal_robot.inference.refine import refined
 from thermal_robot.inference.robust import Noise
 from thermal_robot.observations import Observations
@@ -38,27 +37,6 @@ class Settled:
     def names(self) -> tuple[str, ...]:
         """Names of its effects."""
         return tuple(effect.name for effect, _ in self.held)
-
-    @property
-    def noise(self) -> float:
-        """What remains per axis, m."""
-        return float(self.explanation.whitening.noise[0] * self.explanation.best.noise)
-
-    @property
-    def containers(self) -> set[str]:
-        """Effects of the explanation that contain others."""
-        ranks, found = self.explanation.problem.ranks, set()
-        for pair in contained(self.explanation.problem):
-            smaller, larger = sorted(pair, key=lambda b: ranks[b])
-            if self.families[smaller] != self.families[larger]:
-                found.add(self.families[larger])
-        return found & set(self.names)
-
-    @property
-    def second_order(self) -> bool:
-        """Whether a container holds so much that products of its parameters show."""
-        moved_by, _ = displacement(self.observations, [h for h in self.held if h[0].name in self.containers])
-        return bool(np.abs(np.asarray(moved_by.segment)).max(initial=0.0) > settings.LARGE)
 
 
 def settle(
