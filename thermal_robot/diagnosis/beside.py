@@ -38,8 +38,8 @@ def grown(fit: Fit, number: int, progress: Callable[[str], None]) -> Fit | None:
     bases, wave = [held], _ripple(fit)
     if wave is not None:
         others = [effect for effect in held if not isinstance(effect, JointRipple)]
-        offered[wave.name] = (wave,) if wave.orders else ()
-        bases = [[*others, wave], others] if wave.orders else [others]
+        offered[wave.name] = (wave,)
+        bases = [[*others, wave], others]
     if not offered:
         return None
     before = [effect for effect in bases[0] if effect.name.startswith(PREFIX)]
@@ -49,12 +49,12 @@ def grown(fit: Fit, number: int, progress: Callable[[str], None]) -> Fit | None:
 
 
 def _ripple(fit: Fit) -> JointRipple | None:
-    """Return the ripple that a fit shows, if it is considered and not the one that it holds."""
+    """Return the ripple that a fit shows, if it is considered and another than the one that it holds."""
     if JointRipple.name not in fit.variants or fit.campaign.samples > settings.RIPPLE_ROWS:
         return None
     found = waves(fit)
     held = next((effect for effect, _ in fit.effects if isinstance(effect, JointRipple)), JointRipple())
-    return None if alike(found, held) else found
+    return None if not found.orders or alike(found, held) else found
 
 
 def as_laws_say(left: Unexplained, found: Sequence[Discovery], discrepancy: Discrepancy) -> Unexplained:
@@ -88,7 +88,7 @@ def as_laws_say(left: Unexplained, found: Sequence[Discovery], discrepancy: Disc
 def beside_scatter(
     fit: Fit, chance: RandomGap, refused: Mapping[str, Refused], progress: Callable[[str], None]
 ) -> Conclusion:
-    """Choose the systematic effects again, with the joints' scatter (``chance``) in the covariance of the noise.
+    """Choose among the effects of a fit again, with the joints' scatter (``chance``) in the covariance of the noise.
 
     Effects and laws that the scatter had imitated are then no longer in the fit.
     """
@@ -98,16 +98,15 @@ def beside_scatter(
     linear = generalised(e.linear, covariance, scatter.noise)
     place, *turn = (float(s) for s in scatter.noise[::3])
     noise = Noise(place, turn[0] if turn else None)
-    # of many rows each choice takes minutes: then only what was chosen is asked whether it stays
-    asked = range(len(linear.blocks)) if fit.campaign.samples <= settings.MANY_ROWS else e.best.blocks
-    linear = replace(linear, blocks=tuple(linear.blocks[b] for b in asked))
+    # what obeys the rule is asked whether it stays
+    linear = replace(linear, blocks=tuple(linear.blocks[b] for b in e.best.blocks))
     families = [item.effect.name for item in linear.blocks]
     again = explain(linear, noise, families=families)
     kept = {families[b] for b in again.best.blocks}
     feigned: dict[str, tuple[Effect, ...]] = {name: () for name in dict.fromkeys(fit.families) if name not in kept}
     own = {name: [b for b, family in enumerate(families) if family == name] for name in feigned}
     chances = {n: again.probability(blocks) if blocks else fit.probability(n) for n, blocks in own.items()}
-    refused = {**refused, **{name: Refused(probability) for name, probability in chances.items()}}
+    refused = {**refused, **{name: Refused(p) for name, p in chances.items() if not name.startswith(PREFIX)}}
     fit = refit(fit, feigned, [[linear.blocks[b].effect for b in again.best.blocks]], progress)
     chance = random_gap(fit)
     sigma = replace(fit.explanation.whitening, noise=chance.scatter.noise).sigma()

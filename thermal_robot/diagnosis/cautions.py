@@ -148,8 +148,8 @@ def cautions(
         )
     for name, why in refused.items():
         if why.share is not None:
-            share = percent(why.share)
-            notes.append(f"rows held out are predicted no better with {name} (share {share}): not reported as found")
+            share = f" (share {percent(why.share)})" if why.share < 0.0 else ""
+            notes.append(f"rows held out are predicted no better with {name}{share}: not reported as found")
     notes += _fragile(sensitivity)
     return tuple(notes)
 

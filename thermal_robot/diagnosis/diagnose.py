@@ -172,6 +172,7 @@ def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
             break
         fit = wider
     fit, refused = pruned(fit, progress)
+    fit = replace(fit, explanation=replace(fit.explanation, searched=None))  # no further query comes: it fills memory
     chance = random_gap(fit)
     if chance.explains_size:
         return beside_scatter(fit, chance, refused, progress)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -36,6 +36,9 @@ class Gained:
     interval: tuple[float, float]
 
 
+_NOT_ASKED = Gained("time", 0.0, 0.0, (-np.inf, np.inf))
+
+
 @dataclass(frozen=True)
 class Earned:
     """What one effect of a fit brings on rows held out, all others fitted anew without it.
@@ -53,8 +56,8 @@ class Earned:
 
     @property
     def harms(self) -> bool:
-        """Whether rows held out are no better with it."""
-        return self.blocked.nats <= 0.0 or self.clearly
+        """Whether rows held out are worse with it."""
+        return self.blocked.nats < 0.0 or self.clearly
 
     @property
     def helps(self) -> bool:
@@ -92,16 +95,19 @@ def earned(fit: Fit) -> dict[str, Earned]:
                 continue
             without = walk.residuals([b for b in every if b != k])[judged] / noise
             found[effect.name].append(_gained(name, left, without, block[number]))
-    return {name: Earned(own[0], min(own, key=lambda g: g.interval[1])) for name, own in found.items()}
+    return {name: _earned(own) for name, own in found.items()}
+
+
+def _earned(found: Sequence[Gained]) -> Earned:
+    blocked = next((gained for gained in found if gained.scheme == "time"), _NOT_ASKED)
+    return Earned(blocked, min(found, key=lambda gained: gained.interval[1], default=blocked))
 
 
 def _gained(scheme: str, left: Array, without: Array, block: NDArray[np.int64]) -> Gained:
     after, before = (left**2).sum(axis=1), (without**2).sum(axis=1)
     total = float(before.sum())
     share = 1.0 - float(after.sum()) / total if total > 0.0 else 0.0
-    density = (
-        0.5 * (settings.TAILS + left.shape[1]) * (np.log1p(before / settings.TAILS) - np.log1p(after / settings.TAILS))
-    )
+    density = 0.5 * (settings.TAILS + left.shape[1]) * np.log((settings.TAILS + before) / (settings.TAILS + after))
     parts = np.bincount(block, density)[np.unique(block)]
     nats, count = float(parts.sum()), len(parts)
     if count < 2:
@@ -177,6 +183,9 @@ def determined(fit: Fit) -> set[str]:
 
 
 def _refused(judged: Earned) -> Refused:
-    """Return what rows held out say of an effect: its probability, from its prior and their density, and its share."""
+    """Return what rows held out say of an effect: its probability, from its prior and their density, and its share.
+
+    The probability is at most the prior's: blocks of rows that speak for an effect do not outweigh what refuses it.
+    """
     said = judged.hardest if judged.clearly else judged.blocked
-    return Refused(float(expit(log_odds() + min(said.nats, 0.0))), said.share)
+    return Refused(float(expit(log_odds() + min(judged.blocked.nats, 0.0))), said.share)

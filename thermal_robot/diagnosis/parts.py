@@ -139,7 +139,7 @@ class Finding:
 class Refused:
     """An effect that was taken out of the fit again: its probability, and what it brings rows held out as a share.
 
-    The share is ``None`` where the scatter of joints had feigned it, or where it stayed in question.
+    The share is ``None`` where scatter of joints had feigned it, it stayed in question, or nothing determined it.
     """
 
     probability: float

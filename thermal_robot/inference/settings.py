@@ -78,7 +78,7 @@ CLOSEST = 1e-7
 LARGEST_CLUSTER = 0.1
 """Of all rows: a larger cluster is a path, not a repeated pose."""
 FOLDS = 5
-"""Regions of joint space that are held out in turn; of temperature and of reach the outermost fifth is."""
+"""Regions of joint space that are held out in turn; of temperature, reach and joints' ranges the outermost fifth is."""
 BLOCKS = 20
 """Blocks of consecutive rows that are held out in turn: twenty values tell the spread of a figure to a sixth."""
 GROSS_LEVEL = 0.01
@@ -117,8 +117,8 @@ squares of the noise: what fits better is rounding, or seen anew; times that a s
 PIVOTS, SIDE_ROUNDING, TAKEN_BACK = 60, 1e-10, 0.9
 """Changes at most of the columns held at zero; of the sums that tell it, what is rounding; less is no step back."""
 SCALE_GRID = tuple(np.linspace(-6.0, 6.0, 25))
-"""ln λ at which a block that might be added is weighed: four standard deviations of the widest prior, in steps that are
-one of the narrowest."""
+"""ln λ at which a block that might be added is weighed: three standard deviations of the widest prior, in steps of one
+of the narrowest."""
 NEARLY, AT_ONCE = 3.0, 8
 """Log evidence below the best down to which neighbours are computed exactly, and how many before one is taken."""
 PAIR_REACH, PAIRS = 6.0, 60
@@ -147,12 +147,11 @@ DAMPINGS = (0.0, 1e-4, 1e-3, 1e-2, 1e-1, 1.0)
 """Of a step's information, added to it (Marquardt, *J. SIAM* 11, 1963): the first that betters the fit is taken; where
 none does, it ends there."""
 SELECTIONS = 3
-"""Choices among all terms that one diagnosis makes: of the known effects, then twice with what nobody listed."""
+"""Choices among all terms: of the known effects, then twice with what nobody listed; another where one is taken out."""
 REVISIONS = 3
 """Times that a choice is made again at its own exact fit."""
 MANY_ROWS = 500
-"""Above, a choice is revised once and one law looked for: each takes tens of seconds, and so many rows hardly change
-it."""
+"""Above, a choice is revised once: each takes tens of seconds, and so many rows hardly change it."""
 SETTLED, SETTLED_NAMED = 1e-4, 1e-2
 """Last step of a fit, in standard deviations; of one of named effects, where the next step is a thousandth of it."""
 SETTLED_BETWEEN = 2.0

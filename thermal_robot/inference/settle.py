@@ -33,11 +33,6 @@ class Settled:
     held: tuple[tuple[Effect, Array], ...]
     families: tuple[str, ...]
 
-    @property
-    def names(self) -> tuple[str, ...]:
-        """Names of its effects."""
-        return tuple(effect.name for effect, _ in self.held)
-
 
 def settle(
     start: Observations,
@@ -84,7 +79,7 @@ def settle(
         observations, held = gauss_newton(campaign, observations.frames, explanation, held, least, since)
         if last:
             break
-        before = explanation
+        before = explanation = replace(explanation, searched=None)  # the next search takes as much memory
         for effect, _ in held:
             b = explanation.block_of(effect)
             leading = _leading(effect, blocks[b], explanation.values[b][0])

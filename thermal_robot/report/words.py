@@ -90,7 +90,7 @@ def scattering(diagnosis: Diagnosis) -> list[Finding]:
 def weighty(causes: Sequence[Finding], most: int = _MOST_CAUSES) -> list[Finding]:
     """Return the causes that a headline names: the fewest that hold most of what is explained, at most so many."""
     known = sorted(filter(sized, causes), key=lambda f: -(f.shrinkage or 0.0)) or list(causes)
-    held = np.cumsum([max(f.shrinkage or 0.0, 0.0) for f in known])
+    held = np.cumsum([max(f.shrinkage or 0.0, 0.0) for f in known] or [0.0])
     return known[: min(int(np.searchsorted(held, _WEIGHTY * held[-1])) + 1, most)]
 
 

@@ -35,15 +35,15 @@ IMPORTS = {
 TEXT = (
     "Seconds of the processor and the peak of memory of one diagnosis in a process of its own, the second one "
     "there, but for the real robots, which are diagnosed once. 100 rows are of a UR10. An import is told without "
-    "the start of Python. Shares are of a UR10 with 100 rows and two effects.\n\n"
-    "**Missed.** Asked were 0.15 s for 100 rows, 0.6 s with an unlisted cause, 4 s for the UR5, 8 s and 0.8 GB for the "
-    "UR10. Since that was asked a diagnosis weighs discrepancies of every form and size beside the effects, looks for "
-    "waves of gears and refines constants. It chooses among all combinations three times at most; what is taken out "
-    "again is a query to what was weighed. Tried: neighbours foretold with their sides, so that a fifth of the exact "
-    "evidences is left; evidences left early where they stay behind; sizes of discrepancies begun where they were "
-    "found last; products in chunks; further choices begun at the exact model of the last one, which halves their "
-    "number. What remains is spread over some hundred functions, "
-    "none of which by itself takes more than 8 % of 100 rows."
+    "the start of Python. Shares are of a UR10 with 100 rows and two effects.\n\n**Missed.** Asked were 0.15 s "
+    "for 100 rows, 0.6 s with an unlisted cause, 4 s for the UR5, 8 s and 0.8 GB for the UR10. Since that was "
+    "asked a diagnosis weighs discrepancies of every form and size beside the effects, looks for waves of gears "
+    "and refines constants. It chooses among all combinations three times, and once more where something was "
+    "taken out; what is taken out again is a query to what was weighed. Tried: neighbours foretold with their "
+    "sides, so that a fifth of the exact evidences is left; evidences left early where they stay behind; sizes of"
+    " discrepancies begun where they were found last; products in chunks; further choices begun at the exact "
+    "model of the last one, which halves their number. What remains is spread over some hundred functions, none "
+    "of which by itself takes more than 8 % of 100 rows."
 )
 
 
