@@ -157,6 +157,8 @@ def _concluded(
     if misfit is None:
         require_enough(campaign)  # before signs are asked, which fit frames too
         last = _explained(fit(as_counted(campaign, own), candidates, progress), progress)
+        # no further query comes: what was weighed would fill memory
+        last = replace(last, fit=replace(last.fit, explanation=replace(last.fit.explanation, searched=None)))
         misfit = another_motion(last.fit)
         if misfit is None:
             return delivered(last, candidates)
@@ -172,7 +174,6 @@ def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
             break
         fit = wider
     fit, refused = pruned(fit, progress)
-    fit = replace(fit, explanation=replace(fit.explanation, searched=None))  # no further query comes: it fills memory
     chance = random_gap(fit)
     if chance.explains_size:
         return beside_scatter(fit, chance, refused, progress)

@@ -139,10 +139,11 @@ def pruned(fit: Fit, progress: Callable[[str], None]) -> tuple[Fit, dict[str, Re
 
 def _failing(fit: Fit, progress: Callable[[str], None]) -> dict[str, Refused]:
     """Return the terms that go next, of those that do not obey the rule, and what speaks against each."""
-    table, odds, sure = earned(fit), in_place(fit), determined(fit)
+    table = earned(fit)
     if harmful := {name: _refused(e) for name, e in table.items() if e.clearly}:
         progress(f"rows held out refuse {', '.join(harmful)}")
         return harmful
+    odds, sure = in_place(fit), determined(fit)
     laws = {law.name for law, _ in fit.effects if law.name.startswith(PREFIX) and not is_event(law)}
     poor = {name for name, e in table.items() if e.harms or (name in laws and not e.helps)}
     out = poor | {name for name in table if odds[name] < settings.NAMING_ODDS or name not in sure}

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
-from thermal_robot.campaign.settings import STILL
+from thermal_robot.campaign.turning import moves
 from thermal_robot.diagnosis.one_walk import Model, Squares, Walk, deviation, share
 from thermal_robot.diagnosis.parts import FoldScheme, HeldOut
 from thermal_robot.effects.law_words import is_event
@@ -221,20 +221,19 @@ def schemes(fit: Fit) -> Iterator[tuple[str, str, list[Rows]]]:
         yield "session", "one session after the other", each(np.unique(session, return_inverse=True)[1])
     temperature = _temperature(campaign)
     if temperature is not None and np.ptp(temperature) > settings.COLDEST:
-        cold, warm = (np.quantile(temperature, share) for share in (1.0 / settings.FOLDS, 1.0 - 1.0 / settings.FOLDS))
-        yield "temperature", "the coldest fifth, and the warmest", [temperature <= cold, temperature >= warm]
+        yield "temperature", "the coldest fifth, and the warmest", _ends(temperature)
     yield "region", "neighbourhoods of joint positions", each(neighbourhoods(campaign, settings.FOLDS))
     reach = np.linalg.norm(fit.nominal.position, axis=1)
-    yield "reach", "the fifth that reaches out furthest", [reach >= np.quantile(reach, 1.0 - 1.0 / settings.FOLDS)]
-    yield "range", "the lowest and the highest fifth of a joint's positions", list(_ends(campaign.q))
+    yield "reach", "the fifth that reaches out furthest", _ends(reach)[1:]
+    # where few positions repeat, an end may hold most of the rows
+    ends = [end for position in campaign.q[:, moves(campaign.q)].T for end in _ends(position) if end.mean() < 0.5]
+    yield "range", "the lowest and the highest fifth of a joint's positions", ends
 
 
-def _ends(q: Array) -> Iterator[Rows]:
-    """Yield a mask (N,) of the rows at either end of the range of each joint that moves."""
-    for position in q.T[np.ptp(q, axis=0) > STILL]:
-        low, high = np.quantile(position, (1.0 / settings.FOLDS, 1.0 - 1.0 / settings.FOLDS))
-        # where few positions repeat, an end may hold most of the rows
-        yield from (end for end in (position <= low, position >= high) if end.mean() < 0.5)
+def _ends(values: Array) -> list[Rows]:
+    """Return masks (N,) of the fifths of the rows with the lowest and with the highest values."""
+    low, high = np.quantile(values, (1.0 / settings.FOLDS, 1.0 - 1.0 / settings.FOLDS))
+    return [values <= low, values >= high]
 
 
 def _temperature(campaign: Campaign) -> Array | None:
