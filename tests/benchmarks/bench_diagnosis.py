@@ -21,7 +21,11 @@ from pathlib import Path
 import numpy as np
 
 HERE = Path(__file__).resolve()
-REAL = {"real UR5, 1000 rows": "ur5_jacobi", "real UR10, 12000 rows": "ipa_ur10_a"}
+REAL = {
+    "real UR5, 1000 rows": "ur5_jacobi",
+    "real UR10, 2800 rows": "ipa_ur10_c",
+    "real UR10, 12000 rows": "ipa_ur10_a",
+}
 CASES = ("demo", "100 rows, no effect", "100 rows, one effect", "100 rows, unlisted", *REAL)
 
 

@@ -2,8 +2,12 @@
 
 import numpy as np
 
-from thermal_robot.inference.ripple import left_out
+from thermal_robot.inference.ripple import HeldOut
 from thermal_robot.inference.rows import each
+
+
+def left_out(columns, values, flat, prior, folds):
+    return HeldOut.of(columns, values, folds).left(flat, prior)
 
 
 def problem(seed, noise=1.0):
@@ -42,3 +46,11 @@ def test_columns_of_noise_do_harm_to_rows_held_out():
     folds = each(np.arange(60) % 6)
     wider = np.concatenate([columns, rng.normal(size=(60, 3, 40))], axis=2)
     assert left_out(wider, values, 44, np.zeros(0), folds) > 1.1 * left_out(columns, values, 4, np.zeros(0), folds)
+
+
+def test_a_further_column_counts_as_if_it_had_been_there():
+    columns, values = problem(5)
+    folds, prior = each(np.arange(60) % 6), np.array([0.3])
+    first = HeldOut.of(columns[:, :, :3], values, folds)
+    whole = left_out(columns, values, 3, prior, folds)
+    np.testing.assert_allclose(first.left(3, prior, columns[:, :, 3:]), whole, rtol=1e-12)

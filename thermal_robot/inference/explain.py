@@ -97,38 +97,42 @@ def explain(
     families: Sequence[str] = (),
     starts: Sequence[Sequence[int]] = (),
     outliers: NDArray[np.bool_] | None = None,
-    known: Whitening | None = None,
+    before: Explanation | None = None,
     forms: Sequence[Form] = (),
-    among: int = 0,
     log_prior: Sequence[float] | None = None,
 ) -> Explanation:
     """Find the most probable combination of blocks together with outliers, noise and what no block accounts for.
 
     Robust: rows further than noise allows are set aside, those in the tail weigh less (Huber). Rows not in ``rows``
     (N,) bear on nothing. Blocks of one family are settings that exclude each other and share its prior probability.
-    ``starts`` and ``outliers`` are where the search starts, ``known`` the weights and noise; ``among`` is the number of
-    forms of which these are left; ``log_prior`` is by default :func:`log_priors` of the blocks' effects.
+    ``starts`` and ``outliers`` are where the search starts. Where a problem like it was explained ``before``, its
+    weights and noise are kept, and of the forms those that it left in question; where the first of the starts comes out
+    again beside the same form, that is the answer. ``log_prior`` is by default that of the blocks' effects.
     """
     samples = len(linear.gap)
     use = np.ones(samples, dtype=bool) if rows is None else rows
+    outliers = before.outliers if before and outliers is None else outliers
     aside = np.zeros(samples, dtype=bool) if outliers is None else outliers & use
     families = families or [str(k) for k in range(len(linear.blocks))]
     log_prior = log_priors([b.effect for b in linear.blocks]) if log_prior is None else log_prior
-    asked = _Asked(
-        linear, families, log_prior, settings_of_one(families), max(among, len(forms)), Stack.of(linear.columns)
-    )
-    # effects that are far off, and gross errors, are settled first, beside a noise that is free
-    first = known is None
-    whitening = known or replace(first_whitening(linear, noise, use & ~aside), held=0.0)
-    beside: Sequence[Form] = () if first else forms
-    seeds = [tuple(start) for start in starts]
-    history: list[tuple[object, ...]] = []
+    asked = _Asked(linear, families, log_prior, settings_of_one(families), len(forms), Stack.of(linear.columns))
+    seeds = [tuple(sorted(start)) for start in starts]
+    first, history = before is None, list[tuple[object, ...]]()
+    if before is None:
+        # effects that are far off, and gross errors, are settled first, beside a noise that is free
+        whitening, beside = replace(first_whitening(linear, noise, use & ~aside), held=0.0), ()
+    else:
+        whitening, alive = replace(before.whitening, smooth=None), {form.name for form in before.forms}
+        beside, form = [form for form in forms if form.name in alive], before.discrepancy.form
+        history += [(seed, form and form.words, np.packbits(whitening.weights > 0).tobytes()) for seed in seeds[:1]]
     while True:
         found = _Round.of(asked, whitening, beside, seeds)
-        state = (*found.state, np.packbits(whitening.weights > 0).tobytes())
-        if history and (state in history or len(history) >= settings.FIRST_ROUNDS):
-            return found.told(aside)
-        history.append(state)
+        used = np.packbits(whitening.weights > 0).tobytes()
+        if history and ((*found.state, used) in history or len(history) >= settings.FIRST_ROUNDS):
+            found = found.without(frozenset())  # weights stay: only now is it worth to look for what steps miss
+            if (*found.state, used) in history or len(history) >= settings.FIRST_ROUNDS:
+                return found.told(aside)
+        history.append((*found.state, used))
         whitening, aside = reweigh(found.rough, noise, use, found.leverage, linear.measures)
         seeds = [found.best.blocks]
         beside = forms if first else found.ladder.in_question(found.best)
@@ -164,15 +168,15 @@ class _Round:
         cls, asked: _Asked, whitening: Whitening, beside: Sequence[Form], seeds: Sequence[tuple[int, ...]]
     ) -> _Round:
         ladder = Ladder(asked.linear, whitening, list(beside), asked.log_prior, asked.rivals, asked.forms, asked.stack)
-        return cls._on(asked, ladder, seeds)
+        return cls._on(asked, ladder, seeds, detours=False)
 
     def without(self, out: frozenset[int]) -> _Round:
         """Return the round without some blocks, started from the best of what was weighed without them."""
         return self._on(self.asked, self.ladder.without(out), [tuple(b for b in self.best.blocks if b not in out)])
 
     @classmethod
-    def _on(cls, asked: _Asked, ladder: Ladder, seeds: Sequence[tuple[int, ...]]) -> _Round:
-        ladder.run(seeds)
+    def _on(cls, asked: _Asked, ladder: Ladder, seeds: Sequence[tuple[int, ...]], *, detours: bool = True) -> _Round:
+        ladder.run(seeds, detours=detours)
         rung, best = ladder.consensus(asked.families)
         white = ladder.whitened_at(rung)
         remainder = left_of(asked.linear, white, parameter_values(asked.linear, ladder.beside(rung).gram, best))

@@ -124,8 +124,11 @@ class Ladder:
         found = Search(replace(problem, offset=offset), self.log_prior, self._pairs, self._containers)
         return found.without(self._out) if self._out else found
 
-    def run(self, starts: Sequence[tuple[int, ...]] = ()) -> tuple[Rung, Combination]:
-        """Climb over combinations and discrepancies until neither betters the other, from several starts."""
+    def run(self, starts: Sequence[tuple[int, ...]] = (), *, detours: bool = True) -> tuple[Rung, Combination]:
+        """Climb over combinations and discrepancies until neither betters the other, from several starts.
+
+        With ``detours`` what single steps miss is looked for, too.
+        """
         first = self.beside(PLAIN)
         allowed = dict.fromkeys([*(s for s in starts if first.allowed(s)), ()])
         begin = sorted((first.evaluate(s) for s in allowed), key=lambda c: -c.log_evidence)
@@ -137,7 +140,7 @@ class Ladder:
             seeds = []
             other = max(found, key=lambda item: item[1], default=(rung, -np.inf, ()))
             nearby = self._climbed(other, best) or self._beside_others(best) or self._several_joints(rung, best)
-            nearby = nearby or self._further(rung, best)
+            nearby = nearby or (self._further(rung, best) if detours else None)
             if nearby is None:
                 return rung, best
             rung, best = nearby

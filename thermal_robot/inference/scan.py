@@ -24,14 +24,14 @@ from thermal_robot.inference.gauss_newton import corrected_observations
 from thermal_robot.inference.laws import harmonics, hystereses, law_of, laws, relaxing, shapes, straight
 from thermal_robot.inference.problem import Linear
 from thermal_robot.inference.rows import in_a_row
-from thermal_robot.inference.target import Alike, Seat, Target
+from thermal_robot.inference.target import Alike, Seat, Target, gained
 from thermal_robot.observations import Observations
 
 
 def orders(q: Array, slides: bool = False) -> Array:
     """Return the (K,) orders that are looked at in a joint, rad per rad, or rad/m where it slides.
 
-    They stand an eighth of a peak's width apart, and end where the positions (N,) could no longer tell an order from
+    They stand a quarter of a peak's width apart, and end where the positions (N,) could no longer tell an order from
     its alias: positions on a lattice of spacing d know no order above π/d (Shannon). A joint of very many turns is
     looked at up to :data:`settings.MOST_ORDERS` of them.
     """
@@ -98,9 +98,7 @@ def _chunk(seat: Seat, q: Array, at: Array) -> Array:
     seen = (np.minimum(first, second) > settings.ALIAS * whole) & (apart > settings.LAW_FLOOR * first * second)
     a, b = np.split(values, 2)
     part = (second * a**2 - 2.0 * cross * a * b + first * b**2) / np.where(seen, apart, 1.0)
-    rest = np.maximum(seat.total - explained - part, settings.TINY)
-    gain = 0.5 * seat.freedom * np.log(seat.total / rest) - 0.5 * rank * np.log(seat.freedom)
-    return np.where(seen & (seat.freedom - rank >= settings.FEWEST_LEFT), gain, -np.inf)
+    return np.where(seen, gained(seat.total, explained + part, rank, seat.freedom), -np.inf)
 
 
 def _waves(q: Array, at: Array) -> NDArray[np.complex128]:

@@ -220,8 +220,8 @@ HIGHEST_ORDER, SHORTEST_PERIOD = 200.0, 0.004
 of one that slides, m: a fine ball screw's lead."""
 LOWEST_ORDER = 0.5
 """Turns of the joint that the longest wave takes, inverted: a longer one is a bend, which smooth laws tell."""
-ORDER_STEP, ORDER_CHUNK, ORDER_ZOOMS, MOST_ORDERS = 0.125, 256, 4, 100_000
-"""Of the width of a peak, 2π over the joint's range: an eighth costs 1 % of a peak's height; orders that are measured
+ORDER_STEP, ORDER_CHUNK, ORDER_ZOOMS, MOST_ORDERS = 0.25, 256, 4, 100_000
+"""Of the width of a peak, 2π over the joint's range: a quarter costs 5 % of a peak's height; orders that are measured
 at a time; rounds in which the best one is refined, each eight times finer; orders of one joint, those of 60 turns."""
 LATTICE = 1e-3
 """Of their spacing: positions that lie on a lattice to within this cannot tell an order from its alias."""

@@ -12,7 +12,7 @@ from thermal_robot.effects import Effect, gate
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of, orthonormal, without
 from thermal_robot.inference.columns import Block, block, frame_columns
-from thermal_robot.inference.discrepancy import Form, forms
+from thermal_robot.inference.discrepancy import forms
 from thermal_robot.inference.explain import Explanation, explain
 from thermal_robot.inference.gauss_newton import gauss_newton
 from thermal_robot.inference.problem import Linear
@@ -68,7 +68,7 @@ def settle(
         chosen = [candidates.index(effect) for effect in listed]
         seeds = [chosen] if revision or not starts else [[candidates.index(e) for e in one] for one in starts]
         linear = at_exact_model(observations, blocks, held)
-        explanation = _explanation(linear, noise, families, seeds, forms(observations), before)
+        explanation = explain(linear, noise, families=families, starts=seeds, before=before, forms=forms(observations))
         factor, since = settings.REFINEMENT ** (1 / 2**revision), held
         held = [(candidates[b], explanation.values[b][0]) for b in explanation.best.blocks]
         finer = refined(explanation, observations, factor) if revision < revisions else held
@@ -86,28 +86,6 @@ def settle(
             others = _others(effect, start, whole[effect.name])
             variants[effect.name] = tuple(dict.fromkeys((*gate.nearby(effect, factor), *leading, *others)))
     return Settled(observations, explanation, tuple(held), families)
-
-
-def _explanation(
-    linear: Linear,
-    noise: Noise,
-    families: Sequence[str],
-    starts: Sequence[Sequence[int]],
-    every: Sequence[Form],
-    before: Explanation | None,
-) -> Explanation:
-    """Explain a problem: where one like it was explained before, from its weights, beside what it left in question."""
-    alive = {form.name for form in before.forms} if before else {form.name for form in every}
-    return explain(
-        linear,
-        noise,
-        families=families,
-        starts=starts,
-        outliers=before.outliers if before else None,
-        known=replace(before.whitening, smooth=None) if before else None,
-        forms=[form for form in every if form.name in alive],
-        among=len(every),
-    )
 
 
 def at_exact_model(observations: Observations, blocks: Sequence[Block], held: Sequence[tuple[Effect, Array]]) -> Linear:

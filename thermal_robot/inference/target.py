@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,6 +32,17 @@ class Worth:
 NOTHING = Worth(1.0, 0.0, -np.inf)
 
 
+def gained(total: Array | float, explained: Array | float, rank: Array | float, freedom: float) -> Array:
+    """Gain of log evidence by the Bayes information criterion (Schwarz 1978), ½ ν ln(S₀/S₁) − ½ k ln ν.
+
+    ``total`` S₀ and S₀ − S₁ ``explained`` are sums of squares, ``rank`` k the number of columns, ``freedom`` ν the
+    degrees of freedom without them; −∞ without columns, and where these would leave too few degrees of freedom.
+    """
+    rest = np.maximum(np.asarray(total) - explained, settings.TINY)
+    gain = 0.5 * freedom * np.log(total / rest) - 0.5 * np.asarray(rank) * np.log(freedom)
+    return np.where((np.asarray(rank) == 0) | (freedom - rank < settings.FEWEST_LEFT), -np.inf, gain)
+
+
 @dataclass(frozen=True, eq=False)
 class Target:
     """A remainder to be explained: the residual ``white`` (N·m,) of the gap after a fit of a design, in noise units.
@@ -45,34 +56,35 @@ class Target:
 
     @classmethod
     def of(
-        cls, gap: Array, design: Array, trusted: NDArray[np.bool_] | None = None, relative: Array | None = None
+        cls,
+        gap: Array,
+        design: Array,
+        trusted: NDArray[np.bool_] | None = None,
+        relative: Array | None = None,
+        like: Target | None = None,
     ) -> Target:
         """Project a design (N, m, K) out of a gap (N, m), robustly: rows far from the rest weigh little (Cauchy).
 
         Rows that are ``trusted`` (N,) weigh fully in the residual, however far they are. Where the noise of the figures
-        differs, ``relative`` (N, m) says how.
+        differs, ``relative`` (N, m) says how. Weights are found by iteration, or at once from those of a target that is
+        nearly ``like`` this one.
         """
         if relative is not None:
-            even = cls.of(gap / relative, design / relative[:, :, None], trusted)
+            like = None if like is None else replace(like, root=like.root * relative)
+            even = cls.of(gap / relative, design / relative[:, :, None], trusted, like=like)
             return cls(even.white, even.root / relative, even.basis)
-        measures = gap.shape[1]
-        noise = np.repeat(robust_noise(gap), 3)
-        weight = np.ones(len(gap))
-        for _ in range(settings.CAUCHY_ROUNDS):
-            root = np.sqrt(weight)[:, None] / noise
-            flat = equations_of(design * root[:, :, None])
-            basis = orthonormal(flat)
-            white = (gap * root).ravel()
-            white = without(white, basis)
-            left = white.reshape(gap.shape) / root
-            noise = np.repeat(robust_noise(left), 3)
-            weight = 1.0 / (1.0 + ((left / noise) ** 2).sum(axis=1) / (3.0 * measures))
+        found = _weighed(gap, design, gap if like is None else like.left, first=like is None)
+        for _ in range(settings.CAUCHY_ROUNDS - 1 if like is None else 0):
+            found = _weighed(gap, design, found.left)
         if trusted is not None and trusted.any():
-            root = np.where(trusted[:, None], 1.0 / noise, root)
-            basis = orthonormal(equations_of(design * root[:, :, None]))
-            white = (gap * root).ravel()
-            white = without(white, basis)
-        return cls(white, root, basis)
+            noise = np.repeat(robust_noise(found.left), 3)
+            found = _projected(gap, design, np.where(trusted[:, None], 1.0 / noise, found.root))
+        return found
+
+    @property
+    def left(self) -> Array:
+        """(N, m) what is left of the gap, m and rad."""
+        return self.white.reshape(self.root.shape) / self.root
 
     @property
     def freedom(self) -> int:
@@ -90,12 +102,12 @@ class Target:
         if not k or freedom - k < settings.FEWEST_LEFT:
             return NOTHING
         projected = own.T @ (flat.T @ self.white)
-        total, gained = max(float(self.white @ self.white), settings.TINY), float(projected @ projected)
-        rest = max(total - gained, settings.TINY)
+        total, taken = max(float(self.white @ self.white), settings.TINY), float(projected @ projected)
+        rest = max(total - taken, settings.TINY)
         return Worth(
-            float(fdtrc(k, freedom - k, (gained / k) / (rest / (freedom - k)))),
+            float(fdtrc(k, freedom - k, (taken / k) / (rest / (freedom - k)))),
             1.0 - (rest / (freedom - k)) / (total / freedom),
-            float(0.5 * freedom * np.log(total / rest) - 0.5 * k * np.log(freedom)),
+            float(gained(total, taken, k, freedom)),
         )
 
     def seat(self, moves: Array) -> Seat:
@@ -109,6 +121,18 @@ class Target:
             max(float(self.white @ self.white), settings.TINY),
             self.freedom,
         )
+
+
+def _weighed(gap: Array, design: Array, left: Array, first: bool = False) -> Target:
+    """Return the target with Cauchy's weights of what was left of the rows, all the same the ``first`` time."""
+    noise = np.repeat(robust_noise(left), 3)
+    far2 = 0.0 if first else ((left / noise) ** 2).sum(axis=1) / (3.0 * left.shape[1])
+    return _projected(gap, design, 1.0 / np.sqrt(1.0 + np.broadcast_to(far2, len(gap)))[:, None] / noise)
+
+
+def _projected(gap: Array, design: Array, root: Array) -> Target:
+    basis = orthonormal(equations_of(design * root[:, :, None]))
+    return Target(without((gap * root).ravel(), basis), root, basis)
 
 
 @dataclass(frozen=True, eq=False)
@@ -164,9 +188,7 @@ class Seat:
         gram = whole - inside.transpose(0, 2, 1) @ inside
         vector = (functions.transpose(0, 2, 1) @ self.remainder).reshape(laws, k * d)
         explained, rank = explained_by(gram, vector, np.einsum("cii->ci", whole))
-        rest = np.maximum(self.total - explained, settings.TINY)
-        gain = 0.5 * self.freedom * np.log(self.total / rest) - 0.5 * rank * np.log(self.freedom)
-        return np.where((rank == 0) | (self.freedom - rank < settings.FEWEST_LEFT), -np.inf, gain)
+        return gained(self.total, explained, rank, self.freedom)
 
 
 def explained_by(gram: Array, vector: Array, whole: Array) -> tuple[Array, Array]:
