@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import thermal_robot as tr
-from thermal_robot.diagnosis.cautions import not_executed
+from thermal_robot.diagnosis.data_checks import not_executed
 
 ROWS = 80
 

@@ -8,7 +8,7 @@ from conftest import load_arm
 from simulate import simulate
 
 from thermal_robot import CorrectedModel, calibrate, diagnose
-from thermal_robot.diagnosis.signs import SAID, STRAIGHT, as_counted
+from thermal_robot.diagnosis.data_checks import SAID, STRAIGHT, as_counted
 from thermal_robot.effects import choose
 from thermal_robot.inference.fit import fit
 from thermal_robot.observations import observe

@@ -14,8 +14,8 @@ from spoilt_tables import DRAWN, SPOILT, coupled, measured_at, paired_late, with
 from thermal_robot import read_campaign
 from thermal_robot.campaign import campaign_from_table
 from thermal_robot.diagnosis.data_faults import data_fault
+from thermal_robot.diagnosis.data_faults.faults import TURNS
 from thermal_robot.diagnosis.data_faults.find import KINDS
-from thermal_robot.diagnosis.data_faults.kind import TURNS
 from thermal_robot.robot import load_robot
 
 NOISE = 25e-6

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from thermal_robot.diagnosis.data_faults.kind import Kind
+from thermal_robot.diagnosis.data_faults.faults import Kind
 
 
 def test_every_number_of_a_family_gives_its_own_proposal():

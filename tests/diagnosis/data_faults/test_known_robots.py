@@ -5,8 +5,8 @@ from dataclasses import replace
 import pytest
 from other_robots import measured, read_with
 
+from thermal_robot.diagnosis.data_faults.faults import Readings
 from thermal_robot.diagnosis.data_faults.misfit import fitting
-from thermal_robot.diagnosis.data_faults.readings import Readings
 from thermal_robot.robot import load_robot
 
 pytest.importorskip("example_robot_data")

@@ -6,8 +6,8 @@ from conftest import load_arm
 from simulate import simulate
 from spoilt_tables import SPOILT
 
-from thermal_robot.diagnosis.data_faults.kind import MEASUREMENT_KINDS as KINDS
-from thermal_robot.diagnosis.data_faults.readings import Readings
+from thermal_robot.diagnosis.data_faults.faults import MEASUREMENT_KINDS as KINDS
+from thermal_robot.diagnosis.data_faults.faults import Readings
 
 
 @pytest.fixture(scope="module")

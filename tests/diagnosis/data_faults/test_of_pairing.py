@@ -8,8 +8,8 @@ from conftest import load_arm
 from simulate import simulate
 from spoilt_tables import joints_read_at, measured_at
 
-from thermal_robot.diagnosis.data_faults.kind import PAIRING_KINDS as KINDS
-from thermal_robot.diagnosis.data_faults.readings import Readings
+from thermal_robot.diagnosis.data_faults.faults import PAIRING_KINDS as KINDS
+from thermal_robot.diagnosis.data_faults.faults import Readings
 
 SHIFTED, LATE = KINDS
 EVERY = np.ones(20, dtype=bool)

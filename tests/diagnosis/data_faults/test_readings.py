@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from simulate import simulate
 
-from thermal_robot.diagnosis.data_faults.readings import Readings, rms, stacked
+from thermal_robot.diagnosis.data_faults.faults import Readings, stacked
 from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import rms
 from thermal_robot.kinematics import exp3, quaternion_to_rotation, rotation_to_quaternion
 
 NOISE = 20e-6
@@ -37,7 +38,7 @@ def test_rows_are_taken_from_every_column(rv_m2):
 
 
 def test_the_root_mean_square_of_a_right_triangle():
-    assert rms(np.array([3.0, 4.0])) == pytest.approx(np.sqrt(12.5))
+    assert rms(np.array([[3.0], [4.0]])) == pytest.approx(np.sqrt(12.5))
 
 
 def test_readings_side_by_side_are_what_they_are_one_by_one(rv_m2):

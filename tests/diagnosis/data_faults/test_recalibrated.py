@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from other_robots import lengthened, measured, read_with
 
+from thermal_robot.diagnosis.data_faults.faults import Readings
 from thermal_robot.diagnosis.data_faults.misfit import Recalibrated, arm_length
-from thermal_robot.diagnosis.data_faults.readings import Readings
 from thermal_robot.robot import load_robot
 
 

@@ -8,8 +8,8 @@ from conftest import load_arm
 from simulate import simulate
 from spoilt_tables import SPOILT
 
+from thermal_robot.diagnosis.data_faults.faults import Readings
 from thermal_robot.diagnosis.data_faults.find import Screen, Struck
-from thermal_robot.diagnosis.data_faults.readings import Readings
 
 
 @pytest.fixture(scope="module")

@@ -6,8 +6,8 @@ from conftest import load_arm
 from simulate import simulate
 from spoilt_tables import with_joints
 
-from thermal_robot.diagnosis.data_faults.find import KINDS, Struck, consensus, misfit, mixture, part_of, spread, window
-from thermal_robot.diagnosis.data_faults.readings import Readings
+from thermal_robot.diagnosis.data_faults.faults import Readings
+from thermal_robot.diagnosis.data_faults.find import KINDS, Struck, consensus, mixture, part_of, spread, window
 
 
 @pytest.fixture(scope="module")
@@ -24,7 +24,7 @@ def spoilt(campaign, share):
 def test_few_rows_drawn_at_random_bring_the_sound_ones_near(sound, share):
     readings, struck = spoilt(sound, share)
     distance = readings.distance(consensus(readings))
-    assert distance[~struck].max() < misfit(readings) < np.median(distance[struck])
+    assert distance[~struck].max() < readings.tolerance < np.median(distance[struck])
     part = part_of(readings, consensus(readings))
     # a joint that is near zero counts alike both ways
     assert (part.rows != struck).mean() < 0.05
