@@ -350,7 +350,8 @@ def _lengthened(readings: Readings) -> tuple[float, Robot]:
         return float(np.log(np.median(there.distance(there.align(coarse=True))) + settings.LEAST_GAP))
 
     # the ratio of the two volumes tells the factor to within e
-    factor = float(np.exp(minimize_scalar(gap, bounds=(first - 1.0, first + 1.0), method="bounded").x))
+    bounds, options = (first - 1.0, first + 1.0), {"maxiter": settings.FACTOR_ROUNDS}
+    factor = float(np.exp(minimize_scalar(gap, bounds=bounds, method="bounded", options=options).x))
     return factor, longer(factor)
 
 

@@ -107,6 +107,8 @@ PARTS, PART_ROWS = 4, 12
 that was moved once or twice then stands still in most of them, and twelve rows determine two frames three times."""
 SCALE_ERROR = 0.05
 """By which a common factor of the links is another model's: cameras without a scale bar err by a hundredth."""
+FACTOR_ROUNDS = 25
+"""Steps in which a common factor of the links is found: to a thousandth."""
 HAND_JOINTS = 6
 """Joints that a robot at hand may have beside those of the chain, a gripper's; and ends of an arm: those of a hand."""
 LIKE_ANOTHER = 0.9
