@@ -289,7 +289,7 @@ def _coupled(readings: Readings) -> Iterator[tuple[str, Repair]]:
                 yield f"{names[j]} holds {names[j]} {word} {names[k]} (coupled{usual})", _mapped("q", matrix)
 
 
-def _exchanged(column: str, names: Sequence[str]) -> Iterator[tuple[str, Repair]]:
+def _exchanged(column: str, names: Sequence[str] = "xyz") -> Iterator[tuple[str, Repair]]:
     """Propose pairs of parts of a column that stand for each other."""
     for i, j in combinations(range(len(names)), 2):
         matrix = np.eye(len(names))
@@ -305,10 +305,10 @@ def _scaled(readings: Readings, factor: float) -> Iterator[tuple[str, Repair]]:
         yield "all joints", _mapped("q", _but(robot.n, turning, factor))
 
 
-def _zeros(readings: Readings, *shifts: float) -> Iterator[tuple[str, Repair]]:
+def _zeros(readings: Readings, degrees: Sequence[float]) -> Iterator[tuple[str, Repair]]:
     one = np.eye(readings.robot.n)
-    for j, shift in product(_turning(readings), shifts):
-        yield readings.robot.joint_names[j], _mapped("q", one, shift * one[j])
+    for j, by in product(_turning(readings), degrees):
+        yield readings.robot.joint_names[j], _mapped("q", one, np.deg2rad(by) * one[j])
 
 
 JOINT_KINDS = (
@@ -328,20 +328,15 @@ JOINT_KINDS = (
     ),
     Kind("degrees read as rad", "degrees are read as rad in {}", "convert them", partial(_scaled, factor=np.pi / 180)),
     Kind("rad read as degrees", "rad are read as degrees in {}", "convert them", partial(_scaled, factor=180 / np.pi)),
-    Kind(
-        "zero off by 90°",
-        "the zero of {} is 90° off",
-        "add 90° or take it off",
-        lambda readings: _zeros(readings, np.pi / 2, -np.pi / 2),
-    ),
-    Kind("zero off by 180°", "the zero of {} is 180° off", "add 180°", lambda readings: _zeros(readings, np.pi)),
+    Kind("zero off by 90°", "the zero of {} is 90° off", "add 90° or take it off", partial(_zeros, degrees=(90, -90))),
+    Kind("zero off by 180°", "the zero of {} is 180° off", "add 180°", partial(_zeros, degrees=(180,))),
 )
 
 
 # --- measurements ---
 
 
-def _sizes(readings: Readings, *steps: float, ask: str = "") -> Iterator[tuple[str, Repair]]:
+def _sizes(readings: Readings, steps: Sequence[float], ask: str = "") -> Iterator[tuple[str, Repair]]:
     """Propose factors; one that is no unit beside the declared one was applied twice, or where none was due."""
     read = LENGTH_UNITS[readings.length_unit]
     for by in (sign for step in steps for sign in (step, 1.0 / step)):
@@ -392,34 +387,16 @@ def _turn_kind(name: str, says: str, remedy: str, proposals: Iterable[tuple[str,
     return Kind(name, says, remedy, lambda readings: () if readings.orientation is None else found)
 
 
+_CONVERT = "convert them, or correct length_unit"
 UNITS = (
-    Kind("metric unit", "{}", "correct length_unit", lambda own: _sizes(own, 10.0, 100.0, 1e3, 1e6)),
-    Kind(
-        "inch",
-        "{}",
-        "convert them, or correct length_unit",
-        lambda own: _sizes(own, 25.4, 2.54, 1.0 / 0.0254, ask=" (inches?)"),
-    ),
-    Kind(
-        "foot",
-        "{}",
-        "convert them, or correct length_unit",
-        lambda own: _sizes(own, 304.8, 30.48, 1.0 / 0.3048, ask=" (feet?)"),
-    ),
+    Kind("metric unit", "{}", "correct length_unit", partial(_sizes, steps=(10.0, 100.0, 1e3, 1e6))),
+    Kind("inch", "{}", _CONVERT, partial(_sizes, steps=(25.4, 2.54, 1.0 / 0.0254), ask=" (inches?)")),
+    Kind("foot", "{}", _CONVERT, partial(_sizes, steps=(304.8, 30.48, 1.0 / 0.3048), ask=" (feet?)")),
 )
+_MIRRORS = [(axis, _mapped("position", _but(3, [k], -1.0))) for k, axis in enumerate("xyz")]
 AXES = (
-    Kind(
-        "exchanged axes",
-        "columns {} are exchanged",
-        "exchange their headers",
-        lambda _: _exchanged("position", "xyz"),
-    ),
-    Kind(
-        "mirrored axis",
-        "the instrument's axis {} is mirrored",
-        "change its sign",
-        lambda _: [(axis, _mapped("position", _but(3, [k], -1.0))) for k, axis in enumerate("xyz")],
-    ),
+    Kind("exchanged axes", "columns {} are exchanged", "exchange their headers", lambda _: _exchanged("position")),
+    Kind("mirrored axis", "the instrument's axis {} is mirrored", "change its sign", lambda _: _MIRRORS),
 )
 TURNS = (
     _turn_kind("quaternion order", "quaternions stand in the order {}", "set the headers right", _orders()),

@@ -355,10 +355,6 @@ def _lengthened(readings: Readings) -> tuple[float, Robot]:
     return factor, longer(factor)
 
 
-_NEEDED = "a table that fits the robot"
-_SETTLED = "a fit that settles"
-
-
 def unfit(campaign: Campaign, progress: Callable[[str], None] = lambda _: None) -> Misfit | None:
     """Judge robot and table before any effect: the URDF's unit, faults of the table, another robot.
 
@@ -395,10 +391,12 @@ def another_motion(fitted: Fit) -> Misfit | None:
 def delivered(last: Conclusion, candidates: Sequence[Effect]) -> Conclusion:
     """Return a conclusion whose exact model is the one that was compared; else that of the frames alone, and why."""
     note = unsettled(last.fit)
-    return replace(frames_alone(last.fit.campaign, candidates, _SETTLED), notes=(note,)) if note else last
+    return replace(frames_alone(last.fit.campaign, candidates, "a fit that settles"), notes=(note,)) if note else last
 
 
-def frames_alone(campaign: Campaign, candidates: Sequence[Effect], needed: str = _NEEDED) -> Conclusion:
+def frames_alone(
+    campaign: Campaign, candidates: Sequence[Effect], needed: str = "a table that fits the robot"
+) -> Conclusion:
     """Conclude from the unknown frames and nothing else: no candidate can be tested, for want of what is ``needed``."""
     bare = replace(fit(campaign, ()), needs={effect.name: (needed,) for effect in candidates})
     left = examine(bare)
