@@ -327,19 +327,18 @@ class Screen:
         return family.of(float(least.x) if least.fun < np.log(found[k]) else family.tried[k])
 
     def _glanced(self, faults: Sequence[Fault]) -> Chosen:
-        """Return the faults that leave least of a linear map, fitted twice to the best of them."""
+        """Return the faults that leave least of an affine map, fitted once more without the rows that stray."""
         own = [(fault, part) for fault in faults if (part := self.struck.sketch(fault, settings.RELAXED)) is not None]
         self.asked += len(faults)
         if not own:
             return []
-        left, place = stacked([part for _, part in own]).relaxed()
-        best = np.argsort(middle(left), kind="stable")[: max(round(settings.AGAIN * len(own)), settings.SURVIVORS)]
-        left, place[best] = stacked([own[k][1] for k in best]).relaxed(soft(left[best]))
-        again = middle(left)
-        order = np.argsort(again, kind="stable")[: settings.MOST_SURVIVORS]
-        many = int((again <= settings.NEAR * max(again.min(), settings.LEAST_GAP)).sum())
-        least = again * own[0][1].maps_place
-        return [(own[best[k]][0], place[best[k]], float(least[k])) for k in order[: max(settings.SURVIVORS, many)]]
+        several = stacked([part for _, part in own])
+        left, place = several.relaxed(soft(several.relaxed()[0]))
+        score = middle(left)
+        order = np.argsort(score, kind="stable")[: settings.MOST_SURVIVORS]
+        many = int((score <= settings.NEAR * max(score.min(), settings.LEAST_GAP)).sum())
+        least = score * own[0][1].maps_place
+        return [(own[k][0], place[k], float(least[k])) for k in order[: max(settings.SURVIVORS, many)]]
 
     def _looked(self, chosen: Chosen, *, turns: bool = False) -> list[Tried]:
         """Return the faults with what rigid frames leave on a few rows; points must have the extent of the motion.

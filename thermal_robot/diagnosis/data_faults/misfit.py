@@ -206,7 +206,7 @@ def _prior(robot: Robot) -> Array:
     """
     chain, frames = robot.chain, chain_frames(robot, np.zeros((1, robot.n)))
     index = [segment.index for segment in robot.segments if segment.movable]
-    length = settings.PRIOR_LENGTH * arm_length(robot)
+    length = settings.FARTHEST * arm_length(robot)
     looser = settings.PRIOR_TURN**-2 - settings.PRIOR_ZERO**-2
     blocks = []
     for before, k in pairwise(index):

@@ -49,8 +49,6 @@ RELAXED = 60
 SURVIVORS, NEAR, MOST_SURVIVORS = 24, 3.0, 128
 """Candidates for the joints that are looked at with rigid frames: so many, and all that leave less than so many times
 the least, since they may do the same, but not more than these."""
-AGAIN = 0.25
-"""Share of the candidates, the best, to which maps are fitted anew without the rows that stray."""
 EXTENT = 2.0
 """Times that the extent of the measured points may differ from that of the predicted ones, for their unit to be right:
 a target beside the tool frame changes it by less, and units differ by 2.54 and more."""
@@ -84,9 +82,10 @@ MIXED_ROWS = 400
 UNMIXED = 1e-6
 """Singular value of a mixture, of its largest, below which nothing is given back, as readings have six digits; and what
 a row's own weight in what is given back may lack: with less it is not determined."""
-PRIOR_LENGTH, PRIOR_TURN, PRIOR_ZERO = 0.02, 0.1, 0.5
-"""Of the arm's length, and rad of an axis and of a joint's zero: one sigma to which a free calibration holds what it
-moves. Little of what is determined is held by it; the zeros are freest, as a horn is soon mounted a tooth farther."""
+PRIOR_TURN, PRIOR_ZERO = 0.1, 0.5
+"""rad of an axis and of a joint's zero: one sigma to which a free calibration holds what it moves; places are held to
+``FARTHEST``. Little of what is determined is held by it; the zeros are freest, as a horn is soon mounted a tooth
+farther."""
 ANOTHERS = 1e6
 """Times the precision of what a joint has of its own: to which that is held which another joint has."""
 CALIBRATED, ROUNDED = 1e-3, 1e-9
