@@ -184,6 +184,8 @@ def _norm2(vectors: Array) -> Array:
 
 Repair = Callable[[Readings, Rows], Readings]
 """Readings, and the (N,) rows that the fault struck; returns the readings mended in these rows."""
+Numbered = Callable[[float], tuple[str, Repair]]
+"""Place and repair of a fault by its number."""
 
 
 @dataclass(frozen=True)
@@ -206,7 +208,7 @@ class Family(NamedTuple):
 
     kind: Kind
     tried: tuple[float, ...]  # numbers, in order, between which the best is looked for
-    made: Callable[[float], tuple[str, Repair]]  # place and repair of a number
+    made: Numbered
 
     def of(self, number: float) -> Proposal:
         """Return the fault of a number."""
@@ -223,9 +225,7 @@ class Kind:
     # places and repairs of the faults that readings may have, and the joints turned round, if any
     proposals: Callable[[Readings], Iterable[tuple[Any, ...]]] = lambda _: ()
     # numbers to try, and what makes place and repair of one
-    offsets: Callable[[Readings], Iterable[tuple[tuple[float, ...], Callable[[float], tuple[str, Repair]]]]] = (
-        lambda _: ()
-    )
+    offsets: Callable[[Readings], Iterable[tuple[tuple[float, ...], Numbered]]] = lambda _: ()
 
     def proposed(self, readings: Readings) -> list[Proposal]:
         """Return the faults of this kind that readings may have."""
@@ -311,6 +311,7 @@ def _zeros(readings: Readings, degrees: Sequence[float]) -> Iterator[tuple[str, 
         yield readings.robot.joint_names[j], _mapped("q", one, np.deg2rad(by) * one[j])
 
 
+_HEADERS = "exchange their headers"
 JOINT_KINDS = (
     Kind(
         "reversed joint",
@@ -323,8 +324,8 @@ JOINT_KINDS = (
     Kind(
         "exchanged joints",
         "the columns of {} are exchanged",
-        "exchange their headers",
-        lambda readings: _exchanged("q", readings.robot.joint_names),
+        _HEADERS,
+        lambda own: _exchanged("q", own.robot.joint_names),
     ),
     Kind("degrees read as rad", "degrees are read as rad in {}", "convert them", partial(_scaled, factor=np.pi / 180)),
     Kind("rad read as degrees", "rad are read as degrees in {}", "convert them", partial(_scaled, factor=180 / np.pi)),
@@ -347,13 +348,11 @@ def _sizes(readings: Readings, steps: Sequence[float], ask: str = "") -> Iterato
 
 
 _CONJUGATE = _but(4, [1, 2, 3], -1.0)
-_ORDERS = ((1, "x y z w", "w x y z"), (-1, "w x y z", "x y z w"))
-
-
-def _orders() -> Iterator[tuple[str, Repair]]:
-    for (by, own, headed), (also, signs) in product(_ORDERS, (("", np.eye(4)), (" and conjugate", _CONJUGATE))):
-        matrix = signs @ np.roll(np.eye(4), by, axis=0)
-        yield f"{own}{also} under headers in the order {headed}", _mapped("orientation", matrix)
+_ORDERS = [
+    (f"{own}{also} under headers in the order {headed}", _mapped("orientation", signs @ np.roll(np.eye(4), by, axis=0)))
+    for by, own, headed in ((1, "x y z w", "w x y z"), (-1, "w x y z", "x y z w"))
+    for also, signs in (("", np.eye(4)), (" and conjugate", _CONJUGATE))
+]
 
 
 _ANGLES = {
@@ -395,11 +394,11 @@ UNITS = (
 )
 _MIRRORS = [(axis, _mapped("position", _but(3, [k], -1.0))) for k, axis in enumerate("xyz")]
 AXES = (
-    Kind("exchanged axes", "columns {} are exchanged", "exchange their headers", lambda _: _exchanged("position")),
+    Kind("exchanged axes", "columns {} are exchanged", _HEADERS, lambda _: _exchanged("position")),
     Kind("mirrored axis", "the instrument's axis {} is mirrored", "change its sign", lambda _: _MIRRORS),
 )
 TURNS = (
-    _turn_kind("quaternion order", "quaternions stand in the order {}", "set the headers right", _orders()),
+    _turn_kind("quaternion order", "quaternions stand in the order {}", "set the headers right", _ORDERS),
     _turn_kind(
         "conjugate quaternion",
         "quaternions turn the measurement frame into the target's, not back",
@@ -436,7 +435,7 @@ def _shifted(_: Readings) -> Iterator[tuple[str, Repair]]:
         yield place, partial(_resampled, by=sign * by, in_rows=True)
 
 
-def _late(readings: Readings) -> Iterator[tuple[tuple[float, ...], Callable[[float], tuple[str, Repair]]]]:
+def _late(readings: Readings) -> Iterator[tuple[tuple[float, ...], Numbered]]:
     clock = readings.clock
     if clock is None or not np.ptp(clock) > 0.0:
         return
@@ -507,10 +506,9 @@ def _unmixed(readings: Readings, struck: Rows, by: float, sign: float, columns: 
     return replace(_combined(lambda column: back @ column, [readings], columns), known=known)
 
 
+_ANEW = "pair them anew"
 PAIRING_KINDS = (
-    Kind("shifted rows", "columns are shifted: measurements belong to the joints {}", "pair them anew", _shifted),
-    Kind(
-        "clock offset", "clocks differ: measurements belong to what the joints were {}", "pair them anew", offsets=_late
-    ),
+    Kind("shifted rows", "columns are shifted: measurements belong to the joints {}", _ANEW, _shifted),
+    Kind("clock offset", "clocks differ: measurements belong to what the joints were {}", _ANEW, offsets=_late),
 )
 KINDS: tuple[Kind, ...] = (*JOINT_KINDS, *MEASUREMENT_KINDS, *PAIRING_KINDS)
