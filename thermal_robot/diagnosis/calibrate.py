@@ -11,9 +11,8 @@ from threadpoolctl import ThreadpoolController
 
 from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.diagnosis.calibration import Calibration, of_fit
-from thermal_robot.diagnosis.cautions import usable
+from thermal_robot.diagnosis.data_checks import as_counted, usable
 from thermal_robot.diagnosis.diagnose import check_priors, solvable
-from thermal_robot.diagnosis.signs import as_counted
 from thermal_robot.effects import KINEMATIC, Effect, library, named
 from thermal_robot.errors import CampaignError, EffectError, require
 from thermal_robot.inference.named import fit_named

@@ -17,9 +17,8 @@ from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.campaign.names import did_you_mean
 from thermal_robot.diagnosis import Diagnosis
-from thermal_robot.diagnosis.cautions import usable
+from thermal_robot.diagnosis.data_checks import as_counted, usable
 from thermal_robot.diagnosis.data_faults.misfit import another_motion
-from thermal_robot.diagnosis.signs import as_counted
 from thermal_robot.effects import RANDOM, choose, library
 from thermal_robot.errors import CampaignError, EffectError, require
 from thermal_robot.fleet import wear_settings as settings

@@ -14,8 +14,8 @@ from spoilt_tables import DRAWN, SPOILT, coupled, measured_at, paired_late, with
 from thermal_robot import read_campaign
 from thermal_robot.campaign import campaign_from_table
 from thermal_robot.diagnosis.data_faults import data_fault
-from thermal_robot.diagnosis.data_faults.find import KINDS
-from thermal_robot.diagnosis.data_faults.kind import TURNS
+from thermal_robot.diagnosis.data_faults.faults import TURNS, Readings
+from thermal_robot.diagnosis.data_faults.find import KINDS, Screen, Struck, consensus, mixture, part_of, spread, window
 from thermal_robot.robot import load_robot
 
 NOISE = 25e-6
@@ -225,3 +225,116 @@ def test_a_pair_of_faults_is_told_once(sound):
     shifted = np.array(sound.q) + np.array([0.0, 0.0, np.pi, np.pi / 2, 0.0, 0.0])
     pairs = data_fault(replace(sound, q=shifted)).what.split(", or ")
     assert len({frozenset(pair.split(" and ")) for pair in pairs}) == len(pairs)
+
+
+@pytest.fixture(scope="module")
+def poses():
+    return simulate(load_arm("ur10"), ["joint_offset"], samples=60, seed=4, turning=3e-5)[0]
+
+
+def screened(*spoil, campaign):
+    for one in spoil:
+        campaign = SPOILT[one](campaign)
+    return Screen(Struck.whole(Readings.of(campaign)))
+
+
+def best(tried, faults):
+    own = min((t for t in tried if len(t.fault) == faults), key=lambda t: t.typical)
+    return {p.kind.name for p in own.fault}, own
+
+
+@pytest.mark.parametrize("joints", ["reversed joints", "exchanged joints", "rad read as degrees"])
+@pytest.mark.parametrize("measured", ["inch", "mirrored axis", "quaternion order", "angles of orientations"])
+def test_a_fault_on_each_side_is_found(poses, joints, measured):
+    screen = screened(joints, measured, campaign=poses)
+    kinds, own = best(screen.both_sides(), 2)
+    assert kinds == {joints, measured}
+    assert own.typical < 2e-3
+    assert screen.asked > 100
+
+
+def test_two_faults_of_the_joints_are_found(poses):
+    screen = screened("coupled joints", "reversed joints", campaign=poses)
+    kinds, own = best(screen.two_of_joints(), 2)
+    assert kinds == {"coupled joints", "reversed joints"}
+    assert own.typical < 2e-3
+
+
+def test_of_faults_that_differ_by_a_number_the_best_is_asked(poses):
+    screen = screened("clock offset", campaign=poses)
+    kinds, own = best(screen.both_sides(), 1)
+    assert kinds == {"clock offset"}
+    assert own.typical < 2e-3
+
+
+def test_known_frames_are_not_fitted(poses):
+    readings = Readings.of(SPOILT["reversed joint"](poses))
+    rows = np.ones(poses.samples, dtype=bool)
+    frames = Readings.of(poses).align()
+    screen = Screen(Struck(readings, rows, readings.distance(frames), frames))
+    kinds, own = best(screen.singly(), 1)
+    assert kinds == {"reversed joint"}
+    assert own.typical < 2e-3
+
+
+def test_where_not_even_a_map_leaves_little_nothing_is_looked_at(poses):
+    """A joint that does something else than its column says: neither units nor axes nor two faults mend it."""
+    q = np.array(poses.q)
+    q[:, 1] = np.sin(2.0 * q[:, 1]) + 0.3 * q[:, 2]
+    screen = Screen(Struck.whole(Readings.of(replace(poses, q=q, orientation=None, noise_orientation=None))))
+    assert [t for t in screen.both_sides() if len(t.fault) == 2] == []
+    assert screen.two_of_joints() == []
+    assert screen.asked > 10_000  # they count as tried all the same
+
+
+@pytest.fixture(scope="module")
+def points():
+    return simulate(load_arm("ur10"), ["joint_offset"], samples=60, seed=4)[0]
+
+
+def reversed_rows(campaign, share):
+    struck = np.random.default_rng(1).random(campaign.samples) < share
+    return Readings.of(with_joints(campaign, lambda q: np.where(struck[:, None], -q, q), 2)), struck
+
+
+@pytest.mark.parametrize("share", [0.15, 0.3, 0.45])
+def test_few_rows_drawn_at_random_bring_the_sound_ones_near(points, share):
+    readings, struck = reversed_rows(points, share)
+    distance = readings.distance(consensus(readings))
+    assert distance[~struck].max() < readings.tolerance < np.median(distance[struck])
+    part = part_of(readings, consensus(readings))
+    # a joint that is near zero counts alike both ways
+    assert (part.rows != struck).mean() < 0.05
+    assert part.median == pytest.approx(np.median(distance[struck]), rel=0.3)
+
+
+def test_nobody_strays_from_a_sound_table(points):
+    readings = Readings.of(points)
+    assert part_of(readings, readings.align()) is None
+
+
+@pytest.mark.parametrize("share", [0.55, 0.65])
+def test_rows_that_choose_between_two_tables_are_told_apart(points, share):
+    readings, struck = reversed_rows(points, share)
+    found = mixture(Struck.whole(readings))
+    assert (found.rows != struck).mean() < 0.05
+    assert mixture(Struck.whole(Readings.of(points))) is None
+
+
+def test_a_sketch_has_so_many_rows_and_is_none_where_most_are_not_determined(points):
+    struck = Struck.whole(Readings.of(points))
+    assert len(struck.sketch((), 7).q) == 7
+    assert len(struck.sketch((), 700).q) == points.samples
+    shift = next(p for kind in KINDS if kind.name == "shifted rows" for p in kind.proposed(struck.readings))
+    assert len(struck.sketch((shift,), 700).q) == points.samples
+    assert Struck.whole(struck.readings.take(np.arange(3))).sketch((shift,), 7) is None
+
+
+def test_rows_are_spread_over_the_campaign_and_a_window_is_its_middle(points):
+    assert spread(np.arange(5), 9).tolist() == [0, 1, 2, 3, 4]
+    assert spread(np.arange(101), 3).tolist() == [0, 50, 100]
+    long = simulate(load_arm("ur10"), samples=300, seed=2)[0]
+    seen = window(Readings.of(long)).clock
+    assert len(seen) < 300
+    ordered = np.sort(long.covariates["time"])
+    assert np.array_equal(np.sort(seen), ordered[(ordered >= seen.min()) & (ordered <= seen.max())])

@@ -1,4 +1,4 @@
-"""Where the table is at fault nothing is said of the robot, and the fault comes first."""
+"""Where the table or the URDF is at fault nothing is said of the robot, and the fault comes first."""
 
 import json
 from dataclasses import replace
@@ -6,14 +6,16 @@ from dataclasses import replace
 import jsonschema
 import numpy as np
 import pytest
-from other_robots import lengthened, measured, read_with
+from other_robots import base_moved, lengthened, measured, read_with
 from simulate import simulate
 from spoilt_tables import SPOILT, measured_at
 
-from thermal_robot import diagnose, load_robot
-from thermal_robot.diagnosis.data_faults.misfit import unfit
+from thermal_robot import diagnose
+from thermal_robot.diagnosis.data_faults.faults import Readings
+from thermal_robot.diagnosis.data_faults.misfit import Recalibrated, another_robot, arm_length, fitting, unfit
 from thermal_robot.effects import RANDOM
 from thermal_robot.report import schema
+from thermal_robot.robot import load_robot
 
 
 @pytest.fixture(scope="module")
@@ -91,3 +93,168 @@ def test_orientations_alone_can_be_a_misfit(rv_m2):
     found = diagnose(replace(poses, orientation=wrong / np.linalg.norm(wrong, axis=1, keepdims=True)))
     assert found.misfit.away is None
     assert found.misfit.turned > 0.2
+
+
+EXAMPLES = ("ur3", "ur5", "ur10")
+ENDS = {
+    "panda": "panda_hand_tcp",
+    "xarm7": "link_eef",
+    "kinova": "j2s6s200_end_effector",
+    "talos_arm": "wrist_left_ft_tool_link",
+}
+
+
+def example(name):
+    pytest.importorskip("example_robot_data")
+    return load_robot(f"example-robot-data:{name}", ENDS.get(name, "tool0"))
+
+
+PAIRS = [(a, b) for a in EXAMPLES for b in EXAMPLES if a != b] + [("panda", "xarm7"), ("kinova", "ur5")]
+
+
+@pytest.mark.parametrize(("own", "other"), PAIRS)
+@pytest.mark.parametrize("measures", ["position", "pose"])
+def test_another_robot_of_the_family_is_told(own, other, measures):
+    campaign = measured(example(own), 1, measures=measures, geometric=5e-4, joint_offset=1e-3)
+    found = another_robot(read_with(campaign, example(other)))
+    assert found is not None
+    if own in EXAMPLES and other in EXAMPLES:
+        assert found.model.fits == f"example-robot-data:{own}"
+        assert found.model.remains < 5e-3
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_one_link_that_is_longer_is_told_with_its_joint(rv_m2, seed):
+    joint = ("joint_3", "joint_4")[seed % 2]
+    longer = lengthened(rv_m2, {joint: 1.2 + 0.1 * seed})
+    found = another_robot(read_with(measured(longer, seed, geometric=3e-4), rv_m2))
+    length = next(s.length for s in rv_m2.segments if s.name == joint)
+    assert found.model.joint == joint
+    assert found.model.off == pytest.approx((0.2 + 0.1 * seed) * length, rel=0.05)
+
+
+@pytest.mark.parametrize("factor", [0.6, 0.9, 1.3, 1.9])
+def test_a_common_factor_of_the_links_is_told(rv_m2, factor):
+    sister = lengthened(rv_m2, dict.fromkeys((s.name for s in rv_m2.segments), factor))
+    found = another_robot(read_with(measured(sister, 3, geometric=2e-4), rv_m2))
+    assert found.model.factor == pytest.approx(factor, rel=0.01)
+
+
+COARSE = [
+    {"joint_offset": 0.05},
+    {"joint_offset": 0.03, "backlash": 0.015},
+    {"geometric": 2e-3},
+    {"geometric": 1e-3, "transmission_error": 5e-3},
+    {"joint_gain": 5e-3, "joint_offset": 0.01},
+]
+
+
+@pytest.mark.parametrize("sizes", COARSE)
+@pytest.mark.parametrize("seed", range(3))
+def test_a_coarse_robot_is_no_other_robot(rv_m2, sizes, seed):
+    share, lever = (1.0, 0.5, 1.0)[seed], (0.15, 0.15, 0.5)[seed]
+    campaign = measured(rv_m2, seed, rows=(60, 40, 120)[seed], share=share, lever=lever, **sizes)
+    assert another_robot(campaign) is None
+
+
+@pytest.mark.parametrize("row", [20, 55])
+def test_a_base_that_moved_is_no_other_robot(rv_m2, row):
+    campaign = base_moved(measured(rv_m2, 2, rows=100, joint_offset=5e-3), row, seed=row)
+    assert another_robot(campaign) is None
+
+
+def test_rows_that_are_paired_at_random_are_another_motion(rv_m2):
+    campaign = measured(rv_m2, 4)
+    found = another_robot(replace(campaign, position=np.random.default_rng(0).permutation(campaign.position)))
+    assert found.away > 0.02 * campaign.reach
+    assert found.model is None
+
+
+def test_a_sound_campaign_of_another_simulator_is_not_judged(rv_m2):
+    longer = measured(lengthened(rv_m2, {"joint_3": 1.5}), 6)
+    assert another_robot(replace(read_with(longer, rv_m2), simulated_position=longer.position)) is None
+
+
+def fitted(campaign, near=5e-3):
+    return fitting(replace(Readings.of(campaign), base_known=False, tool_known=False), near)
+
+
+def test_the_robot_that_was_measured_is_named():
+    own, other = (example(name) for name in ("ur5", "ur10"))
+    name, remains = fitted(read_with(measured(own, 1, geometric=2e-4), other))
+    assert name == "example-robot-data:ur5"
+    assert remains < 2e-3
+
+
+def test_columns_go_to_the_joints_of_their_names():
+    ur5 = example("ur5")
+    campaign = measured(ur5, 2)
+    turned = load_robot(ur5.urdf.replace("shoulder_pan_joint", "a_joint"), "tool0")
+    assert fitted(read_with(campaign, turned))[0] == "example-robot-data:ur5"
+
+
+def test_no_robot_is_named_where_none_fits(rv_m2):
+    ur5 = example("ur5")
+    shrunk = measured(ur5, 3)
+    assert fitted(replace(shrunk, position=0.5 * shrunk.position)) is None
+
+
+def test_a_robot_of_the_package_is_at_hand(rv_m2):
+    name, _ = fitted(measured(rv_m2, 4, geometric=2e-4))
+    assert name == "builtin:rv_m2"
+
+
+def calibrated(campaign, parts=1):
+    readings = replace(Readings.of(campaign), base_known=False, tool_known=False)
+    return Recalibrated.of(readings, np.arange(campaign.samples) * parts // campaign.samples, campaign.robot)
+
+
+@pytest.mark.parametrize("measures", ["position", "pose"])
+@pytest.mark.parametrize("parts", [1, 3])
+def test_a_joint_that_sits_elsewhere_is_found(rv_m2, measures, parts):
+    campaign = read_with(measured(lengthened(rv_m2, {"joint_3": 1.5}), 1, rows=90, measures=measures), rv_m2)
+    found = calibrated(campaign, parts)
+    joint, far, times = found.farthest()
+    length = next(s.length for s in rv_m2.segments if s.name == "joint_3")
+    assert joint == "joint_3"
+    assert far == pytest.approx(0.5 * length, rel=0.02)
+    assert times > 10
+    assert found.left()[0] < 2e-4  # noise of 30 µm per axis
+
+
+def test_what_parallel_axes_share_is_told_of_one_joint():
+    ur10 = example("ur10")
+    moved = read_with(measured(lengthened(ur10, {"wrist_2_joint": 1.5}), 2), ur10)
+    shift = np.linalg.norm(calibrated(moved).moved[0], axis=1)
+    length = next(s.length for s in ur10.segments if s.name == "wrist_2_joint")
+    assert shift.max() == pytest.approx(0.5 * length, rel=0.05)
+    assert np.sort(shift)[-2] < 0.05 * shift.max()
+
+
+def test_zeros_are_no_lengths(rv_m2):
+    found = calibrated(measured(rv_m2, 3, joint_offset=0.05))
+    assert found.farthest()[1] < 2e-3
+    assert np.abs(found.moved[1]).max() > 0.02
+
+
+def test_gross_errors_do_not_count(rv_m2):
+    campaign = measured(rv_m2, 4, rows=80)
+    spoilt = campaign.position.copy()
+    spoilt[::8] += 0.4
+    found = calibrated(replace(campaign, position=spoilt))
+    assert found.farthest()[1] < 1e-3
+    assert found.left()[0] < 3e-4
+
+
+def test_a_base_that_moved_is_told_by_its_part(rv_m2):
+    campaign = measured(rv_m2, 5, rows=60)
+    moved = campaign.position.copy()
+    moved[30:] += (0.3, -0.1, 0.2)
+    found = calibrated(replace(campaign, position=moved), parts=2)
+    np.testing.assert_allclose(found.bases[1, :3, 3] - found.bases[0, :3, 3], (0.3, -0.1, 0.2), atol=2e-3)
+
+
+def test_an_arm_is_as_long_as_its_links(rv_m2):
+    assert arm_length(rv_m2) == pytest.approx(sum(s.length for s in rv_m2.segments))
+    doubled = lengthened(rv_m2, dict.fromkeys((s.name for s in rv_m2.segments), 2.0))
+    assert arm_length(doubled) == pytest.approx(2.0 * arm_length(rv_m2))

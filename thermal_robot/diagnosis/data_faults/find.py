@@ -1,18 +1,17 @@
 """Find the fault of the data that repairs a campaign, or the two: all candidates are judged in the same way.
 
-What a repair is worth is how far it brings down the gap, its median over the rows, with the unknown frames fitted
-exactly and robustly: faults of a table are large, and nothing else is fitted.
-
-Candidates are screened side by side: thousands at a glance, a few hundred at a look. Where no frame is known, a linear
-map in place of a rigid motion (``Readings.relaxed``) tells what is wrong with the joints whatever unit and axes the
-instrument has, so that faults of both sides are found apart, and two at once.
+A repair is worth how far it brings down the gap, its median over the rows, with the unknown frames fitted robustly and
+nothing else. Thousands of candidates are screened side by side: with an affine map in place of a rigid motion
+(``Readings.relaxed``), which tells what is wrong with the joints whatever unit and axes the instrument has; the best of
+them with rigid frames on few rows; the best of these on many.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
+from itertools import product
 from operator import attrgetter
 
 import numpy as np
@@ -22,7 +21,7 @@ from scipy.optimize import minimize_scalar
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis.data_faults import settings
-from thermal_robot.diagnosis.data_faults.kind import (
+from thermal_robot.diagnosis.data_faults.faults import (
     AXES,
     JOINT_KINDS,
     KINDS,
@@ -30,17 +29,41 @@ from thermal_robot.diagnosis.data_faults.kind import (
     PAIRING_KINDS,
     TURNS,
     UNITS,
+    Family,
     Fault,
     Kind,
-    Offsets,
     Proposal,
-    repaired,
-    reversing,
-    sign_patterns,
+    Readings,
+    Rows,
+    stacked,
 )
-from thermal_robot.diagnosis.data_faults.readings import Readings, Rows, rms, stacked
 from thermal_robot.diagnosis.parts import DataFault
+from thermal_robot.inference.algebra import rms
 from thermal_robot.inference.frames import Placed, middle, soft
+from thermal_robot.inference.settings import LEVEL
+
+
+def evenly(rows: NDArray[np.int64], count: int = settings.SAMPLED) -> NDArray[np.int64]:
+    """Return so many of the rows, spread evenly; some are repeated where there are fewer."""
+    return np.asarray(rows[np.linspace(0, len(rows) - 1, count).round().astype(np.int64)])
+
+
+def spread(rows: NDArray[np.int64], most: int = settings.SAMPLED) -> NDArray[np.int64]:
+    """Return so many of the rows at most, spread evenly."""
+    return evenly(rows, min(len(rows), most))
+
+
+def window(readings: Readings) -> Readings:
+    """Return the rows in the middle of the campaign, one after the other in time, on which clocks are compared."""
+    rows = len(readings.q)
+    order = np.arange(rows) if readings.clock is None else np.argsort(readings.clock, kind="stable")
+    begin = max(rows - settings.WINDOW, 0) // 2
+    return readings.take(np.sort(order[begin : begin + settings.WINDOW]))
+
+
+def geometric_mean(distance: Array) -> float:
+    """Geometric mean of distances, m: less the more rows are mended, and the better."""
+    return float(np.exp(np.mean(np.log(np.maximum(distance, settings.LEAST_GAP)))))
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,8 +82,8 @@ class Tried:
 
     @property
     def typical(self) -> float:
-        """The geometric mean of the distances, m: less the more rows are mended, and the better."""
-        return float(np.exp(np.mean(np.log(np.maximum(self.distance, settings.LEAST_GAP)))))
+        """The geometric mean of the distances, m."""
+        return geometric_mean(self.distance)
 
 
 @dataclass(frozen=True, eq=False)
@@ -70,18 +93,16 @@ class Struck:
     readings: Readings  # all rows as they stand
     rows: Rows  # (N,) those in question
     distance: Array  # (N,) of all rows as they stand, m
-    # where the other rows put the frames; ``None`` where all are in question, and the frames with them
-    frames: Placed | None
+    frames: Placed | None  # where the other rows put them; ``None`` where all rows are in question, and the frames too
 
     @classmethod
     def whole(cls, readings: Readings) -> Struck:
         """All rows; the frames are fitted to whatever is proposed."""
-        rows = np.ones(len(readings.q), dtype=bool)
-        struck = cls(readings, rows, np.zeros(len(rows)), None)
-        frames = struck.sample.align(coarse=True)
-        if np.median(readings.distance(frames)) > misfit(readings):
-            frames = struck.sample.align()
-        return replace(struck, distance=readings.distance(frames))
+        sample = readings.take(spread(np.arange(len(readings.q))))
+        distance = readings.distance(sample.align(coarse=True))
+        if np.median(distance) > readings.tolerance:
+            distance = readings.distance(sample.align())
+        return cls(readings, np.ones(len(distance), dtype=bool), distance, None)
 
     @property
     def sample(self) -> Readings:
@@ -95,25 +116,33 @@ class Struck:
 
     @property
     def count(self) -> int:
-        """How many rows candidates are compared on, less those that the frames take up."""
-        rows = min(int(self.rows.sum()), settings.SAMPLED)
-        return max(rows - (settings.FEWEST_STRAYS if self.frames is None else 0), 0)
+        """How many rows candidates are compared on, less the three that fitted frames take up."""
+        return max(min(int(self.rows.sum()), settings.SAMPLED) - (3 if self.frames is None else 0), 0)
+
+    def is_chance(self, fall: float, asked: int) -> bool:
+        """Tell whether one of so many candidates may bring the gap down so far by chance (Bonferroni)."""
+        return bool(self.count * np.log(fall) < np.log(asked / LEVEL))
+
+    def mended(self, fault: Fault) -> Readings:
+        """Return the readings with one repair after the other in these rows."""
+        readings = self.readings
+        for proposal in fault:
+            readings = proposal.repair(readings, self.rows)
+        return readings
 
     def sketch(self, fault: Fault, most: int) -> Readings | None:
         """Return so many of these rows, mended; ``None`` where the repair determines too few."""
-        mended = repaired(fault, self.readings, self.rows)
-        own = np.flatnonzero(self.rows & mended.known)
-        if 2 * len(own) < self.rows.sum() or len(own) < settings.FEWEST_STRAYS:
-            return None
-        return mended.take(own[np.linspace(0, len(own) - 1, min(most, self.rows.sum())).round().astype(np.int64)])
+        mended = self.mended(fault)
+        own, asked = np.flatnonzero(self.rows & mended.known), int(self.rows.sum())
+        # fewer than three rows determine no frame
+        return mended.take(evenly(own, min(most, asked))) if len(own) >= max(3, asked / 2) else None
 
-    def tried(self, fault: Fault, begun: Array | None = None) -> Tried | None:
+    def tried(self, fault: Fault, begun: Array) -> Tried | None:
         """Mend a fault in these rows; see what a sample of them leaves, aligned from a place and the declared one."""
         part = self.sketch(fault, settings.SAMPLED)
         if part is None:
             return None
-        own = part.declared.tool[:3, 3]
-        frames = self.frames or part.align(begun=None if begun is None else np.stack([begun, own]))
+        frames = self.frames or part.align(begun=np.stack([begun, part.declared.tool[:3, 3]]))
         return Tried(fault, part.distance(frames), frames.tool[:3, 3], float(part.still()))
 
     def hit(self, found: Tried) -> Rows:
@@ -121,64 +150,39 @@ class Struck:
 
         Rows that nothing mends, and those that are not determined, count as the others.
         """
-        mended = repaired(found.fault, self.readings, self.rows)
-        some = mended.take(spread(np.flatnonzero(mended.known)))
-        frames = self.frames or some.align(begun=found.place[None])
-        before, after = self.readings.distance(frames), mended.distance(frames)
-        better = self.rows & mended.known & (after < before)
-        return self.rows if better.sum() > settings.NEARLY_ALL * (self.rows & mended.known).sum() else better
-
-
-def spread(rows: NDArray[np.int64], most: int = settings.SAMPLED) -> NDArray[np.int64]:
-    """Return so many of the rows that candidates can be compared, evenly."""
-    if len(rows) <= most:
-        return rows
-    return np.asarray(rows[np.linspace(0, len(rows) - 1, most).round().astype(int)])
-
-
-def misfit(readings: Readings) -> float:
-    """Return the gap, m, above which robot and table are not taken to fit."""
-    return settings.MISFIT * readings.spread()
-
-
-def window(readings: Readings) -> Readings:
-    """Return the rows in the middle of the campaign, one after the other in time, on which clocks are compared."""
-    rows = len(readings.q)
-    if rows <= settings.WINDOW:
-        return readings
-    order = np.arange(rows) if readings.clock is None else np.argsort(readings.clock, kind="stable")
-    begin = (rows - settings.WINDOW) // 2
-    return readings.take(np.sort(order[begin : begin + settings.WINDOW]))
+        mended = self.mended(found.fault)
+        frames = self.frames or mended.take(spread(np.flatnonzero(mended.known))).align(begun=found.place[None])
+        known = self.rows & mended.known
+        better = known & (mended.distance(frames) < self.readings.distance(frames))
+        return self.rows if better.sum() > (1.0 - settings.FEW_STRAYS) * known.sum() else better
 
 
 def part_of(readings: Readings, begun: Placed) -> Struck | None:
     """Return the rows that stray from the others, which are many; ``None`` where few stray, or most."""
-    distance = readings.distance(begun)
+    frames, distance = begun, readings.distance(begun)
     for _ in range(settings.PART_ROUNDS):
         near = np.flatnonzero(~_strays(readings, distance))
-        if len(near) <= (1.0 - settings.MOST_STRAYS) * len(distance):
+        if len(near) <= len(distance) / 2:
             return None
         frames = readings.take(spread(near)).align()
         distance = readings.distance(frames)
     away = _strays(readings, distance)
-    least = max(settings.FEWEST_STRAYS, settings.FEW_STRAYS * len(away))
-    if least <= away.sum() <= settings.MOST_STRAYS * len(away):
-        return Struck(readings, away, distance, frames)
-    return None
+    many = max(3, settings.FEW_STRAYS * len(away)) <= away.sum() <= len(away) / 2
+    return Struck(readings, away, distance, frames) if many else None
 
 
 def _strays(readings: Readings, distance: Array) -> Rows:
     """(N,) rows that are far off, for those whose gap is near enough."""
     near = float(np.quantile(distance, settings.NEAREST))
-    return np.asarray(distance > settings.STRAY * max(near, settings.LEAST * misfit(readings)))
+    return np.asarray(distance > settings.STRAY * max(near, settings.LEAST * readings.tolerance))
 
 
 def consensus(sample: Readings) -> Placed:
-    """Return frames that bring many rows near where half of them may be wrong: the best of few rows drawn at random.
+    """Random sample consensus (RANSAC): frames that bring many rows near where half of them may be wrong.
 
     Fischler and Bolles, *Communications of the ACM* 24 (1981). All draws go side by side.
     """
-    rng = np.random.default_rng(settings.SEED)
+    rng = np.random.default_rng(0)
     rows = np.array([rng.choice(len(sample.q), settings.DRAWN, replace=False) for _ in range(settings.DRAWS)])
     best, least = sample.align(coarse=True), np.inf
     for _ in range(1 + settings.PART_ROUNDS):
@@ -196,16 +200,16 @@ def consensus(sample: Readings) -> Placed:
 
 
 def mixture(struck: Struck) -> Struck | None:
-    """Return the rows that fit better mended than as they stand, by the fault beside which all rows fit best so.
+    """Fit mixtures of rows as they stand and rows mended, by each fault; return the rows mended by the best of them.
 
-    For a robot whose own errors are not small beside the fault: no row strays far. Frames are fitted to the rows as
-    they stand and to the others mended, which are told anew in each round. Each row may choose, which counts against
-    the fault as one bit.
+    For a robot whose own errors are not small beside the fault: no row strays far. The rows are told anew in each
+    round. Each row may choose, which counts against the fault as one bit.
     """
     readings = window(struck.readings)
     rows, every = spread(np.arange(len(readings.q)), settings.RELAXED), np.ones(len(readings.q), dtype=bool)
     own, begun = readings.take(rows), struck.sample.align(coarse=True)
-    proposals = [p for kind in KINDS for p in (*kind.proposed(readings), *_numbered(kind, readings))]
+    proposals = [p for kind in KINDS for p in kind.proposed(readings)]
+    proposals += [family.of(number) for kind in KINDS for family in kind.families(readings) for number in family.tried]
     best: list[tuple[float, Proposal, Placed]] = []
     for first in range(0, len(proposals), settings.ABREAST):
         some = proposals[first : first + settings.ABREAST]
@@ -221,15 +225,10 @@ def mixture(struck: Struck) -> Struck | None:
         best.append((float(left[k]), some[k], Placed(frames.base[k], frames.tool[k])))
     least, proposal, frames = min(best, key=lambda found: found[0])
     fall = struck.median / (2.0 * max(least, settings.LEAST_GAP))
-    if fall < 1.0 or struck.count * np.log(fall) < np.log(len(proposals) / settings.LEVEL):
+    if fall < 1.0 or struck.is_chance(fall, len(proposals)):
         return None
-    mended_all, distance = proposal.repair(struck.readings, struck.rows), struck.readings.distance(frames)
+    mended_all, distance = struck.mended((proposal,)), struck.readings.distance(frames)
     return Struck(struck.readings, mended_all.known & (mended_all.distance(frames) < distance), distance, frames)
-
-
-def _numbered(kind: Kind, readings: Readings) -> list[Proposal]:
-    """Return the faults that differ by a number, for each number that is tried."""
-    return [family.of(number) for family in kind.families(readings) for number in family.tried]
 
 
 Chosen = list[tuple[Fault, Array, float]]
@@ -253,12 +252,11 @@ class Screen:
     def both_sides(self) -> list[Tried]:
         """Return faults of the joints, of the measurements, and of both, one on each side: distances on a few rows."""
         joints = self._glanced([(), *((p,) for p in self._of_joints)])
-        units = [p for p in self._measured if p.kind in UNITS]
-        axes = [p for p in self._measured if p.kind in AXES]
-        sides: list[Fault] = [(), *((p,) for p in (*units, *axes)), *((u, a) for u in units for a in axes)]
+        measured = [*self._proposals(MEASUREMENT_KINDS)]
+        units, axes, turns = ([p for p in measured if p.kind in kinds] for kinds in (UNITS, AXES, TURNS))
+        sides: list[Fault] = [(), *((p,) for p in (*units, *axes)), *product(units, axes)]
         asked = [((*own, *side), at, left) for own, at, left in joints for side in sides if len(own) + len(side) <= 2]
         looked = self._looked(asked)
-        turns = [p for p in self._measured if p.kind in TURNS]
         if self.struck.readings.orientation is None:
             return looked
         looked.sort(key=attrgetter("typical"))
@@ -270,22 +268,17 @@ class Screen:
 
     def two_of_joints(self) -> list[Tried]:
         """Return pairs of faults of the joints, among them any number that are reversed beside another fault."""
+        turned = [p for p in self._of_joints if p.joints][: settings.PAIRED_PATTERNS]
         others = [p for p in self._of_joints if not p.joints]
-        signs = sign_patterns(self.struck.readings.robot.n)[: settings.PAIRED_PATTERNS]
         scores: list[Array] = []
         made: list[Fault] = []
-        turned = [Proposal(self._reversed((own < 0).sum()), *reversing(own, self.struck.readings)) for own in signs]
         for other in others:
             part = self.struck.sketch((other,), settings.RELAXED)
-            if part is None:
-                continue
-            several = [replace(part, q=part.q * signs[:, None, :])]
-            made += [(other, own) for own in turned]
-            every = np.ones(len(part.q), dtype=bool)
-            seconds = [p for p in others if p is not other and p.kind not in PAIRING_KINDS]
-            several.append(stacked([p.repair(part, every) for p in seconds]))
-            made += [(other, p) for p in seconds]
-            scores += [middle(own.relaxed()[0]) for own in several]
+            if part is not None:
+                every = np.ones(len(part.q), dtype=bool)
+                seconds = [*turned, *(p for p in others if p is not other and p.kind not in PAIRING_KINDS)]
+                made += [(other, p) for p in seconds]
+                scores.append(middle(stacked([p.repair(part, every) for p in seconds]).relaxed()[0]))
         if not scores:
             return []
         self.asked += len(made)
@@ -296,13 +289,6 @@ class Screen:
     def _of_joints(self) -> list[Proposal]:
         return [*self._proposals((*JOINT_KINDS, *PAIRING_KINDS))]
 
-    @cached_property
-    def _measured(self) -> list[Proposal]:
-        return [*self._proposals(MEASUREMENT_KINDS)]
-
-    def _reversed(self, joints: int) -> Kind:
-        return JOINT_KINDS[0] if joints == 1 else JOINT_KINDS[1]
-
     def _proposals(self, kinds: Sequence[Kind]) -> Iterator[Proposal]:
         """Yield the faults of some kinds; of those that differ by a number the best of each family."""
         for kind in kinds:
@@ -312,53 +298,47 @@ class Screen:
                 if (best := self._refined(family)) is not None:
                     yield best
 
-    def _refined(self, family: Offsets) -> Proposal | None:
+    def _refined(self, family: Family) -> Proposal | None:
         """Return the best of a family: the best of those that are tried, then between its neighbours."""
         if len(family.tried) < 3:
             return None
         struck = self.struck
-        if struck.frames is None and len(struck.rows) > settings.WINDOW:
+        if struck.frames is None:
             part = window(struck.readings)
-            struck = replace(
-                struck, readings=part, rows=np.ones(len(part.q), dtype=bool), distance=np.zeros(len(part.q))
-            )
-        found = [self._typical(struck, (family.of(number),)) for number in family.tried]
+            struck = Struck(part, np.ones(len(part.q), dtype=bool), np.zeros(len(part.q)), None)
+
+        def left(*fault: Proposal) -> float:
+            part = struck.sketch(fault, settings.RELAXED)
+            if part is None:
+                return np.inf
+            return geometric_mean(part.distance(struck.frames) if struck.frames else part.relaxed()[0])
+
+        found = [left(family.of(number)) for number in family.tried]
         k = int(np.argmin(found))
-        if found[k] * settings.PROMISING > self._typical(struck, ()):
+        if found[k] * settings.PROMISING > left():
             return None
         low, high = family.tried[max(k - 1, 0)], family.tried[min(k + 1, len(found) - 1)]
         least = minimize_scalar(
-            lambda number: np.log(min(self._typical(struck, (family.of(number),)), found[k] * settings.WORSE)),
+            lambda number: np.log(min(left(family.of(number)), found[k] * settings.WORSE)),
             bounds=(low, high),
             method="bounded",
-            options={"maxiter": settings.OFFSET_ROUNDS, "xatol": settings.OFFSET_SETTLED * (high - low)},
+            options={"xatol": settings.OFFSET_SETTLED * (high - low)},
         )
         return family.of(float(least.x) if least.fun < np.log(found[k]) else family.tried[k])
 
-    def _typical(self, struck: Struck, fault: Fault) -> float:
-        part = struck.sketch(fault, settings.RELAXED)
-        if part is None:
-            return np.inf
-        left = part.relaxed()[0] if struck.frames is None else part.distance(struck.frames)
-        return float(np.exp(np.mean(np.log(np.maximum(left, settings.LEAST_GAP)))))
-
     def _glanced(self, faults: Sequence[Fault]) -> Chosen:
-        """Return the faults that leave least of a linear map, fitted twice to the best of them."""
+        """Return the faults that leave least of an affine map, fitted once more without the rows that stray."""
         own = [(fault, part) for fault in faults if (part := self.struck.sketch(fault, settings.RELAXED)) is not None]
         self.asked += len(faults)
         if not own:
             return []
-        left, place = stacked([part for _, part in own]).relaxed()
+        several = stacked([part for _, part in own])
+        left, place = several.relaxed(soft(several.relaxed()[0]))
         score = middle(left)
-        best = np.argsort(score, kind="stable")[: max(round(settings.AGAIN * len(own)), settings.SURVIVORS)]
-        left, place[best] = stacked([own[k][1] for k in best]).relaxed(soft(left[best]))
-        again = middle(left)
-        order = best[np.argsort(again, kind="stable")]
-        again = np.sort(again)
-        many = max(settings.SURVIVORS, int((again <= settings.NEAR * max(again[0], settings.LEAST_GAP)).sum()))
-        least = again * own[0][1].maps_place
-        chosen = zip(order, least, strict=True)
-        return [(own[k][0], place[k], float(at)) for k, at in [*chosen][: min(many, settings.MOST_SURVIVORS)]]
+        order = np.argsort(score, kind="stable")[: settings.MOST_SURVIVORS]
+        many = int((score <= settings.NEAR * max(score.min(), settings.LEAST_GAP)).sum())
+        least = score * own[0][1].maps_place
+        return [(own[k][0], place[k], float(least[k])) for k in order[: max(settings.SURVIVORS, many)]]
 
     def _looked(self, chosen: Chosen, *, turns: bool = False) -> list[Tried]:
         """Return the faults with what rigid frames leave on a few rows; points must have the extent of the motion.
@@ -367,53 +347,48 @@ class Screen:
         """
         self.asked += len(chosen)
         chosen = [own for own in chosen if own[2] <= settings.NEAR * settings.STILL[max(len(own[0]), 1) - 1]]
-        parts = [self.struck.sketch(fault, settings.SKETCHED) for fault, *_ in chosen]
-        own = [k for k, part in enumerate(parts) if part is not None and _extends(part)]
+        parts = [(own, self.struck.sketch(own[0], settings.SKETCHED)) for own in chosen]
+        extending = [(own, part) for own, part in parts if part is not None and _extends(part)]
         found: list[Tried] = []
-        for first in range(0, len(own), settings.ABREAST):
-            some = own[first : first + settings.ABREAST]
-            side = stacked([parts[k] for k in some])  # type: ignore[misc]
-            frames = side.align(coarse=True, begun=np.stack([chosen[k][1] for k in some])[:, None, :])
+        for first in range(0, len(extending), settings.ABREAST):
+            some, several = zip(*extending[first : first + settings.ABREAST], strict=True)
+            side = stacked(several)
+            frames = side.align(coarse=True, begun=np.stack([place for _, place, _ in some])[:, None, :])
             left = side.distance(frames, turns=turns)
-            found += [Tried(chosen[k][0], own, at[:3, 3]) for k, own, at in zip(some, left, frames.tool, strict=True)]
+            found += [Tried(own[0], away, at[:3, 3]) for own, away, at in zip(some, left, frames.tool, strict=True)]
         return found
 
 
 def _extends(readings: Readings) -> bool:
     """Tell whether measured and predicted points are about as far from each other."""
     points = readings.poses[:, :3, 3] if readings.simulated_position is None else readings.simulated_position
-    times = [float(np.abs(own - own.mean(axis=0)).sum()) for own in (readings.position, points)]
-    return times[0] <= settings.EXTENT * times[1] and times[1] <= settings.EXTENT * times[0]
+    one, other = (float(np.abs(own - own.mean(axis=0)).sum()) for own in (readings.position, points))
+    return max(one, other) <= settings.EXTENT * min(one, other)
 
 
 def data_fault(campaign: Campaign, progress: Callable[[str], None] = lambda _: None) -> DataFault | None:
     """Return the fault of the data without which robot and table fit; ``None`` where they fit, or none mends them.
 
-    Parameters
-    ----------
-    campaign
-        With measurements.
-    progress
-        Called with a few words where candidates are tried.
+    ``progress`` is called with a few words where candidates are tried.
     """
     if campaign.samples <= settings.DRAWN:
         return None
     readings = Readings.of(campaign)
     every = Struck.whole(readings)
-    apart = every.median > misfit(readings)
+    apart = every.median > readings.tolerance
     if apart:
         progress("faults of the data")
-    found = mended(every) if apart else []
+    found = mending(every) if apart else []
     part = None if found else part_of(readings, consensus(every.sample) if apart else every.sample.align(coarse=True))
     if part is None and apart and not found:
         part = mixture(every)
     if part is not None:
         progress("faults of the data in some rows")
-        every, found = part, mended(part)
+        every, found = part, mending(part)
     return _told(campaign, every, found) if found else None
 
 
-def mended(struck: Struck) -> list[Tried]:
+def mending(struck: Struck) -> list[Tried]:
     """Return the faults that mend the rows and cannot be told apart, in the order of their kinds; none if none does.
 
     Two faults at once are told where they leave so much less than one that it is no chance.
@@ -423,7 +398,7 @@ def mended(struck: Struck) -> list[Tried]:
         return _best(screen, screen.singly(), struck.median)
     tried = screen.both_sides()
     one = _best(screen, [t for t in tried if len(t.fault) == 1], struck.median)
-    least, enough = min((t.median for t in one), default=struck.median), misfit(struck.readings)
+    least, enough = min((t.median for t in one), default=struck.median), struck.readings.tolerance
     if one and least <= enough:
         return one
     pairs = [t for t in tried if len(t.fault) == 2]
@@ -442,10 +417,10 @@ def _best(screen: Screen, tried: Sequence[Tried], before: float) -> list[Tried]:
     if not full:
         return []
     scale = max(min(t.median for t in full), settings.LEAST_GAP)
-    fall = before / scale
-    if fall < settings.FALL or struck.count * np.log(fall) < np.log(screen.asked / settings.LEVEL):
+    if before / scale < settings.FALL or struck.is_chance(before / scale, screen.asked):
         return []
-    said = [_log_likelihood(t, scale) * struck.count for t in full]
+    # log likelihood of Cauchy's law: few rows that nothing mends decide nothing
+    said = [-struck.count * float(np.mean(np.log1p((t.distance / scale) ** 2))) for t in full]
     alike = [t for t, own in zip(full, said, strict=True) if own > max(said) - settings.TIE]
     alike = [*{frozenset((p.kind.name, p.place) for p in t.fault): t for t in reversed(alike)}.values()][::-1]
     return sorted((t for t in alike if not any(_says_more(t, other) for other in alike)), key=_usual)
@@ -466,11 +441,6 @@ def _usual(tried: Tried) -> tuple[int, ...]:
     return (*(KINDS.index(p.kind) for p in tried.fault), *(len(p.joints) for p in tried.fault))
 
 
-def _log_likelihood(tried: Tried, scale: float) -> float:
-    """Log likelihood a row, of Cauchy's law: few rows that nothing mends decide nothing."""
-    return -float(np.mean(np.log1p((tried.distance / scale) ** 2)))
-
-
 def _told(campaign: Campaign, struck: Struck, found: Sequence[Tried]) -> DataFault:
     alike: dict[tuple[Kind, ...], list[Tried]] = {}
     for tried in found:
@@ -478,14 +448,13 @@ def _told(campaign: Campaign, struck: Struck, found: Sequence[Tried]) -> DataFau
     alike = dict([*alike.items()][: settings.TOLD])
     best = min(found, key=attrgetter("median"))
     hit = struck.hit(best)
+    remedies = (" and ".join(dict.fromkeys(kind.remedy for kind in kinds)) for kinds in alike)
     return DataFault(
         kinds=tuple(dict.fromkeys(kind.name for kinds in alike for kind in kinds)),
         what=", or ".join(_words(own) for own in alike.values()),
-        remedy=", or ".join(
-            dict.fromkeys(" and ".join(dict.fromkeys(kind.remedy for kind in kinds)) for kinds in alike)
-        ),
-        rms_before=rms(struck.distance[struck.rows]),
-        rms_after=rms(best.distance[best.distance <= settings.STRAY * best.median]),
+        remedy=", or ".join(dict.fromkeys(remedies)),
+        rms_before=rms(struck.distance[struck.rows, None]),
+        rms_after=rms(best.distance[best.distance <= settings.STRAY * best.median, None]),
         rows=() if hit.all() else tuple(int(r) for r in campaign.rows[hit]),
     )
 
@@ -494,10 +463,6 @@ def _words(alike: Sequence[Tried]) -> str:
     """Say what is wrong, in one kind of place or another, and what else is."""
     parts = []
     for k, proposal in enumerate(alike[0].fault):
-        places = list(dict.fromkeys(t.fault[k].place for t in alike))
-        parts.append(proposal.kind.says.format(_one_of(places)))
+        *others, last = dict.fromkeys(t.fault[k].place for t in alike)
+        parts.append(proposal.kind.says.format(f"{', '.join(others)} or {last}" if others else last))
     return " and ".join(parts)
-
-
-def _one_of(places: Sequence[str]) -> str:
-    return places[0] if len(places) == 1 else f"{', '.join(places[:-1])} or {places[-1]}"

@@ -6,11 +6,12 @@ commands allow, and the robots at hand are tried.
 
 from __future__ import annotations
 
-import re
+import xml.etree.ElementTree as ElementTree
 from collections.abc import Callable, Iterator, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
-from functools import cache
-from itertools import islice, pairwise
+from functools import cache, cached_property
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -23,8 +24,8 @@ from thermal_robot.campaign.plausible import another_unit
 from thermal_robot.diagnosis import settings as diagnosis_settings
 from thermal_robot.diagnosis.answer import Conclusion
 from thermal_robot.diagnosis.data_faults import data_fault, settings
-from thermal_robot.diagnosis.data_faults.find import misfit
-from thermal_robot.diagnosis.data_faults.readings import Readings
+from thermal_robot.diagnosis.data_faults.faults import Readings
+from thermal_robot.diagnosis.data_faults.find import spread
 from thermal_robot.diagnosis.examine import examine
 from thermal_robot.diagnosis.parts import AnotherModel, Misfit
 from thermal_robot.effects import Effect
@@ -50,47 +51,47 @@ from thermal_robot.urdf_text import shipped, urdf_text
 
 @dataclass(frozen=True, eq=False)
 class Recalibrated:
-    """A robot whose joints sit where readings put them, with frames of its own for each part of the rows.
+    """Kinematic calibration: a robot whose joints sit where readings put them, with frames for each part of the rows.
 
     The first joint's placement is the base's, and what lies behind the last joint the target's. What the readings do
-    not determine stays as the URDF has it (Levenberg-Marquardt with prior sizes that no robot reaches).
+    not determine stays as the URDF has it: each of the J joints behind the first has a normal prior of a size that no
+    robot reaches (regularised Gauss-Newton, robust by Cauchy's weights).
     """
 
     readings: Readings  # commands and measurements, and the robot as the URDF has it
     parts: NDArray[np.int64]  # (N,) to which part of the rows each belongs, from 0 on
     robot: Robot  # the calibrated robot
-    # bases, points, turns: (B, 4, 4), (B, 3) and (B, 3, 3): of each part the base, the target's place on the tool and
-    # its turn
-    bases: Array
-    points: Array
-    turns: Array
-    held: Array  # (6 J, 6 J) precision to which shift and turn of the J joints behind the first are held
+    bases: Array  # (B, 4, 4) base of each part
+    points: Array  # (B, 3) place of the target on the tool
+    turns: Array  # (B, 3, 3) turn of the target on the tool
+    prior: Array  # (6 J, 6 J) precision of shift and turn
 
     @classmethod
     def of(cls, readings: Readings, parts: NDArray[np.int64], begun: Robot) -> Recalibrated:
         """Calibrate, beginning with another robot of the same joints, such as one with longer links."""
         own = [replace(readings.take(np.flatnonzero(parts == part)), robot=begun).align() for part in np.unique(parts)]
         bases, tools = np.stack([frames.base for frames in own]), np.stack([frames.tool for frames in own])
-        found = cls(readings, parts, begun, bases, tools[:, :3, 3], tools[:, :3, :3], _held(readings.robot))
-        for _ in range(settings.CALIBRATION_STEPS):
-            after, settled = found._stepped()
-            if after is None:
-                break
-            found = after
+        found = cls(readings, parts, begun, bases, tools[:, :3, 3], tools[:, :3, :3], _prior(readings.robot))
+        for _ in range(inference.FIT_STEPS):
+            found, settled = found._stepped()
             if settled:
                 break
         return found
 
-    @property
-    def _placed(self) -> tuple[list[int], list[int]]:
-        """Segments and chain elements of the joints behind the first."""
-        moving = [s for s, segment in enumerate(self.robot.segments) if segment.movable][1:]
-        return moving, [self.robot.segments[s].index for s in moving]
+    @cached_property
+    def _segments(self) -> list[int]:
+        """(J,) segments of the joints behind the first."""
+        return [s for s, segment in enumerate(self.robot.segments) if segment.movable][1:]
 
-    @property
+    @cached_property
+    def _elements(self) -> list[int]:
+        """(J,) elements of the chain of these joints."""
+        return [self.robot.segments[s].index for s in self._segments]
+
+    @cached_property
     def moved(self) -> tuple[Array, Array]:
         """(J, 3) m and (J, 3) rad: shift and turn of each joint behind the first, in its own frame as in the URDF."""
-        was, own, (_, index) = self.readings.robot.chain, self.robot.chain, self._placed
+        was, own, index = self.readings.robot.chain, self.robot.chain, self._elements
         back = was.rotations[index].transpose(0, 2, 1)
         shift = (back @ (own.translations[index] - was.translations[index])[:, :, None])[:, :, 0]
         return shift, log3(back @ own.rotations[index])
@@ -100,31 +101,30 @@ class Recalibrated:
 
         A slide's own way is its zero and does not count.
         """
-        (shift, _), (_, index), chain = self.moved, self._placed, self.robot.chain
-        slides = (chain.kinds[index] == PRISMATIC)[:, None]
-        axes = chain.axes[index]
-        far = np.linalg.norm(shift - slides * axes * (shift * axes).sum(axis=1)[:, None], axis=1)
+        (shift, _), index, chain = self.moved, self._elements, self.robot.chain
+        axes = chain.axes[index] * (chain.kinds[index] == PRISMATIC)[:, None]
+        far = np.linalg.norm(shift - axes * (shift * axes).sum(axis=1)[:, None], axis=1)
         j = int(np.argmax(far))
         return chain.names[index[j]], float(far[j]), float(far[j] / max(np.median(far), settings.LEAST_GAP))
-
-    @property
-    def gap(self) -> Array:
-        """(N, m) measured − predicted in the root frame's axes: m, and turns times the length of a lever."""
-        return self._seen()[2]
 
     def left(self) -> tuple[float, float, float]:
         """Return the rms distance, m, the rms turn, rad, and the rms of both, m, that so many unknowns leave of one.
 
         As medians tell them: few rows that nothing explains do not count.
         """
-        unknown = 6 * len(self._placed[0]) + len(self.bases) * (6 + self.gap.shape[1])
-        freedom = self.gap.size / max(self.gap.size - unknown, len(self.gap))
-        parts = (self.gap[:, :3], self.gap[:, 3:] / inference.LEVER, self.gap)
-        away, turned, both = (np.median(np.linalg.norm(part, axis=1)) for part in parts)
-        scale = np.sqrt(3.0 * freedom) / settings.MEDIAN
-        return float(scale * away), float(scale * turned), float(scale * both)
+        gap = self._seen[2]
+        unknown = 6 * len(self._segments) + len(self.bases) * (6 + gap.shape[1])
+        scale = np.sqrt(3.0 * gap.size / max(gap.size - unknown, len(gap))) / settings.MEDIAN
+        parts = (gap[:, :3], gap[:, 3:] / inference.LEVER, gap)
+        away, turned, both = (float(scale * np.median(np.linalg.norm(part, axis=1))) for part in parts)
+        return away, turned, both
 
+    @cached_property
     def _seen(self) -> tuple[ChainFrames, Array, Array]:
+        """Frames of the chain, (N, 3) target and (N, m) measured − predicted in the root frame's axes.
+
+        The latter in m; turns times the length of a lever.
+        """
         readings, parts = self.readings, self.parts
         frames = chain_frames(self.robot, readings.q)
         point = frames.tool_position + (frames.tool_rotation @ self.points[parts][:, :, None])[:, :, 0]
@@ -136,59 +136,56 @@ class Recalibrated:
             gap = np.hstack([gap, inference.LEVER * turned])
         return frames, point, gap
 
-    def _stepped(self) -> tuple[Recalibrated | None, bool]:
-        """Return the calibration after one step downhill, ``None`` where there is none, and whether it settled."""
-        frames, point, gap = self._seen()
-        rows, measures = gap.shape
-        scale = max(float(middle(np.linalg.norm(gap, axis=1))) / settings.MEDIAN, settings.LEAST_GAP)
-        weight = np.sqrt(soft(np.linalg.norm(gap, axis=1))) / scale
-        _, index = self._placed
-        flat = self._frame_columns(frames, point, measures)
-        moved = placement_sensitivities(self.robot, self.readings.q, frames=frames, point=self.points[self.parts])
-        moved = moved[:, :measures, self._placed[0]]
-        turned = self.robot.chain.rotations[index].transpose(0, 2, 1) @ self.readings.robot.chain.rotations[index]
-        moved[..., :3] = np.einsum("nmji,jik->nmjk", moved[..., :3], turned)
-        moved = moved.reshape(rows, measures, -1)
-        lever = np.where(np.arange(measures) < 3, 1.0, inference.LEVER)
-        design = np.concatenate([flat, moved], axis=2) * (lever[:, None] * weight[:, None, None])
-        design, known = design.reshape(rows * measures, -1), np.arange(flat.shape[2])
-        matrix, vector = design.T @ design, design.T @ (gap * weight[:, None]).ravel()
-        held = np.arange(len(known), len(matrix))
-        matrix[known, known] += settings.ROUNDED * matrix.diagonal()[known].max()
-        matrix[np.ix_(held, held)] += self.held
-        vector[held] -= self.held @ self._state
+    def _stepped(self) -> tuple[Recalibrated, bool]:
+        """Return the calibration after one step downhill, and whether it settled or there is none."""
+        gap = self._seen[2]
+        distance = np.linalg.norm(gap, axis=1)
+        scale = max(float(middle(distance)) / settings.MEDIAN, settings.LEAST_GAP)
+        weight = np.sqrt(soft(distance))[:, None] / scale
+        columns = self._columns() * weight[:, :, None]
+        design = columns.reshape(gap.size, -1)
+        matrix, vector = design.T @ design, design.T @ (gap * weight).ravel()
+        frames = len(matrix) - len(self.prior)
+        own = np.arange(frames)
+        matrix[own, own] += settings.ROUNDED * matrix.diagonal()[:frames].max()
+        matrix[frames:, frames:] += self.prior
+        vector[frames:] -= self.prior @ np.hstack(self.moved).ravel()
         step, cost = np.linalg.solve(matrix, vector), self._cost(scale)
         for share in settings.STEP_SHARES:
-            taken = np.asarray(share * step, dtype=float)
-            ahead = self._ahead(taken[known], taken[held])
+            ahead = self._ahead(share * np.asarray(step, dtype=float), frames)
             if (after := ahead._cost(scale)) < cost:
                 return ahead, cost - after < settings.CALIBRATED * cost
-        return None, True
-
-    @property
-    def _state(self) -> Array:
-        return np.hstack(self.moved).ravel()
+        return self, True
 
     def _cost(self, scale: float) -> float:
         """Return Cauchy's cost of the gap at a scale, and what the prior sizes cost."""
-        wide = (inference.CAUCHY_SCALE * settings.MEDIAN) ** 2
-        away = (self.gap**2).sum(axis=1) / scale**2
-        return float(wide * np.log1p(away / wide).sum() + self._state @ self.held @ self._state)
+        wide, state = (inference.CAUCHY_SCALE * settings.MEDIAN) ** 2, np.hstack(self.moved).ravel()
+        away = (self._seen[2] ** 2).sum(axis=1) / scale**2
+        return float(wide * np.log1p(away / wide).sum() + state @ self.prior @ state)
 
-    def _frame_columns(self, frames: ChainFrames, point: Array, measures: int) -> Array:
-        """(N, m, F) derivative of the prediction by base and target of each part."""
-        columns = np.zeros((len(point), measures, len(self.bases), 6 + measures))
+    def _columns(self) -> Array:
+        """(N, m, B (6 + m) + 6 J) Jacobian of the prediction by base and target of each part, and by each joint."""
+        frames, point, gap = self._seen
+        rows, measures = gap.shape
+        columns = np.zeros((rows, measures, len(self.bases), 6 + measures))
         for part in range(len(self.bases)):
             own = self.parts == part
             columns[own, :3, part, :3], columns[own, :3, part, 3:6] = np.eye(3), -skew(point[own])
             for first in range(0, measures, 3):
                 columns[own, first : first + 3, part, 6 + first : 9 + first] = frames.tool_rotation[own]
             columns[own, 3:, part, 3:6] = np.eye(3)[: measures - 3]
-        return columns.reshape(len(point), measures, -1)
+        moved = placement_sensitivities(self.robot, self.readings.q, frames=frames, point=self.points[self.parts])
+        moved, index = moved[:, :measures, self._segments], self._elements
+        turned = self.robot.chain.rotations[index].transpose(0, 2, 1) @ self.readings.robot.chain.rotations[index]
+        moved[..., :3] = np.einsum("nmji,jik->nmjk", moved[..., :3], turned)
+        both = [columns.reshape(rows, measures, -1), moved.reshape(rows, measures, -1)]
+        lever = np.where(np.arange(measures) < 3, 1.0, inference.LEVER)
+        return np.concatenate(both, axis=2) * lever[:, None]
 
-    def _ahead(self, frames: Array, twists: Array) -> Recalibrated:
-        """Move frames and joints by a step."""
-        by_part, by_joint, (_, index) = frames.reshape(len(self.bases), -1), twists.reshape(-1, 6), self._placed
+    def _ahead(self, step: Array, frames: int) -> Recalibrated:
+        """Move frames, by so many entries of a step, and joints."""
+        by_part, by_joint = step[:frames].reshape(len(self.bases), -1), step[frames:].reshape(-1, 6)
+        index = self._elements
         chain = self.robot.chain
         rotations, translations = chain.rotations.copy(), chain.translations.copy()
         translations[index] += (self.readings.robot.chain.rotations[index] @ by_joint[:, :3, None])[:, :, 0]
@@ -202,14 +199,14 @@ class Recalibrated:
         )
 
 
-def _held(robot: Robot) -> Array:
-    """(6 J, 6 J) precision to which shifts, turns of the axes and zeros are held.
+def _prior(robot: Robot) -> Array:
+    """(6 J, 6 J) precision of shifts, turns of the axes and zeros.
 
     Where a joint is shifted along the axis before it that axis' own joint may as well be: the shift is that one's.
     """
     chain, frames = robot.chain, chain_frames(robot, np.zeros((1, robot.n)))
     index = [segment.index for segment in robot.segments if segment.movable]
-    length = settings.PRIOR_LENGTH * arm_length(robot)
+    length = settings.FARTHEST * arm_length(robot)
     looser = settings.PRIOR_TURN**-2 - settings.PRIOR_ZERO**-2
     blocks = []
     for before, k in pairwise(index):
@@ -225,57 +222,47 @@ def arm_length(robot: Robot) -> float:
     return float(sum(segment.length for segment in robot.segments))
 
 
-_JOINT = re.compile(r"<joint\b[^>]*>")
-_NAME = re.compile(r"\bname\s*=\s*[\"']([^\"']+)")
-_MOVES = re.compile(r"\btype\s*=\s*[\"'](revolute|continuous|prismatic)")
-
-
 def fitting(readings: Readings, near: float) -> tuple[str, float] | None:
     """Return the shipped robot that fits readings best, and the median distance, m, that it leaves with frames fitted.
 
-    None is returned where none fits within the distance ``near``, m.
+    Those with the joints' names come first. None is returned where none fits within the distance ``near``, m.
     """
-    own = readings.robot
-    alike = [name for name in shipped() if set(own.joint_names) <= _movable(name)]
-    best = None
-    for name in (*alike, *(name for name in shipped() if name not in alike)):
-        if best is not None and name not in alike:
+    own, best = readings.robot, None
+    for name in sorted(shipped(), key=lambda name: not set(own.joint_names) <= _movable(name)):
+        alike = set(own.joint_names) <= _movable(name)
+        if best is not None and not alike:
             break
-        for robot in _chains(name, own.joint_names, own.joint_types, own.root_frame, own.tool_frame):
-            other = replace(readings, robot=robot, q=readings.q[:, _order(robot, own)])
-            left = float(np.median(other.distance(other.align())))
-            least = near if best is None else settings.LIKE_ANOTHER * best[1]
-            if left < min(least, settings.MISFIT * other.spread()):
-                best = name, left
+        robot = _chain(name, own.joint_names, own.joint_types, own.root_frame, own.tool_frame)
+        if robot is None:
+            continue
+        by_name = set(robot.joint_names) == set(own.joint_names)
+        q = readings.q[:, [own.joint_names.index(joint) for joint in robot.joint_names]] if by_name else readings.q
+        other = replace(readings, robot=robot, q=q)
+        left = _left(other)
+        if left < min(near if best is None else settings.LIKE_ANOTHER * best[1], other.tolerance):
+            best = name, left
     return best
-
-
-def _order(robot: Robot, own: Robot) -> list[int]:
-    """Return which column of the table drives each joint: that of its name, else that of its place in the chain."""
-    if set(robot.joint_names) == set(own.joint_names):
-        return [own.joint_names.index(name) for name in robot.joint_names]
-    return list(range(robot.n))
 
 
 @cache
 def _movable(name: str) -> frozenset[str]:
     """Return the movable joints of a shipped robot; none where it cannot be read."""
     try:
-        joints = _JOINT.findall(urdf_text(name).text)
-    except RobotError:
+        joints = ElementTree.fromstring(urdf_text(name).text).iter("joint")
+    except (RobotError, ElementTree.ParseError):
         return frozenset()
-    return frozenset(found[1] for joint in joints if _MOVES.search(joint) and (found := _NAME.search(joint)))
+    return frozenset(j.get("name", "") for j in joints if j.get("type") in ("revolute", "continuous", "prismatic"))
 
 
 @cache
-def _chains(name: str, joints: tuple[str, ...], kinds: tuple[str, ...], root: str, tool: str) -> tuple[Robot, ...]:
-    """Return the chains of a shipped robot that the joints may drive: those of the same ends, else those to a hand."""
+def _chain(name: str, joints: tuple[str, ...], kinds: tuple[str, ...], root: str, tool: str) -> Robot | None:
+    """Return the chain of a shipped robot that the joints may drive: that of the same ends, else one to a hand."""
     alike = set(joints) <= _movable(name)
     if not alike and not len(joints) <= len(_movable(name)) <= len(joints) + settings.HAND_JOINTS:
-        return ()
+        return None
     slides = [kind == "prismatic" for kind in kinds]
     found = (robot for robot in _loaded(name, root, tool) if [k == "prismatic" for k in robot.joint_types] == slides)
-    return tuple(islice((robot for robot in found if not alike or set(robot.joint_names) == set(joints)), 1))
+    return next((robot for robot in found if not alike or set(robot.joint_names) == set(joints)), None)
 
 
 def _loaded(name: str, root: str, tool: str) -> Iterator[Robot]:
@@ -286,11 +273,9 @@ def _loaded(name: str, root: str, tool: str) -> Iterator[Robot]:
             yield load_robot(name, tool_frame, root_frame=root_frame)
         except RobotError as error:
             ends = error.candidates
-    for end in ends if len(ends) <= settings.ENDS else ():
-        try:
+    for end in ends if len(ends) <= settings.HAND_JOINTS else ():
+        with suppress(RobotError):
             yield load_robot(name, end)
-        except RobotError:
-            continue
 
 
 def another_robot(campaign: Campaign, progress: Callable[[str], None] = lambda _: None) -> Misfit | None:
@@ -303,36 +288,35 @@ def another_robot(campaign: Campaign, progress: Callable[[str], None] = lambda _
     """
     if campaign.simulated_position is not None or campaign.samples <= settings.DRAWN:
         return None  # another simulator is no other robot
-    whole = Readings.of(campaign)
-    rows = np.linspace(0, campaign.samples - 1, min(campaign.samples, settings.SAMPLED)).round().astype(np.int64)
-    readings = replace(whole.take(rows), base_known=False, tool_known=False)
-    near, gap = settings.MISFIT * readings.spread(), _left(readings)
+    rows = spread(np.arange(campaign.samples))
+    readings = replace(Readings.of(campaign).take(rows), base_known=False, tool_known=False)
+    near, gap = readings.tolerance, _left(readings)
     if gap <= near or near < settings.LEAST_GAP or sum(segment.movable for segment in campaign.robot.segments) < 2:
         return None
     progress("another robot")
     factor, longer = _lengthened(readings)
     shorter = gap > settings.FALL * _left(replace(readings, robot=longer))
     common = factor if shorter and abs(factor - 1.0) > settings.SCALE_ERROR else None
-    misfit = None
-    for parts in (np.zeros(len(rows), dtype=np.int64), _parts(campaign, rows)):
-        misfit = _judged(Recalibrated.of(readings, parts, longer if shorter else readings.robot), common)
-        if misfit is None:
-            return None
-    known = fitting(readings, near)
+    begun = longer if shorter else readings.robot
+    misfit = _judged(Recalibrated.of(readings, np.zeros(len(rows), dtype=np.int64), begun), common)
+    if misfit is not None:
+        misfit = _judged(Recalibrated.of(readings, _parts(campaign, rows), begun), common)
+    known = fitting(readings, near) if misfit is not None else None
     if known is None or misfit is None:
         return misfit
     return replace(misfit, model=replace(misfit.model or AnotherModel(), fits=known[0], remains=known[1]))
 
 
 def _judged(found: Recalibrated, factor: float | None) -> Misfit | None:
+    """Return what a calibration says: another motion, another model, or ``None`` where a robot errs so."""
     (away, turned, both), (joint, far, times) = found.left(), found.farthest()
     if turned > settings.ANOTHER_TURN:
         places = Recalibrated.of(replace(found.readings, orientation=None), found.parts, found.robot)
         return _judged(places, factor) or Misfit(turned=turned)
-    if away > settings.ANOTHER_MOTION * found.readings.spread():
+    if away > settings.ANOTHER_MOTION * found.readings.spread:
         return Misfit(away=away, model=None if factor is None else AnotherModel(factor))
-    most = settings.FARTHEST_ALONE if times > settings.ALONE else settings.FARTHEST
-    off = far > max(most * arm_length(found.readings.robot), settings.CLEARLY * both)
+    most = settings.FARTHEST * (0.5 if times > settings.ALONE else 1.0) * arm_length(found.readings.robot)
+    off = far > max(most, settings.CLEARLY * both)
     return Misfit(away=away, model=AnotherModel(factor, joint, far)) if off or factor is not None else None
 
 
@@ -356,7 +340,7 @@ def _lengthened(readings: Readings) -> tuple[float, Robot]:
     """Return the common factor by which the links fit best, and the robot with such links."""
     robot = readings.robot
     measured = float(np.linalg.norm(np.ptp(readings.position, axis=0)))
-    first = np.log(max(measured, settings.LEAST_GAP) / readings.spread())
+    first = np.log(max(measured, settings.LEAST_GAP) / readings.spread)
 
     def longer(factor: float) -> Robot:
         return replace(robot, chain=replace(robot.chain, translations=factor * robot.chain.translations))
@@ -365,14 +349,10 @@ def _lengthened(readings: Readings) -> tuple[float, Robot]:
         there = replace(readings, robot=longer(float(np.exp(exponent))))
         return float(np.log(np.median(there.distance(there.align(coarse=True))) + settings.LEAST_GAP))
 
-    bounds = (first - settings.FACTOR_OFF, first + settings.FACTOR_OFF)
-    found = minimize_scalar(gap, bounds=bounds, method="bounded", options={"maxiter": settings.FACTOR_ROUNDS})
-    factor = float(np.exp(found.x))
+    # the ratio of the two volumes tells the factor to within e
+    bounds, options = (first - 1.0, first + 1.0), {"maxiter": settings.FACTOR_ROUNDS}
+    factor = float(np.exp(minimize_scalar(gap, bounds=bounds, method="bounded", options=options).x))
     return factor, longer(factor)
-
-
-_NEEDED = "a table that fits the robot"
-_SETTLED = "a fit that settles"
 
 
 def unfit(campaign: Campaign, progress: Callable[[str], None] = lambda _: None) -> Misfit | None:
@@ -384,7 +364,7 @@ def unfit(campaign: Campaign, progress: Callable[[str], None] = lambda _: None) 
     if factor is not None:
         return Misfit(model=AnotherModel(factor))
     fault = data_fault(campaign, progress)
-    if fault is not None and fault.rms_after < misfit(Readings.of(campaign)):
+    if fault is not None and fault.rms_after < Readings.of(campaign).tolerance:
         return Misfit(fault)
     other = another_robot(campaign, progress)
     if fault is None or (other is not None and settings.FALL * _leaves(other) < fault.rms_after):
@@ -411,10 +391,12 @@ def another_motion(fitted: Fit) -> Misfit | None:
 def delivered(last: Conclusion, candidates: Sequence[Effect]) -> Conclusion:
     """Return a conclusion whose exact model is the one that was compared; else that of the frames alone, and why."""
     note = unsettled(last.fit)
-    return replace(frames_alone(last.fit.campaign, candidates, _SETTLED), notes=(note,)) if note else last
+    return replace(frames_alone(last.fit.campaign, candidates, "a fit that settles"), notes=(note,)) if note else last
 
 
-def frames_alone(campaign: Campaign, candidates: Sequence[Effect], needed: str = _NEEDED) -> Conclusion:
+def frames_alone(
+    campaign: Campaign, candidates: Sequence[Effect], needed: str = "a table that fits the robot"
+) -> Conclusion:
     """Conclude from the unknown frames and nothing else: no candidate can be tested, for want of what is ``needed``."""
     bare = replace(fit(campaign, ()), needs={effect.name: (needed,) for effect in candidates})
     left = examine(bare)

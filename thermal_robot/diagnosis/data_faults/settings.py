@@ -1,7 +1,5 @@
 """Every number that was chosen to find faults of the data: its value, its unit, and why that one."""
 
-import math
-
 MISFIT = 0.003
 """Of the volume over which the arm moved: a gap after registration above it asks for the search. Six public and 22
 simulated campaigns leave 0.00001 to 0.0028; what it costs where it is in vain is seconds, not a false alarm."""
@@ -11,22 +9,16 @@ would err by centimetres, a joint by eleven degrees."""
 FALL = 3.0
 """Times that the gap must fall: what is wrong with a robot stays whatever is done to its table. The best of all
 candidates brings 28 sound campaigns a factor of 1.0 to 1.5; faults of tables bring factors of ten to ten thousand."""
-LEVEL = 1e-3
-"""Chance, all candidates counted, that a search among them finds one as good in data without any fault."""
 TIE = 3.0
 """Natural logarithms by which a candidate must be better than another one to be told from it: odds of 20."""
 LEAST_GAP = 1e-6
 """m: a smaller gap is rounding of the table."""
-NEARLY_ALL = 0.95
-"""Of the rows: a fault that struck so many struck all; what few rows fit as they stand does so by chance."""
 STRAY = 10.0
 """Times the median gap: rows beyond it stray. Of normal noise none is beyond 4, of heavy-tailed noise one in a
 thousand."""
-FEWEST_STRAYS, MOST_STRAYS = 3, 0.5
-"""Rows that must stray, and the share of all above which the others no longer say where the robot stands."""
 FEW_STRAYS, LEAST = 0.05, 0.01
-"""Share of the rows that must stray at least; and the least gap, of a misfit, by which straying is counted: where noise
-is all, a gross error of a few tenths of a millimetre is none of the pairing."""
+"""Share of the rows that must stray at least, as fewer fit by chance as they stand, or stray; and the least gap, of a
+misfit, by which straying is counted: where noise is all, a gross error of a few tenths of a millimetre is none."""
 MIXTURE_ROUNDS = 4
 """Rounds in which rows are told to be struck or not, and the frames fitted to both: they settle after three."""
 PART_ROUNDS = 2
@@ -43,8 +35,8 @@ WORSE = 10.0
 NEAREST = 0.4
 """Share of the rows, nearest to the prediction, by which such a beginning is judged."""
 SAMPLED, SKETCHED = 150, 40
-"""Rows on which candidates are compared, spread evenly: a median is then known to a tenth; and those on which they are
-first looked at."""
+"""Rows on which candidates are compared, spread evenly: a median is then known to a tenth; and those on which rigid
+frames are first fitted to them."""
 STILL = (0.1, 0.03)
 """Of what a robot that does not move leaves, for one fault and for two: with more left a repair only makes the joints
 stand still, and mends nothing. Of 25 public and simulated robots none leaves more than a fiftieth; of pairs there are
@@ -57,19 +49,9 @@ RELAXED = 60
 SURVIVORS, NEAR, MOST_SURVIVORS = 24, 3.0, 128
 """Candidates for the joints that are looked at with rigid frames: so many, and all that leave less than so many times
 the least, since they may do the same, but not more than these."""
-AGAIN = 0.25
-"""Share of the candidates, the best, to which maps are fitted anew without the rows that stray."""
 EXTENT = 2.0
 """Times that the extent of the measured points may differ from that of the predicted ones, for their unit to be right:
 a target beside the tool frame changes it by less, and units differ by 2.54 and more."""
-METRIC, INCHES, FEET = (10.0, 100.0, 1e3, 1e6), (25.4, 2.54, 1.0 / 0.0254), (304.8, 30.48, 1.0 / 0.3048)
-"""Times that lengths may be too small or too large: units of metres by each other, inches and feet by mm, cm and m."""
-ALIKE = 1e-9
-"""Relative difference up to which two factors are one."""
-LARGEST_VOLUME = 100.0
-"""m: the arm's volume above which it is the robot's lengths that are wrong, and no unit of the table is tried."""
-KUKA_JOINTS, KUKA_REVERSED = 6, [0, 3, 5]
-"""Of an arm's joints those that a KUKA counts against the usual direction."""
 MOST_PATTERNS, FEW_REVERSED = 10, 3
 """Joints up to which every pattern of signs is tried: 1023; beyond, up to so many reversed ones."""
 PAIRED_PATTERNS = 128
@@ -93,31 +75,27 @@ OFFSET_RATIO = 1.4
 """Of one offset to the next where they are geometric: within a sixth of the true one the gap falls sixfold."""
 PROMISING = 1.2
 """Times that the gap falls at the best of the offsets tried, for it to be refined: beside the true one it does."""
-OFFSET_ROUNDS, OFFSET_SETTLED = 40, 1e-5
-"""Steps at most in which an offset is refined, and the share of its bracket at which that ends."""
-SEED = 13
-"""Of the rows drawn at random: the same campaign always gets the same answer."""
+OFFSET_SETTLED = 1e-5
+"""Of the bracket of an offset: the accuracy to which it is refined."""
 MIXED_ROWS = 400
 """Rows up to which mixed readings are unmixed: the matrix is inverted."""
-UNMIXED, MIXED_FLOOR = 1.0 - 1e-6, 1e-6
-"""Of a row's own weight in what unmixing gives back: with less it is not determined; and the singular value of the
-mixture, of its largest, below which nothing is given back: readings have six digits."""
-TURN = math.pi
-"""rad: a half turn, by which conventions of a joint's zero differ, or by half of it."""
-PRIOR_LENGTH, PRIOR_TURN, PRIOR_ZERO = 0.02, 0.1, 0.5
-"""Of the arm's length, and rad of an axis and of a joint's zero: one sigma to which a free calibration holds what it
-moves. Little of what is determined is held by it; the zeros are freest, as a horn is soon mounted a tooth farther."""
+UNMIXED = 1e-6
+"""Singular value of a mixture, of its largest, below which nothing is given back, as readings have six digits; and what
+a row's own weight in what is given back may lack: with less it is not determined."""
+PRIOR_TURN, PRIOR_ZERO = 0.1, 0.5
+"""rad of an axis and of a joint's zero: one sigma to which a free calibration holds what it moves; places are held to
+``FARTHEST``. Little of what is determined is held by it; the zeros are freest, as a horn is soon mounted a tooth
+farther."""
 ANOTHERS = 1e6
 """Times the precision of what a joint has of its own: to which that is held which another joint has."""
-CALIBRATION_STEPS, CALIBRATED = 30, 1e-3
-"""Steps at most of that calibration, and the share of its cost by which the last one falls."""
+CALIBRATED, ROUNDED = 1e-3, 1e-9
+"""Share of a calibration's cost by which its last step falls; and of the largest weight of a frame's motion, by which
+those are held that nothing determines."""
 STEP_SHARES = (1.0, 0.5, 0.25, 0.1)
 """Of a step, in the order in which they are tried, until one leads downhill."""
-ROUNDED = 1e-9
-"""Of the largest weight of a frame's motion, by which those are held that nothing determines."""
 MEDIAN = 1.54
 """Median length of a normal vector in three dimensions, of its sigma per axis."""
-FARTHEST, FARTHEST_ALONE, ALONE = 0.02, 0.01, 10.0
+FARTHEST, ALONE = 0.02, 10.0
 """Of the arm's length, by which no joint sits off its place: industrial arms err by a thousandth, printed servo arms by
 a hundredth; half of it where the joint is alone with it, so many times farther off than the median of all: chance makes
 that two or three."""
@@ -128,10 +106,9 @@ PARTS, PART_ROWS = 4, 12
 that was moved once or twice then stands still in most of them, and twelve rows determine two frames three times."""
 SCALE_ERROR = 0.05
 """By which a common factor of the links is another model's: cameras without a scale bar err by a hundredth."""
-FACTOR_OFF, FACTOR_ROUNDS = 1.0, 25
-"""Natural logarithm by which a common factor of the links may be off the ratio of the two volumes, and steps in which
-it is found: to a thousandth."""
-HAND_JOINTS, ENDS = 6, 6
+FACTOR_ROUNDS = 25
+"""Steps in which a common factor of the links is found: to a thousandth."""
+HAND_JOINTS = 6
 """Joints that a robot at hand may have beside those of the chain, a gripper's; and ends of an arm: those of a hand."""
 LIKE_ANOTHER = 0.9
 """Times what a robot at hand leaves, above which another one is like it: the same arm with other limits, or a hand."""
