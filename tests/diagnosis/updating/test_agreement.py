@@ -2,11 +2,11 @@
 
 import numpy as np
 import pytest
-from growing_cases import EFFECTS, in_full, measured
+from updating_cases import EFFECTS, in_full, measured
 
 import thermal_robot as tr
-from thermal_robot.diagnosis.growing.stream import Stream
-from thermal_robot.diagnosis.growing.watched import Agreement, scatter_of
+from thermal_robot.diagnosis.agreement import Agreement, scatter_of
+from thermal_robot.diagnosis.updated import Stream
 
 
 @pytest.fixture(scope="module")
