@@ -115,8 +115,7 @@ def diagnose(
             left_out=sorted(name for name in {*everything, *RANDOM} if not asked(name)),
             notes=notes,
         )
-        diagnosis = told(found)
-        pass_over(diagnosis)
+        pass_over(diagnosis := told(found))
         return diagnosis
 
 
