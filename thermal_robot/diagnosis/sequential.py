@@ -92,6 +92,11 @@ class Fitted(State):
         return self.sigma * self.best.noise
 
     @property
+    def rms(self) -> Array:
+        """(G,) root mean square length of the residual, m and rad."""
+        return np.asarray(np.sqrt(self.squares / max(self.count, 1)))
+
+    @property
     def deviations(self) -> Array:
         """(P,) posterior standard deviation of every parameter, SI."""
         return joined([np.sqrt(np.maximum(np.diag(covariance), 0.0)) for _, covariance in self.values.values()])

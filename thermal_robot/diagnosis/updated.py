@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
 from weakref import WeakKeyDictionary
@@ -16,7 +16,7 @@ from thermal_robot.campaign.more_rows import more_rows
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.diagnosis.agreement import Agreement, Watch, beyond, misfits, scatter_of
 from thermal_robot.diagnosis.parts import Unexplained
-from thermal_robot.diagnosis.sequential import KEPT, Sequential, State, normal
+from thermal_robot.diagnosis.sequential import KEPT, Fitted, Sequential, State, normal
 from thermal_robot.diagnosis.settings import LOOSE
 from thermal_robot.diagnosis.sufficient import Choice, Judge, Point, Rows, Sums, joined, linearised
 from thermal_robot.diagnosis.tabled import LEVELS
@@ -31,7 +31,7 @@ from thermal_robot.inference.inside import identified
 from thermal_robot.inference.robust import Noise
 from thermal_robot.inference.rows import blocks, each
 from thermal_robot.observations import observe
-from thermal_robot.prediction import Spread, moves
+from thermal_robot.prediction import moves
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -127,76 +127,6 @@ def watch(fit: Fit) -> Watch:
     return Watch(tuple(item for item in tested if len(item.sizes)), scatter, aside, fit.campaign.samples)
 
 
-@dataclass(frozen=True, eq=False)
-class Stream:
-    """All rows of a diagnosis and since.
-
-    ``fit`` is the diagnosis's, ``grown`` that of its choice to all rows, ``watch`` what new rows are compared with,
-    ``agreement`` that of the last rows. ``rival`` is the best combination of ``runners`` by all rows so far, ``lead``
-    its log odds against the chosen one, −∞ for none. ``fallen``: what new rows said against the choice, one sentence a
-    reason; it stays.
-    """
-
-    fit: Fit
-    grown: Sequential
-    watch: Watch
-    runners: tuple[Runner, ...]
-    agreement: Agreement
-    rival: tuple[str, ...] = ()
-    lead: float = -np.inf
-    fallen: tuple[str, ...] = ()
-
-    @classmethod
-    def of(cls, fit: Fit) -> Stream:
-        """Begin with a diagnosis; :class:`EstimationError` if rows of a pose share what is drawn anew."""
-        if not independent_rows(fit):
-            raise EstimationError(
-                f"{fit.campaign.name}: what remains is drawn anew in every pose or visit, and how rows count depends "
-                "on all of them; diagnose old and new rows together"
-            )
-        grown, runners = begun(fit), chosen(fit)[1]
-        gains = ahead(grown, runners) if runners else ()  # what was preferred stays preferred: others are behind
-        behind = tuple(runner for runner, gain in zip(runners, gains, strict=True) if gain < 0.0)
-        return cls(fit, grown, watch(fit), behind, Agreement())
-
-    def plus(self, rows: Campaign, spread: Spread | None) -> Stream:
-        """Return the same with further rows; ``spread`` says where the model was measured."""
-        new = Rows.weighed(self.grown.choice, rows)
-        grown = self.grown.plus(new)
-        if not rows.samples:
-            return replace(self, grown=grown)
-        agreement, rival, lead = self.watch.look(self.grown, new, self.agreement), self.rival, self.lead
-        if self.runners:
-            gains = ahead(grown, self.runners)
-            rival, lead = self.runners[int(np.argmax(gains))].names, float(gains.max())
-        found = [*misfits(agreement), *beyond(spread, rows, self.grown.samples), *self._testable(new)]
-        if not grown.fitted.steady:
-            found.append("The fit of the chosen effects to all rows does not come to rest.")
-        fallen = tuple(dict.fromkeys((*self.fallen, *found)))
-        return replace(self, grown=grown, agreement=agreement, rival=rival, lead=lead, fallen=fallen)
-
-    def _testable(self, new: Rows) -> Iterator[str]:
-        """Yield the effects that could not be tested, and can be with what the new rows recorded."""
-        known = library()
-        if asked := {name: needs for name, needs in self.fit.needs.items() if name in known}:
-            old = self.grown.fitted
-            both = observe(Rows.joined(old.rows, new).campaign, old.point.frames)
-            for name, needs in asked.items():
-                if not gate.missing(known[name], both):
-                    yield f"{name} could not be tested without {', '.join(needs)}, and now can be."
-
-    @property
-    def reasons(self) -> tuple[str, ...]:
-        """Why the choice is to be made anew, one sentence each; empty while it stands."""
-        if self.lead <= 0.0:  # a fresh diagnosis takes the more probable combination, however little it is ahead
-            return self.fallen
-        own = dict.fromkeys(item.effect.name for item in self.grown.choice.blocks)
-        told, before = (" and ".join(some) or "no effect" for some in (self.rival, own))
-        rest = f"rather than {before}" if {*self.rival} != {*own} else "in other settings or places than chosen"
-        odds = np.exp(min(self.lead, MOST_LEAD))
-        return (*self.fallen, f"All rows together speak for {told}, {rest} (odds {odds:.2g} : 1).")
-
-
 def independent_rows(fit: Fit) -> bool:
     """Tell whether rows count by themselves: whether nothing of what remains is drawn anew in every pose or visit."""
     return fit.explanation.whitening.smooth is None
@@ -223,20 +153,31 @@ class Diagnosed(Protocol):
     def remaining(self) -> Unexplained | None: ...  # noqa: D102
 
 
-_BEGUN: WeakKeyDictionary[Diagnosed, Stream] = WeakKeyDictionary()
+_BEGUN: WeakKeyDictionary[Fit, tuple[Sequential, Watch, tuple[Runner, ...]]] = WeakKeyDictionary()
 
 
-def begin(found: Diagnosed, fit: Fit) -> Stream:
-    """Return what the updates of a diagnosis begin with; its rows are passed over once."""
-    if found not in _BEGUN:
-        _BEGUN[found] = Stream.of(fit)
-    return _BEGUN[found]
+def begin(fit: Fit) -> tuple[Sequential, Watch, tuple[Runner, ...]]:
+    """Return what the updates of a diagnosis begin with; its rows are passed over once.
+
+    Of the combinations that came near, those are watched that are behind: what was preferred stays preferred.
+    """
+    if not independent_rows(fit):
+        raise EstimationError(
+            f"{fit.campaign.name}: what remains is drawn anew in every pose or visit, and how rows count depends "
+            "on all of them; diagnose old and new rows together"
+        )
+    if fit not in _BEGUN:
+        grown, runners = begun(fit), chosen(fit)[1]
+        gains = ahead(grown, runners) if runners else ()
+        behind = tuple(runner for runner, gain in zip(runners, gains, strict=True) if gain < 0.0)
+        _BEGUN[fit] = grown, watch(fit), behind
+    return _BEGUN[fit]
 
 
 def pass_over(found: Diagnosed) -> None:
     """Form the sums of a diagnosis of many rows: the pass over them is a part of it, not of an update."""
     if found.usable and found.fit is not None and found.samples > 2 * KEPT and independent_rows(found.fit):
-        begin(found, found.fit)
+        begin(found.fit)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -247,25 +188,20 @@ class Updated:
     ----------
     diagnosis
         Where it began; its effects are held.
-    samples
-        Rows so far, those of the diagnosis included.
-    choice_stands
-        Whether nothing speaks against the effects, settings and places that the diagnosis chose. What new rows said
-        against it stays; that other effects explain all rows better may change with more rows.
-    reason
-        Why the choice is to be made anew, in plain words; empty while it stands.
-    noise, noise_orientation
-        One sigma per axis of what remains beside the effects, m and rad; the second ``None`` without orientations.
-    rms_after, rms_after_orientation
-        Root mean square of the remainder, m and rad, over the rows that are not set aside.
     outliers
         Row numbers of the last new rows that are set aside, as their table counts them.
     model
         The corrected model by all rows.
     agreement
         How well the last new rows agreed with the model that did not know them.
-    anew
-        Whether all old rows were looked at again, since the parameters had moved too far for the sums of old rows.
+    grown, watch
+        The fit to all rows; what new rows are compared with.
+    wider
+        (P,) by how much the diagnosis widened each deviation for what it could not explain.
+    runners, rival, lead
+        Combinations that may come first; the best of them by all rows so far, and its log odds against the chosen one.
+    fallen
+        What new rows said against the choice, one sentence a reason; it stays.
 
     Examples
     --------
@@ -281,26 +217,117 @@ class Updated:
     """
 
     diagnosis: Diagnosed
-    samples: int
-    choice_stands: bool
-    reason: str
-    noise: float
-    noise_orientation: float | None
-    rms_after: float
-    rms_after_orientation: float | None
-    outliers: tuple[int, ...]
+    fit: Fit
+    grown: Sequential
+    watch: Watch
+    runners: tuple[Runner, ...]
+    wider: Array
     model: CorrectedModel
     agreement: Agreement
-    anew: bool
-    stream: Stream
-    wider: Array
+    outliers: tuple[int, ...] = ()
+    rival: tuple[str, ...] = ()
+    lead: float = -np.inf
+    fallen: tuple[str, ...] = ()
 
     def update(self, rows: Campaign | pd.DataFrame) -> Updated:
         """Add more rows; see :meth:`Diagnosis.update <thermal_robot.Diagnosis.update>`."""
-        new = more_rows(self.stream.fit.campaign, rows, self.model.needs)
-        with threadpool_limits(1):
-            stream = self.stream.plus(new, self.model.spread)
-        return _told(self.diagnosis, stream, self.wider, self.model, new)
+        rows = more_rows(self.fit.campaign, rows, self.model.needs)
+        with threadpool_limits(1):  # as in a diagnosis: matrices are small
+            new = Rows.weighed(self.grown.choice, rows)
+            after = replace(self, grown=self.grown.plus(new))
+            if rows.samples:
+                after = self._compared(after.grown, new)
+        return replace(after, model=after._model(rows), outliers=tuple(rows.rows[after.grown.aside].tolist()))
+
+    def _compared(self, grown: Sequential, new: Rows) -> Updated:
+        """Return the same with all rows, and what the new ones say of the choice."""
+        agreement, rival, lead = self.watch.look(self.grown, new, self.agreement), self.rival, self.lead
+        if self.runners:
+            gains = ahead(grown, self.runners)
+            rival, lead = self.runners[int(np.argmax(gains))].names, float(gains.max())
+        outside = beyond(self.model.spread, new.campaign, self.grown.samples)
+        found = [*misfits(agreement), *outside, *self._testable(new)]
+        if not grown.fitted.steady:
+            found.append("The fit of the chosen effects to all rows does not come to rest.")
+        fallen = tuple(dict.fromkeys((*self.fallen, *found)))
+        return replace(self, grown=grown, agreement=agreement, rival=rival, lead=lead, fallen=fallen)
+
+    def _testable(self, new: Rows) -> Iterator[str]:
+        """Yield the effects that could not be tested, and can be with what the new rows recorded."""
+        known = library()
+        if asked := {name: needs for name, needs in self.fit.needs.items() if name in known}:
+            old = self.grown.fitted
+            both = observe(Rows.joined(old.rows, new).campaign, old.point.frames)
+            for name, needs in asked.items():
+                if not gate.missing(known[name], both):
+                    yield f"{name} could not be tested without {', '.join(needs)}, and now can be."
+
+    def _model(self, new: Campaign) -> CorrectedModel:
+        """Return the corrected model by all rows, measured where these are, too."""
+        fitted, choice, known = self.grown.fitted, self.grown.choice, self.model.spread
+        model = replace(self.model, frames=fitted.point.frames, effects=tuple(choice.split(fitted.point.values)))
+        if known is None:
+            return model
+        values = {**new.covariates, **dict(zip(new.robot.joint_names, new.q.T, strict=True))}
+        ranges = {
+            name: (
+                float(np.min(values.get(name, low), initial=low)),
+                float(np.max(values.get(name, high), initial=high)),
+            )
+            for name, (low, high) in known.ranges.items()
+        }
+        covariance = _covariance(fitted, choice, unknown_frames(self.fit.campaign))
+        spread = replace(known, covariance=covariance, prior=fitted.expected(choice), ranges=ranges)
+        return replace(model, spread=spread)
+
+    @property
+    def samples(self) -> int:
+        """Rows so far, those of the diagnosis included."""
+        return self.grown.samples
+
+    @property
+    def choice_stands(self) -> bool:
+        """Whether nothing speaks against the effects, settings and places that the diagnosis chose.
+
+        What new rows said against it stays; that other effects explain all rows better may change with more rows.
+        """
+        return not self.reason
+
+    @property
+    def reason(self) -> str:
+        """Why the choice is to be made anew, in plain words; empty while it stands."""
+        if self.lead <= 0.0:  # a fresh diagnosis takes the more probable combination, however little it is ahead
+            return " ".join(self.fallen)
+        own = dict.fromkeys(item.effect.name for item in self.grown.choice.blocks)
+        told, before = (" and ".join(some) or "no effect" for some in (self.rival, own))
+        rest = f"rather than {before}" if {*self.rival} != {*own} else "in other settings or places than chosen"
+        odds = np.exp(min(self.lead, MOST_LEAD))
+        return " ".join((*self.fallen, f"All rows together speak for {told}, {rest} (odds {odds:.2g} : 1)."))
+
+    @property
+    def noise(self) -> float:
+        """One sigma per axis of what remains beside the effects, m."""
+        return float(self.grown.fitted.noise[0])
+
+    @property
+    def noise_orientation(self) -> float | None:
+        """The same of orientations, rad; ``None`` without them."""
+        return float(self.grown.fitted.noise[3]) if self.grown.choice.measures == 6 else None
+
+    @property
+    def rms_after(self) -> float:
+        """Root mean square of the remainder, m, over the rows that are not set aside."""
+        return float(self.grown.fitted.rms[0])
+
+    @property
+    def rms_after_orientation(self) -> float | None:
+        """The same of orientations, rad; ``None`` without them."""
+        return float(self.grown.fitted.rms[1]) if self.grown.choice.measures == 6 else None
+
+    @property
+    def anew(self) -> bool:
+        """Whether all old rows were looked at again, since the parameters had moved too far for their sums."""
+        return self.grown.anew
 
     @property
     def parameters(self) -> pd.DataFrame:
@@ -311,7 +338,7 @@ class Updated:
         """
         import pandas as pd
 
-        choice, fitted = self.stream.grown.choice, self.stream.grown.fitted
+        choice, fitted = self.grown.choice, self.grown.fitted
         listed = [(item.effect.name, p) for item in choice.blocks for p in item.bare]
         std = fitted.deviations * self.wider
         return pd.DataFrame(
@@ -355,35 +382,10 @@ def update(found: Diagnosed, rows: Campaign | pd.DataFrame) -> Updated:
         raise EstimationError(f"{found.campaign}: nothing is known of the robot that rows could add to. {found.reason}")
     if found.fit is None:
         raise EstimationError(f"{found.campaign}: this diagnosis was made without its fit; diagnose the rows")
-    new = more_rows(found.fit.campaign, rows, found.model.needs)
-    with threadpool_limits(1):  # as in a diagnosis: matrices are small
-        start = begin(found, found.fit)
-        stream = start.plus(new, found.model.spread)
-    return _told(found, stream, _widened(found, found.fit, start.grown.fitted.deviations), found.model, new)
-
-
-def _told(found: Diagnosed, stream: Stream, wider: Array, model: CorrectedModel, new: Campaign) -> Updated:
-    """Return what is told after new rows; ``model`` is that before them."""
-    fitted, choice = stream.grown.fitted, stream.grown.choice
-    rms, turned = np.sqrt(fitted.squares / max(fitted.count, 1)), choice.measures == 6
-    effects = tuple(choice.split(fitted.point.values))
-    spread = None if model.spread is None else _spread(stream, model.spread, new)
-    return Updated(
-        diagnosis=found,
-        samples=stream.grown.samples,
-        choice_stands=not stream.reasons,
-        reason=" ".join(stream.reasons),
-        noise=float(fitted.noise[0]),
-        noise_orientation=float(fitted.noise[3]) if turned else None,
-        rms_after=float(rms[0]),
-        rms_after_orientation=float(rms[1]) if turned else None,
-        outliers=tuple(new.rows[stream.grown.aside].tolist()),
-        model=replace(model, frames=fitted.point.frames, effects=effects, spread=spread),
-        agreement=stream.agreement,
-        anew=stream.grown.anew,
-        stream=stream,
-        wider=wider,
-    )
+    with threadpool_limits(1):
+        grown, watched, runners = begin(found.fit)
+    wider = _widened(found, found.fit, grown.fitted.deviations)
+    return Updated(found, found.fit, grown, watched, runners, wider, found.model, Agreement()).update(rows)
 
 
 def _widened(found: Diagnosed, fit: Fit, own: Array) -> Array:
@@ -395,24 +397,10 @@ def _widened(found: Diagnosed, fit: Fit, own: Array) -> Array:
     return np.maximum(told / np.maximum(own, settings.TINY), 1.0)
 
 
-def _spread(stream: Stream, known: Spread, new: Campaign) -> Spread:
-    """Return how far predictions may be off, with the covariance by all rows; what no effect tells is as diagnosed."""
-    fitted, names = stream.grown.fitted, unknown_frames(stream.fit.campaign)
-    expected = fitted.expected(stream.grown.choice)
-    precision = fitted.precision(np.maximum(expected, settings.TINY), frames=LOOSE)
+def _covariance(fitted: Fitted, choice: Choice, names: tuple[str, ...]) -> Array:
+    """(K, K) covariance of frames and parameters by all rows, without what turns the target and does not move it."""
+    precision = fitted.precision(np.maximum(fitted.expected(choice), settings.TINY), frames=LOOSE)
     unit = precision.diagonal() ** -0.5
     inner = np.linalg.inv(precision * np.outer(unit, unit))
-    moving = np.concatenate([moves(names), np.ones(len(expected), dtype=bool)])
-    covariance = (np.outer(unit, unit) * (inner + inner.T) / 2.0)[np.ix_(moving, moving)]
-    return replace(known, covariance=covariance, prior=expected, ranges=_ranges(known.ranges, new))
-
-
-def _ranges(known: Mapping[str, tuple[float, float]], new: Campaign) -> dict[str, tuple[float, float]]:
-    """Return the ranges that were measured, the new rows included."""
-    values = {**new.covariates, **dict(zip(new.robot.joint_names, new.q.T, strict=True))}
-    return {
-        name: (min(low, float(values[name].min())), max(high, float(values[name].max())))
-        if name in values and new.samples
-        else (low, high)
-        for name, (low, high) in known.items()
-    }
+    moving = np.r_[moves(names), np.ones(len(fitted.point.values), dtype=bool)]
+    return np.asarray((np.outer(unit, unit) * (inner + inner.T) / 2.0)[np.ix_(moving, moving)])
