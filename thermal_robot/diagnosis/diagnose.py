@@ -23,7 +23,7 @@ from thermal_robot.diagnosis.examine import examine
 from thermal_robot.diagnosis.held_out import held_out
 from thermal_robot.diagnosis.result import Diagnosis, told
 from thermal_robot.diagnosis.signs import as_counted
-from thermal_robot.diagnosis.updated import pass_over
+from thermal_robot.diagnosis.updated import prepare
 from thermal_robot.diagnosis.where import without_laws
 from thermal_robot.effects import RANDOM, Effect, choose, library
 from thermal_robot.errors import CampaignError, EstimationError, require
@@ -115,7 +115,7 @@ def diagnose(
             left_out=sorted(name for name in {*everything, *RANDOM} if not asked(name)),
             notes=notes,
         )
-        pass_over(diagnosis := told(found))
+        prepare(diagnosis := told(found))
         return diagnosis
 
 

@@ -319,8 +319,8 @@ def _guarded(choice: Choice, begin: State) -> tuple[Rows, Guard | None]:
     rows = begin.rows
     if choice.judge is not None:
         return rows, None
-    gaps = [residual(rows.take(part).campaign, begin.point, choice) for part in chunks(len(rows.aside))]
-    found = weighed(choice, summed(choice, rows.take(slice(0)), begin), begin, np.concatenate(gaps))
+    gap = residual(rows.campaign, begin.point, choice)
+    found = weighed(choice, summed(choice, rows.take(slice(0)), begin), begin, gap)
     some = rows.take(_sample(len(rows.aside)))
     stack, share = linearised(some.campaign, begin.point, choice), len(rows.aside) / len(some.aside)
     metric = np.tensordot(found.sigma[::3] ** -2.0, products(stack, np.ones(len(stack))), 1)[:-1, :-1] * share

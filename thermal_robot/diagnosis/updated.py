@@ -86,11 +86,11 @@ def chosen(fit: Fit) -> tuple[Choice, list[Runner]]:
     return choice, runners
 
 
-def ahead(grown: Sequential, listed: Sequence[Runner]) -> Array:
+def log_odds(estimate: Sequential, listed: Sequence[Runner]) -> Array:
     """(R,) log Bayes factor of each combination against the chosen one, prior odds included, by all rows so far."""
-    choice, fitted = grown.choice, grown.fitted
+    choice, fitted = estimate.choice, estimate.fitted
     stack = linearised(fitted.rows.campaign, fitted.point, choice, rivals=True)
-    total = grown.sums.after(fitted.step, stack.shape[2]).plus(Sums.of(stack, fitted.rows))
+    total = estimate.sums.after(fitted.step, stack.shape[2]).plus(Sums.of(stack, fitted.rows))
     gram = normal(choice, total, fitted, rivals=True)[2]
     own = evidence(gram, tuple(range(len(choice.blocks))), 0.0, fitted.best)
     return np.array([evidence(gram, r.blocks, r.log_prior, own).log_evidence - own.log_evidence for r in listed])
@@ -106,7 +106,7 @@ def _point(fit: Fit) -> Point:
     return Point(fit.corrected.frames, joined([values for _, values in fit.effects]))
 
 
-def begun(fit: Fit) -> Sequential:
+def fixed_point(fit: Fit) -> Sequential:
     """Return the fit of a diagnosis at its fixed point, ready to take in more rows."""
     e, point, flat = fit.explanation, _point(fit), len(unknown_frames(fit.campaign))
     leverage = (e.best.effective + flat) / max(e.problem.equations + flat, 1)
@@ -156,7 +156,7 @@ class Diagnosed(Protocol):
 _BEGUN: WeakKeyDictionary[Fit, tuple[Sequential, Watch, tuple[Runner, ...]]] = WeakKeyDictionary()
 
 
-def begin(fit: Fit) -> tuple[Sequential, Watch, tuple[Runner, ...]]:
+def start(fit: Fit) -> tuple[Sequential, Watch, tuple[Runner, ...]]:
     """Return what the updates of a diagnosis begin with; its rows are passed over once.
 
     Of the combinations that came near, those are watched that are behind: what was preferred stays preferred.
@@ -167,17 +167,17 @@ def begin(fit: Fit) -> tuple[Sequential, Watch, tuple[Runner, ...]]:
             "on all of them; diagnose old and new rows together"
         )
     if fit not in _BEGUN:
-        grown, runners = begun(fit), chosen(fit)[1]
-        gains = ahead(grown, runners) if runners else ()
+        estimate, runners = fixed_point(fit), chosen(fit)[1]
+        gains = log_odds(estimate, runners) if runners else ()
         behind = tuple(runner for runner, gain in zip(runners, gains, strict=True) if gain < 0.0)
-        _BEGUN[fit] = grown, watch(fit), behind
+        _BEGUN[fit] = estimate, watch(fit), behind
     return _BEGUN[fit]
 
 
-def pass_over(found: Diagnosed) -> None:
+def prepare(found: Diagnosed) -> None:
     """Form the sums of a diagnosis of many rows: the pass over them is a part of it, not of an update."""
     if found.usable and found.fit is not None and found.samples > 2 * KEPT and independent_rows(found.fit):
-        begin(found.fit)
+        start(found.fit)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -194,7 +194,7 @@ class Updated:
         The corrected model by all rows.
     agreement
         How well the last new rows agreed with the model that did not know them.
-    grown, watch
+    estimate, watch
         The fit to all rows; what new rows are compared with.
     wider
         (P,) by how much the diagnosis widened each deviation for what it could not explain.
@@ -218,7 +218,7 @@ class Updated:
 
     diagnosis: Diagnosed
     fit: Fit
-    grown: Sequential
+    estimate: Sequential
     watch: Watch
     runners: tuple[Runner, ...]
     wider: Array
@@ -233,30 +233,30 @@ class Updated:
         """Add more rows; see :meth:`Diagnosis.update <thermal_robot.Diagnosis.update>`."""
         rows = more_rows(self.fit.campaign, rows, self.model.needs)
         with threadpool_limits(1):  # as in a diagnosis: matrices are small
-            new = Rows.weighed(self.grown.choice, rows)
-            after = replace(self, grown=self.grown.plus(new))
+            new = Rows.weighed(self.estimate.choice, rows)
+            after = replace(self, estimate=self.estimate.plus(new))
             if rows.samples:
-                after = self._compared(after.grown, new)
-        return replace(after, model=after._model(rows), outliers=tuple(rows.rows[after.grown.aside].tolist()))
+                after = self._compared(after.estimate, new)
+        return replace(after, model=after._model(rows), outliers=tuple(rows.rows[after.estimate.aside].tolist()))
 
-    def _compared(self, grown: Sequential, new: Rows) -> Updated:
+    def _compared(self, estimate: Sequential, new: Rows) -> Updated:
         """Return the same with all rows, and what the new ones say of the choice."""
-        agreement, rival, lead = self.watch.look(self.grown, new, self.agreement), self.rival, self.lead
+        agreement, rival, lead = self.watch.look(self.estimate, new, self.agreement), self.rival, self.lead
         if self.runners:
-            gains = ahead(grown, self.runners)
+            gains = log_odds(estimate, self.runners)
             rival, lead = self.runners[int(np.argmax(gains))].names, float(gains.max())
-        outside = beyond(self.model.spread, new.campaign, self.grown.samples)
+        outside = beyond(self.model.spread, new.campaign, self.estimate.samples)
         found = [*misfits(agreement), *outside, *self._testable(new)]
-        if not grown.fitted.steady:
+        if not estimate.fitted.steady:
             found.append("The fit of the chosen effects to all rows does not come to rest.")
         fallen = tuple(dict.fromkeys((*self.fallen, *found)))
-        return replace(self, grown=grown, agreement=agreement, rival=rival, lead=lead, fallen=fallen)
+        return replace(self, estimate=estimate, agreement=agreement, rival=rival, lead=lead, fallen=fallen)
 
     def _testable(self, new: Rows) -> Iterator[str]:
         """Yield the effects that could not be tested, and can be with what the new rows recorded."""
         known = library()
         if asked := {name: needs for name, needs in self.fit.needs.items() if name in known}:
-            old = self.grown.fitted
+            old = self.estimate.fitted
             both = observe(Rows.joined(old.rows, new).campaign, old.point.frames)
             for name, needs in asked.items():
                 if not gate.missing(known[name], both):
@@ -264,7 +264,7 @@ class Updated:
 
     def _model(self, new: Campaign) -> CorrectedModel:
         """Return the corrected model by all rows, measured where these are, too."""
-        fitted, choice, known = self.grown.fitted, self.grown.choice, self.model.spread
+        fitted, choice, known = self.estimate.fitted, self.estimate.choice, self.model.spread
         model = replace(self.model, frames=fitted.point.frames, effects=tuple(choice.split(fitted.point.values)))
         if known is None:
             return model
@@ -283,7 +283,7 @@ class Updated:
     @property
     def samples(self) -> int:
         """Rows so far, those of the diagnosis included."""
-        return self.grown.samples
+        return self.estimate.samples
 
     @property
     def choice_stands(self) -> bool:
@@ -298,7 +298,7 @@ class Updated:
         """Why the choice is to be made anew, in plain words; empty while it stands."""
         if self.lead <= 0.0:  # a fresh diagnosis takes the more probable combination, however little it is ahead
             return " ".join(self.fallen)
-        own = dict.fromkeys(item.effect.name for item in self.grown.choice.blocks)
+        own = dict.fromkeys(item.effect.name for item in self.estimate.choice.blocks)
         told, before = (" and ".join(some) or "no effect" for some in (self.rival, own))
         rest = f"rather than {before}" if {*self.rival} != {*own} else "in other settings or places than chosen"
         odds = np.exp(min(self.lead, MOST_LEAD))
@@ -307,27 +307,27 @@ class Updated:
     @property
     def noise(self) -> float:
         """One sigma per axis of what remains beside the effects, m."""
-        return float(self.grown.fitted.noise[0])
+        return float(self.estimate.fitted.noise[0])
 
     @property
     def noise_orientation(self) -> float | None:
         """The same of orientations, rad; ``None`` without them."""
-        return float(self.grown.fitted.noise[3]) if self.grown.choice.measures == 6 else None
+        return float(self.estimate.fitted.noise[3]) if self.estimate.choice.measures == 6 else None
 
     @property
     def rms_after(self) -> float:
         """Root mean square of the remainder, m, over the rows that are not set aside."""
-        return float(self.grown.fitted.rms[0])
+        return float(self.estimate.fitted.rms[0])
 
     @property
     def rms_after_orientation(self) -> float | None:
         """The same of orientations, rad; ``None`` without them."""
-        return float(self.grown.fitted.rms[1]) if self.grown.choice.measures == 6 else None
+        return float(self.estimate.fitted.rms[1]) if self.estimate.choice.measures == 6 else None
 
     @property
     def anew(self) -> bool:
         """Whether all old rows were looked at again, since the parameters had moved too far for their sums."""
-        return self.grown.anew
+        return self.estimate.anew
 
     @property
     def parameters(self) -> pd.DataFrame:
@@ -338,7 +338,7 @@ class Updated:
         """
         import pandas as pd
 
-        choice, fitted = self.grown.choice, self.grown.fitted
+        choice, fitted = self.estimate.choice, self.estimate.fitted
         listed = [(item.effect.name, p) for item in choice.blocks for p in item.bare]
         std = fitted.deviations * self.wider
         return pd.DataFrame(
@@ -383,9 +383,9 @@ def update(found: Diagnosed, rows: Campaign | pd.DataFrame) -> Updated:
     if found.fit is None:
         raise EstimationError(f"{found.campaign}: this diagnosis was made without its fit; diagnose the rows")
     with threadpool_limits(1):
-        grown, watched, runners = begin(found.fit)
-    wider = _widened(found, found.fit, grown.fitted.deviations)
-    return Updated(found, found.fit, grown, watched, runners, wider, found.model, Agreement()).update(rows)
+        estimate, watched, runners = start(found.fit)
+    wider = _widened(found, found.fit, estimate.fitted.deviations)
+    return Updated(found, found.fit, estimate, watched, runners, wider, found.model, Agreement()).update(rows)
 
 
 def _widened(found: Diagnosed, fit: Fit, own: Array) -> Array:

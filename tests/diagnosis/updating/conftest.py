@@ -5,7 +5,7 @@ import pytest
 from updating_cases import ALL, OLD, measured
 
 import thermal_robot as tr
-from thermal_robot.diagnosis.updated import begun
+from thermal_robot.diagnosis.updated import fixed_point
 
 ASKED = ["joint_offset", "backlash", "joint_gain"]
 
@@ -30,4 +30,4 @@ def fresh(whole):
 
 @pytest.fixture(scope="session")
 def grown(found):
-    return begun(found.fit)
+    return fixed_point(found.fit)

@@ -6,13 +6,13 @@ from updating_cases import EFFECTS, in_full, measured
 
 import thermal_robot as tr
 from thermal_robot.diagnosis.agreement import Agreement, scatter_of
-from thermal_robot.diagnosis.updated import begin
+from thermal_robot.diagnosis.updated import start
 
 
 @pytest.fixture(scope="module")
 def stream():
     """A robot that is well known."""
-    return begin(tr.diagnose(measured(300, seed=40), only=["joint_offset", "backlash"]).fit)
+    return start(tr.diagnose(measured(300, seed=40), only=["joint_offset", "backlash"]).fit)
 
 
 def look(stream, new, last):

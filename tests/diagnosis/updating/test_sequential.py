@@ -10,7 +10,7 @@ import thermal_robot as tr
 from thermal_robot.diagnosis import sequential
 from thermal_robot.diagnosis.sequential import Sequential, settled, split
 from thermal_robot.diagnosis.sufficient import Judge, Point, Rows, linearised, products
-from thermal_robot.diagnosis.updated import begun
+from thermal_robot.diagnosis.updated import fixed_point
 from thermal_robot.inference.columns import unknown_frames
 from thermal_robot.inference.frames import moved
 
@@ -32,13 +32,13 @@ def few(monkeypatch):
 @pytest.fixture(scope="module")
 def once(found, whole):
     """All rows fitted together, each looked at."""
-    return begun(found.fit).plus(in_full(whole.take(np.arange(OLD, ALL)))).fitted
+    return fixed_point(found.fit).plus(in_full(whole.take(np.arange(OLD, ALL)))).fitted
 
 
 @pytest.mark.parametrize(("batches", "seed"), [(1, 0), (4, 1), (12, 2)])
 def test_batches_and_order_do_not_matter(found, whole, once, few, batches, seed):
     order = OLD + np.random.default_rng(seed).permutation(ALL - OLD)
-    start = begun(found.fit)
+    start = fixed_point(found.fit)
     assert start.sums.counts[0] > 700
     last = added(start, whole, np.array_split(order, batches)).fitted
     assert far(last, once) < PROMISED
@@ -48,7 +48,7 @@ def test_batches_and_order_do_not_matter(found, whole, once, few, batches, seed)
 
 
 def test_it_is_a_fresh_fit_of_the_same_choice(fresh, once):
-    assert far(once, begun(fresh.fit).fitted) < PROMISED
+    assert far(once, fixed_point(fresh.fit).fitted) < PROMISED
 
 
 def test_old_rows_are_looked_at_only_where_it_says_so(found, whole, few, monkeypatch):
@@ -56,7 +56,7 @@ def test_old_rows_are_looked_at_only_where_it_says_so(found, whole, few, monkeyp
     monkeypatch.setattr(
         sequential, "settled", lambda c, s, begin: (seen.append(len(begin.rows.weights)), plain(c, s, begin))[1]
     )
-    start, looked = begun(found.fit), []
+    start, looked = fixed_point(found.fit), []
     for k in range(10):
         seen.clear()
         start = start.plus(in_full(whole.take(np.arange(OLD + 20 * k, OLD + 20 * k + 20))))
@@ -74,15 +74,15 @@ def test_a_jump_of_the_robot_is_followed_by_looking_at_all_rows(found, whole, fe
     rows = whole.take(np.arange(OLD, ALL))
     q = rows.q + np.array([0.0, 3e-4, 0.0, 0.0, 0.0])
     moved = in_full(replace(rows, position=rows.position + 1e-3 * np.sin(q[:, 1:4])))
-    few_rows = begun(found.fit).plus(moved)
+    few_rows = fixed_point(found.fit).plus(moved)
     assert few_rows.anew
     sequential.KEPT = 10_000
-    assert far(few_rows.fitted, begun(found.fit).plus(moved).fitted) < 1e-5
+    assert far(few_rows.fitted, fixed_point(found.fit).plus(moved).fitted) < 1e-5
 
 
 def with_held_weights(found):
     """The diagnosis as if it had found more than noise: rows keep their weights."""
-    e, start = found.fit.explanation, begun(found.fit)
+    e, start = found.fit.explanation, fixed_point(found.fit)
     judge = Judge(start.fitted.point, e.whitening.noise * e.best.noise, found.samples)
     rows = Rows(found.fit.campaign, e.whitening.weights, e.outliers)
     return Sequential.of(replace(start.choice, judge=judge), (rows,), start.fitted)
@@ -147,7 +147,7 @@ def test_gross_errors_are_set_aside_and_do_not_count(found, grown):
 def test_the_noise_is_found_whether_it_is_stated_or_not(stated):
     campaign = measured(200, seed=8)
     campaign = campaign if stated else replace(campaign, noise_position=None)
-    fitted = begun(tr.diagnose(campaign, only=["joint_offset", "backlash"]).fit).fitted
+    fitted = fixed_point(tr.diagnose(campaign, only=["joint_offset", "backlash"]).fit).fitted
     assert fitted.noise[0] == pytest.approx(2e-5, rel=0.1)
 
 
@@ -182,7 +182,7 @@ def test_rows_kept_are_as_many_as_are_asked_for(parted):
 def test_a_diagnosis_is_where_its_own_choice_comes_to_rest(which, request):
     """Values within a ten-thousandth of a deviation, noise and remainder within a millionth."""
     diagnosis = request.getfixturevalue(which)
-    e, rest = diagnosis.fit.explanation, begun(diagnosis.fit).fitted
+    e, rest = diagnosis.fit.explanation, fixed_point(diagnosis.fit).fitted
     values = np.concatenate([v for _, v in diagnosis.fit.effects])
     deviation = np.concatenate([np.sqrt(np.diag(e.values[b][1])) for b in e.best.blocks])
     assert rest.steady

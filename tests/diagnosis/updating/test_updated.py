@@ -9,7 +9,7 @@ from updating_cases import ALL, EFFECTS, OLD, in_full, measured
 
 import thermal_robot as tr
 from thermal_robot.diagnosis.agreement import beyond
-from thermal_robot.diagnosis.updated import ahead, begun, chosen, independent_rows, rivals
+from thermal_robot.diagnosis.updated import chosen, fixed_point, independent_rows, log_odds, rivals
 from thermal_robot.errors import CampaignError, EstimationError
 
 
@@ -156,7 +156,7 @@ def test_what_is_drawn_anew_in_every_pose_is_left_to_a_fresh_diagnosis(known):
 
 
 def test_expected_sizes_are_those_of_the_priors(known):
-    e, grown = known.fit.explanation, begun(known.fit)
+    e, grown = known.fit.explanation, fixed_point(known.fit)
     told = np.concatenate([e.linear.blocks[b].sizes * e.best.scales[b] for b in e.best.blocks])
     assert np.allclose(grown.fitted.expected(grown.choice), told, rtol=0.02)
 
@@ -200,7 +200,7 @@ def test_by_the_rows_of_the_diagnosis_the_order_is_its_own(found, grown):
         chance[combination.blocks] += probability
     further = sorted({b for c in e.combinations for b in c.blocks} - {*e.best.blocks})
     assert further
-    gain = ahead(grown, listed)
+    gain = log_odds(grown, listed)
     told = [np.log(p / chance[e.best.blocks]) for p in sorted(chance.values(), reverse=True)[1:4]]
     assert np.allclose(np.sort(gain)[::-1][:3], told, atol=0.05)
 
@@ -210,15 +210,15 @@ def test_rows_that_show_more_bring_a_runner_forward(sparse, little):
     with_play = [k for k, runner in enumerate(listed) if "backlash" in runner.names]
     assert sparse.verdict == ("joint_offset",)
     assert with_play
-    before = ahead(begun(sparse.fit), listed)[with_play].max()
-    after = ahead(begun(sparse.fit).plus(in_full(little[0].take(np.arange(60, 400)))), listed)[with_play].max()
+    before = log_odds(fixed_point(sparse.fit), listed)[with_play].max()
+    after = log_odds(fixed_point(sparse.fit).plus(in_full(little[0].take(np.arange(60, 400)))), listed)[with_play].max()
     assert before < 0.0 < after
 
 
 def test_prior_odds_count(found, grown):
     listed = chosen(found.fit)[1][:1]
     likelier = [listed[0]._replace(log_prior=listed[0].log_prior + 2.0)]
-    assert ahead(grown, likelier)[0] - ahead(grown, listed)[0] == pytest.approx(2.0)
+    assert log_odds(grown, likelier)[0] - log_odds(grown, listed)[0] == pytest.approx(2.0)
 
 
 def test_it_holds_no_rows(grown):
