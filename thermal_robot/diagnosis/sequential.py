@@ -7,7 +7,7 @@ in whatever order, and one batch or many, end at the same place.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any
 
 import numpy as np
@@ -66,7 +66,7 @@ class State:
     held: float
     leverage: float
     best: Combination | None = None
-    medians: Array | float = 0.0
+    medians: Array = field(default_factory=lambda: np.zeros(1))
     bend: float = np.inf
     steady: bool = True
 
@@ -234,13 +234,12 @@ class Sequential:
         fitted = settled(self.choice, self.sums, replace(self.fitted, rows=Rows.joined(self.fitted.rows, new)))
         grown = replace(self, fitted=fitted, batches=batches, aside=fitted.rows.aside[old:], anew=False)
         summing = bool(self.sums.counts[0])
-        if summing and not (fitted.steady and self._holds(fitted)):
-            return Sequential.of(self.choice, batches, fitted, anew=True)
-        if summing:
+        holds = not summing or (fitted.steady and self._holds(fitted))
+        if summing and holds:
             grown = grown._take_in(old)
-        if len(grown.fitted.rows.aside) > 2 * KEPT:
-            return Sequential.of(self.choice, batches, fitted, anew=summing)
-        return grown
+        if holds and len(grown.fitted.rows.aside) <= 2 * KEPT:
+            return grown
+        return Sequential.of(self.choice, batches, fitted, anew=summing)
 
     def _take_in(self, old: int) -> Sequential:
         """Return the same with those of the last rows in the sums that need not be looked at again."""
@@ -250,16 +249,14 @@ class Sequential:
         if guard is not None:
             safe = guard.scores(stack, own.weights) >= guard.reach
         sums = self.sums.plus(Sums.of(stack[safe], own.take(safe), guard))
-        return replace(self, sums=sums, fitted=replace(self.fitted, rows=rows.take(np.r_[np.ones(old, bool), ~safe])))
+        kept = rows.take(np.r_[np.ones(old, bool), ~safe])
+        return replace(self, sums=sums, fitted=replace(self.fitted, rows=kept))
 
     def _holds(self, fitted: Fitted) -> bool:
         """Tell whether every row in the sums kept its side of the limits, and is straight as far as the point moved."""
-        guard, rms = self.sums.guard, np.sqrt(fitted.squares / max(3 * fitted.count, 1))
-        if guard is not None and not guard.holds(
-            fitted.step, fitted.sigma, np.asarray(fitted.medians), fitted.bend, rms
-        ):
-            return False
-        return self._bent(fitted) < CURVED
+        guard, axis = self.sums.guard, fitted.rms / np.sqrt(3.0)
+        near = guard is None or guard.holds(fitted.step, fitted.sigma, fitted.medians, fitted.bend, axis)
+        return near and self._bent(fitted) < CURVED
 
     def _bent(self, fitted: Fitted) -> float:
         """Return by how many deviations the curvature of the rows in the sums moves a parameter at most.
@@ -270,7 +267,7 @@ class Sequential:
         old, k = self.fitted.rows, len(fitted.step)
         here, there = (linearised(old.campaign, point, self.choice) for point in (self.anchor, fitted.point))
         curved, turned = here.copy(), there - here
-        curved[:, :, -1] = there[:, :, -1] - (here[:, :, -1] - here[:, :, :k] @ fitted.step)
+        curved[:, :, -1] = turned[:, :, -1] + here[:, :, :-1] @ fitted.step
         turned[:, :, -1] = there[:, :, -1]
         root, times = whitener(fitted.products[:-1, :-1]), self.sums.counts[1] / max(len(here), 1)
         unit = np.sqrt((root**2).sum(axis=1)).clip(settings.TINY) * fitted.best.noise
@@ -329,4 +326,4 @@ def _guarded(choice: Choice, begin: State) -> tuple[Rows, Guard | None]:
     left = axis_noise(found.medians * found.sigma[::3], begin.leverage)
     quiet = found.held > 0.0 and bool((left < settings.NOISE_SLACK * found.sigma[::3]).all())
     share, typical = float(np.median(moves(stack, metric, found.sigma))), len(rows.aside) ** -0.5
-    return found.rows, Guard(metric, 0.0, share, typical, found.sigma, np.asarray(found.medians), found.bend, quiet)
+    return found.rows, Guard(metric, 0.0, share, typical, found.sigma, found.medians, found.bend, quiet)
