@@ -18,8 +18,7 @@ if TYPE_CHECKING:
     from thermal_robot.correction import CorrectedModel
     from thermal_robot.datasets import demo_campaign
     from thermal_robot.diagnosis import Diagnosis
-    from thermal_robot.diagnosis.calibrate import calibrate
-    from thermal_robot.diagnosis.calibration import Calibration
+    from thermal_robot.diagnosis.calibration import Calibration, calibrate
     from thermal_robot.diagnosis.diagnose import diagnose
     from thermal_robot.effects import Effect
     from thermal_robot.errors import CampaignError, EffectError, EstimationError, RobotError, ThermalRobotError
@@ -50,7 +49,7 @@ _HOME = {
     "Robot": "robot",
     "RobotError": "errors",
     "ThermalRobotError": "errors",
-    "calibrate": "diagnosis.calibrate",
+    "calibrate": "diagnosis.calibration",
     "campaign_from_table": "campaign",
     "demo_campaign": "datasets",
     "describe": "campaign",

@@ -20,11 +20,9 @@ from thermal_robot.diagnosis.data_faults.misfit import another_motion, delivered
 from thermal_robot.diagnosis.deviations import as_remainder_says
 from thermal_robot.diagnosis.earned import pruned
 from thermal_robot.diagnosis.examine import examine
-from thermal_robot.diagnosis.growing.settings import KEPT
-from thermal_robot.diagnosis.growing.stream import can_grow
-from thermal_robot.diagnosis.growing.updated import ready
 from thermal_robot.diagnosis.held_out import held_out
 from thermal_robot.diagnosis.result import Diagnosis, told
+from thermal_robot.diagnosis.updated import prepare
 from thermal_robot.diagnosis.where import without_laws
 from thermal_robot.effects import RANDOM, Effect, choose, library
 from thermal_robot.errors import CampaignError, EstimationError, require
@@ -116,14 +114,8 @@ def diagnose(
             left_out=sorted(name for name in {*everything, *RANDOM} if not asked(name)),
             notes=notes,
         )
-        return _ready(told(found))
-
-
-def _ready(found: Diagnosis) -> Diagnosis:
-    """Return a diagnosis of many rows ready for new ones: the pass over its rows is a part of it, not of an update."""
-    if found.usable and found.fit is not None and found.samples > 2 * KEPT and can_grow(found.fit):
-        ready(found, found.fit)
-    return found
+        prepare(diagnosis := told(found))
+        return diagnosis
 
 
 @contextmanager

@@ -37,8 +37,8 @@ if TYPE_CHECKING:
 
     from thermal_robot.campaign import Campaign
     from thermal_robot.diagnosis.explained import Arm
-    from thermal_robot.diagnosis.growing.updated import Updated
     from thermal_robot.diagnosis.next_samples import NextSamples
+    from thermal_robot.diagnosis.updated import Updated
     from thermal_robot.inference.fit import Fit
     from thermal_robot.iso9283 import Performance
 
@@ -223,7 +223,7 @@ class Diagnosis:
         >>> tr.diagnose(campaign.take(~new)).update(campaign.take(new))
         Updated('demo': backlash, thermal_elongation; 120 rows; the choice stands)
         """
-        from thermal_robot.diagnosis.growing.updated import update
+        from thermal_robot.diagnosis.updated import update
 
         return update(self, rows)
 

@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from growing_cases import ALL, OLD, measured
+from updating_cases import ALL, OLD, measured
 
 import thermal_robot as tr
-from thermal_robot.diagnosis.growing.stream import begun
+from thermal_robot.diagnosis.updated import fixed_point
 
 ASKED = ["joint_offset", "backlash", "joint_gain"]
 
@@ -30,4 +30,4 @@ def fresh(whole):
 
 @pytest.fixture(scope="session")
 def grown(found):
-    return begun(found.fit)
+    return fixed_point(found.fit)

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 import thermal_robot as tr
-from thermal_robot.diagnosis.growing.settled import Single
+from thermal_robot.diagnosis.sufficient import Rows
 
 OLD, ALL, NOISE = 900, 1100, 2e-5
 EFFECTS = {"joint_offset": {"joint_3": 5e-4, "joint_4": -4e-4}, "backlash": {"joint_2": 3e-4, "joint_3": 2e-4}}
@@ -32,10 +32,9 @@ def measured(rows, seed=0, gross=0.0, effects=None, **how):
 
 def in_full(campaign):
     """Rows as they come, before they are weighed."""
-    return Single(campaign, np.ones(campaign.samples), np.zeros(campaign.samples, dtype=bool))
+    return Rows(campaign, np.ones(campaign.samples), np.zeros(campaign.samples, dtype=bool))
 
 
 def far(one, other):
     """How many deviations two fits of the same choice are apart, at most."""
-    deviation = np.concatenate([np.sqrt(np.diag(other.values[k][1])) for k in sorted(other.values)])
-    return float(np.abs((one.point.values - other.point.values) / deviation).max())
+    return float(np.abs((one.point.values - other.point.values) / other.deviations).max())

@@ -2,17 +2,22 @@
 
 import numpy as np
 import pytest
-from growing_cases import EFFECTS, in_full, measured
+from updating_cases import EFFECTS, in_full, measured
 
 import thermal_robot as tr
-from thermal_robot.diagnosis.growing.stream import Stream
-from thermal_robot.diagnosis.growing.watched import Agreement, scatter_of
+from thermal_robot.diagnosis.agreement import Agreement, scatter_of
+from thermal_robot.diagnosis.updated import start
 
 
 @pytest.fixture(scope="module")
 def stream():
     """A robot that is well known."""
-    return Stream.of(tr.diagnose(measured(300, seed=40), only=["joint_offset", "backlash"]).fit)
+    return start(tr.diagnose(measured(300, seed=40), only=["joint_offset", "backlash"]).fit)
+
+
+def look(stream, new, last):
+    grown, watch, _ = stream
+    return watch.look(grown, new, last)
 
 
 @pytest.fixture(scope="module")
@@ -20,7 +25,7 @@ def chances(stream):
     """(seeds, 3) of batches of 20 fresh rows of the same robot: misfit, change, misfit of all."""
     found = []
     for seed in range(60):
-        agreement = stream.watch.look(stream.grown, in_full(measured(20, seed=100 + seed)), Agreement())
+        agreement = look(stream, in_full(measured(20, seed=100 + seed)), Agreement())
         found.append((agreement.p_batch, agreement.p_change, agreement.p_aside))
     return np.array(found)
 
@@ -44,21 +49,21 @@ def test_rows_without_gross_errors_speak_of_none(chances):
 @pytest.mark.parametrize("size", [2e-4, 4e-4])
 def test_play_that_begins_is_seen_and_named(stream, size):
     worn = {**EFFECTS, "backlash": {**EFFECTS["backlash"], "joint_4": size}}
-    agreement = stream.watch.look(stream.grown, in_full(measured(60, seed=7, effects=worn)), Agreement())
+    agreement = look(stream, in_full(measured(60, seed=7, effects=worn)), Agreement())
     assert agreement.p_change < 1e-6
     assert agreement.changed == ("backlash", "lost motion, joint_4")
 
 
 def test_gross_errors_that_were_not_there_before_are_counted(stream):
-    agreement = stream.watch.look(stream.grown, in_full(measured(60, seed=9, gross=0.2)), Agreement())
+    agreement = look(stream, in_full(measured(60, seed=9, gross=0.2)), Agreement())
     assert agreement.aside >= 6
     assert agreement.p_aside < 1e-4
     assert agreement.p_batch > 1e-3
 
 
 def test_misfits_add_up_over_batches(stream):
-    first = stream.watch.look(stream.grown, in_full(measured(20, seed=1)), Agreement())
-    both = stream.watch.look(stream.grown, in_full(measured(20, seed=2)), first)
+    first = look(stream, in_full(measured(20, seed=1)), Agreement())
+    both = look(stream, in_full(measured(20, seed=2)), first)
     assert both.whole == pytest.approx(first.chi2 + both.chi2)
     assert both.whole_figures == first.figures + both.figures
     assert both.rows == 40

@@ -1,0 +1,193 @@
+"""Rows added a few at a time: the same as all at once, whatever the order and the batches, and few are looked at."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from updating_cases import ALL, OLD, far, in_full, measured
+
+import thermal_robot as tr
+from thermal_robot.diagnosis import sequential
+from thermal_robot.diagnosis.sequential import Sequential, settled, split
+from thermal_robot.diagnosis.sufficient import Judge, Point, Rows, linearised, products
+from thermal_robot.diagnosis.updated import fixed_point
+from thermal_robot.inference.columns import unknown_frames
+from thermal_robot.inference.frames import moved
+
+PROMISED = 1e-6
+
+
+def added(start, whole, parts):
+    for part in parts:
+        start = start.plus(in_full(whole.take(part)))
+    return start
+
+
+@pytest.fixture
+def few(monkeypatch):
+    """Keep as few rows that most are in the sums."""
+    monkeypatch.setattr(sequential, "KEPT", 150)
+
+
+@pytest.fixture(scope="module")
+def once(found, whole):
+    """All rows fitted together, each looked at."""
+    return fixed_point(found.fit).plus(in_full(whole.take(np.arange(OLD, ALL)))).fitted
+
+
+@pytest.mark.parametrize(("batches", "seed"), [(1, 0), (4, 1), (12, 2)])
+def test_batches_and_order_do_not_matter(found, whole, once, few, batches, seed):
+    order = OLD + np.random.default_rng(seed).permutation(ALL - OLD)
+    start = fixed_point(found.fit)
+    assert start.sums.counts[0] > 700
+    last = added(start, whole, np.array_split(order, batches)).fitted
+    assert far(last, once) < PROMISED
+    assert last.noise == pytest.approx(once.noise, rel=PROMISED)
+    assert last.squares == pytest.approx(once.squares, rel=PROMISED)
+    assert last.count == once.count
+
+
+def test_it_is_a_fresh_fit_of_the_same_choice(fresh, once):
+    assert far(once, fixed_point(fresh.fit).fitted) < PROMISED
+
+
+def test_old_rows_are_looked_at_only_where_it_says_so(found, whole, few, monkeypatch):
+    seen, plain = [], sequential.settled
+    monkeypatch.setattr(
+        sequential, "settled", lambda c, s, begin: (seen.append(len(begin.rows.weights)), plain(c, s, begin))[1]
+    )
+    start, looked = fixed_point(found.fit), []
+    for k in range(10):
+        seen.clear()
+        start = start.plus(in_full(whole.take(np.arange(OLD + 20 * k, OLD + 20 * k + 20))))
+        looked.append((max(seen), start.anew))
+    assert all(rows < 400 for rows, _ in looked)
+    assert sum(anew for _, anew in looked) < 5
+
+
+def test_no_rows_change_nothing(grown, whole):
+    assert far(grown.plus(in_full(whole.take([]))).fitted, grown.fitted) < 1e-8
+
+
+def test_a_jump_of_the_robot_is_followed_by_looking_at_all_rows(found, whole, few):
+    """Rows that move the parameters far leave the reach of the sums; the answer is still that of all rows."""
+    rows = whole.take(np.arange(OLD, ALL))
+    q = rows.q + np.array([0.0, 3e-4, 0.0, 0.0, 0.0])
+    moved = in_full(replace(rows, position=rows.position + 1e-3 * np.sin(q[:, 1:4])))
+    few_rows = fixed_point(found.fit).plus(moved)
+    assert few_rows.anew
+    sequential.KEPT = 10_000
+    assert far(few_rows.fitted, fixed_point(found.fit).plus(moved).fitted) < 1e-5
+
+
+def with_held_weights(found):
+    """The diagnosis as if it had found more than noise: rows keep their weights."""
+    e, start = found.fit.explanation, fixed_point(found.fit)
+    judge = Judge(start.fitted.point, e.whitening.noise * e.best.noise, found.samples)
+    rows = Rows(found.fit.campaign, e.whitening.weights, e.outliers)
+    return Sequential.of(replace(start.choice, judge=judge), (rows,), start.fitted)
+
+
+@pytest.mark.parametrize("batches", [1, 5])
+def test_where_weights_are_held_batches_do_not_matter_either(found, whole, few, batches, monkeypatch):
+    start = with_held_weights(found)
+    assert start.sums.counts[0] > 300
+    for part in np.array_split(np.arange(OLD, ALL), batches):
+        start = start.plus(Rows.weighed(start.choice, whole.take(part)))
+    monkeypatch.setattr(sequential, "KEPT", 10_000)
+    once = with_held_weights(found)
+    once = once.plus(Rows.weighed(once.choice, whole.take(np.arange(OLD, ALL)))).fitted
+    assert far(start.fitted, once) < 5.0 * PROMISED
+    assert start.fitted.noise == pytest.approx(once.noise, rel=PROMISED)
+    assert start.fitted.count == once.count
+
+
+def test_it_ends_at_the_same_place_wherever_it_begins(whole, grown):
+    known = grown.fitted
+    begin = replace(known, best=None, leverage=0.0, rows=in_full(whole))
+    astray = replace(begin, point=Point(begin.point.frames, 1.3 * known.point.values))
+    one, other = (settled(grown.choice, grown.sums, b) for b in (begin, astray))
+    assert one.steady
+    assert other.steady
+    assert far(one, other) < 1e-7
+
+
+def test_the_order_of_rows_does_not_matter(whole, grown):
+    mixed = whole.take(np.random.default_rng(2).permutation(whole.samples))
+    one, other = (settled(grown.choice, grown.sums, replace(grown.fitted, rows=in_full(c))) for c in (whole, mixed))
+    assert far(one, other) < 1e-7
+    assert one.noise == pytest.approx(other.noise, rel=1e-10)
+    assert set(whole.rows[one.rows.aside]) == set(mixed.rows[other.rows.aside])
+
+
+def cost(grown, fitted, point):
+    """What the fit makes least, by the exact model: weighed squares in units of the noise, and the priors'."""
+    seen = linearised(fitted.rows.campaign, point, grown.choice)[:, :, -1]
+    sizes = fitted.expected(grown.choice)
+    return (fitted.rows.weights @ (seen / fitted.noise) ** 2).sum() + ((point.values / sizes) ** 2).sum()
+
+
+def test_no_step_makes_the_cost_less(grown):
+    fitted, names = grown.fitted, unknown_frames(grown.fitted.rows.campaign)
+    least, rng = cost(grown, fitted, fitted.point), np.random.default_rng(3)
+    deviation = np.sqrt(np.diag(np.linalg.inv(fitted.products[:-1, :-1]))) * fitted.best.noise
+    for _ in range(20):
+        step = 0.1 * deviation * rng.normal(size=len(deviation))
+        there = Point(moved(fitted.point.frames, step[: len(names)], names), fitted.point.values + step[len(names) :])
+        assert cost(grown, fitted, there) > least
+
+
+def test_gross_errors_are_set_aside_and_do_not_count(found, grown):
+    assert grown.fitted.rows.aside.sum() >= 20
+    assert grown.fitted.count == found.samples - grown.fitted.rows.aside.sum()
+    assert np.sqrt(grown.fitted.squares[0] / grown.fitted.count) < 1.2 * np.sqrt(3.0) * 2e-5
+
+
+@pytest.mark.parametrize("stated", [True, False])
+def test_the_noise_is_found_whether_it_is_stated_or_not(stated):
+    campaign = measured(200, seed=8)
+    campaign = campaign if stated else replace(campaign, noise_position=None)
+    fitted = fixed_point(tr.diagnose(campaign, only=["joint_offset", "backlash"]).fit).fitted
+    assert fitted.noise[0] == pytest.approx(2e-5, rel=0.1)
+
+
+@pytest.fixture
+def parted(whole, grown, monkeypatch):
+    monkeypatch.setattr(sequential, "KEPT", 150)
+    return split(grown.choice, replace(grown.fitted, rows=in_full(whole)))
+
+
+def test_no_row_is_lost_and_none_counts_twice(whole, grown, parted):
+    sums, kept = parted
+    rest = np.setdiff1d(np.arange(whole.samples), kept)
+    assert sums.counts.tolist() == [len(rest)] * 3
+    stack = linearised(whole.take(rest), grown.fitted.point, grown.choice, rivals=True)
+    expected = products(stack, np.ones(len(rest)))
+    assert np.allclose(sums.products, expected, rtol=1e-9, atol=1e-9 * np.abs(expected).max())
+
+
+def test_rows_in_the_tail_are_kept(whole, grown, parted):
+    gap = linearised(whole, grown.fitted.point, grown.choice)[:, :, -1]
+    tail = np.linalg.norm(gap / grown.fitted.sigma, axis=1) > parted[0].guard.bend
+    assert tail.sum() > 5
+    assert set(np.flatnonzero(tail)) <= set(parted[1])
+
+
+def test_rows_kept_are_as_many_as_are_asked_for(parted):
+    assert len(parted[1]) == 150
+    assert parted[0].guard.reach > 0.0
+
+
+@pytest.mark.parametrize("which", ["found", "fresh"])
+def test_a_diagnosis_is_where_its_own_choice_comes_to_rest(which, request):
+    """Values within a ten-thousandth of a deviation, noise and remainder within a millionth."""
+    diagnosis = request.getfixturevalue(which)
+    e, rest = diagnosis.fit.explanation, fixed_point(diagnosis.fit).fitted
+    values = np.concatenate([v for _, v in diagnosis.fit.effects])
+    deviation = np.concatenate([np.sqrt(np.diag(e.values[b][1])) for b in e.best.blocks])
+    assert rest.steady
+    assert np.abs((rest.point.values - values) / deviation).max() < 1e-4
+    assert np.allclose(rest.deviations, deviation, rtol=1e-4)
+    assert np.allclose(rest.noise, e.whitening.noise * e.best.noise, rtol=1e-5)
+    assert np.sqrt(rest.squares[0] / rest.count) == pytest.approx(diagnosis.gap.rms_after, rel=1e-7)
+    assert rest.count == (~e.outliers).sum()

@@ -1,0 +1,329 @@
+"""Sequential estimation: a choice of effects fitted to old rows, most of them as sums, and to new ones.
+
+A diagnosis alternates between weights, noise, prior scales and parameters while it chooses, and ends where the choice
+no longer changes. Here nothing is chosen, and the iteration goes on to its fixed point, so that old rows and new ones
+in whatever order, and one batch or many, end at the same place.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, fields, replace
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.special import chdtri
+
+from thermal_robot.arrays import Array
+from thermal_robot.diagnosis.settings import LOOSE
+from thermal_robot.diagnosis.sufficient import (
+    Choice,
+    Guard,
+    Point,
+    Rows,
+    Sums,
+    carried,
+    joined,
+    linearised,
+    moves,
+    products,
+    residual,
+)  # fmt: skip
+from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import solve, whitener
+from thermal_robot.inference.columns import unknown_frames
+from thermal_robot.inference.evidence import Combination, Gram, evidence
+from thermal_robot.inference.frames import moved
+from thermal_robot.inference.problem import Linear, Whitening, normal_equations, parameter_values
+from thermal_robot.inference.robust import distance_limit, far_scale, judged, tail_weight
+from thermal_robot.inference.stack import chunks
+
+KEPT = 500
+"""Rows that are kept one by one, more where more are in the tail; up to twice as many before sums are formed anew. A
+fit of a thousand rows takes some tens of milliseconds, and a thousand rows hold the median well inside those kept. As
+many stand for all where it is asked how firmly rows hold the parameters, and how far they are from linear."""
+SETTLED, STEPS = 1e-9, 60
+"""Deviations by which parameters, and share by which noise and scales, still move when they are found; rounds at most.
+A thousandth of what is promised; each round is about ten times nearer."""
+CURVED = 5e-6
+"""Deviations by which the curvature of the rows in the sums may move a parameter before they are linearised anew. A
+diagnosis itself ends its rounds about 1e-5 deviations from where they would come to rest."""
+
+
+@dataclass(frozen=True, eq=False)
+class State:
+    """State of the iteration: point, (k,) step since the sums were linearised, the rows kept one by one, the noise.
+
+    ``sigma`` (m,) and ``held``: whitening noise and its prior's degrees of freedom. ``leverage``: share of the
+    equations that is fitted. ``best``: prior scales and noise, if known. ``medians`` (G,) and ``bend``, in units of
+    ``sigma``: median distance of rows, and that from which on one counts less; ``steady``: the median is a row's.
+    """
+
+    point: Point
+    step: Array
+    rows: Rows
+    sigma: Array
+    held: float
+    leverage: float
+    best: Combination | None = None
+    medians: Array = field(default_factory=lambda: np.zeros(1))
+    bend: float = np.inf
+    steady: bool = True
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Fitted(State):
+    """Fit of a choice to all rows; ``values`` are mean and covariance per chosen effect, ``gram`` its problem.
+
+    ``products`` (k + 1, k + 1) in units of ``sigma``, the gap at the point. ``squares`` (G,): sum of squares, m² and
+    rad², over ``count`` rows not set aside. ``steady``: it is the fixed point, too.
+    """
+
+    best: Combination
+    gram: Gram
+    values: dict[int, tuple[Array, Array]]
+    products: Array
+    squares: Array
+    count: int
+
+    @property
+    def noise(self) -> Array:
+        """(m,) one sigma of each component, m and rad."""
+        return self.sigma * self.best.noise
+
+    @property
+    def rms(self) -> Array:
+        """(G,) root mean square length of the residual, m and rad."""
+        return np.asarray(np.sqrt(self.squares / max(self.count, 1)))
+
+    @property
+    def deviations(self) -> Array:
+        """(P,) posterior standard deviation of every parameter, SI."""
+        return joined([np.sqrt(np.maximum(np.diag(covariance), 0.0)) for _, covariance in self.values.values()])
+
+    def expected(self, choice: Choice) -> Array:
+        """(P,) prior standard deviation of every parameter, SI."""
+        return joined([item.sizes * self.best.scales[k] for k, item in enumerate(choice.blocks)])
+
+    def precision(self, prior: Array, frames: float) -> Array:
+        """(k, k) inverse covariance of frames and parameters, SI, by all rows and prior deviations (P,), of frames."""
+        found = self.products[:-1, :-1] / self.best.noise**2
+        return np.asarray(found + np.diag(np.r_[np.full(len(found) - len(prior), frames), prior] ** -2.0))
+
+
+def settled(choice: Choice, sums: Sums, begin: State) -> Fitted:
+    """Fit a choice to rows in sums and rows one by one, to the fixed point; where it begins does not matter."""
+    for _ in range(STEPS):
+        found, size = _round(choice, sums, begin)
+        before = np.e * found.best.noise if begin.best is None else begin.best.noise
+        still = max(abs(found.leverage - begin.leverage), abs(np.log(found.best.noise / before))) < SETTLED
+        begin = found
+        if size < SETTLED and still:
+            return found
+    return replace(found, steady=False)
+
+
+def _round(choice: Choice, sums: Sums, begin: State) -> tuple[Fitted, float]:
+    """Iterate once: weigh the rows, find scales and noise, step; return also how far the step went, in noise."""
+    campaign, point = begin.rows.campaign, begin.point
+    stack, names = linearised(campaign, point, choice), unknown_frames(campaign)
+    state, flat = weighed(choice, sums, begin, stack[:, :, -1]), len(names)
+    total = sums.after(state.step, stack.shape[2]).plus(Sums.of(stack, state.rows))
+    white, linear, gram = normal(choice, total, state)
+    best = evidence(gram, tuple(range(len(choice.blocks))), 0.0, begin.best, settled=SETTLED)
+    values = parameter_values(linear, gram, best)
+    mean = joined([own for own, _ in values.values()])
+    change = mean - point.values
+    left = white[:flat, -1] - white[:flat, flat:-1] @ change
+    step = np.concatenate([solve(white[:flat, :flat], left), change])
+    size = float(np.sqrt(max(step @ white[:-1, :-1] @ step, 0.0))) / best.noise
+    leverage = float(min((best.effective + flat) / max(gram.equations + flat, 1), settings.MOST_LEVERAGE))
+    known: dict[str, Any] = {own.name: getattr(state, own.name) for own in fields(State)}
+    known |= {"point": Point(moved(point.frames, step[:flat], names), mean), "step": begin.step + step}
+    known |= {"leverage": leverage, "best": best}
+    fitted = Fitted(
+        **known,
+        gram=gram,
+        values=values,
+        products=carried(white, step),
+        squares=carried(total.products[1], step)[:, -1, -1],
+        count=int(total.counts[2]),
+    )
+    return fitted, size
+
+
+def normal(choice: Choice, total: Sums, state: State, rivals: bool = False) -> tuple[Array, Linear, Gram]:
+    """Return whitened products of all rows at a point, and the problem without frames whose parameters are whole."""
+    white, flat = np.tensordot(state.sigma[::3] ** -2.0, total.products[0], 1), len(unknown_frames(state.rows.campaign))
+    full = carried(white, np.r_[np.zeros(flat), -state.point.values])
+    nothing = np.zeros((0, choice.measures, flat + 1))
+    linear = Linear(nothing[:, :, 0], nothing[:, :, 1:], choice.listed(rivals))
+    whitening = Whitening(state.rows.weights, state.sigma, state.held)
+    return white, linear, normal_equations(linear, whitening, full, int(total.counts[1]) * choice.measures)
+
+
+def weighed(choice: Choice, sums: Sums, state: State, gap: Array) -> State:
+    """Robust weights (Huber 1964) of the rows kept one by one, by their residual (n, m), and the noise of all rows."""
+    if choice.judge is not None:
+        return replace(state, steady=True)
+    count, measures, rows, guard = len(gap), choice.measures, state.rows, sums.guard
+    total = int(sums.counts[0]) + count
+    if guard is not None and guard.quiet:
+        medians, steady = guard.medians * guard.sigma[::3], True
+    else:  # it is known as long as it lies among the rows that are kept one by one
+        ordered = np.sort((gap.reshape(count, -1, 3) ** 2).sum(axis=2), axis=0)
+        pair = np.array([(total - 1) // 2, total // 2])[:, None] - sums.below
+        steady = bool((pair >= 0).all() and (pair < count).all())
+        medians = np.sqrt(np.take_along_axis(ordered, np.clip(pair, 0, count - 1), axis=0).mean(axis=0))
+    measured = np.maximum(axis_noise(medians, state.leverage), settings.ROUNDING)
+    stated = replace(choice.noise, relative=rows.campaign.relative_noise)
+    sigma, held, distance2 = judged(gap, measured, stated, state.leverage, measures)
+    aside = distance2 > distance_limit(measures, total)
+    rows = Rows(rows.campaign, np.where(aside, 0.0, tail_weight(distance2, measures)), aside)
+    edge = bend(measures, state.leverage, sigma, far_scale(measured, sigma))
+    return replace(state, rows=rows, sigma=sigma, held=held, medians=medians / sigma[::3], bend=edge, steady=steady)
+
+
+def axis_noise(medians: Array, leverage: float) -> Array:
+    """(G,) one sigma per axis, from the median distance of three normal axes and the share of equations fitted."""
+    return np.asarray(medians / np.sqrt(float(chdtri(3, 0.5)) * (1.0 - leverage)))
+
+
+def bend(measures: int, leverage: float, sigma: Array, scale: Array) -> float:
+    """Distance, in units of the noise, from which on a row counts less (Huber 1964); of two parts the nearer one's."""
+    return float(np.sqrt(chdtri(measures, settings.BEND_LEVEL) * (1.0 - leverage)) * (scale / sigma).min())
+
+
+@dataclass(frozen=True, eq=False)
+class Sequential:
+    """Sequential estimate: all rows so far, as a fit of the choice needs them.
+
+    ``sums`` are of rows that are not looked at again, linearised at ``anchor``; ``fitted`` is the fit to all, and has
+    those kept one by one. ``batches`` are read only when the sums must be formed anew; ``aside`` are those of the last
+    batch set aside; ``anew`` whether the last rows made it necessary to look at all of them.
+    """
+
+    choice: Choice
+    anchor: Point
+    sums: Sums
+    fitted: Fitted
+    batches: tuple[Rows, ...]
+    aside: NDArray[np.bool_]
+    anew: bool = False
+
+    @classmethod
+    def of(cls, choice: Choice, batches: tuple[Rows, ...], begin: State, anew: bool = False) -> Sequential:
+        """Fit a choice to rows, and form the sums of those that need not be looked at again."""
+        rows = Rows.joined(*batches)
+        begin = replace(begin, step=np.zeros_like(begin.step), rows=rows)
+        aside, kept, sums = rows.aside.copy(), np.arange(len(rows.aside)), summed(choice, rows.take(slice(0)), begin)
+        if len(kept) > 2 * KEPT:
+            sums, kept = split(choice, begin)
+        fitted = settled(choice, sums, replace(begin, rows=rows.take(kept)))
+        aside[kept] = fitted.rows.aside  # rows in the sums are not set aside, or keep what they had
+        return cls(choice, begin.point, sums, fitted, batches, aside[len(aside) - len(batches[-1].aside) :], anew)
+
+    @property
+    def samples(self) -> int:
+        """Number of all rows."""
+        return int(self.sums.counts[0]) + len(self.fitted.rows.aside)
+
+    def plus(self, new: Rows) -> Sequential:
+        """Return all rows and some more; old rows in the sums are looked at again only where ``anew`` says so."""
+        batches, old = (*self.batches, new), len(self.fitted.rows.aside)
+        fitted = settled(self.choice, self.sums, replace(self.fitted, rows=Rows.joined(self.fitted.rows, new)))
+        grown = replace(self, fitted=fitted, batches=batches, aside=fitted.rows.aside[old:], anew=False)
+        summing = bool(self.sums.counts[0])
+        holds = not summing or (fitted.steady and self._holds(fitted))
+        if summing and holds:
+            grown = grown._take_in(old)
+        if holds and len(grown.fitted.rows.aside) <= 2 * KEPT:
+            return grown
+        return Sequential.of(self.choice, batches, fitted, anew=summing)
+
+    def _take_in(self, old: int) -> Sequential:
+        """Return the same with those of the last rows in the sums that need not be looked at again."""
+        rows, guard = self.fitted.rows, self.sums.guard
+        own = rows.take(slice(old, None))
+        stack, safe = linearised(own.campaign, self.anchor, self.choice, rivals=True), np.ones(len(own.aside), bool)
+        if guard is not None:
+            safe = guard.scores(stack, own.weights) >= guard.reach
+        sums = self.sums.plus(Sums.of(stack[safe], own.take(safe), guard))
+        kept = rows.take(np.r_[np.ones(old, bool), ~safe])
+        return replace(self, sums=sums, fitted=replace(self.fitted, rows=kept))
+
+    def _holds(self, fitted: Fitted) -> bool:
+        """Tell whether every row in the sums kept its side of the limits, and is straight as far as the point moved."""
+        guard, axis = self.sums.guard, fitted.rms / np.sqrt(3.0)
+        near = guard is None or guard.holds(fitted.step, fitted.sigma, fitted.medians, fitted.bend, axis)
+        return near and self._bent(fitted) < CURVED
+
+    def _bent(self, fitted: Fitted) -> float:
+        """Return by how many deviations the curvature of the rows in the sums moves a parameter at most.
+
+        Rows kept one by one tell what it leaves of the gap, which adds up over rows, and how it turns the columns. The
+        latter meets residuals that know nothing of it, so that its sum grows as the square root of the rows.
+        """
+        old, k = self.fitted.rows, len(fitted.step)
+        here, there = (linearised(old.campaign, point, self.choice) for point in (self.anchor, fitted.point))
+        curved, turned = here.copy(), there - here
+        curved[:, :, -1] = turned[:, :, -1] + here[:, :, :-1] @ fitted.step
+        turned[:, :, -1] = there[:, :, -1]
+        root, times = whitener(fitted.products[:-1, :-1]), self.sums.counts[1] / max(len(here), 1)
+        unit = np.sqrt((root**2).sum(axis=1)).clip(settings.TINY) * fitted.best.noise
+        shift = np.zeros(k)
+        for stack, factor in ((curved, times), (turned, np.sqrt(times))):
+            along = np.tensordot(fitted.sigma[::3] ** -2.0, products(stack, old.weights), 1)[:k, -1] * factor
+            shift += np.abs(root @ (root.T @ along)) / unit
+        return float(shift.max(initial=0.0))
+
+
+def summed(choice: Choice, rows: Rows, at: State, guard: Guard | None = None) -> Sums:
+    """Return the sums of rows linearised at the point of a state."""
+    return Sums.of(linearised(rows.campaign, at.point, choice, rivals=True), rows, guard)
+
+
+def split(choice: Choice, begin: State) -> tuple[Sums, NDArray[np.int64]]:
+    """Form the sums of many rows, linearised near their fit (``begin``); with the numbers (n,) of the other rows."""
+    rows, guard = _guarded(choice, begin)
+    total, scores = summed(choice, rows.take(slice(0)), begin, guard), []
+    for part in chunks(len(rows.aside)):
+        own = rows.take(part)
+        stack = linearised(own.campaign, begin.point, choice, rivals=True)
+        total = total.plus(Sums.of(stack, own, guard))
+        scores.append(np.zeros(len(stack)) if guard is None else guard.scores(stack, own.weights))
+    kept, reach = _kept(np.concatenate(scores), guard)
+    left = total.plus(summed(choice, rows.take(kept), begin, guard), -1)
+    return replace(left, guard=None if guard is None else replace(guard, reach=reach)), kept
+
+
+def _sample(rows: int) -> NDArray[np.int64]:
+    """Return the numbers of rows, evenly spread, that stand for so many."""
+    return np.linspace(0, rows - 1, min(KEPT, rows)).astype(np.int64)
+
+
+def _kept(scores: Array, guard: Guard | None) -> tuple[NDArray[np.int64], float]:
+    """Return which rows are kept one by one, and up to which reach the others are safe."""
+    if guard is None:
+        return _sample(len(scores)), 0.0
+    count = min(max(KEPT, int((scores < 0.0).sum()) + KEPT // 2), len(scores))
+    order = np.argsort(scores, kind="stable")
+    return np.sort(order[:count]), float(scores[order[min(count, len(scores) - 1)]])
+
+
+def _guarded(choice: Choice, begin: State) -> tuple[Rows, Guard | None]:
+    """Weigh all rows at the point, and find the trust region of their sums, its reach still open."""
+    rows = begin.rows
+    if choice.judge is not None:
+        return rows, None
+    gap = residual(rows.campaign, begin.point, choice)
+    found = weighed(choice, summed(choice, rows.take(slice(0)), begin), begin, gap)
+    some = rows.take(_sample(len(rows.aside)))
+    stack, share = linearised(some.campaign, begin.point, choice), len(rows.aside) / len(some.aside)
+    metric = np.tensordot(found.sigma[::3] ** -2.0, products(stack, np.ones(len(stack))), 1)[:-1, :-1] * share
+    prior = joined([item.sizes for item in choice.blocks])
+    metric += np.diag(np.r_[np.full(len(metric) - len(prior), LOOSE), prior] ** -2.0)
+    left = axis_noise(found.medians * found.sigma[::3], begin.leverage)
+    quiet = found.held > 0.0 and bool((left < settings.NOISE_SLACK * found.sigma[::3]).all())
+    share, typical = float(np.median(moves(stack, metric, found.sigma))), len(rows.aside) ** -0.5
+    return found.rows, Guard(metric, 0.0, share, typical, found.sigma, found.medians, found.bend, quiet)

@@ -1,0 +1,406 @@
+"""Update of a diagnosis with new rows: its choice of effects is held while they agree with it, all else fitted anew."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any, NamedTuple, Protocol
+from weakref import WeakKeyDictionary
+
+import numpy as np
+from threadpoolctl import threadpool_limits
+
+from thermal_robot.arrays import Array
+from thermal_robot.campaign import Campaign
+from thermal_robot.campaign.more_rows import more_rows
+from thermal_robot.correction import CorrectedModel
+from thermal_robot.diagnosis.agreement import Agreement, Watch, beyond, misfits, scatter_of
+from thermal_robot.diagnosis.parts import Unexplained
+from thermal_robot.diagnosis.sequential import KEPT, Fitted, Sequential, State, normal
+from thermal_robot.diagnosis.settings import LOOSE
+from thermal_robot.diagnosis.sufficient import Choice, Judge, Point, Rows, Sums, joined, linearised
+from thermal_robot.diagnosis.tabled import LEVELS
+from thermal_robot.effects import Effect, gate, library
+from thermal_robot.errors import EstimationError
+from thermal_robot.inference import settings
+from thermal_robot.inference.columns import Block, block, unknown_frames
+from thermal_robot.inference.evidence import evidence
+from thermal_robot.inference.explain import log_priors
+from thermal_robot.inference.fit import Fit
+from thermal_robot.inference.inside import identified
+from thermal_robot.inference.robust import Noise
+from thermal_robot.inference.rows import blocks, each
+from thermal_robot.observations import observe
+from thermal_robot.prediction import moves
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+RIVALS, LEAST_RIVAL = 8, 1e-3
+"""Combinations that are weighed again with the new rows, and their least probability against the chosen one: one of a
+thousandth needs rows that say as much as a deviation of 3.7 before it is the better one."""
+MOST_LEAD = 20.0
+"""Log odds that are told at most: beyond 5e8 : 1 nobody asks how many."""
+
+
+class Runner(NamedTuple):
+    """A combination that may come first: blocks of a :class:`Choice`, log prior odds less the chosen one's, names."""
+
+    blocks: tuple[int, ...]
+    log_prior: float
+    names: tuple[str, ...]
+
+
+def rivals(fit: Fit) -> list[tuple[int, ...]]:
+    """Return the combinations of blocks that came nearest to the chosen one, most probable first."""
+    e = fit.explanation
+    known = [(c.blocks, p) for c, p in zip(e.combinations, e.probabilities, strict=True)]
+    own = max((p for blocks, p in known if blocks == e.best.blocks), default=1.0)
+    found = [blocks for blocks, p in known if blocks != e.best.blocks and LEAST_RIVAL * own <= p]
+    return list(dict.fromkeys(found))[:RIVALS]
+
+
+def chosen(fit: Fit) -> tuple[Choice, list[Runner]]:
+    """Return what a diagnosis chose, the effects of its fit in their settings, and the combinations that came near.
+
+    Where a discrepancy was found beside them, rows keep the weight that they had: it took part in weighing them, and is
+    told from all rows together.
+    """
+    e, near, prior = fit.explanation, rivals(fit), log_priors([item.effect for item in fit.explanation.linear.blocks])
+    further = sorted({b for found in near for b in found} - {*e.best.blocks})
+    place = {b: k for k, b in enumerate((*e.best.blocks, *further))}
+    odds = [sum(prior[b] for b in found) - sum(prior[b] for b in e.best.blocks) for found in near]
+    runners = [
+        Runner(tuple(sorted(place[b] for b in found)), own, tuple(dict.fromkeys(fit.families[b] for b in found)))
+        for found, own in zip(near, odds, strict=True)
+    ]
+    pairs = zip(e.best.blocks, (effect for effect, _ in fit.effects), strict=True)
+    judge = Judge(_point(fit), e.whitening.noise * e.best.noise, fit.campaign.samples)
+    choice = Choice(
+        tuple(_without_columns(fit, e.linear.blocks[b], effect) for b, effect in pairs),
+        tuple(_without_columns(fit, e.linear.blocks[b], e.linear.blocks[b].effect) for b in further),
+        e.linear.measures,
+        Noise(fit.campaign.noise_position, fit.campaign.noise_orientation),
+        None if e.discrepancy.form is None else judge,
+    )
+    return choice, runners
+
+
+def log_odds(estimate: Sequential, listed: Sequence[Runner]) -> Array:
+    """(R,) log Bayes factor of each combination against the chosen one, prior odds included, by all rows so far."""
+    choice, fitted = estimate.choice, estimate.fitted
+    stack = linearised(fitted.rows.campaign, fitted.point, choice, rivals=True)
+    total = estimate.sums.after(fitted.step, stack.shape[2]).plus(Sums.of(stack, fitted.rows))
+    gram = normal(choice, total, fitted, rivals=True)[2]
+    own = evidence(gram, tuple(range(len(choice.blocks))), 0.0, fitted.best)
+    return np.array([evidence(gram, r.blocks, r.log_prior, own).log_evidence - own.log_evidence for r in listed])
+
+
+def _without_columns(fit: Fit, item: Block, effect: Effect) -> Block:
+    """Return a block with no rows, of the effect as a model holds it."""
+    nothing = np.zeros((0, fit.explanation.linear.measures, len(item.sizes)))
+    return Block(gate.delivered(effect, fit.nominal), item.bare, nothing, item.sizes, item.spread)
+
+
+def _point(fit: Fit) -> Point:
+    return Point(fit.corrected.frames, joined([values for _, values in fit.effects]))
+
+
+def fixed_point(fit: Fit) -> Sequential:
+    """Return the fit of a diagnosis at its fixed point, ready to take in more rows."""
+    e, point, flat = fit.explanation, _point(fit), len(unknown_frames(fit.campaign))
+    leverage = (e.best.effective + flat) / max(e.problem.equations + flat, 1)
+    rows = Rows(fit.campaign, e.whitening.weights, e.outliers)
+    step = np.zeros(flat + len(point.values))
+    begin = State(point, step, rows, e.whitening.noise, e.whitening.held, leverage)
+    return Sequential.of(chosen(fit)[0], (rows,), begin)
+
+
+def watch(fit: Fit) -> Watch:
+    """Return what new rows are compared with."""
+    e, kept = fit.explanation, ~fit.explanation.outliers
+    left = (fit.corrected.gap / (e.whitening.sigma() * e.best.noise))[kept]
+    first = [own[0] for own in fit.variants.values() if own]
+    tested = [_without_columns(fit, block(fit.nominal, effect), effect) for effect in first]
+    apart = [own[kept] for own in each(blocks(fit.campaign)) if own[kept].any()]
+    scatter, aside = scatter_of(left, apart), int(e.outliers.sum())
+    return Watch(tuple(item for item in tested if len(item.sizes)), scatter, aside, fit.campaign.samples)
+
+
+def independent_rows(fit: Fit) -> bool:
+    """Tell whether rows count by themselves: whether nothing of what remains is drawn anew in every pose or visit."""
+    return fit.explanation.whitening.smooth is None
+
+
+class Diagnosed(Protocol):
+    """What of a :class:`~thermal_robot.Diagnosis` rows are added to."""
+
+    @property
+    def campaign(self) -> str: ...  # noqa: D102
+    @property
+    def samples(self) -> int: ...  # noqa: D102
+    @property
+    def usable(self) -> bool: ...  # noqa: D102
+    @property
+    def reason(self) -> str: ...  # noqa: D102
+    @property
+    def model(self) -> CorrectedModel: ...  # noqa: D102
+    @property
+    def fit(self) -> Fit | None: ...  # noqa: D102
+    @property
+    def unexplained(self) -> Unexplained: ...  # noqa: D102
+    @property
+    def remaining(self) -> Unexplained | None: ...  # noqa: D102
+
+
+_BEGUN: WeakKeyDictionary[Fit, tuple[Sequential, Watch, tuple[Runner, ...]]] = WeakKeyDictionary()
+
+
+def start(fit: Fit) -> tuple[Sequential, Watch, tuple[Runner, ...]]:
+    """Return what the updates of a diagnosis begin with; its rows are passed over once.
+
+    Of the combinations that came near, those are watched that are behind: what was preferred stays preferred.
+    """
+    if not independent_rows(fit):
+        raise EstimationError(
+            f"{fit.campaign.name}: what remains is drawn anew in every pose or visit, and how rows count depends "
+            "on all of them; diagnose old and new rows together"
+        )
+    if fit not in _BEGUN:
+        estimate, runners = fixed_point(fit), chosen(fit)[1]
+        gains = log_odds(estimate, runners) if runners else ()
+        behind = tuple(runner for runner, gain in zip(runners, gains, strict=True) if gain < 0.0)
+        _BEGUN[fit] = estimate, watch(fit), behind
+    return _BEGUN[fit]
+
+
+def prepare(found: Diagnosed) -> None:
+    """Form the sums of a diagnosis of many rows: the pass over them is a part of it, not of an update."""
+    if found.usable and found.fit is not None and found.samples > 2 * KEPT and independent_rows(found.fit):
+        start(found.fit)
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Updated:
+    """A diagnosis whose effects stand, with new rows: its parameters, noise and model by all rows.
+
+    Attributes
+    ----------
+    diagnosis
+        Where it began; its effects are held.
+    outliers
+        Row numbers of the last new rows that are set aside, as their table counts them.
+    model
+        The corrected model by all rows.
+    agreement
+        How well the last new rows agreed with the model that did not know them.
+    estimate, watch
+        The fit to all rows; what new rows are compared with.
+    wider
+        (P,) by how much the diagnosis widened each deviation for what it could not explain.
+    runners, rival, lead
+        Combinations that may come first; the best of them by all rows so far, and its log odds against the chosen one.
+    fallen
+        What new rows said against the choice, one sentence a reason; it stays.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import thermal_robot as tr
+    >>> campaign, new = tr.demo_campaign(), np.arange(120) % 6 == 0
+    >>> found = tr.diagnose(campaign.take(~new))
+    >>> updated = found.update(campaign.take(new))
+    >>> updated.samples, updated.choice_stands, updated.reason
+    (120, True, '')
+    >>> updated.parameters.shape == found.parameters.shape
+    True
+    """
+
+    diagnosis: Diagnosed
+    fit: Fit
+    estimate: Sequential
+    watch: Watch
+    runners: tuple[Runner, ...]
+    wider: Array
+    model: CorrectedModel
+    agreement: Agreement
+    outliers: tuple[int, ...] = ()
+    rival: tuple[str, ...] = ()
+    lead: float = -np.inf
+    fallen: tuple[str, ...] = ()
+
+    def update(self, rows: Campaign | pd.DataFrame) -> Updated:
+        """Add more rows; see :meth:`Diagnosis.update <thermal_robot.Diagnosis.update>`."""
+        rows = more_rows(self.fit.campaign, rows, self.model.needs)
+        with threadpool_limits(1):  # as in a diagnosis: matrices are small
+            new = Rows.weighed(self.estimate.choice, rows)
+            after = replace(self, estimate=self.estimate.plus(new))
+            if rows.samples:
+                after = self._compared(after.estimate, new)
+        return replace(after, model=after._model(rows), outliers=tuple(rows.rows[after.estimate.aside].tolist()))
+
+    def _compared(self, estimate: Sequential, new: Rows) -> Updated:
+        """Return the same with all rows, and what the new ones say of the choice."""
+        agreement, rival, lead = self.watch.look(self.estimate, new, self.agreement), self.rival, self.lead
+        if self.runners:
+            gains = log_odds(estimate, self.runners)
+            rival, lead = self.runners[int(np.argmax(gains))].names, float(gains.max())
+        outside = beyond(self.model.spread, new.campaign, self.estimate.samples)
+        found = [*misfits(agreement), *outside, *self._testable(new)]
+        if not estimate.fitted.steady:
+            found.append("The fit of the chosen effects to all rows does not come to rest.")
+        fallen = tuple(dict.fromkeys((*self.fallen, *found)))
+        return replace(self, estimate=estimate, agreement=agreement, rival=rival, lead=lead, fallen=fallen)
+
+    def _testable(self, new: Rows) -> Iterator[str]:
+        """Yield the effects that could not be tested, and can be with what the new rows recorded."""
+        known = library()
+        if asked := {name: needs for name, needs in self.fit.needs.items() if name in known}:
+            old = self.estimate.fitted
+            both = observe(Rows.joined(old.rows, new).campaign, old.point.frames)
+            for name, needs in asked.items():
+                if not gate.missing(known[name], both):
+                    yield f"{name} could not be tested without {', '.join(needs)}, and now can be."
+
+    def _model(self, new: Campaign) -> CorrectedModel:
+        """Return the corrected model by all rows, measured where these are, too."""
+        fitted, choice, known = self.estimate.fitted, self.estimate.choice, self.model.spread
+        model = replace(self.model, frames=fitted.point.frames, effects=tuple(choice.split(fitted.point.values)))
+        if known is None:
+            return model
+        values = {**new.covariates, **dict(zip(new.robot.joint_names, new.q.T, strict=True))}
+        ranges = {
+            name: (
+                float(np.min(values.get(name, low), initial=low)),
+                float(np.max(values.get(name, high), initial=high)),
+            )
+            for name, (low, high) in known.ranges.items()
+        }
+        covariance = _covariance(fitted, choice, unknown_frames(self.fit.campaign))
+        spread = replace(known, covariance=covariance, prior=fitted.expected(choice), ranges=ranges)
+        return replace(model, spread=spread)
+
+    @property
+    def samples(self) -> int:
+        """Rows so far, those of the diagnosis included."""
+        return self.estimate.samples
+
+    @property
+    def choice_stands(self) -> bool:
+        """Whether nothing speaks against the effects, settings and places that the diagnosis chose.
+
+        What new rows said against it stays; that other effects explain all rows better may change with more rows.
+        """
+        return not self.reason
+
+    @property
+    def reason(self) -> str:
+        """Why the choice is to be made anew, in plain words; empty while it stands."""
+        if self.lead <= 0.0:  # a fresh diagnosis takes the more probable combination, however little it is ahead
+            return " ".join(self.fallen)
+        own = dict.fromkeys(item.effect.name for item in self.estimate.choice.blocks)
+        told, before = (" and ".join(some) or "no effect" for some in (self.rival, own))
+        rest = f"rather than {before}" if {*self.rival} != {*own} else "in other settings or places than chosen"
+        odds = np.exp(min(self.lead, MOST_LEAD))
+        return " ".join((*self.fallen, f"All rows together speak for {told}, {rest} (odds {odds:.2g} : 1)."))
+
+    @property
+    def noise(self) -> float:
+        """One sigma per axis of what remains beside the effects, m."""
+        return float(self.estimate.fitted.noise[0])
+
+    @property
+    def noise_orientation(self) -> float | None:
+        """The same of orientations, rad; ``None`` without them."""
+        return float(self.estimate.fitted.noise[3]) if self.estimate.choice.measures == 6 else None
+
+    @property
+    def rms_after(self) -> float:
+        """Root mean square of the remainder, m, over the rows that are not set aside."""
+        return float(self.estimate.fitted.rms[0])
+
+    @property
+    def rms_after_orientation(self) -> float | None:
+        """The same of orientations, rad; ``None`` without them."""
+        return float(self.estimate.fitted.rms[1]) if self.estimate.choice.measures == 6 else None
+
+    @property
+    def anew(self) -> bool:
+        """Whether all old rows were looked at again, since the parameters had moved too far for their sums."""
+        return self.estimate.anew
+
+    @property
+    def parameters(self) -> pd.DataFrame:
+        """Parameters of the effects that are held, as the model has them, SI.
+
+        Index (effect, parameter); columns ``value``, ``std`` (one sigma), ``unit`` and ``identified``. Where the
+        diagnosis widened deviations for what it could not explain, they are wider by the same factor.
+        """
+        import pandas as pd
+
+        choice, fitted = self.estimate.choice, self.estimate.fitted
+        listed = [(item.effect.name, p) for item in choice.blocks for p in item.bare]
+        std = fitted.deviations * self.wider
+        return pd.DataFrame(
+            {
+                "value": fitted.point.values,
+                "std": std,
+                "unit": [p.unit for _, p in listed],
+                "identified": identified(std, fitted.expected(choice)),
+            },
+            index=pd.MultiIndex.from_tuples([(name, p.name) for name, p in listed], names=LEVELS),
+        )
+
+    def to_dict(self) -> dict[str, Any]:
+        """Return plain values, SI, ready for JSON: schema ``thermal-robot/updated/1``."""
+        names = ("samples", "choice_stands", "reason", "noise", "noise_orientation", "rms_after")
+        told = {name: getattr(self, name) for name in (*names, "rms_after_orientation")}
+        table = self.parameters.reset_index().rename(columns={"parameter": "name"})
+        return {
+            "schema": "thermal-robot/updated/1",
+            "campaign": self.diagnosis.campaign,
+            **told,
+            "outliers": list(self.outliers),
+            "parameters": table.to_dict("records"),
+        }
+
+    def __repr__(self) -> str:
+        names = ", ".join(effect.name for effect, _ in self.model.effects) or "no effect"
+        state = "the choice stands" if self.choice_stands else "to be diagnosed anew"
+        return f"Updated({self.diagnosis.campaign!r}: {names}; {self.samples} rows; {state})"
+
+    def __str__(self) -> str:
+        return "\n\n".join([repr(self), *([self.reason] if self.reason else []), str(self.parameters)])
+
+
+def update(found: Diagnosed, rows: Campaign | pd.DataFrame) -> Updated:
+    """Add rows to a diagnosis; see :meth:`Diagnosis.update <thermal_robot.Diagnosis.update>`.
+
+    Raises :class:`EstimationError` if it says nothing of the robot, or was made without its fit.
+    """
+    if not found.usable:
+        raise EstimationError(f"{found.campaign}: nothing is known of the robot that rows could add to. {found.reason}")
+    if found.fit is None:
+        raise EstimationError(f"{found.campaign}: this diagnosis was made without its fit; diagnose the rows")
+    with threadpool_limits(1):
+        estimate, watched, runners = start(found.fit)
+    wider = _widened(found, found.fit, estimate.fitted.deviations)
+    return Updated(found, found.fit, estimate, watched, runners, wider, found.model, Agreement()).update(rows)
+
+
+def _widened(found: Diagnosed, fit: Fit, own: Array) -> Array:
+    """(P,) by how much the diagnosis widened each deviation for what it could not explain; ``own`` are at rest."""
+    left, e = found.unexplained if found.remaining is None else found.remaining, fit.explanation
+    if not left.flagged:
+        return np.ones_like(own)
+    told = joined([np.sqrt(np.maximum(np.diag(e.values[b][1]), 0.0)) for b in e.best.blocks])
+    return np.maximum(told / np.maximum(own, settings.TINY), 1.0)
+
+
+def _covariance(fitted: Fitted, choice: Choice, names: tuple[str, ...]) -> Array:
+    """(K, K) covariance of frames and parameters by all rows, without what turns the target and does not move it."""
+    precision = fitted.precision(np.maximum(fitted.expected(choice), settings.TINY), frames=LOOSE)
+    unit = precision.diagonal() ** -0.5
+    inner = np.linalg.inv(precision * np.outer(unit, unit))
+    moving = np.r_[moves(names), np.ones(len(fitted.point.values), dtype=bool)]
+    return np.asarray((np.outer(unit, unit) * (inner + inner.T) / 2.0)[np.ix_(moving, moving)])
