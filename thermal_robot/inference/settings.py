@@ -59,10 +59,11 @@ RUNG_REACH = 5.4
 # --- rounding ---
 
 ROUNDING = 1e-9
-"""m and rad: no table and no robot is more accurate."""
+"""m and rad: no table and no robot is more accurate; a smaller step of the frames is their last."""
 UNSEEN, ALIAS = 1e-12, 1e-6
-"""m and rad: what an expected size moves by less is rounding. Of a column's length: where less is left of it once
-others are projected out, it is an exact alias of them."""
+"""m and rad: what an expected size moves by less is rounding, as is a smaller distance. Of a column's length: where
+less is left of it once others are projected out, it is an exact alias of them; a joint that moves the target by less of
+what others do cannot be seen to scatter."""
 TINY, BETTER = 1e-300, 1e-9
 """Keeps a quotient of nothing from being infinite; and log evidence, natural logarithm: a smaller difference makes no
 explanation better than another."""
@@ -89,9 +90,8 @@ BEND_LEVEL = 0.01
 """Share of sound rows that weigh less than fully (Huber's bend)."""
 MOST_OUTLIERS = 0.25
 """Of the rows: more are not gross errors but another motion."""
-CAUCHY_SCALE, NO_DISTANCE = 1.5, 1e-12
-"""Times the median distance: the scale of the weights that find the frames, as a third of the rows may be wrong; and m,
-added to it, for rows that fit exactly."""
+CAUCHY_SCALE = 1.5
+"""Times the median distance: the scale of the weights that find the frames, as a third of the rows may be wrong."""
 CAUCHY_ROUNDS = 4
 """Rounds of weights and noise in a scan: they settle to a per cent."""
 RUN = 3
@@ -105,9 +105,8 @@ for scatter, the others must still speak for it: of normal scatter they hold a q
 START_ROWS = 400
 """Rows on which the frames' starts are compared: these frames are then known far better than any start needs."""
 START_ROUNDS, START_SETTLED = 200, 1e-5
-"""Alternations of base and tool at most, and the relative change of the median distance at which they end."""
-REFINE_ROUNDS, REFINE_SETTLED = 60, 1e-9
-"""Gauss-Newton steps of the frames at most, and the step (m, rad) at which they end."""
+"""Alternations of base and tool at most, and steps of the frames; the relative change of the median distance at which
+alternations end."""
 TARGET_STARTS = np.vstack([np.zeros(3), 0.2 * np.eye(3), -0.2 * np.eye(3)])
 """m: where the target may sit on the tool frame; from each the fit reaches 0.3 m."""
 SPARE_EQUATIONS = 6
