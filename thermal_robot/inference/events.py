@@ -77,7 +77,7 @@ class _Sums:
         if not len(runs):
             return np.zeros(2, dtype=np.int64)
         sums = self.summed[runs[:, 1]] - self.summed[runs[:, 0]]
-        return runs[int(np.argmax(self.gains(sums, self.total, self.freedom)))]
+        return np.asarray(runs[int(np.argmax(self.gains(sums, self.total, self.freedom)))])
 
     def best_step(self) -> Runs:
         """Return the best run from the first row, or to the last."""

@@ -306,14 +306,14 @@ class Scatter:
         means over ``visits`` (N,) of a pose, what comes anew at each visit averages out, what a pose brings does not: S
         is (N + J Λ_v Jᵀ)/k + N₀ + J Λ_u Jᵀ, and the joint's own scatter by visit counts as an error of the mean.
         """
-        column = sensitivity[:, : len(self.noise), joint]
-        noise, over = self.noise, 1.0 if visits is None else visits
+        noise, anew, over = self.noise, 0.0, np.ones(len(residual))
         if visits is not None:
-            noise = np.sqrt(self.noise**2 / visits[:, None] + self.common**2)
-        covariance = self.covariance(sensitivity, noise, joint, over)
-        weighted = np.linalg.solve(covariance, column[:, :, None])[:, :, 0]
+            over = visits.astype(float)
+            noise = np.sqrt(self.noise**2 / over[:, None] + self.common**2)
+            anew = sum(c.sigma**2 for c in self.chosen("visit") if c.joint == joint)
+        column = sensitivity[:, : len(self.noise), joint]
+        weighted = np.linalg.solve(self.covariance(sensitivity, noise, joint, over), column[:, :, None])[:, :, 0]
         known = (weighted * column).sum(axis=1) + settings.TINY
-        anew = 0.0 if visits is None else sum(c.sigma**2 for c in self.chosen("visit") if c.joint == joint)
         return (weighted * residual).sum(axis=1) / known, 1.0 / known + anew / over
 
 
