@@ -64,8 +64,8 @@ class _Sums:
 
     def gains(self, sums: Array, total: float, freedom: int) -> Array:
         """(C,) log evidence gained by a move of some rows (:attr:`Worth.gain`), from (C, ·) sums over these rows."""
-        _, d, r = self.size
-        whole, design = sums[:, : d * d].reshape(-1, d, d), sums[:, d * d : d * (d + r)].reshape(-1, r, d)
+        (_, d, r), runs = self.size, len(sums)
+        whole, design = sums[:, : d * d].reshape(runs, d, d), sums[:, d * d : d * (d + r)].reshape(runs, r, d)
         gram = whole - design.transpose(0, 2, 1) @ design
         explained, rank = explained_by(gram, sums[:, d * (d + r) :], np.einsum("cii->ci", whole))
         rest = np.maximum(total - explained, settings.TINY)
