@@ -35,7 +35,7 @@ def shifted(kind, size, **options):
         return measured(base=moved, **options)
     if kind == "tool":
         return measured(tool=exp6(size * np.array([0.6, 0.5, -0.62, 0.0, 0.0, 0.0])) @ TOOL, **options)
-    return measured({"joint_offset": {"joint_2": size}}, **options)
+    return measured({"joint_offset": {"joint_2": size}} if size else None, **options)
 
 
 def found(campaign, *only):
@@ -56,6 +56,14 @@ def test_rows_that_go_together_are_one_event_at_its_place(kind, span):
     true[slice(*span)] = True
     assert (inside == true).all() or (inside == ~true).all()
     assert first.shape == ("run" if span == (35, 55) else "step")
+
+
+def test_an_event_is_found_where_no_frame_is_fitted():
+    """A joint alone, as base and target are known; nothing is then projected out."""
+    known = {"base_known": True, "tool_known": True, "target": TOOL[:3, 3]}
+    one, other = (replace(shifted("joint", size, base=np.eye(4)), **known) for size in (0.0, 1e-3))
+    _, (first, *_) = found(spliced(one, other, slice(0, 30)))
+    assert (first.kind, first.place, first.shape) == ("joint", "joint_2", "step")
 
 
 def test_half_the_rows_of_a_session_that_were_set_aside_are_an_event_of_the_session():

@@ -11,7 +11,7 @@ from thermal_robot import diagnose
 from thermal_robot.diagnosis.findings import random_findings
 from thermal_robot.effects import choose
 from thermal_robot.inference.fit import fit
-from thermal_robot.inference.random_gap import _Mean, _pose_errors, random_gap
+from thermal_robot.inference.random_gap import _means, random_gap
 from thermal_robot.inference.scatter import JointScatter, Scatter
 from thermal_robot.kinematics import Displacement, frame_jacobians
 from thermal_robot.observations import Frames, observe
@@ -116,9 +116,9 @@ def test_the_error_of_a_pose_varies_as_its_variance_says(rv_m2):
     sensitivity = frame_jacobians(rv_m2, q, point=[0, 0, 0.08])[number][:, :3]
     own, steps, wear, own_wear, common = 1e-4, 2e-4, 3e-4, 1e-4, 0.5
     parts = (("pose", 1, own), ("pose", 2, steps), ("visit", 3, wear), ("visit", 1, own_wear))
-    components = tuple(JointScatter(kind, j, sigma, 0.0, 1.0, 9.0, True) for kind, j, sigma in parts)
+    components = tuple(JointScatter(kind, j, sigma, 0.0, 1.0) for kind, j, sigma in parts)
     noise = np.full(3, NOISE)
-    scatter = Scatter(("visit", "pose"), components, {"visit": 1.0, "pose": 1.0}, noise, common)
+    scatter = Scatter(("visit", "pose"), components, {"visit": 1.0, "pose": 1.0}, noise, common * noise)
     ratios = []
     for _ in range(800):
         true = own * rng.normal(size=9)
@@ -128,7 +128,7 @@ def test_the_error_of_a_pose_varies_as_its_variance_says(rv_m2):
         joint[:, 2] = steps * rng.normal(size=9)[number]
         joint[:, 3] = wear * rng.normal(size=len(number))
         gap = gap + np.einsum("nij,nj->ni", sensitivity, joint)
-        errors, variance = _pose_errors(scatter, gap, sensitivity, _Mean(number, np.ones(len(number))), 1, noise)
+        errors, variance = scatter.errors(1, _means(gap, number), _means(sensitivity, number), visits)
         ratios.append((errors - true) ** 2 / variance)
     # a χ² of one degree of freedom varies by 2: its mean over 800 draws by 0.05
     np.testing.assert_allclose(np.mean(ratios, axis=0), 1.0, atol=0.2)

@@ -26,7 +26,7 @@ def drawn(seed, poses=30, repeats=3, measures=3, noise=1.0, visit=2.0, pose=3.0,
 
 
 def rows_of(values, columns, number, freedom=0):
-    return independent_rows(values, columns, number, np.ones(len(values)), freedom)
+    return independent_rows(values, columns, number, freedom)
 
 
 def raw_density(values, columns, number, lever, logs):
@@ -197,10 +197,10 @@ def test_what_a_variance_costs_is_the_mean_of_its_likelihood_over_the_grid(size)
         values, columns, number = drawn(seed, repeats=1, poses=60, visit=0.0, pose=size, common=0.0)
         law = Likelihood(rows_of(values, columns, number), (True,))
         fitted = law.fit((POSE,))
-        factor, counted = law._factors((POSE,))
+        density = law.density((POSE,))
 
-        def likelihood(log, law=law, fitted=fitted, factor=factor, counted=counted):
-            return np.exp(law._at(np.array([fitted.logs[0], log]), factor, counted)[0] - fitted.value)
+        def likelihood(log, density=density, fitted=fitted):
+            return np.exp(density(np.array([fitted.logs[0], log]))[0] - fitted.value)
 
         mean = quad(likelihood, *ends, limit=200)[0] / np.ptp(ends)
-        assert law.log_widths(fitted, (POSE,)) == pytest.approx(np.log(mean), abs=0.35)
+        assert law.log_widths(fitted) == pytest.approx(np.log(mean), abs=0.35)

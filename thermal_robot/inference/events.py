@@ -1,4 +1,4 @@
-"""Events: from one row to another, or in one session, base, tool or a joint's zero stands elsewhere than in the others.
+"""Change points: from one row to another, or in one session, base, tool or a joint's zero stands elsewhere.
 
 Every run of rows in the order of measurement is weighed at every place by a likelihood ratio (Page, *Biometrika* 42,
 1955, for one change; Siegmund, *Annals of Statistics* 14, 1986, for a run between two), from cumulative sums, so that
@@ -20,6 +20,7 @@ from thermal_robot.effects.law import Discovered
 from thermal_robot.effects.quantities import quantity, unit
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block
+from thermal_robot.inference.explain import log_odds
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.rows import in_order
 from thermal_robot.inference.target import Target, explained_by
@@ -32,93 +33,110 @@ Runs = NDArray[np.int64]
 
 @dataclass(frozen=True, eq=False)
 class _Sums:
-    """A place's moves in a remainder, row after row in the order of measurement, and their sums up to each row.
+    """Products of a place's d moves in each row (N, ·), in the order of measurement, and their cumulative sums.
 
-    ``own`` holds (N, ·) the flat products of a row: moves with themselves, with the design, and with the remainder.
+    They are those with each other, with the r columns of the design, and with the residual, of which ``squares`` (N,)
+    are the squared lengths; ``total`` and ``freedom`` as of a :class:`~thermal_robot.inference.target.Seat`.
     """
 
-    own: Array
+    products: Array
     summed: Array
-    moves: Array
-    white: Array
-    rank: int
+    squares: Array
+    size: tuple[int, int, int]
     total: float
     freedom: int
 
     @classmethod
     def of(cls, target: Target, moves: Array, order: NDArray[np.int64]) -> _Sums:
-        """Sum the moves (N, m, d) of a place over a remainder."""
-        whitened = (moves * target.root[:, :, None])[order]
-        basis = target.basis.reshape(*target.root.shape, -1)[order]
-        white = target.white.reshape(target.root.shape)[order]
-        products = [
-            np.einsum("nmd,nme->nde", whitened, whitened),
-            np.einsum("nmr,nmd->nrd", basis, whitened),
-            np.einsum("nmd,nm->nd", whitened, white),
-        ]
-        own = np.concatenate([p.reshape(len(order), -1) for p in products], axis=1)
-        summed = np.concatenate([np.zeros((1, own.shape[1])), np.cumsum(own, axis=0)])
-        total = max(float((white**2).sum()), settings.TINY)
-        return cls(own, summed, whitened, white, basis.shape[2], total, target.freedom)
+        """Sum the moves (N, m, d) of a place over a residual."""
+        (rows, m, d), seat = moves.shape, target.seat(moves)
+        parts = (seat.weight, seat.design.transpose(2, 0, 1), seat.remainder)
+        products = np.concatenate([part.reshape(rows, -1) for part in parts], axis=1)[order]
+        summed = np.concatenate([np.zeros((1, products.shape[1])), np.cumsum(products, axis=0)])
+        squares = (target.white.reshape(rows, m) ** 2).sum(axis=1)[order]
+        return cls(products, summed, squares, (m, d, len(seat.design)), seat.total, seat.freedom)
 
-    def solved(self, sums: Array) -> tuple[Array, Array]:
-        """Return (C,) squares that a move of some rows explains, and its ranks, from (C, ·) sums over these rows."""
-        d, r = self.moves.shape[2], self.rank
-        runs = len(sums)
+    @property
+    def fewest(self) -> int:
+        """Number of rows that a run has at least, and leaves at either end."""
+        m, d, _ = self.size
+        return settings.FEWEST_ASIDE + -(-2 * d // m)
+
+    def gains(self, sums: Array, total: float, freedom: int) -> Array:
+        """(C,) log evidence gained by a move of some rows (:attr:`Worth.gain`), from (C, ·) sums over these rows."""
+        (_, d, r), runs = self.size, len(sums)
         whole, design = sums[:, : d * d].reshape(runs, d, d), sums[:, d * d : d * (d + r)].reshape(runs, r, d)
         gram = whole - design.transpose(0, 2, 1) @ design
-        return explained_by(gram, sums[:, d * (d + r) :], np.einsum("cii->ci", whole))
-
-    def gains(self, sums: Array, total: float | None = None, freedom: int | None = None) -> Array:
-        """Return (C,) log evidence gained (:class:`~thermal_robot.inference.target.Worth`)."""
-        total, freedom = total or self.total, freedom or self.freedom
-        explained, rank = self.solved(sums)
+        explained, rank = explained_by(gram, sums[:, d * (d + r) :], np.einsum("cii->ci", whole))
         rest = np.maximum(total - explained, settings.TINY)
         gain = 0.5 * freedom * np.log(total / rest) - 0.5 * rank * np.log(freedom)
         return np.where((rank == 0) | (freedom - rank < settings.FEWEST_LEFT), -np.inf, gain)
 
-    def of_rows(self, rows: Rows) -> float:
-        """Return the log evidence gained by a move of rows (N,), and by it in all but the few that are farthest off.
+    def best(self, runs: Runs) -> Runs:
+        """Return (2,) the run that gains most, or the empty one where there is none."""
+        if not len(runs):
+            return np.zeros(2, dtype=np.int64)
+        sums = self.summed[runs[:, 1]] - self.summed[runs[:, 0]]
+        return np.asarray(runs[int(np.argmax(self.gains(sums, self.total, self.freedom)))])
 
-        It is the smaller of both: in an event all rows share, in gross errors side by side a few.
+    def best_step(self) -> Runs:
+        """Return the best run from the first row, or to the last."""
+        rows = len(self.products)
+        inner = np.arange(self.fewest, rows - self.fewest + 1)
+        steps = [np.column_stack([0 * inner, inner]), np.column_stack([inner, 0 * inner + rows])]
+        return self.best(np.concatenate(steps))
+
+    def best_run(self) -> Runs:
+        """Return the best run between two changes: between marks that are spread evenly, then by pattern search."""
+        rows, least = len(self.products), self.fewest
+
+        def best(runs: Runs) -> Runs:
+            inside = (runs[:, 0] >= least) & (runs[:, 1] <= rows - least) & (runs[:, 1] - runs[:, 0] >= least)
+            return self.best(runs[inside])
+
+        marks = np.unique(np.linspace(least, rows - least, settings.EVENT_MARKS).round().astype(np.int64))
+        run, step = best(marks[np.column_stack(np.triu_indices(len(marks), 1))]), max(rows // settings.EVENT_MARKS, 1)
+        while step and run.any():
+            near = np.array([(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, 1), (-1, 1), (1, -1)])
+            better = best(run + step * near)
+            step = step if (better != run).any() else step // 2
+            run = better
+        return run
+
+    def shared(self, rows: Rows) -> float:
+        """Log evidence gained by a move of rows (N,), or if it is less by it in all but the few that are farthest off.
+
+        In an event all rows share, in gross errors side by side a few.
         """
-        far = np.where(rows, (self.white**2).sum(axis=1), -1.0)
-        few = max(int(np.ceil(settings.EVENT_CARRYING * rows.sum())), settings.FEWEST_ASIDE)
+        few, far = max(int(np.ceil(settings.EVENT_CARRYING * rows.sum())), settings.FEWEST_ASIDE), self.squares * rows
         out = np.argsort(-far)[:few]
         total = max(self.total - float(far[out].sum()), settings.TINY)
-        freedom = max(self.freedom - few * self.white.shape[1], 1)
-        whole = self.own[rows].sum(axis=0)
-        fewer = self.gains((whole - self.own[out].sum(axis=0))[None], total, freedom)
-        return float(min(self.gains(whole[None])[0], fewer[0]))
+        whole = self.products[rows].sum(axis=0)
+        less, freedom = whole - self.products[out].sum(axis=0), max(self.freedom - few * self.size[0], 1)
+        gain = self.gains(whole[None], self.total, self.freedom)[0]
+        return float(min(gain, self.gains(less[None], total, freedom)[0]))
 
 
 def events(fit: Fit) -> tuple[Discovered, ...]:
     """Events that may be at work in a fit: steps in time, runs, and sessions apart; the plainest first, one a place."""
     if fit.campaign.samples > settings.RIPPLE_ROWS or fit.campaign.samples < settings.FEWEST_WITH_EVENTS:
         return ()
-    observations = fit.corrected
-    order, labels = in_order(fit.campaign), fit.campaign.labels.get("session")
-    sessions = {} if labels is None else {str(label): labels == label for label in np.unique(labels)}
-    found: dict[tuple[str, str], tuple[float, Discovered]] = {}
-    places = list(_places(observations))
+    observations, order = fit.corrected, in_order(fit.campaign)
+    turns, joints = fit.campaign.measures == "pose", fit.campaign.robot.joint_names
+    plain = Discovered(quantity="none", shape="constant", turns=turns)
+    where = [("base", "base"), ("tool", "tool"), *(("joint", joint) for joint in joints)]
+    places = [replace(plain, kind=kind, place=place) for kind, place in where]
     moves = [block(observations, place).columns for place in places]
+    found: dict[tuple[str, str], tuple[float, Discovered]] = {}
     for target, instead in _targets(fit):
         for place, own in zip(places, moves, strict=True):
-            sums = _Sums.of(target, own, order)
-            for worth, law in _at_place(observations, place, sums, order, sessions, len(places)):
-                key = (law.kind, law.place)
-                if worth - instead > found.get(key, (0.0, law))[0]:
+            for gain, law in _at_place(observations, place, _Sums.of(target, own, order), order):
+                # the choice among all places and runs, and the law itself, are paid for
+                law = replace(law, tried=law.tried * len(places))
+                worth, key = gain + log_odds() - float(np.log(law.tried)), (law.kind, law.place)
+                if worth > 0.0 and worth - instead > found.get(key, (0.0, law))[0]:
                     found[key] = (worth - instead, law)
     return tuple(law for _, law in sorted(found.values(), key=lambda item: -item[0]))
-
-
-def _places(observations: Observations) -> Iterator[Discovered]:
-    """Yield a constant move at each place where an event may be: the base, the tool, the zero of a joint."""
-    plain = Discovered(quantity="none", shape="constant", turns=observations.campaign.measures == "pose")
-    yield replace(plain, kind="base", place="base")
-    yield replace(plain, kind="tool", place="tool")
-    for joint in observations.robot.joint_names:
-        yield replace(plain, kind="joint", place=joint)
 
 
 def _targets(fit: Fit) -> Iterator[tuple[Target, float]]:
@@ -152,73 +170,26 @@ def gathered(fit: Fit, aside: Rows) -> Rows:
 
 
 def _at_place(
-    observations: Observations,
-    place: Discovered,
-    sums: _Sums,
-    order: NDArray[np.int64],
-    sessions: dict[str, Rows],
-    places: int,
+    observations: Observations, place: Discovered, sums: _Sums, order: NDArray[np.int64]
 ) -> Iterator[tuple[float, Discovered]]:
-    """Yield what the best step, the best run and the best session at a place are worth, and their laws."""
-    rows, fewest = len(order), settings.FEWEST_ASIDE + -(-2 * sums.moves.shape[2] // sums.white.shape[1])
-    kinds = 3 if len(sessions) > 1 else 2
-    inner = np.arange(fewest, rows - fewest + 1)
-    steps = np.concatenate([np.column_stack([0 * inner, inner]), np.column_stack([inner, 0 * inner + rows])])
-    best = _plainest(sums, steps)
-    yield from _told(observations, place, sums, best, order, float(kinds * places * len(inner)))
-    best = _plainest(sums, _grid(rows, fewest))
-    step = max(rows // settings.EVENT_MARKS, 1)
-    while best is not None and step:
-        near = best + step * np.array([(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, 1), (-1, 1), (1, -1)])
-        good = (near[:, 0] >= fewest) & (near[:, 1] <= rows - fewest) & (near[:, 1] - near[:, 0] >= fewest)
-        better = _plainest(sums, near[good])
-        moved = better is not None and not np.array_equal(better, best)
-        best, step = (better, step) if moved else (best, step // 2)
-    yield from _told(observations, place, sums, best, order, float(kinds * places * len(inner) ** 2))
-    tried = float(kinds * places * len(sessions))
-    for number, own in sorted(enumerate(sessions.values()), key=lambda item: item[1].sum()):
-        if kinds == 3 and fewest <= own.sum() < rows - fewest:
-            law = replace(place, quantity="session", shape="apart", marks=(float(number),), labels=tuple(sessions))
-            worth = _worth(sums.of_rows(own[order]), tried)
-            if worth > 0.0:
-                yield worth, replace(law, origin=0.0, span=len(sessions) - 1.0, tried=tried)
-
-
-def _grid(rows: int, fewest: int) -> Runs:
-    """Return runs between marks that are spread evenly, none at either end."""
-    marks = np.unique(np.linspace(fewest, rows - fewest, settings.EVENT_MARKS).round().astype(np.int64))
-    first, last = np.triu_indices(len(marks), 1)
-    runs = np.column_stack([marks[first], marks[last]])
-    return runs[runs[:, 1] - runs[:, 0] >= fewest]
-
-
-def _plainest(sums: _Sums, runs: Runs) -> Runs | None:
-    """Return (2,) the run that gains most; ``None`` where there is none."""
-    return runs[int(np.argmax(sums.gains(sums.summed[runs[:, 1]] - sums.summed[runs[:, 0]])))] if len(runs) else None
-
-
-def _worth(gain: float, tried: float) -> float:
-    """Return what is left of a gain once the choice among all places and runs, and the law itself, are paid for."""
-    return float(gain + np.log(settings.PRIOR_PROBABILITY / (1.0 - settings.PRIOR_PROBABILITY)) - np.log(tried))
-
-
-def _told(
-    observations: Observations, place: Discovered, sums: _Sums, run: Runs | None, order: NDArray[np.int64], tried: float
-) -> Iterator[tuple[float, Discovered]]:
-    """Yield a run as a law of the clock, and what it is worth; nothing where the rows do not share in it."""
-    if run is None:
-        return
-    rows = np.zeros(len(order), dtype=bool)
-    rows[run[0] : run[1]] = True
-    worth = _worth(sums.of_rows(rows), tried)
+    """Yield what the best step, run and session at a place gain, and their laws, with how many were tried there."""
+    rows, labels = len(order), observations.campaign.labels.get("session")
+    sessions = {} if labels is None else {str(label): labels == label for label in np.unique(labels)}
+    kinds, inner = 3 if len(sessions) > 1 else 2, max(rows - 2 * sums.fewest + 1, 0)
     name = next((name for name in CLOCK if observations.varies(name)), "order")
-    clock = quantity(observations, name)
-    if worth <= 0.0 or clock is None:
-        return
-    ordered = clock[order]
-    ends = [0.5 * (ordered[k - 1] + ordered[k]) for k in run if 0 < k < len(order)]
-    if len(ends) > 1 and ends[0] == ends[1]:
-        return  # all of it at one time
-    law = replace(place, quantity=name, shape="step" if len(ends) == 1 else "run", marks=tuple(map(float, ends)))
-    law = replace(law, origin=float(clock.min()), span=float(np.ptp(clock)), unit=unit(observations.robot, name))
-    yield worth, replace(law, tried=tried)
+    clock = np.asarray(quantity(observations, name), dtype=float)
+    for run, tried in ((sums.best_step(), inner), (sums.best_run(), inner**2)):
+        inside, ordered = np.zeros(rows, dtype=bool), clock[order]
+        inside[run[0] : run[1]] = True
+        ends = tuple(float(0.5 * (ordered[k - 1] + ordered[k])) for k in run if 0 < k < rows)
+        if ends[:1] != ends[1:]:  # there is a run, and not all of it at one time
+            law = replace(place, quantity=name, shape="step" if len(ends) == 1 else "run", marks=ends)
+            law = replace(
+                law, origin=float(clock.min()), span=float(np.ptp(clock)), unit=unit(observations.robot, name)
+            )
+            yield sums.shared(inside), replace(law, tried=float(kinds * tried))
+    for number, own in sorted(enumerate(sessions.values()), key=lambda item: item[1].sum()):
+        if kinds == 3 and sums.fewest <= own.sum() < rows - sums.fewest:
+            law = replace(place, quantity="session", shape="apart", marks=(float(number),), labels=tuple(sessions))
+            law = replace(law, origin=0.0, span=len(sessions) - 1.0, tried=float(kinds * len(sessions)))
+            yield sums.shared(own[order]), law

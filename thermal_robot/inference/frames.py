@@ -1,4 +1,4 @@
-"""Unknown frames, fitted exactly before any effect: the tracker may stand anywhere, turned by any angle.
+"""Registration: base and tool frames that are unknown are fitted before any effect, wherever the tracker stands.
 
 From nothing, the rigid alignment of the base and the place of the target go by turns: each of the two is linear while
 the other is held, and a third of the rows may be grossly wrong. Starts go side by side, each until its own median
@@ -57,11 +57,8 @@ def starts(campaign: Paired) -> Array:
 
 def soft(distance: Array) -> Array:
     """Cauchy weights of distances (..., N) at the scale of their median: a third of the rows may be grossly wrong."""
-    return _soft(distance, middle(distance))
-
-
-def _soft(distance: Array, scale: Array) -> Array:
-    return np.asarray(1.0 / (1.0 + (distance / (settings.CAUCHY_SCALE * scale[..., None] + settings.NO_DISTANCE)) ** 2))
+    scale = settings.CAUCHY_SCALE * middle(distance)[..., None] + settings.UNSEEN
+    return np.asarray(1.0 / (1.0 + (distance / scale) ** 2))
 
 
 def middle(values: Array) -> Array:
@@ -92,31 +89,28 @@ def alternate(
     else:
         poses = tool_poses(campaign.robot, campaign.q[some]) if poses is None else poses
         origin, turns = poses[..., :3, 3], poses[..., :3, :3]
-    begun = declared.tool[:3, 3] if campaign.tool_known else targets
-    begun = np.array(np.broadcast_to(begun, (*lead, many, 3))).reshape(-1, 3)
-    repeated = _repeated(measured, lead, many), _repeated(origin, lead, many)
-    several = None if turns is None else _repeated(turns, lead, many, 3)
-    state = Alternating(*repeated, several, campaign.base_known, campaign.tool_known, declared.base, begun)
-    state.run(rounds)
-    best = np.arange(0, len(begun), many) + state.cost.reshape(-1, many).argmin(axis=1)
-    base = state.base[best].reshape(*lead, 4, 4)
-    tool = np.repeat(declared.tool[None], len(best), axis=0).reshape(*lead, 4, 4)
-    tool[..., :3, 3] = state.place[best].reshape(*lead, 3)
+
+    def repeated(own: Array, axes: int) -> Array:
+        """(S, ...) columns side by side, each as often as there are targets; as they are where none are in front."""
+        if not lead:
+            return own
+        shape = own.shape[own.ndim - axes :]
+        return np.repeat(np.broadcast_to(own, (*lead, *shape)).reshape(-1, *shape), many, axis=0)
+
+    begun = np.broadcast_to(declared.tool[:3, 3] if campaign.tool_known else targets, (*lead, many, 3)).reshape(-1, 3)
+    several = None if turns is None else repeated(turns, 3)
+    known = campaign.base_known, campaign.tool_known
+    found = _alternated(repeated(measured, 2), repeated(origin, 2), several, declared.base, begun, known, rounds)
+    best = np.arange(0, len(begun), many) + found[3].reshape(-1, many).argmin(axis=1)
+    base, place, weights, cost = (own[best].reshape((*lead, *own.shape[1:])) for own in found)
+    tool = np.broadcast_to(declared.tool, base.shape).copy()
+    tool[..., :3, 3] = place
     if campaign.orientation is not None and turns is not None and not campaign.tool_known:
-        weights = state.weights[best].reshape(*lead, -1)
-        tool[..., :3, :3] = turned(turns, base, quaternion_to_rotation(campaign.orientation[..., some, :]), weights)
-    return state.cost[best].reshape(lead)[()], Placed(base, tool)
+        tool[..., :3, :3] = _turn(turns, base, quaternion_to_rotation(campaign.orientation[..., some, :]), weights)
+    return cost[()], Placed(base, tool)
 
 
-def _repeated(own: Array, lead: tuple[int, ...], times: int, axes: int = 2) -> Array:
-    """(S·times, ...) columns side by side, each so many times; as they are where there are none in front."""
-    if not lead:
-        return own
-    shape = own.shape[own.ndim - axes :]
-    return np.repeat(np.broadcast_to(own, (*lead, *shape)).reshape(-1, *shape), times, axis=0)
-
-
-def turned(turns: Array, base: Array, measured: Array, weights: Array) -> Array:
+def _turn(turns: Array, base: Array, measured: Array, weights: Array) -> Array:
     """(..., 3, 3) turn of the target on the tool frame: the weighted mean (..., N) of what each row says."""
     seen = turns.swapaxes(-1, -2) @ base[..., None, :3, :3].swapaxes(-1, -2) @ measured
     u, _, vt = np.linalg.svd(np.einsum("...n,...nij->...ij", weights, seen))
@@ -125,57 +119,41 @@ def turned(turns: Array, base: Array, measured: Array, weights: Array) -> Array:
     return np.asarray((u * upright[..., None, :]) @ vt)
 
 
-class Alternating:
-    """S alternations side by side: bases (S, 4, 4), places (S, 3), weights (S, N), medians (S,), and who moves.
+def _alternated(
+    measured: Array,
+    origin: Array,
+    turns: Array | None,
+    base: Array,
+    place: Array,
+    known: tuple[bool, bool],
+    rounds: int,
+) -> tuple[Array, Array, Array, Array]:
+    """Alternate S starts side by side: bases (S, 4, 4), places of the target (S, 3), weights (S, N), medians (S,).
 
-    Measured points and origins (N, 3) and turns (N, 3, 3) are those of all, or have the S in front.
+    Measured points and origins (N, 3) and turns (N, 3, 3) of the tool frame are those of all starts, or have the S in
+    front; ``known``: base and tool.
     """
-
-    def __init__(
-        self,
-        measured: Array,
-        origin: Array,
-        turns: Array | None,
-        base_known: bool,
-        tool_known: bool,
-        base: Array,
-        place: Array,
-    ) -> None:
-        self._measured, self._origin, self._turns = measured, origin, turns
-        self._base_known, self._tool_known = base_known, tool_known
-        self.base = np.repeat(base[None], len(place), axis=0)
-        self.place, self.cost = place, np.full(len(place), np.inf)
-        self.weights = np.ones((len(place), measured.shape[-2]))
-        self._moving = np.arange(len(place))
-
-    def run(self, rounds: int) -> None:
-        """Alternate so many times at most."""
-        for _ in range(rounds):
-            if self.step():
-                break
-
-    def step(self) -> bool:
-        """Take one alternation of those that still move; tell whether none is left."""
-        moving = self._moving
-        base, place, weights = self.base[moving], self.place[moving], self.weights[moving]
-        measured, origin = (own if own.ndim == 2 else own[moving] for own in (self._measured, self._origin))
-        turns = self._turns if self._turns is None or self._turns.ndim == 3 else self._turns[moving]
-        predicted = _predicted(origin, turns, place)
-        if not self._base_known:
-            base = align(predicted, measured, weights)
-        turned, shift = base[:, :3, :3], base[:, None, :3, 3]
-        if turns is not None and not self._tool_known:
+    bases, places, costs = np.repeat(base[None], len(place), axis=0), place.copy(), np.full(len(place), np.inf)
+    weights, moving = np.ones((len(place), measured.shape[-2])), np.arange(len(place))
+    for _ in range(rounds):
+        base, place, weight = bases[moving], places[moving], weights[moving]
+        seen, start = (own if own.ndim == 2 else own[moving] for own in (measured, origin))
+        turn = turns if turns is None or turns.ndim == 3 else turns[moving]
+        if not known[0]:
+            base = align(_predicted(start, turn, place), seen, weight)
+        rotation, shift = base[:, :3, :3], base[:, None, :3, 3]
+        if turn is not None and not known[1]:
             # (measured in the root frame − origin) = R t: the mean over rows of Rᵀ(…), since each R is orthogonal
-            local = np.einsum("...nji,...nj->...ni", turns, (measured - shift) @ turned - origin)
-            place = (weights[:, None] @ local)[:, 0] / weights.sum(axis=1)[:, None]
-            predicted = _predicted(origin, turns, place)
-        away = measured - predicted @ turned.transpose(0, 2, 1) - shift
+            local = np.einsum("...nji,...nj->...ni", turn, (seen - shift) @ rotation - start)
+            place = (weight[:, None] @ local)[:, 0] / weight.sum(axis=1)[:, None]
+        away = seen - _predicted(start, turn, place) @ rotation.transpose(0, 2, 1) - shift
         distance = np.sqrt((away * away).sum(axis=2))
-        before, cost = self.cost[moving], middle(distance)
-        self.base[moving], self.place[moving], self.cost[moving] = base, place, cost
-        self.weights[moving] = _soft(distance, cost)
-        self._moving = moving[~(np.abs(before - cost) < settings.START_SETTLED * cost)]
-        return not len(self._moving)
+        before, cost = costs[moving], middle(distance)
+        bases[moving], places[moving], costs[moving], weights[moving] = base, place, cost, soft(distance)
+        moving = moving[~(np.abs(before - cost) < settings.START_SETTLED * cost)]
+        if not len(moving):
+            break
+    return bases, places, weights, costs
 
 
 def _predicted(origin: Array, turns: Array | None, place: Array) -> Array:
@@ -214,32 +192,27 @@ def found_frames(campaign: Campaign) -> Frames:
 
 def moved(frames: Frames, step: Array, names: tuple[str, ...]) -> Frames:
     """Return the frames after a step along :func:`~thermal_robot.inference.columns.frame_columns`."""
-    base_step = step[[k for k, name in enumerate(names) if name == "base"]]
-    tool_step = step[[k for k, name in enumerate(names) if name == "tool"]]
-    base, tool = frames.base, frames.tool
-    if base_step.size:
-        base = base @ exp6(base_step)
-    if tool_step.size:
-        tool = exp6(np.concatenate([tool_step, np.zeros(6 - tool_step.size)])) @ tool
-    return Frames(base, tool)
+    base_step, tool_step = (step[np.array(names, dtype=object) == name] for name in ("base", "tool"))
+    base = frames.base @ exp6(base_step) if base_step.size else frames.base
+    turn = exp6(np.concatenate([tool_step, np.zeros(6 - tool_step.size)])) if tool_step.size else np.eye(4)
+    return Frames(base, turn @ frames.tool)
 
 
 def refined_frames(campaign: Campaign, frames: Frames, robust: bool) -> Frames:
     """Gauss-Newton on position and orientation, each at the scale of its own median; noisier rows count less."""
     relative = np.ones((1, 1)) if campaign.relative_noise is None else campaign.relative_noise
-    for _ in range(settings.REFINE_ROUNDS):
+    for _ in range(settings.START_ROUNDS):
         observations = observe(campaign, frames)
-        columns, names = frame_columns(observations)
-        gap = observations.gap
+        (columns, names), gap = frame_columns(observations), observations.gap
         root_weight = np.zeros_like(gap)
         for part in (slice(0, 3), slice(3, 6))[: gap.shape[1] // 3]:
             distance = np.linalg.norm(gap[:, part], axis=1)
             weight = np.sqrt(soft(distance)) if robust else np.ones(len(distance))
-            root_weight[:, part] = weight[:, None] / (middle(distance) + settings.NO_DISTANCE)
+            root_weight[:, part] = weight[:, None] / (middle(distance) + settings.UNSEEN)
         root_weight = root_weight / relative
         design = equations_of(columns * root_weight[:, :, None])
         step = solve(design.T @ design, design.T @ (gap * root_weight).ravel())
         frames = moved(frames, step, names)
-        if np.abs(step).max() < settings.REFINE_SETTLED:
+        if np.abs(step).max() < settings.ROUNDING:
             break
     return frames

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -19,35 +20,33 @@ from thermal_robot.inference.laws import smooth_columns
 from thermal_robot.inference.problem import Linear, generalised
 from thermal_robot.inference.robust import distance_limit
 from thermal_robot.inference.rows import repeated_poses
-from thermal_robot.inference.scatter import JointScatter, Scatter, enough_rows, joint_errors, variance_components
+from thermal_robot.inference.scatter import Component, JointScatter, Scatter, enough_rows, variance_components
 from thermal_robot.inference.target import Target
+
+Rows = NDArray[np.bool_]
 
 
 def followed(errors: Array, weight: Array, recorded: Mapping[str, Array], pose: NDArray[np.int64] | None = None) -> str:
-    """Name the quantity that errors (K,) of weight 1/variance follow smoothly; empty where none does.
+    """F test of each recorded quantity: name that which errors (K,) of weight 1/variance follow smoothly, or none.
 
-    Each ``recorded`` quantity has an F test, its p-value multiplied by their number (Bonferroni); a law must also
-    explain a good part of the errors. ``pose`` (K,): where errors are those within a pose, the mean of each was taken
-    out of them.
+    The p-value is multiplied by their number (Bonferroni); a law must also explain a good part of the errors. ``pose``
+    (K,): where errors are those within a pose, the mean of each was taken out of them.
     """
-    best, follows = settings.LEVEL, ""
     root = np.sqrt(weight)
     number = np.zeros(len(errors), dtype=np.int64) if pose is None else np.unique(pose, return_inverse=True)[1]
     means = np.eye(int(number.max()) + 1)[number] * root[:, None]
     means = means / np.linalg.norm(means, axis=0)
     target = Target(without(errors * root, means), root[:, None], means)
-    for name, values in recorded.items():
-        columns = smooth_columns(values) if np.ptp(values) > settings.ROUNDING else np.zeros((len(values), 0))
-        worth = target.worth(columns[:, None, :])
-        p = worth.p_value * len(recorded)
-        if p < best and worth.share > settings.SCATTER_LAW_SHARE:
-            best, follows = p, name
-    return follows
+    vary = {name: values for name, values in recorded.items() if np.ptp(values) > settings.ROUNDING}
+    worth = {name: target.worth(smooth_columns(values)[:, None, :]) for name, values in vary.items()}
+    p_values = {name: w.p_value for name, w in worth.items() if w.share > settings.SCATTER_LAW_SHARE}
+    best = min(p_values, key=p_values.__getitem__, default="")
+    return best if best and p_values[best] * len(recorded) < settings.LEVEL else ""
 
 
 @dataclass(frozen=True)
 class Steps:
-    """What errors say of steps of an encoder: their distance, rad or m, and the log Bayes factor of steps over none.
+    """Distance of an encoder's steps, rad or m, and the log Bayes factor of steps over none.
 
     Where none is seen the distance is what the errors' size implies, and the factor 0 where it cannot be asked.
     """
@@ -57,7 +56,7 @@ class Steps:
 
 
 def period(errors: Array, variance: Array, command: Array, step: float) -> Steps:
-    """Look for the distance of the only positions at which a joint stands, where an encoder counts in steps.
+    """Periodogram of a sawtooth: look for the distance of the only positions at which a joint stands, an encoder's.
 
     The joint stands at the multiple of the step s, from a first position φ on, that is nearest to its command. Its
     error (K,) is then a sawtooth of the command, u s with u from -½ to ½, seen with its variance v and a slack of the
@@ -68,20 +67,20 @@ def period(errors: Array, variance: Array, command: Array, step: float) -> Steps
     """
     some = np.linspace(0.0, len(errors) - 1.0, min(len(errors), settings.STEP_POSES)).round().astype(np.int64)
     errors, variance, command = errors[some] / step, variance[some] / step**2, (command - command.mean())[some] / step
-    without = float(_normal(errors, 0.0, variance + 1.0 / settings.FLAT).sum())
+    without_steps = float(_normal(errors, 0.0, variance + 1.0 / 12).sum())
     tried = [_tried(errors, variance, command, slack) for slack in settings.STEP_SLACKS]
     if not all(len(frequency) for frequency, _ in tried):
         return Steps(step, 0.0)
     means = [float(logsumexp(each) - np.log(len(each))) for _, each in tried]
-    factor = float(logsumexp(means) - np.log(len(means))) - without
+    factor = float(logsumexp(means) - np.log(len(means))) - without_steps
     frequency, each = tried[int(np.argmax(means))]
-    return Steps(step / float(frequency[np.argmax(each)]) if factor > settings.STEP_SURE else step, factor)
+    return Steps(step / float(frequency[np.argmax(each)]) if factor > settings.CONVINCING else step, factor)
 
 
 def _tried(errors: Array, variance: Array, command: Array, slack: float) -> tuple[Array, Array]:
-    """Return frequencies, and the log likelihood of steps of each, its mean over their phase; in implied steps.
+    """Return frequencies, none where there are too many, and the log likelihood of steps of each, its mean over phase.
 
-    There are none where there would be too many.
+    All are in implied steps.
     """
     known = variance + slack**2
     width = 1.0 / (max(float(command.std()), 1.0) * np.sqrt(max(float((1.0 / known).sum()), (2.0 * np.pi) ** 2)))
@@ -117,7 +116,7 @@ def _series(errors: Array, variance: Array, slack: float) -> NDArray[np.complex1
 
 
 def _sums(weight: NDArray[np.complex128], place: Array, lowest: float, width: float, count: int) -> Array:
-    """(count,) Σ weight exp(-2π i f place) at frequencies f that begin at the lowest and are a width apart.
+    """(count,) Fourier sums Σ weight exp(-2π i f place) at frequencies f that begin at the lowest, a width apart.
 
     A frequency is a coarse one and a fine one, so that the sums are a product of two small matrices.
     """
@@ -127,18 +126,14 @@ def _sums(weight: NDArray[np.complex128], place: Array, lowest: float, width: fl
     return np.asarray(((weight * first) @ second.T).ravel()[:count])
 
 
-def seen(log_factors: Sequence[float]) -> float:
-    """Return the logarithm of the Bayes factor of steps in all these joints, of which some may stay hidden."""
-    hidden = np.log(settings.STEPS_HIDDEN)
-    return float(np.logaddexp(np.log1p(-settings.STEPS_HIDDEN) + np.asarray(log_factors, dtype=float), hidden).sum())
+def stepped(log_factors: Iterable[float]) -> float:
+    """Posterior probability that joints which err anew from pose to pose do so by the steps of their encoders.
 
-
-def stepped(factor: float) -> float:
-    """Probability that joints which err anew from pose to pose do so by their encoders' steps, by the log Bayes factor.
-
-    Steps are a claim about the count of one joint: that later visits of a pose find the same error does not tell them.
+    From the log Bayes factor of each joint, of which some steps may stay hidden. That later visits of a pose find the
+    same error does not tell steps.
     """
-    return float(expit(factor - np.log(settings.RIVALS)))
+    shown = np.log1p(-settings.STEPS_HIDDEN) + np.array(list(log_factors), dtype=float)
+    return float(expit(np.logaddexp(shown, np.log(settings.STEPS_HIDDEN)).sum() - np.log(settings.RIVALS)))
 
 
 @dataclass(frozen=True)
@@ -168,19 +163,15 @@ class RandomGap:
     note: str = ""
 
     @property
-    def seen(self) -> float:
-        """The logarithm of the Bayes factor of steps in all those joints, some of whose steps may stay hidden."""
-        return seen(tuple(self.steps.values()))
-
-    @property
     def stepped(self) -> float:
         """Probability that what poses bring is due to such steps."""
-        return stepped(self.seen)
+        return stepped(self.steps.values())
 
 
 def nothing_random(fit: Fit) -> RandomGap:
     """Return the random gap of which nothing can be said."""
-    return RandomGap((), False, 1.0, Scatter((), (), {}, fit.explanation.whitening.noise), {}, {})
+    noise = fit.explanation.whitening.noise
+    return RandomGap((), False, 1.0, Scatter((), (), {}, noise, 0.0 * noise), {}, {})
 
 
 def random_gap(fit: Fit) -> RandomGap:
@@ -189,9 +180,8 @@ def random_gap(fit: Fit) -> RandomGap:
     If a joint's errors follow a smooth law of a recorded quantity, they are no scatter. Errors of an encoder are a
     sawtooth of the command with the period √12 σ; without repeats only that separates its steps from wear.
     """
-    e, observed = fit.explanation, fit.corrected
-    m = observed.gap.shape[1]
-    even = _even(fit)
+    e, observed, even = fit.explanation, fit.corrected, _even(fit)
+    m = even.shape[1]
     gap, sensitivity = observed.gap / even, observed.joint_sensitivity[:, :m] / even[:, :, None]
     given = (fit.campaign.noise_position, fit.campaign.noise_orientation)[: m // 3]
     noise = np.repeat([g or e.whitening.noise[3 * k] for k, g in enumerate(given)], 3)
@@ -199,73 +189,68 @@ def random_gap(fit: Fit) -> RandomGap:
     asked = np.isin(np.arange(len(gap)), enough_rows(pose, ~e.outliers)) | e.outliers
     used = asked & ~e.outliers
     freedom = round(e.best.effective) + e.linear.frames.shape[2]
+    estimate = partial(
+        variance_components, sensitivity=sensitivity, noise=noise, pose=pose, stated=held, freedom=freedom
+    )
     for _ in range(settings.SCATTER_PASSES):
-        scatter = variance_components(
-            gap,
-            sensitivity,
-            noise,
-            pose,
-            stated=held,
-            freedom=freedom,
-            weights=used.astype(float),
-            start=_in_joints(fit),
-        )
-        if not any(c.chosen for c in scatter.components):
+        scatter = estimate(gap, used=used, start=_in_joints(fit))
+        if not scatter.components:
             break
-        gap = _refitted(fit, scatter, used, even)
+        gap = _refitted(fit, scatter, sensitivity, used, even)
         # rows set aside as gross errors may be no more than this scatter
-        within = _distance2(scatter, gap, sensitivity, scatter.noise) <= distance_limit(m, len(gap))
+        within = _distance2(scatter, gap, sensitivity) <= distance_limit(m, len(gap))
         if 2 * within.sum() < len(within):
             break  # most rows lie beyond any scatter: robot and table do not belong together
         used = within & asked
-    scatter, used, carried = _stands(scatter, gap, sensitivity, noise, pose, held, freedom, used)
-    laws, steps, kept = _judge(fit, scatter, gap[used], sensitivity[used], pose, used, noise, freedom)
-    likely = stepped(seen(tuple(steps.values())))
-    real = tuple(k.component for k in kept if k.component.kind == "visit" or likely >= settings.SCATTER_SURE)
-    p_value, explains = _chance_of_size(scatter, real, gap[used], sensitivity[used], noise, held, freedom)
+    scatter, used, carried = _stands(partial(estimate, gap), scatter, gap, sensitivity, used)
+    gap, sensitivity = gap[used], sensitivity[used]
+    laws, steps, kept = _judge(fit, scatter, gap, sensitivity, pose, used, freedom)
+    likely = stepped(steps.values()) >= settings.SCATTER_SURE
+    real = tuple(k.component for k in kept if k.component.kind == "visit" or likely)
+    known = replace(scatter, components=real, noise=np.where(np.repeat(held, 3), noise, scatter.noise))
+    p_value, explains = _chance_of_size(_distance2(known, gap, sensitivity), m, freedom)
     few = ", ".join(fit.campaign.robot.joint_names[j] for j in carried)
-    note = _note(scatter, laws, few, bool(steps) and likely < settings.SCATTER_SURE)
-    return RandomGap(tuple(kept), explains, p_value, scatter, steps, laws, note)
+    note = _note(scatter, laws, few, bool(steps) and not likely)
+    return RandomGap(tuple(kept), bool(real) and explains, p_value, scatter, steps, laws, note)
 
 
 def _stands(
-    scatter: Scatter,
-    gap: Array,
-    sensitivity: Array,
-    noise: Array,
-    pose: NDArray[np.int64],
-    held: list[bool],
-    freedom: int,
-    used: NDArray[np.bool_],
-) -> tuple[Scatter, NDArray[np.bool_], list[int]]:
+    estimate: Callable[..., Scatter], scatter: Scatter, gap: Array, sensitivity: Array, used: Rows
+) -> tuple[Scatter, Rows, list[int]]:
     """Ask whether scatter is seen without the few rows that speak most for it; scatter is in all rows.
 
     Returns it, the rows that count, and the joints of which a few rows had told it: it is then that of the other rows.
     """
-    chosen = [c for c in scatter.components if c.chosen]
-    if not chosen:
+    if not scatter.components:
         return scatter, used, []
     rows = np.flatnonzero(used)
-    told = [joint_errors(scatter, gap[rows], sensitivity[rows], c.joint) for c in chosen]
-    most = np.argsort(-np.max([np.abs(errors / spread) for errors, spread in told], axis=0), kind="stable")
+    told = [scatter.errors(c.joint, gap[rows], sensitivity[rows]) for c in scatter.components]
+    most = np.argsort(-np.max([errors**2 / variance for errors, variance in told], axis=0), kind="stable")
     rest = used.copy()
-    rest[rows[most[: int(np.ceil(settings.CARRYING * len(rows)))]]] = False
-    start = [(c.kind, c.joint) for c in chosen]
-    again = variance_components(
-        gap, sensitivity, noise, pose, stated=held, freedom=freedom, weights=rest.astype(float), start=start
-    )
-    speaks = {(c.kind, c.joint) for c in again.components if c.chosen or c.log_bayes_factor > 0.0}
+    rest[rows[most[: int(np.ceil(settings.FEW_ASIDE * len(rows)))]]] = False
+    start = [(c.kind, c.joint) for c in scatter.components]
+    again = estimate(used=rest, start=start)
+    speaks = {(c.kind, c.joint) for c in again.components} | {c for c, f in again.log_factors.items() if f > 0.0}
     carried = [joint for kind, joint in start if (kind, joint) not in speaks]
     return (again, rest, carried) if carried else (scatter, used, [])
 
 
-def _in_joints(fit: Fit) -> list[tuple[str, int]]:
+def _in_joints(fit: Fit) -> list[Component]:
     """Return the kind and the joints of a discrepancy that is anew in every pose or visit."""
     form, names = fit.explanation.discrepancy.form, fit.campaign.robot.joint_names
     if form is None or not form.anew:
         return []
     kind = "visit" if form.name.startswith("visits") else "pose"
     return [(kind, names.index(joint)) for joint in form.joints]
+
+
+def _means(values: Array, number: NDArray[np.int64], weight: Array | None = None) -> Array:
+    """(P, ...) weighted mean of the rows of each pose."""
+    weight = np.ones(len(number)) if weight is None else weight
+    total = np.bincount(number, weight)
+    sums = np.zeros((len(total), *values.shape[1:]))
+    np.add.at(sums, number, (weight * values.T).T)
+    return np.asarray((sums.T / total).T)
 
 
 def _even(fit: Fit) -> Array:
@@ -278,138 +263,88 @@ def _even(fit: Fit) -> Array:
     if relative is None:
         return np.ones_like(fit.corrected.gap)
     pose = repeated_poses(fit.campaign)
-    return np.sqrt(_Mean(pose, np.ones(len(pose)))(relative**2))[pose]
+    return np.asarray(np.sqrt(_means(relative**2, pose))[pose])
 
 
-def _refitted(fit: Fit, scatter: Scatter, used: NDArray[np.bool_], even: Array) -> Array:
-    """(N, m) remainder once frames and explanation are fitted in the covariance of the scatter.
+def _refitted(fit: Fit, scatter: Scatter, sensitivity: Array, used: Rows, even: Array) -> Array:
+    """(N, m) residual of generalised least squares: frames and explanation in the covariance of the scatter.
 
-    Generalised least squares. If the noise were taken for the instrument's alone, a joint that scatters would pull the
-    frames far off, and their error would then count as scatter of the other joints.
+    If the noise were taken for the instrument's alone, a joint that scatters would pull the frames far off, and their
+    error would then count as scatter of the other joints.
     """
     e = fit.explanation
     blocks = [e.linear.blocks[b].columns * e.linear.blocks[b].sizes for b in e.best.blocks]
-    design = np.concatenate([e.linear.frames, *blocks], axis=2)
-    gap, design = fit.corrected.gap / even, design / even[:, :, None]
+    design = np.concatenate([e.linear.frames, *blocks], axis=2) / even[:, :, None]
+    gap = fit.corrected.gap / even
     if not design.shape[2]:
         return gap
-    covariance = scatter.covariance(fit.corrected.joint_sensitivity[used, : gap.shape[1]] / even[used, :, None])
+    covariance = scatter.covariance(sensitivity[used])
     white = generalised(Linear(gap[used], design[used], ()), covariance, np.ones(gap.shape[1]))
     columns = equations_of(white.frames)
     return np.asarray(gap - design @ solve(columns.T @ columns, columns.T @ white.gap.ravel()))
 
 
-def _distance2(scatter: Scatter, gap: Array, sensitivity: Array, noise: Array) -> Array:
-    solved = np.linalg.solve(scatter.covariance(sensitivity, noise), gap[:, :, None])[:, :, 0]
+def _distance2(scatter: Scatter, gap: Array, sensitivity: Array) -> Array:
+    solved = np.linalg.solve(scatter.covariance(sensitivity), gap[:, :, None])[:, :, 0]
     return np.asarray((solved * gap).sum(axis=1))
 
 
-@dataclass(frozen=True, eq=False)
-class _Mean:
-    """Weighted mean of each pose."""
-
-    number: NDArray[np.int64]
-    weight: Array
-
-    @property
-    def total(self) -> Array:
-        return np.bincount(self.number, self.weight).astype(float)
-
-    def __call__(self, values: Array) -> Array:
-        sums = np.zeros((len(self.total), *values.shape[1:]))
-        np.add.at(sums, self.number, (self.weight * values.T).T)
-        return np.asarray((sums.T / self.total).T)
-
-
 def _judge(
-    fit: Fit,
-    scatter: Scatter,
-    gap: Array,
-    sensitivity: Array,
-    pose: NDArray[np.int64],
-    used: NDArray[np.bool_],
-    noise: Array,
-    freedom: int,
+    fit: Fit, scatter: Scatter, gap: Array, sensitivity: Array, pose: NDArray[np.int64], used: Rows, freedom: int
 ) -> tuple[dict[str, str], dict[str, float], list[Kept]]:
-    """Sort the chosen components: those that follow a law, and scatter; with what speaks for steps of each joint.
+    """Sort the components: those that follow a law, and scatter; with what speaks for steps of each joint.
 
     What was fitted took errors of the poses with it: a share of so many parameters in all that was measured of them.
     """
-    names = fit.campaign.robot.joint_names
     recorded = {name: values[used] for name, values in quantities(fit.corrected).items()}
     number = np.unique(pose[used], return_inverse=True)[1].ravel()
-    taken = freedom / (gap.shape[1] * (int(number.max()) + 1))
+    visits = np.bincount(number)
+    averaged = _means(gap, number), _means(sensitivity, number)
     laws: dict[str, str] = {}
     factors: dict[str, float] = {}
     kept: list[Kept] = []
-    for c in (c for c in scatter.components if c.chosen):
+    for c in scatter.components:
+        name, step = fit.campaign.robot.joint_names[c.joint], float(np.sqrt(12) * c.sigma)
         if c.kind == "visit":
-            errors, spread = joint_errors(scatter, gap, sensitivity, c.joint)
-            weight = 1.0 / (spread**2 + c.sigma**2)
-            mean = _Mean(number, weight)
-            common, counts = mean(errors)[number], np.bincount(number)[number] > 1
-            errors, weight = (errors - common)[counts], weight[counts]
-            within = {name: (v - mean(v)[number])[counts] for name, v in recorded.items()}
-            law = followed(errors, weight, within, number[counts])
+            law = _within_poses(*scatter.errors(c.joint, gap, sensitivity), c.sigma, recorded, number)
         else:
-            mean = _Mean(number, np.ones(len(number)))
-            errors, variance = _pose_errors(scatter, gap, sensitivity, mean, c.joint, noise)
-            weight, command = 1.0 / (variance + c.sigma**2), mean(fit.campaign.q[used, c.joint])
-            law = followed(errors, weight, {name: mean(v) for name, v in recorded.items()})
+            errors, variance = scatter.errors(c.joint, *averaged, visits)
+            law = followed(errors, 1.0 / (variance + c.sigma**2), {n: _means(v, number) for n, v in recorded.items()})
         if law:
-            laws[names[c.joint]] = law
+            laws[name] = law
             continue
-        step = float(np.sqrt(settings.FLAT) * c.sigma)
         if c.kind == "pose":
+            taken, command = freedom / averaged[0].size, _means(fit.campaign.q[used, c.joint], number)
             found = period(errors, variance + taken * c.sigma**2, command, step)
-            step, factors[names[c.joint]] = found.step, found.log_factor
+            step, factors[name] = found.step, found.log_factor
         kept.append(Kept(c, step))
     return laws, factors, kept
 
 
-def _pose_errors(
-    scatter: Scatter, gap: Array, sensitivity: Array, mean: _Mean, joint: int, noise: Array
-) -> tuple[Array, Array]:
-    """(poses,) error of one joint in the mean of each pose's k visits, and its variance from everything else.
+def _within_poses(
+    errors: Array, variance: Array, sigma: float, recorded: Mapping[str, Array], number: NDArray[np.int64]
+) -> str:
+    """F test as :func:`followed`, of what errors (N,) of visits differ by from the mean of their pose."""
+    weight, repeated = 1.0 / (variance + sigma**2), np.bincount(number)[number] > 1
 
-    What comes anew at each visit averages out, what a pose brings does not: with N of the noise and N₀ of what visits
-    have in common from no joint, the mean has the covariance (N + J Λ_v Jᵀ)/k + N₀ + J Λ_u Jᵀ (Searle, Casella,
-    McCulloch, *Variance Components*, 1992, ch. 3).
+    def within(values: Array) -> Array:
+        return np.asarray((values - _means(values, number, weight)[number])[repeated])
+
+    inside = {name: within(values) for name, values in recorded.items()}
+    return followed(within(errors), weight[repeated], inside, number[repeated])
+
+
+def _chance_of_size(distance2: Array, m: int, freedom: int) -> tuple[float, bool]:
+    """χ² test of squared distances (N,) of rows in their whole covariance; heavy tails reduce its degrees of freedom.
+
+    Returns the p-value, and whether the size is explained.
     """
-    gap, sensitivity, visits = mean(gap), mean(sensitivity), mean.total
-    errors, variance = np.zeros(len(visits)), np.zeros(len(visits))
-    for k in np.unique(visits):
-        own = visits == k
-        parts = [replace(c, sigma=c.sigma / np.sqrt(k)) if c.kind == "visit" else c for c in scatter.components]
-        rest = np.sqrt(scatter.noise**2 / k + (scatter.common * noise) ** 2)
-        averaged = replace(scatter, components=tuple(parts), noise=rest)
-        errors[own], spread = joint_errors(averaged, gap[own], sensitivity[own], joint)
-        anew = sum(c.sigma**2 for c in parts if c.chosen and (c.kind, c.joint) == ("visit", joint))
-        variance[own] = spread**2 + anew
-    return errors, variance
-
-
-def _chance_of_size(
-    scatter: Scatter,
-    real: tuple[JointScatter, ...],
-    gap: Array,
-    sensitivity: Array,
-    noise: Array,
-    held: list[bool],
-    freedom: int,
-) -> tuple[float, bool]:
-    """Test the remainder in the rows' whole covariance by χ²; heavy tails reduce its degrees of freedom."""
-    parts = np.repeat(held, 3)
-    known = Scatter(scatter.kinds, real, scatter.probability, np.where(parts, noise, scatter.noise))
-    distance2 = _distance2(known, gap, sensitivity, known.noise)
-    left = max(gap.size - freedom, 1)
+    left = max(m * len(distance2) - freedom, 1)
     ratio2 = float(distance2.sum()) / left
-    m = gap.shape[1]
     spread = max(float((distance2**2).mean() / max(float(distance2.mean()) ** 2, settings.TINY) - 1.0), 2.0 / m)
     effective = left * (2.0 / m) / spread
     p = float(chdtrc(effective, ratio2 * effective))
-    # a noise that is not stated fits whatever is left: scatter explains only where there is some
-    return p, bool(real) and (p > settings.LEVEL or ratio2 < settings.MATERIAL_SCALE**2)
+    return p, p > settings.LEVEL or ratio2 < settings.MATERIAL_SCALE**2
 
 
 def _note(scatter: Scatter, laws: Mapping[str, str], few: str, doubtful: bool) -> str:

@@ -1,4 +1,4 @@
-"""Robust weights: the noise of a residual, its gross errors, and what correlated rows are worth."""
+"""Robust noise and weights: one sigma of a residual by its median, gross errors, Huber's weights."""
 
 from __future__ import annotations
 
@@ -37,12 +37,12 @@ class Noise:
 
 
 def distance_limit(measures: int, rows: int) -> float:
-    """Return the squared distance, in units of the noise, beyond which one of so many rows is a gross error."""
+    """χ² quantile: the squared distance, in units of the noise, beyond which one of so many rows is a gross error."""
     return settings.GROSS_FACTOR * float(chdtri(measures, settings.GROSS_LEVEL / max(rows, 1)))
 
 
 def robust_noise(remainder: Array, leverage: float = 0.0, relative: Array | None = None) -> Array:
-    """Return one sigma per axis of positions and of orientations, from the median squared length of a residual.
+    """One sigma per axis of positions and of orientations, from the median squared length of a residual.
 
     The ``leverage``, the share of the equations that the fit has taken up, is given back to the noise. Where the noise
     of the figures differs, ``relative`` (N, m) says how.
@@ -54,38 +54,31 @@ def robust_noise(remainder: Array, leverage: float = 0.0, relative: Array | None
 
 
 def settled_noise(measured: Array, noise: Noise, measures: int) -> tuple[Array, float]:
-    """Return the noise of each component, and the degrees of freedom of its prior.
-
-    The noise that is stated counts; what is more in the residual is something else. Where none is stated it is what
-    the residual shows.
-    """
+    """Noise of each component, as stated or else as measured of the residual; degrees of freedom of its prior."""
     stated = noise.parts(measures)
     sigma = np.array([m if g is None else g for g, m in zip(stated, measured, strict=True)])
-    firm = all(g is not None for g in stated)
-    return np.repeat(sigma, 3), settings.GIVEN_NOISE_DOF if firm else 0.0
+    return np.repeat(sigma, 3), 0.0 if None in stated else settings.GIVEN_NOISE_DOF
 
 
 def first_whitening(linear: Linear, noise: Noise, use: NDArray[np.bool_]) -> Whitening:
-    """Give all rows in use the same weight, and take the noise from the median of the gap."""
-    weights = use.astype(float)
+    """Equal weights of all rows in use, and the noise from the median of the gap."""
     own = None if noise.relative is None else noise.relative[use]
     sigma, held = settled_noise(robust_noise(linear.gap[use], relative=own), noise, linear.measures)
-    return Whitening(weights, sigma, held, relative=noise.relative)
+    return Whitening(use.astype(float), sigma, held, relative=noise.relative)
 
 
 def reweigh(
     remainder: Array, noise: Noise, use: NDArray[np.bool_], leverage: float, measures: int
 ) -> tuple[Whitening, NDArray[np.bool_]]:
-    """Set gross errors aside, at most a quarter, and give the tail less weight (Huber 1964), at the remainder's noise.
+    """Huber's weights at the residual's noise, and (N,) the rows set aside as gross errors, at most a quarter.
 
-    ``leverage`` is the share of the equations that was fitted. Returns the weighting, and (N,) the rows aside.
+    ``leverage`` is the share of the equations that was fitted.
     """
     remainder = remainder if noise.relative is None else remainder / noise.relative
     sigma, held, distance2 = judged(remainder, robust_noise(remainder[use], leverage), noise, leverage, measures)
     aside = use & (distance2 > distance_limit(measures, int(use.sum())))
-    if aside.sum() > settings.MOST_OUTLIERS * use.sum():
-        worst = np.argsort(np.where(use, -distance2, np.inf))[: int(settings.MOST_OUTLIERS * use.sum())]
-        aside = np.isin(np.arange(len(use)), worst) & aside
+    worst = np.argsort(np.where(use, -distance2, np.inf))[: int(settings.MOST_OUTLIERS * use.sum())]
+    aside &= np.isin(np.arange(len(use)), worst)
     weights = np.where(use & ~aside, tail_weight(distance2, measures), 0.0)
     return Whitening(weights, sigma, held, relative=noise.relative), aside
 
@@ -93,7 +86,7 @@ def reweigh(
 def judged(
     remainder: Array, measured: Array, noise: Noise, leverage: float, measures: int
 ) -> tuple[Array, float, Array]:
-    """Return noise and degrees of freedom as :func:`settled_noise`, and (N,) squared distances of rows in its units.
+    """Noise and degrees of freedom as :func:`settled_noise`, and (N,) squared distances of rows in its units.
 
     ``remainder`` (N, m) is that of rows alike; what a median says of its noise is ``measured``, one sigma a part.
     """
@@ -108,6 +101,6 @@ def far_scale(measured: Array, sigma: Array) -> Array:
 
 
 def tail_weight(distance2: Array, measures: int) -> Array:
-    """Return the weight of rows at a squared distance in units of the noise: less in the tail (Huber 1964)."""
+    """Huber's weight (1964) of rows at a squared distance in units of the noise: less in the tail."""
     bend = float(chdtri(measures, settings.BEND_LEVEL))
     return np.asarray(np.minimum(1.0, np.sqrt(bend / np.maximum(distance2, settings.TINY))))

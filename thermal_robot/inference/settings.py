@@ -59,10 +59,11 @@ RUNG_REACH = 5.4
 # --- rounding ---
 
 ROUNDING = 1e-9
-"""m and rad: no table and no robot is more accurate."""
+"""m and rad: no table and no robot is more accurate; a smaller step of the frames is their last."""
 UNSEEN, ALIAS = 1e-12, 1e-6
-"""m and rad: what an expected size moves by less is rounding. Of a column's length: where less is left of it once
-others are projected out, it is an exact alias of them."""
+"""m and rad: what an expected size moves by less is rounding, as is a smaller distance. Of a column's length: where
+less is left of it once others are projected out, it is an exact alias of them; a joint that moves the target by less of
+what others do cannot be seen to scatter."""
 TINY, BETTER = 1e-300, 1e-9
 """Keeps a quotient of nothing from being infinite; and log evidence, natural logarithm: a smaller difference makes no
 explanation better than another."""
@@ -89,31 +90,31 @@ BEND_LEVEL = 0.01
 """Share of sound rows that weigh less than fully (Huber's bend)."""
 MOST_OUTLIERS = 0.25
 """Of the rows: more are not gross errors but another motion."""
-CAUCHY_SCALE, NO_DISTANCE = 1.5, 1e-12
-"""Times the median distance: the scale of the weights that find the frames, as a third of the rows may be wrong; and m,
-added to it, for rows that fit exactly."""
+CAUCHY_SCALE = 1.5
+"""Times the median distance: the scale of the weights that find the frames, as a third of the rows may be wrong."""
 CAUCHY_ROUNDS = 4
 """Rounds of weights and noise in a scan: they settle to a per cent."""
 RUN = 3
 """Rows set aside one after another that are a change: of five gross errors in a hundred, three are so once in 170."""
 FEW_ASIDE = 0.05
-"""Of all rows: fewer that follow each other may be one lapse of the instrument."""
+"""Of all rows: fewer that follow each other may be one lapse of the instrument. Without as many, those that speak most
+for scatter, the others must still speak for it: of normal scatter they hold a quarter of its variance."""
 
 # --- iterations, and how many rows suffice ---
 
 START_ROWS = 400
 """Rows on which the frames' starts are compared: these frames are then known far better than any start needs."""
 START_ROUNDS, START_SETTLED = 200, 1e-5
-"""Alternations of base and tool at most, and the relative change of the median distance at which they end."""
-REFINE_ROUNDS, REFINE_SETTLED = 60, 1e-9
-"""Gauss-Newton steps of the frames at most, and the step (m, rad) at which they end."""
+"""Alternations of base and tool at most, and steps of the frames; the relative change of the median distance at which
+alternations end."""
 TARGET_STARTS = np.vstack([np.zeros(3), 0.2 * np.eye(3), -0.2 * np.eye(3)])
 """m: where the target may sit on the tool frame; from each the fit reaches 0.3 m."""
 SPARE_EQUATIONS = 6
 """Equations that must be left once the frames are fitted: as many as one pose has."""
 EVIDENCE_STEPS, EVIDENCE_SETTLED, LEAST_VARIANCE, CLEARLY = 40, 1e-3, 1e-6, 4.0
-"""Newton steps of scales and noise at most; the change of a logarithm at which they end; the smallest variance, in
-squares of the noise: what fits better is rounding, or seen anew; times that a step's promise must not suffice."""
+"""Newton steps of scales, noise and variances at most; the change of a logarithm at which they end; the smallest
+variance, in squares of the noise: what fits better is rounding, or seen anew; times that a step's promise must not
+suffice."""
 PIVOTS, SIDE_ROUNDING, TAKEN_BACK = 60, 1e-10, 0.9
 """Changes at most of the columns held at zero; of the sums that tell it, what is rounding; less is no step back."""
 SCALE_GRID = tuple(np.linspace(-6.0, 6.0, 25))
@@ -164,8 +165,8 @@ and how often its neighbours are tried: a factor of 1.6 is then halved to 1.0001
 REFINED_FLAT = 8.0 * REFINED_GAIN
 """Natural logarithms lost on both sides, below which the vertex of their parabola is no more than that higher."""
 ENOUGH_ROWS, ENOUGH_REMAINDER = 1500, 2000
-"""Rows that are scanned for laws, of very many: a law that explains a hundredth of the remainder is then seen; and the
-same for the tests of the remainder."""
+"""Rows, of very many, that are scanned for laws and for scatter: a law that explains a hundredth of the remainder is
+then seen, and a standard deviation known to two per cent; and the same for the tests of the remainder."""
 DRAW_SEED, TEST_SEED = 61, 17
 """Of the rows drawn for a scan, and for a test: the same campaign always gets the same answer."""
 
@@ -289,48 +290,43 @@ FEWEST_ROWS = 10
 """Below, nothing can be said of scatter."""
 FEWEST_CONTRASTS = 6
 """Differences of repeats below which visits and poses cannot be told apart."""
-SCATTER_ROWS = 1500
-"""A standard deviation is then known to about two per cent."""
+TAILS = 4.0
+"""Degrees of freedom of the Student law that is tried beside the normal one."""
 MOST_COMPONENTS = 6
 """Joints that scatter at once."""
-TAILS, WORTH_TAILS = 4.0, 3.0
-"""Degrees of freedom of the Student law tried beside the normal one, and the log likelihood that it must gain."""
+CONVINCING = 3.0
+"""Logarithm of a Bayes factor, 20 to 1: from it heavy tails are believed, and a step is measured by its period, no more
+by the errors' size; a component that gains less overcomes no prior odds."""
 NORMAL_ROWS = 1000
 """Above, the likelihood of a variance that is well seen is normal in its logarithm."""
 DROP_95, SIGMAS_95 = 1.92, 1.96
 """Of the log likelihood at the ends of a 95 % interval: half the χ² quantile of one degree of freedom; and standard
 deviations of a normal law from its middle to these ends."""
-FULLY_TRIED, HOPELESS = 3, 3.0
-"""Components fitted in full at each step, and the gain in log likelihood below which no prior odds are overcome."""
+FULLY_TRIED = 3
+"""Components fitted in full at each step of the search: those that promise most."""
 MOST_INFLATION = 4.0
 """Of a mean square, for the parameters that were fitted."""
-SCATTER_STEPS, SCATTER_SETTLED = 40, 1e-3
-"""Scoring steps of variances at most, and the gain in log likelihood at which they end."""
+SCATTER_SETTLED = 1e-3
+"""Gain in log likelihood at which scoring steps of variances end."""
 SCATTER_ROUNDING = 1e-13
 """Of a covariance's trace: a joint that scatters a million times more than the instrument must not make it singular."""
 LOG_VARIANCE = (-12.0, 14.0)
-"""Range of the logarithm of a variance, in squares of the noise."""
+"""Range of the logarithm of a variance, in squares of the noise; a profile likelihood is followed over as much of it as
+lies below the noise."""
 VARIANCE_GRID = np.exp(np.linspace(np.log(1e-2), np.log(1e4), 22))
 """Variances of a component that are compared, in squares of the noise: a tenth to a hundred times its sigma."""
-BOUNDED = 1.0
-"""Standard deviation of the logarithm of a variance from which the data but bound it: its likelihood has no peak."""
 MEDIAN_SQUARE = 0.455
 """Median of χ² with one degree of freedom: turns the median of squares into a variance."""
 SCATTER_RIDGE = 1e-3
 """Information added to each log variance: one that nothing determines then moves by nothing."""
-SCATTER_STEP, SCATTER_HALVINGS, SCATTER_CUT = 2.0, 8, 3.0
-"""Largest step of a log variance, how often a step is cut where it does not help, and by what."""
-PROFILE_REACH, PROFILE_ROOT = 12.0, 0.02
-"""How far a profile likelihood is followed, and how finely its end is found, in logarithms of a variance."""
-LEVER_FLOOR = 1e-9
-"""Of the largest: a joint that moves the target less cannot be seen to scatter."""
+SCATTER_STEP, SCATTER_CUT = 2.0, 3.0
+"""Largest step of a log variance, and by what it is divided where it does not help."""
+PROFILE_ROOT = 0.02
+"""How finely the end of a profile likelihood is found, in logarithms of a variance."""
 SCATTER_SURE = 0.5
 """Probability from which scatter is named."""
 SCATTER_PASSES = 3
 """Times that rows set aside, frames and scatter are settled together."""
-CARRYING = 0.05
-"""Of the rows, those that speak most for scatter: without them the others must still speak for it. Of normal scatter
-they hold a quarter of its variance, of a few bad rows all: as many as may be one lapse of the instrument."""
 SCATTER_LAW_SHARE = 0.15
 """Of a scatter that a smooth law must explain to make it none."""
 STEPS_HIDDEN = 0.05
@@ -338,8 +334,6 @@ STEPS_HIDDEN = 0.05
 RIVALS = 2.0
 """Prior odds of other causes against an encoder, in a joint that errs anew from pose to pose: wear or a ripple too fine
 for its period to be looked for, and what nobody recorded, each as probable."""
-STEP_SURE = 3.0
-"""Logarithm of a Bayes factor, 20 to 1, from which a step is measured by its period, no more by the errors' size."""
 BAND = 1.35
 """The step is looked for within this factor of what the scatter's size says: its 99.9 % interval with 30 poses."""
 STEP_SLACKS = (0.05, 0.1, 0.2)
@@ -348,8 +342,6 @@ STEP_BANDS, STEP_PHASES, STEP_HARMONICS = 12, 32, 8
 """Bands of frequency, 5 % each, in which errors count in one step; phases; harmonics that such a slack leaves."""
 STEP_POSES, MOST_FREQUENCIES = 200, 500_000
 """Poses of a search for steps, more only say it more surely; and frequencies: some seconds of time, and 0.2 GB."""
-FLAT = 12.0
-"""Square of a step over the variance of the errors that rounding to it makes: those of an even distribution."""
 
 # --- findings ---
 
