@@ -8,7 +8,7 @@ from simulate import simulate
 
 from thermal_robot import diagnose
 from thermal_robot.diagnosis.cautions import cautions, contradicted, usable
-from thermal_robot.diagnosis.parts import Refused, Sensitivity
+from thermal_robot.diagnosis.values import Refused, Sensitivity
 from thermal_robot.effects import choose
 from thermal_robot.inference.fit import fit
 

@@ -4,28 +4,21 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING, Protocol
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from thermal_robot.correction import CorrectedModel
+from thermal_robot.correction.model import CorrectedModel
 from thermal_robot.diagnosis.deviations import as_remainder_says
 from thermal_robot.diagnosis.examine import Examined, examine
 from thermal_robot.diagnosis.findings import estimates, told_inside
-from thermal_robot.diagnosis.parts import Estimate
+from thermal_robot.diagnosis.values import Estimate
 from thermal_robot.inference.algebra import rms
 from thermal_robot.inference.fit import Fit
 from thermal_robot.teller import registered
 
 if TYPE_CHECKING:
     import pandas as pd
-
-
-class Teller(Protocol):
-    """Who puts a calibration into words."""
-
-    def calibration_text(self, calibration: Calibration) -> str:
-        """Return all of it as plain text."""
 
 
 @dataclass(frozen=True)
@@ -133,9 +126,9 @@ class Calibration:
 
         NaN where the data do not identify the parameter.
         """
-        from thermal_robot.diagnosis.tabled import estimates
+        from thermal_robot.diagnosis.result import estimate_table
 
-        return estimates((effect.name, estimate) for effect in self.effects for estimate in effect.parameters)
+        return estimate_table((effect.name, estimate) for effect in self.effects for estimate in effect.parameters)
 
     @cached_property
     def model(self) -> CorrectedModel:
@@ -146,17 +139,16 @@ class Calibration:
 
     @property
     def frames(self) -> pd.DataFrame:
-        """Base and target as declared or fitted, SI: see :func:`~thermal_robot.diagnosis.tabled.fitted_frames`."""
-        from thermal_robot.diagnosis.tabled import fitted_frames
+        """Base and target as declared or fitted, SI: see :func:`~thermal_robot.diagnosis.result.frame_table`."""
+        from thermal_robot.diagnosis.result import frame_table
 
-        return fitted_frames(self.model)
+        return frame_table(self.model)
 
     def __repr__(self) -> str:
         return f"Calibration({self.campaign!r}: {', '.join(self.names)})"
 
     def __str__(self) -> str:
-        teller: Teller = registered()
-        return teller.calibration_text(self)
+        return registered().calibration_text(self)
 
 
 def of_fit(fit: Fit, names: tuple[str, ...], warnings: tuple[str, ...]) -> Calibration:

@@ -21,7 +21,7 @@ from thermal_robot.campaign.table import told_rows
 from thermal_robot.diagnosis.data_faults import settings as faults
 from thermal_robot.diagnosis.data_faults.find import misfit, spread
 from thermal_robot.diagnosis.data_faults.readings import Readings
-from thermal_robot.diagnosis.parts import Refused, Sensitivity
+from thermal_robot.diagnosis.values import Refused, Sensitivity
 from thermal_robot.effects import gate
 from thermal_robot.inference import settings
 from thermal_robot.inference.fit import Fit

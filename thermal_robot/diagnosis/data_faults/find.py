@@ -39,7 +39,7 @@ from thermal_robot.diagnosis.data_faults.kind import (
     sign_patterns,
 )
 from thermal_robot.diagnosis.data_faults.readings import Readings, Rows, rms, stacked
-from thermal_robot.diagnosis.parts import DataFault
+from thermal_robot.diagnosis.values import DataFault
 from thermal_robot.inference.frames import Placed, middle, soft
 
 

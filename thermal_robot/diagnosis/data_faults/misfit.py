@@ -26,7 +26,7 @@ from thermal_robot.diagnosis.data_faults import data_fault, settings
 from thermal_robot.diagnosis.data_faults.find import misfit
 from thermal_robot.diagnosis.data_faults.readings import Readings
 from thermal_robot.diagnosis.examine import examine
-from thermal_robot.diagnosis.parts import AnotherModel, Misfit
+from thermal_robot.diagnosis.values import AnotherModel, Misfit
 from thermal_robot.effects import Effect
 from thermal_robot.errors import RobotError
 from thermal_robot.inference import settings as inference

@@ -11,13 +11,13 @@ from threadpoolctl import threadpool_limits
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
-from thermal_robot.correction import CorrectedModel
+from thermal_robot.correction.model import CorrectedModel
 from thermal_robot.diagnosis.growing.choice import together
 from thermal_robot.diagnosis.growing.stream import Stream, expected_sizes, received
 from thermal_robot.diagnosis.growing.sums import frame_names
 from thermal_robot.diagnosis.growing.watched import Agreement
-from thermal_robot.diagnosis.parts import Unexplained
 from thermal_robot.diagnosis.settings import LOOSE
+from thermal_robot.diagnosis.values import Unexplained
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings as chosen
 from thermal_robot.inference.fit import Fit
