@@ -26,7 +26,7 @@ if TYPE_CHECKING:
     import pandas as pd
 
 Shares = Mapping[str, tuple[float, tuple[float, float]]]
-NO_SHARE = (0.0, (0.0, 0.0))
+_NO_SHARE = (0.0, (0.0, 0.0))
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ def _of_random(fit: Fit, chance: RandomGap, effect: RandomEffect) -> Finding:
         return Finding(effect.name, "not_testable", needs=effect.needs)
     own = [k for k in chance.kept if k.component.kind == kind]
     probability = scatter.probability.get(kind, 0.0)
-    found, likely = Finding(effect.name, "not_found", probability, *NO_SHARE), probability >= settings.SCATTER_SURE
+    found, likely = Finding(effect.name, "not_found", probability, *_NO_SHARE), probability >= settings.SCATTER_SURE
     if not likely or not own:
         # what follows a law is not this effect
         return replace(found, probability=0.0) if likely and scatter.chosen(kind) else found
@@ -200,7 +200,7 @@ def findings(
             continue  # a law that did not last was never a candidate of anybody's
         else:
             one = Finding(name, "not_found", fit.probability(name))
-        share, interval = shares.get(name, NO_SHARE)
+        share, interval = shares.get(name, _NO_SHARE)
         one = replace(one, shrinkage=share, shrinkage_ci95=interval, locations=locations.get(name, ()))
         if part := inside.get(name):
             one = replace(one, parameters=part.parameters, unseen=part.unseen)
@@ -210,7 +210,7 @@ def findings(
         elif others := apart.get(name) or _hidden(fit, name, explained):
             one = replace(one, status="confounded", confounded_with=others)
         found.append(one)
-    out = (Finding(name, "not_found", r.probability, *shares.get(name, NO_SHARE)) for name, r in refused.items())
+    out = (Finding(name, "not_found", r.probability, *shares.get(name, _NO_SHARE)) for name, r in refused.items())
     return (*found, *out, *(Finding(name, "not_testable", needs=needs) for name, needs in fit.needs.items()))
 
 

@@ -104,15 +104,6 @@ class NextSample:
     separates: tuple[Effects, ...]
     gain: float
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain values, SI, ready for JSON."""
-        return {
-            "joints": dict(self.position),
-            "conditions": dict(self.conditions),
-            "separates": [list(effects) for effects in self.separates],
-            "gain": self.gain,
-        }
-
 
 @dataclass(frozen=True, eq=False)
 class NextSamples:
@@ -126,7 +117,15 @@ class NextSamples:
 
     def to_list(self) -> list[dict[str, Any]]:
         """Return the list that stands in the JSON under ``next.samples``."""
-        return [sample.to_dict() for sample in self.samples]
+        return [
+            {
+                "joints": dict(sample.position),
+                "conditions": dict(sample.conditions),
+                "separates": [list(effects) for effects in sample.separates],
+                "gain": sample.gain,
+            }
+            for sample in self.samples
+        ]
 
     def to_table(self) -> pd.DataFrame:
         """Return a table in the campaign's units, with the columns of its file, ``separates`` and ``gain``."""
@@ -226,10 +225,10 @@ def candidates(fit: Fit, seed: int = 0, loads: Sequence[float] = (), pool: int =
 
 
 def _range(campaign: Campaign) -> tuple[Array, Array]:
-    used = campaign.q.min(axis=0), campaign.q.max(axis=0)
     low, high = joint_range(campaign.robot)
-    low, high = np.where(np.isfinite(low), low, used[0]), np.where(np.isfinite(high), high, used[1])
-    return np.minimum(low, used[0]), np.maximum(high, used[1])
+    low = np.where(np.isfinite(low), low, np.inf)
+    high = np.where(np.isfinite(high), high, -np.inf)
+    return np.minimum(low, campaign.q.min(axis=0)), np.maximum(high, campaign.q.max(axis=0))
 
 
 def _effects(fit: Fit, combination: Combination) -> Effects:
@@ -300,31 +299,19 @@ def _predictive(fit: Fit, offered: Observations, leading: Sequence[Combination])
 
 def _root(design: Array, precision: Array) -> Array:
     """(K, m, p) root of the covariance of design · N(0, precision⁻¹), the precision at least that of the prior, 1."""
-    value, vector = _eigen(precision)
-    return np.asarray(design @ (vector / np.sqrt(value)))
-
-
-def _inverse(matrix: Array) -> tuple[Array, Array]:
-    """Return inverse and log determinant of symmetric matrices (..., m, m) that are at least the identity."""
-    value, vector = _eigen(matrix)
-    return (vector / value[..., None, :]) @ np.swapaxes(vector, -1, -2), np.log(value).sum(axis=-1)
-
-
-def _eigen(matrix: Array) -> tuple[Array, Array]:
-    """Return eigenvalues and vectors of matrices at least the identity: below it there is rounding alone."""
-    value, vector = np.linalg.eigh(matrix)
-    return np.maximum(value, 1.0), vector
+    value, vector = np.linalg.eigh(precision)
+    return np.asarray(design @ (vector / np.sqrt(np.maximum(value, 1.0))))
 
 
 class _Conditional:
-    """Distribution of every candidate given the chosen samples S: mean y_c − B y_S, covariance C."""
+    """Conditional distribution of every candidate given the chosen samples S: mean y_c − B y_S, root ``learnt``."""
 
-    def __init__(self, root: Array, chosen: Sequence[int]) -> None:
-        past = equations_of(root[list(chosen)])
-        self.own = np.einsum("nap,nbp->nab", root, root) + np.eye(root.shape[1])
+    def __init__(self, root: Array, learnt: Array, chosen: Sequence[int]) -> None:
+        past, one = equations_of(root[list(chosen)]), np.eye(root.shape[1])
+        self.own = root @ root.transpose(0, 2, 1) + one
         self.cross, self.past = root @ past.T, past @ past.T + np.eye(len(past))
-        self.gain = self.cross @ _inverse(self.past)[0]
-        self.inverse, self.log_det = _inverse(self.own - self.gain @ self.cross.transpose(0, 2, 1))
+        self.gain = self.cross @ np.linalg.inv(self.past)
+        self.inverse, self.log_det = np.linalg.inv(learnt @ learnt.transpose(0, 2, 1) + one), 2.0 * _log_det(learnt)
 
 
 def _increase(i: _Conditional, j: _Conditional, apart: Array, chosen: Sequence[int]) -> Array:
@@ -342,16 +329,16 @@ def _chosen(
     """Choose rows greedily; return them, the explanations that each tells apart best, and the cumulative gain."""
     number = len(models)
     if number == 1:
-        alone, learnt = most_informative(models[0].root, models[0].frames, count)
-        return alone, [(0,)] * count, learnt
+        alone, gained = most_informative(models[0].root, models[0].frames, count)
+        return alone, [(0,)] * count, gained
     itself = np.eye(number, dtype=bool)[:, :, None]
-    so_far = np.zeros((number, number))
+    so_far, learnt, frames = np.zeros((number, number)), [model.root for model in models], models[0].frames
     chosen: list[int] = []
     pairs: list[tuple[int, ...]] = []
     gains: list[float] = []
     for _ in range(count):
-        known = [_Conditional(model.root, chosen) for model in models]
-        information = 0.5 * (known[0].log_det - _Conditional(models[0].frames, chosen).log_det)
+        known = [_Conditional(model.root, root, chosen) for model, root in zip(models, learnt, strict=True)]
+        information = _log_det(learnt[0]) - _log_det(frames)
         added = np.zeros((number, number, len(information)))
         for i, j in np.argwhere(~itself[:, :, 0]):
             added[i, j] = _increase(known[i], known[j], models[i].mean - models[j].mean, chosen)
@@ -362,6 +349,7 @@ def _chosen(
         row = int(score.argmax())
         chosen.append(row)
         gains.append(float(expected[row]))
+        learnt, frames = [_learnt(root, root[row]) for root in learnt], _learnt(frames, frames[row])
         so_far = reached[:, :, row]
         both = np.outer(probability, probability) * (added[:, :, row] + added[:, :, row].T)
         pairs.append(tuple(sorted(int(k) for k in np.unravel_index(both.argmax(), both.shape))))
@@ -402,32 +390,27 @@ def _pose(fit: Fit, group: Effects) -> Wanted | None:
 
     ``None`` where no sample tells enough, or tells other effects apart than those of the group.
     """
-    plain = next_samples(fit)
-    loaded = plain
+    plain = loaded = next_samples(fit)
     if fit.campaign.robot.has_masses and not fit.nominal.varies("payload"):
         loaded = next_samples(fit, loads=(settings.LOAD,))
-    least = 0.0 if group else settings.WORTHWHILE
-    if _gain(loaded, group) > max(least, settings.PAYS * _gain(plain, group)):
-        return Wanted("column", "payload", apart=_apart(loaded, group))
-    if _gain(plain, group) < settings.WORTHWHILE:
+    (apart, gain), (with_load, more) = _apart(plain, group), _apart(loaded, group)
+    if more > max(0.0 if group else settings.WORTHWHILE, settings.PAYS * gain):
+        return Wanted("column", "payload", apart=with_load)
+    if gain < settings.WORTHWHILE:
         return None
     sample = plain.samples[0]
     # when it is measured, and from where the joints come, matters less than where they are
     set_up = {name: v for name, v in sample.conditions.items() if name.partition(".")[0] not in (*CLOCK, *_OF_JOINTS)}
-    return Wanted("pose", apart=_apart(plain, group), position=sample.position, conditions=set_up)
+    return Wanted("pose", apart=apart, position=sample.position, conditions=set_up)
 
 
-def _gain(samples: NextSamples, group: Effects) -> float:
-    return samples.samples[-1].gain if _apart(samples, group) else 0.0
-
-
-def _apart(samples: NextSamples, group: Effects) -> Effects:
-    """Return the effects that only one of the two explanations has that the first sample tells apart."""
+def _apart(samples: NextSamples, group: Effects) -> tuple[Effects, float]:
+    """Return the effects that only one of the two explanations has that the first sample tells apart, and the gain."""
     if not samples.samples or len(samples.samples[0].separates) < 2:
-        return ()
+        return (), 0.0
     one, other = map(set, samples.samples[0].separates)
-    either = tuple(sorted(one ^ other))
-    return either if not group or set(either) & set(group) else ()
+    apart = tuple(sorted(one ^ other))
+    return (apart, samples.samples[-1].gain) if apart and (not group or set(apart) & set(group)) else ((), 0.0)
 
 
 def _column(fit: Fit, found: Sequence[Finding], left: Unexplained) -> Wanted | None:

@@ -91,33 +91,23 @@ class Diagnosis:
     ----------
     campaign, robot, tool_frame, samples, measures, joint_names, reach
         What was diagnosed; movable joints, root to tool; diagonal of the measured volume, m.
-    outliers
-        Row numbers in the file of the measurements set aside.
-    gap, effects, where, unexplained
-        The parts of the answer; effects are ordered by held-out share.
-    verdict
-        Names of the effects of the fit, largest share first, then of the random effects that were found.
-    probability
-        Posterior probability of exactly this explanation.
-    separates
-        Groups of effects that further measurements would have to tell apart.
-    model
-        The corrected model.
-    rows
-        Measurement by measurement.
-    summary, advice
-        The verdict, and what to measure next, in one plain sentence each; see :func:`told`.
-    warnings
-        What a reader should know about the data.
+    outliers, left_out
+        Row numbers in the file of the measurements set aside; names of the effects left out by request.
+    gap, effects, where, unexplained, rows
+        The parts of the answer, effects ordered by held-out share, and the same measurement by measurement.
     remaining
         The residual of the whole fit, discovered laws included, while ``unexplained`` is that of the known effects
         alone; ``None`` where the two are the same.
-    left_out
-        Names of the effects that were left out by request.
-    wanted
-        What to measure or to record next; ``None`` where nothing is needed.
-    sensitivity, fit
-        How far the verdict depends on the prior sizes; the fit behind the diagnosis.
+    verdict, probability
+        Names of the effects of the fit, largest share first, then of the random effects that were found; posterior
+        probability of exactly this explanation.
+    separates, wanted
+        Groups of effects that further measurements would have to tell apart; the next measurement, ``None`` where
+        nothing is needed.
+    model, fit, sensitivity
+        The corrected model, the fit behind it, and how far the verdict depends on the prior sizes.
+    summary, advice, warnings
+        The verdict, and what to measure next, in one plain sentence each; what a reader should know about the data.
     misfit
         Why nothing can be said of the robot: robot and table do not belong together; ``None`` where they do.
     performance
