@@ -310,8 +310,12 @@ class _Conditional:
         past, one = equations_of(root[list(chosen)]), np.eye(root.shape[1])
         self.own = root @ root.transpose(0, 2, 1) + one
         self.cross, self.past = root @ past.T, past @ past.T + np.eye(len(past))
-        self.gain = self.cross @ np.linalg.inv(self.past)
-        self.inverse, self.log_det = np.linalg.inv(learnt @ learnt.transpose(0, 2, 1) + one), 2.0 * _log_det(learnt)
+        along, size, across = np.linalg.svd(past, full_matrices=False)
+        self.gain = ((root @ across.T) * (size / (1.0 + size**2))) @ along.T
+        value, vector = np.linalg.eigh(learnt @ learnt.transpose(0, 2, 1) + one)
+        value = np.maximum(value, 1.0)  # below it there is rounding alone
+        self.inverse = (vector / value[:, None, :]) @ vector.transpose(0, 2, 1)
+        self.log_det = np.log(value).sum(axis=1)
 
 
 def _increase(i: _Conditional, j: _Conditional, apart: Array, chosen: Sequence[int]) -> Array:
@@ -338,7 +342,7 @@ def _chosen(
     gains: list[float] = []
     for _ in range(count):
         known = [_Conditional(model.root, root, chosen) for model, root in zip(models, learnt, strict=True)]
-        information = _log_det(learnt[0]) - _log_det(frames)
+        information = 0.5 * known[0].log_det - _log_det(frames)
         added = np.zeros((number, number, len(information)))
         for i, j in np.argwhere(~itself[:, :, 0]):
             added[i, j] = _increase(known[i], known[j], models[i].mean - models[j].mean, chosen)
