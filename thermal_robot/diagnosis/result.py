@@ -329,15 +329,15 @@ class Diagnosis:
         left = self.unexplained
         plain: dict[str, Any] = {
             "schema": SCHEMA,
-            "campaign": {
-                "name": self.campaign,
-                "robot": self.robot,
-                "tool_frame": self.tool_frame,
-                "samples": self.samples,
-                "measures": self.measures,
-                "outliers": self.outliers,
-                "warnings": self.warnings,
-            },
+            "campaign": dict(
+                name=self.campaign,
+                robot=self.robot,
+                tool_frame=self.tool_frame,
+                samples=self.samples,
+                measures=self.measures,
+                outliers=self.outliers,
+                warnings=self.warnings,
+            ),
             "gap": _gap_as_json(self.gap),
             "verdict": {
                 "usable": self.usable,
