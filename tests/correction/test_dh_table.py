@@ -14,7 +14,7 @@ from readers import displaced
 from thermal_robot import CampaignError
 from thermal_robot.campaign import Units
 from thermal_robot.correction import dh_table
-from thermal_robot.correction.calibrated import CONVENTIONS
+from thermal_robot.correction.robot_files import CONVENTIONS
 from thermal_robot.kinematics import Displacement, tool_poses
 
 ROWS = 10

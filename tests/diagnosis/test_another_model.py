@@ -2,7 +2,7 @@
 
 import pytest
 
-from thermal_robot.diagnosis.parts import AnotherModel
+from thermal_robot.diagnosis.values import AnotherModel
 
 
 @pytest.mark.parametrize(

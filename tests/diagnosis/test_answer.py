@@ -5,7 +5,7 @@ import pytest
 from simulate import simulate
 
 from thermal_robot import diagnose
-from thermal_robot.diagnosis.parts import FoldScheme
+from thermal_robot.diagnosis.values import FoldScheme
 from thermal_robot.effects import RANDOM, library
 
 

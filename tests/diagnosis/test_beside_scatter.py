@@ -8,7 +8,7 @@ from simulate import simulate
 
 from thermal_robot import diagnose
 from thermal_robot.diagnosis.beside import beside_scatter
-from thermal_robot.diagnosis.parts import Refused
+from thermal_robot.diagnosis.values import Refused
 from thermal_robot.effects import choose
 from thermal_robot.inference import settings
 from thermal_robot.inference.fit import fit

@@ -10,7 +10,7 @@ from simulate import simulate
 import thermal_robot as tr
 from thermal_robot import CorrectedModel, calibrate, diagnose
 from thermal_robot.diagnosis.data_checks import SAID, STRAIGHT, as_counted, cautions, contradicted, not_executed, usable
-from thermal_robot.diagnosis.parts import Refused, Sensitivity
+from thermal_robot.diagnosis.values import Refused, Sensitivity
 from thermal_robot.effects import choose
 from thermal_robot.inference.fit import fit
 from thermal_robot.observations import observe

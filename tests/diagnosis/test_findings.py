@@ -11,7 +11,7 @@ from simulate import simulate
 
 from thermal_robot import diagnose
 from thermal_robot.diagnosis.findings import by_share, findings, separates, titled
-from thermal_robot.diagnosis.parts import Finding, Refused
+from thermal_robot.diagnosis.values import Finding, Refused
 from thermal_robot.effects import choose, library, random_effects
 from thermal_robot.effects.law import Discovered
 from thermal_robot.inference.fit import fit, refit

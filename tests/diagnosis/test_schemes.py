@@ -10,7 +10,7 @@ from simulate import simulate
 from thermal_robot import simulate as simulated
 from thermal_robot.diagnosis.beside import grown
 from thermal_robot.diagnosis.held_out import hardest, harmed, worst_folds
-from thermal_robot.diagnosis.parts import FoldScheme, HeldOut
+from thermal_robot.diagnosis.values import FoldScheme, HeldOut
 from thermal_robot.effects import choose
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.fit import fit

@@ -7,7 +7,7 @@ import pytest
 from helpers import with_law
 from simulate import simulate
 
-from thermal_robot.diagnosis.parts import Unexplained, Where
+from thermal_robot.diagnosis.values import Unexplained, Where
 from thermal_robot.diagnosis.where import locate, without_laws
 from thermal_robot.effects import choose
 from thermal_robot.effects.law import Discovered

@@ -6,7 +6,7 @@ import pytest
 from fleet.robots import ONLY
 
 import thermal_robot as tr
-from thermal_robot.diagnosis.parts import Misfit
+from thermal_robot.diagnosis.values import Misfit
 from thermal_robot.fleet.rows import failed, rows_of, schema, write_rows
 
 

@@ -8,7 +8,8 @@ import pytest
 from simulate import simulate
 
 from thermal_robot import diagnose
-from thermal_robot.diagnosis.parts import (
+from thermal_robot.diagnosis.result import Diagnosis
+from thermal_robot.diagnosis.values import (
     Dependence,
     Estimate,
     Finding,
@@ -19,7 +20,6 @@ from thermal_robot.diagnosis.parts import (
     Unexplained,
     Where,
 )
-from thermal_robot.diagnosis.result import Diagnosis
 from thermal_robot.effects.law_words import Size
 from thermal_robot.iso9283 import (
     Accuracy,

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from thermal_robot.diagnosis.parts import Finding, FoldScheme, Misfit
+from thermal_robot.diagnosis.values import Finding, FoldScheme, Misfit
 from thermal_robot.report.words import details
 
 

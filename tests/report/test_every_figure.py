@@ -7,7 +7,7 @@ import pytest
 from report.looking import outside, overlapping, texts
 
 from thermal_robot import report
-from thermal_robot.diagnosis.parts import Dependence, Where
+from thermal_robot.diagnosis.values import Dependence, Where
 
 PLOTS = ("plot_how_far", "plot_which", "plot_where", "plot_remainder", "plot_map", "overview")
 ROWS = ("overview", "plot_remainder")  # the overview holds all other panels that show rows

@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import pytest
 
-from thermal_robot.diagnosis.parts import AnotherModel, DataFault, Misfit, Wanted
+from thermal_robot.diagnosis.values import AnotherModel, DataFault, Misfit, Wanted
 from thermal_robot.report.plain_text import text
 from thermal_robot.report.words import advice
 

@@ -7,7 +7,8 @@ from html.parser import HTMLParser
 
 import pytest
 
-from thermal_robot.diagnosis.parts import (
+from thermal_robot.diagnosis.result import Diagnosis
+from thermal_robot.diagnosis.values import (
     DataFault,
     Dependence,
     Estimate,
@@ -18,7 +19,6 @@ from thermal_robot.diagnosis.parts import (
     Unexplained,
     Where,
 )
-from thermal_robot.diagnosis.result import Diagnosis
 from thermal_robot.report import advice, fragment, headline, html, html_parts
 
 KINDS = ("found", "nothing", "unexplained", "confounded")

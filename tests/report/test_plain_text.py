@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from thermal_robot.diagnosis.parts import Estimate, Finding, FoldScheme
+from thermal_robot.diagnosis.values import Estimate, Finding, FoldScheme
 from thermal_robot.report import text
 from thermal_robot.report.words import details
 

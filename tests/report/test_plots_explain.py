@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from report.looking import line, outside, overlapping, texts
 
-from thermal_robot.diagnosis.explained import Explained, Place
+from thermal_robot.diagnosis.values import Explained, Place
 from thermal_robot.report import explain_figure
 from thermal_robot.report import plots as plots_explain
 from thermal_robot.report.drawing import BEFORE

@@ -8,7 +8,7 @@ from report.looking import line, lines_of
 from simulate import simulate
 
 from thermal_robot import diagnose
-from thermal_robot.diagnosis.parts import Dependence
+from thermal_robot.diagnosis.values import Dependence
 from thermal_robot.report import plot_remainder
 
 

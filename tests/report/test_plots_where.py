@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 from report.looking import bars, tick_labels
 
-from thermal_robot.diagnosis.parts import Where
+from thermal_robot.diagnosis.values import Where
 from thermal_robot.report import plot_where
 from thermal_robot.report.drawing import AFTER, BEFORE, MUTED, THIRD
 

@@ -7,7 +7,7 @@ from itertools import product
 import numpy as np
 import pytest
 
-from thermal_robot.diagnosis.parts import (
+from thermal_robot.diagnosis.values import (
     AnotherModel,
     DataFault,
     Dependence,

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from thermal_robot.diagnosis.parts import Estimate, Location
+from thermal_robot.diagnosis.values import Estimate, Location
 from thermal_robot.report import units
 
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from thermal_robot.diagnosis.data_checks import SAID
-from thermal_robot.diagnosis.parts import Dependence, Estimate, Finding, FoldScheme, Location
+from thermal_robot.diagnosis.values import Dependence, Estimate, Finding, FoldScheme, Location
 from thermal_robot.effects.law_words import Size
 from thermal_robot.report.words import (
     NO_BREAK,

@@ -8,8 +8,8 @@ import pytest
 
 from thermal_robot.campaign import Campaign
 from thermal_robot.datasets import demo_campaign
-from thermal_robot.diagnosis.parts import DataFault, Misfit
 from thermal_robot.diagnosis.result import told
+from thermal_robot.diagnosis.values import DataFault, Misfit
 from thermal_robot.errors import CampaignError
 from thermal_robot.kinematics import tool_poses
 from thermal_robot.viewer.scene import scene_of_campaign, scene_of_diagnosis

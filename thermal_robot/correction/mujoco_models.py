@@ -18,7 +18,7 @@ import numpy as np
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
-from thermal_robot.correction.calibrated import Calibrated, calibrated_urdf, target_link
+from thermal_robot.correction.robot_files import Calibrated, calibrated_urdf, target_link
 from thermal_robot.errors import CampaignError
 from thermal_robot.kinematics import quaternion_to_rotation, rotation_to_quaternion
 from thermal_robot.kinematics.model import PRISMATIC, Mimic, mimics

@@ -1,4 +1,4 @@
-"""Assemble a diagnosis from the last fit: gap, findings, places, shrinkage, corrected model."""
+"""The diagnosis that a final fit is: gap, findings, places, shrinkage, corrected model, next measurement."""
 
 from __future__ import annotations
 
@@ -6,17 +6,18 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from scipy.special import softmax
 
-from thermal_robot.correction import CorrectedModel
+from thermal_robot.correction.model import CorrectedModel
 from thermal_robot.diagnosis import settings
 from thermal_robot.diagnosis.data_checks import cautions
 from thermal_robot.diagnosis.examine import Examined
 from thermal_robot.diagnosis.findings import by_share, findings, random_findings, separates, titled
 from thermal_robot.diagnosis.held_out import Shrinkage, hardest, harmed, worst_folds
-from thermal_robot.diagnosis.parts import Finding, Gap, Misfit, Refused, Rows, Sensitivity, Unexplained
+from thermal_robot.diagnosis.next_measurement import wanted
 from thermal_robot.diagnosis.predictive import registered, uncertainty
 from thermal_robot.diagnosis.result import Diagnosis
-from thermal_robot.diagnosis.wanted import wanted
+from thermal_robot.diagnosis.values import Finding, Gap, Misfit, Refused, Rows, Sensitivity, Unexplained
 from thermal_robot.diagnosis.where import locate
 from thermal_robot.effects import Effect, gate, random_effects
 from thermal_robot.effects.apply import depends_on
@@ -28,8 +29,9 @@ from thermal_robot.inference.explain import log_priors
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.random_gap import RandomGap
 from thermal_robot.inference.search import Search
-from thermal_robot.iso9283 import Performance, performance
 from thermal_robot.iso9283.groups import repeats
+from thermal_robot.iso9283.measure import performance
+from thermal_robot.iso9283.performance import Performance
 from thermal_robot.kinematics import exp3, quaternion_to_rotation, rotation_to_quaternion
 
 _HELD_OUT = "Corrected figures are of rows held out: the model was fitted without the poses that they are told of."
@@ -80,26 +82,22 @@ def numbered(fit: Fit, shrinkage: Shrinkage, laws: Sequence[Discovery]) -> tuple
 
 
 def prior_sensitivity(fit: Fit) -> Sensitivity:
-    """Recompute the probability of the verdict with all prior sizes divided and multiplied by ``PRIOR_FACTOR``.
+    """Prior sensitivity: probability of the verdict with all prior sizes divided and multiplied by ``PRIOR_FACTOR``.
 
-    The scale of each effect is learnt from the data, with a prior about the stated size that is as wide as its size is
-    unknown (:attr:`~thermal_robot.effects.Effect.size_spread`). The verdict should therefore depend little on the
-    stated sizes; where it does, the data do not decide. The leading combinations alone are compared.
+    The scale of each effect is learnt from the data; where the verdict depends on the stated sizes all the same, the
+    data do not decide. The leading combinations alone are compared.
     """
     e = fit.explanation
     problem = e.problem
     prior = log_priors([b.effect for b in e.linear.blocks])
     chosen = {effect.name for effect, _ in fit.effects}
+    compared = e.combinations[: settings.COMPARED]
+    same = np.array([fit.names_of(combination) == chosen for combination in compared])
     found = []
     for factor in (1.0 / settings.PRIOR_FACTOR, settings.PRIOR_FACTOR):
-        scaled = replace(problem, matrix=problem.matrix * factor**2, vector=problem.vector * factor)
-        search = Search(scaled, prior)
-        log, same = [], []
-        for combination in e.combinations[: settings.COMPARED]:
-            log.append(search.evaluate(combination.blocks).log_evidence)
-            same.append(fit.names_of(combination) == chosen)
-        weight = np.exp(np.array(log) - max(log))
-        found.append(float(weight[np.array(same)].sum() / weight.sum()))
+        search = Search(replace(problem, matrix=problem.matrix * factor**2, vector=problem.vector * factor), prior)
+        weight = softmax([search.evaluate(combination.blocks).log_evidence for combination in compared])
+        found.append(float(weight[same].sum()))
     return Sensitivity(*found)
 
 
@@ -137,18 +135,14 @@ def answer(
     that were left out; ``notes`` say what was left out of the campaign, one sentence each.
     """
     fit, shrinkage, laws = numbered(last.fit, shrinkage, last.laws)
-    last = replace(last, fit=fit, laws=laws)
-    campaign, remaining, gap = fit.campaign, last.left.unexplained, _gap(last, shrinkage)
+    campaign, remaining, gap = fit.campaign, last.left.unexplained, _gap(fit, last.left, shrinkage)
     sensitivity = prior_sensitivity(fit)
-    shares = {name: value for name, (value, _) in shrinkage.shares.items()}
-    where, locations = locate(fit, shares)
+    where, locations = locate(fit, {name: value for name, (value, _) in shrinkage.shares.items()})
     held = [effect.name for effect, _ in fit.effects]
-    of_laws = {d.law.name: d.probability for d in last.laws}
-    systematic = findings(fit, shrinkage.shares, locations, of_laws, last.refused)
+    systematic = findings(fit, shrinkage.shares, locations, {d.law.name: d.probability for d in laws}, last.refused)
     chance = [f for f in random_findings(fit, last.chance) if asked(f.name)]
-    known = (*candidates, *random_effects())
-    found, harms = _no_surer(by_share(titled((*systematic, *chance), known)), gap)
-    groups, probability = separates(found), _probability(last, gap)
+    found, harms = _no_surer(by_share(titled((*systematic, *chance), (*candidates, *random_effects()))), gap)
+    groups, probability = separates(found), _probability(fit, last.refused, gap)
     return Diagnosis(
         campaign=campaign.name,
         robot=campaign.robot.name,
@@ -178,40 +172,37 @@ def answer(
     )
 
 
-def _probability(last: Conclusion, gap: Gap) -> float:
+def _probability(fit: Fit, refused: Mapping[str, Refused], gap: Gap) -> float:
     """Return how probable exactly the effects of the fit are; with what was refused at work they are not all."""
-    exactly = last.fit.probability_of_just({effect.name for effect, _ in last.fit.effects})
-    exactly = min([exactly, *(1.0 - refused.probability for refused in last.refused.values())])
-    return exactly if gap.worse is None else min(exactly, settings.SUREST_IF_WORSE)
+    exactly = fit.probability_of_just({effect.name for effect, _ in fit.effects})
+    exactly = min([exactly, *(1.0 - out.probability for out in refused.values())])
+    return exactly if gap.worse is None else min(exactly, settings.DECIDED)
 
 
 def _no_surer(found: tuple[Finding, ...], gap: Gap) -> tuple[tuple[Finding, ...], list[str]]:
     """Cap the probabilities of what harms rows held out by session or region, and say why."""
     if gap.worse is None:
         return found, []
-    most = settings.SUREST_IF_WORSE
+    most = settings.DECIDED
     capped = (f if f.probability is None else replace(f, probability=min(f.probability, most)) for f in found)
     note = f"the correction harms rows held out by {gap.worse.name}: no probability above {most:.0%} is told"
     return tuple(capped), [note]
 
 
-def _gap(last: Conclusion, shrinkage: Shrinkage) -> Gap:
-    fit = last.fit
-    kept = ~fit.explanation.outliers
-    before, after = fit.nominal.gap[kept], fit.corrected.gap[kept]
-
+def _gap(fit: Fit, left: Examined, shrinkage: Shrinkage) -> Gap:
+    before, after = (seen.gap[~fit.explanation.outliers] for seen in (fit.nominal, fit.corrected))
     turned, schemes = before.shape[1] == 6, worst_folds(fit)
     return Gap(
-        rms(before[:, :3]),
-        rms(after[:, :3]),
-        float(np.sqrt(3.0) * last.left.floor),
-        last.left.source,
-        shrinkage.overall,
-        rms(before[:, 3:]) if turned else None,
-        rms(after[:, 3:]) if turned else None,
-        schemes,
-        hardest(schemes, shrinkage.overall),
-        harmed(schemes),
+        rms_before=rms(before[:, :3]),
+        rms_after=rms(after[:, :3]),
+        noise_floor=float(np.sqrt(3.0) * left.floor),
+        noise_source=left.source,
+        held_out=shrinkage.overall,
+        orientation_before=rms(before[:, 3:]) if turned else None,
+        orientation_after=rms(after[:, 3:]) if turned else None,
+        schemes=schemes,
+        hardest=hardest(schemes, shrinkage.overall),
+        worse=harmed(schemes),
     )
 
 

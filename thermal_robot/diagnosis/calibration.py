@@ -12,16 +12,14 @@ from typing import TYPE_CHECKING
 from threadpoolctl import ThreadpoolController
 
 from thermal_robot.campaign import Campaign, read_campaign
-from thermal_robot.correction import CorrectedModel
-from thermal_robot.diagnosis import tabled
+from thermal_robot.correction.model import CorrectedModel
 from thermal_robot.diagnosis.answer import model_of
-from thermal_robot.diagnosis.data_checks import usable
+from thermal_robot.diagnosis.data_checks import as_counted, usable
 from thermal_robot.diagnosis.deviations import as_remainder_says
 from thermal_robot.diagnosis.diagnose import check_priors, solvable
 from thermal_robot.diagnosis.examine import Examined, examine
 from thermal_robot.diagnosis.findings import estimates, told_inside
-from thermal_robot.diagnosis.parts import Estimate
-from thermal_robot.diagnosis.data_checks import as_counted
+from thermal_robot.diagnosis.values import Estimate
 from thermal_robot.effects import KINEMATIC, Effect, library, named
 from thermal_robot.errors import CampaignError, EffectError, require
 from thermal_robot.inference.algebra import rms
@@ -139,14 +137,16 @@ class Calibration:
 
     @property
     def frames(self) -> pd.DataFrame:
-        """Base and target as declared or fitted, SI: see :func:`~thermal_robot.diagnosis.tabled.fitted_frames`."""
-        return tabled.fitted_frames(self.model)
+        """Base and target as declared or fitted, SI: see :func:`~thermal_robot.diagnosis.result.frame_table`."""
+        from thermal_robot.diagnosis.result import frame_table
+
+        return frame_table(self.model)
 
     def __repr__(self) -> str:
         return f"Calibration({self.campaign!r}: {', '.join(self.names)})"
 
     def __str__(self) -> str:
-        return str(registered().calibration_text(self))
+        return registered().calibration_text(self)
 
 
 def calibrate(

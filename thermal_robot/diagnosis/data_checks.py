@@ -29,7 +29,7 @@ from thermal_robot.diagnosis import settings as diagnosis_settings
 from thermal_robot.diagnosis.data_faults import settings as faults
 from thermal_robot.diagnosis.data_faults.faults import Readings
 from thermal_robot.diagnosis.data_faults.find import spread
-from thermal_robot.diagnosis.parts import Refused, Sensitivity
+from thermal_robot.diagnosis.values import Refused, Sensitivity
 from thermal_robot.effects import Effect, Parameter, choose, gate
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block, frame_columns

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.special import bdtrc, chdtrc, chdtri, fdtrc, fdtri, gammaln, ndtr, pdtr
 
 from thermal_robot.arrays import Array
-from thermal_robot.diagnosis.parts import Dependence, Location, Unexplained
+from thermal_robot.diagnosis.values import Dependence, Location, Unexplained
 from thermal_robot.effects.effect import in_words
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference import settings

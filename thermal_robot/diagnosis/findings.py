@@ -1,19 +1,19 @@
-"""Which effect: status, probability, parameters of every candidate."""
+"""Model selection, told effect by effect: status, posterior probability and estimates of every candidate."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from thermal_robot.arrays import Array
-from thermal_robot.diagnosis.parts import Estimate, Finding, Location, Refused, is_frame
+from thermal_robot.diagnosis.values import Estimate, Finding, Location, Refused, is_frame
 from thermal_robot.effects import Effect, Parameter, gate, library, random_effects
 from thermal_robot.effects.law import PREFIX, Discovered
-from thermal_robot.effects.law_words import Size, called, event, in_joints, sizes, usually
+from thermal_robot.effects.law_words import called, event, in_joints, sizes, usually
 from thermal_robot.effects.quantities import unit
 from thermal_robot.effects.random_effect import RandomEffect
 from thermal_robot.inference import settings
@@ -21,6 +21,12 @@ from thermal_robot.inference.algebra import equations_of, orthonormal, without
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.inside import divided, identified
 from thermal_robot.inference.random_gap import Kept, RandomGap
+
+if TYPE_CHECKING:
+    import pandas as pd
+
+Shares = Mapping[str, tuple[float, tuple[float, float]]]
+_NO_SHARE = (0.0, (0.0, 0.0))
 
 
 @dataclass(frozen=True)
@@ -47,15 +53,19 @@ def told_inside(fit: Fit) -> dict[str, Inside]:
 
 def estimates(fit: Fit, block: int) -> tuple[Estimate, ...]:
     """Return the estimates of one block of the best combination, in its own parameters."""
-    e = fit.explanation
-    item = e.linear.blocks[block]
-    spread = np.sqrt(np.maximum(np.diag(e.values[block][1]), 0.0))
-    return _estimates(item.parameters, fitted_values(fit, block), spread, item.sizes * e.best.scales[block])
+    parameters = fit.explanation.linear.blocks[block].parameters
+    return _estimates(parameters, fitted_values(fit, block), *_deviations(fit, block))
 
 
 def fitted_values(fit: Fit, block: int) -> Array:
     """(P,) values of one block of the best combination, as they were refined, SI."""
     return fit.effects[fit.explanation.best.blocks.index(block)][1]
+
+
+def _deviations(fit: Fit, block: int) -> tuple[Array, Array]:
+    """(P,) posterior and prior standard deviations of one block of the best combination, SI."""
+    e = fit.explanation
+    return np.sqrt(np.maximum(np.diag(e.values[block][1]), 0.0)), e.linear.blocks[block].sizes * e.best.scales[block]
 
 
 def _estimates(parameters: Iterable[Parameter], values: Array, spread: Array, prior: Array) -> tuple[Estimate, ...]:
@@ -66,6 +76,27 @@ def _estimates(parameters: Iterable[Parameter], values: Array, spread: Array, pr
     )
 
 
+def covariance(fit: Fit, joint: Array) -> pd.DataFrame:
+    """Covariance of the identified parameters of the fit, by (effect, parameter), in the product of their SI units.
+
+    Deviations are those of :func:`estimates`, widened to what the remainder says of each effect
+    (:func:`~thermal_robot.diagnosis.deviations.as_remainder_says`); correlations those of the ``joint`` (K, K)
+    posterior of all frames and parameters, those of the effects last, frames marginalised.
+    """
+    import pandas as pd
+
+    e = fit.explanation
+    fitted = list(zip(e.best.blocks, fit.effects, strict=True))
+    names = [(effect.name, p.name) for b, (effect, _) in fitted for p in e.linear.blocks[b].parameters]
+    std, prior = np.hstack([np.empty((2, 0)), *(_deviations(fit, b) for b in e.best.blocks)])
+    kept = np.flatnonzero(identified(std, prior))
+    last = kept + len(joint) - len(std)
+    own = joint[np.ix_(last, last)]
+    size = std[kept] / np.sqrt(own.diagonal())
+    index = pd.MultiIndex.from_tuples([names[k] for k in kept], names=("effect", "parameter"))
+    return pd.DataFrame(own * np.outer(size, size), index=index, columns=index)
+
+
 def random_findings(fit: Fit, chance: RandomGap) -> tuple[Finding, ...]:
     """Return a finding for every random effect; none shrinks the gap, as a correction predicts a mean.
 
@@ -73,40 +104,38 @@ def random_findings(fit: Fit, chance: RandomGap) -> tuple[Finding, ...]:
     Without repeats, scatter between visits is not testable, and scatter between poses is confounded with it unless the
     steps of the encoder are seen.
     """
-    return tuple(_finding(fit, chance, effect) for effect in random_effects())
+    return tuple(_of_random(fit, chance, effect) for effect in random_effects())
 
 
-def _finding(fit: Fit, chance: RandomGap, effect: RandomEffect) -> Finding:
+def _of_random(fit: Fit, chance: RandomGap, effect: RandomEffect) -> Finding:
     scatter, kind = chance.scatter, effect.component
-    own = [k for k in chance.kept if k.component.kind == kind]
     if effect.needs and kind not in scatter.kinds:
         return Finding(effect.name, "not_testable", needs=effect.needs)
+    own = [k for k in chance.kept if k.component.kind == kind]
     probability = scatter.probability.get(kind, 0.0)
-    if probability < settings.SCATTER_SURE or not own:
+    found, likely = Finding(effect.name, "not_found", probability, *_NO_SHARE), probability >= settings.SCATTER_SURE
+    if not likely or not own:
         # what follows a law is not this effect
-        refuted = probability >= settings.SCATTER_SURE and scatter.chosen(kind)
-        return Finding(effect.name, "not_found", 0.0 if refuted else probability, 0.0, (0.0, 0.0))
+        return replace(found, probability=0.0) if likely and scatter.chosen(kind) else found
     probability *= chance.stepped if kind == "pose" else 1.0
     others = tuple(e.name for e in random_effects() if e.component not in scatter.kinds)
     likely = probability >= settings.SCATTER_SURE
     if not likely and not (others and probability >= settings.PRIOR_PROBABILITY):
-        return Finding(effect.name, "not_found", probability, 0.0, (0.0, 0.0))
+        return replace(found, probability=probability)
     names, lever = fit.campaign.robot.joint_names, fit.corrected.joint_sensitivity[:, :3]
     moved = np.array([k.component.sigma**2 * (lever[:, :, k.component.joint] ** 2).mean() for k in own])
     order = np.argsort(-moved)
-    return Finding(
-        effect.name,
-        "found" if likely else "confounded",
-        probability,
-        0.0,
-        (0.0, 0.0),
+    return replace(
+        found,
+        status="found" if likely else "confounded",
+        probability=probability,
         confounded_with=() if likely else others,
         locations=tuple(Location("joint", names[own[k].component.joint], float(moved[k] / moved.sum())) for k in order),
-        parameters=tuple(_estimate(fit, own[k], effect) for k in order),
+        parameters=tuple(_scatter(fit, own[k], effect) for k in order),
     )
 
 
-def _estimate(fit: Fit, kept: Kept, effect: RandomEffect) -> Estimate:
+def _scatter(fit: Fit, kept: Kept, effect: RandomEffect) -> Estimate:
     c, joint = kept.component, fit.campaign.robot.joint_names[kept.component.joint]
     width = effect.factor * (c.upper - c.lower) / (2.0 * settings.SIGMAS_95)
     value = kept.step if c.kind == "pose" else effect.factor * c.sigma
@@ -115,12 +144,11 @@ def _estimate(fit: Fit, kept: Kept, effect: RandomEffect) -> Estimate:
 
 def unknown_frames(fit: Fit) -> tuple[str, ...]:
     """Return the names of the frame effects whose frame is unknown and therefore fitted."""
-    frames = [effect for effect in library().values() if effect.frame]
-    return tuple(effect.name for effect in frames if gate.missing(effect, fit.nominal))
+    return tuple(e.name for e in library().values() if e.frame and gate.missing(e, fit.nominal))
 
 
 def within_frames(fit: Fit, block: int) -> bool:
-    """Whether the columns of an effect lie in the span of those of the unknown frames."""
+    """Tell whether the columns of an effect lie in the span of those of the unknown frames."""
     item, linear = fit.explanation.linear.blocks[block], fit.explanation.linear
     if not linear.frames.size or not item.parameters:
         return False
@@ -130,7 +158,7 @@ def within_frames(fit: Fit, block: int) -> bool:
 
 
 def rivals(fit: Fit, explained: Mapping[str, int]) -> dict[str, tuple[str, ...]]:
-    """By effect of the fit (with its block): the effects that it is confounded with.
+    """Confounding by posterior probability: by effect of the fit (with its block), those it is confounded with.
 
     That is a known one outside the fit that, fitted anew in its place, is nearly as probable: by more than
     ``IN_ITS_PLACE`` it is at work and the effect is not, and nothing else joins it.
@@ -149,13 +177,10 @@ def rivals(fit: Fit, explained: Mapping[str, int]) -> dict[str, tuple[str, ...]]
     return {name: tuple(sorted(others)) for name, others in told.items()}
 
 
-Shares = dict[str, tuple[float, tuple[float, float]]]
-
-
 def findings(
     fit: Fit,
     shares: Shares,
-    locations: dict[str, tuple[Location, ...]],
+    locations: Mapping[str, tuple[Location, ...]],
     laws: Mapping[str, float],
     refused: Mapping[str, Refused],
 ) -> tuple[Finding, ...]:
@@ -165,45 +190,38 @@ def findings(
     discovered law follows, where, is right.
     """
     explained = {effect.name: b for b, (effect, _) in zip(fit.explanation.best.blocks, fit.effects, strict=True)}
-    known = {effect.name: effect for effect, _ in fit.effects}
     apart, inside = rivals(fit, explained), told_inside(fit)
-    result = []
+    found = []
     for name in dict.fromkeys(fit.families):
-        if name.startswith(PREFIX) and name not in explained:
+        if name in explained:
+            block, probability = explained[name], laws.get(name, fit.probability(name))
+            one = Finding(name, "found", probability, parameters=estimates(fit, block), **_of_effect(fit, block))
+        elif name.startswith(PREFIX):
             continue  # a law that did not last was never a candidate of anybody's
-        part, law = inside.get(name), known.get(name)
-        share, interval = shares.get(name, (0.0, (0.0, 0.0)))
-        found = Finding(
-            name,
-            "found" if name in explained else "not_found",
-            probability=laws.get(name, fit.probability(name)),
-            shrinkage=share,
-            shrinkage_ci95=interval,
-            locations=locations.get(name, ()),
-            parameters=part.parameters if part else estimates(fit, explained[name]) if name in explained else (),
-            unseen=part.unseen if part else (),
-        )
-        if isinstance(law, Discovered):
-            found = replace(found, **_of_law(fit, law, explained[name]))
-        elif law is not None and law.sized_as:
-            found = replace(found, size=_in_joints(fit, law, explained[name]))
+        else:
+            one = Finding(name, "not_found", fit.probability(name))
+        share, interval = shares.get(name, _NO_SHARE)
+        one = replace(one, shrinkage=share, shrinkage_ci95=interval, locations=locations.get(name, ()))
+        if part := inside.get(name):
+            one = replace(one, parameters=part.parameters, unseen=part.unseen)
         if part and part.parameters and name not in explained:
-            found = replace(found, status="contained", probability=fit.probability(part.container))
-            found = replace(found, confounded_with=(part.container,))
+            contained = fit.probability(part.container)
+            one = replace(one, status="contained", probability=contained, confounded_with=(part.container,))
         elif others := apart.get(name) or _hidden(fit, name, explained):
-            found = replace(found, status="confounded", confounded_with=others)
-        result.append(found)
-    result += [
-        Finding(name, "not_found", r.probability, *shares.get(name, (0.0, (0.0, 0.0)))) for name, r in refused.items()
-    ]
-    result += [Finding(name, "not_testable", needs=needs) for name, needs in fit.needs.items()]
-    return tuple(result)
+            one = replace(one, status="confounded", confounded_with=others)
+        found.append(one)
+    out = (Finding(name, "not_found", r.probability, *shares.get(name, _NO_SHARE)) for name, r in refused.items())
+    return (*found, *out, *(Finding(name, "not_testable", needs=needs) for name, needs in fit.needs.items()))
 
 
-def _of_law(fit: Fit, law: Discovered, block: int) -> dict[str, Any]:
-    """Return the fields of a finding that only a law has: what it follows, in which shape, how far, and in words."""
+def _of_effect(fit: Fit, block: int) -> dict[str, Any]:
+    """Return the fields of a finding that only a law has, in words, or an effect that is a curve of each joint."""
     e, values = fit.explanation, fitted_values(fit, block)
-    size = sizes(law, fit.nominal, values, e.values[block][1])
+    law, _ = fit.effects[e.best.blocks.index(block)]
+    parameters, spread = e.linear.blocks[block].parameters, e.values[block][1]
+    if not isinstance(law, Discovered):
+        return {"size": in_joints(law.sized_as, parameters, values, spread)} if law.sized_as else {}
+    size = sizes(law, fit.nominal, values, spread)
     short, whole = event(law, fit.nominal, size)
     return {
         "quantity": law.follows,
@@ -216,9 +234,10 @@ def _of_law(fit: Fit, law: Discovered, block: int) -> dict[str, Any]:
     }
 
 
-def _in_joints(fit: Fit, effect: Effect, block: int) -> tuple[Size, ...]:
-    e = fit.explanation
-    return in_joints(effect.sized_as, e.linear.blocks[block].parameters, fitted_values(fit, block), e.values[block][1])
+def _hidden(fit: Fit, name: str, explained: Mapping[str, int]) -> tuple[str, ...]:
+    """Return the unknown frames that hold all that an effect outside the fit could do; empty where they do not."""
+    inside = name not in explained and all(within_frames(fit, b) for b in fit.blocks_of(name))
+    return unknown_frames(fit) if inside else ()
 
 
 def titled(found: Sequence[Finding], effects: Iterable[Effect]) -> tuple[Finding, ...]:
@@ -239,15 +258,8 @@ def by_share(found: Sequence[Finding]) -> tuple[Finding, ...]:
     )
 
 
-def _hidden(fit: Fit, name: str, explained: Mapping[str, int]) -> tuple[str, ...]:
-    """Return the unknown frames that hold all that an effect outside the fit could do; empty where they do not."""
-    inside = name not in explained and all(within_frames(fit, b) for b in fit.blocks_of(name))
-    return unknown_frames(fit) if inside else ()
-
-
 def separates(found: Sequence[Finding]) -> tuple[tuple[str, ...], ...]:
     """Return the groups of effects that the data cannot tell apart; one with an unknown frame only if it is alone."""
-    groups = tuple(
-        dict.fromkeys(tuple(sorted((f.name, *f.confounded_with))) for f in found if f.status == "confounded")
-    )
+    confounded = [tuple(sorted((f.name, *f.confounded_with))) for f in found if f.status == "confounded"]
+    groups = tuple(dict.fromkeys(confounded))
     return tuple(g for g in groups if len(groups) == 1 or not any(is_frame(found, name) for name in g))

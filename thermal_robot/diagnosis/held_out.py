@@ -19,7 +19,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.turning import moves
 from thermal_robot.diagnosis.one_walk import Model, Squares, Walk, deviation, share
-from thermal_robot.diagnosis.parts import FoldScheme, HeldOut
+from thermal_robot.diagnosis.values import FoldScheme, HeldOut
 from thermal_robot.effects.law_words import is_event
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings

@@ -1,20 +1,21 @@
-"""The result of a diagnosis: one frozen value, its JSON, and the port through which it is put into words and drawn.
+"""The result of a diagnosis: one frozen value, its tables and its JSON.
 
-This module knows nothing of reports. The package registers one with :func:`thermal_robot.teller.told_by`; any object
-with the methods of :class:`Teller` will do.
+This module knows nothing of reports: whoever is registered in :mod:`thermal_robot.teller` puts it into words.
 """
 
 from __future__ import annotations
 
 import json
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Protocol
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from thermal_robot.correction import CorrectedModel
-from thermal_robot.diagnosis.parts import (
+from thermal_robot.correction.model import CorrectedModel
+from thermal_robot.diagnosis.values import (
+    Estimate,
     Finding,
     Gap,
     Misfit,
@@ -23,12 +24,12 @@ from thermal_robot.diagnosis.parts import (
     Unexplained,
     Wanted,
     Where,
-    gap_as_json,
     is_frame,
     jsonable,
 )
 from thermal_robot.effects.catalogue import of_effect
 from thermal_robot.files import write_text
+from thermal_robot.kinematics import rotation_to_rpy
 from thermal_robot.teller import registered
 
 if TYPE_CHECKING:
@@ -36,43 +37,50 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from thermal_robot.campaign import Campaign
-    from thermal_robot.diagnosis.explained import Arm
-    from thermal_robot.diagnosis.next_samples import NextSamples
     from thermal_robot.diagnosis.updated import Updated
+    from thermal_robot.diagnosis.next_measurement import NextSamples
     from thermal_robot.inference.fit import Fit
-    from thermal_robot.iso9283 import Performance
+    from thermal_robot.iso9283.performance import Performance
+    from thermal_robot.shapes.arm import Arm
 
 SCHEMA = "thermal-robot/diagnosis/2"
 
 
-class Teller(Protocol):
-    """Who puts a diagnosis into words and draws it."""
-
-    def headline(self, diagnosis: Diagnosis) -> str:
-        """Return the verdict in one plain sentence."""
-
-    def advice(self, diagnosis: Diagnosis) -> str:
-        """Return what to measure next in one plain sentence."""
-
-    def text(self, diagnosis: Diagnosis) -> str:
-        """Return all of it as plain text."""
-
-    def fragment(self, diagnosis: Diagnosis) -> str:
-        """Return all of it as HTML without a page around it."""
-
-    def explain_figure(self, explained: Any) -> Any:
-        """Draw what one effect explains."""
-
-
-def _teller() -> Teller:
-    found: Teller = registered()
-    return found
-
-
 def told(diagnosis: Diagnosis) -> Diagnosis:
     """Return the diagnosis with its summary and advice."""
-    teller = _teller()
+    teller = registered()
     return replace(diagnosis, summary=teller.headline(diagnosis), advice=teller.advice(diagnosis))
+
+
+def estimate_table(estimates: Iterable[tuple[str, Estimate]]) -> pd.DataFrame:
+    """Return estimates, each with the name of its effect, as a table; NaN where the data do not identify one.
+
+    Index (effect, parameter); columns ``value``, ``std`` (one sigma), ``unit`` and ``identified``.
+    """
+    import pandas as pd
+
+    told = list(estimates)
+    index = pd.MultiIndex.from_tuples([(name, e.name) for name, e in told], names=("effect", "parameter"))
+    rows = [(e.value, e.std, e.unit, e.identified) for _, e in told]
+    table = pd.DataFrame(rows, index=index, columns=["value", "std", "unit", "identified"])
+    return table.astype({"value": float, "std": float, "identified": bool})
+
+
+def frame_table(model: CorrectedModel) -> pd.DataFrame:
+    """Where the robot stands and where the target sits, as they were declared or fitted.
+
+    Index ``base`` (the root frame in the measurement frame) and ``tool`` (the target in the tool frame); columns ``x``
+    ``y`` ``z`` in m, and ``roll`` ``pitch`` ``yaw`` in rad, as in a URDF; NaN for a target of which positions alone
+    were measured, unless declared: a point has no direction.
+    """
+    import pandas as pd
+
+    frames = {"base": model.frames.base, "tool": model.frames.tool}
+    told = [[*pose[:3, 3], *rotation_to_rpy(pose[:3, :3])] for pose in frames.values()]
+    table = pd.DataFrame(told, index=list(frames), columns=["x", "y", "z", "roll", "pitch", "yaw"])
+    if model.measures != "pose" and not model.settings.tool_known:
+        table.loc["tool", ["roll", "pitch", "yaw"]] = np.nan
+    return table
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -81,39 +89,25 @@ class Diagnosis:
 
     Attributes
     ----------
-    campaign, robot, tool_frame, samples, measures
-        What was diagnosed.
-    joint_names
-        Movable joints, root to tool.
-    outliers
-        Row numbers in the file of the measurements set aside.
-    gap, effects, where, unexplained
-        The parts of the answer; effects are ordered by held-out share.
-    verdict
-        Names of the effects of the fit, largest share first, then of the random effects that were found.
-    probability
-        Posterior probability of exactly this explanation.
-    separates
-        Groups of effects that further measurements would have to tell apart.
-    model
-        The corrected model.
-    rows
-        Measurement by measurement.
-    summary, advice
-        The verdict, and what to measure next, in one plain sentence each; see :func:`told`.
-    warnings
-        What a reader should know about the data.
+    campaign, robot, tool_frame, samples, measures, joint_names, reach
+        What was diagnosed; movable joints, root to tool; diagonal of the measured volume, m.
+    outliers, left_out
+        Row numbers in the file of the measurements set aside; names of the effects left out by request.
+    gap, effects, where, unexplained, rows
+        The parts of the answer, effects ordered by held-out share, and the same measurement by measurement.
     remaining
         The residual of the whole fit, discovered laws included, while ``unexplained`` is that of the known effects
         alone; ``None`` where the two are the same.
-    reach
-        Diagonal of the measured volume, m.
-    left_out
-        Names of the effects that were left out by request.
-    wanted
-        What to measure or to record next; ``None`` where nothing is needed.
-    sensitivity, fit
-        How far the verdict depends on the prior sizes; the fit behind the diagnosis.
+    verdict, probability
+        Names of the effects of the fit, largest share first, then of the random effects that were found; posterior
+        probability of exactly this explanation.
+    separates, wanted
+        Groups of effects that further measurements would have to tell apart; the next measurement, ``None`` where
+        nothing is needed.
+    model, fit, sensitivity
+        The corrected model, the fit behind it, and how far the verdict depends on the prior sizes.
+    summary, advice, warnings
+        The verdict, and what to measure next, in one plain sentence each; what a reader should know about the data.
     misfit
         Why nothing can be said of the robot: robot and table do not belong together; ``None`` where they do.
     performance
@@ -174,28 +168,16 @@ class Diagnosis:
     def explain(self, effect: str) -> Any:
         """Draw the residual with and without one effect, against the quantity that drives it, place by place.
 
-        Parameters
-        ----------
-        effect
-            Name of an effect of the fit.
-
-        Returns
-        -------
-        matplotlib.figure.Figure
-
-        Raises
-        ------
-        EffectError
-            If the effect is not part of the fit.
+        Returns a :class:`matplotlib.figure.Figure`; raises :class:`EffectError` if the fit does not hold the effect.
 
         Examples
         --------
         >>> figure = tr.diagnose(tr.demo_campaign()).explain("backlash")
         >>> figure.savefig("backlash.png")
         """
-        from thermal_robot.diagnosis.one_effect import explained
+        from thermal_robot.diagnosis.effect_in_detail import explained
 
-        return _teller().explain_figure(explained(self._fitted(), effect))
+        return registered().explain_figure(explained(self._fitted(), effect))
 
     def next_samples(self, count: int = 10) -> NextSamples:
         """Choose samples that would best separate the leading explanations; ``to_table()`` makes a table of them.
@@ -206,7 +188,7 @@ class Diagnosis:
         >>> len(samples.to_table())
         3
         """
-        from thermal_robot.diagnosis.next_samples import next_samples
+        from thermal_robot.diagnosis.next_measurement import next_samples
 
         return next_samples(self._fitted(), count)
 
@@ -235,15 +217,8 @@ class Diagnosis:
     def arm(self, rows: ArrayLike) -> Arm | None:
         """Return how the arm stood in some of :attr:`rows`, with the shares of its places, for a drawing.
 
-        Parameters
-        ----------
-        rows
-            (R,) positions in :attr:`rows`, from 0 on.
-
-        Returns
-        -------
-        Arm or None
-            ``None`` where nothing is known of places: this diagnosis is not usable, or was made without its fit.
+        ``rows`` (R,) are positions in :attr:`rows`, from 0 on. ``None`` where nothing is known of places: this
+        diagnosis is not usable, or was made without its fit.
 
         Examples
         --------
@@ -251,41 +226,52 @@ class Diagnosis:
         >>> arm.poses.shape
         (2, 8, 4, 4)
         """
-        from thermal_robot.diagnosis.explained import arm
+        from thermal_robot.shapes.arm import arm
 
         if not self.usable or self.fit is None:
             return None
-        return arm(self.model.robot, self.rows.q[np.asarray(rows, dtype=np.int64)], self.where)
+        return arm(self.model.robot, self.rows.q[np.asarray(rows, dtype=np.int64)], self.where.places)
 
     @property
     def parameters(self) -> pd.DataFrame:
-        """Parameters of all effects that are told, SI: see :func:`~thermal_robot.diagnosis.tabled.parameters`."""
-        from thermal_robot.diagnosis.tabled import parameters
+        """Parameters of all effects that are told, SI, in the order of the findings.
 
-        return parameters(self.effects)
+        ``status`` of the effect and the columns of :func:`~thermal_robot.diagnosis.result.estimate_table`.
+        """
+        table = estimate_table((finding.name, estimate) for finding in self.effects for estimate in finding.parameters)
+        table.insert(0, "status", [finding.status for finding in self.effects for _ in finding.parameters])
+        return table
 
     @property
     def residuals(self) -> pd.DataFrame:
-        """Gap and remainder row by row, SI: see :func:`~thermal_robot.diagnosis.tabled.residuals`."""
-        from thermal_robot.diagnosis.tabled import residuals
+        """Gap and remainder by ``row``, the number in the file, in the root frame's axes.
 
-        return residuals(self.rows)
+        Columns ``gap.x`` … and ``remainder.x`` … in m, of poses also ``.rx`` ``.ry`` ``.rz`` in rad, the turn of
+        several targets in the axes of their common frame; ``held_out.before`` and ``held_out.after``, distance in m
+        when held out (NaN where set aside); ``set_aside``.
+        """
+        import pandas as pd
+
+        rows = self.rows
+        axes = ("x", "y", "z", "rx", "ry", "rz")[: rows.gap.shape[1]]
+        pairs = (("gap", rows.gap), ("remainder", rows.remainder))
+        columns = {f"{kind}.{axis}": values[:, k] for kind, values in pairs for k, axis in enumerate(axes)}
+        held = {"held_out.before": rows.held_out_before, "held_out.after": rows.held_out_after}
+        return pd.DataFrame({**columns, **held, "set_aside": rows.outliers}, index=pd.Index(rows.rows, name="row"))
 
     @property
     def frames(self) -> pd.DataFrame:
-        """Base and target as declared or fitted, SI: see :func:`~thermal_robot.diagnosis.tabled.fitted_frames`."""
-        from thermal_robot.diagnosis.tabled import fitted_frames
-
-        return fitted_frames(self.model)
+        """Base and target as declared or fitted, SI: see :func:`~thermal_robot.diagnosis.result.frame_table`."""
+        return frame_table(self.model)
 
     @property
     def covariance(self) -> pd.DataFrame:
-        """Covariance of the identified parameters, SI: see :func:`~thermal_robot.diagnosis.tabled.covariance`.
+        """Covariance of the identified parameters, SI: see :func:`~thermal_robot.diagnosis.findings.covariance`.
 
         Its diagonal is the square of ``std`` in :attr:`parameters`. Not in it: zeros that are told inside a larger
         effect, of which they are a part.
         """
-        from thermal_robot.diagnosis.tabled import covariance
+        from thermal_robot.diagnosis.findings import covariance
 
         if self.model.spread is None:
             raise ValueError("this diagnosis was made without the covariance of its parameters")
@@ -352,7 +338,7 @@ class Diagnosis:
                 outliers=self.outliers,
                 warnings=self.warnings,
             ),
-            "gap": gap_as_json(self.gap),
+            "gap": _gap_as_json(self.gap),
             "verdict": {
                 "usable": self.usable,
                 "reason": self.reason,
@@ -394,7 +380,21 @@ class Diagnosis:
         return f"Diagnosis({self.campaign!r}: {', '.join(self.verdict) or 'no effect'})"
 
     def __str__(self) -> str:
-        return _teller().text(self)
+        return registered().text(self)
 
     def _repr_html_(self) -> str:
-        return _teller().fragment(self)
+        return registered().fragment(self)
+
+
+def _gap_as_json(gap: Gap) -> dict[str, Any]:
+    turned = {"rms_before": gap.orientation_before, "rms_after": gap.orientation_after}
+    return {
+        "rms_before": gap.rms_before,
+        "rms_after": gap.rms_after,
+        "noise_floor": gap.noise_floor,
+        "noise_source": gap.noise_source,
+        "orientation": None if gap.orientation_before is None else turned,
+        "held_out": asdict(gap.held_out),
+        "schemes": [asdict(scheme) for scheme in gap.schemes],
+        "hardest": None if gap.hardest is None else gap.hardest.name,
+    }

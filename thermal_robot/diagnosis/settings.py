@@ -1,22 +1,19 @@
 """Every number that was chosen to weigh a verdict again, to draw an effect, and to propose what to measure next."""
 
-LEADING, MOST_LEADING = 0.01, 4
-"""Probability of an explanation that is to be told apart, and how many are."""
-LEAST_LEADING = 1e-3
-"""Explanations that are less probable are not worth a measurement."""
+LEAST_LEADING, MOST_LEADING = 1e-3, 4
+"""Probability below which no explanation is worth a measurement, and how many explanations are told apart."""
 DECIDED, WORTHWHILE = 0.9, 1.0
-"""An explanation so probable is decided where further samples would bring less than so many nats for any rival."""
+"""An explanation so probable is decided where further samples would bring less than so many nats for any rival; none is
+told as more probable whose correction harms rows held out by session or region."""
 BEYOND = 5.0
 """K outside the campaign's temperatures: a hall on another day."""
 LOOSE = 0.1
 """m and rad: where the data leave a frame open, it is somewhere there."""
 TIE = 1e-3
 """Weight of the information on parameters beside that on explanations, when samples are proposed: it breaks ties."""
-FEW_PAYLOADS = 6
-"""A campaign with no more payloads than this is offered these; another its lightest and heaviest."""
-LOAD, PAYS, TRIAL = 2.0, 1.3, 10
-"""kg that nearly every arm carries, offered where no payload was recorded; times what poses without it tell, less is
-not worth a second set-up; and of how many samples that is asked."""
+LOAD, PAYS = 2.0, 1.3
+"""kg that nearly every arm carries, offered where no payload was recorded; times what poses without it tell: less is
+not worth a second set-up."""
 WRONG_SIDE, INSISTS, LEAVES_LESS = 3.0, 7.0, 0.95
 """Standard deviations from which a parameter tells its side; the natural logarithm, 1 in 1000, by which an explanation
 with a quantity turned round must be more probable than any without; and what it may leave of what those leave: beside a
@@ -27,17 +24,10 @@ MATERIAL_PLACE, MOST_PLACES = 0.03, 8
 """Of an effect's work: a place with less is not drawn; and how many are."""
 LINE_POINTS, ROUGH, DENSE_POINTS, ROWS_A_POINT = 25, 0.01, 400, 10
 """Points of a drawn law; of its range, the roughness below which it follows one quantity alone, its points then, and
-rows that a point stands for otherwise."""
-ROWS_ALIKE = 8
-"""Rows that are taken together when asking whether an error follows a quantity."""
-PURE = 1e-6
-"""Of a unit twist, m or rad: with less of one kind it is all of the other."""
+rows that a point stands for otherwise, and that are taken together to ask whether an error follows a quantity."""
 UNSETTLED = 1.5
 """Times what the linear model leaves: an exact one that leaves more is another model. They agree to a thousandth where
 errors are those of robots."""
-SUREST_IF_WORSE = 0.9
-"""Probability above which nothing is told of a correction that harms rows held out by session or region: what does not
-carry over may be no cause."""
 LEAST_SEEN = 1e-4
 """Of the strongest direction of the frames, squared: one that the rows tell to a hundredth of that takes nothing over,
 as it would move far rows a hundred times as much."""

@@ -15,7 +15,7 @@ from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.more_rows import more_rows
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.diagnosis.agreement import Agreement, Watch, beyond, misfits, scatter_of
-from thermal_robot.diagnosis.parts import Unexplained
+from thermal_robot.diagnosis.values import Unexplained
 from thermal_robot.diagnosis.sequential import KEPT, Fitted, Sequential, State, normal
 from thermal_robot.diagnosis.settings import LOOSE
 from thermal_robot.diagnosis.sufficient import Choice, Judge, Point, Rows, Sums, joined, linearised

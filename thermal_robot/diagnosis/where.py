@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
-from thermal_robot.diagnosis.parts import Location, Unexplained, Where
+from thermal_robot.diagnosis.values import Location, Unexplained, Where
 from thermal_robot.effects.apply import by_place, column
 from thermal_robot.effects.law import PREFIX
 from thermal_robot.effects.quantities import quantities

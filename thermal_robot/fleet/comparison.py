@@ -7,7 +7,7 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
-from thermal_robot.diagnosis.parts import jsonable
+from thermal_robot.diagnosis.values import jsonable
 from thermal_robot.files import write_text
 from thermal_robot.teller import registered
 

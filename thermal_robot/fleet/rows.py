@@ -27,7 +27,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.diagnosis import Diagnosis, Finding
-from thermal_robot.diagnosis.parts import jsonable
+from thermal_robot.diagnosis.values import jsonable
 from thermal_robot.effects import choose, gate
 from thermal_robot.errors import ThermalRobotError
 from thermal_robot.files import whole

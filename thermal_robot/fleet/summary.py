@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
-from thermal_robot.diagnosis.parts import jsonable
+from thermal_robot.diagnosis.values import jsonable
 from thermal_robot.fleet import settings
 from thermal_robot.fleet.population import Population, combined, population
 from thermal_robot.fleet.rows import CAMPAIGN, Overview, Told, findings, overview, told

@@ -25,7 +25,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign, Units
 from thermal_robot.campaign.write import write_commands, write_planned
 from thermal_robot.diagnosis import settings as design
-from thermal_robot.diagnosis.next_samples import most_informative
+from thermal_robot.diagnosis.next_measurement import most_informative
 from thermal_robot.effects import Effect, choose, gate
 from thermal_robot.effects.catalogue import of_effect
 from thermal_robot.errors import CampaignError, require

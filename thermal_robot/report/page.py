@@ -54,9 +54,9 @@ from thermal_robot.report.words import (
 )
 
 if TYPE_CHECKING:
-    from thermal_robot.diagnosis.explained import Arm
-    from thermal_robot.diagnosis.parts import Finding
     from thermal_robot.diagnosis.result import Diagnosis
+    from thermal_robot.diagnosis.values import Finding
+    from thermal_robot.shapes.arm import Arm
 
 
 def html(diagnosis: Diagnosis, generated: str | None = None, files: Mapping[str, str] | None = None) -> str:

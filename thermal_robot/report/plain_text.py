@@ -29,8 +29,8 @@ from thermal_robot.report.words import (
 
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.calibration import Calibrated, Calibration
-    from thermal_robot.diagnosis.parts import Finding
     from thermal_robot.diagnosis.result import Diagnosis
+    from thermal_robot.diagnosis.values import Finding
 
 
 WIDTH = 96

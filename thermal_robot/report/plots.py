@@ -40,9 +40,8 @@ if TYPE_CHECKING:
     from matplotlib.axes import Axes
     from matplotlib.figure import Figure
 
-    from thermal_robot.diagnosis.explained import Explained, Place
-    from thermal_robot.diagnosis.parts import Finding, Rows
     from thermal_robot.diagnosis.result import Diagnosis
+    from thermal_robot.diagnosis.values import Explained, Finding, Place, Rows
 
 
 _BELOW_KEY = 0.77  # of a panel's height for the bars; the key stands above

@@ -11,7 +11,7 @@ from thermal_robot.percents import MISSING as MISSING
 from thermal_robot.percents import percent as percent
 
 if TYPE_CHECKING:
-    from thermal_robot.diagnosis.parts import Estimate
+    from thermal_robot.diagnosis.values import Estimate
 
 # leading unit: (smallest size in SI, what it is multiplied by, what it is then called), largest first
 _LADDERS: dict[str, tuple[tuple[float, float, str], ...]] = {

@@ -13,8 +13,8 @@ import numpy as np
 from thermal_robot.report import units
 
 if TYPE_CHECKING:
-    from thermal_robot.diagnosis.parts import AnotherModel, Finding, Misfit, Unexplained, Wanted
     from thermal_robot.diagnosis.result import Diagnosis
+    from thermal_robot.diagnosis.values import AnotherModel, Finding, Misfit, Unexplained, Wanted
 
 
 MOST_WORDS = 45

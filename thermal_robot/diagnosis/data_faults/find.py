@@ -37,7 +37,7 @@ from thermal_robot.diagnosis.data_faults.faults import (
     Rows,
     stacked,
 )
-from thermal_robot.diagnosis.parts import DataFault
+from thermal_robot.diagnosis.values import DataFault
 from thermal_robot.inference.algebra import rms
 from thermal_robot.inference.frames import Placed, middle, soft
 from thermal_robot.inference.settings import LEVEL

@@ -1,4 +1,4 @@
-"""Optimal design: the samples to measure next, which best tell the leading explanations apart.
+"""Optimal design of the next measurement: samples that tell the leading explanations apart, or the column that lacks.
 
 Each leading explanation k is a linear model with a normal posterior, y = A f + Σ_b X_b θ_b + e: what it expects of
 samples S is N(μ_k, V_k), V_k = A_S Σ_k A_S' + noise. Under explanation i, samples S are expected to bring a log Bayes
@@ -27,18 +27,26 @@ from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.names import CLOCK
 from thermal_robot.campaign.settings import ABSOLUTE_ZERO
 from thermal_robot.diagnosis import settings
+from thermal_robot.diagnosis.values import Finding, Unexplained, Wanted, is_frame
 from thermal_robot.effects import gate
+from thermal_robot.effects.law_words import TELLS, WHETHER, kind_of
 from thermal_robot.errors import CampaignError
 from thermal_robot.inference.algebra import equations_of, solve
 from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.evidence import Combination
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.problem import Linear, whitened
+from thermal_robot.inference.settings import FEW_LEVELS, IN_ITS_PLACE
 from thermal_robot.observations import Observations, observe
 from thermal_robot.robot import joint_range
 
 if TYPE_CHECKING:
     import pandas as pd
+
+Effects = tuple[str, ...]
+
+_ANSWERS = ("torque", "encoder")  # columns that answer a sample, and cannot be asked for
+_OF_JOINTS = ("approach", "torque", "velocity", "acceleration")
 
 
 def most_informative(
@@ -58,19 +66,18 @@ def most_informative(
     chosen: list[int] = []
     gains: list[float] = []
     for _ in range(count):
-        information = np.where(free, log_det(root) - log_det(frames), -np.inf)
+        information = np.where(free, _log_det(root) - _log_det(frames), -np.inf)
         row = int(information.argmax())
         chosen.append(row)
-        gains.append(float(information[row]) + (gains[-1] if gains else 0.0))
+        gains.append(float(information[row]))
         root, frames = _learnt(root, root[row]), _learnt(frames, frames[row])
         free &= alike != alike[row]
-    return chosen, gains
+    return chosen, np.cumsum(gains).tolist()
 
 
-def log_det(root: Array) -> Array:
+def _log_det(root: Array) -> Array:
     """(K,) half the log determinant of root root' + 1 of each candidate, nats."""
-    own = root @ root.transpose(0, 2, 1) + np.eye(root.shape[1])
-    return np.asarray(0.5 * np.linalg.slogdet(own)[1])
+    return np.asarray(0.5 * np.linalg.slogdet(root @ root.transpose(0, 2, 1) + np.eye(root.shape[1]))[1])
 
 
 def _learnt(root: Array, row: Array) -> Array:
@@ -81,27 +88,15 @@ def _learnt(root: Array, row: Array) -> Array:
     return np.asarray(root - ((root @ along.T) * (1.0 - 1.0 / np.sqrt(1.0 + value**2))) @ along)
 
 
-Effects = tuple[str, ...]
-
-_GIVEN = ("torque", "encoder")  # columns that answer a sample, and cannot be asked for
-
-
 @dataclass(frozen=True)
 class NextSample:
     """One sample to measure.
 
-    Attributes
-    ----------
-    position
-        Joint positions by name, rad (m for a prismatic joint).
-    conditions
-        By column, SI: the conditions that the explanations depend on. ``time`` is a proposal; any later time will do.
-    separates
-        The explanations that this sample tells apart best, each as a tuple of effects (empty: noise alone). A single
-        one if the explanation is settled and the sample improves its parameters.
-    gain
-        Expected gain of this sample and those before it, nats: the log Bayes factor of the true explanation against
-        its nearest rival, or the information about the parameters where there is a single explanation.
+    ``position``: joint positions by name, rad or m. ``conditions`` that the explanations depend on, by column, SI;
+    ``time`` is a proposal, any later one will do. ``separates``: the explanations that it tells apart best, each a
+    tuple of effects (empty: noise alone); a single one if that is settled and the sample improves its parameters.
+    ``gain`` of this sample and those before it, nats: the expected log Bayes factor of the true explanation against its
+    nearest rival, or the information about the parameters of a single one.
     """
 
     position: dict[str, float]
@@ -109,26 +104,12 @@ class NextSample:
     separates: tuple[Effects, ...]
     gain: float
 
-    def to_dict(self) -> dict[str, Any]:
-        """Return plain values, SI, ready for JSON."""
-        return {
-            "joints": dict(self.position),
-            "conditions": dict(self.conditions),
-            "separates": [list(effects) for effects in self.separates],
-            "gain": self.gain,
-        }
-
 
 @dataclass(frozen=True, eq=False)
 class NextSamples:
     """Samples to measure, most informative first.
 
-    Attributes
-    ----------
-    samples
-        The samples.
-    commands
-        The same samples as a campaign without measurements, with a value in every column, for :func:`write_table`.
+    ``commands`` are the same as a campaign without measurements, with a value in every column.
     """
 
     samples: tuple[NextSample, ...]
@@ -136,7 +117,15 @@ class NextSamples:
 
     def to_list(self) -> list[dict[str, Any]]:
         """Return the list that stands in the JSON under ``next.samples``."""
-        return [sample.to_dict() for sample in self.samples]
+        return [
+            {
+                "joints": dict(sample.position),
+                "conditions": dict(sample.conditions),
+                "separates": [list(effects) for effects in sample.separates],
+                "gain": sample.gain,
+            }
+            for sample in self.samples
+        ]
 
     def to_table(self) -> pd.DataFrame:
         """Return a table in the campaign's units, with the columns of its file, ``separates`` and ``gain``."""
@@ -155,22 +144,22 @@ class NextSamples:
         return pd.DataFrame(rows)
 
 
-def next_samples(fit: Fit, count: int = 10, pool: int = 400, seed: int = 0, loads: Sequence[float] = ()) -> NextSamples:
-    """Choose the samples to measure next; none where none would be informative.
+def next_samples(fit: Fit, count: int = 10, seed: int = 0, loads: Sequence[float] = ()) -> NextSamples:
+    """Choose the samples to measure next from :func:`candidates`; none where none would be informative.
 
-    They are drawn from a ``pool`` of :func:`candidates`; ``loads`` are payloads beside none, kg, that these may carry
-    where the campaign recorded none. Raises :class:`CampaignError` if ``count`` is no whole number above 0.
+    Raises :class:`CampaignError` if ``count`` is no whole number above 0.
     """
     if not isinstance(count, (int, np.integer)) or count < 1:
         expected = "a whole number above 0"
         raise CampaignError("next_samples()", "cannot propose so many", found=repr(count), expected=expected)
-    offered = candidates(fit, pool, seed, loads)
+    offered = candidates(fit, seed, loads)
     leading, probability = _leading(fit)
-    models = _expected(fit, observe(offered, fit.corrected.frames), leading)
-    chosen, pairs, gains = _chosen(models, probability, min(int(count), pool))
-    if len(models) > 1 and probability[0] > settings.DECIDED and max(gains, default=0.0) < settings.WORTHWHILE:
-        chosen, pairs, gains = _chosen(models[:1], np.ones(1), min(int(count), pool))
-    if max(gains, default=0.0) <= 0.0:
+    models = _predictive(fit, observe(offered, fit.corrected.frames), leading)
+    count = min(int(count), offered.samples)
+    chosen, pairs, gains = _chosen(models, probability, count)
+    if len(models) > 1 and probability[0] > settings.DECIDED and max(gains) < settings.WORTHWHILE:
+        chosen, pairs, gains = _chosen(models[:1], np.ones(1), count)
+    if max(gains) <= 0.0:
         chosen, pairs, gains = [], [], []  # there is nothing to learn
     names = [_effects(fit, c) for c in leading]
     robot, read = offered.robot, _conditions(fit, leading)
@@ -186,14 +175,14 @@ def next_samples(fit: Fit, count: int = 10, pool: int = 400, seed: int = 0, load
     return NextSamples(samples, offered.take(np.array(chosen, dtype=np.int64)))
 
 
-def candidates(fit: Fit, pool: int = 400, seed: int = 0, loads: Sequence[float] = ()) -> Campaign:
-    """Draw samples that could be measured next: a campaign without measurements.
+def candidates(fit: Fit, seed: int = 0, loads: Sequence[float] = (), pool: int = 400) -> Campaign:
+    """Draw a pool of samples that could be measured next: a campaign without measurements.
 
     Joint positions are uniform within the limits, and within 2.4 rad for a joint that can turn once round; the
     range of the campaign is always included. Temperatures are the campaign's lowest and highest, and 5 K beyond them,
-    alike for all links. Payloads are those of the campaign, or none and ``loads`` where these are given. Joints are
-    approached from either side. Times follow the campaign, for as long as it lasted. Other columns are copied from a
-    random row; torques and encoder readings from the row with the nearest pose.
+    alike for all links. Payloads are those of the campaign, or none and ``loads``, kg, where these are given. Joints
+    are approached from either side. Times follow the campaign, for as long as it lasted. Other columns are copied from
+    a random row; torques and encoder readings from the row with the nearest pose.
     """
     from scipy.spatial import cKDTree
 
@@ -207,20 +196,18 @@ def candidates(fit: Fit, pool: int = 400, seed: int = 0, loads: Sequence[float] 
     for name, values in campaign.covariates.items():
         kind, first, last = name.partition(".")[0], float(values.min()), float(values.max())
         if kind == "temperature":
-            covariates[name] = np.maximum(
-                [first - settings.BEYOND, first, last, last + settings.BEYOND], ABSOLUTE_ZERO
-            )[level]
+            levels = [first - settings.BEYOND, first, last, last + settings.BEYOND]
+            covariates[name] = np.maximum(levels, ABSOLUTE_ZERO)[level]
         elif kind == "payload":
-            covariates[name] = rng.choice(
-                np.unique(values) if len(np.unique(values)) < settings.FEW_PAYLOADS else [first, last], pool
-            )
+            seen = np.unique(values)
+            covariates[name] = rng.choice(seen if len(seen) < FEW_LEVELS else [first, last], pool)
         elif kind == "approach":
             covariates[name] = rng.choice([-1.0, 1.0], pool)
         elif kind in CLOCK:
             after = last + late * (last - first)
             covariates[name] = np.ceil(after) if kind == "order" else after
         else:
-            covariates[name] = values[alike if kind in _GIVEN else rows]
+            covariates[name] = values[alike if kind in _ANSWERS else rows]
     if loads:
         covariates["payload"] = rng.choice([0.0, *loads], pool)
     # orientation only says what is measured; the simulator knows nothing of new poses, and columns do not ask it
@@ -238,10 +225,10 @@ def candidates(fit: Fit, pool: int = 400, seed: int = 0, loads: Sequence[float] 
 
 
 def _range(campaign: Campaign) -> tuple[Array, Array]:
-    used = campaign.q.min(axis=0), campaign.q.max(axis=0)
     low, high = joint_range(campaign.robot)
-    low, high = np.where(np.isfinite(low), low, used[0]), np.where(np.isfinite(high), high, used[1])
-    return np.minimum(low, used[0]), np.maximum(high, used[1])
+    low = np.where(np.isfinite(low), low, np.inf)
+    high = np.where(np.isfinite(high), high, -np.inf)
+    return np.minimum(low, campaign.q.min(axis=0)), np.maximum(high, campaign.q.max(axis=0))
 
 
 def _effects(fit: Fit, combination: Combination) -> Effects:
@@ -258,7 +245,7 @@ def _leading(fit: Fit) -> tuple[list[Combination], Array]:
         best.setdefault(effects, combination)
         total[effects] = total.get(effects, 0.0) + float(probability)
     order = sorted(total, key=lambda effects: -total[effects])[: settings.MOST_LEADING]
-    least = settings.LEADING if len(order) > 1 and total[order[1]] > settings.LEADING else settings.LEAST_LEADING
+    least = IN_ITS_PLACE if len(order) > 1 and total[order[1]] > IN_ITS_PLACE else settings.LEAST_LEADING
     kept = [effects for k, effects in enumerate(order) if k == 0 or total[effects] > least]
     probability = np.array([total[effects] for effects in kept])
     return [best[effects] for effects in kept], probability / probability.sum()
@@ -268,11 +255,11 @@ def _conditions(fit: Fit, leading: Sequence[Combination]) -> list[str]:
     """Columns that an explanation depends on and that can be commanded."""
     listed = {b for combination in leading for b in combination.blocks}
     read = {name for b in listed for name in gate.reads(fit.explanation.linear.blocks[b].effect, fit.nominal)}
-    return [n for n in fit.campaign.covariates if n in read and n.partition(".")[0] not in _GIVEN]
+    return [n for n in fit.campaign.covariates if n in read and n.partition(".")[0] not in _ANSWERS]
 
 
 @dataclass(frozen=True, eq=False)
-class _Expected:
+class _Predictive:
     """Predictive distribution of the candidates under one explanation, in units of the noise: N(mean, root root' + 1).
 
     ``mean`` (K, m), ``root`` (K, m, p) of the covariance, ``frames`` (K, m, f) its part were the effects known.
@@ -283,7 +270,7 @@ class _Expected:
     frames: Array
 
 
-def _expected(fit: Fit, offered: Observations, leading: Sequence[Combination]) -> list[_Expected]:
+def _predictive(fit: Fit, offered: Observations, leading: Sequence[Combination]) -> list[_Predictive]:
     e = fit.explanation
     noise = e.whitening.noise * e.best.noise
     flat = e.linear.frames.shape[2]
@@ -295,87 +282,70 @@ def _expected(fit: Fit, offered: Observations, leading: Sequence[Combination]) -
     # the simulator's own tool is never refitted: its columns come last and are left out
     columns = [frame_columns(offered)[0][:, :, :flat], *(block(offered, i.effect).columns for i in items)]
     asked = np.concatenate(columns, axis=2) / noise[:, None]
-    ends = np.cumsum([flat, *(len(i.sizes) for i in items)])
+    of = np.repeat([-1, *index], [flat, *(len(item.sizes) for item in items)])  # the block of each column
     found = []
     for combination in leading:
-        mine = [k for k, b in enumerate(index) if b in combination.blocks]
-        spans = [np.arange(flat), *(np.arange(ends[k], ends[k + 1]) for k in mine)]
-        picked = np.concatenate(spans).astype(int)
-        size = np.concatenate(
-            [np.full(flat, settings.LOOSE), *(items[k].sizes * combination.scales[index[k]] for k in mine)]
-        )
+        own = [b for b in index if b in combination.blocks]
+        picked = np.flatnonzero(np.isin(of, [-1, *own]))
+        sizes = (e.linear.blocks[b].sizes * combination.scales[b] for b in own)
+        size = np.concatenate([np.full(flat, settings.LOOSE), *sizes])
         precision = gram[np.ix_(picked, picked)] * np.outer(size, size) + np.eye(len(size))
         mean = size * solve(precision, gram[picked, -1] * size)
         design = asked[:, :, picked]
-        scaled = design * size
-        found.append(
-            _Expected(design @ mean, _root(scaled, precision), _root(scaled[:, :, :flat], precision[:flat, :flat]))
-        )
+        root, frames = _root(design * size, precision), _root((design * size)[:, :, :flat], precision[:flat, :flat])
+        found.append(_Predictive(design @ mean, root, frames))
     return found
 
 
 def _root(design: Array, precision: Array) -> Array:
     """(K, m, p) root of the covariance of design · N(0, precision⁻¹), the precision at least that of the prior, 1."""
-    value, vector = _eigen(precision)
-    return np.asarray(design @ (vector / np.sqrt(value)))
-
-
-def _inverse(matrix: Array) -> tuple[Array, Array]:
-    """Return inverse and log determinant of symmetric matrices (..., m, m) that are at least the identity."""
-    value, vector = _eigen(matrix)
-    return (vector / value[..., None, :]) @ np.swapaxes(vector, -1, -2), np.log(value).sum(axis=-1)
-
-
-def _eigen(matrix: Array) -> tuple[Array, Array]:
-    """Return eigenvalues and vectors of matrices at least the identity: below it there is rounding alone."""
-    value, vector = np.linalg.eigh(matrix)
-    return np.maximum(value, 1.0), vector
+    value, vector = np.linalg.eigh(precision)
+    return np.asarray(design @ (vector / np.sqrt(np.maximum(value, 1.0))))
 
 
 class _Conditional:
-    """Distribution of every candidate given the chosen samples S: mean y_c − B y_S, covariance C."""
+    """Conditional distribution of every candidate given the chosen samples S: mean y_c − B y_S, root ``learnt``."""
 
-    def __init__(self, root: Array, chosen: Sequence[int]) -> None:
-        measures = root.shape[1]
-        past = equations_of(root[list(chosen)])
-        own = np.einsum("nap,nbp->nab", root, root) + np.eye(measures)
-        self.own, self.cross, self.past = own, root @ past.T, past @ past.T + np.eye(len(past))
-        self.gain = self.cross @ _inverse(self.past)[0]
-        self.covariance = own - self.gain @ self.cross.transpose(0, 2, 1)
-        self.inverse, self.log_det = _inverse(self.covariance)
-        self.weighed = self.inverse @ self.gain
+    def __init__(self, root: Array, learnt: Array, chosen: Sequence[int]) -> None:
+        past, one = equations_of(root[list(chosen)]), np.eye(root.shape[1])
+        self.own = root @ root.transpose(0, 2, 1) + one
+        self.cross, self.past = root @ past.T, past @ past.T + np.eye(len(past))
+        along, size, across = np.linalg.svd(past, full_matrices=False)
+        self.gain = ((root @ across.T) * (size / (1.0 + size**2))) @ along.T
+        value, vector = np.linalg.eigh(learnt @ learnt.transpose(0, 2, 1) + one)
+        value = np.maximum(value, 1.0)  # below it there is rounding alone
+        self.inverse = (vector / value[:, None, :]) @ vector.transpose(0, 2, 1)
+        self.log_det = np.log(value).sum(axis=1)
 
 
-def _further(i: _Conditional, j: _Conditional, apart: Array, chosen: Sequence[int]) -> Array:
+def _increase(i: _Conditional, j: _Conditional, apart: Array, chosen: Sequence[int]) -> Array:
     """(K,) increase of KL(i, j) by each candidate, as sums of products; ``apart`` is μ_i − μ_j."""
     left = apart - j.gain @ apart[list(chosen)].ravel()
     trace = (j.inverse * i.own).sum(axis=(1, 2)) + ((j.inverse @ left[:, :, None])[:, :, 0] * left).sum(axis=1)
     if len(chosen):
-        trace += (j.weighed * (j.gain @ i.past - 2.0 * i.cross)).sum(axis=(1, 2))
+        trace += ((j.inverse @ j.gain) * (j.gain @ i.past - 2.0 * i.cross)).sum(axis=(1, 2))
     return np.asarray(0.5 * (trace - apart.shape[1] + j.log_det - i.log_det))
 
 
 def _chosen(
-    models: Sequence[_Expected], probability: Array, count: int
+    models: Sequence[_Predictive], probability: Array, count: int
 ) -> tuple[list[int], list[tuple[int, ...]], list[float]]:
     """Choose rows greedily; return them, the explanations that each tells apart best, and the cumulative gain."""
     number = len(models)
     if number == 1:
-        alone, learnt = most_informative(models[0].root, models[0].frames, count)
-        return alone, [(0,)] * count, learnt
+        alone, gained = most_informative(models[0].root, models[0].frames, count)
+        return alone, [(0,)] * count, gained
     itself = np.eye(number, dtype=bool)[:, :, None]
-    so_far = np.zeros((number, number))
+    so_far, learnt, frames = np.zeros((number, number)), [model.root for model in models], models[0].frames
     chosen: list[int] = []
     pairs: list[tuple[int, ...]] = []
     gains: list[float] = []
     for _ in range(count):
-        known = [_Conditional(model.root, chosen) for model in models]
-        information = 0.5 * (known[0].log_det - _Conditional(models[0].frames, chosen).log_det)
+        known = [_Conditional(model.root, root, chosen) for model, root in zip(models, learnt, strict=True)]
+        information = 0.5 * known[0].log_det - _log_det(frames)
         added = np.zeros((number, number, len(information)))
-        for i in range(number):
-            for j in range(number):
-                if i != j:
-                    added[i, j] = _further(known[i], known[j], models[i].mean - models[j].mean, chosen)
+        for i, j in np.argwhere(~itself[:, :, 0]):
+            added[i, j] = _increase(known[i], known[j], models[i].mean - models[j].mean, chosen)
         reached = so_far[:, :, None] + added
         expected = probability @ np.where(itself, np.inf, reached).min(axis=1)
         score = expected + settings.TIE * information
@@ -383,8 +353,85 @@ def _chosen(
         row = int(score.argmax())
         chosen.append(row)
         gains.append(float(expected[row]))
+        learnt, frames = [_learnt(root, root[row]) for root in learnt], _learnt(frames, frames[row])
         so_far = reached[:, :, row]
-        weight = np.outer(probability, probability)
-        both = weight * (added[:, :, row] + added[:, :, row].T)
+        both = np.outer(probability, probability) * (added[:, :, row] + added[:, :, row].T)
         pairs.append(tuple(sorted(int(k) for k in np.unravel_index(both.argmax(), both.shape))))
     return chosen, pairs, gains
+
+
+def wanted(
+    fit: Fit,
+    found: Sequence[Finding],
+    groups: Sequence[Effects],
+    left: Unexplained,
+    laws: Unexplained,
+    probability: float,
+) -> Wanted | None:
+    """Return the next measurement that would help most; ``None`` where the data determine the explanation.
+
+    ``groups``: effects that the data cannot tell apart; ``left`` and ``laws``: what the whole fit leaves, and what the
+    known effects leave, which laws may explain; ``probability`` of the explanation.
+    """
+    if groups:
+        group = groups[0]
+        needs = {f.name: f.needs for f in found}
+        frame = next((need for name in group for need in needs.get(name, ()) if need.startswith("frames.")), "")
+        if frame or any(is_frame(found, name) for name in group):
+            return Wanted("frame", frame, apart=group[:2])
+        if any(needs.get(name) == ("pose",) for name in group):
+            return Wanted("repeats", "pose", apart=group[:2])
+        return _pose(fit, group) or Wanted("range", apart=group[:2])
+    if left.flagged:
+        return _column(fit, found, left) or Wanted("repeats")
+    if laws.flagged:
+        return _column(fit, (), laws)  # a law says it all: a column may still tell what it is
+    return _pose(fit, ()) if probability < settings.DECIDED else None
+
+
+def _pose(fit: Fit, group: Effects) -> Wanted | None:
+    """Return the sample that tells explanations apart best, or another load where samples with it tell clearly more.
+
+    ``None`` where no sample tells enough, or tells other effects apart than those of the group.
+    """
+    plain = loaded = next_samples(fit)
+    if fit.campaign.robot.has_masses and not fit.nominal.varies("payload"):
+        loaded = next_samples(fit, loads=(settings.LOAD,))
+    (apart, gain), (with_load, more) = _apart(plain, group), _apart(loaded, group)
+    if more > max(0.0 if group else settings.WORTHWHILE, settings.PAYS * gain):
+        return Wanted("column", "payload", apart=with_load)
+    if gain < settings.WORTHWHILE:
+        return None
+    sample = plain.samples[0]
+    # when it is measured, and from where the joints come, matters less than where they are
+    set_up = {name: v for name, v in sample.conditions.items() if name.partition(".")[0] not in (*CLOCK, *_OF_JOINTS)}
+    return Wanted("pose", apart=apart, position=sample.position, conditions=set_up)
+
+
+def _apart(samples: NextSamples, group: Effects) -> tuple[Effects, float]:
+    """Return the effects that only one of the two explanations has that the first sample tells apart, and the gain."""
+    if not samples.samples or len(samples.samples[0].separates) < 2:
+        return (), 0.0
+    one, other = map(set, samples.samples[0].separates)
+    apart = tuple(sorted(one ^ other))
+    return (apart, samples.samples[-1].gain) if apart and (not group or set(apart) & set(group)) else ((), 0.0)
+
+
+def _column(fit: Fit, found: Sequence[Finding], left: Unexplained) -> Wanted | None:
+    """Return the column that would tell what a remainder is; ``None`` where there is none to record."""
+    kind, place = next(((p.kind, p.name) for p in left.locations), ("", ""))
+    follows = next((d.covariate for d in left.depends_on), "")
+    missing = [f for f in found if f.status == "not_testable" and not is_frame(found, f.name)]
+    # what is no column, such as masses in the URDF, cannot be recorded; repeats are not recorded but made
+    needed = [n.partition(".")[0] for f in missing for n in f.needs if " " not in n and n != "pose"]
+    kinds = [kind_of(name, place, fit.campaign.robot.joint_names) for name in (follows or "none").split(" * ")]
+    telling = [column for kind in kinds for column in TELLS.get(kind, ())]
+    for column in (*telling, *sorted(needed, key=lambda c: (c in _OF_JOINTS) != (kind == "joint"))):
+        name = f"{column}.{place}" if column in _OF_JOINTS and kind == "joint" else column
+        known = [c for c in fit.campaign.covariates if c == name or c.partition(".")[0] == name]
+        if not any(fit.nominal.varies(c) for c in known):
+            untested = tuple(f.name for f in missing if column in {n.partition(".")[0] for n in f.needs})
+            words = next((p.words for p in left.locations), "")
+            whether = WHETHER.get(column, "")
+            return Wanted("column", name, untested=untested, whether=whether, place=words, follows=follows)
+    return None

@@ -1,9 +1,9 @@
-"""The parts of a diagnosis: frozen values without behaviour."""
+"""The values that a diagnosis is made of: frozen, without behaviour. SI throughout; distances are in m."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from typing import Any, Literal
 
 import numpy as np
@@ -17,33 +17,6 @@ from thermal_robot.effects.law_words import Size
 UNIT = 30.0
 """Times too long or too short that all links are where a unit is wrong, not the model: inches read as m are 39, cm a
 hundred, mm a thousand; sisters differ by three."""
-
-
-@dataclass(frozen=True)
-class AnotherModel:
-    """The robot that was measured, as far as a table tells it from that of the URDF.
-
-    Its links are ``factor`` times as long, if all alike; ``joint`` sits farthest from where the URDF has it, ``off`` m.
-    A robot at hand that ``fits`` the table, as :func:`~thermal_robot.load_robot` takes it, leaves the median distance
-    ``remains``, m.
-    """
-
-    factor: float | None = None
-    joint: str = ""
-    off: float = 0.0
-    fits: str | None = None
-    remains: float = 0.0
-
-    @property
-    def in_another_unit(self) -> bool:
-        """Whether the URDF's lengths stand in another unit than m."""
-        return self.factor is not None and not 1.0 / UNIT < self.factor < UNIT
-
-    @property
-    def unit(self) -> str:
-        """In which unit the URDF's lengths stand, in words; empty where it is m."""
-        return in_another_unit(self.factor) if self.factor is not None and self.in_another_unit else ""
-
 
 Status = Literal["found", "not_found", "not_testable", "confounded", "contained"]
 
@@ -79,8 +52,8 @@ class Finding:
 
     Attributes
     ----------
-    name
-        The effect's name.
+    name, title
+        The effect's name, and the same in plain words; of a discovered law a short name.
     status
         ``found``, ``not_found``, ``not_testable``, ``confounded``, or ``contained``: a part of a larger effect that was
         found, in ``confounded_with``.
@@ -97,20 +70,16 @@ class Finding:
         Effects that the data cannot tell it from.
     locations
         Places where it acts, largest share first.
-    parameters
-        Its estimates; empty if it is neither part of the fit nor contained.
-    unseen
-        Names of parameters of which the data see nothing, or nothing beside the others.
-    quantity, shape, describes
-        Only of a discovered law: the quantity that it follows, the shape, and a sentence about it.
+    parameters, unseen
+        Its estimates, empty if it is neither part of the fit nor contained; names of parameters of which the data see
+        nothing, or nothing beside the others.
     size
         How much a discovered law changes over the rows that were measured, or an effect that is a curve of each joint.
-    usually
-        Only of a discovered law: what one of that place and quantity usually is; ``None`` where nobody can say.
+    quantity, shape, describes, usually
+        Only of a discovered law: the quantity that it follows, its shape, a sentence about it, and what one of that
+        place and quantity usually is; ``None`` where nobody can say.
     of
         Only of a discovered law that is a known effect whose size follows the quantity: that effect's name.
-    title
-        The effect in plain words; of a discovered law a short name.
     random
         Whether it is random, so that no correction can remove it.
     """
@@ -135,6 +104,15 @@ class Finding:
     random: bool = False
 
 
+def is_frame(found: Sequence[Finding], name: str) -> bool:
+    """Tell whether an effect is the displacement of an unknown frame.
+
+    A name without a finding is one: of what was no candidate, only unknown frames are confounded with effects.
+    """
+    needs = next((f.needs for f in found if f.name == name), ("frames.",))
+    return any(need.startswith("frames.") for need in needs)
+
+
 @dataclass(frozen=True)
 class Refused:
     """An effect that was taken out of the fit again: its probability, and what it brings rows held out as a share.
@@ -150,10 +128,9 @@ class Refused:
 class DataFault:
     """A fault of the table, not of the robot, that alone makes robot and table fit.
 
-    ``kinds`` are those that the data cannot tell apart; ``what`` and ``remedy`` in plain words without a full stop.
-    ``rms_before`` and ``rms_after``: rms distance, m, over the rows struck once frames are registered, as they stand
-    and mended; where orientations are measured their turns count in it. ``rows``: numbers in the file, empty where it
-    struck all.
+    ``kinds`` are those that the data cannot tell apart; ``what`` and ``remedy`` are plain words without a full stop.
+    ``rms_before``, ``rms_after``: rms distance over the rows struck with frames registered, as they stand and mended;
+    turns count in it where orientations are measured. ``rows``: numbers in the file, empty where it struck all.
     """
 
     kinds: tuple[str, ...]
@@ -162,6 +139,32 @@ class DataFault:
     rms_before: float
     rms_after: float
     rows: tuple[int, ...] = ()
+
+
+@dataclass(frozen=True)
+class AnotherModel:
+    """The robot that was measured, as far as a table tells it from that of the URDF.
+
+    Its links are ``factor`` times as long, if all alike; ``joint`` is ``off`` m from its place in the URDF, the
+    farthest. A robot at hand that ``fits``, as :func:`~thermal_robot.load_robot` takes it, leaves the median distance
+    ``remains``, m.
+    """
+
+    factor: float | None = None
+    joint: str = ""
+    off: float = 0.0
+    fits: str | None = None
+    remains: float = 0.0
+
+    @property
+    def in_another_unit(self) -> bool:
+        """Whether the URDF's lengths stand in another unit than m."""
+        return self.factor is not None and not 1.0 / UNIT < self.factor < UNIT
+
+    @property
+    def unit(self) -> str:
+        """In which unit the URDF's lengths stand, in words; empty where it is m."""
+        return in_another_unit(self.factor) if self.factor is not None and self.in_another_unit else ""
 
 
 @dataclass(frozen=True)
@@ -178,18 +181,9 @@ class Misfit:
     model: AnotherModel | None = None
 
 
-def is_frame(found: Sequence[Finding], name: str) -> bool:
-    """Tell whether an effect is the displacement of an unknown frame.
-
-    A name without a finding counts as one: only unknown frames are confounded with effects without being candidates.
-    """
-    needs = next((f.needs for f in found if f.name == name), ("frames.",))
-    return any(need.startswith("frames.") for need in needs)
-
-
 @dataclass(frozen=True)
 class HeldOut:
-    """Shrinkage of the gap on held-out rows: rms distances in m, shares 0..1; all with the noise of the rows in it.
+    """Cross-validation: rms distances, m, and shrinkage of the gap on held-out rows, the noise of the rows included.
 
     Frames and parameters are fitted anew without each fold. Candidates, the choice among them, the place and quantity
     of a law, refined constants, prior scales and outliers are those of all rows.
@@ -211,11 +205,11 @@ class HeldOut:
 
 @dataclass(frozen=True)
 class FoldScheme:
-    """Shrinkage of the gap under one scheme: ``time``, ``session``, ``temperature``, ``region``, ``reach``, ``range``.
+    """Cross-validation under one scheme: ``time``, ``session``, ``temperature``, ``region``, ``reach``, ``range``.
 
     ``held_out`` says what is held out at a time; ``folds`` could be fitted, ``rows`` were held out in them. Rms
-    distances of these rows, m, with the frames alone and with the effects, and the standard ``uncertainty`` of the
-    latter, m; ``shrinkage`` is 1 − (rms_after / rms_before)².
+    distances of these rows with the frames alone and with the effects, and the standard ``uncertainty`` of the latter;
+    ``shrinkage`` is 1 − (rms_after / rms_before)².
     """
 
     name: str
@@ -230,7 +224,7 @@ class FoldScheme:
 
 @dataclass(frozen=True)
 class Gap:
-    """Rms distances in m over the rows that are not outliers; of orientation in rad, ``None`` if not measured.
+    """Rms distances, m, over the rows that are not outliers; of orientation in rad, ``None`` if not measured.
 
     ``schemes`` are other ways of holding rows out, the hardest first; ``hardest`` is the first of them where it leaves
     clearly more than ``held_out`` does, ``worse`` that by session or region where the correction harms; else ``None``.
@@ -270,8 +264,7 @@ class Where:
     @property
     def places(self) -> dict[tuple[str, str], float]:
         """Shares of all places, by kind and name, largest first: they sum to the part that the fit explains."""
-        chain = (("joint", self.joints), ("link", self.links))
-        shares = {(kind, name): share for kind, found in chain for name, share in found.items()}
+        shares = {(kind, name): s for kind in ("joint", "link") for name, s in getattr(self, f"{kind}s").items()}
         shares |= {(kind, kind): share for kind, share in self.beyond.items()}
         return dict(sorted(shares.items(), key=lambda item: -item[1]))
 
@@ -307,7 +300,7 @@ class Unexplained:
 
 @dataclass(frozen=True)
 class Wanted:
-    """The one thing that would help most.
+    """The next measurement: the one thing that would help most.
 
     ``kind`` is ``column``: to be recorded; ``frame``: to be measured and declared known; ``pose``: to be measured;
     ``range``: poses over the whole range of every joint; ``repeats``: poses repeated on another day. ``name`` is that
@@ -332,24 +325,11 @@ class Wanted:
 class Rows:
     """The data of the figures, one row per measurement, N rows.
 
-    Attributes
-    ----------
-    rows
-        (N,) row numbers in the file.
-    gap, remainder
-        (N, m) residual with the frames alone and with the effects, in root frame axes: m, then rad.
-    outliers
-        (N,) True for outliers.
-    position
-        (N, 3) predicted position of the target in the root frame, m.
-    q
-        (N, n) commanded joint positions.
-    covariates
-        Recorded quantities by name, (N,).
-    held_out_before, held_out_after
-        (N,) distance in m of the row when held out; NaN where it was left out as an outlier.
-    units
-        SI unit of every covariate and of every joint's position, by name; empty where it has none.
+    ``rows`` (N,) are numbers in the file, ``outliers`` (N,) is True for outliers. ``gap`` and ``remainder`` (N, m):
+    residual with the frames alone and with the effects, in root frame axes, m, then rad. ``position`` (N, 3) of the
+    target as predicted, root frame, m; ``q`` (N, n) as commanded; ``covariates`` (N,) by name. ``held_out_before`` and
+    ``held_out_after`` (N,): distance, m, of the row when held out, NaN where it was left out as an outlier. ``units``:
+    SI unit of every covariate and of every joint's position, by name; empty where it has none.
     """
 
     rows: NDArray[np.int64]
@@ -372,21 +352,35 @@ class Sensitivity:
     larger: float
 
 
-def gap_as_json(gap: Gap) -> dict[str, Any]:
-    """Return the object that stands in the JSON under ``gap``."""
-    orientation = None
-    if gap.orientation_before is not None:
-        orientation = {"rms_before": gap.orientation_before, "rms_after": gap.orientation_after}
-    return {
-        "rms_before": gap.rms_before,
-        "rms_after": gap.rms_after,
-        "noise_floor": gap.noise_floor,
-        "noise_source": gap.noise_source,
-        "orientation": orientation,
-        "held_out": asdict(gap.held_out),
-        "schemes": [asdict(scheme) for scheme in gap.schemes],
-        "hardest": None if gap.hardest is None else gap.hardest.name,
-    }
+@dataclass(frozen=True, eq=False)
+class Place(Location):
+    """Component-plus-residual plot of one place: the error in n rows against the ``quantity`` that drives it.
+
+    ``share`` 0..1 of the effect's contribution enters here. ``values`` (n,) are the quantity's, SI, a few only where it
+    is ``levels``. ``before``, ``after`` and ``spread`` (n,): error with the effect left in, without it, and one sigma
+    of noise of both, in ``unit``: rad or m at the place, ``m at the tool`` where it both shifts and turns. ``line``
+    (2, k) is the fitted law. ``centred``: told less the mean, which unknown frames take up as well.
+    """
+
+    quantity: str
+    quantity_unit: str
+    values: Array
+    levels: bool
+    unit: str
+    before: Array
+    after: Array
+    spread: Array
+    line: Array
+    centred: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class Explained:
+    """What one effect explains: places with a share worth drawing, largest first, and how many more were left out."""
+
+    effect: str
+    places: tuple[Place, ...]
+    left_out: int
 
 
 def jsonable(value: Any) -> Any:
@@ -397,6 +391,4 @@ def jsonable(value: Any) -> Any:
         return [jsonable(v) for v in value]
     if isinstance(value, np.generic):
         value = value.item()
-    if isinstance(value, float) and not np.isfinite(value):
-        return None
-    return value
+    return None if isinstance(value, float) and not np.isfinite(value) else value

@@ -9,7 +9,7 @@ from helpers import with_law
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from simulate import demo, simulate
 
-from thermal_robot.diagnosis.one_effect import Explained, explained
+from thermal_robot.diagnosis.effect_in_detail import Explained, explained
 from thermal_robot.effects import Effect, Parameter, at_joint, choose
 from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.law import Discovered

@@ -1,8 +1,8 @@
-"""What one effect explains, place by place: the residual with the effect and without it.
+"""Component-plus-residual data of one effect, place by place: the residual with the effect and without it.
 
-These are the data of component-plus-residual plots (Ezekiel 1924; Larsen and McCleary, *American Sociological Review*
-37, 1972). In each row, r is the residual of the whole fit (m, rad), c the contribution of the effect at this place, and
-D the displacement of the target for a unit error there, in units of the noise:
+Ezekiel 1924; Larsen and McCleary, *American Sociological Review* 37, 1972. In each row, r is the residual of the whole
+fit (m, rad), c the contribution of the effect at this place, and D the displacement of the target for a unit error
+there, in units of the noise:
 
     before = D'(r + c) / D'D        after = D'r / D'D        spread = 1 / √(D'D)
 
@@ -13,11 +13,10 @@ error changes by: it is left out, so that the change can be seen.
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.diagnosis import settings
-from thermal_robot.diagnosis.explained import Explained, Place
+from thermal_robot.diagnosis.values import Explained, Location, Place
 from thermal_robot.diagnosis.where import locate
 from thermal_robot.effects import Effect, Parameter
 from thermal_robot.effects.apply import by_place, sensitivity
@@ -25,10 +24,10 @@ from thermal_robot.effects.effect import Channel, Driver
 from thermal_robot.effects.gate import driver
 from thermal_robot.effects.quantities import quantities, unit
 from thermal_robot.errors import EffectError
-from thermal_robot.inference.algebra import orthonormal, rms, without
+from thermal_robot.inference.algebra import equations_of, orthonormal, rms, without
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.fit import Fit
-from thermal_robot.inference.settings import FEW_LEVELS, TINY
+from thermal_robot.inference.settings import ALIAS, FEW_LEVELS, TINY
 from thermal_robot.observations import Observations
 
 
@@ -39,47 +38,43 @@ def explained(fit: Fit, effect: str) -> Explained:
         listed = ", ".join(held) or "no effect"
         raise EffectError(f"{effect!r} is not part of the explanation, which holds {listed}")
     setting, values = held[effect]
-    parameters = block(fit.corrected, setting).parameters
+    fitted = zip(block(fit.corrected, setting).parameters, values, strict=True)
+    parts = [(part, float(v)) for p, v in fitted for part in by_place(fit.campaign.robot, p)]
     found = [p for p in locate(fit, {effect: 1.0})[1][effect] if p.share > 0.0]
     shown = [p for p in found if p.share >= settings.MATERIAL_PLACE][: settings.MOST_PLACES]
-    rows, robot = ~fit.explanation.outliers, fit.campaign.robot
-    places = []
-    for location in shown:
-        each = ((part, float(v)) for p, v in zip(parameters, values, strict=True) for part in by_place(robot, p))
-        mine = [(part, v) for part, v in each if (part.kind, part.place) == (location.kind, location.name)]
-        places.append(_shown(fit, setting, mine, location.share, rows))
-    return Explained(effect, tuple(places), len(found) - len(shown))
+    places = tuple(
+        _at(fit, setting, place, [(p, v) for p, v in parts if (p.kind, p.place) == (place.kind, place.name)])
+        for place in shown
+    )
+    return Explained(effect, places, len(found) - len(shown))
 
 
-def _shown(
-    fit: Fit, effect: Effect, parameters: list[tuple[Parameter, float]], share: float, rows: NDArray[np.bool_]
-) -> Place:
+def _at(fit: Fit, effect: Effect, place: Location, parameters: list[tuple[Parameter, float]]) -> Place:
     observations, e = fit.corrected, fit.explanation
-    first = parameters[0][0]
     error, moves, unit = _error(observations, parameters)
     noise = np.broadcast_to(e.whitening.sigma() * e.best.noise, observations.gap.shape)
     direction, remainder = moves / noise, observations.gap / noise
     length2 = np.einsum("nm,nm->n", direction, direction)
-    rows = rows & (length2 > 1e-12 * length2.max(initial=0.0))
+    rows = ~e.outliers & (length2 > 1e-12 * length2.max(initial=0.0))
     after = np.einsum("nm,nm->n", direction, remainder)[rows] / length2[rows]
-    name, name_unit, values = _driver(observations, effect, parameters, error)
+    name, name_unit, values = _driver(observations, effect, [p for p, _ in parameters], error)
     values, error = values[rows], error[rows]
     constant = _undetermined(e.linear.frames[rows] / noise[rows, :, None], direction[rows], error)
     error = error - constant
     return Place(
-        first.kind,
-        first.place,
-        share,
-        name,
-        name_unit,
-        values,
-        len(np.unique(values)) <= FEW_LEVELS,
-        unit,
-        error + after,
-        after,
-        1.0 / np.sqrt(length2[rows]),
-        _line(values, error),
-        constant != 0.0,
+        place.kind,
+        place.name,
+        place.share,
+        quantity=name,
+        quantity_unit=name_unit,
+        values=values,
+        levels=len(np.unique(values)) <= FEW_LEVELS,
+        unit=unit,
+        before=error + after,
+        after=after,
+        spread=1.0 / np.sqrt(length2[rows]),
+        line=_line(values, error),
+        centred=constant != 0.0,
     )
 
 
@@ -93,60 +88,55 @@ def _undetermined(frames: Array, direction: Array, error: Array) -> float:
     change = float(np.ptp(error))
     if not frames.shape[2] or change == 0.0 or error.min() <= 0.0 <= error.max():
         return 0.0
-    beyond = without(direction.ravel(), orthonormal(frames.reshape(direction.size, -1)))
+    beyond = without(direction.ravel(), orthonormal(equations_of(frames)))
     return float(error.mean()) if float(np.linalg.norm(beyond)) * change < 1.0 else 0.0
 
 
 def _error(observations: Observations, parameters: list[tuple[Parameter, float]]) -> tuple[Array, Array, str]:
     """(N,) error at a place along its first singular vector, (N, m) displacement of the target per unit, and unit."""
-    measures = observations.gap.shape[1]
-    samples = len(observations.q)
+    samples, measures = observations.gap.shape
     parts: dict[tuple[Channel, int], Array] = {}
     for parameter, value in parameters:
         for response in parameter.responses:
-            moved = value * np.asarray(response.values)
-            if response.channel == "joint":
-                moved = np.broadcast_to(moved, samples)[:, None]
-            moved = np.broadcast_to(moved, (samples, moved.shape[-1]))
-            key = (response.channel, response.index)
-            parts[key] = parts.get(key, np.zeros(moved.shape)) + moved
-    maps = [sensitivity(observations, channel, index)[:, :measures] for channel, index in parts]
+            moved, key = value * np.asarray(response.values), (response.channel, response.index)
+            width = 1 if response.channel == "joint" else moved.shape[-1]
+            moved = np.broadcast_to(moved[..., None] if response.channel == "joint" else moved, (samples, width))
+            parts[key] = parts[key] + moved if key in parts else moved
     twists = np.concatenate(list(parts.values()), axis=1)
-    moves = np.concatenate(maps, axis=2)
+    moves = np.concatenate([sensitivity(observations, *key)[:, :measures] for key in parts], axis=2)
     channels = {channel for channel, _ in parts}
     if channels == {"instrument"}:
         # it points elsewhere in every row; the sign is that of its parameter
         length = (-1.0 if parameters[0][1] < 0.0 else 1.0) * np.linalg.norm(twists, axis=1)
         return length, np.einsum("nmk,nk->nm", moves, twists / np.where(length == 0.0, 1.0, length)[:, None]), "m"
-    main = np.linalg.svd(twists, full_matrices=False)[2][0]
-    main = main * np.sign(main[int(np.abs(main).argmax())])
     if channels == {"joint"} and len(parts) == 1:
         robot, index = observations.robot, next(index for _, index in parts)
         return twists[:, 0], moves[:, :, 0], unit(robot, robot.joint_names[index])
+    main = np.linalg.svd(twists, full_matrices=False)[2][0]
+    main = main * np.sign(main[int(np.abs(main).argmax())])
     direction = moves @ main
-    if len(parts) == 1:
-        shift, turn = np.linalg.norm(main[:3]), np.linalg.norm(main[3:])
-        if min(shift, turn) < settings.PURE:
-            return twists @ main, direction, "m" if shift > turn else "rad"
+    shift, turn = np.linalg.norm(main[:3]), np.linalg.norm(main[3:])
+    if len(parts) == 1 and min(shift, turn) < ALIAS:
+        return twists @ main, direction, "m" if shift > turn else "rad"
     size = rms(direction[:, :3])
-    return twists @ main * size, direction / max(size, 1e-300), "m at the tool"
+    return twists @ main * size, direction / max(size, TINY), "m at the tool"
 
 
-def _driver(
-    observations: Observations, effect: Effect, parameters: list[tuple[Parameter, float]], error: Array
-) -> Driver:
-    """Return the quantity that drives an effect at a place, or else the one that its error follows best."""
-    if known_driver := driver(effect, observations, [parameter for parameter, _ in parameters], error):
+def _driver(observations: Observations, effect: Effect, parameters: list[Parameter], error: Array) -> Driver:
+    """Return the quantity that drives an effect at a place, or else the one that its error follows best.
+
+    That is the one with the least mean variance of the error among rows with neighbouring values.
+    """
+    if known_driver := driver(effect, observations, parameters, error):
         return known_driver
-    known = quantities(observations)
-    name = max(known, key=lambda n: -_unsteady(known[n], error))
+    known, number = quantities(observations), max(len(error) // settings.ROWS_A_POINT, 2)
+
+    def unsteady(name: str) -> float:
+        parts = np.array_split(error[np.argsort(known[name], kind="stable")], number)
+        return float(np.mean([part.var() for part in parts if len(part)]))
+
+    name = min(known, key=unsteady)
     return name, unit(observations.robot, name), known[name]
-
-
-def _unsteady(values: Array, error: Array) -> float:
-    """Mean variance of the error among rows with neighbouring values of a quantity."""
-    parts = np.array_split(error[np.argsort(values, kind="stable")], max(len(error) // settings.ROWS_ALIKE, 2))
-    return float(np.mean([part.var() for part in parts if len(part)]))
 
 
 def _line(values: Array, error: Array) -> Array:
@@ -157,12 +147,8 @@ def _line(values: Array, error: Array) -> Array:
     order = np.argsort(values, kind="stable")
     x, y = values[order], error[order]
     # a law of this quantity alone lies between its neighbours
-    between = np.interp(x[1:-1:2], x[::2], y[::2])[: len(x[1:-1:2])]
-    alone = float(np.abs(between - y[1:-1:2]).mean()) < settings.ROUGH * float(np.ptp(y)) + TINY
-    parts = np.array_split(
-        order,
-        min(len(order), settings.DENSE_POINTS)
-        if alone
-        else min(settings.LINE_POINTS, max(len(order) // settings.ROWS_A_POINT, 2)),
-    )
+    off = np.interp(x[1:-1:2], x[::2], y[::2]) - y[1:-1:2]
+    alone = float(np.abs(off).mean()) < settings.ROUGH * float(np.ptp(y)) + TINY
+    several = min(settings.LINE_POINTS, max(len(x) // settings.ROWS_A_POINT, 2))
+    parts = np.array_split(order, min(len(x), settings.DENSE_POINTS) if alone else several)
     return np.array([[values[p].mean() for p in parts], [error[p].mean() for p in parts]])
