@@ -8,8 +8,7 @@ from diagnosis.simulated import WIDTHS, drawn, explained, on_fresh
 from simulate import simulate
 
 from thermal_robot import EstimationError, diagnose
-from thermal_robot.diagnosis.held_out import held_out, shrinkage
-from thermal_robot.diagnosis.one_walk import Model, Walk
+from thermal_robot.diagnosis.cross_validation import Model, Walk, held_out, shrinkage
 from thermal_robot.effects import choose
 from thermal_robot.inference.columns import block
 from thermal_robot.inference.fit import fit
@@ -124,10 +123,9 @@ def test_parts_are_fitted_at_the_nominal_robot(rv_m2):
     nominal = replace(known.before, blocks=tuple(block(known.nominal, effect) for effect, _ in known.effects))
     values = [known.explanation.values[b][0] for b in known.explanation.best.blocks]
     part = Walk.over(model.partial(nominal, values), each(model.block)).squares(())
-    bare = Walk.over(model.bare(known.before), each(model.block)).squares(())
+    bare = Walk.over(model.partial(known.before), each(model.block)).squares(())
     assert len(values) == 2
-    assert part.total == pytest.approx(bare.total, rel=1e-9)
-    np.testing.assert_allclose(part.without, bare.without, rtol=1e-9)
+    np.testing.assert_allclose(part, bare, rtol=1e-9)
 
 
 def test_without_effects_nothing_shrinks(rv_m2):
@@ -197,5 +195,5 @@ def test_rows_set_aside_are_told_with_the_figure(rv_m2):
     spoilt = np.sqrt(np.mean((campaign.position - known.corrected.predicted_position)[aside] ** 2) * 3.0)
     share = aside.mean()
     expected = np.hypot(np.sqrt(1.0 - share) * found.overall.rms_after, np.sqrt(share) * spoilt)
-    assert found.with_aside[1] == pytest.approx(expected, rel=0.05)
-    assert found.with_aside[0] > found.with_aside[1] > 2.0 * found.overall.rms_after
+    assert found.overall.rms_after_with_aside == pytest.approx(expected, rel=0.05)
+    assert found.overall.rms_before_with_aside > found.overall.rms_after_with_aside > 2.0 * found.overall.rms_after

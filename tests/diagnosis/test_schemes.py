@@ -9,7 +9,7 @@ from simulate import simulate
 
 from thermal_robot import simulate as simulated
 from thermal_robot.diagnosis.beside import grown
-from thermal_robot.diagnosis.held_out import hardest, harmed, worst_folds
+from thermal_robot.diagnosis.cross_validation import hardest, harmed, worst_folds
 from thermal_robot.diagnosis.parts import FoldScheme, HeldOut
 from thermal_robot.effects import choose
 from thermal_robot.inference.columns import block
@@ -105,7 +105,7 @@ def test_a_target_mounted_anew_for_a_session_does_not_count_against_what_carries
 
 
 def test_folds_by_time_are_those_of_the_diagnosis(rv_m2):
-    from thermal_robot.diagnosis.held_out import held_out
+    from thermal_robot.diagnosis.cross_validation import held_out
 
     found = fit(simulate(rv_m2, ["backlash"], seed=3)[0], choose((), (), ()))
     blocked = next(s for s in worst_folds(found) if s.name == "time")

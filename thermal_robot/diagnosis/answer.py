@@ -10,9 +10,9 @@ import numpy as np
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.diagnosis import settings
 from thermal_robot.diagnosis.cautions import cautions
+from thermal_robot.diagnosis.cross_validation import Shrinkage, hardest, harmed, worst_folds
 from thermal_robot.diagnosis.examine import Examined
 from thermal_robot.diagnosis.findings import by_share, findings, random_findings, separates, titled
-from thermal_robot.diagnosis.held_out import Shrinkage, hardest, harmed, worst_folds
 from thermal_robot.diagnosis.parts import Finding, Gap, Misfit, Refused, Rows, Sensitivity, Unexplained
 from thermal_robot.diagnosis.predictive import registered, uncertainty
 from thermal_robot.diagnosis.result import Diagnosis

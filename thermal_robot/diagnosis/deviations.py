@@ -30,7 +30,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
-from thermal_robot.diagnosis.one_walk import Model
+from thermal_robot.diagnosis.cross_validation import Model
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import orthonormal, without
 from thermal_robot.inference.discrepancy import Spectrum

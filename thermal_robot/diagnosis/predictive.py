@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis import settings as diagnosis_settings
-from thermal_robot.diagnosis.one_walk import Model, Walk
+from thermal_robot.diagnosis.cross_validation import Model, Walk
 from thermal_robot.effects import Effect, gate
 from thermal_robot.effects.fading import Fading
 from thermal_robot.inference import settings

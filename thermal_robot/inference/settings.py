@@ -375,8 +375,6 @@ HARDER = 1.25
 """Times what is left of rows held out on average: a way of holding out that leaves more is told beside it."""
 COLDEST = 0.01
 """K: a temperature that varies less does not vary."""
-FRAME_DETERMINED = 1e-9
-"""Of the strongest direction of the frames: weaker ones are not determined without the rows held out."""
 FRAME_PRIOR = 1e-12
 """Of a frame's own information, added to it, so that what nothing determines stays where it is."""
 FRAGILE = 1e-3
