@@ -14,8 +14,8 @@ from thermal_robot.diagnosis.cross_validation import Shrinkage, hardest, harmed,
 from thermal_robot.diagnosis.examine import Examined
 from thermal_robot.diagnosis.findings import by_share, findings, random_findings, separates, titled
 from thermal_robot.diagnosis.parts import Finding, Gap, Misfit, Refused, Rows, Sensitivity, Unexplained
-from thermal_robot.diagnosis.predictive import registered, uncertainty
 from thermal_robot.diagnosis.result import Diagnosis
+from thermal_robot.diagnosis.uncertainty import registered, uncertainty
 from thermal_robot.diagnosis.wanted import wanted
 from thermal_robot.diagnosis.where import locate
 from thermal_robot.effects import Effect, gate, random_effects

@@ -18,7 +18,6 @@ from thermal_robot.diagnosis.beside import as_laws_say, beside_scatter, grown
 from thermal_robot.diagnosis.cautions import not_executed, usable
 from thermal_robot.diagnosis.cross_validation import held_out
 from thermal_robot.diagnosis.data_faults.misfit import another_motion, delivered, frames_alone, unfit
-from thermal_robot.diagnosis.deviations import as_remainder_says
 from thermal_robot.diagnosis.earned import pruned
 from thermal_robot.diagnosis.examine import examine
 from thermal_robot.diagnosis.growing.settings import KEPT
@@ -26,6 +25,7 @@ from thermal_robot.diagnosis.growing.stream import can_grow
 from thermal_robot.diagnosis.growing.updated import ready
 from thermal_robot.diagnosis.result import Diagnosis, told
 from thermal_robot.diagnosis.signs import as_counted
+from thermal_robot.diagnosis.uncertainty import as_remainder_says
 from thermal_robot.diagnosis.where import without_laws
 from thermal_robot.effects import RANDOM, Effect, choose, library
 from thermal_robot.errors import CampaignError, EstimationError, require
