@@ -9,6 +9,7 @@ import numpy as np
 
 from thermal_robot.correction import CorrectedModel
 from thermal_robot.diagnosis import settings
+from thermal_robot.diagnosis.attribution import locate
 from thermal_robot.diagnosis.cautions import cautions
 from thermal_robot.diagnosis.cross_validation import Shrinkage, hardest, harmed, worst_folds
 from thermal_robot.diagnosis.examine import Examined
@@ -17,7 +18,6 @@ from thermal_robot.diagnosis.parts import Finding, Gap, Misfit, Refused, Rows, S
 from thermal_robot.diagnosis.result import Diagnosis
 from thermal_robot.diagnosis.uncertainty import registered, uncertainty
 from thermal_robot.diagnosis.wanted import wanted
-from thermal_robot.diagnosis.where import locate
 from thermal_robot.effects import Effect, gate, random_effects
 from thermal_robot.effects.apply import depends_on
 from thermal_robot.effects.law import PREFIX, Discovered

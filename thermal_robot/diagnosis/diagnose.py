@@ -14,6 +14,7 @@ from threadpoolctl import threadpool_limits
 from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.campaign.names import did_you_mean
 from thermal_robot.diagnosis.answer import Conclusion, answer
+from thermal_robot.diagnosis.attribution import without_laws
 from thermal_robot.diagnosis.beside import as_laws_say, beside_scatter, grown
 from thermal_robot.diagnosis.cautions import not_executed, usable
 from thermal_robot.diagnosis.cross_validation import held_out
@@ -26,7 +27,6 @@ from thermal_robot.diagnosis.growing.updated import ready
 from thermal_robot.diagnosis.result import Diagnosis, told
 from thermal_robot.diagnosis.signs import as_counted
 from thermal_robot.diagnosis.uncertainty import as_remainder_says
-from thermal_robot.diagnosis.where import without_laws
 from thermal_robot.effects import RANDOM, Effect, choose, library
 from thermal_robot.errors import CampaignError, EstimationError, require
 from thermal_robot.inference import settings

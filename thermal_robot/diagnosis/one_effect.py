@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.diagnosis import settings
+from thermal_robot.diagnosis.attribution import locate
 from thermal_robot.diagnosis.explained import Explained, Place
-from thermal_robot.diagnosis.where import locate
 from thermal_robot.effects import Effect, Parameter
 from thermal_robot.effects.apply import by_place, sensitivity
 from thermal_robot.effects.effect import Channel, Driver
