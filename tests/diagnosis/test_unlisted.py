@@ -12,8 +12,8 @@ from simulate import simulate
 
 from thermal_robot import CorrectedModel, diagnose
 from thermal_robot.diagnosis.beside import as_laws_say, grown
-from thermal_robot.diagnosis.examine import examine
 from thermal_robot.diagnosis.parts import Dependence, Location, Unexplained
+from thermal_robot.diagnosis.residual_tests import examine
 from thermal_robot.effects import choose
 from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.law import Discovered

@@ -12,9 +12,9 @@ from thermal_robot.diagnosis import settings
 from thermal_robot.diagnosis.attribution import locate
 from thermal_robot.diagnosis.cautions import cautions
 from thermal_robot.diagnosis.cross_validation import Shrinkage, hardest, harmed, worst_folds
-from thermal_robot.diagnosis.examine import Examined
 from thermal_robot.diagnosis.findings import by_share, findings, random_findings, separates, titled
 from thermal_robot.diagnosis.parts import Finding, Gap, Misfit, Refused, Rows, Sensitivity, Unexplained
+from thermal_robot.diagnosis.residual_tests import Examined
 from thermal_robot.diagnosis.result import Diagnosis
 from thermal_robot.diagnosis.uncertainty import registered, uncertainty
 from thermal_robot.diagnosis.wanted import wanted

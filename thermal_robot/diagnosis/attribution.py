@@ -65,14 +65,15 @@ def locate(fit: Fit, shrinkage: dict[str, float]) -> tuple[Where, dict[str, tupl
         locations[effect.name] = tuple(sorted(found, key=lambda place: -place.share))
         for place in found:
             shares[place.kind][place.name] += place.share
-    order = {"joint": robot.joint_names, "link": dict.fromkeys(segment.parent_link for segment in robot.segments)}
-    chain = [{name: shares[kind][name] for name in order[kind] if name in shares[kind]} for kind in ("joint", "link")]
-    beyond = {kind: sum(shares[kind].values()) for kind in ("base", "tool", "instrument") if kind in shares}
+    bodies = dict.fromkeys(segment.parent_link for segment in robot.segments)
+    joints = {name: shares["joint"][name] for name in robot.joint_names if name in shares["joint"]}
+    links = {name: shares["link"][name] for name in bodies if name in shares["link"]}
+    beyond: dict[str, float] = {k: sum(shares[k].values()) for k in ("base", "tool", "instrument") if k in shares}
     gap = fit.nominal.gap[kept, :3]
     power_of_axes = (gap**2).sum(axis=0)
     axes = dict(zip("xyz", (power_of_axes / (power_of_axes.sum() or 1.0)).tolist(), strict=True))
     laws = {name: smooth_columns(values[kept]) for name, values in quantities(fit.corrected).items()}
-    return Where(axes, *chain, _determination(gap, laws), beyond), locations
+    return Where(axes, joints, links, _determination(gap, laws), beyond), locations
 
 
 def _displaced(observations: Observations, block: Block, values: Array) -> dict[tuple[str, str], Array]:

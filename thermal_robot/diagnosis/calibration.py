@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Protocol
 import numpy as np
 
 from thermal_robot.correction import CorrectedModel
-from thermal_robot.diagnosis.examine import Examined, examine
 from thermal_robot.diagnosis.findings import estimates, told_inside
 from thermal_robot.diagnosis.parts import Estimate
+from thermal_robot.diagnosis.residual_tests import Examined, examine
 from thermal_robot.diagnosis.uncertainty import as_remainder_says
 from thermal_robot.inference.algebra import rms
 from thermal_robot.inference.fit import Fit

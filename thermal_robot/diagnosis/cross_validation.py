@@ -152,12 +152,12 @@ class Model:
     def determines(self, rows: Rows) -> bool:
         """Tell whether some rows determine as much of the frames as all rows do."""
         some, every = (whitener(p.sum(axis=0)[: self.flat, : self.flat]) for p in (self.products(rows), self.whole))
-        return some.shape[1] >= every.shape[1]
+        return bool(some.shape[1] >= every.shape[1])
 
     def columns(self, chosen: Sequence[int]) -> NDArray[np.int64]:
         """(k + 1,) numbers of the columns of the frames and of some blocks, and of the gap."""
-        own = (np.arange(self.flat), *(self.spans[b] for b in chosen), [self.whole.shape[1] - 1])
-        return np.concatenate(own).astype(np.int64)
+        gap = np.array([self.whole.shape[1] - 1])
+        return np.concatenate([np.arange(self.flat), *(self.spans[b] for b in chosen), gap])
 
     def fits(self, rows: Sequence[Rows], chosen: Sequence[int]) -> list[Array]:
         """Ridge regression on each set of rows: (k + 1,) −θ and 1; what all rows leave is noise to priors."""
@@ -338,15 +338,22 @@ def shrinkage(explanation: Explanation, before: Linear, families: Sequence[str],
     added = {families[b]: squares(players) - squares(players | {k}) for k, b in enumerate(beside, len(best))}
     shares |= {name: share(added.get(name, 0.0 * none), none) for name in dict.fromkeys(families) if name not in shares}
     far, near = (np.linalg.norm(of[:, :3], axis=1) for of in (left(frozenset()), after))
-    sizes = [float(np.sqrt(np.nanmean(of**2))) for of in (far[kept], near[kept], far, near)]
-    overall = HeldOut("blocked", int(block.max()) + 1, *sizes[:2], *share(none - squares(players), none), *sizes[2:])
+    before_all, after_all, before_kept, after_kept = (_rms(of) for of in (far, near, far[kept], near[kept]))
+    value, interval = share(none - squares(players), none)
+    folds = int(block.max()) + 1
+    overall = HeldOut("blocked", folds, before_kept, after_kept, value, interval, before_all, after_all)
     far[~kept] = near[~kept] = np.nan
     return Shrinkage(overall, far, near, shares, after)
 
 
+def _rms(distance: Array) -> float:
+    return float(np.sqrt(np.nanmean(distance**2)))
+
+
 def _beside(explanation: Explanation, families: Sequence[str]) -> dict[int, float]:
     """Return of each effect outside the model the setting that the evidence likes best beside it, and its scale."""
-    best, found = explanation.best.blocks, {}
+    best = explanation.best.blocks
+    found: dict[int, float] = {}
     for rival in sorted(explanation.combinations, key=lambda c: -c.log_evidence):
         more = set(rival.blocks) - set(best)
         if len(more) == 1 and len(rival.blocks) == len(best) + 1:
@@ -389,10 +396,10 @@ def worst_folds(fit: Fit) -> tuple[FoldScheme, ...]:
 
 def _scheme(name: str, words: str, walk: Walk, before: Array, after: Array) -> FoldScheme:
     rows, *without = walk.counts
-    rms = [float(np.sqrt(of[0] / rows)) for of in (before, after)]
+    far, near = (float(np.sqrt(of[0] / rows)) for of in (before, after))
     shrinkage = float(1.0 - after[0] / before[0]) if before[0] > 0.0 else 0.0
     uncertainty = float(np.sqrt(jackknife(np.sqrt(after[1:] / np.maximum(without, 1.0)))))
-    return FoldScheme(name, words, len(walk.tests), int(rows), *rms, shrinkage, uncertainty)
+    return FoldScheme(name, words, len(walk.tests), int(rows), far, near, shrinkage, uncertainty)
 
 
 def _events_known(fit: Fit, plain: Model, model: Model) -> tuple[Model, Model]:

@@ -20,10 +20,10 @@ from thermal_robot.diagnosis.cautions import not_executed, usable
 from thermal_robot.diagnosis.cross_validation import held_out
 from thermal_robot.diagnosis.data_faults.misfit import another_motion, delivered, frames_alone, unfit
 from thermal_robot.diagnosis.earned import pruned
-from thermal_robot.diagnosis.examine import examine
 from thermal_robot.diagnosis.growing.settings import KEPT
 from thermal_robot.diagnosis.growing.stream import can_grow
 from thermal_robot.diagnosis.growing.updated import ready
+from thermal_robot.diagnosis.residual_tests import examine
 from thermal_robot.diagnosis.result import Diagnosis, told
 from thermal_robot.diagnosis.signs import as_counted
 from thermal_robot.diagnosis.uncertainty import as_remainder_says

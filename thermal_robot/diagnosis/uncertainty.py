@@ -39,7 +39,7 @@ from thermal_robot.effects.fading import Fading
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import orthonormal, whitener, without
 from thermal_robot.inference.columns import frame_columns
-from thermal_robot.inference.discrepancy import Spectrum
+from thermal_robot.inference.discrepancy import Form, Spectrum
 from thermal_robot.inference.explain import Explanation
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.problem import Linear, whitened
@@ -83,15 +83,17 @@ def _said(fit: Fit, model: Model) -> list[Array]:
         rows = [~group for group in each(labels) if model.determines(~group)]
         if len(rows) > 1:
             found.append(jackknife(np.stack(model.fits(rows, range(len(model.spans))))[:, model.flat : -1]))
-    if _smooth(e):
+    if form := _smooth(e):
         stack = _independent(model)
-        found.append(_sandwich(e, without(stack[:, model.flat :], orthonormal(stack[:, : model.flat])), model.tight))
+        columns = without(stack[:, model.flat :], orthonormal(stack[:, : model.flat]))
+        found.append(_sandwich(e, form, columns, model.tight))
     return found
 
 
-def _smooth(e: Explanation) -> bool:
-    """Whether rows have a smooth discrepancy; one that is anew in every pose or visit is in the fit's covariance."""
-    return e.discrepancy.form is not None and not e.discrepancy.form.anew
+def _smooth(e: Explanation) -> Form | None:
+    """Form of a smooth discrepancy; one that is anew in every pose or visit is part of the covariance in the fit."""
+    form = e.discrepancy.form
+    return None if form is None or form.anew else form
 
 
 def _independent(model: Model) -> Array:
@@ -99,9 +101,9 @@ def _independent(model: Model) -> Array:
     return whitened(model.linear, replace(model.whitening, smooth=None))[:, :-1]
 
 
-def _sandwich(e: Explanation, columns: Array, tight: Array) -> Array:
+def _sandwich(e: Explanation, form: Form, columns: Array, tight: Array) -> Array:
     """(K, K) covariance A (XᵀVX/σ⁴ + Λ⁻¹) A of whitened columns X (E, K) with prior precisions Λ⁻¹ (K,)."""
-    form, variance = e.discrepancy.form, e.best.noise**2
+    variance = e.best.noise**2
     spectrum = Spectrum.of(form.over(e.whitening.relative), e.whitening.weights, e.whitening.noise)
     alike = spectrum.spread(e.discrepancy.tau, columns * (e.discrepancy.noise / variance))
     inner = _posterior(columns.T @ columns / variance, tight)
@@ -112,7 +114,8 @@ def _posterior(information: Array, tight: Array) -> Array:
     """(K, K) covariance A = (XᵀX/σ² + Λ⁻¹)⁻¹, each column scaled to unit length."""
     unit = (information.diagonal() + tight) ** -0.5
     size = np.outer(unit, unit)
-    return size * _symmetric(np.linalg.inv(information * size + np.diag(tight * unit**2)))
+    inverse: Array = np.asarray(np.linalg.inv(information * size + np.diag(tight * unit**2)))
+    return size * _symmetric(inverse)
 
 
 def _symmetric(matrix: Array) -> Array:
@@ -131,7 +134,8 @@ def _widened(covariance: Array, said: Sequence[Array]) -> Array:
 
 def _times(variance: Array, axes: Array, said: Sequence[Array]) -> Array:
     """(P,) how many times a variance along its axes the largest of those said is, at least once."""
-    return np.max([variance, *(np.einsum("ki,kl,li->i", axes, own, axes) for own in said)], axis=0) / variance
+    most = np.max([variance, *(np.einsum("ki,kl,li->i", axes, own, axes) for own in said)], axis=0)
+    return np.asarray(most / variance)
 
 
 def uncertainty(fit: Fit, needs: tuple[str, ...], floor: float) -> Spread:
@@ -175,7 +179,8 @@ def _covariances(fit: Fit, model: Model) -> tuple[Array, Array | None]:
     tight = np.concatenate([np.full(model.flat, diagnosis_settings.LOOSE**-2.0), model.tight])
     moving = np.concatenate([moves(frame_columns(fit.corrected)[1]), np.ones(len(model.tight), dtype=bool)])
     own = np.ix_(moving, moving)
-    wider = _sandwich(e, _independent(model), tight)[own] if _smooth(e) else None
+    form = _smooth(e)
+    wider = None if form is None else _sandwich(e, form, _independent(model), tight)[own]
     return _posterior(model.whole[0][:-1, :-1] / e.best.noise**2, tight)[own], wider
 
 

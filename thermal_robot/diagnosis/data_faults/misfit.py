@@ -25,8 +25,8 @@ from thermal_robot.diagnosis.answer import Conclusion
 from thermal_robot.diagnosis.data_faults import data_fault, settings
 from thermal_robot.diagnosis.data_faults.find import misfit
 from thermal_robot.diagnosis.data_faults.readings import Readings
-from thermal_robot.diagnosis.examine import examine
 from thermal_robot.diagnosis.parts import AnotherModel, Misfit
+from thermal_robot.diagnosis.residual_tests import examine
 from thermal_robot.effects import Effect
 from thermal_robot.errors import RobotError
 from thermal_robot.inference import settings as inference
