@@ -16,7 +16,7 @@ from thermal_robot.diagnosis.residual_tests import (
     nearest,
     repeats,
     residual,
-    together,
+    scan_test,
     too_many,
 )
 from thermal_robot.effects import choose
@@ -317,7 +317,7 @@ def test_chance_puts_them_together_as_often_as_it_is_said_to():
         for _ in range(400):
             aside = np.isin(np.arange(samples), rng.permutation(samples)[:count])
             values = [rng.normal(size=samples), rng.choice([-1.0, 1.0], samples), rng.integers(0, 4, samples)]
-            said += [together(np.asarray(v, dtype=float), aside) for v in values]
+            said += [scan_test(np.asarray(v, dtype=float), aside) for v in values]
         assert np.mean(np.array(said) < 0.05) < 0.05
         assert np.mean(np.array(said) < 0.01) < 0.01
 
@@ -327,14 +327,14 @@ def test_rows_on_one_side_of_two_have_the_probability_of_a_draw_from_it():
     values = np.repeat([-1.0, 1.0], 50)
     aside = np.isin(np.arange(100), np.arange(12))
     alone = hypergeom.sf(11, 99, 49, 11) + hypergeom.pmf(11, 99, 49, 11)
-    assert alone < together(values, aside) < 100.0 * alone
-    assert together(values, np.isin(np.arange(100), np.arange(44, 56))) == 1.0
+    assert alone < scan_test(values, aside) < 100.0 * alone
+    assert scan_test(values, np.isin(np.arange(100), np.arange(44, 56))) == 1.0
 
 
 def test_a_narrow_band_in_the_middle_is_seen():
     values = np.random.default_rng(1).permutation(200).astype(float)
-    assert together(values, (values > 95) & (values < 103)) < 1e-6
-    assert together(values, values % 25 == 0) > 0.5
+    assert scan_test(values, (values > 95) & (values < 103)) < 1e-6
+    assert scan_test(values, values % 25 == 0) > 0.5
 
 
 def test_two_rows_have_nothing_in_common(rv_m2):

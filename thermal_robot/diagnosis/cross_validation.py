@@ -338,16 +338,14 @@ def shrinkage(explanation: Explanation, before: Linear, families: Sequence[str],
     added = {families[b]: squares(players) - squares(players | {k}) for k, b in enumerate(beside, len(best))}
     shares |= {name: share(added.get(name, 0.0 * none), none) for name in dict.fromkeys(families) if name not in shares}
     far, near = (np.linalg.norm(of[:, :3], axis=1) for of in (left(frozenset()), after))
-    before_all, after_all, before_kept, after_kept = (_rms(of) for of in (far, near, far[kept], near[kept]))
+    before_all, after_all, before_kept, after_kept = (
+        float(np.sqrt(np.nanmean(of**2))) for of in (far, near, far[kept], near[kept])
+    )
     value, interval = share(none - squares(players), none)
     folds = int(block.max()) + 1
     overall = HeldOut("blocked", folds, before_kept, after_kept, value, interval, before_all, after_all)
     far[~kept] = near[~kept] = np.nan
     return Shrinkage(overall, far, near, shares, after)
-
-
-def _rms(distance: Array) -> float:
-    return float(np.sqrt(np.nanmean(distance**2)))
 
 
 def _beside(explanation: Explanation, families: Sequence[str]) -> dict[int, float]:

@@ -317,13 +317,13 @@ def alike(fit: Fit) -> Outcome:
     count = int(aside.sum())
     if count < settings.FEWEST_ASIDE or len(aside) - count < count:
         return PASSED
-    found = {name: together(values, aside) for name, values in _asked(fit.corrected).items()}
+    found = {name: scan_test(values, aside) for name, values in _asked(fit.corrected).items()}
     name = min(found, key=lambda n: found[n])
     told = f"the {count} rows that were set aside are no gross errors: they lie together in {name}"
     return Outcome(min(1.0, found[name] * len(found)), told)
 
 
-def together(values: Array, aside: NDArray[np.bool_]) -> float:
+def scan_test(values: Array, aside: NDArray[np.bool_]) -> float:
     """Return the p-value, all ranges counted, that the rows set aside lie together in a quantity (N,) by chance."""
     from scipy.stats import hypergeom
 

@@ -58,7 +58,7 @@ def as_remainder_says(fit: Fit) -> Fit:
         values, covariance = e.values[b]
         prior = e.linear.blocks[b].sizes * e.best.scales[b]
         unit, own = np.outer(prior, prior), np.ix_(span - model.flat, span - model.flat)
-        wider[b] = values, unit * _widened(covariance / unit, [s[own] / unit for s in said])
+        wider[b] = values, unit * _inflated(covariance / unit, [s[own] / unit for s in said])
     return replace(fit, explanation=replace(e, values=wider))
 
 
@@ -123,7 +123,7 @@ def _symmetric(matrix: Array) -> Array:
     return (matrix + matrix.T) / 2.0
 
 
-def _widened(covariance: Array, said: Sequence[Array]) -> Array:
+def _inflated(covariance: Array, said: Sequence[Array]) -> Array:
     """(P, P) covariance in units of the prior deviations, along none of its axes smaller than any of those said."""
     variance, axes = np.linalg.eigh(covariance)
     variance = np.maximum(variance, settings.TINY)
@@ -166,7 +166,7 @@ def uncertainty(fit: Fit, needs: tuple[str, ...], floor: float) -> Spread:
         wider,
         np.concatenate([*(e.linear.blocks[b].sizes * e.best.scales[b] for b in e.best.blocks), np.zeros(0)]),
         {} if session is None else {"session": tuple(np.unique(session).tolist())},
-        _between(fit, session),
+        _between_sessions(fit, session),
     )
 
 
@@ -206,7 +206,7 @@ def _size(left: Array, told: Array, kept: NDArray[np.bool_]) -> Array:
     return np.asarray(size * np.quantile(beside, min(inside * (1.0 + 1.0 / len(left)), 1.0)))
 
 
-def _between(fit: Fit, session: NDArray[np.str_] | None) -> Array | None:
+def _between_sessions(fit: Fit, session: NDArray[np.str_] | None) -> Array | None:
     """(3,) one sigma per axis between sessions (random effects), measurement frame, m; ``None`` for one session."""
     kept = ~fit.explanation.outliers
     left = fit.corrected.gap[kept, :3] @ fit.corrected.frames.base[:3, :3].T
