@@ -27,6 +27,7 @@ from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.turning import moves
 from thermal_robot.diagnosis.parts import FoldScheme, HeldOut
 from thermal_robot.effects.law_words import is_event
+from thermal_robot.effects.quantities import resolution, varies
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of, ridge, whitener
@@ -34,23 +35,21 @@ from thermal_robot.inference.columns import block as columns
 from thermal_robot.inference.explain import Explanation
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.problem import Linear, Whitening
-from thermal_robot.inference.rows import blocks, each, neighbourhoods
+from thermal_robot.inference.rows import Labels, blocks, each, neighbourhoods
 from thermal_robot.inference.stack import chunks
 
-Labels = NDArray[np.int64]
 Rows = NDArray[np.bool_]
 Share = tuple[float, tuple[float, float]]
 
 
 @dataclass(frozen=True, eq=False)
 class Model:
-    """A linear model whose frames and K parameters can be fitted to any rows.
+    """A linear model whose frames and K parameters can be fitted to any rows by ridge regression.
 
     ``scales``: prior standard deviation of each block's parameters, in expected sizes; one for all, or (P,), next to
-    none where held at zero. ``variance`` of the noise in squares of the whitening noise, against which priors count; a
-    fit to some rows whitens those alone. ``kept`` (N,): rows on which it is judged; ``block`` (N,): block of
-    consecutive rows, 0..B−1. ``apart``: positions and orientations count by what is left of each, as where frames are
-    registered, not in the ratio of their noise.
+    none where held at zero. ``variance`` of the noise in squares of the whitening noise. ``kept`` (N,): rows on which
+    it is judged; ``block`` (N,): block of consecutive rows, 0..B−1. ``apart``: positions and orientations count by what
+    is left of each, as where frames are registered, not in the ratio of their noise.
     """
 
     linear: Linear
@@ -73,9 +72,8 @@ class Model:
     def partial(self, nominal: Linear, values: Sequence[Array] = ()) -> Model:
         """Return the model for fits of a part of its effects: linearised at the nominal robot, with a block for each.
 
-        Each is held to the size of its ``values`` in the whole model. Such a fit leaves much, and whatever it is counts
-        as noise: a smooth discrepancy is small beside it, and how positions compare with orientations is not what the
-        noise says. At the corrected robot frames that are aliases could seem apart, and would stretch without measure.
+        Each is held to the size of its ``values`` in the whole model. What such a fit leaves counts as noise: a smooth
+        discrepancy is small beside it. At the corrected robot frames that are aliases could seem apart, and stretch.
         """
         pairs = list(zip(values, nominal.blocks, strict=True))
         sizes = [float(np.sqrt(np.mean((v / b.sizes) ** 2))) for v, b in pairs]
@@ -100,12 +98,12 @@ class Model:
         return np.concatenate([*own, np.zeros(0)])
 
     @cached_property
-    def _used(self) -> Rows:
-        return np.asarray(self.whitening.weights > 0)
-
-    @cached_property
     def _known(self) -> dict[bytes, Array]:
         return {}
+
+    @cached_property
+    def _used(self) -> Rows:
+        return np.asarray(self.whitening.weights > 0)
 
     def products(self, rows: Rows) -> Array:
         """(G, K + 1, K + 1) Xᵀ V⁻¹ X of the columns and the gap over some rows, V their own covariance; computed once.
@@ -292,13 +290,12 @@ class Shrinkage:
 def held_out(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Shrinkage:
     """Cross-validate in blocks of consecutive measurements, one block held out at a time.
 
-    Frames and parameters come from the training rows alone. What was chosen stays that of all rows: candidates,
-    effects, the place and quantity of a law, refined constants, prior scales, the point of linearisation, noise, and
-    which rows are set aside. Choosing anew in each fold was tried: as an estimate for the model that is saved it is off
-    by more, not by less. The price is that an effect chosen by chance from noise alone seems worth a little;
-    :func:`~thermal_robot.diagnosis.earned.earned` asks for more than that. The intervals are of what fresh rows of the
-    same kind would say of the saved model, noise included. Raises :class:`EstimationError` if all rows repeat one pose,
-    so that there is only one fold.
+    Frames and parameters come from the training rows alone. What was chosen stays that of all rows: effects, laws,
+    constants, prior scales, the point of linearisation, noise, and outliers. Choosing anew in each fold is further off
+    as an estimate for the model that is saved. The price is that an effect chosen by chance from noise alone seems
+    worth a little; :func:`~thermal_robot.diagnosis.earned.earned` asks for more than that. The intervals are of what
+    fresh rows of the same kind would say of the saved model, noise included. Raises :class:`EstimationError` if all
+    rows repeat one pose.
     """
     block = blocks(fit.campaign)
     count = int(block.max()) + 1
@@ -374,9 +371,8 @@ def _shapley(player: int, players: frozenset[int], squares: Callable[[frozenset[
 def worst_folds(fit: Fit) -> tuple[FoldScheme, ...]:
     """Cross-validate by time, session, temperature, region, reach and range; the largest rms after comes first.
 
-    Its shrinkage need not be the smallest, as the gap before may be larger on its rows, too. Every figure has the noise
-    of the held-out rows in it. A scheme is left out if the campaign lacks its column; a fold if its training rows do
-    not determine the frames.
+    Its shrinkage need not be the smallest, as the gap before may be larger on its rows, too. A scheme is left out if
+    the campaign lacks its column; a fold if its training rows do not determine the frames.
     """
     model = Model.of(fit.explanation, blocks(fit.campaign))
     plain = model.partial(fit.before)
@@ -403,8 +399,7 @@ def _scheme(name: str, words: str, walk: Walk, before: Array, after: Array) -> F
 def _events_known(fit: Fit, plain: Model, model: Model) -> tuple[Model, Model]:
     """Return the models of the frames alone and of a fit once what its events moved is taken out of the gap.
 
-    What stands elsewhere in a session is not told by the others, nor what stood elsewhere in all rows of a region:
-    whether the rest carries over to these can be asked only where that is known, as by registering anew.
+    Other rows do not tell what stood elsewhere in a whole session or region: it must be known, as by registering anew.
     """
     e = fit.explanation
     events = [(b, effect) for b, (effect, _) in zip(e.best.blocks, fit.effects, strict=True) if is_event(effect)]
@@ -436,7 +431,7 @@ def schemes(fit: Fit) -> Iterator[tuple[str, str, list[Rows]]]:
     if session is not None and len(set(session.tolist())) > 1:
         yield "session", "one session after the other", each(np.unique(session, return_inverse=True)[1])
     temperature = _temperature(campaign)
-    if temperature is not None and np.ptp(temperature) > settings.COLDEST:
+    if temperature is not None and varies(temperature, resolution(temperature, "°C")):
         yield "temperature", "the coldest fifth, and the warmest", _ends(temperature)
     yield "region", "neighbourhoods of joint positions", each(neighbourhoods(campaign, settings.FOLDS))
     reach = np.linalg.norm(fit.nominal.position, axis=1)

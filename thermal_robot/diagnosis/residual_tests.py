@@ -31,12 +31,9 @@ from thermal_robot.percents import percent
 class Outcome(NamedTuple):
     """Result of a test: p-value, what is said where it fails, and the ``share`` of the residual that is no noise."""
 
-    p: float
-    reason: str
+    p: float = 1.0
+    reason: str = ""
     share: float = 0.0
-
-
-PASSED = Outcome(1.0, "")
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,9 +55,8 @@ class Residual:
         drawn = np.sort(np.random.default_rng(settings.TEST_SEED).choice(len(self.rows), count, replace=False))
         m = self.white.shape[1]
         basis, _ = np.linalg.qr(self.target.basis.reshape(len(self.rows), m, -1)[drawn].reshape(count * m, -1))
-        return Residual(
-            self.rows[drawn], Target(without(self.white[drawn].ravel(), basis), self.target.root[drawn], basis)
-        )
+        white = without(self.white[drawn].ravel(), basis)
+        return Residual(self.rows[drawn], Target(white, self.target.root[drawn], basis))
 
 
 def residual(fit: Fit) -> Residual:
@@ -163,7 +159,7 @@ def examine(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Exami
 
 def _too_large(fit: Fit, left: Residual) -> Outcome:
     """Chi-square test of the residual against the stated noise; heavy tails reduce the degrees of freedom."""
-    found, noise, measures = [PASSED], fit.explanation.whitening.noise, left.white.shape[1]
+    found, noise, measures = [Outcome()], fit.explanation.whitening.noise, left.white.shape[1]
     stated = {"position": fit.campaign.noise_position, "orientation": fit.campaign.noise_orientation}
     freedom = left.target.freedom * 3.0 / measures
     for what, start in zip(stated, range(0, measures, 3), strict=False):
@@ -180,14 +176,13 @@ def _too_large(fit: Fit, left: Residual) -> Outcome:
 def _lack_of_fit(left: Residual, again: Repeats | None) -> Outcome:
     """F test of the residual against the differences of near-repeats (lack of fit)."""
     if again is None:
-        return PASSED
+        return Outcome()
     ratio2 = float((left.white**2).sum()) / left.target.freedom / max(again.scale2, settings.TINY)
-    if ratio2 < settings.MATERIAL_REPEATS**2:
-        return PASSED
+    if ratio2 < settings.NOISE_SLACK**2:
+        return Outcome()
     p = float(fdtrc(left.target.freedom, again.pairs * left.white.shape[1], ratio2))
-    return Outcome(
-        p, f"what remains is {np.sqrt(ratio2):.2g} times what {again.pairs} pairs of repeated commands differ by"
-    )
+    times = f"{np.sqrt(ratio2):.2g} times"
+    return Outcome(p, f"what remains is {times} what {again.pairs} pairs of repeated commands differ by")
 
 
 def _neighbours(fit: Fit, left: Residual) -> Outcome:
@@ -202,7 +197,7 @@ def _neighbours(fit: Fit, left: Residual) -> Outcome:
         pairs["joint space"] = np.repeat(np.arange(len(q)), settings.NEIGHBOURS), near.ravel()
     order = np.argsort(np.argsort(in_order(fit.campaign))[left.rows], kind="stable")
     pairs["the order of measurement"] = order[:-1], order[1:]
-    rng, found = np.random.default_rng(0), [PASSED]
+    rng, found = np.random.default_rng(0), [Outcome()]
     shuffles = settings.SHUFFLES if len(white) < settings.SHUFFLED_ROWS else settings.FEW_SHUFFLES
     for where, (one, other) in pairs.items():
         orders = (np.arange(len(white)), *(rng.permutation(len(white)) for _ in range(shuffles)))
@@ -228,19 +223,19 @@ def _laws(fit: Fit, left: Residual) -> tuple[Outcome, tuple[Location, ...], tupl
     every = _smooth_laws(fit.corrected, left.some(settings.ENOUGH_REMAINDER))
     tested = sorted((law for law in every if np.isfinite(law.worth.gain)), key=lambda law: -law.worth.gain)
     if not tested:
-        return PASSED, (), ()
+        return Outcome(), (), ()
     best: dict[tuple[str, str], float] = {}
     depends: dict[str, tuple[float, LawTest]] = {}
     for law in tested:
         best.setdefault(law.place, law.worth.gain)
         p = law.worth.p_value * len(tested)
-        if law.worth.share > settings.MATERIAL_SHARE and p < settings.LAW_LEVEL:
+        if law.worth.share > settings.MATERIAL_SHARE and p < 2.0 * settings.INTERVAL[0]:
             depends.setdefault(law.quantity, (min(1.0, p), law))
     # posterior probability of the best law at each place
     shares = zip(best, softmax(list(best.values())), strict=True)
     locations = tuple(Location(*place, float(share)) for place, share in shares)[: settings.NAMED]
     if not depends:
-        return PASSED, locations, ()
+        return Outcome(), locations, ()
     p, first = next(iter(depends.values()))
     kind, name = first.place
     at = in_words("joint", name) if kind == "joint" else f"the {name}"
@@ -273,7 +268,7 @@ def _in_a_row(fit: Fit) -> Outcome:
     count, samples = int(aside.sum()), len(aside)
     follow = int((aside[1:] & aside[:-1]).sum())
     if count < settings.FEW_ASIDE * samples or not follow:
-        return PASSED
+        return Outcome()
     # what chance gives has a Poisson law
     p = 1.0 - float(pdtr(follow - 1, count * (count - 1) / samples))
     together = int(in_a_row(fit.campaign, fit.explanation.outliers).sum())
@@ -289,7 +284,7 @@ def too_many(fit: Fit, left: Residual) -> Outcome:
     count, samples = int(fit.explanation.outliers.sum()), len(fit.explanation.outliers)
     share = settings.SPOILT + _share_of_tails(left, samples)
     if count <= share * samples:
-        return PASSED
+        return Outcome()
     told = f"{count} of {samples} rows were set aside ({percent(count / samples, 0)})"
     return Outcome(float(bdtrc(count - 1, samples, share)), f"{told}: more than gross errors account for")
 
@@ -316,7 +311,7 @@ def alike(fit: Fit) -> Outcome:
     aside = fit.explanation.outliers
     count = int(aside.sum())
     if count < settings.FEWEST_ASIDE or len(aside) - count < count:
-        return PASSED
+        return Outcome()
     found = {name: scan_test(values, aside) for name, values in _asked(fit.corrected).items()}
     name = min(found, key=lambda n: found[n])
     told = f"the {count} rows that were set aside are no gross errors: they lie together in {name}"
