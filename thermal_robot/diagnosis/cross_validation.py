@@ -157,8 +157,8 @@ class Model:
         gap = np.array([self.whole.shape[1] - 1])
         return np.concatenate([np.arange(self.flat), *(self.spans[b] for b in chosen), gap])
 
-    def fits(self, rows: Sequence[Rows], chosen: Sequence[int]) -> list[Array]:
-        """Ridge regression on each set of rows: (k + 1,) −θ and 1; what all rows leave is noise to priors."""
+    def fits(self, rows: Sequence[Rows], chosen: Sequence[int]) -> Array:
+        """(S, k + 1) −θ and 1 by ridge regression on each set of rows; what all rows leave is noise to priors."""
         picked = self.columns(chosen)
         tight = self.tight[picked[self.flat : -1] - self.flat]
         own = (slice(None), picked[:, None], picked)
@@ -171,7 +171,7 @@ class Model:
             variance = np.maximum(np.einsum("i,gij,j->g", signed, whole, signed) / equations, self.variance)
         different = {used.tobytes(): used for used in rows}
         solved = {key: _signed(self.products(r)[own], variance, self.flat, tight) for key, r in different.items()}
-        return [solved[used.tobytes()] for used in rows]
+        return np.stack([solved[used.tobytes()] for used in rows])
 
 
 def _signed(products: Array, variance: Array, flat: int, tight: Array) -> Array:
@@ -200,20 +200,17 @@ class Walk:
         return np.append(held.sum(), held.sum() - np.bincount(self.model.block, held)).astype(np.int64)
 
     def squares(self, chosen: Sequence[int]) -> Array:
-        """(1 + B,) sums of squared distances that some blocks leave on rows held out, m²: of all, without each block.
-
-        The latter are those of a cross-validation without the block.
-        """
+        """(1 + B,) held-out sums of squared distances with some blocks, m²: in all, and repeated without each block."""
         model, picked, own = self.model, self.model.columns(chosen), each(self.model.block)
         every = np.ones(len(model.block), dtype=bool)
-        fits = np.stack(model.fits([*(~rows for rows in (*self.tests, *own)), every], chosen))
+        fits = model.fits([*(~rows for rows in (*self.tests, *own)), every], chosen)
         fits, moved = fits[: len(self.tests)], fits[len(self.tests) : -1] - fits[-1]
         # share of each block's rows on which the fit of each fold rests
         shared = 1.0 - np.stack(self.tests) @ np.stack(own, axis=1).astype(float) / np.sum(own, axis=1)
         total = np.zeros(1 + len(own))
-        for test, fit, share in zip(self.tests, fits, shared, strict=True):
+        for test, fit, resting in zip(self.tests, fits, shared, strict=True):
             judged = test & model.kept
-            left = model.linear.stack[judged, :3][:, :, picked] @ np.vstack([fit, fit + share[:, None] * moved]).T
+            left = model.linear.stack[judged, :3][:, :, picked] @ np.vstack([fit, fit + resting[:, None] * moved]).T
             squares = (left**2).sum(axis=1)
             squares[np.arange(len(squares)), 1 + model.block[judged]] = 0.0
             total += squares.sum(axis=0)

@@ -1,17 +1,13 @@
-"""Covariance of parameters and standard deviation of predictions, where the residual is no independent noise.
+"""Covariance of parameters and deviation of predictions where the residual is no noise: sandwich, jackknife, conformal.
 
-The posterior takes the residual for noise that is independent from row to row. What no effect describes is alike for
-neighbours in joint space, or in time, and many rows then say no more than a few. Two figures tell what that does:
+What no effect describes is alike for neighbours in joint space, or in time; many rows then say no more than a few.
 
-* The smooth discrepancy beside the effects: V = s²(1 + τ²K) is the covariance of the rows. Effects are fitted as if
-  there were none, θ̂ = A Xᵀy/σ² with A = (XᵀX/σ² + Λ⁻¹)⁻¹. Such a θ̂ has the covariance
-
-      A (XᵀVX/σ⁴ + Λ⁻¹) A,
-
-  which is A itself where V = σ² (the sandwich of Huber, *Proc. 5th Berkeley Symposium* 1, 1967).
+* With a smooth discrepancy V = s²(1 + τ²K) is the covariance of the rows. Effects are fitted as if there were none, θ̂ =
+  A Xᵀy/σ² with A = (XᵀX/σ² + Λ⁻¹)⁻¹. Such a θ̂ has the covariance A (XᵀVX/σ⁴ + Λ⁻¹) A, which is A itself where V = σ²
+  (the sandwich of Huber, *Proc. 5th Berkeley Symposium* 1, 1967).
 * The jackknife over groups, regions of joint space and blocks of time (Efron and Stein, *Annals of Statistics* 9, 1981;
-  for clusters, Cameron and Miller, *Journal of Human Resources* 50, 2015). It knows of no form, but not of what is
-  smooth over many groups.
+  for clusters, Cameron and Miller, *Journal of Human Resources* 50, 2015) knows of no form, but not of what is smooth
+  over many groups.
 
 Along each principal axis of a block's posterior covariance, in units of the prior deviations, the largest of the
 variances takes the place of the posterior's: 1/λ − 1, what the data say beside the prior, becomes less in proportion.
@@ -19,8 +15,8 @@ variances takes the place of the posterior's: 1/λ − 1, what the data say besi
 A prediction is linear in the errors of frames and parameters, e = J (θ̂ − θ) + δ + n. The first has the variance
 J C Jᵀ with C the posterior covariance of all of them. What neither frames nor effects tell, δ, and the instrument's
 noise n are measured on rows held out, as the size t for which 95 % of them lie within 1.96 √(J C Jᵀ + t²) (split
-conformal prediction: Lei et al., *J. Am. Stat. Assoc.* 113, 2018): a normal law is not assumed of them. Between the
-rows measured a smooth discrepancy and J (θ̂ − θ) cancel in part; outside nothing does: there C is the sandwich.
+conformal prediction: Lei et al., *J. Am. Stat. Assoc.* 113, 2018), whatever their law. Outside the rows measured a
+smooth discrepancy and J (θ̂ − θ) do not cancel: there C is the sandwich.
 """
 
 from __future__ import annotations
@@ -63,10 +59,9 @@ def as_remainder_says(fit: Fit) -> Fit:
 
 
 def exceeding(fit: Fit, linear: Linear, information: Array, axes: Array) -> Array:
-    """(K,) variance inflation factor of parameters, 1 or more, over independent rows.
+    """(K,) variance inflation factor of parameters over independent rows: divide their information by it.
 
-    ``information`` (K,) is what independent rows would say, along its principal ``axes`` (K, K), and is to be divided
-    by the factor; the K parameters of ``linear`` are held to one unit each.
+    ``information`` (K,) stands along its principal ``axes`` (K, K); the parameters of ``linear`` are held to one unit.
     """
     model = replace(_model(fit), linear=linear, scales=(1.0,) * len(linear.blocks))
     return _times(1.0 / (1.0 + information), axes, _said(fit, model))
@@ -82,7 +77,7 @@ def _said(fit: Fit, model: Model) -> list[Array]:
     for labels in (model.block, neighbourhoods(fit.campaign, settings.BLOCKS)):
         rows = [~group for group in each(labels) if model.determines(~group)]
         if len(rows) > 1:
-            found.append(jackknife(np.stack(model.fits(rows, range(len(model.spans))))[:, model.flat : -1]))
+            found.append(jackknife(model.fits(rows, range(len(model.spans)))[:, model.flat : -1]))
     if form := _smooth(e):
         stack = _independent(model)
         columns = without(stack[:, model.flat :], orthonormal(stack[:, : model.flat]))
@@ -92,8 +87,7 @@ def _said(fit: Fit, model: Model) -> list[Array]:
 
 def _smooth(e: Explanation) -> Form | None:
     """Form of a smooth discrepancy; one that is anew in every pose or visit is part of the covariance in the fit."""
-    form = e.discrepancy.form
-    return None if form is None or form.anew else form
+    return None if e.discrepancy.form is None or e.discrepancy.form.anew else e.discrepancy.form
 
 
 def _independent(model: Model) -> Array:
