@@ -7,11 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.special import bdtrc, chdtrc, chdtri, fdtrc, fdtri, ndtr, pdtr, softmax
+from scipy.special import bdtrc, betaln, chdtrc, chdtri, fdtrc, fdtri, ndtr, pdtr, softmax
 
 from thermal_robot.arrays import Array
 from thermal_robot.diagnosis.parts import Dependence, Location, Unexplained
@@ -320,8 +320,6 @@ def alike(fit: Fit) -> Outcome:
 
 def scan_test(values: Array, aside: NDArray[np.bool_]) -> float:
     """Return the p-value, all ranges counted, that the rows set aside lie together in a quantity (N,) by chance."""
-    from scipy.stats import hypergeom
-
     own = np.sort(values[aside])
     count, samples = len(own), len(values)
     ordered = np.sort(values)
@@ -331,12 +329,23 @@ def scan_test(values: Array, aside: NDArray[np.bool_]) -> float:
     before, until = np.searchsorted(own, marks, "left"), np.searchsorted(own, marks, "right")
     first, last = np.triu_indices(len(marks), 1)
     # the ends of a range are rows set aside; of the others so many or more lie within
-    low = hypergeom.sf(until - 2, samples - 1, up_to - 1, count - 1)
-    high = hypergeom.sf(count - before - 2, samples - 1, samples - below - 1, count - 1)
-    held, rows = until[last] - before[first], up_to[last] - below[first]
-    inside = hypergeom.sf(held - 3, samples - 2, rows - 2, count - 2)
+    low = _tail(until - 1, count - 1, up_to - 1, samples - 1)
+    high = _tail(count - before - 1, count - 1, samples - below - 1, samples - 1)
+    inside = _tail(until[last] - before[first] - 2, count - 2, up_to[last] - below[first] - 2, samples - 2)
     ranges = 0.5 * count * (count - 1) + 2.0 * count
     return float(min(1.0, ranges * min(low.min(), high.min(), inside.min(initial=1.0))))
+
+
+def _tail(held: NDArray[np.int64], drawn: int, good: NDArray[np.int64], total: int) -> Array:
+    """Hypergeometric probability that of ``drawn`` of ``total`` rows at least ``held`` are among ``good`` ones."""
+
+    def log_choose(n: Any, k: Any) -> Any:
+        return -np.log1p(n) - betaln(n - k + 1.0, k + 1.0)
+
+    every = np.arange(drawn + 1)[:, None]
+    k = np.clip(every, drawn - (total - good), good)  # what can be
+    log = log_choose(good, k) + log_choose(total - good, drawn - k) - log_choose(total, drawn)
+    return np.minimum(np.where((k == every) & (k >= held), np.exp(log), 0.0).sum(axis=0), 1.0)
 
 
 def _asked(observations: Observations) -> dict[str, Array]:
