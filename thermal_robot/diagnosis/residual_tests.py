@@ -345,7 +345,7 @@ def _tail(held: NDArray[np.int64], drawn: int, good: NDArray[np.int64], total: i
     every = np.arange(drawn + 1)[:, None]
     k = np.clip(every, drawn - (total - good), good)  # what can be
     log = log_choose(good, k) + log_choose(total - good, drawn - k) - log_choose(total, drawn)
-    return np.minimum(np.where((k == every) & (k >= held), np.exp(log), 0.0).sum(axis=0), 1.0)
+    return np.asarray(np.minimum(np.where((k == every) & (k >= held), np.exp(log), 0.0).sum(axis=0), 1.0))
 
 
 def _asked(observations: Observations) -> dict[str, Array]:
