@@ -12,7 +12,7 @@ import pytest
 
 from thermal_robot import CorrectedModel, diagnose
 from thermal_robot.campaign import read_campaign
-from thermal_robot.diagnosis.held_out import held_out
+from thermal_robot.diagnosis.cross_validation import held_out
 from thermal_robot.effects import choose
 from thermal_robot.inference.fit import fit
 

@@ -6,7 +6,7 @@ from math import factorial
 
 import numpy as np
 
-from thermal_robot.diagnosis.one_walk import Model
+from thermal_robot.diagnosis.cross_validation import Model
 from thermal_robot.inference.columns import Block
 from thermal_robot.inference.explain import explain, log_odds
 from thermal_robot.inference.problem import Linear

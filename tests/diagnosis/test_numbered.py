@@ -8,7 +8,7 @@ from helpers import with_law
 from simulate import simulate
 
 from thermal_robot.diagnosis.answer import numbered
-from thermal_robot.diagnosis.held_out import held_out
+from thermal_robot.diagnosis.cross_validation import held_out
 from thermal_robot.effects import choose
 from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.law import Discovered

@@ -12,7 +12,7 @@ from simulate import simulate
 
 from thermal_robot import CorrectedModel, diagnose
 from thermal_robot.diagnosis.beside import as_laws_say, grown
-from thermal_robot.diagnosis.examine import examine
+from thermal_robot.diagnosis.residual_tests import examine
 from thermal_robot.diagnosis.values import Dependence, Location, Unexplained
 from thermal_robot.effects import choose
 from thermal_robot.effects.apply import displacement

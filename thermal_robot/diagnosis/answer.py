@@ -10,15 +10,15 @@ from scipy.special import softmax
 
 from thermal_robot.correction.model import CorrectedModel
 from thermal_robot.diagnosis import settings
+from thermal_robot.diagnosis.attribution import locate
+from thermal_robot.diagnosis.cross_validation import Shrinkage, hardest, harmed, worst_folds
 from thermal_robot.diagnosis.data_checks import cautions
-from thermal_robot.diagnosis.examine import Examined
 from thermal_robot.diagnosis.findings import by_share, findings, random_findings, separates, titled
-from thermal_robot.diagnosis.held_out import Shrinkage, hardest, harmed, worst_folds
 from thermal_robot.diagnosis.next_measurement import wanted
-from thermal_robot.diagnosis.predictive import registered, uncertainty
+from thermal_robot.diagnosis.residual_tests import Examined
 from thermal_robot.diagnosis.result import Diagnosis
+from thermal_robot.diagnosis.uncertainty import registered, uncertainty
 from thermal_robot.diagnosis.values import Finding, Gap, Misfit, Refused, Rows, Sensitivity, Unexplained
-from thermal_robot.diagnosis.where import locate
 from thermal_robot.effects import Effect, gate, random_effects
 from thermal_robot.effects.apply import depends_on
 from thermal_robot.effects.law import PREFIX, Discovered

@@ -8,9 +8,9 @@ from dataclasses import replace
 import numpy as np
 
 from thermal_robot.diagnosis.answer import Conclusion
-from thermal_robot.diagnosis.examine import Examined, examine
+from thermal_robot.diagnosis.attribution import without_laws
+from thermal_robot.diagnosis.residual_tests import Examined, examine
 from thermal_robot.diagnosis.values import Dependence, Location, Refused, Unexplained
-from thermal_robot.diagnosis.where import without_laws
 from thermal_robot.effects import Effect
 from thermal_robot.effects.joint_ripple import JointRipple
 from thermal_robot.effects.law import PREFIX

@@ -15,10 +15,10 @@ from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.correction.model import CorrectedModel
 from thermal_robot.diagnosis.answer import model_of
 from thermal_robot.diagnosis.data_checks import as_counted, usable
-from thermal_robot.diagnosis.deviations import as_remainder_says
 from thermal_robot.diagnosis.diagnose import check_priors, solvable
-from thermal_robot.diagnosis.examine import Examined, examine
 from thermal_robot.diagnosis.findings import estimates, told_inside
+from thermal_robot.diagnosis.residual_tests import Examined, examine
+from thermal_robot.diagnosis.uncertainty import as_remainder_says
 from thermal_robot.diagnosis.values import Estimate
 from thermal_robot.effects import KINEMATIC, Effect, library, named
 from thermal_robot.errors import CampaignError, EffectError, require
@@ -128,7 +128,9 @@ class Calibration:
 
         NaN where the data do not identify the parameter.
         """
-        return tabled.estimates((effect.name, estimate) for effect in self.effects for estimate in effect.parameters)
+        from thermal_robot.diagnosis.result import estimate_table
+
+        return estimate_table((effect.name, estimate) for effect in self.effects for estimate in effect.parameters)
 
     @cached_property
     def model(self) -> CorrectedModel:

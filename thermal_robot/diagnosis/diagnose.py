@@ -14,16 +14,16 @@ from threadpoolctl import threadpool_limits
 from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.campaign.names import did_you_mean
 from thermal_robot.diagnosis.answer import Conclusion, answer
+from thermal_robot.diagnosis.attribution import without_laws
 from thermal_robot.diagnosis.beside import as_laws_say, beside_scatter, grown
+from thermal_robot.diagnosis.cross_validation import held_out
 from thermal_robot.diagnosis.data_checks import as_counted, not_executed, usable
 from thermal_robot.diagnosis.data_faults.misfit import another_motion, delivered, frames_alone, unfit
-from thermal_robot.diagnosis.deviations import as_remainder_says
 from thermal_robot.diagnosis.earned import pruned
-from thermal_robot.diagnosis.examine import examine
-from thermal_robot.diagnosis.held_out import held_out
+from thermal_robot.diagnosis.residual_tests import examine
 from thermal_robot.diagnosis.result import Diagnosis, told
+from thermal_robot.diagnosis.uncertainty import as_remainder_says
 from thermal_robot.diagnosis.updated import prepare
-from thermal_robot.diagnosis.where import without_laws
 from thermal_robot.effects import RANDOM, Effect, choose, library
 from thermal_robot.errors import CampaignError, EstimationError, require
 from thermal_robot.inference import settings

@@ -10,8 +10,7 @@ from numpy.typing import NDArray
 from scipy.special import expit, stdtrit
 
 from thermal_robot.arrays import Array
-from thermal_robot.diagnosis.held_out import schemes
-from thermal_robot.diagnosis.one_walk import Model, Walk
+from thermal_robot.diagnosis.cross_validation import Model, Walk, schemes
 from thermal_robot.diagnosis.values import Refused
 from thermal_robot.effects.law import PREFIX
 from thermal_robot.effects.law_words import is_event

@@ -16,8 +16,8 @@ import numpy as np
 
 from thermal_robot.arrays import Array
 from thermal_robot.diagnosis import settings
+from thermal_robot.diagnosis.attribution import locate
 from thermal_robot.diagnosis.values import Explained, Location, Place
-from thermal_robot.diagnosis.where import locate
 from thermal_robot.effects import Effect, Parameter
 from thermal_robot.effects.apply import by_place, sensitivity
 from thermal_robot.effects.effect import Channel, Driver

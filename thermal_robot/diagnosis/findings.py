@@ -80,7 +80,7 @@ def covariance(fit: Fit, joint: Array) -> pd.DataFrame:
     """Covariance of the identified parameters of the fit, by (effect, parameter), in the product of their SI units.
 
     Deviations are those of :func:`estimates`, widened to what the remainder says of each effect
-    (:func:`~thermal_robot.diagnosis.deviations.as_remainder_says`); correlations those of the ``joint`` (K, K)
+    (:func:`~thermal_robot.diagnosis.uncertainty.as_remainder_says`); correlations those of the ``joint`` (K, K)
     posterior of all frames and parameters, those of the effects last, frames marginalised.
     """
     import pandas as pd

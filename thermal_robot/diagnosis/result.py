@@ -37,8 +37,8 @@ if TYPE_CHECKING:
     from numpy.typing import ArrayLike
 
     from thermal_robot.campaign import Campaign
-    from thermal_robot.diagnosis.updated import Updated
     from thermal_robot.diagnosis.next_measurement import NextSamples
+    from thermal_robot.diagnosis.updated import Updated
     from thermal_robot.inference.fit import Fit
     from thermal_robot.iso9283.performance import Performance
     from thermal_robot.shapes.arm import Arm

@@ -13,13 +13,12 @@ from threadpoolctl import threadpool_limits
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.more_rows import more_rows
-from thermal_robot.correction import CorrectedModel
+from thermal_robot.correction.model import CorrectedModel
 from thermal_robot.diagnosis.agreement import Agreement, Watch, beyond, misfits, scatter_of
-from thermal_robot.diagnosis.values import Unexplained
 from thermal_robot.diagnosis.sequential import KEPT, Fitted, Sequential, State, normal
 from thermal_robot.diagnosis.settings import LOOSE
 from thermal_robot.diagnosis.sufficient import Choice, Judge, Point, Rows, Sums, joined, linearised
-from thermal_robot.diagnosis.tabled import LEVELS
+from thermal_robot.diagnosis.values import Unexplained
 from thermal_robot.effects import Effect, gate, library
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
@@ -348,7 +347,7 @@ class Updated:
                 "unit": [p.unit for _, p in listed],
                 "identified": identified(std, fitted.expected(choice)),
             },
-            index=pd.MultiIndex.from_tuples([(name, p.name) for name, p in listed], names=LEVELS),
+            index=pd.MultiIndex.from_tuples([(name, p.name) for name, p in listed], names=("effect", "parameter")),
         )
 
     def to_dict(self) -> dict[str, Any]:

@@ -6,7 +6,7 @@ With y the gap, X the columns of all parameters and F those of the unknown frame
 
 What an unknown frame takes up, such as the first joint's zero, is not in G: campaigns are compared without it. Where
 what remains is no noise, rows say less than they seem to: along each axis of G the information is divided by as much as
-the variance of the parameters exceeds what independent rows would give (:mod:`thermal_robot.diagnosis.deviations`).
+the variance of the parameters exceeds what independent rows would give (:mod:`thermal_robot.diagnosis.uncertainty`).
 
 A model file may stand in the place of a campaign. It holds the effects that were found with their values, the
 covariance C of frames and parameters, the deviation π that each parameter was expected to have, and the ranges that
@@ -34,8 +34,8 @@ from numpy.typing import NDArray
 from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import LABELS
 from thermal_robot.correction import CorrectedModel
-from thermal_robot.diagnosis.deviations import exceeding
 from thermal_robot.diagnosis.result import Diagnosis
+from thermal_robot.diagnosis.uncertainty import exceeding
 from thermal_robot.effects import Effect, Parameter, gate
 from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.fading import OfPosition

@@ -117,10 +117,10 @@ def explain(
     log_prior = log_priors([b.effect for b in linear.blocks]) if log_prior is None else log_prior
     asked = _Asked(linear, families, log_prior, settings_of_one(families), len(forms), Stack.of(linear.columns))
     seeds = [tuple(sorted(start)) for start in starts]
-    first, history = before is None, list[tuple[object, ...]]()
+    first, beside, history = before is None, list[Form](), list[tuple[object, ...]]()
     if before is None:
         # effects that are far off, and gross errors, are settled first, beside a noise that is free
-        whitening, beside = replace(first_whitening(linear, noise, use & ~aside), held=0.0), ()
+        whitening = replace(first_whitening(linear, noise, use & ~aside), held=0.0)
     else:
         whitening, alive = replace(before.whitening, smooth=None), {form.name for form in before.forms}
         beside, form = [form for form in forms if form.name in alive], before.discrepancy.form
@@ -135,7 +135,7 @@ def explain(
         history.append((*found.state, used))
         whitening, aside = reweigh(found.rough, noise, use, found.leverage, linear.measures)
         seeds = [found.best.blocks]
-        beside = forms if first else found.ladder.in_question(found.best)
+        beside = [*(forms if first else found.ladder.in_question(found.best))]
         first = False
         del found  # before the next one takes as much memory
 

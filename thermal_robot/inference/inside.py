@@ -1,10 +1,10 @@
-"""What is inside what: one effect of a fit told in other parameters, as many as the data can tell apart.
+"""Reparametrisation: one effect of a fit told in other parameters, as many as the data can tell apart.
 
 A large effect has more parameters than the data determine: many do the same, alone or with the unknown frames. Of a
 list of parameters that are combinations of them, in the order in which a reader wants them, each is kept that the data
-see beside those before it, until together they do all that the effect does. This is a change of coordinates: the first
-take all they can, and no prior bears on those of an effect inside. For the geometry of robots such parameters were
-listed by Khalil, Gautier and Enguehard (*Robotica* 9, 1991).
+see beside those before it, until together they do all that the effect does; no prior bears on those of an effect
+inside. For the geometry of robots such base parameters were listed by Khalil, Gautier and Enguehard (*Robotica* 9,
+1991).
 """
 
 from __future__ import annotations
@@ -49,34 +49,26 @@ def divided(fit: Fit, name: str) -> tuple[Portion, ...]:
     inside, rest = _inside(fit, effect), gate.independent(effect, fit.corrected)
     if not inside and not rest:
         return ()
-    block = fit.explanation.best.blocks[number]
-    item = fit.explanation.linear.blocks[block]
+    e, b = fit.explanation, fit.explanation.best.blocks[number]
+    item = e.linear.blocks[b]
     listed = [(e.name, p) for e in inside for p in gate.checked(e, fit.corrected)] + [(name, p) for p in rest]
     of, wanted = zip(*listed, *((name, p) for p in item.parameters), strict=True)  # whatever the list does not do
     seen, across, within = _coordinates(fit, item, wanted)
     kept = distinct(across, within)
-    free = np.array([of[k] != name for k in kept])
-    sizes = np.array([p.size for p in wanted])[kept]
+    free, sizes = np.array([of[k] != name for k in kept]), np.array([wanted[k].size for k in kept])
+    covariance = seen.T @ (e.values[b][1] / np.outer(item.sizes, item.sizes)) @ seen
     told, covariance, prior = _freed(
-        seen.T @ (values / item.sizes),
-        seen.T @ (fit.explanation.values[block][1] / np.outer(item.sizes, item.sizes)) @ seen,
-        fit.explanation.best.scales[block],
-        across[:, kept],
-        free,
+        seen.T @ (values / item.sizes), covariance, e.best.scales[b], across[:, kept], free
     )
-    spread = np.sqrt(np.maximum(np.diag(covariance), 0.0))
-    return tuple(
-        Portion(
-            part,
-            tuple(wanted[kept[k]] for k in mine),
-            (sizes * told)[mine],
-            (sizes * spread)[mine],
-            (sizes * prior)[mine],
-            tuple(wanted[k] for k in range(len(listed)) if of[k] == part and within[k] and k not in kept),
-        )
-        for part in dict.fromkeys((*(e.name for e in inside), name))
-        for mine in [[k for k, number in enumerate(kept) if of[number] == part]]
-    )
+    figures = sizes * np.stack([told, np.sqrt(np.maximum(np.diag(covariance), 0.0)), prior])
+    found = []
+    for part in dict.fromkeys((*(e.name for e in inside), name)):
+        mine = [k for k, number in enumerate(kept) if of[number] == part]
+        unseen = (k for k in range(len(listed)) if of[k] == part and within[k] and k not in kept)
+        value, spread, before = figures[:, mine]
+        parameters = tuple(wanted[kept[k]] for k in mine)
+        found.append(Portion(part, parameters, value, spread, before, tuple(wanted[k] for k in unseen)))
+    return tuple(found)
 
 
 def _freed(
@@ -89,10 +81,9 @@ def _freed(
     """
     tight = np.linalg.inv(covariance)
     data = across.T @ (tight - np.eye(len(tight)) / scale**2) @ across
-    said = across.T @ tight @ values
     posterior: Array = np.asarray(np.linalg.inv(data + np.diag((scale * np.where(free, settings.UNHELD, 1.0)) ** -2.0)))
     prior = scale * np.linalg.norm(np.linalg.pinv(across), axis=1)
-    return np.asarray(posterior @ said), posterior, np.asarray(prior)
+    return np.asarray(posterior @ (across.T @ tight @ values)), posterior, np.asarray(prior)
 
 
 def _inside(fit: Fit, effect: Effect) -> list[Effect]:
@@ -110,8 +101,8 @@ def _coordinates(fit: Fit, item: Block, wanted: Sequence[Parameter]) -> tuple[Ar
     asked = Block(item.effect, tuple(wanted), moved_by(fit.corrected, wanted), sizes)
     problem = gram(Linear(e.linear.gap, e.linear.frames, (item, asked)), e.whitening)
     own, others = problem.slices
-    inner, cross = problem.matrix[own, own], problem.matrix[own, others] @ problem.bases[1].T
-    across = np.asarray(np.linalg.solve(inner, cross))
+    cross = problem.matrix[own, others] @ problem.bases[1].T
+    across = np.asarray(np.linalg.solve(problem.matrix[own, own], cross))
     length = np.einsum("wi,ij,wj->w", problem.bases[1], problem.matrix[others, others], problem.bases[1])
     left = length - (cross * across).sum(axis=0)
     return problem.bases[0], across, left < np.maximum(settings.CONTAINED * length, settings.CONTAINED_LEFT)
@@ -123,7 +114,7 @@ def identified(spread: Array, prior: Array) -> NDArray[np.bool_]:
 
 
 def distinct(across: Array, within: NDArray[np.bool_], least: float = settings.DISTINCT) -> list[int]:
-    """Return the columns independent of those before them, as many as rows, ``least`` being the length to be left."""
+    """Gram-Schmidt selection: columns independent of those before them by ``least``, as many as there are rows."""
     basis = np.zeros((len(across), 0))
     kept: list[int] = []
     for k in np.flatnonzero(within):

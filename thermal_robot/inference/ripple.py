@@ -237,7 +237,7 @@ class _Pursuit:
     def _wave(self, wave: _Wave) -> Array:
         """(N, m, 2) what sine and cosine of a wave do."""
         q, moves = self._moves(wave.joint)
-        return moves * np.column_stack([np.sin(wave.order * q), np.cos(wave.order * q)])[:, None, :]
+        return np.asarray(moves * np.column_stack([np.sin(wave.order * q), np.cos(wave.order * q)])[:, None, :])
 
     def _columns(self, found: Sequence[_Wave]) -> Array:
         """(N, m, K + 2W) the design and waves, in this order."""

@@ -20,7 +20,7 @@ LEADING_PLACES = 4
 GIVEN_NOISE_DOF = 20.0
 """Degrees of freedom that a stated noise is worth: it is trusted to about 15 %, as data sheets are."""
 NOISE_SLACK = 1.3
-"""Times a stated noise: a remainder above it is no longer that noise (two sigma of those 15 %)."""
+"""Times a noise, stated or told by repeats: a remainder above it is no longer that noise (two sigma of those 15 %)."""
 MISTRUST = 5.0
 """Largest penalty, natural logarithm, for calling a stated noise wrong: e⁵, about 1 in 150."""
 SMOOTH_PRIOR = 0.5
@@ -252,12 +252,8 @@ WORSE_ELSEWHERE = 1.05
 
 LEVEL = 1e-3
 """p-value, corrected for the number of tests, below which a remainder is not called noise."""
-LAW_LEVEL = 0.05
-"""The same for naming a quantity that it follows, once it is not noise."""
 MATERIAL_SCALE = 1.15
 """Times the stated noise: a remainder below it is not called large, as no stated noise is better known."""
-MATERIAL_REPEATS = 1.3
-"""The same against repeats, of which there are fewer."""
 MATERIAL_SHARE = 0.04
 """A law that explains less of the remainder than this is not worth a name."""
 FEWEST_PAIRS = 12
@@ -358,17 +354,13 @@ NAMING_ODDS = 9.0
 IN_ITS_PLACE = 0.01
 """Probability that another effect is at work in an effect's place, from which both are told: less is no doubt."""
 INTERVAL = (0.025, 0.975)
-"""Quantiles of every interval."""
+"""Quantiles of every interval, and ends of a test at its level: of naming a quantity that a remainder follows."""
 LEAST_HELD = 1e-6
 """Of an effect's expected size: to less its parameters are not held where it is fitted without others."""
 FOLD_ROUNDS = 3
 """Rounds of noise in the fit of a subset of effects: what a subset leaves out is noise to it."""
 HARDER = 1.25
 """Times what is left of rows held out on average: a way of holding out that leaves more is told beside it."""
-COLDEST = 0.01
-"""K: a temperature that varies less does not vary."""
-FRAME_DETERMINED = 1e-9
-"""Of the strongest direction of the frames: weaker ones are not determined without the rows held out."""
 FRAME_PRIOR = 1e-12
 """Of a frame's own information, added to it, so that what nothing determines stays where it is."""
 FRAGILE = 1e-3

@@ -12,8 +12,8 @@ from benchmarks.timing import by_turns
 from simulate import simulate
 
 from thermal_robot import diagnose, load_robot
+from thermal_robot.diagnosis.cross_validation import held_out, worst_folds
 from thermal_robot.diagnosis.earned import earned
-from thermal_robot.diagnosis.held_out import held_out, worst_folds
 from thermal_robot.diagnosis.next_measurement import next_samples
 from thermal_robot.effects import choose
 from thermal_robot.inference.discover import candidates

@@ -26,7 +26,7 @@ from thermal_robot.diagnosis.answer import Conclusion
 from thermal_robot.diagnosis.data_faults import data_fault, settings
 from thermal_robot.diagnosis.data_faults.faults import Readings
 from thermal_robot.diagnosis.data_faults.find import spread
-from thermal_robot.diagnosis.examine import examine
+from thermal_robot.diagnosis.residual_tests import examine
 from thermal_robot.diagnosis.values import AnotherModel, Misfit
 from thermal_robot.effects import Effect
 from thermal_robot.errors import RobotError

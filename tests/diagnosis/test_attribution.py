@@ -7,8 +7,8 @@ import pytest
 from helpers import with_law
 from simulate import simulate
 
+from thermal_robot.diagnosis.attribution import locate, without_laws
 from thermal_robot.diagnosis.values import Unexplained, Where
-from thermal_robot.diagnosis.where import locate, without_laws
 from thermal_robot.effects import choose
 from thermal_robot.effects.law import Discovered
 from thermal_robot.inference.fit import fit, refit

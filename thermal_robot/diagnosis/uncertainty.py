@@ -1,0 +1,235 @@
+"""Covariance of parameters and deviation of predictions where the residual is no noise: sandwich, jackknife, conformal.
+
+What no effect describes is alike for neighbours in joint space, or in time; many rows then say no more than a few.
+
+* With a smooth discrepancy V = s²(1 + τ²K) is the covariance of the rows. Effects are fitted as if there were none, θ̂ =
+  A Xᵀy/σ² with A = (XᵀX/σ² + Λ⁻¹)⁻¹. Such a θ̂ has the covariance A (XᵀVX/σ⁴ + Λ⁻¹) A, which is A itself where V = σ²
+  (the sandwich of Huber, *Proc. 5th Berkeley Symposium* 1, 1967).
+* The jackknife over groups, regions of joint space and blocks of time (Efron and Stein, *Annals of Statistics* 9, 1981;
+  for clusters, Cameron and Miller, *Journal of Human Resources* 50, 2015) knows of no form, but not of what is smooth
+  over many groups.
+
+Along each principal axis of a block's posterior covariance, in units of the prior deviations, the largest of the
+variances takes the place of the posterior's: 1/λ − 1, what the data say beside the prior, becomes less in proportion.
+
+A prediction is linear in the errors of frames and parameters, e = J (θ̂ − θ) + δ + n. The first has the variance
+J C Jᵀ with C the posterior covariance of all of them. What neither frames nor effects tell, δ, and the instrument's
+noise n are measured on rows held out, as the size t for which 95 % of them lie within 1.96 √(J C Jᵀ + t²) (split
+conformal prediction: Lei et al., *J. Am. Stat. Assoc.* 113, 2018), whatever their law. Outside the rows measured a
+smooth discrepancy and J (θ̂ − θ) do not cancel: there C is the sandwich.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.arrays import Array
+from thermal_robot.diagnosis import settings as diagnosis_settings
+from thermal_robot.diagnosis.cross_validation import Model, Walk, jackknife
+from thermal_robot.effects import Effect, gate
+from thermal_robot.effects.fading import Fading
+from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import orthonormal, whitener, without
+from thermal_robot.inference.columns import frame_columns
+from thermal_robot.inference.discrepancy import Form, Spectrum
+from thermal_robot.inference.explain import Explanation
+from thermal_robot.inference.fit import Fit
+from thermal_robot.inference.problem import Linear, whitened
+from thermal_robot.inference.rows import blocks, each, neighbourhoods
+from thermal_robot.prediction import Spread, by_parameters, moves, sensitivity
+
+
+def as_remainder_says(fit: Fit) -> Fit:
+    """Widen the covariances of a fit to what its residual may do to its parameters; values stay."""
+    e = fit.explanation
+    if not e.best.blocks:
+        return fit
+    model = _model(fit)
+    said, wider = _said(fit, model), dict(e.values)
+    for b, span in zip(e.best.blocks, model.spans, strict=True):
+        values, covariance = e.values[b]
+        prior = e.linear.blocks[b].sizes * e.best.scales[b]
+        unit, own = np.outer(prior, prior), np.ix_(span - model.flat, span - model.flat)
+        wider[b] = values, unit * _inflated(covariance / unit, [s[own] / unit for s in said])
+    return replace(fit, explanation=replace(e, values=wider))
+
+
+def exceeding(fit: Fit, linear: Linear, information: Array, axes: Array) -> Array:
+    """(K,) variance inflation factor of parameters over independent rows: divide their information by it.
+
+    ``information`` (K,) stands along its principal ``axes`` (K, K); the parameters of ``linear`` are held to one unit.
+    """
+    model = replace(_model(fit), linear=linear, scales=(1.0,) * len(linear.blocks))
+    return _times(1.0 / (1.0 + information), axes, _said(fit, model))
+
+
+def _model(fit: Fit) -> Model:
+    return Model.of(fit.explanation, blocks(fit.campaign))
+
+
+def _said(fit: Fit, model: Model) -> list[Array]:
+    """Return the covariances (P, P) of the parameters beside the posterior's: by jackknife, and the sandwich."""
+    found, e = [], fit.explanation
+    for labels in (model.block, neighbourhoods(fit.campaign, settings.BLOCKS)):
+        rows = [~group for group in each(labels) if model.determines(~group)]
+        if len(rows) > 1:
+            found.append(jackknife(model.fits(rows, range(len(model.spans)))[:, model.flat : -1]))
+    if form := _smooth(e):
+        stack = _independent(model)
+        columns = without(stack[:, model.flat :], orthonormal(stack[:, : model.flat]))
+        found.append(_sandwich(e, form, columns, model.tight))
+    return found
+
+
+def _smooth(e: Explanation) -> Form | None:
+    """Form of a smooth discrepancy; one that is anew in every pose or visit is part of the covariance in the fit."""
+    return None if e.discrepancy.form is None or e.discrepancy.form.anew else e.discrepancy.form
+
+
+def _independent(model: Model) -> Array:
+    """(E, K) columns of frames and parameters, whitened as if rows were independent."""
+    return whitened(model.linear, replace(model.whitening, smooth=None))[:, :-1]
+
+
+def _sandwich(e: Explanation, form: Form, columns: Array, tight: Array) -> Array:
+    """(K, K) covariance A (XᵀVX/σ⁴ + Λ⁻¹) A of whitened columns X (E, K) with prior precisions Λ⁻¹ (K,)."""
+    variance = e.best.noise**2
+    spectrum = Spectrum.of(form.over(e.whitening.relative), e.whitening.weights, e.whitening.noise)
+    alike = spectrum.spread(e.discrepancy.tau, columns * (e.discrepancy.noise / variance))
+    inner = _posterior(columns.T @ columns / variance, tight)
+    return _symmetric(inner @ (alike + np.diag(tight)) @ inner)
+
+
+def _posterior(information: Array, tight: Array) -> Array:
+    """(K, K) covariance A = (XᵀX/σ² + Λ⁻¹)⁻¹, each column scaled to unit length."""
+    unit = (information.diagonal() + tight) ** -0.5
+    size = np.outer(unit, unit)
+    inverse: Array = np.asarray(np.linalg.inv(information * size + np.diag(tight * unit**2)))
+    return size * _symmetric(inverse)
+
+
+def _symmetric(matrix: Array) -> Array:
+    """Return the matrix without what rounding makes it miss its transpose by."""
+    return (matrix + matrix.T) / 2.0
+
+
+def _inflated(covariance: Array, said: Sequence[Array]) -> Array:
+    """(P, P) covariance in units of the prior deviations, along none of its axes smaller than any of those said."""
+    variance, axes = np.linalg.eigh(covariance)
+    variance = np.maximum(variance, settings.TINY)
+    times = _times(variance, axes, said)
+    wide = np.where(variance < 1.0, 1.0 / (1.0 + (1.0 / variance - 1.0) / times), variance)
+    return np.asarray((axes * wide) @ axes.T)
+
+
+def _times(variance: Array, axes: Array, said: Sequence[Array]) -> Array:
+    """(P,) how many times a variance along its axes the largest of those said is, at least once."""
+    most = np.max([variance, *(np.einsum("ki,kl,li->i", axes, own, axes) for own in said)], axis=0)
+    return np.asarray(most / variance)
+
+
+def uncertainty(fit: Fit, needs: tuple[str, ...], floor: float) -> Spread:
+    """Return what makes predictions of a fit uncertain; ``needs`` are the columns that its model reads.
+
+    ``floor`` is one sigma per axis of the noise where the campaign states none, m.
+    """
+    campaign, e, model = fit.campaign, fit.explanation, _model(fit)
+    covariance, wider = _covariances(fit, model)
+    left, rows = _held_out(fit, model)
+    told = by_parameters(sensitivity(fit.corrected, [effect for effect, _ in fit.effects])[rows], covariance)
+    quiet, share = np.ones(len(rows), dtype=bool), 1.0
+    if campaign.relative_noise is not None:  # the less noisy half shows best what is no noise
+        relative = campaign.relative_noise[rows, 0]
+        quiet = relative <= np.median(relative)
+        share = float(np.sqrt((relative[quiet] ** 2).mean()))
+    total = _size(left[quiet], told[quiet], ~e.outliers[rows[quiet]])
+    noise = share * (campaign.noise_position or floor)
+    beyond = np.sqrt(np.maximum(total**2 - noise**2, 0.0))
+    values = {name: campaign.q[:, j] for j, name in enumerate(campaign.robot.joint_names)}
+    values.update({name: campaign.covariates[name] for name in needs if name in campaign.covariates})
+    session = campaign.labels.get("session")
+    return Spread(
+        covariance,
+        beyond,
+        np.sqrt(np.maximum(total**2 - beyond**2, 0.0)) / share,
+        {name: (float(v.min()), float(v.max())) for name, v in values.items()},
+        wider,
+        np.concatenate([*(e.linear.blocks[b].sizes * e.best.scales[b] for b in e.best.blocks), np.zeros(0)]),
+        {} if session is None else {"session": tuple(np.unique(session).tolist())},
+        _between_sessions(fit, session),
+    )
+
+
+def _covariances(fit: Fit, model: Model) -> tuple[Array, Array | None]:
+    """(K, K) covariance of frames and parameters together, without what turns the target and does not move it.
+
+    The second is the sandwich; ``None`` without a smooth discrepancy.
+    """
+    e = fit.explanation
+    tight = np.concatenate([np.full(model.flat, diagnosis_settings.LOOSE**-2.0), model.tight])
+    moving = np.concatenate([moves(frame_columns(fit.corrected)[1]), np.ones(len(model.tight), dtype=bool)])
+    own = np.ix_(moving, moving)
+    form = _smooth(e)
+    wider = None if form is None else _sandwich(e, form, _independent(model), tight)[own]
+    return _posterior(model.whole[0][:-1, :-1] / e.best.noise**2, tight)[own], wider
+
+
+def _held_out(fit: Fit, model: Model) -> tuple[Array, NDArray[np.int64]]:
+    """(H, 3) residual of rows held out, of all where none can be, measurement frame, m, and the number of each."""
+    walk, base = Walk.over(model, each(model.block)), fit.corrected.frames.base[:3, :3]
+    if not walk.tests:
+        return fit.corrected.gap[:, :3] @ base.T, np.arange(fit.campaign.samples)
+    return walk.residuals(range(len(model.spans)))[:, :3] @ base.T, walk.numbers
+
+
+def _size(left: Array, told: Array, kept: NDArray[np.bool_]) -> Array:
+    """(3,) size per axis of what is left beside what is told, so that 95 % of all are within 1.96 of both together.
+
+    The axes differ as their rms does; rows set aside count in the share, and not in that.
+    """
+    size = np.log(np.mean(left[kept] ** 2, axis=0) + settings.TINY) / 2.0
+    # a rms of K numbers is known to 1/√2K: axes differ by what exceeds that (James and Stein)
+    apart, chance = size - size.mean(), 1.0 / max(2 * int(kept.sum()), 1)
+    size = np.exp(size.mean() + apart * max(1.0 - 2.0 * chance / max(float((apart**2).sum()), settings.TINY), 0.0))
+    beside = np.sqrt(np.maximum((left / settings.SIGMAS_95) ** 2 - told, 0.0)) / size
+    inside = settings.INTERVAL[1] - settings.INTERVAL[0]
+    return np.asarray(size * np.quantile(beside, min(inside * (1.0 + 1.0 / len(left)), 1.0)))
+
+
+def _between_sessions(fit: Fit, session: NDArray[np.str_] | None) -> Array | None:
+    """(3,) one sigma per axis between sessions (random effects), measurement frame, m; ``None`` for one session."""
+    kept = ~fit.explanation.outliers
+    left = fit.corrected.gap[kept, :3] @ fit.corrected.frames.base[:3, :3].T
+    runs = [] if session is None else [left[session[kept] == run] for run in np.unique(session[kept])]
+    runs = [run for run in runs if len(run) > 1]
+    if len(runs) < 2:
+        return None
+    chance = np.mean([run.var(axis=0, ddof=1) / len(run) for run in runs], axis=0)
+    return np.asarray(np.sqrt(np.maximum(np.var([run.mean(axis=0) for run in runs], axis=0, ddof=1) - chance, 0.0)))
+
+
+def registered(fit: Fit, held: Sequence[tuple[Effect, Array]]) -> tuple[tuple[Effect, Array], ...]:
+    """Return effects that, where they fade, leave what registration alone does; as they are where others do not fade.
+
+    The frames take over of a column what they do as they are fitted without it, by the products of all columns.
+    """
+    fading = [(effect, values) for effect, values in held if isinstance(effect, Fading) and effect.found]
+    if len(fading) < len(held):
+        return tuple(held)
+    model, names = _model(fit), frame_columns(fit.corrected)[1]
+    gram, flat = model.whole[0], model.flat
+    places = [k if name == "base" else 6 + k - names.index("tool") for k, name in enumerate(names)]
+    twists = np.zeros((12, gram.shape[1] - 1 - flat))
+    known = whitener(gram[:flat, :flat], diagnosis_settings.LEAST_SEEN)
+    twists[places] = known @ (known.T @ gram[:flat, flat:-1])
+    found: list[tuple[Effect, Array]] = []
+    for (effect, values), own in zip(fading, model.spans, strict=True):
+        kept = {p.name: twists[:, k] for p, k in zip(gate.checked(effect, fit.nominal), own - flat, strict=True)}
+        every = gate.checked(replace(effect, places=(), excluded=()), fit.nominal)
+        rests = np.concatenate([kept.get(p.name, np.zeros(12)) for p in every]).tolist()
+        found.append((replace(effect, means=(), rests=tuple(rests)), values))
+    return tuple(found)
