@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 import thermal_robot as tr
-from thermal_robot.diagnosis.sufficient import Rows
+from thermal_robot.diagnosis.sequential import Rows
 
 OLD, ALL, NOISE = 900, 1100, 2e-5
 EFFECTS = {"joint_offset": {"joint_3": 5e-4, "joint_4": -4e-4}, "backlash": {"joint_2": 3e-4, "joint_3": 2e-4}}

@@ -15,7 +15,7 @@ from thermal_robot.campaign.settings import STILL
 from thermal_robot.effects import Effect, gate, settings
 from thermal_robot.effects.law import Discovered
 from thermal_robot.inference.columns import block, frame_columns
-from thermal_robot.inference.stack import chunks
+from thermal_robot.inference.kernels import chunks
 from thermal_robot.observations import Observations
 
 

@@ -32,7 +32,7 @@ CASES = ("demo", "100 rows, no effect", "100 rows, one effect", "100 rows, unlis
 def unlisted(campaign):
     """Add to a sound campaign a turn of the second joint that no effect follows: by the first, with sharp edges."""
     from thermal_robot import observe
-    from thermal_robot.inference.frames import register
+    from thermal_robot.inference.registration import register
 
     seen = observe(campaign, register(campaign))
     turn = 1.5e-4 * np.tanh(4.0 * np.sin(2.0 * campaign.q[:, 0])) * (1.0 + 0.4 * campaign.q[:, 2])

@@ -26,7 +26,7 @@ from thermal_robot.effects import choose
 from thermal_robot.fleet.wear import of_fits
 from thermal_robot.fleet.wear_problem import problem
 from thermal_robot.inference.fit import fit
-from thermal_robot.inference.frames import register
+from thermal_robot.inference.registration import register
 from thermal_robot.kinematics import quaternion_to_rotation
 from thermal_robot.observations import observe
 

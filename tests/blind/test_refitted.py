@@ -9,7 +9,7 @@ from simulate import simulate
 from thermal_robot import diagnose
 from thermal_robot.blind.examinee import refitted
 from thermal_robot.blind.score import shares
-from thermal_robot.inference.frames import register
+from thermal_robot.inference.registration import register
 from thermal_robot.observations import observe
 from thermal_robot.robot import load_robot
 

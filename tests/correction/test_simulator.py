@@ -13,7 +13,7 @@ from thermal_robot import CampaignError, diagnose, observe
 from thermal_robot.campaign import Campaign
 from thermal_robot.correction import calibrated, calibrated_mjcf, with_simulator
 from thermal_robot.correction.mujoco_models import mjcf_of_urdf
-from thermal_robot.inference.frames import register
+from thermal_robot.inference.registration import register
 from thermal_robot.kinematics import quaternion_to_rotation, tool_poses
 from thermal_robot.robot import load_robot
 

@@ -10,7 +10,7 @@ from thermal_robot.diagnosis.cross_validation import Model
 from thermal_robot.inference.columns import Block
 from thermal_robot.inference.explain import explain, log_odds
 from thermal_robot.inference.problem import Linear
-from thermal_robot.inference.robust import Noise
+from thermal_robot.inference.weights import Noise
 
 WIDTHS = (1, 1, 2, 3, 5, 6, 12)
 FRESH = 30

@@ -7,13 +7,13 @@ import pytest
 from simulate import simulate
 
 from thermal_robot import diagnose
-from thermal_robot.diagnosis.beside import beside_scatter
+from thermal_robot.diagnosis.prune import beside_scatter
 from thermal_robot.diagnosis.values import Refused
 from thermal_robot.effects import choose
 from thermal_robot.inference import settings
 from thermal_robot.inference.fit import fit
-from thermal_robot.inference.frames import register
-from thermal_robot.inference.random_gap import random_gap
+from thermal_robot.inference.registration import register
+from thermal_robot.inference.scatter import random_gap
 from thermal_robot.kinematics import Displacement
 from thermal_robot.observations import Frames, observe
 from thermal_robot.robot import load_robot

@@ -10,7 +10,6 @@ from simulate import simulate
 
 from thermal_robot import EstimationError, diagnose
 from thermal_robot import simulate as simulated
-from thermal_robot.diagnosis.beside import grown
 from thermal_robot.diagnosis.cross_validation import (
     Model,
     Walk,
@@ -22,13 +21,14 @@ from thermal_robot.diagnosis.cross_validation import (
     shrinkage,
     worst_folds,
 )
+from thermal_robot.diagnosis.prune import grown
 from thermal_robot.diagnosis.values import FoldScheme, HeldOut
 from thermal_robot.effects import choose
 from thermal_robot.inference.columns import block
-from thermal_robot.inference.discrepancy import Form, Smooth, Spectrum
 from thermal_robot.inference.fit import fit
+from thermal_robot.inference.grouping import blocks, each
+from thermal_robot.inference.kernels import Form, Smooth, Spectrum
 from thermal_robot.inference.problem import Linear
-from thermal_robot.inference.rows import blocks, each
 from thermal_robot.kinematics import exp6
 
 ROWS = 60

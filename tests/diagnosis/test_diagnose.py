@@ -13,7 +13,7 @@ from thermal_robot import CampaignError, EffectError, diagnose
 from thermal_robot.campaign import campaign_from_table, write_campaign
 from thermal_robot.effects import RANDOM, library
 from thermal_robot.inference.columns import frame_columns, moved_by
-from thermal_robot.inference.frames import register
+from thermal_robot.inference.registration import register
 from thermal_robot.kinematics import Displacement, rotation_to_quaternion
 from thermal_robot.observations import observe
 

@@ -9,13 +9,13 @@ from helpers import with_law
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from simulate import demo, simulate
 
-from thermal_robot.diagnosis.effect_in_detail import Explained, explained
+from thermal_robot.diagnosis.attribution import Explained, explained
 from thermal_robot.effects import Effect, Parameter, at_joint, choose
 from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.law import Discovered
 from thermal_robot.errors import EffectError
 from thermal_robot.inference.fit import fit
-from thermal_robot.inference.frames import register
+from thermal_robot.inference.registration import register
 from thermal_robot.observations import observe
 from thermal_robot.report.plots import explain_figure
 

@@ -6,7 +6,7 @@ import pytest
 import thermal_robot as tr
 from thermal_robot.diagnosis.findings import estimates, fitted_values, told_inside
 from thermal_robot.effects import named
-from thermal_robot.inference.named import fit_named
+from thermal_robot.inference.fit import fit_named
 
 
 @pytest.fixture(scope="module")

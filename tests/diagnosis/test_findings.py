@@ -15,7 +15,7 @@ from thermal_robot.diagnosis.values import Finding, Refused
 from thermal_robot.effects import choose, library, random_effects
 from thermal_robot.effects.law import Discovered
 from thermal_robot.inference.fit import fit, refit
-from thermal_robot.inference.frames import register
+from thermal_robot.inference.registration import register
 
 
 def in_the_root_frame(campaign):

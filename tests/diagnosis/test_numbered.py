@@ -12,8 +12,8 @@ from thermal_robot.diagnosis.cross_validation import held_out
 from thermal_robot.effects import choose
 from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.law import Discovered
-from thermal_robot.inference.discover import discovered
 from thermal_robot.inference.fit import fit, refit
+from thermal_robot.inference.generate import discovered
 from thermal_robot.observations import Frames, observe
 
 SMALL = Discovered("discovered.2", "joint", "joint_2", "time", "step", (3600.0,), 1.0)

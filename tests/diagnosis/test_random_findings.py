@@ -10,7 +10,7 @@ from thermal_robot.diagnosis.findings import random_findings
 from thermal_robot.effects import choose, random_effects
 from thermal_robot.inference import settings
 from thermal_robot.inference.fit import fit
-from thermal_robot.inference.random_gap import random_gap
+from thermal_robot.inference.scatter import random_gap
 from thermal_robot.kinematics import Displacement
 from thermal_robot.observations import Frames, observe
 

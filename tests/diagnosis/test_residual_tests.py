@@ -21,7 +21,7 @@ from thermal_robot.diagnosis.residual_tests import (
 from thermal_robot.effects import choose
 from thermal_robot.inference import settings
 from thermal_robot.inference.fit import fit
-from thermal_robot.inference.frames import register
+from thermal_robot.inference.registration import register
 from thermal_robot.observations import Frames, observe
 
 

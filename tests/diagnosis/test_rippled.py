@@ -6,8 +6,8 @@ from helpers import NOISE, with_law
 from inference.test_ripple import rippling
 
 from thermal_robot import diagnose
-from thermal_robot.diagnosis import beside
-from thermal_robot.diagnosis.beside import grown
+from thermal_robot.diagnosis import prune
+from thermal_robot.diagnosis.prune import grown
 from thermal_robot.effects import choose
 from thermal_robot.effects.joint_ripple import JointRipple
 from thermal_robot.effects.law import Discovered
@@ -40,7 +40,7 @@ def test_a_ripple_that_is_held_stays_where_none_is_generated_anew(rv_m2, monkeyp
     """Evidence and rows held out decide of it, and no generator."""
     rippled = grown(fit(rippling(rv_m2, JointRipple().having("joint_2", 26.6, 1.0), (3e-4,), 0), choose()), 1, str)
     assert any(isinstance(effect, JointRipple) for effect, _ in rippled.effects)
-    monkeypatch.setattr(beside, "waves", lambda _: JointRipple())
+    monkeypatch.setattr(prune, "waves", lambda _: JointRipple())
     again = grown(rippled, 2, str) or rippled
     assert any(isinstance(effect, JointRipple) for effect, _ in again.effects)
     assert JointRipple.name in again.variants

@@ -11,7 +11,7 @@ from helpers import NOISE, with_law
 from simulate import simulate
 
 from thermal_robot import CorrectedModel, diagnose
-from thermal_robot.diagnosis.beside import as_laws_say, grown
+from thermal_robot.diagnosis.prune import as_laws_say, grown
 from thermal_robot.diagnosis.residual_tests import examine
 from thermal_robot.diagnosis.values import Dependence, Location, Unexplained
 from thermal_robot.effects import choose
@@ -19,12 +19,12 @@ from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.law import Discovered
 from thermal_robot.effects.quantities import GRAVITY, quantities
 from thermal_robot.inference import settings
-from thermal_robot.inference.discover import Discovery, discovered
-from thermal_robot.inference.discrepancy import Form
 from thermal_robot.inference.explain import Discrepancy
 from thermal_robot.inference.fit import fit
-from thermal_robot.inference.frames import register
-from thermal_robot.inference.random_gap import random_gap
+from thermal_robot.inference.generate import Discovery, discovered
+from thermal_robot.inference.kernels import Form
+from thermal_robot.inference.registration import register
+from thermal_robot.inference.scatter import random_gap
 from thermal_robot.kinematics import Displacement
 from thermal_robot.observations import Frames, observe
 from thermal_robot.report import schema

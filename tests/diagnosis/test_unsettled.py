@@ -8,7 +8,7 @@ from simulate import simulate
 
 from thermal_robot import diagnose
 from thermal_robot.diagnosis.data_faults.misfit import unsettled
-from thermal_robot.inference import settle
+from thermal_robot.inference import exact
 from thermal_robot.observations import Frames, observe
 
 
@@ -25,8 +25,8 @@ def run_away(observations, held, away):
 
 
 def test_a_fit_that_runs_away_is_not_delivered(campaign, monkeypatch):
-    true = settle.gauss_newton
-    monkeypatch.setattr(settle, "gauss_newton", lambda *given: run_away(*true(*given), 1e-3))
+    true = exact.gauss_newton
+    monkeypatch.setattr(exact, "gauss_newton", lambda *given: run_away(*true(*given), 1e-3))
     found = diagnose(campaign, only="joint_offset")
     assert found.verdict == ()
     assert found.finding("joint_offset").needs == ("a fit that settles",)

@@ -9,8 +9,8 @@ from diagnosis.simulated import forced
 from helpers import NOISE, with_law
 from simulate import simulate
 
-from thermal_robot.diagnosis import earned as word
-from thermal_robot.diagnosis.earned import Earned, Gained, determined, earned, in_place, pruned
+from thermal_robot.diagnosis import prune as word
+from thermal_robot.diagnosis.prune import Earned, Gained, determined, earned, in_place, pruned
 from thermal_robot.effects import choose
 from thermal_robot.effects.law import Discovered
 from thermal_robot.inference import settings

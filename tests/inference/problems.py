@@ -7,8 +7,8 @@ from simulate import simulate
 
 from thermal_robot.effects import Effect, Parameter, at_joint
 from thermal_robot.inference.columns import Block, block, frame_columns
-from thermal_robot.inference.frames import register
 from thermal_robot.inference.problem import Linear, Whitening, gram
+from thermal_robot.inference.registration import register
 from thermal_robot.observations import observe
 
 WIDTHS = (1, 2, 3)

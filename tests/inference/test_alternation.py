@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 import thermal_robot as tr
-from thermal_robot.inference.frames import alternate, middle, soft, starts
+from thermal_robot.inference.registration import alternate, middle, soft, starts
 from thermal_robot.kinematics import exp3
 from thermal_robot.observations import Frames
 

@@ -8,7 +8,7 @@ from simulate import simulate
 
 from thermal_robot.effects import library
 from thermal_robot.inference.columns import block, frame_columns, moved_by
-from thermal_robot.inference.frames import moved
+from thermal_robot.inference.registration import moved
 from thermal_robot.kinematics import exp6, rotation_to_quaternion
 from thermal_robot.observations import Frames, observe
 

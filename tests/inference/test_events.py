@@ -7,8 +7,8 @@ import pytest
 
 import thermal_robot as tr
 from thermal_robot.effects import choose
-from thermal_robot.inference.events import events, gathered
 from thermal_robot.inference.fit import fit
+from thermal_robot.inference.generate import events, gathered
 from thermal_robot.kinematics import exp6
 
 ROWS, NOISE = 90, 20e-6

@@ -10,10 +10,10 @@ from inference.problems import WIDTHS, columns_of
 from thermal_robot.effects import choose
 from thermal_robot.effects.backlash import Backlash
 from thermal_robot.effects.law import Discovered
-from thermal_robot.inference.discrepancy import Form
 from thermal_robot.inference.explain import explain, log_odds, log_priors, settings_of_one
+from thermal_robot.inference.kernels import Form
 from thermal_robot.inference.problem import Linear
-from thermal_robot.inference.robust import Noise
+from thermal_robot.inference.weights import Noise
 
 NOISE = Noise(2e-5)
 ROWS = 80

@@ -13,8 +13,8 @@ from time_constants import DRIFT, LAG, NOISE, campaign
 
 from thermal_robot import diagnose
 from thermal_robot.effects import choose
+from thermal_robot.inference.exact import corrected_observations
 from thermal_robot.inference.fit import fit, less, refit
-from thermal_robot.inference.gauss_newton import corrected_observations
 
 
 def constant_of(effects, kind):

@@ -2,8 +2,8 @@
 
 import numpy as np
 
-from thermal_robot.inference.ripple import HeldOut
-from thermal_robot.inference.rows import each
+from thermal_robot.inference.generate import HeldOut
+from thermal_robot.inference.grouping import each
 
 
 def left_out(columns, values, flat, prior, folds):

@@ -10,12 +10,12 @@ from simulate import simulate
 from thermal_robot.effects import choose
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block, frame_columns
+from thermal_robot.inference.exact import _ridge_step, corrected_observations, gauss_newton
 from thermal_robot.inference.explain import explain
-from thermal_robot.inference.frames import moved, register
-from thermal_robot.inference.gauss_newton import _ridge_step, corrected_observations, gauss_newton
 from thermal_robot.inference.problem import Linear, gram, parameter_values
-from thermal_robot.inference.robust import Noise
+from thermal_robot.inference.registration import moved, register
 from thermal_robot.inference.search import Search
+from thermal_robot.inference.weights import Noise
 from thermal_robot.observations import observe
 
 SETTLED = 1e-4  # standard deviations

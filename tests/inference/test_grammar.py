@@ -9,7 +9,7 @@ from simulate import simulate
 
 from thermal_robot.effects import Effect, JointOffset, Parameter, TransmissionError, at_joint, gate, library
 from thermal_robot.inference.columns import block
-from thermal_robot.inference.scan import conditions, memory, modulated, products
+from thermal_robot.inference.screening import conditions, memory, modulated, products
 from thermal_robot.observations import Frames, observe
 
 

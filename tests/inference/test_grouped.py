@@ -7,8 +7,7 @@ import pytest
 from inference.densities import dense
 from scipy.linalg import sqrtm
 
-from thermal_robot.inference.discrepancy import Form, Smooth, Spectrum, decomposed
-from thermal_robot.inference.stack import Grouped
+from thermal_robot.inference.kernels import Form, Grouped, Smooth, Spectrum, decomposed
 
 TAUS = (0.5, 3.0)
 # rows' groups of a dozen rows; measures and columns a group; whether the moves are the same for all rows

@@ -11,8 +11,8 @@ from simulate import simulate
 from thermal_robot.effects import JointOffset, choose
 from thermal_robot.inference.columns import moved_by
 from thermal_robot.inference.fit import fit
-from thermal_robot.inference.frames import register
 from thermal_robot.inference.inside import divided
+from thermal_robot.inference.registration import register
 
 GEOMETRY = ("joint_offset", "geometric")
 SIGMAS = 1.96

@@ -10,9 +10,9 @@ from inference.problems import small_problem
 from scipy.special import logsumexp
 
 from thermal_robot.inference import settings
-from thermal_robot.inference.discrepancy import Form
 from thermal_robot.inference.evidence import evidence
-from thermal_robot.inference.ladder import PLAIN, Ladder
+from thermal_robot.inference.explain import PLAIN, Ladder
+from thermal_robot.inference.kernels import Form
 
 PRIOR = (-1.0, -2.0, -0.5)
 CHOSEN = [c for size in range(4) for c in combinations(range(3), size)]

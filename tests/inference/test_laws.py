@@ -9,7 +9,7 @@ from simulate import simulate
 from thermal_robot.effects.law import Discovered
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference.columns import block
-from thermal_robot.inference.laws import harmonics, laws, of_quantity, shapes, smooth_columns
+from thermal_robot.inference.screening import harmonics, laws, of_quantity, shapes, smooth_columns
 from thermal_robot.observations import Frames, observe
 
 

@@ -8,8 +8,7 @@ import pytest
 import thermal_robot as tr
 from thermal_robot.effects import JointOffset, choose, gate, named
 from thermal_robot.errors import EffectError, EstimationError
-from thermal_robot.inference.fit import fit
-from thermal_robot.inference.named import fit_named
+from thermal_robot.inference.fit import fit, fit_named
 
 ARM, NOISE = "builtin:rv_m2", 20e-6
 OFF = {"joint_2": 1.2e-3, "joint_3": -8e-4, "joint_4": 5e-4}

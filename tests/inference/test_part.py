@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from thermal_robot.inference import settings
-from thermal_robot.inference.stack import Part
+from thermal_robot.inference.kernels import Part
 
 ROWS = 20
 

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from thermal_robot.inference.scan import independent, orders, peak, periodogram
-from thermal_robot.inference.target import Target
+from thermal_robot.inference.screening import Target, independent, orders, peak, periodogram
 
 ROWS = 90
 

@@ -6,7 +6,7 @@ from scipy.integrate import quad
 from scipy.stats import multivariate_normal
 
 from thermal_robot.errors import EstimationError
-from thermal_robot.inference.posterior import Columns, Posterior
+from thermal_robot.inference.evidence import Columns, Posterior
 
 
 def drawn(seed, size=6, noise=1.0, rows=20):

@@ -8,8 +8,8 @@ from simulate import simulate
 
 from thermal_robot.effects import choose
 from thermal_robot.inference.columns import block, frame_columns
-from thermal_robot.inference.frames import register
 from thermal_robot.inference.problem import Linear, Products, Whitening, gram
+from thermal_robot.inference.registration import register
 from thermal_robot.observations import observe
 
 NAMES = ("joint_offset", "joint_gain", "backlash", "drift")

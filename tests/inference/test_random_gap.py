@@ -11,8 +11,7 @@ from thermal_robot import diagnose
 from thermal_robot.diagnosis.findings import random_findings
 from thermal_robot.effects import choose
 from thermal_robot.inference.fit import fit
-from thermal_robot.inference.random_gap import _means, random_gap
-from thermal_robot.inference.scatter import JointScatter, Scatter
+from thermal_robot.inference.scatter import JointScatter, Scatter, _means, random_gap
 from thermal_robot.kinematics import Displacement, frame_jacobians
 from thermal_robot.observations import Frames, observe
 

@@ -11,11 +11,11 @@ import thermal_robot
 from thermal_robot.effects import choose
 from thermal_robot.effects.backlash import Backlash
 from thermal_robot.inference.columns import block, frame_columns
+from thermal_robot.inference.exact import heard, refined
 from thermal_robot.inference.explain import Noise, explain
 from thermal_robot.inference.fit import fit
-from thermal_robot.inference.frames import register
 from thermal_robot.inference.problem import Linear, gram
-from thermal_robot.inference.refine import heard, refined
+from thermal_robot.inference.registration import register
 from thermal_robot.inference.search import Search
 from thermal_robot.observations import Frames, observe
 

@@ -10,7 +10,7 @@ from simulate import simulate
 from thermal_robot.effects import choose
 from thermal_robot.effects.joint_ripple import JointRipple
 from thermal_robot.inference.fit import fit
-from thermal_robot.inference.ripple import alike, waves
+from thermal_robot.inference.generate import alike, waves
 
 SAMPLES = 200
 

@@ -210,7 +210,7 @@ def test_robots_with_hidden_scatter(tmp_path):
     from thermal_robot.diagnosis.findings import random_findings
     from thermal_robot.effects import RANDOM, choose
     from thermal_robot.inference.fit import fit
-    from thermal_robot.inference.random_gap import random_gap
+    from thermal_robot.inference.scatter import random_gap
 
     asked = [("random", {"single": 6}, RANDOM), ("other", {"single": 3}, ("joint_offset", "drift", "geometric"))]
     asked.append(("null", {"null": 3}, ()))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from thermal_robot.inference import settings
-from thermal_robot.inference.stack import Stack, chunks
+from thermal_robot.inference.kernels import Stack, chunks
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from thermal_robot.blind.score import reliability
-from thermal_robot.inference.random_gap import followed, period, stepped
+from thermal_robot.inference.scatter import followed, period, stepped
 
 STEP = 1e-3  # rad
 

@@ -5,7 +5,7 @@ import pytest
 from scipy.stats import f as f_law
 from scipy.stats import kstest
 
-from thermal_robot.inference.target import NOTHING, Target
+from thermal_robot.inference.screening import NOTHING, Target
 
 ROWS, DESIGN, FURTHER = 40, 4, 3
 

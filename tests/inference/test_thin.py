@@ -9,8 +9,8 @@ from simulate import simulate
 from thermal_robot.effects import choose
 from thermal_robot.inference import settings
 from thermal_robot.inference.fit import fit
-from thermal_robot.inference.rows import in_a_row
-from thermal_robot.inference.scan import Thin
+from thermal_robot.inference.grouping import in_a_row
+from thermal_robot.inference.screening import Thin
 
 
 @pytest.fixture(scope="module")

@@ -41,7 +41,7 @@ from thermal_robot.fleet.rows import write_rows
 from thermal_robot.fleet.summary import summarise
 from thermal_robot.fleet.wear import wear
 from thermal_robot.inference.columns import block, frame_columns
-from thermal_robot.inference.frames import register
+from thermal_robot.inference.registration import register
 from thermal_robot.observations import Observations, observe
 
 MOST = 6

@@ -39,7 +39,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign, read_campaign, write_campaign, write_table
-from thermal_robot.inference.rows import in_order
+from thermal_robot.inference.grouping import in_order
 from thermal_robot.kinematics import Displacement, align, exp6, tool_poses
 from thermal_robot.observations import Frames, Observations, observe
 from thermal_robot.percents import percent

@@ -34,8 +34,8 @@ from thermal_robot.errors import CampaignError
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import orthonormal, without
 from thermal_robot.inference.columns import frame_columns, moved_by
-from thermal_robot.inference.frames import moved
 from thermal_robot.inference.inside import distinct, identified
+from thermal_robot.inference.registration import moved
 from thermal_robot.kinematics import Displacement
 from thermal_robot.observations import Observations, observe
 from thermal_robot.prediction import moves

@@ -24,10 +24,10 @@ from thermal_robot.effects.apply import depends_on
 from thermal_robot.effects.law import PREFIX, Discovered
 from thermal_robot.effects.quantities import unit
 from thermal_robot.inference.algebra import rms
-from thermal_robot.inference.discover import Discovery
 from thermal_robot.inference.explain import log_priors
 from thermal_robot.inference.fit import Fit
-from thermal_robot.inference.random_gap import RandomGap
+from thermal_robot.inference.generate import Discovery
+from thermal_robot.inference.scatter import RandomGap
 from thermal_robot.inference.search import Search
 from thermal_robot.iso9283.groups import repeats
 from thermal_robot.iso9283.measure import performance

@@ -23,8 +23,7 @@ from thermal_robot.diagnosis.values import Estimate
 from thermal_robot.effects import KINEMATIC, Effect, library, named
 from thermal_robot.errors import CampaignError, EffectError, require
 from thermal_robot.inference.algebra import rms
-from thermal_robot.inference.fit import Fit
-from thermal_robot.inference.named import fit_named
+from thermal_robot.inference.fit import Fit, fit_named
 from thermal_robot.teller import registered
 
 if TYPE_CHECKING:

@@ -34,9 +34,9 @@ from thermal_robot.inference.algebra import equations_of, ridge, whitener
 from thermal_robot.inference.columns import block as columns
 from thermal_robot.inference.explain import Explanation
 from thermal_robot.inference.fit import Fit
+from thermal_robot.inference.grouping import Labels, blocks, each, neighbourhoods
+from thermal_robot.inference.kernels import chunks
 from thermal_robot.inference.problem import Linear, Whitening
-from thermal_robot.inference.rows import Labels, blocks, each, neighbourhoods
-from thermal_robot.inference.stack import chunks
 
 Rows = NDArray[np.bool_]
 Share = tuple[float, tuple[float, float]]
@@ -290,7 +290,7 @@ def held_out(fit: Fit, progress: Callable[[str], None] = lambda _: None) -> Shri
     Frames and parameters come from the training rows alone. What was chosen stays that of all rows: effects, laws,
     constants, prior scales, the point of linearisation, noise, and outliers. Choosing anew in each fold is further off
     as an estimate for the model that is saved. The price is that an effect chosen by chance from noise alone seems
-    worth a little; :func:`~thermal_robot.diagnosis.earned.earned` asks for more than that. The intervals are of what
+    worth a little; :func:`~thermal_robot.diagnosis.prune.earned` asks for more than that. The intervals are of what
     fresh rows of the same kind would say of the saved model, noise included. Raises :class:`EstimationError` if all
     rows repeat one pose.
     """

@@ -34,14 +34,14 @@ from thermal_robot.effects import Effect, Parameter, choose, gate
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import block, frame_columns
 from thermal_robot.inference.evidence import Combination
+from thermal_robot.inference.exact import heard
 from thermal_robot.inference.explain import Explanation, explain, log_priors, settings_of_one
 from thermal_robot.inference.fit import Fit
-from thermal_robot.inference.frames import Placed, register
+from thermal_robot.inference.grouping import in_order
 from thermal_robot.inference.problem import Linear, contained, gram
-from thermal_robot.inference.refine import heard
-from thermal_robot.inference.robust import Noise
-from thermal_robot.inference.rows import in_order
+from thermal_robot.inference.registration import Placed, register
 from thermal_robot.inference.search import Search
+from thermal_robot.inference.weights import Noise
 from thermal_robot.kinematics import gravity_torques
 from thermal_robot.observations import observe
 from thermal_robot.percents import percent

@@ -15,11 +15,10 @@ from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.campaign.names import did_you_mean
 from thermal_robot.diagnosis.answer import Conclusion, answer
 from thermal_robot.diagnosis.attribution import without_laws
-from thermal_robot.diagnosis.beside import as_laws_say, beside_scatter, grown
 from thermal_robot.diagnosis.cross_validation import held_out
 from thermal_robot.diagnosis.data_checks import as_counted, not_executed, usable
 from thermal_robot.diagnosis.data_faults.misfit import another_motion, delivered, frames_alone, unfit
-from thermal_robot.diagnosis.earned import pruned
+from thermal_robot.diagnosis.prune import as_laws_say, beside_scatter, grown, pruned
 from thermal_robot.diagnosis.residual_tests import examine
 from thermal_robot.diagnosis.result import Diagnosis, told
 from thermal_robot.diagnosis.uncertainty import as_remainder_says
@@ -27,9 +26,9 @@ from thermal_robot.diagnosis.updated import prepare
 from thermal_robot.effects import RANDOM, Effect, choose, library
 from thermal_robot.errors import CampaignError, EstimationError, require
 from thermal_robot.inference import settings
-from thermal_robot.inference.discover import discovered
 from thermal_robot.inference.fit import Fit, fit, require_enough
-from thermal_robot.inference.random_gap import random_gap
+from thermal_robot.inference.generate import discovered
+from thermal_robot.inference.scatter import random_gap
 
 
 def diagnose(

@@ -20,7 +20,7 @@ from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of, orthonormal, without
 from thermal_robot.inference.fit import Fit
 from thermal_robot.inference.inside import divided, identified
-from thermal_robot.inference.random_gap import Kept, RandomGap
+from thermal_robot.inference.scatter import Kept, RandomGap
 
 if TYPE_CHECKING:
     import pandas as pd

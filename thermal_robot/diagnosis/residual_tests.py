@@ -20,10 +20,9 @@ from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import orthonormal, without
 from thermal_robot.inference.fit import Fit
-from thermal_robot.inference.laws import harmonics, smooth_columns
-from thermal_robot.inference.robust import distance_limit
-from thermal_robot.inference.rows import in_a_row, in_order
-from thermal_robot.inference.target import Target, Worth
+from thermal_robot.inference.grouping import in_a_row, in_order
+from thermal_robot.inference.screening import Target, Worth, harmonics, smooth_columns
+from thermal_robot.inference.weights import distance_limit
 from thermal_robot.observations import Observations
 from thermal_robot.percents import percent
 

@@ -175,7 +175,7 @@ class Diagnosis:
         >>> figure = tr.diagnose(tr.demo_campaign()).explain("backlash")
         >>> figure.savefig("backlash.png")
         """
-        from thermal_robot.diagnosis.effect_in_detail import explained
+        from thermal_robot.diagnosis.attribution import explained
 
         return registered().explain_figure(explained(self._fitted(), effect))
 

@@ -35,11 +35,11 @@ from thermal_robot.effects.fading import Fading
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import orthonormal, whitener, without
 from thermal_robot.inference.columns import frame_columns
-from thermal_robot.inference.discrepancy import Form, Spectrum
 from thermal_robot.inference.explain import Explanation
 from thermal_robot.inference.fit import Fit
+from thermal_robot.inference.grouping import blocks, each, neighbourhoods
+from thermal_robot.inference.kernels import Form, Spectrum
 from thermal_robot.inference.problem import Linear, whitened
-from thermal_robot.inference.rows import blocks, each, neighbourhoods
 from thermal_robot.prediction import Spread, by_parameters, moves, sensitivity
 
 

@@ -29,8 +29,8 @@ class JointRipple(OfPosition):
     or half multiple of it is said to be the motor's.
 
     ``orders`` (rad per rad; rad/m where the joint slides) are no parameters: they are looked for in what remains, joint
-    by joint, and join one after another (:mod:`thermal_robot.inference.ripple`); ``tried`` is among how many waves all
-    of these were picked, the product of the numbers for each. Without waves the effect does nothing.
+    by joint, and join one after another (:mod:`thermal_robot.inference.generate`); ``tried`` is among how many
+    waves all of these were picked, the product of the numbers for each. Without waves the effect does nothing.
     """
 
     joints: tuple[str, ...] = ()

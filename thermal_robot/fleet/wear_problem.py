@@ -30,8 +30,8 @@ from thermal_robot.inference import settings as inference
 from thermal_robot.inference.algebra import whitener
 from thermal_robot.inference.columns import Block, frame_columns, moved_by
 from thermal_robot.inference.fit import Fit
-from thermal_robot.inference.frames import moved
 from thermal_robot.inference.problem import Linear, Whitening, frame_step, whitened
+from thermal_robot.inference.registration import moved
 from thermal_robot.observations import Frames, Observations, observe
 
 Key = tuple[str, str]

@@ -16,9 +16,8 @@ from thermal_robot.arrays import Array
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of, solve, whitener
 from thermal_robot.inference.columns import Block
-from thermal_robot.inference.discrepancy import Smooth
 from thermal_robot.inference.evidence import Combination, Gram
-from thermal_robot.inference.stack import Stack
+from thermal_robot.inference.kernels import Smooth, Stack
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,7 +11,7 @@ from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.names import split_name
 from thermal_robot.campaign.plausible import SAME_COMMAND
 from thermal_robot.campaign.turning import arrivals
-from thermal_robot.inference.rows import in_order, repeated_poses
+from thermal_robot.inference.grouping import in_order, repeated_poses
 
 Rows = NDArray[np.int64]
 

@@ -16,7 +16,7 @@ from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.names import listed
 from thermal_robot.campaign.plausible import SAME_COMMAND
 from thermal_robot.errors import CampaignError, require
-from thermal_robot.inference.frames import register
+from thermal_robot.inference.registration import register
 from thermal_robot.iso9283.criteria import (
     Accuracy,
     Attained,

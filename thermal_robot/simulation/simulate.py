@@ -22,7 +22,7 @@ from thermal_robot.effects import Effect, Parameter, RandomEffect, gate, named
 from thermal_robot.effects.apply import displacement
 from thermal_robot.effects.quantities import unit
 from thermal_robot.errors import CampaignError, EffectError
-from thermal_robot.inference.rows import repeated_poses
+from thermal_robot.inference.grouping import repeated_poses
 from thermal_robot.kinematics import exp3, rotation_to_quaternion
 from thermal_robot.observations import Frames, Observations, observe
 from thermal_robot.robot import ENDS, Robot, joint_range, load_robot

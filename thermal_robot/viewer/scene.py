@@ -13,7 +13,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.diagnosis import Diagnosis
 from thermal_robot.errors import CampaignError
-from thermal_robot.inference.frames import register
+from thermal_robot.inference.registration import register
 from thermal_robot.kinematics import chain_frames, link_poses, rotation_to_quaternion
 from thermal_robot.observations import Observations, observe
 from thermal_robot.report.units import round_down

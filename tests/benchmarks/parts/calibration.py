@@ -14,7 +14,7 @@ from benchmarks.timing import by_turns
 
 import thermal_robot as tr
 from thermal_robot.effects import Geometric
-from thermal_robot.inference.frames import register
+from thermal_robot.inference.registration import register
 from thermal_robot.kinematics import exp3
 
 ARM = ("example-robot-data:ur10", "tool0")

@@ -13,12 +13,11 @@ from simulate import simulate
 
 from thermal_robot import diagnose, load_robot
 from thermal_robot.diagnosis.cross_validation import held_out, worst_folds
-from thermal_robot.diagnosis.earned import earned
 from thermal_robot.diagnosis.next_measurement import next_samples
+from thermal_robot.diagnosis.prune import earned
 from thermal_robot.effects import choose
-from thermal_robot.inference.discover import candidates
-from thermal_robot.inference.events import events
 from thermal_robot.inference.fit import fit
+from thermal_robot.inference.generate import candidates, events
 
 SCRIPT = Path(__file__).resolve().parents[1] / "bench_diagnosis.py"
 TREE = SCRIPT.parents[2]

@@ -5,8 +5,7 @@ import pytest
 from updating_cases import EFFECTS, in_full, measured
 
 import thermal_robot as tr
-from thermal_robot.diagnosis.agreement import Agreement, scatter_of
-from thermal_robot.diagnosis.updated import start
+from thermal_robot.diagnosis.updated import Agreement, scatter_of, start
 
 
 @pytest.fixture(scope="module")

@@ -8,11 +8,10 @@ from updating_cases import ALL, OLD, far, in_full, measured
 
 import thermal_robot as tr
 from thermal_robot.diagnosis import sequential
-from thermal_robot.diagnosis.sequential import Sequential, settled, split
-from thermal_robot.diagnosis.sufficient import Judge, Point, Rows, linearised, products
+from thermal_robot.diagnosis.sequential import Judge, Point, Rows, Sequential, linearised, products, settled, split
 from thermal_robot.diagnosis.updated import fixed_point
 from thermal_robot.inference.columns import unknown_frames
-from thermal_robot.inference.frames import moved
+from thermal_robot.inference.registration import moved
 
 PROMISED = 1e-6
 

@@ -7,10 +7,20 @@ import numpy as np
 import pytest
 from updating_cases import in_full, measured
 
-from thermal_robot.diagnosis.sequential import bend
-from thermal_robot.diagnosis.sufficient import Guard, Judge, Point, Rows, Sums, carried, joined, linearised, products
+from thermal_robot.diagnosis.sequential import (
+    Guard,
+    Judge,
+    Point,
+    Rows,
+    Sums,
+    bend,
+    carried,
+    joined,
+    linearised,
+    products,
+)
 from thermal_robot.inference.columns import unknown_frames
-from thermal_robot.inference.frames import moved
+from thermal_robot.inference.registration import moved
 
 
 @pytest.fixture

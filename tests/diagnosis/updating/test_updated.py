@@ -8,8 +8,7 @@ import pytest
 from updating_cases import ALL, EFFECTS, OLD, in_full, measured
 
 import thermal_robot as tr
-from thermal_robot.diagnosis.agreement import beyond
-from thermal_robot.diagnosis.updated import chosen, fixed_point, independent_rows, log_odds, rivals
+from thermal_robot.diagnosis.updated import beyond, chosen, fixed_point, independent_rows, log_odds, rivals
 from thermal_robot.errors import CampaignError, EstimationError
 
 

@@ -22,7 +22,7 @@ from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.units import LENGTH_UNITS
 from thermal_robot.diagnosis.data_faults import settings
-from thermal_robot.inference.frames import Placed, alternate, middle, starts
+from thermal_robot.inference.registration import Placed, alternate, middle, starts
 from thermal_robot.inference.settings import LEVER, START_ROUNDS
 from thermal_robot.kinematics import log3, quaternion_to_rotation, tool_poses
 from thermal_robot.observations import Frames

@@ -39,7 +39,7 @@ from thermal_robot.diagnosis.data_faults.faults import (
 )
 from thermal_robot.diagnosis.values import DataFault
 from thermal_robot.inference.algebra import rms
-from thermal_robot.inference.frames import Placed, middle, soft
+from thermal_robot.inference.registration import Placed, middle, soft
 from thermal_robot.inference.settings import LEVEL
 
 

@@ -33,8 +33,8 @@ from thermal_robot.errors import RobotError
 from thermal_robot.inference import settings as inference
 from thermal_robot.inference.algebra import rms
 from thermal_robot.inference.fit import Fit, fit
-from thermal_robot.inference.frames import middle, soft
-from thermal_robot.inference.random_gap import nothing_random
+from thermal_robot.inference.registration import middle, soft
+from thermal_robot.inference.scatter import nothing_random
 from thermal_robot.kinematics import (
     ChainFrames,
     chain_frames,

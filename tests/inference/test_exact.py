@@ -13,9 +13,8 @@ from thermal_robot.effects import choose, gate
 from thermal_robot.effects.joint_gain import JointGain
 from thermal_robot.effects.law import Discovered
 from thermal_robot.inference.columns import block
-from thermal_robot.inference.frames import register
-from thermal_robot.inference.gauss_newton import corrected_observations
-from thermal_robot.inference.settle import _leading, _others, settle
+from thermal_robot.inference.exact import _leading, _others, corrected_observations, settle
+from thermal_robot.inference.registration import register
 from thermal_robot.observations import observe
 
 NOISE = 25e-6  # m

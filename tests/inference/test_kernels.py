@@ -11,11 +11,11 @@ from simulate import simulate
 
 from thermal_robot.inference import settings
 from thermal_robot.inference.columns import frame_columns
-from thermal_robot.inference.discrepancy import Form, Smooth, Spectrum, decomposed, forms
 from thermal_robot.inference.explain import explain
-from thermal_robot.inference.frames import register
+from thermal_robot.inference.kernels import Form, Smooth, Spectrum, decomposed, forms
 from thermal_robot.inference.problem import Linear
-from thermal_robot.inference.robust import Noise
+from thermal_robot.inference.registration import register
+from thermal_robot.inference.weights import Noise
 from thermal_robot.observations import Frames, observe
 
 NOISE = 25e-6  # m

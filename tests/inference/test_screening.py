@@ -14,10 +14,8 @@ from thermal_robot.effects.effect import in_words
 from thermal_robot.effects.law import Discovered
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference.columns import block, frame_columns
-from thermal_robot.inference.frames import register
-from thermal_robot.inference.laws import shapes
-from thermal_robot.inference.scan import scan, shaped
-from thermal_robot.inference.target import Target
+from thermal_robot.inference.registration import register
+from thermal_robot.inference.screening import Target, scan, shaped, shapes
 from thermal_robot.kinematics import Displacement
 from thermal_robot.observations import Frames, observe
 

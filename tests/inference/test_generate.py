@@ -7,14 +7,13 @@ import pytest
 from helpers import NOISE, with_law
 from simulate import simulate
 
-from thermal_robot.diagnosis.beside import grown
+from thermal_robot.diagnosis.prune import grown
 from thermal_robot.effects import choose
 from thermal_robot.effects.law import Discovered
 from thermal_robot.inference import settings
-from thermal_robot.inference.discover import candidates, discovered, listed, where
-from thermal_robot.inference.events import events
 from thermal_robot.inference.fit import fit, refit
-from thermal_robot.inference.scan import Thin
+from thermal_robot.inference.generate import candidates, discovered, events, listed, where
+from thermal_robot.inference.screening import Thin
 
 LISTED = ("joint_offset", "joint_gain", "backlash")
 STEP = Discovered(place="joint_3", quantity="time", shape="step", marks=(3600.0,))

@@ -8,7 +8,7 @@ from scipy.spatial.distance import cdist
 from simulate import commands
 
 from thermal_robot.campaign import Campaign
-from thermal_robot.inference.rows import (
+from thermal_robot.inference.grouping import (
     blocks,
     each,
     in_a_row,

@@ -1,4 +1,8 @@
-"""Scan of places, quantities and kinds of law: which law, entering where, explains a remainder best."""
+"""Screening: how much further columns would explain of a residual, and which law, entering where, explains it best.
+
+The residual is a projection (:class:`Target`), the score the Bayes information criterion (:func:`gained`). Screened are
+laws of every quantity at every place, in several shapes, and waves of any order by a periodogram.
+"""
 
 from __future__ import annotations
 
@@ -8,24 +12,377 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.special import fdtrc
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign.names import CLOCK
 from thermal_robot.campaign.settings import STILL
-from thermal_robot.campaign.turning import moves
+from thermal_robot.campaign.turning import SLIPS, moves
 from thermal_robot.effects import Effect, Parameter, Response, gate, library
 from thermal_robot.effects.law import Discovered
-from thermal_robot.effects.quantities import GRAVITY, REACH, TURN, quantities, unit
+from thermal_robot.effects.quantities import GRAVITY, REACH, TURN, began, quantities, unit
 from thermal_robot.effects.shapes import SHAPES
 from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import equations_of, orthonormal, whitener, without
 from thermal_robot.inference.columns import block
+from thermal_robot.inference.exact import corrected_observations
 from thermal_robot.inference.fit import Fit
-from thermal_robot.inference.gauss_newton import corrected_observations
-from thermal_robot.inference.laws import harmonics, hystereses, law_of, laws, relaxing, shapes, straight
+from thermal_robot.inference.grouping import in_a_row
 from thermal_robot.inference.problem import Linear
-from thermal_robot.inference.rows import in_a_row
-from thermal_robot.inference.target import Alike, Seat, Target, gained
+from thermal_robot.inference.weights import robust_noise
 from thermal_robot.observations import Observations
+
+
+@dataclass(frozen=True)
+class Worth:
+    """How much further columns explain beyond what was fitted: p-value of their F test, share, and gain.
+
+    ``share`` of the residual mean square, adjusted for their number; ``gain`` of log evidence by the Bayes information
+    criterion: ½ ν ln(S₀/S₁) − ½ k ln ν, S₀ and S₁ the residual sums of squares without and with the k columns, ν the
+    degrees of freedom.
+    """
+
+    p_value: float
+    share: float
+    gain: float
+
+
+NOTHING = Worth(1.0, 0.0, -np.inf)
+
+
+def gained(total: Array | float, explained: Array | float, rank: Array | float, freedom: float) -> Array:
+    """Gain of log evidence by the Bayes information criterion (Schwarz 1978), ½ ν ln(S₀/S₁) − ½ k ln ν.
+
+    ``total`` S₀ and S₀ − S₁ ``explained`` are sums of squares, ``rank`` k the number of columns, ``freedom`` ν the
+    degrees of freedom without them; −∞ without columns, and where these would leave too few degrees of freedom.
+    """
+    rest = np.maximum(np.asarray(total) - explained, settings.TINY)
+    gain = 0.5 * freedom * np.log(total / rest) - 0.5 * np.asarray(rank) * np.log(freedom)
+    return np.where((np.asarray(rank) == 0) | (freedom - rank < settings.FEWEST_LEFT), -np.inf, gain)
+
+
+@dataclass(frozen=True, eq=False)
+class Target:
+    """A remainder to be explained: the residual ``white`` (N·m,) of the gap after a fit of a design, in noise units.
+
+    ``root`` (N, m): square root of each weight over the noise; ``basis`` (N·m, r): an orthonormal one of the design.
+    """
+
+    white: Array
+    root: Array
+    basis: Array
+
+    @classmethod
+    def of(
+        cls,
+        gap: Array,
+        design: Array,
+        trusted: NDArray[np.bool_] | None = None,
+        relative: Array | None = None,
+        like: Target | None = None,
+    ) -> Target:
+        """Project a design (N, m, K) out of a gap (N, m), robustly: rows far from the rest weigh little (Cauchy).
+
+        Rows that are ``trusted`` (N,) weigh fully in the residual, however far they are. Where the noise of the figures
+        differs, ``relative`` (N, m) says how. Weights are found by iteration, or at once from those of a target that is
+        nearly ``like`` this one.
+        """
+        if relative is not None:
+            like = None if like is None else replace(like, root=like.root * relative)
+            even = cls.of(gap / relative, design / relative[:, :, None], trusted, like=like)
+            return cls(even.white, even.root / relative, even.basis)
+        found = _weighed(gap, design, gap if like is None else like.left, first=like is None)
+        for _ in range(settings.CAUCHY_ROUNDS - 1 if like is None else 0):
+            found = _weighed(gap, design, found.left)
+        if trusted is not None and trusted.any():
+            noise = np.repeat(robust_noise(found.left), 3)
+            found = _projected(gap, design, np.where(trusted[:, None], 1.0 / noise, found.root))
+        return found
+
+    @property
+    def left(self) -> Array:
+        """(N, m) what is left of the gap, m and rad."""
+        return self.white.reshape(self.root.shape) / self.root
+
+    @property
+    def freedom(self) -> int:
+        """Residual degrees of freedom: equations less the rank of the design."""
+        return max(int(len(self.white) - self.basis.shape[1]), 1)
+
+    def worth(self, columns: Array) -> Worth:
+        """Return what further columns (N, m, K) explain; nothing where they would leave too few degrees of freedom."""
+        whole = equations_of(columns * self.root[:, :, None])
+        flat = without(whole, self.basis)
+        # what is left of an exact alias of the design is rounding, no column
+        flat[:, np.linalg.norm(flat, axis=0) < settings.ALIAS * np.linalg.norm(whole, axis=0)] = 0.0
+        own = whitener(flat.T @ flat, settings.LAW_FLOOR)
+        k, freedom = own.shape[1], self.freedom
+        if not k or freedom - k < settings.FEWEST_LEFT:
+            return NOTHING
+        projected = own.T @ (flat.T @ self.white)
+        total, taken = max(float(self.white @ self.white), settings.TINY), float(projected @ projected)
+        rest = max(total - taken, settings.TINY)
+        return Worth(
+            float(fdtrc(k, freedom - k, (taken / k) / (rest / (freedom - k)))),
+            1.0 - (rest / (freedom - k)) / (total / freedom),
+            float(gained(total, taken, k, freedom)),
+        )
+
+    def seat(self, moves: Array) -> Seat:
+        """Return the target seen from a place whose d components move the gap by (N, m, d) a unit."""
+        own = moves * self.root[:, :, None]
+        basis = self.basis.reshape(*self.root.shape, -1)
+        return Seat(
+            np.einsum("nmd,nme->nde", own, own),
+            np.einsum("nmr,nmd->rdn", basis, own),
+            np.einsum("nm,nmd->nd", self.white.reshape(self.root.shape), own),
+            max(float(self.white @ self.white), settings.TINY),
+            self.freedom,
+        )
+
+
+def _weighed(gap: Array, design: Array, left: Array, first: bool = False) -> Target:
+    """Return the target with Cauchy's weights of what was left of the rows, all the same the ``first`` time."""
+    noise = np.repeat(robust_noise(left), 3)
+    far2 = 0.0 if first else ((left / noise) ** 2).sum(axis=1) / (3.0 * left.shape[1])
+    return _projected(gap, design, 1.0 / np.sqrt(1.0 + np.broadcast_to(far2, len(gap)))[:, None] / noise)
+
+
+def _projected(gap: Array, design: Array, root: Array) -> Target:
+    basis = orthonormal(equations_of(design * root[:, :, None]))
+    return Target(without((gap * root).ravel(), basis), root, basis)
+
+
+@dataclass(frozen=True, eq=False)
+class Alike:
+    """C laws of K functions each (C, N, K) with their products (C, N, K, K), computed once for all targets."""
+
+    laws: int
+    stacks: tuple[tuple[list[int], Array, Array], ...]
+
+    @classmethod
+    def of(cls, laws: Sequence[Array]) -> Alike:
+        """Put together laws, each with its (N, K) functions."""
+        stacks = []
+        for width in {law.shape[1] for law in laws}:
+            which = [i for i, law in enumerate(laws) if law.shape[1] == width]
+            functions = np.stack([laws[i] for i in which])
+            stacks.append((which, functions, functions[:, :, :, None] * functions[:, :, None, :]))
+        return cls(len(laws), tuple(stacks))
+
+
+@dataclass(frozen=True, eq=False)
+class Seat:
+    """A target seen from one place: what many laws there need, summed over the components of a row once.
+
+    A law's columns are the products of the place's d components with K functions of a quantity. Their Gram matrix
+    without the design is then Σ_n φ_k φ_l W_n less that of their part in the design. In units of the noise: ``weight``
+    (N, d, d) products of the components, ``design`` (r, d, N) and ``remainder`` (N, d) those with the basis and the
+    residual; ``total`` and ``freedom`` of the residual.
+    """
+
+    weight: Array
+    design: Array
+    remainder: Array
+    total: float
+    freedom: int
+
+    def gains(self, laws: Sequence[Array] | Alike) -> Array:
+        """Return the log evidence that laws gain (:attr:`Worth.gain`), each with its (N, K) functions."""
+        alike = laws if isinstance(laws, Alike) else Alike.of(laws)
+        found = np.full(alike.laws, -np.inf)
+        for which, functions, products in alike.stacks:
+            found[which] = self._alike(functions, products)
+        return found
+
+    def _alike(self, functions: Array, products: Array) -> Array:
+        """(C,) the same of C laws of K functions each, (C, N, K), and these functions' products (C, N, K, K)."""
+        laws, rows, k = functions.shape
+        r, d, _ = self.design.shape
+        summed = products.reshape(laws, rows, k * k).transpose(0, 2, 1) @ self.weight.reshape(rows, d * d)
+        whole = summed.reshape(laws, k, k, d, d).transpose(0, 1, 3, 2, 4).reshape(laws, k * d, k * d)
+        seen = (self.design.reshape(r * d, rows) @ functions).reshape(laws, r, d, k)
+        inside = seen.transpose(0, 1, 3, 2).reshape(laws, r, k * d)
+        gram = whole - inside.transpose(0, 2, 1) @ inside
+        vector = (functions.transpose(0, 2, 1) @ self.remainder).reshape(laws, k * d)
+        explained, rank = explained_by(gram, vector, np.einsum("cii->ci", whole))
+        return gained(self.total, explained, rank, self.freedom)
+
+
+def explained_by(gram: Array, vector: Array, whole: Array) -> tuple[Array, Array]:
+    """(C,) sums of squares that columns explain, and their ranks, from (C, K, K), (C, K) and squared lengths (C, K)."""
+    own = np.einsum("cii->ci", gram)
+    # what is left of an exact alias of the design is rounding, no column
+    kept = own > settings.ALIAS**2 * whole
+    length = np.where(kept, np.sqrt(np.where(kept, own, 1.0)), np.inf)
+    value, axes = np.linalg.eigh(gram / (length[:, :, None] * length[:, None, :]))
+    seen = value > settings.LAW_FLOOR * np.maximum(value.max(axis=1, initial=1.0), 1.0)[:, None]
+    along = np.einsum("cki,ck->ci", axes, vector / length)
+    return (np.where(seen, along**2 / np.where(seen, value, 1.0), 0.0)).sum(axis=1), seen.sum(axis=1)
+
+
+__all__ = [
+    "CLOCK",
+    "harmonics",
+    "hystereses",
+    "law_of",
+    "laws",
+    "of_quantity",
+    "relaxing",
+    "shapes",
+    "smooth_columns",
+    "straight",
+]
+
+
+def laws(observations: Observations, kinds: Sequence[str], names: Iterable[str] | None = None) -> list[Discovered]:
+    """Smooth laws of each quantity at each place of the given kinds, and at a segment constant ones, too."""
+    turns = observations.campaign.measures == "pose"
+    robot = observations.robot
+    places = {
+        "joint": robot.joint_names,
+        "base": ("base",),
+        "tool": ("tool",),
+        # before the first joint a segment is the base, behind the last one the tool
+        "link": tuple(s.name for s in robot.segments[1:] if s.movable),
+    }
+    known = quantities(observations)
+    # knots and levels are the same wherever it enters
+    follow = {
+        n: law_of(observations, Discovered(turns=turns), n, known[n]) for n in (known if names is None else names)
+    }
+    found = []
+    for kind in kinds:
+        for place in places[kind]:
+            plain = Discovered(kind=kind, place=place, turns=turns)
+            if kind == "link":
+                found.append(replace(plain, shape="constant", quantity="none"))
+            for name, followed in follow.items():
+                law = replace(followed, kind=kind, place=place)
+                found.append(law)
+                if kind == "joint" and name == place and law.shape == "smooth":
+                    # five knots do not follow a wheel that turns more than once
+                    found += [replace(law, shape="harmonic", marks=(k,)) for k in harmonics(observations, place)]
+    return found
+
+
+def law_of(observations: Observations, plain: Discovered, name: str, values: Array) -> Discovered:
+    """Return a law as a smooth one of a quantity (N,), or one of its levels."""
+    own = None if name in observations.covariates else observations.campaign.labels.get(name)
+    labels = () if own is None else tuple(np.unique(own).tolist())
+    law = replace(plain, quantity=name, unit=unit(observations.robot, name), labels=labels)
+    return of_quantity(law, values)
+
+
+def straight(law: Discovered) -> Discovered:
+    """Return a law as a straight line; one of labels as it is, since nothing lies between these."""
+    return law if law.labels else replace(law, shape="ramp", marks=())
+
+
+def harmonics(observations: Observations, joint: str) -> tuple[float, ...]:
+    """Return the harmonics tried in a joint: the first three, and the motor's where its ratio is stated."""
+    ratio = observations.campaign.gears.get(joint)
+    return settings.HARMONICS if ratio is None else (*settings.HARMONICS, float(ratio), 2.0 * float(ratio))
+
+
+def of_quantity(law: Discovered, values: Array, knots: int = settings.KNOTS) -> Discovered:
+    """Return the law with knots at the quantity's quantiles, or with its levels where it has few values."""
+    levels = np.unique(values)
+    low, high = float(values.min()), float(values.max())
+    if len(levels) <= settings.FEW_LEVELS:
+        return replace(law, shape="levels", marks=tuple(levels.tolist()), origin=low, span=high - low)
+    marks = np.quantile(values, np.linspace(settings.OUTER_KNOTS, 1.0 - settings.OUTER_KNOTS, knots))
+    if np.diff(marks).min() < settings.NARROW_KNOTS * (high - low) / knots:
+        # most values lie in one spot: a spline between knots there would be free to do anything
+        marks = np.linspace(low, high, knots)
+    return replace(law, shape="smooth", marks=tuple(marks.tolist()), origin=low, span=high - low)
+
+
+def shapes(
+    law: Discovered, values: Array, jumps: bool = True, orders: Sequence[float] = settings.HARMONICS
+) -> list[Discovered]:
+    """Return a law in its own shape, as a smooth one, and in all simpler shapes that may suffice, each once.
+
+    Always: straight, quadratic, and hinges at quantiles of the quantity. With ``jumps`` also steps and bumps: of
+    positions, gravity and the clock, as nothing jumps at a temperature. Of a velocity also its sign. Of a joint's own
+    position also harmonics of the given orders. Of labels also one that is apart from the others. Of two quantities
+    their product alone. Of what a joint remembers elements that slip.
+    """
+    if law.shape == "constant":
+        return [law]
+    law = replace(of_quantity(law, values), runs=(), starts=()) if law.starts else law
+    if law.by:
+        largest = float(np.abs(values).max())
+        product = [replace(law, shape="product", span=largest)] if largest > 0.0 else []
+        return list(dict.fromkeys([law, *product]))
+    smooth = of_quantity(law, values)
+    found = [law, smooth] if law.labels or len(smooth.marks) < 3 else [law, smooth, straight(law)]
+    if law.labels and len(levels := np.unique(values)) > 2:
+        found += [replace(law, shape="apart", marks=(float(m),)) for m in levels]
+    if smooth.shape == "levels":
+        return list(dict.fromkeys(found))
+    found.append(replace(law, shape="quadratic", marks=()))
+    middle = np.quantile(values, np.linspace(settings.INNER_MARKS, 1.0 - settings.INNER_MARKS, settings.MARKS))
+    if law.quantity.startswith(TURN):
+        return list(dict.fromkeys([*found, *hystereses(law, values)]))
+    if jumps:
+        found += _jumps(law, middle)
+    found += [replace(law, shape="hinge", marks=(float(m), side)) for m in middle[2:-2:2] for side in (1.0, -1.0)]
+    if law.quantity.startswith("velocity."):
+        found.append(replace(law, shape="drag", marks=()))
+    if law.quantity == law.place and law.kind == "joint" and not law.of:
+        found += [replace(law, shape="harmonic", marks=(k,)) for k in orders]
+    return list(dict.fromkeys(found))
+
+
+def _jumps(law: Discovered, middle: Array) -> list[Discovered]:
+    found = [replace(law, shape="step", marks=(float(m),)) for m in middle]
+    found += [replace(law, shape="slide", marks=(float(m), settings.SLIDE_WIDTH * law.span)) for m in middle[::2]]
+    widths = [w * law.span for w in settings.BUMP_WIDTHS]
+    return found + [replace(law, shape="bump", marks=(float(m), w)) for m in middle[1:-1:2] for w in widths]
+
+
+def hystereses(law: Discovered, values: Array) -> list[Discovered]:
+    """Return a law of a joint's memory as elements that slip: over the whole range, coarsely first, or some neighbours.
+
+    Which show, ``values`` (N,) tell, rad or m from the last turning point; one between two is nearly their sum.
+    """
+    least, most = (share * float(np.abs(values).max()) for share in settings.SLIP_SHARES)
+    slips = tuple(r for r in SLIPS if least <= r <= most)
+    whole = [slips[::step] for step in settings.SLIP_STEPS]
+    few = [slips[k : k + n] for n in settings.SLIPS_TOGETHER for k in range(len(slips) - n + 1)]
+    return [replace(law, shape="hysteresis", marks=marks) for marks in dict.fromkeys([*whole, *few]) if marks]
+
+
+def relaxing(observations: Observations, law: Discovered) -> list[Discovered]:
+    """Return a law of the clock as one that relaxes after each start: of one size, and of one each.
+
+    A session begins with its first row; where there are none, the campaign does.
+    """
+    clock = law.values(observations)
+    if clock is None or not np.ptp(clock) > 0.0:
+        return []
+    span, starts = float(np.ptp(clock)), began(observations, clock)
+    law = replace(law, labels=(), runs=(), origin=float(clock.min()), span=span, starts=tuple(starts.values()))
+    if len(starts) < 2:
+        found = [replace(law, shape="relaxing")]
+    else:
+        found = [replace(law, shape=shape, runs=tuple(starts)) for shape in ("relaxing", "relaxing each")]
+    return [replace(one, marks=(share * span,)) for one in found for share in settings.RELAXED_WITHIN]
+
+
+def smooth_columns(values: Array) -> Array:
+    """Return an (N, k) basis of the smooth laws of a quantity: centred, uncorrelated, of mean square one.
+
+    It spans the laws of :func:`of_quantity` without their constant: levels of a quantity with few values, a natural
+    cubic spline otherwise. It is empty (N, 0) where the quantity does not vary.
+    """
+    if np.ptp(values) == 0.0:
+        return np.zeros((len(values), 0))
+    functions, _ = of_quantity(Discovered(), values).functions(values)
+    u, s, _ = np.linalg.svd(functions - functions.mean(axis=0), full_matrices=False)
+    kept: Array = u[:, s > settings.SPLINE_FLOOR * s[0]] * np.sqrt(len(values))
+    return kept
 
 
 def orders(q: Array, slides: bool = False) -> Array:
@@ -54,7 +411,7 @@ def periodogram(seat: Seat, q: Array, at: Array) -> Array:
 
     The least-squares periodogram with a floating mean (Zechmeister and Kuerster, *The generalised Lomb-Scargle
     periodogram*, 2009), of many equations a row, the design projected out. Positions q (N,), rad or m; orders in equal
-    steps (K,). Gains are those of :meth:`~thermal_robot.inference.target.Seat.gains`; orders that the design can do, or
+    steps (K,). Gains are those of :meth:`Seat.gains`; orders that the design can do, or
     whose sine and cosine the positions cannot tell apart, gain −∞.
     """
     found = [_chunk(seat, q, at[k : k + settings.ORDER_CHUNK]) for k in range(0, len(at), settings.ORDER_CHUNK)]

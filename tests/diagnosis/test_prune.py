@@ -7,13 +7,12 @@ import pytest
 from diagnosis.simulated import forced
 from simulate import simulate
 
-from thermal_robot.diagnosis.earned import earned
+from thermal_robot.diagnosis.prune import earned
 from thermal_robot.effects import choose
 from thermal_robot.effects.quantities import quantities
 from thermal_robot.inference.columns import Block, block
 from thermal_robot.inference.fit import fit
-from thermal_robot.inference.laws import smooth_columns
-from thermal_robot.inference.target import Target
+from thermal_robot.inference.screening import Target, smooth_columns
 
 NOISE = 25e-6
 SINGLE = ("joint_offset", "joint_gain", "transmission_error", "backlash", "joint_compliance", "thermal_elongation")

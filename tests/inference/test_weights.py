@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from inference.problems import small_problem
 
-from thermal_robot.inference.robust import (
+from thermal_robot.inference.weights import (
     Noise,
     distance_limit,
     first_whitening,

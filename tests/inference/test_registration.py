@@ -8,7 +8,7 @@ from simulate import commands, simulate
 
 from thermal_robot import EstimationError, diagnose
 from thermal_robot.campaign import Campaign
-from thermal_robot.inference.frames import register
+from thermal_robot.inference.registration import register
 from thermal_robot.kinematics import Displacement, align, exp3, quaternion_to_rotation, rotation_to_quaternion
 from thermal_robot.observations import Frames, observe
 

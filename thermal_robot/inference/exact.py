@@ -1,0 +1,370 @@
+"""Model selection at the exact fit: choose effects, refine their constants, refit, and choose again there.
+
+The exact fit is by Levenberg and Marquardt's steps over frames and parameters, priors held at their scales. Constants
+that are no linear parameters, such as a lag, are moved by coordinate search until the evidence gains nothing more.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from thermal_robot.arrays import Array
+from thermal_robot.campaign import Campaign
+from thermal_robot.effects import Effect, gate
+from thermal_robot.effects.apply import displacement
+from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import equations_of, orthonormal, whitener, without
+from thermal_robot.inference.columns import Block, block, frame_columns
+from thermal_robot.inference.evidence import Combination, Gram
+from thermal_robot.inference.explain import Explanation, explain, log_odds
+from thermal_robot.inference.kernels import forms
+from thermal_robot.inference.problem import Linear, Products, Whitening, parameter_values, whitened
+from thermal_robot.inference.registration import moved
+from thermal_robot.inference.search import Search
+from thermal_robot.inference.weights import Noise, tail_weight
+from thermal_robot.observations import Frames, Observations, observe
+
+
+def gauss_newton(
+    campaign: Campaign,
+    frames: Frames,
+    explanation: Explanation,
+    held: Sequence[tuple[Effect, Array]],
+    settled: float,
+    since: Sequence[tuple[Effect, Array]] | None = None,
+) -> tuple[Observations, list[tuple[Effect, Array]]]:
+    """Refit frames and parameters with the exact model by Gauss-Newton, the priors held at their scales.
+
+    It begins at the (P,) values of a linear fit (``held``); where it then ends worse than ``since``, about which the
+    explanation was linearised, it begins there. It ends at a step of ``settled`` standard deviations.
+    """
+    observations, found, cost = _descended(campaign, frames, explanation, held, settled, settings.FIT_STEPS)
+    if since is not None:
+        known = {(effect.name, effect.places, len(values)): values for effect, values in since}
+        begun = [(e, known.get((e.name, e.places, len(values)), np.zeros(len(values)))) for e, values in held]
+        if _descended(campaign, frames, explanation, begun, settled, 0)[2] < cost:
+            observations, found, _ = _descended(campaign, frames, explanation, begun, settled, settings.FIT_STEPS)
+    return observations, found
+
+
+def _descended(
+    campaign: Campaign,
+    frames: Frames,
+    explanation: Explanation,
+    held: Sequence[tuple[Effect, Array]],
+    settled: float,
+    steps: int,
+) -> tuple[Observations, list[tuple[Effect, Array]], float]:
+    """Return the corrected model and its effects after so many steps downhill at most, and what they cost."""
+    whitening, best = explanation.whitening, explanation.best
+    effects = [effect for effect, _ in held]
+    chosen = [explanation.block_of(effect) for effect in effects]
+    sizes, sides = [explanation.held(b) for b in chosen], [explanation.linear.blocks[b].positive for b in chosen]
+    least = np.where(np.concatenate([*sides, np.zeros(0, dtype=bool)]), 0.0, -np.inf)
+    ends = np.cumsum([len(size) for size in sizes])[:-1]
+    prior = np.concatenate([*sizes, np.zeros(0)])
+    state = np.concatenate([*(values for _, values in held), np.zeros(0)])
+    beside = replace(whitening, noise=whitening.noise * best.noise)
+
+    def pairs(state: Array) -> list[tuple[Effect, Array]]:
+        return list(zip(effects, np.split(state, ends), strict=True)) if effects else []
+
+    def left(observations: Observations, state: Array) -> float:
+        gap = whitened(Linear(observations.gap, np.zeros((*observations.gap.shape, 0)), ()), beside)
+        return float((gap**2).sum() + ((state / prior) ** 2).sum())
+
+    observations = corrected_observations(campaign, frames, pairs(state))
+    cost = left(observations, state)
+    for _ in range(steps):
+        flat, names = frame_columns(observations)
+        items = tuple(block(observations, effect) for effect in effects)
+        stack = whitened(Linear(observations.gap, flat, items), beside)
+        for damping in settings.DAMPINGS:
+            step, size = _step_inside(stack[:, :-1], stack[:, -1], state, prior, least, damping)
+            tried = moved(frames, step[: len(names)], names), np.maximum(state + step[len(names) :], least)
+            there = corrected_observations(campaign, tried[0], pairs(tried[1]))
+            if (after := left(there, tried[1])) <= cost or size < settled:
+                break
+        else:
+            break
+        (frames, state), observations, cost = tried, there, after
+        if size < settled:
+            break
+    return observations, pairs(state), cost
+
+
+def _step_inside(
+    design: Array, gap: Array, state: Array, prior: Array, least: Array, damping: float
+) -> tuple[Array, float]:
+    """Return the damped ridge step after which nothing is below its least, 0 or −∞: what would be is held at zero."""
+    flat, held = design.shape[1] - len(prior), np.zeros(len(prior), dtype=bool)
+    while True:
+        step, size = _ridge_step(design, gap, state, np.where(held, settings.LEAST_HELD * prior, prior), damping)
+        below = ~held & (state + step[flat:] < least)
+        if not below.any():
+            return step, size
+        held |= below
+
+
+def _ridge_step(design: Array, gap: Array, state: Array, prior: Array, damping: float) -> tuple[Array, float]:
+    """Return the step that minimises |gap − design step|² + |(state + step)/prior|², and what it moves, in noise.
+
+    The first columns have no prior. Directions that nothing determines are not moved. A step along directions that do
+    nearly the same moves little, however long it is.
+    """
+    flat = design.shape[1] - len(prior)
+    matrix, vector = design.T @ design, design.T @ gap
+    matrix[np.arange(flat, len(matrix)), np.arange(flat, len(matrix))] += 1.0 / prior**2
+    vector[flat:] -= state / prior**2
+    matrix.ravel()[:: len(matrix) + 1] *= 1.0 + damping  # Levenberg and Marquardt
+    root = whitener(matrix, settings.STEP_FLOOR)
+    along = root.T @ vector
+    return np.asarray(root @ along), float(np.linalg.norm(along))
+
+
+def corrected_observations(campaign: Campaign, frames: Frames, pairs: Sequence[tuple[Effect, Array]]) -> Observations:
+    """Observe with the effects at work; their responses are read from the nominal robot, as prediction reads them."""
+    moved_by, instrument = displacement(observe(campaign, frames), pairs)
+    return observe(campaign, frames, displacement=moved_by, instrument=instrument)
+
+
+def refined(explanation: Explanation, observations: Observations, factor: float) -> list[tuple[Effect, Array]]:
+    """Move the constants of chosen effects to where the evidence is largest, by coordinate search.
+
+    Of one effect after another settings nearby are tried. Where none is better by 0.1 nat they move closer, the
+    logarithm of ``factor`` (above 1) halved, until a parabola through them promises no more. Rows set aside are heard
+    with the weight of their distance, as a constant that is off puts aside just the rows that tell of it. Returns
+    the effects with their (P,) values.
+    """
+    kept = Products(explanation.linear, heard(explanation))
+    blocks = [explanation.linear.blocks[b].held for b in explanation.best.blocks]
+    values = [explanation.values[b][0] for b in explanation.best.blocks]
+    moved = constants_moved(kept, observations, blocks, factor)
+    if moved != blocks:
+        linear, problem, found = _evaluated(kept, moved)
+        values = [mean for mean, _ in parameter_values(linear, problem, found).values()]
+    return [(item.effect, mean) for item, mean in zip(moved, values, strict=True)]
+
+
+def constants_moved(kept: Products, observations: Observations, blocks: Sequence[Block], factor: float) -> list[Block]:
+    """Return the blocks with the constants of each moved in turn."""
+    moved = list(blocks)
+    for place, item in enumerate(blocks):
+        if _movable(item, factor):
+            moved[place] = _moved(kept, observations, moved, place, factor)
+    return moved
+
+
+def _movable(item: Block, factor: float) -> bool:
+    """Whether the block's effect has constants to move, or is shared in other ways."""
+    return len(gate.nearby(item.effect, factor)) > 1
+
+
+def weighed(kept: Products, blocks: Sequence[Block]) -> float:
+    """Return the log evidence of these effects with the prior odds of each."""
+    priors = log_odds() * sum(1.0 + item.effect.apart for item in blocks)
+    return _evaluated(kept, blocks)[2].log_evidence + priors
+
+
+def heard(explanation: Explanation) -> Whitening:
+    """Return the whitening in which rows set aside have a weight; what rows have in common is known of the others.
+
+    What is anew in every pose counts for nothing: a constant that is a little off leaves just that.
+    """
+    whitening, aside, form = explanation.whitening, explanation.outliers, explanation.discrepancy.form
+    if form is not None and form.anew:
+        whitening = replace(whitening, smooth=None)
+    if whitening.smooth is not None or not aside.any():
+        return whitening
+    noise = whitening.sigma() * explanation.best.noise
+    distance2 = ((explanation.remainder / noise) ** 2).sum(axis=1)
+    return replace(whitening, weights=np.where(aside, tail_weight(distance2, noise.shape[1]), whitening.weights))
+
+
+def _moved(kept: Products, observations: Observations, blocks: Sequence[Block], place: int, factor: float) -> Block:
+    """Return the block at one place with the setting of its effect that nothing nearby betters."""
+    item, before, after = blocks[place], blocks[:place], blocks[place + 1 :]
+    seen: dict[Effect, float] = {}
+
+    def evidence(own: Block) -> float:
+        if own.effect not in seen:
+            seen[own.effect] = _evaluated(kept, [*before, own, *after])[2].log_evidence
+        return seen[own.effect]
+
+    for _ in range(settings.REFINED_TRIES):
+        near = [block(observations, e) for e in gate.nearby(item.effect, factor) if e != item.effect]
+        near = [n for n in near if len(n.sizes) == len(item.sizes)]
+        if not near:
+            break
+        more = [evidence(n) - evidence(item) for n in near]
+        # one that stands apart is as rare as an effect, however close it is
+        gains = [own + log_odds() * (n.effect.apart - item.effect.apart) for n, own in zip(near, more, strict=True)]
+        best = int(np.argmax(gains))
+        if gains[best] > settings.REFINED_GAIN:
+            item = near[best].held
+            continue
+        apart = gate.nearby(item.effect, 1.0)  # settings that do not come closer
+        if all(own > -settings.REFINED_FLAT for n, own in zip(near, more, strict=True) if n.effect not in apart):
+            break
+        factor = float(np.sqrt(factor))
+    return item
+
+
+def _evaluated(kept: Products, blocks: Sequence[Block]) -> tuple[Linear, Gram, Combination]:
+    """Evaluate these blocks together and no others."""
+    linear, problem = kept.problem(blocks)
+    return linear, problem, Search(problem, [0.0] * len(blocks)).evaluate(range(len(blocks)))
+
+
+@dataclass(frozen=True, eq=False)
+class Settled:
+    """An explanation, linearised at the exact model at which it was found, its effects with their (P,) values.
+
+    ``families`` names the effect that each block belongs to.
+    """
+
+    observations: Observations
+    explanation: Explanation
+    held: tuple[tuple[Effect, Array], ...]
+    families: tuple[str, ...]
+
+
+def settle(
+    start: Observations,
+    variants: dict[str, tuple[Effect, ...]],
+    progress: Callable[[str], None],
+    *,
+    held: Sequence[tuple[Effect, Array]] = (),
+    before: Explanation | None = None,
+    starts: Sequence[Sequence[Effect]] = (),
+) -> Settled:
+    """Model selection at the exact fit: choose effects, refine their constants, refit, until the choice stays.
+
+    It begins at ``start``, the exact model of effects that are ``held`` with their values, and with the weights that
+    were found there ``before``. The first search starts from each of the ``starts``, by default from what is held.
+    """
+    campaign, observations, held = start.campaign, start, list(held)
+    begun = list(dict.fromkeys(effect for one in starts for effect in one))
+    whole = dict(variants)
+    whole.update({e.name: tuple(dict.fromkeys((*whole[e.name], e))) for e in begun})
+    variants = dict(whole)
+    for effect, _ in held:
+        if effect.name in variants:
+            rivals = _others(effect, start, whole[effect.name])
+            variants[effect.name] = tuple(dict.fromkeys((*variants[effect.name], effect, *rivals)))
+    noise = Noise.of(campaign)
+    many = campaign.samples > settings.MANY_ROWS
+    revisions = 1 if many else settings.REVISIONS
+    for revision in range(revisions + 1):
+        progress("combinations of effects" if revision == 0 else f"exact fit, revision {revision}")
+        listed = [effect for effect, _ in held if effect.name in variants]
+        blocks = tuple(_listed(variants, observations, (*begun, *listed)))
+        candidates, families = [b.effect for b in blocks], tuple(b.effect.name for b in blocks)
+        chosen = [candidates.index(effect) for effect in listed]
+        seeds = [chosen] if revision or not starts else [[candidates.index(e) for e in one] for one in starts]
+        linear = at_exact_model(observations, blocks, held)
+        explanation = explain(linear, noise, families=families, starts=seeds, before=before, forms=forms(observations))
+        factor, since = settings.REFINEMENT ** (1 / 2**revision), held
+        held = [(candidates[b], explanation.values[b][0]) for b in explanation.best.blocks]
+        finer = refined(explanation, observations, factor) if revision < revisions else held
+        stays = [e for e, _ in finer] == [e for e, _ in held] and set(explanation.best.blocks) == set(chosen)
+        known = revision > 0 or before is not None
+        held, last = finer, revision == revisions or (known and stays)
+        least = settings.SETTLED_BETWEEN if many and not last else settings.SETTLED
+        observations, held = gauss_newton(campaign, observations.frames, explanation, held, least, since)
+        if last:
+            break
+        before = explanation = replace(explanation, searched=None)  # the next search takes as much memory
+        for effect, _ in held:
+            b = explanation.block_of(effect)
+            leading = _leading(effect, blocks[b], explanation.values[b][0])
+            others = _others(effect, start, whole[effect.name])
+            variants[effect.name] = tuple(dict.fromkeys((*gate.nearby(effect, factor), *leading, *others)))
+    return Settled(observations, explanation, tuple(held), families)
+
+
+def at_exact_model(observations: Observations, blocks: Sequence[Block], held: Sequence[tuple[Effect, Array]]) -> Linear:
+    """Return the linear problem at the exact model: its gap, and what the effects that it holds have moved."""
+    moved = (block(observations, effect).columns @ values for effect, values in held)
+    gap = observations.gap + sum(moved, np.zeros_like(observations.gap))
+    return Linear(gap, frame_columns(observations)[0], tuple(blocks))
+
+
+def _leading(chosen: Effect, item: Block, values: Array) -> Iterator[Effect]:
+    """Yield a setting in all places in those alone that do most, as fitted: in the two, three and more of them."""
+    if chosen.places or chosen.share is not None:
+        return
+    every = gate.places_of(item.parameters)
+    of = np.array([parameter.place for parameter in item.parameters])
+    columns = item.columns
+    moved = [float(np.linalg.norm(columns[:, :, of == place] @ values[of == place])) for place in every]
+    most = sorted(every, key=lambda place: -moved[every.index(place)])
+    for count in range(2, min(len(every), settings.LEADING_PLACES + 1)):
+        yield replace(chosen, places=tuple(place for place in every if place in most[:count]))
+
+
+def _others(chosen: Effect, observations: Observations, settings_of: Sequence[Effect]) -> Iterator[Effect]:
+    """Yield what stays a rival of a setting while its constants are refined.
+
+    One place more, less or another, other places alone, and all places; its places, and each of them, in other
+    settings. Of a law, all that were compared with it.
+    """
+    if chosen.share is not None:
+        yield from settings_of
+        return
+    every = [alone.places[0] for alone in gate.alone(replace(chosen, places=()), observations)]
+    own = set(chosen.places)
+    fewer = [own - {place} for place in chosen.places] if len(own) > 1 else []
+    more = [kept | {place} for kept in (own, *fewer) for place in every if own and place not in own]
+    for places in (*more, *fewer):
+        yield replace(chosen, places=tuple(place for place in every if place in places))
+    yield replace(chosen, places=())
+    yield from gate.alone(replace(chosen, places=()), observations)
+    for setting in (setting for setting in settings_of if not setting.places):
+        if set(chosen.places) <= set(gate.places_of(gate.checked(setting, observations))):
+            yield replace(setting, places=chosen.places)
+        yield from (alone for place in chosen.places if (alone := gate.at(setting, place, observations)) is not None)
+
+
+def _listed(
+    variants: dict[str, tuple[Effect, ...]], observations: Observations, kept: Sequence[Effect]
+) -> Iterator[Block]:
+    """Yield all settings but those with a place of which the data see nothing, or nothing beside the frames.
+
+    What is kept stays in any case.
+    """
+    frames, names = frame_columns(observations)[0], observations.robot.joint_names
+    basis = orthonormal(equations_of(frames))
+    flat = equations_of(observations.joint_sensitivity[:, : frames.shape[1]])
+    left = np.linalg.norm(without(flat, basis), axis=0)
+    hidden = {
+        n for n, seen in zip(names, left > settings.ALIAS * np.linalg.norm(flat, axis=0), strict=True) if not seen
+    }
+    segments = observations.robot.segments
+    # before the first joint a segment is the base, behind the last one the tool
+    hidden |= {s.parent_link for s in segments} - {s.parent_link for s in segments[1:] if s.movable}
+    every = [setting for own in variants.values() for setting in own]
+    for setting in every:
+        if setting in kept or not (hidden & set(setting.places) and constant(setting, observations)):
+            item = block(observations, setting)
+            if setting in kept or _sees(item):
+                yield item
+
+
+def _sees(item: Block) -> bool:
+    """Whether the data see something of each place of a setting in several places."""
+    places = item.effect.places if len(item.effect.places) > 1 else ()
+    if not places:
+        return True
+    length = np.linalg.norm(item.columns, axis=(0, 1)) * item.sizes
+    of = np.array([parameter.place for parameter in item.parameters])
+    return all(length[of == place].max(initial=0.0) > settings.ALIAS * length.max() for place in places)
+
+
+def constant(effect: Effect, observations: Observations) -> bool:
+    """Whether an effect displaces each place by the same in all rows."""
+    responses = [r for p in gate.checked(effect, observations) for r in p.responses]
+    return all(r.values.ndim == (0 if r.channel == "joint" else 1) for r in responses)

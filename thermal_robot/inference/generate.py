@@ -1,0 +1,609 @@
+"""Candidate terms that nobody listed: change points, ripple of the gears, and laws of any quantity at any place.
+
+Change points: every run of rows in the order of measurement is weighed at every place by a likelihood ratio (Page,
+*Biometrika* 42, 1955, for one change; Siegmund, *Annals of Statistics* 14, 1986, for a run between two), from
+cumulative sums. Rows that were set aside near each other count fully: they are what is to be explained.
+
+Ripple: a matching pursuit (Mallat and Zhang, *Matching pursuits with time-frequency dictionaries*, 1993) over all
+joints and orders at once, all that is known fitted anew beside each wave.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from itertools import islice
+
+import numpy as np
+from numpy.typing import NDArray
+
+from thermal_robot.arrays import Array
+from thermal_robot.campaign.names import CLOCK
+from thermal_robot.effects.joint_ripple import JointRipple
+from thermal_robot.effects.law import PREFIX, Discovered
+from thermal_robot.effects.quantities import quantity, unit
+from thermal_robot.inference import settings
+from thermal_robot.inference.algebra import equations_of, orthonormal, ridge, whitener, without
+from thermal_robot.inference.columns import block
+from thermal_robot.inference.exact import constant
+from thermal_robot.inference.explain import log_odds
+from thermal_robot.inference.fit import Fit
+from thermal_robot.inference.grouping import blocks, each, in_order, neighbourhoods
+from thermal_robot.inference.screening import (
+    Scanned,
+    Seats,
+    Target,
+    Thin,
+    explained_by,
+    gained,
+    independent,
+    orders,
+    peak,
+    periodogram,
+    scan,
+    shaped,
+)
+from thermal_robot.observations import Observations
+
+Rows = NDArray[np.bool_]
+Runs = NDArray[np.int64]
+"""(C, 2) first row of each run in the order of measurement, and the first behind it."""
+
+
+@dataclass(frozen=True, eq=False)
+class _Sums:
+    """Products of a place's d moves in each row (N, ·), in the order of measurement, and their cumulative sums.
+
+    They are those with each other, with the r columns of the design, and with the residual, of which ``squares`` (N,)
+    are the squared lengths; ``total`` and ``freedom`` as of a :class:`~thermal_robot.inference.screening.Seat`.
+    """
+
+    products: Array
+    summed: Array
+    squares: Array
+    size: tuple[int, int, int]
+    total: float
+    freedom: int
+
+    @classmethod
+    def of(cls, target: Target, moves: Array, order: NDArray[np.int64]) -> _Sums:
+        """Sum the moves (N, m, d) of a place over a residual."""
+        (rows, m, d), seat = moves.shape, target.seat(moves)
+        parts = (seat.weight, seat.design.transpose(2, 0, 1), seat.remainder)
+        products = np.concatenate([part.reshape(rows, -1) for part in parts], axis=1)[order]
+        summed = np.concatenate([np.zeros((1, products.shape[1])), np.cumsum(products, axis=0)])
+        squares = (target.white.reshape(rows, m) ** 2).sum(axis=1)[order]
+        return cls(products, summed, squares, (m, d, len(seat.design)), seat.total, seat.freedom)
+
+    @property
+    def fewest(self) -> int:
+        """Number of rows that a run has at least, and leaves at either end."""
+        m, d, _ = self.size
+        return settings.FEWEST_ASIDE + -(-2 * d // m)
+
+    def gains(self, sums: Array, total: float, freedom: int) -> Array:
+        """(C,) log evidence gained by a move of some rows (:attr:`Worth.gain`), from (C, ·) sums over these rows."""
+        (_, d, r), runs = self.size, len(sums)
+        whole, design = sums[:, : d * d].reshape(runs, d, d), sums[:, d * d : d * (d + r)].reshape(runs, r, d)
+        gram = whole - design.transpose(0, 2, 1) @ design
+        explained, rank = explained_by(gram, sums[:, d * (d + r) :], np.einsum("cii->ci", whole))
+        rest = np.maximum(total - explained, settings.TINY)
+        gain = 0.5 * freedom * np.log(total / rest) - 0.5 * rank * np.log(freedom)
+        return np.where((rank == 0) | (freedom - rank < settings.FEWEST_LEFT), -np.inf, gain)
+
+    def best(self, runs: Runs) -> Runs:
+        """Return (2,) the run that gains most, or the empty one where there is none."""
+        if not len(runs):
+            return np.zeros(2, dtype=np.int64)
+        sums = self.summed[runs[:, 1]] - self.summed[runs[:, 0]]
+        return np.asarray(runs[int(np.argmax(self.gains(sums, self.total, self.freedom)))])
+
+    def best_step(self) -> Runs:
+        """Return the best run from the first row, or to the last."""
+        rows = len(self.products)
+        inner = np.arange(self.fewest, rows - self.fewest + 1)
+        steps = [np.column_stack([0 * inner, inner]), np.column_stack([inner, 0 * inner + rows])]
+        return self.best(np.concatenate(steps))
+
+    def best_run(self) -> Runs:
+        """Return the best run between two changes: between marks that are spread evenly, then by pattern search."""
+        rows, least = len(self.products), self.fewest
+
+        def best(runs: Runs) -> Runs:
+            inside = (runs[:, 0] >= least) & (runs[:, 1] <= rows - least) & (runs[:, 1] - runs[:, 0] >= least)
+            return self.best(runs[inside])
+
+        marks = np.unique(np.linspace(least, rows - least, settings.EVENT_MARKS).round().astype(np.int64))
+        run, step = best(marks[np.column_stack(np.triu_indices(len(marks), 1))]), max(rows // settings.EVENT_MARKS, 1)
+        while step and run.any():
+            near = np.array([(0, 0), (-1, 0), (1, 0), (0, -1), (0, 1), (-1, -1), (1, 1), (-1, 1), (1, -1)])
+            better = best(run + step * near)
+            step = step if (better != run).any() else step // 2
+            run = better
+        return run
+
+    def shared(self, rows: Rows) -> float:
+        """Log evidence gained by a move of rows (N,), or if it is less by it in all but the few that are farthest off.
+
+        In an event all rows share, in gross errors side by side a few.
+        """
+        few, far = max(int(np.ceil(settings.EVENT_CARRYING * rows.sum())), settings.FEWEST_ASIDE), self.squares * rows
+        out = np.argsort(-far)[:few]
+        total = max(self.total - float(far[out].sum()), settings.TINY)
+        whole = self.products[rows].sum(axis=0)
+        less, freedom = whole - self.products[out].sum(axis=0), max(self.freedom - few * self.size[0], 1)
+        gain = self.gains(whole[None], self.total, self.freedom)[0]
+        return float(min(gain, self.gains(less[None], total, freedom)[0]))
+
+
+def events(fit: Fit) -> tuple[Discovered, ...]:
+    """Events that may be at work in a fit: steps in time, runs, and sessions apart; the plainest first, one a place."""
+    if fit.campaign.samples > settings.RIPPLE_ROWS or fit.campaign.samples < settings.FEWEST_WITH_EVENTS:
+        return ()
+    observations, order = fit.corrected, in_order(fit.campaign)
+    turns, joints = fit.campaign.measures == "pose", fit.campaign.robot.joint_names
+    plain = Discovered(quantity="none", shape="constant", turns=turns)
+    where = [("base", "base"), ("tool", "tool"), *(("joint", joint) for joint in joints)]
+    places = [replace(plain, kind=kind, place=place) for kind, place in where]
+    moves = [block(observations, place).columns for place in places]
+    found: dict[tuple[str, str], tuple[float, Discovered]] = {}
+    for target, instead in _targets(fit):
+        for place, own in zip(places, moves, strict=True):
+            for gain, law in _at_place(observations, place, _Sums.of(target, own, order), order):
+                # the choice among all places and runs, and the law itself, are paid for
+                law = replace(law, tried=law.tried * len(places))
+                worth, key = gain + log_odds() - float(np.log(law.tried)), (law.kind, law.place)
+                if worth > 0.0 and worth - instead > found.get(key, (0.0, law))[0]:
+                    found[key] = (worth - instead, law)
+    return tuple(law for _, law in sorted(found.values(), key=lambda item: -item[0]))
+
+
+def _targets(fit: Fit) -> Iterator[tuple[Target, float]]:
+    """Yield what a fit leaves of all rows but single gross errors, and what an event in it has to gain at least.
+
+    Once as these rows stand, once less of what is far off; and without each effect, which may stand in for an event:
+    that has to gain more than the effect does.
+    """
+    e = fit.explanation
+    single = e.outliers & ~gathered(fit, e.outliers)
+    blocks = e.best.blocks
+
+    def target(some: Iterable[int], trusted: Rows) -> Target:
+        design = np.concatenate([e.linear.frames, *(e.linear.blocks[b].columns for b in some)], axis=2)
+        return Target.of(e.linear.gap, design, trusted, fit.campaign.relative_noise)
+
+    yield target(blocks, ~single), 0.0
+    yield target(blocks, e.outliers & ~single), 0.0
+    for out in blocks if len(blocks) <= settings.LEFT_OUT else ():
+        rest = target([b for b in blocks if b != out], ~single)
+        yield rest, rest.worth(e.linear.blocks[out].columns).gain
+
+
+def gathered(fit: Fit, aside: Rows) -> Rows:
+    """(N,) those rows set aside that have others near them in the order of measurement: more than chance puts there."""
+    order = in_order(fit.campaign)
+    near = np.convolve(aside[order], np.ones(2 * settings.NEAR_IN_ORDER + 1), "same")
+    found = np.zeros_like(aside)
+    found[order] = near >= settings.FEWEST_ASIDE
+    return found & aside
+
+
+def _at_place(
+    observations: Observations, place: Discovered, sums: _Sums, order: NDArray[np.int64]
+) -> Iterator[tuple[float, Discovered]]:
+    """Yield what the best step, run and session at a place gain, and their laws, with how many were tried there."""
+    rows, labels = len(order), observations.campaign.labels.get("session")
+    sessions = {} if labels is None else {str(label): labels == label for label in np.unique(labels)}
+    kinds, inner = 3 if len(sessions) > 1 else 2, max(rows - 2 * sums.fewest + 1, 0)
+    name = next((name for name in CLOCK if observations.varies(name)), "order")
+    clock = np.asarray(quantity(observations, name), dtype=float)
+    for run, tried in ((sums.best_step(), inner), (sums.best_run(), inner**2)):
+        inside, ordered = np.zeros(rows, dtype=bool), clock[order]
+        inside[run[0] : run[1]] = True
+        ends = tuple(float(0.5 * (ordered[k - 1] + ordered[k])) for k in run if 0 < k < rows)
+        if ends[:1] != ends[1:]:  # there is a run, and not all of it at one time
+            law = replace(place, quantity=name, shape="step" if len(ends) == 1 else "run", marks=ends)
+            law = replace(
+                law, origin=float(clock.min()), span=float(np.ptp(clock)), unit=unit(observations.robot, name)
+            )
+            yield sums.shared(inside), replace(law, tried=float(kinds * tried))
+    for number, own in sorted(enumerate(sessions.values()), key=lambda item: item[1].sum()):
+        if kinds == 3 and sums.fewest <= own.sum() < rows - sums.fewest:
+            law = replace(place, quantity="session", shape="apart", marks=(float(number),), labels=tuple(sessions))
+            law = replace(law, origin=0.0, span=len(sessions) - 1.0, tried=float(kinds * len(sessions)))
+            yield sums.shared(own[order]), law
+
+
+@dataclass(frozen=True, eq=False)
+class HeldOut:
+    """Cross-validation of a ridge regression, from sums of products over the rows of each of F folds.
+
+    ``stacks`` (n·m, K + 1) are the weighted columns in each fold, the values last, ``products`` (F, K + 1, K + 1).
+    """
+
+    folds: Sequence[Rows]
+    stacks: tuple[Array, ...]
+    products: Array
+
+    @classmethod
+    def of(cls, columns: Array, values: Array, folds: Sequence[Rows]) -> HeldOut:
+        """Sum columns (N, m, K) and values (N, m) over folds that divide the rows."""
+        stack = np.concatenate([columns, values[:, :, None]], axis=2)
+        stacks = tuple(equations_of(stack[fold]) for fold in folds)
+        return cls(folds, stacks, np.array([own.T @ own for own in stacks]))
+
+    def left(self, flat: int, prior: Array, further: Array | None = None) -> float:
+        """Sum of squares that fits to the other rows leave in each fold, in units of the noise.
+
+        The first ``flat`` columns have no prior, the others ``prior`` (K − flat,), 1/variance; ``further`` columns
+        (N, m, k) may join.
+        """
+        products = self.products if further is None else self._with(further)
+        whole, total = products.sum(axis=0), 0.0
+        for own in products:
+            fitted = np.append(ridge(whole - own, flat, prior), -1.0)
+            total += float(fitted @ own @ fitted)
+        return total
+
+    def _with(self, further: Array) -> Array:
+        size, more = self.products.shape[1] - 1, further.shape[2]
+        old, new = np.array([*range(size), size + more]), np.arange(size, size + more)
+        found = np.empty((len(self.products), size + more + 1, size + more + 1))
+        for own, before, stack, fold in zip(found, self.products, self.stacks, self.folds, strict=True):
+            flat = equations_of(further[fold])
+            own[np.ix_(old, old)], own[np.ix_(new, new)] = before, flat.T @ flat
+            own[np.ix_(old, new)] = beside = stack.T @ flat
+            own[np.ix_(new, old)] = beside.T
+        return found
+
+
+def waves(fit: Fit) -> JointRipple:
+    """Return the ripple that the remainder of a fit shows, beside all its other effects; without waves where none does.
+
+    The chance of the best of so many orders counts: a wave costs the logarithm of the number of independent orders of
+    all joints (Baluev, *MNRAS* 385, 2008), one that another joint has that of the number of such waves. It must gain
+    that in all equations, and in one a row, the part of the remainder that goes with the joint: what else is left is
+    rarely independent in the components of a pose. And rows held out by time must be left with no more than without
+    it, regions held out with hardly more.
+    """
+    thin = Thin.of(fit)
+    others = [b for b in fit.explanation.best.blocks if not isinstance(thin.linear.blocks[b].effect, JointRipple)]
+    return _Pursuit.of(thin, others, fit).run(_waves_of(fit))
+
+
+def _waves_of(fit: Fit) -> list[_Wave]:
+    """Return the waves that a fit holds: the pursuit goes on from them."""
+    held = next((effect for effect, _ in fit.effects if isinstance(effect, JointRipple)), JointRipple())
+    each = held.tried ** (1.0 / max(len(held.orders), 1))
+    return [_Wave(joint, order, each) for joint, order in zip(held.joints, held.orders, strict=True)]
+
+
+def alike(one: JointRipple, other: JointRipple) -> bool:
+    """Whether two ripples have the same waves, but for what refining their orders may move these by."""
+    first, second = (sorted(zip(ripple.joints, ripple.orders, strict=True)) for ripple in (one, other))
+    return [joint for joint, _ in first] == [joint for joint, _ in second] and np.allclose(
+        [order for _, order in first], [order for _, order in second], rtol=0.0, atol=settings.SAME_ORDER
+    )
+
+
+@dataclass(frozen=True)
+class _Wave:
+    """A wave of a joint, and among how many it was picked."""
+
+    joint: str
+    order: float
+    tried: float
+
+
+@dataclass(frozen=True, eq=False)
+class _Pursuit:
+    """Waves that are found one after another (matching pursuit), at the rows that are looked at.
+
+    ``gap`` (N, m) is what all effects and waves explain; ``design`` (N, m, K) the columns of ``flat`` frame parameters
+    and the other effects, ``prior`` (K − flat,) one over their prior variances; ``grids`` the orders tried by joint,
+    ``folds`` the rows (N,) of each fold by scheme; rows that are ``changed`` (N,) weigh fully, however far they are.
+    """
+
+    observations: Observations
+    gap: Array
+    design: Array
+    flat: int
+    prior: Array
+    grids: dict[str, Array]
+    folds: tuple[list[Rows], ...]
+    changed: Rows
+
+    @classmethod
+    def of(cls, thin: Thin, others: Sequence[int], fit: Fit) -> _Pursuit:
+        linear, best, campaign = thin.linear, fit.explanation.best, thin.observations.campaign
+        columns = [linear.blocks[b].columns for b in others]
+        sizes = [linear.blocks[b].sizes * best.scales[b] for b in others]
+        robot = campaign.robot
+        grids = {
+            joint: _orders(campaign.q[:, j], robot.joint_types[j] == "prismatic")
+            for j, joint in enumerate(robot.joint_names)
+        }
+        return cls(
+            thin.observations,
+            linear.gap,
+            np.concatenate([linear.frames, *columns], axis=2),
+            linear.frames.shape[2],
+            np.concatenate([np.zeros(0), *sizes]) ** -2.0,
+            {joint: grid for joint, grid in grids.items() if len(grid)},
+            (each(blocks(campaign)), each(neighbourhoods(campaign, settings.FOLDS))),
+            thin.changed,
+        )
+
+    @property
+    def allowed(self) -> Array:
+        """(S,) how much more may be left in rows held out by each scheme than before: by time nothing."""
+        return np.array([1.0, settings.WORSE_ELSEWHERE**2])
+
+    @property
+    def price(self) -> float:
+        """Number of independent waves among which the best is picked."""
+        return max(sum(independent(grid) for grid in self.grids.values()), 1.0)
+
+    def run(self, found: list[_Wave]) -> JointRipple:
+        """Return the waves, beginning with those that were found before."""
+        astray, target = np.ones(len(self.folds)), self._target(found)
+        while len(found) < settings.MOST_WAVES:
+            wider = self._wider(found, astray, target)
+            if wider is None:
+                break
+            found, astray = wider
+            target = self._target(found, target)
+        return _ripple(self._pruned(found, target))
+
+    def _wider(self, found: list[_Wave], astray: Array, target: Target) -> tuple[list[_Wave], Array] | None:
+        """Return the waves with the one that is worth most of those that do no harm; ``None`` where none is worth it.
+
+        ``astray`` (S,) is what rows held out are left with by each scheme, times the least that any wave before left.
+        """
+        along = {joint: _along(target, self._moves(joint)[1][:, :, 0]) for joint in self.grids}
+        root, columns = target.root[:, :, None], self._columns(found)
+        held = [HeldOut.of(columns * root, self.gap * target.root, folds) for folds in self.folds]
+        prior = np.concatenate([self.prior, self._priors(found)])
+        before = np.array([one.left(self.flat, prior) for one in held])
+        seen = list(found)
+        for _ in range(settings.WAVES_REFUSED):
+            worth = [
+                (self._gain(target, along[wave.joint], wave) - np.log(wave.tried), wave)
+                for wave in self._peaks(target, found, seen)
+            ]
+            offered = [wave for gain, wave in sorted(worth, key=lambda item: -item[0]) if gain > 0.0]
+            if not offered:
+                break
+            for wave in offered:
+                further, more = self._wave(wave) * root, np.concatenate([prior, self._priors([wave])])
+                left = astray * np.array([one.left(self.flat, more, further) for one in held]) / before
+                if (left <= self.allowed).all():
+                    return [*found, wave], np.maximum(left, 1.0)
+                seen.append(wave)
+        return None
+
+    def _pruned(self, found: list[_Wave], target: Target) -> list[_Wave]:
+        """Backward elimination: return the waves less those that later ones made needless."""
+        kept = list(found)
+        while kept:
+            whole = self._columns(kept) * target.root[:, :, None]
+            values, last = self.gap * target.root, whole.shape[2] - 2 * np.arange(len(kept), 0, -1)
+            worth = _dropped(equations_of(whole), values.ravel(), last)
+            for joint in {wave.joint for wave in kept}:
+                way = _way(target, self._moves(joint)[1][:, :, 0])[0]
+                own = [k for k, wave in enumerate(kept) if wave.joint == joint]
+                alone = _dropped(np.einsum("nm,nmk->nk", way, whole), (way * values).sum(axis=1), last[own])
+                worth[own] = np.minimum(worth[own], alone)
+            worth -= np.log([wave.tried for wave in kept])
+            if worth.min() > 0.0:
+                break
+            kept.pop(int(np.argmin(worth)))
+        return kept
+
+    def _peaks(self, target: Target, found: Sequence[_Wave], seen: Sequence[_Wave]) -> Iterator[_Wave]:
+        """Yield each joint's best wave beyond those that were seen, and its best of the orders of other joints.
+
+        Joints of one size have gears of one kind: a wave that another joint has is one of few.
+        """
+        for joint, grid in self.grids.items():
+            q, moves = self._moves(joint)
+            width = np.pi / float(np.ptp(q))
+            free, echo = np.ones(len(grid), dtype=bool), np.zeros(len(grid), dtype=bool)
+            for wave in seen:
+                free &= (wave.joint != joint) | (np.abs(grid - wave.order) > width)
+            for wave in found:
+                echo |= (wave.joint != joint) & (np.abs(grid - wave.order) <= width)
+            seat = target.seat(moves)
+            gains = np.where(free, periodogram(seat, q, grid), -np.inf)
+            for among, tried in ((free, self.price), (free & echo, float(len(found) * len(self.grids)))):
+                if among.any():
+                    best = int(np.argmax(np.where(among, gains, -np.inf)))
+                    order = peak(seat, q, grid[best : best + 1]) if np.isfinite(gains[best]) else 0.0
+                    if grid[0] <= order <= grid[-1]:  # what peaks beyond is no ripple
+                        yield _Wave(joint, order, tried)
+
+    def _wave(self, wave: _Wave) -> Array:
+        """(N, m, 2) what sine and cosine of a wave do."""
+        q, moves = self._moves(wave.joint)
+        return np.asarray(moves * np.column_stack([np.sin(wave.order * q), np.cos(wave.order * q)])[:, None, :])
+
+    def _columns(self, found: Sequence[_Wave]) -> Array:
+        """(N, m, K + 2W) the design and waves, in this order."""
+        return np.concatenate([self.design, *(self._wave(wave) for wave in found)], axis=2)
+
+    def _priors(self, found: Sequence[_Wave]) -> Array:
+        """(2W,) one over the prior variance of the amplitudes of waves."""
+        return block(self.observations, _ripple(found)).sizes ** -2.0
+
+    def _target(self, found: Sequence[_Wave], like: Target | None = None) -> Target:
+        relative = self.observations.campaign.relative_noise
+        return Target.of(self.gap, self._columns(found), self.changed, relative, like)
+
+    def _moves(self, joint: str) -> tuple[Array, Array]:
+        """(N,) positions of a joint, and (N, m, 1) what a unit of it moves."""
+        j = self.observations.robot.joint_names.index(joint)
+        return self.observations.q[:, j], self.observations.joint_sensitivity[:, : self.gap.shape[1], j, None]
+
+    def _gain(self, target: Target, along: Target, wave: _Wave) -> float:
+        """Return the log evidence that a wave gains: the lesser of all equations and of one a row, along its joint."""
+        q, _ = self._moves(wave.joint)
+        functions = np.column_stack([np.sin(wave.order * q), np.cos(wave.order * q)])
+        return min(target.worth(self._wave(wave)).gain, along.worth(functions[:, None, :]).gain)
+
+
+def _dropped(columns: Array, values: Array, pairs: NDArray[np.int64]) -> Array:
+    """(W,) log evidence that each pair of columns (E, K) gains beside all others, by their fit without it.
+
+    Without a pair the sum of squares is larger by β_wᵀ C_ww⁻¹ β_w, β the values fitted and C their covariance.
+    """
+    root = whitener(columns.T @ columns)
+    fitted = root @ (root.T @ (columns.T @ values))
+    rest = max(float(((values - columns @ fitted) ** 2).sum()), settings.TINY)
+    own = np.column_stack([pairs, pairs + 1])
+    inner = root[own] @ root[own].transpose(0, 2, 1)
+    more = np.einsum("wi,wi->w", fitted[own], np.linalg.solve(inner, fitted[own][:, :, None])[:, :, 0])
+    return np.array([gained(rest + each, each, 2, len(values) - root.shape[1] + 2) for each in more])
+
+
+def _ripple(waves: Sequence[_Wave]) -> JointRipple:
+    found = JointRipple()
+    for wave in waves:
+        found = found.having(wave.joint, wave.order, wave.tried)
+    return found
+
+
+def _orders(q: Array, slides: bool) -> Array:
+    """(K,) orders that are tried in a joint at positions (N,): those of which its range holds a whole wave."""
+    grid = orders(q, slides)
+    least = 2.0 * np.pi / max(float(np.ptp(q)), settings.TINY)
+    return grid[grid >= (least if slides else max(least, settings.LOWEST_RIPPLE))]
+
+
+def _way(target: Target, moves: Array) -> tuple[Array, Array]:
+    """(N, m) unit vectors along what a joint moves, moves (N, m) weighted, and (N,) how far."""
+    own = moves * target.root
+    length = np.linalg.norm(own, axis=1)
+    return own / np.where(length > 0.0, length, 1.0)[:, None], length
+
+
+def _along(target: Target, moves: Array) -> Target:
+    """Return the target of one equation a row: the part of it that goes with moves (N, m) of one joint, a unit each."""
+    way, length = _way(target, moves)
+    basis = orthonormal(np.einsum("nm,nmr->nr", way, target.basis.reshape(*way.shape, -1)))
+    white = np.einsum("nm,nm->n", way, target.white.reshape(way.shape))
+    return Target(without(white, basis), length[:, None], basis)
+
+
+@dataclass(frozen=True, eq=False)
+class Discovery:
+    """A law of a fit with its probability, and rival places and quantities with theirs, the most probable first."""
+
+    law: Discovered
+    probability: float
+    places: tuple[tuple[tuple[str, str], float], ...]
+    quantities: tuple[tuple[str, float], ...]
+
+
+def candidates(fit: Fit, number: int, happened: Sequence[Discovered]) -> tuple[Discovered, ...]:
+    """Laws that may be worth their place, best first, the events that may have happened before all others.
+
+    Scanned are the remainders of the explanation and, unless one effect leaves but noise, of the laws alone and without
+    each effect: known effects may have absorbed an unlisted cause. A law is called ``discovered.<number>``.
+    """
+    thin = Thin.of(fit)
+    remainders = list(dict.fromkeys(_remainders(fit)))
+    targets = [thin.target(blocks) for blocks in remainders]
+    if fit.explanation.outliers.any():
+        targets += [thin.target(blocks, sound=True) for blocks in remainders[:2]]
+    found, _ = scan(thin.observations, targets, [effect for own in fit.variants.values() for effect in own[:1]])
+    offered = [_offered(thin, target, own) for target, own in zip(targets, found, strict=True)]
+    chosen = list(happened[: settings.LIKELY_EVENTS])
+    for k in range(max(map(len, offered), default=0)):  # the first of each remainder, in turn
+        chosen += [own[k] for own in offered if k < len(own)]
+    named = dict.fromkeys(replace(law, name=f"{PREFIX}{number}") for law in chosen)
+    return tuple(islice((law for law in named if not listed(thin, law)), settings.COMPARED_LAWS))
+
+
+def listed(thin: Thin, law: Discovered) -> bool:
+    """Whether a known effect in that joint, with a zero that is off, does exactly what a law does: then it is none."""
+    if law.kind != "joint":
+        return False
+    own = [item for item in thin.linear.blocks if item.effect.places == (law.place,)]
+    free = [item.columns for item in own if constant(item.effect, thin.observations)] + [thin.linear.frames]
+    columns = equations_of(block(thin.observations, law).columns)
+    length = np.linalg.norm(columns, axis=0).max()
+    for item in own:
+        basis = orthonormal(equations_of(np.concatenate([item.columns, *free], axis=2)))
+        if np.linalg.norm(without(columns, basis), axis=0).max() < settings.ALIAS * length:
+            return True
+    return False
+
+
+def _remainders(fit: Fit) -> Iterator[tuple[int, ...]]:
+    """Yield the blocks of the explanation that are taken out of each remainder that is scanned."""
+    best = fit.explanation.best.blocks
+    laws = tuple(b for b in best if fit.families[b].startswith(PREFIX))
+    effects = [b for b in best if b not in laws]
+    yield best
+    if len(effects) > 1 or fit.explanation.discrepancy.probability > settings.SMOOTH_PRIOR:
+        yield laws
+    if 2 < len(effects) <= settings.LEFT_OUT or (len(effects) == 2 and laws):
+        yield from (tuple(b for b in best if b != out) for out in effects)
+
+
+def _offered(thin: Thin, target: Target, own: Sequence[Scanned]) -> list[Discovered]:
+    """Return a remainder's best laws, at a segment also in the joint behind it, with how many it was picked among."""
+    first = [(item, shaped(thin.observations, target, item.law)) for item in _with_joints(own)]
+    joints = thin.observations.robot.joint_names
+    at_links = [(item, s) for item, s in first if s.law.kind == "link" and s.law.place in joints]
+    if at_links:
+        simpler = [replace(s.law, kind="joint") for _, s in at_links]
+        gains = Seats(thin.observations, [target]).gains(simpler)[0]
+        first += [
+            (item, replace(s, law=law, gain=float(gain)))
+            for (item, s), law, gain in zip(at_links, simpler, gains, strict=True)
+        ]
+    worth = [(s.gain - float(np.log(item.tried * s.tried)), item, s) for item, s in first]
+    worth.sort(key=lambda entry: -entry[0])
+    return [replace(s.law, tried=float(item.tried * s.tried)) for gain, item, s in worth if gain > -settings.RUNG_REACH]
+
+
+def _with_joints(own: Sequence[Scanned]) -> list[Scanned]:
+    """Return the best candidates; where one is at a segment, also the law of the joint behind it, which is simpler."""
+    first = list(own[: settings.SHAPED])
+    simpler = {(i.law.place, i.law.follows) for i in first if i.law.kind == "link"}
+    return first + [
+        i for i in own[settings.SHAPED :] if i.law.kind == "joint" and (i.law.place, i.law.follows) in simpler
+    ]
+
+
+def discovered(fit: Fit) -> tuple[Discovery, ...]:
+    """Return the laws of a fit with the probabilities of their places and quantities among all that were compared."""
+    e = fit.explanation
+    laws = {b: item.effect for b, item in enumerate(e.linear.blocks) if isinstance(item.effect, Discovered)}
+    found = []
+    for b in e.best.blocks:
+        if b in laws:
+            rivals = {k: law for k, law in laws.items() if law.name == laws[b].name}
+            places: dict[tuple[str, str], float] = {}
+            followed: dict[str, float] = {}
+            same = 0.0
+            for combination, w in zip(e.combinations, e.probabilities, strict=True):
+                for law in (rivals[k] for k in combination.blocks if k in rivals):
+                    place = where(fit, law)
+                    places[place] = places.get(place, 0.0) + float(w)
+                    followed[law.follows] = followed.get(law.follows, 0.0) + float(w)
+                    same += float(w) * ((place, law.follows) == (where(fit, laws[b]), laws[b].follows))
+            found.append(Discovery(laws[b], min(same, 1.0), _sorted(places), _sorted(followed)))
+    return tuple(found)
+
+
+def _sorted(found: dict) -> tuple:  # type: ignore[type-arg]
+    return tuple(sorted(found.items(), key=lambda item: -item[1]))
+
+
+def where(fit: Fit, law: Discovered) -> tuple[str, str]:
+    """Return a law's place as a diagnosis names it: a segment by the link that carries it."""
+    if law.kind != "link":
+        return law.kind, law.place
+    return "link", next(s.parent_link for s in fit.campaign.robot.segments if s.name == law.place)
