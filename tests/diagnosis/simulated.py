@@ -72,12 +72,11 @@ def on_fresh(explanation, block, fresh):
 
 def forced(known, item):
     """The same fit, said to hold one block more and no discrepancy: no evidence speaks against what a prior knows."""
-    e, white = known.explanation, replace(known.explanation.whitening, smooth=None)
+    e = known.explanation
     linear = replace(e.linear, blocks=(*(e.linear.blocks[b] for b in e.best.blocks), item))
     families = tuple(b.effect.name for b in linear.blocks)
     every, noise = range(len(families)), Noise.of(known.campaign)
-    how = {"families": families, "starts": [every], "outliers": e.outliers, "known": white}
-    said = explain(linear, noise, log_prior=[CERTAIN] * len(families), **how)
+    said = explain(linear, noise, families=families, starts=[every], before=e, log_prior=[CERTAIN] * len(families))
     assert said.best.blocks == tuple(every)
     effects = tuple((b.effect, said.values[k][0]) for k, b in enumerate(linear.blocks))
     return replace(known, explanation=said, effects=effects, families=families)
