@@ -612,8 +612,8 @@ def _tried(errors: Array, variance: Array, command: Array, slack: float) -> tupl
     for low, high in pairwise(bands):
         here, frequency = float(np.sqrt(low * high)), np.arange(low, high, width)
         series = _series(errors * here, known * here**2, slack)
-        waves = [_sums(c, k * command, low, width, len(frequency)) for k, c in enumerate(series.T)]
-        of_phase = np.fft.irfft(np.stack(waves), settings.STEP_PHASES, axis=0) + len(errors) * np.log(here)
+        waves = _sums(series, command, low, width, len(frequency))
+        of_phase = np.fft.irfft(waves, settings.STEP_PHASES, axis=0) + len(errors) * np.log(here)
         likelihoods.append(logsumexp(of_phase, axis=0) - np.log(settings.STEP_PHASES))
         frequencies.append(frequency)
     return np.concatenate(frequencies), np.concatenate(likelihoods)
@@ -636,15 +636,19 @@ def _series(errors: Array, variance: Array, slack: float) -> NDArray[np.complex1
     return np.asarray(np.fft.rfft(logsumexp(each, axis=1), axis=1)[:, : settings.STEP_HARMONICS + 1])
 
 
-def _sums(weight: NDArray[np.complex128], place: Array, lowest: float, width: float, count: int) -> Array:
-    """(count,) Fourier sums Σ weight exp(-2π i f place) at frequencies f that begin at the lowest, a width apart.
+def _sums(weights: NDArray[np.complex128], place: Array, lowest: float, width: float, count: int) -> Array:
+    """(H, count) Fourier sums Σ weight exp(-2π i k f place) of weights (K, H), k = 0…, at frequencies a width apart.
 
     A frequency is a coarse one and a fine one, so that the sums are a product of two small matrices.
     """
     fine = int(np.sqrt(count)) + 1
     coarse = lowest + width * fine * np.arange(-(-count // fine))
     first, second = (np.exp(-2j * np.pi * np.outer(f, place)) for f in (coarse, width * np.arange(fine)))
-    return np.asarray(((weight * first) @ second.T).ravel()[:count])
+    found, own, beside = [], np.ones_like(first), np.ones_like(second)
+    for weight in weights.T:
+        found.append(((weight * own) @ beside.T).ravel()[:count])
+        own, beside = own * first, beside * second
+    return np.array(found)
 
 
 def stepped(log_factors: Iterable[float]) -> float:
