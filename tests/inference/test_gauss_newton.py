@@ -22,6 +22,11 @@ SETTLED = 1e-4  # standard deviations
 NOISE = 25e-6  # m
 
 
+def products_of(design, gap):
+    stack = np.column_stack([design, gap])
+    return stack.T @ stack
+
+
 def explained(campaign, effects):
     """Frames fitted to the nominal robot, and the explanation by all of some effects, linearised there."""
     seen = observe(campaign, register(campaign))
@@ -150,7 +155,7 @@ def test_a_step_minimises_misfit_and_prior_together():
     rng = np.random.default_rng(0)
     design, gap = rng.normal(size=(40, 7)), rng.normal(size=40)
     state, prior = rng.normal(size=4), rng.uniform(0.1, 2.0, 4)
-    step, size = _ridge_step(design, gap, state, prior, 0.0)
+    step, size = _ridge_step(products_of(design, gap), state, prior, 0.0)
     rows = np.vstack([design, np.hstack([np.zeros((4, 3)), np.diag(1.0 / prior)])])
     wanted = np.linalg.lstsq(rows, np.concatenate([gap, -state / prior]), rcond=None)[0]
     np.testing.assert_allclose(step, wanted, rtol=1e-9)
@@ -164,7 +169,7 @@ def test_a_damped_step_is_shorter_and_goes_downhill():
     down = design.T @ gap - np.concatenate([np.zeros(3), state])
     lengths = []
     for damping in settings.DAMPINGS:
-        step, _ = _ridge_step(design, gap, state, prior, damping)
+        step, _ = _ridge_step(products_of(design, gap), state, prior, damping)
         assert step @ down > 0.0
         lengths.append(np.linalg.norm(step))
     assert (np.diff(lengths) < 0.0).all()
@@ -173,7 +178,7 @@ def test_a_damped_step_is_shorter_and_goes_downhill():
 def test_directions_that_nothing_determines_are_not_moved():
     rng = np.random.default_rng(1)
     column = rng.normal(size=(30, 1))
-    step, _ = _ridge_step(np.hstack([column, -column]), rng.normal(size=30), np.zeros(0), np.zeros(0), 0.0)
+    step, _ = _ridge_step(products_of(np.hstack([column, -column]), rng.normal(size=30)), np.zeros(0), np.zeros(0), 0.0)
     assert step[0] == pytest.approx(-step[1], rel=1e-9)
     assert abs(step.sum()) < 1e-9 * abs(step[0])
 

@@ -82,8 +82,9 @@ def _descended(
         flat, names = frame_columns(observations)
         items = tuple(block(observations, effect) for effect in effects)
         stack = whitened(Linear(observations.gap, flat, items), beside)
+        products = stack.T @ stack
         for damping in settings.DAMPINGS:
-            step, size = _step_inside(stack[:, :-1], stack[:, -1], state, prior, least, damping)
+            step, size = _step_inside(products, state, prior, least, damping)
             tried = moved(frames, step[: len(names)], names), np.maximum(state + step[len(names) :], least)
             there = corrected_observations(campaign, tried[0], pairs(tried[1]))
             if (after := left(there, tried[1])) <= cost or size < settled:
@@ -96,27 +97,26 @@ def _descended(
     return observations, pairs(state), cost
 
 
-def _step_inside(
-    design: Array, gap: Array, state: Array, prior: Array, least: Array, damping: float
-) -> tuple[Array, float]:
+def _step_inside(products: Array, state: Array, prior: Array, least: Array, damping: float) -> tuple[Array, float]:
     """Return the damped ridge step after which nothing is below its least, 0 or −∞: what would be is held at zero."""
-    flat, held = design.shape[1] - len(prior), np.zeros(len(prior), dtype=bool)
+    flat, held = len(products) - 1 - len(prior), np.zeros(len(prior), dtype=bool)
     while True:
-        step, size = _ridge_step(design, gap, state, np.where(held, settings.LEAST_HELD * prior, prior), damping)
+        step, size = _ridge_step(products, state, np.where(held, settings.LEAST_HELD * prior, prior), damping)
         below = ~held & (state + step[flat:] < least)
         if not below.any():
             return step, size
         held |= below
 
 
-def _ridge_step(design: Array, gap: Array, state: Array, prior: Array, damping: float) -> tuple[Array, float]:
+def _ridge_step(products: Array, state: Array, prior: Array, damping: float) -> tuple[Array, float]:
     """Return the step that minimises |gap − design step|² + |(state + step)/prior|², and what it moves, in noise.
 
-    The first columns have no prior. Directions that nothing determines are not moved. A step along directions that do
-    nearly the same moves little, however long it is.
+    ``products`` are those of the columns of the design and of the gap, the last. The first columns have no prior.
+    Directions that nothing determines are not moved. A step along directions that do nearly the same moves little,
+    however long it is.
     """
-    flat = design.shape[1] - len(prior)
-    matrix, vector = design.T @ design, design.T @ gap
+    matrix, vector = products[:-1, :-1].copy(), products[:-1, -1].copy()
+    flat = len(matrix) - len(prior)
     matrix[np.arange(flat, len(matrix)), np.arange(flat, len(matrix))] += 1.0 / prior**2
     vector[flat:] -= state / prior**2
     matrix.ravel()[:: len(matrix) + 1] *= 1.0 + damping  # Levenberg and Marquardt
