@@ -27,7 +27,6 @@ from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.turning import moves
 from thermal_robot.diagnosis.values import FoldScheme, HeldOut
 from thermal_robot.effects.law_words import is_event
-from thermal_robot.effects.quantities import resolution, varies
 from thermal_robot.errors import EstimationError
 from thermal_robot.inference import settings
 from thermal_robot.inference.algebra import equations_of, ridge, whitener
@@ -428,7 +427,7 @@ def schemes(fit: Fit) -> Iterator[tuple[str, str, list[Rows]]]:
     if session is not None and len(set(session.tolist())) > 1:
         yield "session", "one session after the other", each(np.unique(session, return_inverse=True)[1])
     temperature = _temperature(campaign)
-    if temperature is not None and varies(temperature, resolution(temperature, "°C")):
+    if temperature is not None and np.ptp(temperature) > 0.0:
         yield "temperature", "the coldest fifth, and the warmest", _ends(temperature)
     yield "region", "neighbourhoods of joint positions", each(neighbourhoods(campaign, settings.FOLDS))
     reach = np.linalg.norm(fit.nominal.position, axis=1)
