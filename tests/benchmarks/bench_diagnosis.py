@@ -31,10 +31,9 @@ CASES = ("demo", "100 rows, no effect", "100 rows, one effect", "100 rows, unlis
 
 def unlisted(campaign):
     """Add to a sound campaign a turn of the second joint that no effect follows: by the first, with sharp edges."""
-    from thermal_robot import observe
-    from thermal_robot.inference.registration import register
+    from thermal_robot import diagnose
 
-    seen = observe(campaign, register(campaign))
+    seen = diagnose(campaign, only="joint_offset").fit.nominal
     turn = 1.5e-4 * np.tanh(4.0 * np.sin(2.0 * campaign.q[:, 0])) * (1.0 + 0.4 * campaign.q[:, 2])
     moved = seen.joint_sensitivity[:, :3, 1] * turn[:, None]
     return replace(campaign, position=campaign.position + moved @ seen.frames.base[:3, :3].T)
