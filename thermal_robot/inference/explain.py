@@ -96,6 +96,14 @@ class Ladder:
         found.searches = {rung: search for rung, search in left.items() if search.seen or rung == PLAIN}
         return found
 
+    def bare(self) -> Ladder:
+        """Return the same without the rows' columns, unless what is anew in every pose may still ask for them."""
+        if any(form.anew for form in self.forms):
+            return self
+        found = copy(self)
+        found.stack, found._stack = None, replace(self._stack, different=())
+        return found
+
     def _consider(self, form: Form, log_prior: float) -> int:
         """Add a form, which shares its prior among all sizes; return its number.
 
@@ -520,7 +528,7 @@ class _Asked:
     log_prior: Sequence[float]
     rivals: frozenset[frozenset[int]]
     forms: int
-    stack: Stack
+    stack: Stack | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -607,7 +615,7 @@ class _Round:
             aside,
             Discrepancy(self.form, self.rung[1], 1.0 - odds.get("", 0.0), odds, self.best.noise),
             ladder.in_question(self.best),
-            self,
+            replace(self, asked=replace(self.asked, stack=None), ladder=ladder.bare()),
         )
 
 
