@@ -172,7 +172,6 @@ def test_figures_are_consistent(cases):
 
 
 @pytest.mark.slow
-@pytest.mark.xfail(reason="0.87: links that bend are within three nats of it, as the answer says", strict=True)
 @pytest.mark.parametrize("arm", ["ur10"], indirect=True)
 def test_a_soft_base_under_a_ur10_is_as_sure_as_all_others(cases):
     own = next(case.found.finding(case.name) for case in cases if case.name == DOUBTED[1])
