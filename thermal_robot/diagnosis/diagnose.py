@@ -14,11 +14,10 @@ from threadpoolctl import threadpool_limits
 from thermal_robot.campaign import Campaign, read_campaign
 from thermal_robot.campaign.names import did_you_mean
 from thermal_robot.diagnosis.answer import Conclusion, answer
-from thermal_robot.diagnosis.attribution import without_laws
 from thermal_robot.diagnosis.cross_validation import held_out
 from thermal_robot.diagnosis.data_checks import as_counted, not_executed, usable
 from thermal_robot.diagnosis.data_faults.misfit import another_motion, delivered, frames_alone, unfit
-from thermal_robot.diagnosis.prune import as_laws_say, beside_scatter, grown, pruned
+from thermal_robot.diagnosis.prune import beside_scatter, concluded, grown, pruned
 from thermal_robot.diagnosis.residual_tests import examine
 from thermal_robot.diagnosis.result import Diagnosis, told
 from thermal_robot.diagnosis.uncertainty import as_remainder_says
@@ -27,7 +26,6 @@ from thermal_robot.effects import RANDOM, Effect, choose, library
 from thermal_robot.errors import CampaignError, EstimationError, require
 from thermal_robot.inference import settings
 from thermal_robot.inference.fit import Fit, fit, require_enough
-from thermal_robot.inference.generate import discovered
 from thermal_robot.inference.scatter import random_gap
 
 
@@ -170,9 +168,7 @@ def _explained(known: Fit, progress: Callable[[str], None]) -> Conclusion:
     left = examine(fit, progress)
     if left.unexplained.flagged:
         fit = as_remainder_says(fit)
-    laws = discovered(fit)
-    unexplained = as_laws_say(without_laws(fit, left.unexplained), laws, fit.explanation.discrepancy)
-    return Conclusion(fit, laws, unexplained, left, chance, refused)
+    return concluded(fit, left, chance, refused)
 
 
 def check_priors(campaign: Campaign, known: set[str]) -> None:

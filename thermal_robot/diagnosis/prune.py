@@ -22,7 +22,7 @@ from thermal_robot.effects.law_words import is_event
 from thermal_robot.inference import settings
 from thermal_robot.inference.explain import Discrepancy, explain, log_odds
 from thermal_robot.inference.fit import Fit, less, refit
-from thermal_robot.inference.generate import Discovery, alike, candidates, discovered, events, waves
+from thermal_robot.inference.generate import Discovery, alike, candidates, discovered, events, ripple_of, waves
 from thermal_robot.inference.grouping import blocks
 from thermal_robot.inference.problem import generalised
 from thermal_robot.inference.scatter import RandomGap, random_gap
@@ -57,8 +57,7 @@ def _ripple(fit: Fit) -> JointRipple | None:
     if JointRipple.name not in fit.variants or fit.campaign.samples > settings.RIPPLE_ROWS:
         return None
     found = waves(fit)
-    held = next((effect for effect, _ in fit.effects if isinstance(effect, JointRipple)), JointRipple())
-    return None if not found.orders or alike(found, held) else found
+    return None if not found.orders or alike(found, ripple_of(fit)) else found
 
 
 def as_laws_say(left: Unexplained, found: Sequence[Discovery], discrepancy: Discrepancy) -> Unexplained:
@@ -119,9 +118,14 @@ def beside_scatter(
     left = Unexplained(not chance.explains_size, 0.0, chance.p_value)
     if left.flagged:
         left = examine(fit, progress).unexplained
+    return concluded(fit, Examined(left, floor, "scatter"), chance, refused)
+
+
+def concluded(fit: Fit, left: Examined, chance: RandomGap, refused: Mapping[str, Refused]) -> Conclusion:
+    """Return what is concluded of a fit: its laws are told apart from what its known effects explain."""
     laws = discovered(fit)
-    unexplained = as_laws_say(without_laws(fit, left), laws, fit.explanation.discrepancy)
-    return Conclusion(fit, laws, unexplained, Examined(left, floor, "scatter"), chance, refused)
+    unexplained = as_laws_say(without_laws(fit, left.unexplained), laws, fit.explanation.discrepancy)
+    return Conclusion(fit, laws, unexplained, left, chance, refused)
 
 
 @dataclass(frozen=True)

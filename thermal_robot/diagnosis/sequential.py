@@ -27,7 +27,7 @@ from scipy.special import chdtri
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.campaign import appended
-from thermal_robot.diagnosis.settings import LOOSE
+from thermal_robot.diagnosis.settings import CURVED, KEPT, LOOSE, SETTLED, STEPS, WIDE
 from thermal_robot.effects import Effect
 from thermal_robot.effects.gate import checked
 from thermal_robot.inference import settings
@@ -40,10 +40,6 @@ from thermal_robot.inference.problem import Linear, Whitening, normal_equations,
 from thermal_robot.inference.registration import moved
 from thermal_robot.inference.weights import Noise, distance_limit, far_scale, judged, tail_weight
 from thermal_robot.observations import Frames
-
-WIDE = 2.0
-"""Root mean squares of the rows' moves by which rows stand off the median that are not kept one by one: of the few that
-move further, as many cross it one way as the other."""
 
 
 class Point(NamedTuple):
@@ -247,18 +243,6 @@ class Sums:
         """Return the sums of some columns, the first ones and the residual, after a step of the parameters."""
         own = np.r_[: columns - 1, -1]
         return replace(self, products=carried(self.products[..., own[:, None], own], step))
-
-
-KEPT = 500
-"""Rows that are kept one by one, more where more are in the tail; up to twice as many before sums are formed anew. A
-fit of a thousand rows takes some tens of milliseconds, and a thousand rows hold the median well inside those kept. As
-many stand for all where it is asked how firmly rows hold the parameters, and how far they are from linear."""
-SETTLED, STEPS = 1e-9, 60
-"""Deviations by which parameters, and share by which noise and scales, still move when they are found; rounds at most.
-A thousandth of what is promised; each round is about ten times nearer."""
-CURVED = 5e-6
-"""Deviations by which the curvature of the rows in the sums may move a parameter before they are linearised anew. A
-diagnosis itself ends its rounds about 1e-5 deviations from where they would come to rest."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -32,7 +32,6 @@ from thermal_robot.campaign.more_rows import more_rows
 from thermal_robot.campaign.names import CLOCK
 from thermal_robot.correction.model import CorrectedModel
 from thermal_robot.diagnosis.sequential import (
-    KEPT,
     Choice,
     Fitted,
     Judge,
@@ -45,7 +44,7 @@ from thermal_robot.diagnosis.sequential import (
     linearised,
     normal,
 )
-from thermal_robot.diagnosis.settings import LOOSE
+from thermal_robot.diagnosis.settings import FEWEST_OUTSIDE, KEPT, LEAST_RIVAL, LEVEL, LOOSE, MOST_LEAD, OUTSIDE, RIVALS
 from thermal_robot.diagnosis.values import Unexplained
 from thermal_robot.effects import Effect, gate, library
 from thermal_robot.errors import EstimationError
@@ -63,14 +62,6 @@ from thermal_robot.prediction import Spread, moves
 
 if TYPE_CHECKING:
     import pandas as pd
-
-
-LEVEL = 1e-3 / 5.0
-"""p-value of one test below which the choice falls: new rows of the same robot and the same noise make it fall once in
-a thousand updates, a chance that five tests share."""
-FEWEST_OUTSIDE, OUTSIDE = 3, 0.05
-"""Rows, and share of the new rows, beyond what was measured from which on the choice is to be made anew: a model of
-effects that were told apart inside says little of those that show outside alone."""
 
 
 @dataclass(frozen=True)
@@ -204,13 +195,6 @@ def beyond(spread: Spread | None, rows: Campaign, before: int) -> Iterator[str]:
         chance -= gammaln([n - k + 1.0, before + n + 1.0]).sum()
         if chance + np.log(len(spread.ranges)) < np.log(LEVEL):
             yield f"{k} of {n} new rows lie outside of what was measured, in {name}."
-
-
-RIVALS, LEAST_RIVAL = 8, 1e-3
-"""Combinations that are weighed again with the new rows, and their least probability against the chosen one: one of a
-thousandth needs rows that say as much as a deviation of 3.7 before it is the better one."""
-MOST_LEAD = 20.0
-"""Log odds that are told at most: beyond 5e8 : 1 nobody asks how many."""
 
 
 class Runner(NamedTuple):

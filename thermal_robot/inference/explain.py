@@ -496,27 +496,36 @@ def explain(
     log_prior = log_priors([b.effect for b in linear.blocks]) if log_prior is None else log_prior
     asked = _Asked(linear, families, log_prior, settings_of_one(families), len(forms), Stack.of(linear.columns))
     seeds = [tuple(sorted(start)) for start in starts]
-    first, beside, history = before is None, list[Form](), list[tuple[object, ...]]()
+    first, history = before is None, list[tuple[object, ...]]()
+    beside: Sequence[Form] = ()
     if before is None:
         # effects that are far off, and gross errors, are settled first, beside a noise that is free
         whitening = replace(first_whitening(linear, noise, use & ~aside), held=0.0)
     else:
         whitening, alive = replace(before.whitening, smooth=None), {form.name for form in before.forms}
         beside, form = [form for form in forms if form.name in alive], before.discrepancy.form
-        history += [(seed, form and form.words, np.packbits(whitening.weights > 0).tobytes()) for seed in seeds[:1]]
+        history += [_state(seed, form, whitening) for seed in seeds[:1]]
+
+    def settled(found: _Round) -> bool:
+        return bool(history) and (found.state in history or len(history) >= settings.FIRST_ROUNDS)
+
     while True:
         found = _Round.of(asked, whitening, beside, seeds)
-        used = np.packbits(whitening.weights > 0).tobytes()
-        if history and ((*found.state, used) in history or len(history) >= settings.FIRST_ROUNDS):
+        if settled(found):
             found = found.without(frozenset())  # weights stay: only now is it worth to look for what steps miss
-            if (*found.state, used) in history or len(history) >= settings.FIRST_ROUNDS:
+            if settled(found):
                 return found.told(aside)
-        history.append((*found.state, used))
+        history.append(found.state)
         whitening, aside = reweigh(found.rough, noise, use, found.leverage, linear.measures)
         seeds = [found.best.blocks]
-        beside = [*(forms if first else found.ladder.in_question(found.best))]
+        beside = forms if first else found.ladder.in_question(found.best)
         first = False
         del found  # before the next one takes as much memory
+
+
+def _state(blocks: tuple[int, ...], form: Form | None, whitening: Whitening) -> tuple[object, ...]:
+    """Return what tells one round from another: blocks, form of the discrepancy, and which rows are used."""
+    return blocks, form and form.words, np.packbits(whitening.weights > 0).tobytes()
 
 
 @dataclass(frozen=True, eq=False)
@@ -567,7 +576,7 @@ class _Round:
 
     @property
     def state(self) -> tuple[object, ...]:
-        return self.best.blocks, self.form and self.form.words
+        return _state(self.best.blocks, self.form, self.ladder.whitening)
 
     @property
     def rough(self) -> Array:

@@ -87,9 +87,7 @@ class _Sums:
         whole, design = sums[:, : d * d].reshape(runs, d, d), sums[:, d * d : d * (d + r)].reshape(runs, r, d)
         gram = whole - design.transpose(0, 2, 1) @ design
         explained, rank = explained_by(gram, sums[:, d * (d + r) :], np.einsum("cii->ci", whole))
-        rest = np.maximum(total - explained, settings.TINY)
-        gain = 0.5 * freedom * np.log(total / rest) - 0.5 * rank * np.log(freedom)
-        return np.where((rank == 0) | (freedom - rank < settings.FEWEST_LEFT), -np.inf, gain)
+        return gained(total, explained, rank, freedom)
 
     def best(self, runs: Runs) -> Runs:
         """Return (2,) the run that gains most, or the empty one where there is none."""
@@ -268,14 +266,16 @@ def waves(fit: Fit) -> JointRipple:
     """
     thin = Thin.of(fit)
     others = [b for b in fit.explanation.best.blocks if not isinstance(thin.linear.blocks[b].effect, JointRipple)]
-    return _Pursuit.of(thin, others, fit).run(_waves_of(fit))
+    # it goes on from the waves that the fit holds
+    held = ripple_of(fit)
+    share = held.tried ** (1.0 / max(len(held.orders), 1))
+    known = [_Wave(joint, order, share) for joint, order in zip(held.joints, held.orders, strict=True)]
+    return _Pursuit.of(thin, others, fit).run(known)
 
 
-def _waves_of(fit: Fit) -> list[_Wave]:
-    """Return the waves that a fit holds: the pursuit goes on from them."""
-    held = next((effect for effect, _ in fit.effects if isinstance(effect, JointRipple)), JointRipple())
-    each = held.tried ** (1.0 / max(len(held.orders), 1))
-    return [_Wave(joint, order, each) for joint, order in zip(held.joints, held.orders, strict=True)]
+def ripple_of(fit: Fit) -> JointRipple:
+    """Return the ripple that a fit holds, without waves where it holds none."""
+    return next((effect for effect, _ in fit.effects if isinstance(effect, JointRipple)), JointRipple())
 
 
 def alike(one: JointRipple, other: JointRipple) -> bool:
@@ -422,10 +422,14 @@ class _Pursuit:
                     if grid[0] <= order <= grid[-1]:  # what peaks beyond is no ripple
                         yield _Wave(joint, order, tried)
 
+    def _functions(self, wave: _Wave) -> Array:
+        """(N, 1, 2) sine and cosine of a wave."""
+        q, _ = self._moves(wave.joint)
+        return np.stack([np.sin(wave.order * q), np.cos(wave.order * q)], axis=1)[:, None, :]
+
     def _wave(self, wave: _Wave) -> Array:
         """(N, m, 2) what sine and cosine of a wave do."""
-        q, moves = self._moves(wave.joint)
-        return np.asarray(moves * np.column_stack([np.sin(wave.order * q), np.cos(wave.order * q)])[:, None, :])
+        return np.asarray(self._moves(wave.joint)[1] * self._functions(wave))
 
     def _columns(self, found: Sequence[_Wave]) -> Array:
         """(N, m, K + 2W) the design and waves, in this order."""
@@ -446,9 +450,7 @@ class _Pursuit:
 
     def _gain(self, target: Target, along: Target, wave: _Wave) -> float:
         """Return the log evidence that a wave gains: the lesser of all equations and of one a row, along its joint."""
-        q, _ = self._moves(wave.joint)
-        functions = np.column_stack([np.sin(wave.order * q), np.cos(wave.order * q)])
-        return min(target.worth(self._wave(wave)).gain, along.worth(functions[:, None, :]).gain)
+        return min(target.worth(self._wave(wave)).gain, along.worth(self._functions(wave)).gain)
 
 
 def _dropped(columns: Array, values: Array, pairs: NDArray[np.int64]) -> Array:
