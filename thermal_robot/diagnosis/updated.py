@@ -150,7 +150,7 @@ class Watch:
                 length = np.sqrt(np.maximum(np.diag(inside)[own], settings.TINY))
                 largest = item.bare[int(np.argmax(np.abs(inside[own, -1]) / length))]
                 best, where = chance, (item.effect.name, largest.name)
-        return min(best * len(self.tested), 1.0), where
+        return min(best * max(len(self.tested), 1), 1.0), where
 
 
 def scatter_of(left: Array, blocks: Sequence[NDArray[np.bool_]]) -> float:
@@ -253,7 +253,7 @@ def log_odds(estimate: Sequential, listed: Sequence[Runner]) -> Array:
 def _without_columns(fit: Fit, item: Block, effect: Effect) -> Block:
     """Return a block with no rows, of the effect as a model holds it."""
     nothing = np.zeros((0, fit.explanation.linear.measures, len(item.sizes)))
-    return Block(gate.delivered(effect, fit.nominal), item.bare, nothing, item.sizes, item.spread)
+    return replace(item, effect=gate.delivered(effect, fit.nominal), source=nothing)
 
 
 def _point(fit: Fit) -> Point:
