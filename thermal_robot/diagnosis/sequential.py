@@ -27,7 +27,7 @@ from scipy.special import chdtri
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.campaign import appended
-from thermal_robot.diagnosis.settings import CURVED, KEPT, LOOSE, SETTLED, STEPS, WIDE
+from thermal_robot.diagnosis import settings as own_settings
 from thermal_robot.effects import Effect
 from thermal_robot.effects.gate import checked
 from thermal_robot.inference import settings
@@ -190,7 +190,7 @@ class Guard:
         parts = self.distances(stack)
         score = (self.bend - np.linalg.norm(parts, axis=1)) / (moves(stack, self.metric, self.sigma) + self.share)
         if not self.quiet:
-            wide = 2.0 * WIDE * self.typical  # the row and the median
+            wide = 2.0 * own_settings.WIDE * self.typical  # the row and the median
             score = np.minimum(score, np.abs(parts - self.medians).min(axis=1) / wide)
         return np.where((score > 0.0) & (weights >= 1.0), score, -1.0)
 
@@ -201,7 +201,7 @@ class Guard:
         if self.quiet:
             return within and bool((rms <= settings.NOISE_SLACK * sigma[::3]).all())
         apart = np.abs(medians * ratio - self.medians).max()
-        return within and bool(apart <= WIDE * self.typical * self.reach)
+        return within and bool(apart <= own_settings.WIDE * self.typical * self.reach)
 
 
 def moves(stack: Array, metric: Array, sigma: Array) -> Array:
@@ -308,12 +308,12 @@ class Fitted(State):
 
 def settled(choice: Choice, sums: Sums, begin: State) -> Fitted:
     """Fit a choice to rows in sums and rows one by one, to the fixed point; where it begins does not matter."""
-    for _ in range(STEPS):
+    for _ in range(own_settings.REST_ROUNDS):
         found, size = _round(choice, sums, begin)
         before = np.e * found.best.noise if begin.best is None else begin.best.noise
-        still = max(abs(found.leverage - begin.leverage), abs(np.log(found.best.noise / before))) < SETTLED
+        still = max(abs(found.leverage - begin.leverage), abs(np.log(found.best.noise / before))) < own_settings.AT_REST
         begin = found
-        if size < SETTLED and still:
+        if size < own_settings.AT_REST and still:
             return found
     return replace(found, steady=False)
 
@@ -325,7 +325,7 @@ def _round(choice: Choice, sums: Sums, begin: State) -> tuple[Fitted, float]:
     state, flat = weighed(choice, sums, begin, stack[:, :, -1]), len(names)
     total = sums.after(state.step, stack.shape[2]).plus(Sums.of(stack, state.rows))
     white, linear, gram = normal(choice, total, state)
-    best = evidence(gram, tuple(range(len(choice.blocks))), 0.0, begin.best, settled=SETTLED)
+    best = evidence(gram, tuple(range(len(choice.blocks))), 0.0, begin.best, settled=own_settings.AT_REST)
     values = parameter_values(linear, gram, best)
     mean = joined([own for own, _ in values.values()])
     change = mean - point.values
@@ -412,7 +412,7 @@ class Sequential:
         rows = Rows.joined(*batches)
         begin = replace(begin, step=np.zeros_like(begin.step), rows=rows)
         aside, kept, sums = rows.aside.copy(), np.arange(len(rows.aside)), summed(choice, rows.take(slice(0)), begin)
-        if len(kept) > 2 * KEPT:
+        if len(kept) > 2 * own_settings.KEPT:
             sums, kept = split(choice, begin)
         fitted = settled(choice, sums, replace(begin, rows=rows.take(kept)))
         aside[kept] = fitted.rows.aside  # rows in the sums are not set aside, or keep what they had
@@ -432,7 +432,7 @@ class Sequential:
         holds = not summing or (fitted.steady and self._holds(fitted))
         if summing and holds:
             grown = grown._take_in(old)
-        if holds and len(grown.fitted.rows.aside) <= 2 * KEPT:
+        if holds and len(grown.fitted.rows.aside) <= 2 * own_settings.KEPT:
             return grown
         return Sequential.of(self.choice, batches, fitted, anew=summing)
 
@@ -451,7 +451,7 @@ class Sequential:
         """Tell whether every row in the sums kept its side of the limits, and is straight as far as the point moved."""
         guard, axis = self.sums.guard, fitted.rms / np.sqrt(3.0)
         near = guard is None or guard.holds(fitted.step, fitted.sigma, fitted.medians, fitted.bend, axis)
-        return near and self._bent(fitted) < CURVED
+        return near and self._bent(fitted) < own_settings.CURVED
 
     def _bent(self, fitted: Fitted) -> float:
         """Return by how many deviations the curvature of the rows in the sums moves a parameter at most.
@@ -494,14 +494,14 @@ def split(choice: Choice, begin: State) -> tuple[Sums, NDArray[np.int64]]:
 
 def _sample(rows: int) -> NDArray[np.int64]:
     """Return the numbers of rows, evenly spread, that stand for so many."""
-    return np.linspace(0, rows - 1, min(KEPT, rows)).astype(np.int64)
+    return np.linspace(0, rows - 1, min(own_settings.KEPT, rows)).astype(np.int64)
 
 
 def _kept(scores: Array, guard: Guard | None) -> tuple[NDArray[np.int64], float]:
     """Return which rows are kept one by one, and up to which reach the others are safe."""
     if guard is None:
         return _sample(len(scores)), 0.0
-    count = min(max(KEPT, int((scores < 0.0).sum()) + KEPT // 2), len(scores))
+    count = min(max(own_settings.KEPT, int((scores < 0.0).sum()) + own_settings.KEPT // 2), len(scores))
     order = np.argsort(scores, kind="stable")
     return np.sort(order[:count]), float(scores[order[min(count, len(scores) - 1)]])
 
@@ -517,7 +517,7 @@ def _guarded(choice: Choice, begin: State) -> tuple[Rows, Guard | None]:
     stack, share = linearised(some.campaign, begin.point, choice), len(rows.aside) / len(some.aside)
     metric = np.tensordot(found.sigma[::3] ** -2.0, products(stack, np.ones(len(stack))), 1)[:-1, :-1] * share
     prior = joined([item.sizes for item in choice.blocks])
-    metric += np.diag(np.r_[np.full(len(metric) - len(prior), LOOSE), prior] ** -2.0)
+    metric += np.diag(np.r_[np.full(len(metric) - len(prior), own_settings.LOOSE), prior] ** -2.0)
     left = axis_noise(found.medians * found.sigma[::3], begin.leverage)
     quiet = found.held > 0.0 and bool((left < settings.NOISE_SLACK * found.sigma[::3]).all())
     share, typical = float(np.median(moves(stack, metric, found.sigma))), len(rows.aside) ** -0.5

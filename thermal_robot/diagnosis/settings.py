@@ -41,19 +41,19 @@ KEPT = 500
 """Rows that are kept one by one, more where more are in the tail; up to twice as many before sums are formed anew. A
 fit of a thousand rows takes some tens of milliseconds, and a thousand rows hold the median well inside those kept. As
 many stand for all where it is asked how firmly rows hold the parameters, and how far they are from linear."""
-SETTLED, STEPS = 1e-9, 60
+AT_REST, REST_ROUNDS = 1e-9, 60
 """Deviations by which parameters, and share by which noise and scales, still move when they are found; rounds at most.
 A thousandth of what is promised; each round is about ten times nearer."""
 CURVED = 5e-6
 """Deviations by which the curvature of the rows in the sums may move a parameter before they are linearised anew. A
 diagnosis itself ends its rounds about 1e-5 deviations from where they would come to rest."""
-LEVEL = 1e-3 / 5.0
+FALLS = 1e-3 / 5.0
 """p-value of one test below which the choice falls: new rows of the same robot and the same noise make it fall once in
 a thousand updates, a chance that five tests share."""
 FEWEST_OUTSIDE, OUTSIDE = 3, 0.05
 """Rows, and share of the new rows, beyond what was measured from which on the choice is to be made anew: a model of
 effects that were told apart inside says little of those that show outside alone."""
-RIVALS, LEAST_RIVAL = 8, 1e-3
+RUNNERS, LEAST_RIVAL = 8, 1e-3
 """Combinations that are weighed again with the new rows, and their least probability against the chosen one: one of a
 thousandth needs rows that say as much as a deviation of 3.7 before it is the better one."""
 MOST_LEAD = 20.0

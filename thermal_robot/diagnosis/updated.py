@@ -31,6 +31,7 @@ from thermal_robot.campaign import Campaign
 from thermal_robot.campaign.more_rows import more_rows
 from thermal_robot.campaign.names import CLOCK
 from thermal_robot.correction.model import CorrectedModel
+from thermal_robot.diagnosis import settings as own_settings
 from thermal_robot.diagnosis.sequential import (
     Choice,
     Fitted,
@@ -44,7 +45,6 @@ from thermal_robot.diagnosis.sequential import (
     linearised,
     normal,
 )
-from thermal_robot.diagnosis.settings import FEWEST_OUTSIDE, KEPT, LEAST_RIVAL, LEVEL, LOOSE, MOST_LEAD, OUTSIDE, RIVALS
 from thermal_robot.diagnosis.values import Unexplained
 from thermal_robot.effects import Effect, gate, library
 from thermal_robot.errors import EstimationError
@@ -167,14 +167,14 @@ def scatter_of(left: Array, blocks: Sequence[NDArray[np.bool_]]) -> float:
 def misfits(a: Agreement) -> Iterator[str]:
     """Yield a sentence for each test that is unlikely where the robot and its noise are as they were."""
     rest = "times the mean square that noise and the parameters' deviations allow"
-    if a.p_batch < LEVEL:
+    if a.p_batch < own_settings.FALLS:
         yield f"The new rows leave {a.chi2 / a.figures:.3g} {rest} (p = {a.p_batch:.1g})."
-    elif a.p_whole < LEVEL:
+    elif a.p_whole < own_settings.FALLS:
         yield f"The rows since the diagnosis leave {a.whole / a.whole_figures:.3g} {rest} (p = {a.p_whole:.1g})."
-    if a.p_change < LEVEL:
+    if a.p_change < own_settings.FALLS:
         what = "{} would explain, most of it in {}".format(*a.changed)
         yield f"Something begins with the new rows that {what} (p = {a.p_change:.1g})."
-    if a.p_aside < LEVEL:
+    if a.p_aside < own_settings.FALLS:
         yield f"{a.aside} of {a.rows} rows since the diagnosis are gross errors (p = {a.p_aside:.1g})."
 
 
@@ -187,13 +187,13 @@ def beyond(spread: Spread | None, rows: Campaign, before: int) -> Iterator[str]:
     known = () if spread is None else spread.outside(rows)
     outside = [[name for name in names if name not in CLOCK] for names in known]  # time goes on
     count, n = sum(bool(names) for names in outside), rows.samples
-    if spread is None or count < max(FEWEST_OUTSIDE, OUTSIDE * n):
+    if spread is None or count < max(own_settings.FEWEST_OUTSIDE, own_settings.OUTSIDE * n):
         return
     for name in dict.fromkeys(name for own in outside for name in own):
         k = sum(name in own for own in outside)
         chance = np.log(k + 1.0) + gammaln([n + 1.0, before + n - k + 1.0]).sum()
         chance -= gammaln([n - k + 1.0, before + n + 1.0]).sum()
-        if chance + np.log(len(spread.ranges)) < np.log(LEVEL):
+        if chance + np.log(len(spread.ranges)) < np.log(own_settings.FALLS):
             yield f"{k} of {n} new rows lie outside of what was measured, in {name}."
 
 
@@ -210,8 +210,8 @@ def rivals(fit: Fit) -> list[tuple[int, ...]]:
     e = fit.explanation
     known = [(c.blocks, p) for c, p in zip(e.combinations, e.probabilities, strict=True)]
     own = max((p for blocks, p in known if blocks == e.best.blocks), default=1.0)
-    found = [blocks for blocks, p in known if blocks != e.best.blocks and LEAST_RIVAL * own <= p]
-    return list(dict.fromkeys(found))[:RIVALS]
+    found = [blocks for blocks, p in known if blocks != e.best.blocks and own_settings.LEAST_RIVAL * own <= p]
+    return list(dict.fromkeys(found))[: own_settings.RUNNERS]
 
 
 def chosen(fit: Fit) -> tuple[Choice, list[Runner]]:
@@ -330,7 +330,7 @@ def start(fit: Fit) -> tuple[Sequential, Watch, tuple[Runner, ...]]:
 
 def prepare(found: Diagnosed) -> None:
     """Form the sums of a diagnosis of many rows: the pass over them is a part of it, not of an update."""
-    if found.usable and found.fit is not None and found.samples > 2 * KEPT and independent_rows(found.fit):
+    if found.usable and found.fit is not None and found.samples > 2 * own_settings.KEPT and independent_rows(found.fit):
         start(found.fit)
 
 
@@ -455,7 +455,7 @@ class Updated:
         own = dict.fromkeys(item.effect.name for item in self.estimate.choice.blocks)
         told, before = (" and ".join(some) or "no effect" for some in (self.rival, own))
         rest = f"rather than {before}" if {*self.rival} != {*own} else "in other settings or places than chosen"
-        odds = np.exp(min(self.lead, MOST_LEAD))
+        odds = np.exp(min(self.lead, own_settings.MOST_LEAD))
         return " ".join((*self.fallen, f"All rows together speak for {told}, {rest} (odds {odds:.2g} : 1)."))
 
     @property
@@ -553,7 +553,7 @@ def _widened(found: Diagnosed, fit: Fit, own: Array) -> Array:
 
 def _covariance(fitted: Fitted, choice: Choice, names: tuple[str, ...]) -> Array:
     """(K, K) covariance of frames and parameters by all rows, without what turns the target and does not move it."""
-    precision = fitted.precision(np.maximum(fitted.expected(choice), settings.TINY), frames=LOOSE)
+    precision = fitted.precision(np.maximum(fitted.expected(choice), settings.TINY), frames=own_settings.LOOSE)
     unit = precision.diagonal() ** -0.5
     inner = np.linalg.inv(precision * np.outer(unit, unit))
     moving = np.r_[moves(names), np.ones(len(fitted.point.values), dtype=bool)]

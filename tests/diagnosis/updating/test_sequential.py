@@ -8,6 +8,7 @@ from updating_cases import ALL, OLD, far, in_full, measured
 
 import thermal_robot as tr
 from thermal_robot.diagnosis import sequential
+from thermal_robot.diagnosis import settings as diagnosis_settings
 from thermal_robot.diagnosis.sequential import Judge, Point, Rows, Sequential, linearised, products, settled, split
 from thermal_robot.diagnosis.updated import fixed_point
 from thermal_robot.inference.columns import unknown_frames
@@ -25,7 +26,7 @@ def added(start, whole, parts):
 @pytest.fixture
 def few(monkeypatch):
     """Keep as few rows that most are in the sums."""
-    monkeypatch.setattr(sequential, "KEPT", 150)
+    monkeypatch.setattr(diagnosis_settings, "KEPT", 150)
 
 
 @pytest.fixture(scope="module")
@@ -75,7 +76,7 @@ def test_a_jump_of_the_robot_is_followed_by_looking_at_all_rows(found, whole, fe
     moved = in_full(replace(rows, position=rows.position + 1e-3 * np.sin(q[:, 1:4])))
     few_rows = fixed_point(found.fit).plus(moved)
     assert few_rows.anew
-    sequential.KEPT = 10_000
+    diagnosis_settings.KEPT = 10_000
     assert far(few_rows.fitted, fixed_point(found.fit).plus(moved).fitted) < 1e-5
 
 
@@ -93,7 +94,7 @@ def test_where_weights_are_held_batches_do_not_matter_either(found, whole, few, 
     assert start.sums.counts[0] > 300
     for part in np.array_split(np.arange(OLD, ALL), batches):
         start = start.plus(Rows.weighed(start.choice, whole.take(part)))
-    monkeypatch.setattr(sequential, "KEPT", 10_000)
+    monkeypatch.setattr(diagnosis_settings, "KEPT", 10_000)
     once = with_held_weights(found)
     once = once.plus(Rows.weighed(once.choice, whole.take(np.arange(OLD, ALL)))).fitted
     assert far(start.fitted, once) < 5.0 * PROMISED
@@ -152,7 +153,7 @@ def test_the_noise_is_found_whether_it_is_stated_or_not(stated):
 
 @pytest.fixture
 def parted(whole, grown, monkeypatch):
-    monkeypatch.setattr(sequential, "KEPT", 150)
+    monkeypatch.setattr(diagnosis_settings, "KEPT", 150)
     return split(grown.choice, replace(grown.fitted, rows=in_full(whole)))
 
 
