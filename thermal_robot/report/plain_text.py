@@ -10,6 +10,7 @@ from thermal_robot.report import units
 from thermal_robot.report.words import (
     NO_BREAK,
     STATUS,
+    WIDTH,
     bound,
     described,
     details,
@@ -33,7 +34,6 @@ if TYPE_CHECKING:
     from thermal_robot.diagnosis.values import Finding
 
 
-WIDTH = 96
 _BAR = 24
 _NAME = 26
 

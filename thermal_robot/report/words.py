@@ -19,6 +19,8 @@ if TYPE_CHECKING:
 
 MOST_WORDS = 45
 """Of a headline."""
+WIDTH = 96
+"""Columns of a text."""
 _MOST_CAUSES = 3  # that a headline names; the others are counted
 _MOST_OF_A_NAME = 9  # words: of a longer title the headline says the beginning
 _WEIGHTY = 0.95  # of what all causes together explain: the fewest that hold it are named, the others counted
