@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 
     from thermal_robot.diagnosis.result import Diagnosis
     from thermal_robot.fleet.wear_result import Wear
-    from thermal_robot.shapes.arm import Arm
+    from thermal_robot.shapes import Arm
 
 Plain = Mapping[str, Any]
 
@@ -173,8 +173,8 @@ def arm_drawing(diagnosis: Diagnosis) -> dict[str, Any] | None:
 def _places(arm: Arm) -> dict[str, Any]:
     joints = zip(arm.joints, arm.joint_shares, arm.moves.tolist(), strict=True)
     solids = [
-        {"link": arm.links.index(s.link), "corners": _short(s.corners), "faces": s.faces.ravel().tolist()}
-        for s in arm.hulls
+        {"link": arm.links.index(link), "corners": _short(hull.vertices), "faces": hull.faces.ravel().tolist()}
+        for link, hull in arm.hulls
     ]
     return {
         "links": [_place(*link) for link in zip(arm.links, arm.link_shares, strict=True)],
