@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -242,9 +241,9 @@ def length(metres: float) -> str:
     return f"{metres * factor:.3g} {unit}"
 
 
-def listed(names: Sequence[str]) -> str:
-    """Put names one after the other: ``a, b and c``."""
-    return "".join(names) if len(names) < 2 else ", ".join(names[:-1]) + " and " + names[-1]
+def listed(names: Sequence[str], last: str = "and") -> str:
+    """Put names one after the other: ``a, b and c``, or with another word before the last."""
+    return "".join(names) if len(names) < 2 else f"{', '.join(names[:-1])} {last} {names[-1]}"
 
 
 def _place(unexplained: Unexplained) -> str:
@@ -294,47 +293,31 @@ def by_status(diagnosis: Diagnosis) -> list[Finding]:
     return [f for status in STATUS for f in diagnosis.effects if told_as(f) == status]
 
 
-@dataclass(frozen=True)
-class Shown:
-    """An effect's parameters as far as they are printed.
+Lines = list[tuple[str, int]]
 
-    Attributes
-    ----------
-    heading
-        What was chosen; empty where all are shown.
-    shown
-        Name, and value with its standard deviation and unit.
-    more
-        How many identified ones are not shown.
-    undetermined
-        Names of those that the data do not determine; empty where there is none.
-    unseen
-        How many the data do not see, or not beside the others, with their names; empty where there is none.
+
+def described(finding: Finding, diagnosis: Diagnosis) -> tuple[Lines, list[tuple[str, str]], Lines]:
+    """Return what is said of an effect before its parameters, these as name and value, and what after.
+
+    Lines stand with how far they hang. All of a few parameters are shown, in the order of the chain, else the most
+    significant.
     """
-
-    heading: str
-    shown: tuple[tuple[str, str], ...]
-    more: int
-    undetermined: str
-    unseen: str
-
-
-def parameters(finding: Finding) -> Shown:
-    """Choose the parameters to print: all of a few in the order of the chain, else the most significant."""
     known = [p for p in finding.parameters if p.identified and p.value is not None]
     chosen, heading, hidden = known, "", finding.unseen
     if len(known) > _ALL_UP_TO:
         chosen = sorted(known, key=lambda p: -abs(p.value or 0.0) / max(p.std or 0.0, 1e-300))[:_MOST]
         heading = f"the {_MOST} most significant of {len(known)} parameters:"
+    more, where = len(known) - len(chosen), _places(finding)
     # where there is a size, it says what is known; a constant that the frames can take up is no news
-    undetermined = [] if finding.size else [p.name for p in finding.parameters if p not in known]
-    return Shown(
-        heading,
-        tuple((p.name, units.estimate(p, chosen)) for p in chosen),
-        len(known) - len(chosen),
-        in_words(undetermined, most=4, between="; "),  # names hold commas
-        f"{len(hidden)} not seen apart from the others or the frames: {in_words(hidden, 6, '; ')}" if hidden else "",
-    )
+    free = [] if finding.size else [p.name for p in finding.parameters if p not in known]
+    names = in_words(free, most=4, between="; "), in_words(hidden, 6, "; ")  # they hold commas
+    before = [(_rivals(finding, diagnosis), 0), (_law(finding), 0), (f"where: {where}" if where else "", 7)]
+    before += [(_in_joints(finding), 2), (heading, 0)]
+    after = [(f"and {more} more, listed in the JSON" if more else "", 0)]
+    after += [(f"not determined by these data: {names[0]}" if free else "", 2)]
+    after += [(f"{len(hidden)} not seen apart from the others or the frames: {names[1]}" if hidden else "", 2)]
+    shown = [(p.name, units.estimate(p, chosen)) for p in chosen]
+    return [line for line in before if line[0]], shown, [line for line in after if line[0]]
 
 
 def in_words(names: Sequence[str], most: int = 10, between: str = ", ") -> str:
@@ -350,29 +333,24 @@ def bound(sentence: str) -> str:
     return _TOGETHER.sub(NO_BREAK, sentence)
 
 
-def rows_in_words(rows: Sequence[int], most: int = 10) -> str:
+def _rows(rows: Sequence[int]) -> str:
     """Say which rows of the file: ``rows 17, 80 and 3 more``."""
-    return f"{'row' if len(rows) == 1 else 'rows'} {in_words([str(r) for r in rows], most)}"
-
-
-def set_aside(diagnosis: Diagnosis) -> str:
-    """Say which rows were set aside, and how rows are counted: ``as outliers: rows 8, 24, 74, 90 of the file ...``."""
-    rows = f"as outliers: {rows_in_words(diagnosis.outliers)} of the file (its header is row 1)"
-    return rows if diagnosis.outliers else "no row"
-
-
-def struck(diagnosis: Diagnosis) -> str:
-    """Say which rows a fault of the table struck; empty where it struck all, or there is none."""
-    fault = diagnosis.misfit.fault if diagnosis.misfit else None
-    return rows_in_words(fault.rows) if fault and fault.rows else ""
+    return f"{'row' if len(rows) == 1 else 'rows'} {in_words([str(r) for r in rows])}"
 
 
 def facts(diagnosis: Diagnosis) -> dict[str, str]:
     """Return what stands above all else, by its heading: verdict, campaign, and which rows and effects count."""
-    told = {"Verdict": verdict(diagnosis), "Campaign": campaign(diagnosis)}
+    what = "position and orientation" if diagnosis.measures == "pose" else "position"
+    name = f"{diagnosis.campaign}: " if diagnosis.campaign else ""
+    rows = f"{diagnosis.samples} {'row' if diagnosis.samples == 1 else 'rows'}"
+    campaign = f"{name}robot {diagnosis.robot}, tool frame {diagnosis.tool_frame}, {rows}, {what} measured"
+    told = {"Verdict": _verdict(diagnosis), "Campaign": campaign}
     if diagnosis.usable:
-        told |= {"Set aside": set_aside(diagnosis), "Rows used": rows_used(diagnosis), "Left out": left_out(diagnosis)}
-    told["Struck"] = struck(diagnosis)
+        aside = f"as outliers: {_rows(diagnosis.outliers)} of the file (its header is row 1)"
+        told["Set aside"] = aside if diagnosis.outliers else "no row"
+        told |= {"Rows used": rows_used(diagnosis), "Left out": _left_out(diagnosis)}
+    elif diagnosis.misfit and diagnosis.misfit.fault and diagnosis.misfit.fault.rows:
+        told["Struck"] = _rows(diagnosis.misfit.fault.rows)
     return {heading: said for heading, said in told.items() if said}
 
 
@@ -392,14 +370,12 @@ def hardest(diagnosis: Diagnosis) -> str:
     return f"{before} → {after}, held out by {scheme.name} ({scheme.held_out}): {times} times the average"
 
 
-def places(finding: Finding, most: int = 4) -> str:
+def _places(finding: Finding, most: int = 4) -> str:
     """Say where an effect sits, its largest shares first; empty where that is not known."""
     shown = [p for p in finding.locations if p.share >= _NEGLIGIBLE][:most] or list(finding.locations[:1])
     said = ", ".join(f"{p.words} {units.percent(p.share)}" for p in shown)
     rest = finding.locations[len(shown) :]
-    if not rest:
-        return said
-    return f"{said} and {more(len(rest), rest[0].share)}"
+    return f"{said} and {more(len(rest), rest[0].share)}" if rest else said
 
 
 def more(count: int, largest: float) -> str:
@@ -413,7 +389,7 @@ def turned(diagnosis: Diagnosis) -> list[str]:
     return [f"Note: {said}." for said in diagnosis.warnings if "read with the other sign" in said]
 
 
-def verdict(diagnosis: Diagnosis) -> str:
+def _verdict(diagnosis: Diagnosis) -> str:
     """Name the explanation and how probable exactly this one is."""
     if not diagnosis.usable:
         return "none: robot and table do not belong together"
@@ -422,21 +398,17 @@ def verdict(diagnosis: Diagnosis) -> str:
     return said + ("; a remainder stays unexplained" if diagnosis.unexplained.flagged else "")
 
 
-def campaign(diagnosis: Diagnosis) -> str:
-    """Say what was measured on which robot."""
-    what = "position and orientation" if diagnosis.measures == "pose" else "position"
-    name = f"{diagnosis.campaign}: " if diagnosis.campaign else ""
-    rows = f"{diagnosis.samples} {'row' if diagnosis.samples == 1 else 'rows'}"
-    return f"{name}robot {diagnosis.robot}, tool frame {diagnosis.tool_frame}, {rows}, {what} measured"
+def noise(diagnosis: Diagnosis, floor: str = "") -> str:
+    """Say what noise alone would leave, where that is known from, and how the gap after compares with it.
 
-
-def noise(diagnosis: Diagnosis, floor: str) -> str:
-    """Say what noise alone would leave, where that is known from, and how the gap after compares with it."""
+    The ``floor`` is written in the unit that suits the gap, unless it is given.
+    """
     gap = diagnosis.gap
+    floor = floor or units.together((gap.rms_before, gap.rms_after, gap.noise_floor), "m")[2]
     parts = [floor, _SOURCES.get(gap.noise_source, gap.noise_source)]
     if gap.noise_floor > 0.0:
         parts.append(f"the gap after correction is {gap.rms_after / gap.noise_floor:.2f} times that")
-    return "; ".join(p for p in parts if p)
+    return "; ".join(filter(None, parts))
 
 
 def with_aside(diagnosis: Diagnosis) -> str:
@@ -446,12 +418,6 @@ def with_aside(diagnosis: Diagnosis) -> str:
         return ""
     before, after = units.together((held.rms_before_with_aside, held.rms_after_with_aside), "m")
     return f"with the {'row' if count == 1 else f'{count} rows'} set aside in it: {before} → {after}"
-
-
-def noise_of(diagnosis: Diagnosis) -> str:
-    """Say the same of a diagnosis that stands alone, in the unit that suits the gap."""
-    gap = diagnosis.gap
-    return noise(diagnosis, units.together((gap.rms_before, gap.rms_after, gap.noise_floor), "m")[2])
 
 
 def needs(finding: Finding, joints: Sequence[str]) -> str:
@@ -464,10 +430,10 @@ def needs(finding: Finding, joints: Sequence[str]) -> str:
     for quantity, columns in by_quantity.items():
         of_joints = any(c.removeprefix(quantity) in joints for c in columns)
         named.append(columns[0] if len(columns) == 1 else f"{quantity}<{'joint' if of_joints else 'link'}>")
-    return one_of(named)
+    return listed(named, "or")
 
 
-def law(finding: Finding) -> str:
+def _law(finding: Finding) -> str:
     """Describe a law that was discovered in the data, its size and what it usually is; empty for a known effect."""
     if not finding.quantity:
         return ""
@@ -477,7 +443,7 @@ def law(finding: Finding) -> str:
     return "; ".join(part for part in (*told, f"usually {finding.usually}" if finding.usually else "") if part)
 
 
-def in_joints(finding: Finding) -> str:
+def _in_joints(finding: Finding) -> str:
     """Say how much a known effect does in each joint, the largest first; empty where its parameters say it."""
     if finding.quantity or not finding.size:
         return ""
@@ -485,7 +451,7 @@ def in_joints(finding: Finding) -> str:
     return f"{finding.size[0].what}: {in_words(told, most=4)}"
 
 
-def rivals(finding: Finding, diagnosis: Diagnosis) -> str:
+def _rivals(finding: Finding, diagnosis: Diagnosis) -> str:
     """Say of which effect it is a part, or what it cannot be told from and how to see what is not preferred."""
     if not finding.confounded_with:
         return ""
@@ -498,20 +464,7 @@ def rivals(finding: Finding, diagnosis: Diagnosis) -> str:
     return f"{said}; --without {finding.name} shows what would then stand in its place"
 
 
-def described(
-    finding: Finding, diagnosis: Diagnosis
-) -> tuple[list[tuple[str, int]], tuple[tuple[str, str], ...], list[tuple[str, int]]]:
-    """Return what is said of an effect before its parameters, these, and what after: lines with how far they hang."""
-    known = parameters(finding)
-    where = f"where: {places(finding)}" if finding.locations else ""
-    more = f"and {known.more} more, listed in the JSON" if known.more else ""
-    free = f"not determined by these data: {known.undetermined}" if known.undetermined else ""
-    before = (rivals(finding, diagnosis), 0), (law(finding), 0), (where, 7), (in_joints(finding), 2), (known.heading, 0)
-    after = (more, 0), (free, 2), (known.unseen, 2)
-    return [line for line in before if line[0]], known.shown, [line for line in after if line[0]]
-
-
-def left_out(diagnosis: Diagnosis) -> str:
+def _left_out(diagnosis: Diagnosis) -> str:
     """Say which effects the user left out, and how he asked for that; empty where he did not."""
     out, kept = diagnosis.left_out, [f.name for f in diagnosis.effects if f.quantity is None]
     if not out:
@@ -551,7 +504,7 @@ def sentences(diagnosis: Diagnosis) -> Iterator[str]:
     if left.locations:
         likely = [p for p in left.locations if p.share >= _UNLIKELY][:3] or left.locations[:1]
         spots = [f"{p.words} ({units.probability(p.share)})" for p in likely]
-        yield f"It enters most probably at {one_of(spots)}."
+        yield f"It enters most probably at {listed(spots, 'or')}."
     known_laws = laws(diagnosis)
     if left.depends_on and not known_laws:
         quantities = [f"{d.covariate} ({units.p_value(d.p_value)})" for d in left.depends_on[:3]]
@@ -560,21 +513,8 @@ def sentences(diagnosis: Diagnosis) -> Iterator[str]:
         yield f"{found.name} describes part of it: {found.describes or 'a law'}."
 
 
-def one_of(items: Sequence[str]) -> str:
-    """List alternatives: ``a, b or c``."""
-    if len(items) < 2:
-        return "".join(items)
-    return f"{', '.join(items[:-1])} or {items[-1]}"
-
-
 _SURER = 0.05  # by which a single effect is surer than all together, so that a reader asks why
-_TOLD, _MOST_OTHERS = (
-    0.01,
-    3,
-)  # probability from which another effect is told that may be at work, too, and how many are
-
-if TYPE_CHECKING:
-    from thermal_robot.diagnosis.result import Diagnosis
+_TOLD, _MOST_OTHERS = 0.01, 3  # probability from which another effect is told that may be at work, and how many are
 
 
 def details(diagnosis: Diagnosis) -> Iterator[str]:
