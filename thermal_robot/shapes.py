@@ -25,6 +25,8 @@ _PACKAGE, _FILE = "package://", "file://"
 _SEARCHED = ("ROS_PACKAGE_PATH", "AMENT_PREFIX_PATH")
 """Variables of the environment in which ROS lists its packages, or the folders above them."""
 _DECLARATION = re.compile(r"^\s*<\?xml.*?\?>", re.DOTALL)
+_FLAT = 1e-9
+"""Thickness over extent of what has no hull."""
 _CORNERS = 80
 """Directions in which the outermost point of a mesh is kept: tubes look round, a page of ten links stays small."""
 
@@ -173,12 +175,13 @@ def hull(points: Array) -> Any:
     if len(points) > _CORNERS:
         k = np.arange(_CORNERS) + 0.5
         height, turn = 1.0 - 2.0 * k / _CORNERS, np.pi * (1.0 + np.sqrt(5.0)) * k
-        flat = np.sqrt(1.0 - height**2)
-        directions = np.stack([flat * np.cos(turn), flat * np.sin(turn), height])
+        level = np.sqrt(1.0 - height**2)
+        directions = np.stack([level * np.cos(turn), level * np.sin(turn), height])
         points = points[np.unique(np.argmax(points @ directions, axis=0))]
     try:
-        return convex_hull(points)
-    except (QhullError, ValueError):
+        flat = np.linalg.matrix_rank(points - points.mean(axis=0), rtol=_FLAT) < 3
+        return None if flat else convex_hull(points)
+    except (QhullError, ValueError):  # of coordinates that are no numbers
         return None
 
 
