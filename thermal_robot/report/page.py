@@ -43,12 +43,12 @@ def _environment() -> Environment:
 
 def render(
     template: str,
+    shown: Plain,
     *,
     title: str = "",
     generated: str | None = None,
     files: Mapping[str, str] | None = None,
     script: str = "",
-    **shown: Any,
 ) -> str:
     """Fill a template of this room; the Content-Security-Policy of a page allows no script but its own.
 
@@ -56,6 +56,8 @@ def render(
     ----------
     template
         Name of a file that extends ``base.html``.
+    shown
+        What it names.
     title
         For the browser's bar; a piece for a notebook, not a page, where empty.
     generated
@@ -64,8 +66,6 @@ def render(
         Names of the files that it was made from, with the SHA-256 of each, for the footer.
     script
         JavaScript that ships with this room.
-    **shown
-        What the template names.
     """
     runs = f"'sha256-{b64encode(sha256(script.encode()).digest()).decode()}'" if script else "'none'"
     told = {"title": title, "files": files, "signature": signature(generated)}
@@ -129,8 +129,8 @@ def html(diagnosis: Diagnosis, generated: str | None = None, files: Mapping[str,
     drawn = arm_drawing(diagnosis)
     script = shipped(__package__).joinpath("templates/arm.js").read_text(encoding="utf-8") if drawn else ""
     title = f"Diagnosis of {diagnosis.campaign or diagnosis.robot}"
-    signed = {"generated": generated, "files": files}
-    return render("diagnosis.html", title=title, **signed, script=script, d=diagnosis, arm=drawn)
+    shown = {"d": diagnosis, "arm": drawn}
+    return render("diagnosis.html", shown, title=title, generated=generated, files=files, script=script)
 
 
 def fragment(diagnosis: Diagnosis) -> str:
@@ -138,7 +138,7 @@ def fragment(diagnosis: Diagnosis) -> str:
 
     Of a table that does not fit the robot it says what is wrong with it and what to do, and nothing of the robot.
     """
-    return render("diagnosis.html", d=diagnosis)
+    return render("diagnosis.html", {"d": diagnosis})
 
 
 _ROWS = 150  # of a long campaign that are drawn: their postures are most of what the drawing weighs
@@ -217,22 +217,19 @@ def comparison_html(comparison: Plain, generated: str | None = None, files: Mapp
     files
         Names of the files that it was made from, with the SHA-256 of each, for the footer.
     """
-    return render(
-        "campaigns.html",
-        title="Comparison of campaigns",
-        generated=generated,
-        files=files,
-        kicker="What the same robot shares between campaigns, and what changed",
-        headline=text_campaigns.comparison_headline(comparison),
-        campaigns=map(text_campaigns.campaign_in_words, comparison["campaigns"]),
-        sections=_of_comparison(comparison),
-    )
+    shown = {
+        "kicker": "What the same robot shares between campaigns, and what changed",
+        "headline": text_campaigns.comparison_headline(comparison),
+        "campaigns": map(text_campaigns.campaign_in_words, comparison["campaigns"]),
+        "sections": _of_comparison(comparison),
+    }
+    return render("campaigns.html", shown, title="Comparison of campaigns", generated=generated, files=files)
 
 
 def comparison_fragment(comparison: Plain) -> str:
     """Write a comparison as HTML for a notebook: one ``<div>`` with its own style."""
     headline = text_campaigns.comparison_headline(comparison)
-    return render("campaigns.html", headline=headline, sections=_of_comparison(comparison))
+    return render("campaigns.html", {"headline": headline, "sections": _of_comparison(comparison)})
 
 
 def _of_comparison(comparison: Plain) -> Iterator[dict[str, Any]]:
@@ -274,15 +271,12 @@ def fleet_html(summary: Plain, generated: str | None = None) -> str:
     generated
         When it was made, for the footer; nothing is said where absent.
     """
-    return render(
-        "campaigns.html",
-        title="Fleet",
-        generated=generated,
-        kicker="What is wrong with which robot, and what several share",
-        headline=text_campaigns.fleet_headline(summary),
-        campaigns=(),
-        sections=_of_fleet(summary),
-    )
+    shown = {
+        "kicker": "What is wrong with which robot, and what several share",
+        "headline": text_campaigns.fleet_headline(summary),
+        "sections": _of_fleet(summary),
+    }
+    return render("campaigns.html", shown, title="Fleet", generated=generated)
 
 
 def _of_fleet(summary: Plain) -> Iterator[dict[str, Any]]:
@@ -306,18 +300,13 @@ def wear_html(wear: Wear, generated: str | None = None, files: Mapping[str, str]
     files
         Names of the files that it was made from, with the SHA-256 of each, for the footer.
     """
-    return render(
-        "campaigns.html",
-        title=f"{wear.robot} over time",
-        generated=generated,
-        files=files,
-        kicker="What moves, at once or steadily, and when it crosses a limit",
-        headline=wear.summary,
-        said=f"Without any change, at most {units.percent(wear.false_alarm)} of such series ring at all, whatever the "
-        f"parameter and the day. Campaigns scatter {wear.scatter:.2f} times as much as their deviations say.",
-        campaigns=(),
-        sections=_of_wear(wear),
+    said = (
+        f"Without any change, at most {units.percent(wear.false_alarm)} of such series ring at all, whatever the "
+        f"parameter and the day. Campaigns scatter {wear.scatter:.2f} times as much as their deviations say."
     )
+    kicker = "What moves, at once or steadily, and when it crosses a limit"
+    shown = {"kicker": kicker, "headline": wear.summary, "said": said, "sections": _of_wear(wear)}
+    return render("campaigns.html", shown, title=f"{wear.robot} over time", generated=generated, files=files)
 
 
 def _of_wear(wear: Wear) -> Iterator[dict[str, Any]]:

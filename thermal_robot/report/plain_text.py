@@ -66,7 +66,7 @@ def _how_far(diagnosis: Diagnosis) -> Iterator[str]:
     lines = [("gap, rms distance", before, after, words.rows_used(diagnosis))]
     if gap.orientation_before is not None:
         turned = units.together((gap.orientation_before, gap.orientation_after), "rad")
-        lines.append(("gap of orientation, rms", *turned, ""))
+        lines.append(("gap of orientation, rms", turned[0], turned[1], ""))
     said = f"not used for the fit: {held.scheme}, {held.folds} folds"
     lines.append(("gap on rows held out", held_before, held_after, said))
     wide = max(len(cell) for line in lines for cell in line[1:3])

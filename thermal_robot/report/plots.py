@@ -47,8 +47,10 @@ if TYPE_CHECKING:
     from thermal_robot.diagnosis.values import Explained, Finding, Place
     from thermal_robot.fleet.wear_result import Wear, Worn
 
-_SAID: dict[str, Any] = {"fontsize": SMALL, "color": INK, "va": "center"}
-_KEY: dict[str, Any] = {"fontsize": SMALL, "labelcolor": INK, "frameon": False}
+Look = dict[str, Any]
+"""Options of Matplotlib."""
+_SAID: Look = {"fontsize": SMALL, "color": INK, "va": "center"}
+_KEY: Look = {"fontsize": SMALL, "labelcolor": INK, "frameon": False}
 _BELOW_KEY = 0.77  # of a panel's height for the bars; the key stands above
 _ROOM = 1.08  # beside the outermost bins, as a factor
 
@@ -104,14 +106,14 @@ def _draw_distances(axes: Axes, before: Array, after: Array, held_out: Array, sa
         label = f"after, on rows held out: rms {said[2]}"
         _draw_shape(axes, held_out, bins, 0.0, label, color=THIRD, linewidth=1.5, linestyle=(0, (4, 2)))
     if floor > 0.0:
-        look = {"color": INK, "linewidth": 1.2, "linestyle": ":", "label": f"noise floor: rms {said[3]}"}
+        look: Look = {"color": INK, "linewidth": 1.2, "linestyle": ":", "label": f"noise floor: rms {said[3]}"}
         axes.plot([floor] * 2, [0.0, _BELOW_KEY], transform=axes.get_xaxis_transform(), **look)
     # room beside the outermost bins, so that none looks cut off
     log_axis(axes, low / _ROOM, high * _ROOM)
     axes.set_ylabel("rows")
     axes.set_ylim(0.0, axes.get_ylim()[1] / _BELOW_KEY)
     axes.locator_params(axis="y", integer=True, nbins=5)
-    box = {"frameon": True, "facecolor": PAPER, "edgecolor": "none", "framealpha": 0.9}
+    box: Look = {"frameon": True, "facecolor": PAPER, "edgecolor": "none", "framealpha": 0.9}
     axes.legend(loc="upper left", ncols=2, handlelength=1.6, **_KEY | box)
     tidy(axes)
 
@@ -126,7 +128,7 @@ def _draw_shape(axes: Axes, values: Array, bins: Array, opacity: float, label: s
     axes.stairs(counts, edges, label=None if opacity > 0.0 else label, **line)
 
 
-_LOOK: dict[str, dict[str, Any]] = {
+_LOOK: dict[str, Look] = {
     "found": {"color": AFTER, "edgecolor": AFTER},
     "confounded": {"color": "none", "edgecolor": AFTER, "hatch": "////"},
     "contained": {"color": FAINT, "edgecolor": AFTER},
@@ -158,7 +160,7 @@ def _draw_which(axes: Axes, diagnosis: Diagnosis, brief: bool = False) -> None:
         note(axes, "No effect was tried.")
         return
     inks = [INK if f.status in ("found", "confounded") else MUTED for f in ordered]
-    beside = {**_SAID, "transform": axes.get_yaxis_transform()}
+    beside: Look = {**_SAID, "transform": axes.get_yaxis_transform()}
     for line, (finding, ink) in enumerate(zip(ordered, inks, strict=True)):
         if finding.status == "not_testable":
             said = "not testable" if brief else f"not testable: needs {needs(finding, diagnosis.joint_names)}"
@@ -346,7 +348,14 @@ def _draw_map(axes: Axes, diagnosis: Diagnosis, plane: tuple[int, int]) -> None:
     axes.set_ylim(middle[1] - _FILLED * height / 2.0, middle[1] + (1.0 - _FILLED / 2.0) * height)
     axes.set_aspect("equal", adjustable="box")
     axes.locator_params(axis="both", nbins=6)
-    true = {"units": "inches", "width": 0.018, "minlength": 1.5, "angles": "xy", "scale_units": "xy", "scale": 1.0}
+    true: Look = {
+        "units": "inches",
+        "width": 0.018,
+        "minlength": 1.5,
+        "angles": "xy",
+        "scale_units": "xy",
+        "scale": 1.0,
+    }
     for arrows, colour, label in ((before, BEFORE, "before"), (after, AFTER, "after")):
         axes.quiver(*start.T, *arrows.T, color=colour, label=label, **true)
     axes.legend(loc="upper left", ncols=2, borderaxespad=0.2, **_KEY)
@@ -362,7 +371,7 @@ def _draw_scale(axes: Axes, sample: float, factor: float) -> None:
     along = blended_transform_factory(axes.transData, axes.transAxes) + below
     start = axes.get_xlim()[0]
     tip = (start + sample * factor, 1.0)
-    arrow = {"arrowstyle": "-|>", "color": INK, "linewidth": 1.3, "shrinkA": 0.0, "shrinkB": 0.0}
+    arrow: Look = {"arrowstyle": "-|>", "color": INK, "linewidth": 1.3, "shrinkA": 0.0, "shrinkB": 0.0}
     axes.annotate("", tip, (start, 1.0), xycoords=along, textcoords=along, arrowprops=arrow)
     times = f"{factor:,.0f}".replace(",", "\u2009")
     said = f"gap of {units.quantity(sample, 'm')}, drawn {times} times larger"
@@ -455,12 +464,12 @@ def _draw_remainder(axes: Axes, along: Array, values: Array, aside: NDArray[np.b
     used, marked = np.flatnonzero(known & ~aside), np.flatnonzero(known & aside)
     drawn = used[thinned(len(used))]
     many, few = len(used) > RASTER_ABOVE, len(marked) <= _FEW_CROSSES
-    dots = {"marker": "o", "markersize": 1.6 if many else 3.0, "markeredgewidth": 0, "color": MUTED}
-    shown = {"alpha": 0.35 if many else 0.7, "rasterized": many, "label": "remainder"}
+    dots: Look = {"marker": "o", "markersize": 1.6 if many else 3.0, "markeredgewidth": 0, "color": MUTED}
+    shown: Look = {"alpha": 0.35 if many else 0.7, "rasterized": many, "label": "remainder"}
     axes.plot(along[drawn], values[drawn], linestyle="none", **dots, **shown)
     _draw_middles(axes, along[used], values[used])
     held = np.clip(values[marked], -_EDGE * limit, _EDGE * limit)
-    crosses = {"marker": "x", "markersize": 6.0 if few else 3.0, "markeredgewidth": 1.8 if few else 0.9}
+    crosses: Look = {"marker": "x", "markersize": 6.0 if few else 3.0, "markeredgewidth": 1.8 if few else 0.9}
     axes.plot(along[marked], held, linestyle="none", **crosses, color=BEFORE, label="set aside")
     axes.set_ylim(-limit, limit)
     axes.axhline(0.0, color=MUTED, linewidth=0.7)
@@ -471,7 +480,7 @@ def _draw_middles(axes: Axes, along: Array, values: Array) -> None:
     levels = np.unique(along)
     if len(levels) <= _LEVELS:  # between two directions of approach there is nothing that a line could tell
         middle = [np.median(values[along == level]) for level in levels]
-        dash = {"linestyle": "none", "marker": "_", "markersize": 22.0, "markeredgewidth": 2.2}
+        dash: Look = {"linestyle": "none", "marker": "_", "markersize": 22.0, "markeredgewidth": 2.2}
         axes.plot(levels, middle, color=AFTER, label="median at each value", **dash)
         return
     order = np.argsort(along, kind="stable")
@@ -525,7 +534,7 @@ def explain_figure(explained: Explained) -> Figure:
     figure.suptitle(plain(f"What {explained.effect} explains{more}"), x=0.01, ha="left", fontsize=11.0, color=INK)
     if places:
         handles, labels = panels[0].get_legend_handles_labels()
-        large = {"markerscale": 5.0 / handles[0].get_markersize()}
+        large: Look = {"markerscale": 5.0 / handles[0].get_markersize()}
         shown = figure.legend(handles, labels, loc="outside lower center", ncols=3, **_KEY, **large)
         for handle in filter(None, shown.legend_handles):
             handle.set_alpha(1.0)
@@ -556,8 +565,8 @@ def _draw_place(axes: Axes, place: Place, factor: float) -> None:
     if place.levels:
         step = float(np.diff(levels).min()) if len(levels) > 1 else 1.0
     beside = np.random.default_rng(0).uniform(-0.5, 0.5, len(rows)) * 0.7 * _APART * step
-    dots = {"linestyle": "none", "marker": "o", "markersize": 1.8 if many else 3.2, "markeredgewidth": 0}
-    shown = {"alpha": 0.35 if many else 0.6, "rasterized": many}
+    dots: Look = {"linestyle": "none", "marker": "o", "markersize": 1.8 if many else 3.2, "markeredgewidth": 0}
+    shown: Look = {"alpha": 0.35 if many else 0.6, "rasterized": many}
     for error, side, colour, label in (
         (place.before, -1.0, MUTED, "as measured"),
         (place.after, 1.0, AFTER, "with this effect taken off"),
@@ -684,9 +693,9 @@ def _draw_worn(axes: Axes, wear: Wear, worn: Worn) -> None:
         beside = slice(jump.after, jump.after + 2)
         along = np.insert(times, jump.after + 1, [times[beside].mean()] * 2)
         fitted = np.insert(fitted, jump.after + 1, fitted[beside])
-    look = {"color": BEFORE, "linewidth": 2.0} if worn.alarm else {"color": MUTED, "linewidth": 1.2}
+    look: Look = {"color": BEFORE, "linewidth": 2.0} if worn.alarm else {"color": MUTED, "linewidth": 1.2}
     axes.plot(along, scale.factor * (fitted - middle), **look)
-    dots = {"fmt": "o", "markersize": 3.5, "color": AFTER, "ecolor": AFTER, "elinewidth": 1.0}
+    dots: Look = {"fmt": "o", "markersize": 3.5, "color": AFTER, "ecolor": AFTER, "elinewidth": 1.0}
     axes.errorbar(times[seen], scale.factor * (values - middle), scale.factor * stds, **dots)
     low, high = axes.get_ylim()
     for limit in () if worn.crossing is None else (worn.crossing.limit, -worn.crossing.limit):
@@ -695,5 +704,5 @@ def _draw_worn(axes: Axes, wear: Wear, worn: Worn) -> None:
     tidy(axes)
     axes.set_ylabel(scale.unit or "1", fontsize=SMALL)
     said = f"ALARM: {worn.kind}" if worn.alarm else f"moved: {units.probability(worn.moved)}"
-    weight = {"color": INK, "fontweight": "bold"} if worn.alarm else {"color": MUTED, "fontweight": "normal"}
+    weight: Look = {"color": INK, "fontweight": "bold"} if worn.alarm else {"color": MUTED, "fontweight": "normal"}
     axes.set_title(plain(f"{worn.parameter}\n{said}"), loc="left", fontsize=SMALL, **weight)

@@ -185,10 +185,12 @@ def unit_arrow() -> Any:
     """Return the arrow from the origin to (0, 0, 1), whose head has the radius 1, as a ``trimesh.Trimesh``."""
     import trimesh
 
-    neck = 1.0 - settings.HEAD_LENGTH
-    shaft = trimesh.creation.cylinder(settings.SHAFT_RADIUS, segment=[[0.0, 0.0, 0.0], [0.0, 0.0, neck]], sections=16)
-    raised = trimesh.transformations.translation_matrix([0.0, 0.0, neck])
-    return shaft + trimesh.creation.cone(1.0, settings.HEAD_LENGTH, sections=16, transform=raised)
+    neck, foot = 1.0 - settings.HEAD_LENGTH, np.eye(4)
+    foot[2, 3] = neck
+    shaft: Any = trimesh.creation.cylinder(
+        settings.SHAFT_RADIUS, segment=[[0.0, 0.0, 0.0], [0.0, 0.0, neck]], sections=16
+    )
+    return shaft + trimesh.creation.cone(1.0, settings.HEAD_LENGTH, sections=16, transform=foot)
 
 
 def readable(displacements: Array, size: float) -> float:

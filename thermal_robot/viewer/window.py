@@ -248,7 +248,7 @@ class Cloud:
         """Draw the arrows of k rows, the same number each time, or hide them."""
         scene = self._scene
         turns, stretches = arrows(self._vectors[rows], magnification, scene.size, self._thicker)
-        drawn = {"batched_positions": scene.predicted[rows], "batched_wxyzs": turns}
+        drawn: dict[str, Any] = {"batched_positions": scene.predicted[rows], "batched_wxyzs": turns}
         drawn |= {"batched_scales": stretches, "batched_colors": self._colours[rows]}
         if self._node is None:
             mesh, flat = unit_arrow(), {"cast_shadow": False, "receive_shadow": False, "lod": "off"}

@@ -296,7 +296,7 @@ def html(score: Plain, generated: str) -> str:
         When it was made, in the words that shall stand in the footer; may be empty.
     """
     shown = {"score": score, "text": text, "figures": sys.modules[__name__], "groups": _groups(score)}
-    return render("blind.html", title="Blind trial", generated=generated, **shown)
+    return render("blind.html", shown, title="Blind trial", generated=generated)
 
 
 def _groups(score: Plain) -> list[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
