@@ -209,6 +209,7 @@ def fleet_headline(summary: Plain) -> str:
 
 
 def _found(summary: Plain) -> Iterator[Line]:
+    yield ("effect", "robots in which it was found", "mostly in")
     for effect in summary["effects"]:
         if effect["found"]:
             places = [f"{place} {n}" for place, n in effect["places"].items()]
@@ -219,12 +220,14 @@ def _found(summary: Plain) -> Iterator[Line]:
 
 
 def _gathered(summary: Plain) -> Iterator[Line]:
+    yield ("effect", "group", "found there", "elsewhere", "by chance")
     for g in summary["gathered"]:
         there, elsewhere = f"{g['found']} of {g['robots']}", f"{g['found_elsewhere']} of {g['robots_elsewhere']}"
         yield _named(g["effect"]), f"{g['label']} {g['group']}", there, elsewhere, units.p_value(g["p_value"])
 
 
 def _shared(summary: Plain) -> Iterator[Line]:
+    yield ("effect", "parameter", "mean", "spread between robots", "robots", "zero by chance")
     for s in summary["shared"]:
         if not s["label"]:
             mean, spread = (units.measured(s[k], s[f"{k}_std"], s["unit"]) for k in ("mean", "spread"))
@@ -232,6 +235,7 @@ def _shared(summary: Plain) -> Iterator[Line]:
 
 
 def _differs(summary: Plain) -> Iterator[Line]:
+    yield ("effect", "parameter", "group", "mean there", "robots", "alike by chance")
     for s in summary["shared"]:
         for k, g in enumerate(s["groups"]):
             first = (_named(s["effect"]), s["parameter"]) if not k else ("", "")
@@ -240,12 +244,14 @@ def _differs(summary: Plain) -> Iterator[Line]:
 
 
 def _apart(summary: Plain) -> Iterator[Line]:
+    yield ("robot", "effect", "parameter", "value", "usual", "stands out")
     for a in summary["apart"]:
         value, usual = units.measured(a["value"], a["std"], a["unit"]), units.quantity(a["usual"], a["unit"])
         yield a["robot"], _named(a["effect"]), a["parameter"], value, usual, units.probability(a["probability"])
 
 
 def _cases(summary: Plain) -> Iterator[Line]:
+    yield ("robot", "campaign", "effect", "place", "probability", "gap", "after")
     for c in summary["found"]:
         before, after = (units.quantity(c[name], "m") for name in ("rms_before", "rms_after"))
         rivals = f" (or {' or '.join(map(_named, c['confounded_with']))})" if c["confounded_with"] else ""
@@ -262,35 +268,19 @@ def failures(summary: Plain) -> list[str]:
     return [f"{name} ({outcome}): {reason}" for name, outcome, reason in summary["failures"]]
 
 
-_SECTIONS = (
-    ("Effects by how often they were found", ("effect", "robots in which it was found", "mostly in"), _found),
-    (
-        "Found in one group more often than elsewhere",
-        ("effect", "group", "found there", "elsewhere", "by chance"),
-        _gathered,
-    ),
-    (
-        "The same in all robots",
-        ("effect", "parameter", "mean", "spread between robots", "robots", "zero by chance"),
-        _shared,
-    ),
-    (
-        "Different between groups",
-        ("effect", "parameter", "group", "mean there", "robots", "alike by chance"),
-        _differs,
-    ),
-    ("Robots that stand out", ("robot", "effect", "parameter", "value", "usual", "stands out"), _apart),
-    (
-        "What is wrong with which robot, largest gaps first",
-        ("robot", "campaign", "effect", "place", "probability", "gap", "after"),
-        _cases,
-    ),
-)
+_SECTIONS = {
+    "Effects by how often they were found": _found,
+    "Found in one group more often than elsewhere": _gathered,
+    "The same in all robots": _shared,
+    "Different between groups": _differs,
+    "Robots that stand out": _apart,
+    "What is wrong with which robot, largest gaps first": _cases,
+}
 
 
 def fleet_tables(summary: Plain) -> dict[str, list[Line]]:
     """Return what is known of a fleet by heading, as tables of text, the names of the columns first; no empty one."""
-    told = {heading: [heads, *lines(summary)] for heading, heads, lines in _SECTIONS}
+    told = {heading: list(lines(summary)) for heading, lines in _SECTIONS.items()}
     return {heading: table for heading, table in told.items() if table[1:]}
 
 

@@ -64,33 +64,28 @@ def _wordings(diagnosis: Diagnosis) -> Iterator[str]:
         which = "none of the effects that were considered" if diagnosis.narrowed else "no known effect"
         for place in (_place(left), ""):
             yield f"The gap of {size} is explained by {which}{place}."
-    elif not (causes := systematic(diagnosis)):
+    elif not (found := causes(diagnosis)):
         gap = diagnosis.gap
         rest = _unexplained(diagnosis, remaining, gap.rms_before, gap.held_out.rms_before_with_aside)
-        names = listed([_name(diagnosis, f) for f in scattering(diagnosis)])
+        names = listed([_name(diagnosis, f) for f in causes(diagnosis, random=True)])
         yield f"The gap of {size} is scatter: {names} ({_sure(diagnosis)}){rest}; no correction removes scatter."
     else:
         first, rivals = (_MOST_CAUSES, 2, 1), (True, False)
         worse, the = _worse(diagnosis), "the" if diagnosis.gap.worse else "The"
         for most, beside in product(first, rivals):
-            names = _causes(diagnosis, causes, most, beside)
-            for told in _how_far(diagnosis, remaining, len(causes) > 1):
+            names = _causes(diagnosis, found, most, beside)
+            for told in _how_far(diagnosis, remaining, len(found) > 1):
                 yield f"{worse}{the} gap of {size} comes from {names} ({_sure(diagnosis)}); {told}."
 
 
-def systematic(diagnosis: Diagnosis) -> list[Finding]:
-    """Return the causes that a correction can remove, the largest share first."""
-    return [f for f in map(diagnosis.finding, diagnosis.verdict) if not f.random]
+def causes(diagnosis: Diagnosis, random: bool = False) -> list[Finding]:
+    """Return the causes that a correction can remove, or the random ones, which none can; the largest share first."""
+    return [f for f in map(diagnosis.finding, diagnosis.verdict) if f.random is random]
 
 
-def scattering(diagnosis: Diagnosis) -> list[Finding]:
-    """Return the causes that no correction can remove."""
-    return [f for f in map(diagnosis.finding, diagnosis.verdict) if f.random]
-
-
-def weighty(causes: Sequence[Finding], most: int = _MOST_CAUSES) -> list[Finding]:
+def weighty(found: Sequence[Finding], most: int = _MOST_CAUSES) -> list[Finding]:
     """Return the causes that a headline names: the fewest that hold most of what is explained, at most so many."""
-    known = sorted(filter(sized, causes), key=lambda f: -(f.shrinkage or 0.0)) or list(causes)
+    known = sorted(filter(sized, found), key=lambda f: -(f.shrinkage or 0.0)) or list(found)
     held = np.cumsum([max(f.shrinkage or 0.0, 0.0) for f in known] or [0.0])
     return known[: min(int(np.searchsorted(held, _WEIGHTY * held[-1])) + 1, most)]
 
@@ -106,7 +101,7 @@ def sized(finding: Finding) -> bool:
 def unnamed(diagnosis: Diagnosis) -> list[Finding]:
     """Return the causes that the headline counts without naming them."""
     text = headline(diagnosis)
-    return [f for f in systematic(diagnosis) if _name(diagnosis, f) not in text]
+    return [f for f in causes(diagnosis) if _name(diagnosis, f) not in text]
 
 
 def _worse(diagnosis: Diagnosis) -> str:
@@ -159,11 +154,11 @@ def _sure(diagnosis: Diagnosis) -> str:
     return f"{units.percent(probability, 0)} sure" if probability < _SURE else "more than 99 % sure"
 
 
-def _causes(diagnosis: Diagnosis, causes: Sequence[Finding], most: int, beside: bool) -> str:
+def _causes(diagnosis: Diagnosis, found: Sequence[Finding], most: int, beside: bool) -> str:
     """Name the first few, each with what the data cannot tell it from, and count the others."""
-    named = weighty(causes, most)
+    named = weighty(found, most)
     names = [_name(diagnosis, f) + _doubt(diagnosis, f, beside) for f in named]
-    fewer = len(causes) - len(named)
+    fewer = len(found) - len(named)
     return listed([*names, *(["a smaller one"] if fewer == 1 else [f"{fewer} smaller ones"] if fewer else [])])
 
 
@@ -195,7 +190,7 @@ def _how_far(diagnosis: Diagnosis, remaining: Unexplained, several: bool) -> Ite
     elif gap.hardest is not None:
         hard = f"; held out by {gap.hardest.name}, {length(gap.hardest.rms_after)}"
     full = f"correcting for {it} removes {units.percent(held.shrinkage)} of its mean square on held-out data"
-    scatter = "; there is also scatter" * bool(scattering(diagnosis))
+    scatter = "; there is also scatter" * bool(causes(diagnosis, random=True))
     yield f"{full} and leaves {leaves}{_rest(diagnosis, remaining)}{hard}{scatter}"
     yield f"{full} and leaves {leaves}{_rest(diagnosis, remaining)}{hard}"
     short = f"correcting removes {units.percent(held.shrinkage)} on held-out data and leaves {leaves}"
@@ -521,20 +516,20 @@ def details(diagnosis: Diagnosis) -> Iterator[str]:
     """Yield a sentence for each thing that the headline leaves out and no table says."""
     if not diagnosis.usable:
         return
-    causes, chance = systematic(diagnosis), scattering(diagnosis)
+    found, chance = causes(diagnosis), causes(diagnosis, random=True)
     if slight := [diagnosis.title(f.name) for f in unnamed(diagnosis)]:
         yield f"{'The smaller one is' if len(slight) == 1 else 'The smaller ones are'} {listed(slight)}."
-    for f in causes:
+    for f in found:
         if f.confounded_with:
             rivals = " or ".join(map(diagnosis.title, f.confounded_with))
             yield f"{capitalised(diagnosis.title(f.name))} cannot be told apart from {rivals}."
-    if unsized := [diagnosis.title(f.name) for f in causes if not sized(f)]:
+    if unsized := [diagnosis.title(f.name) for f in found if not sized(f)]:
         yield f"How large it is these data do not determine: {listed(unsized)}."
     yield from _beside(diagnosis)
-    if causes and chance:
+    if found and chance:
         names = listed([diagnosis.title(f.name) for f in chance])
         yield f"There is also scatter, which no correction removes: {names}."
-    if laws := sum(f.quantity is not None for f in causes):
+    if laws := sum(f.quantity is not None for f in found):
         which = "None of the effects that were considered" if diagnosis.narrowed else "No known effect"
         shapes = "the shape of the law that was" if laws == 1 else f"the shapes of the {laws} laws that were"
         yield f"{which} has {shapes} found."
@@ -585,48 +580,40 @@ def advice(diagnosis: Diagnosis) -> str:
         return f"{first}; then diagnose again."
     if wanted is None:
         return ""
-    told = _shows(diagnosis, wanted)
-    if wanted.kind == "frame":
-        declared = f" ({wanted.name})" if wanted.name else ""
-        return f"A frame measured on its own, and declared known{declared}, would {told}."
-    if wanted.kind == "range":
-        return f"More poses over the whole range of every joint would {told}."
-    if wanted.kind == "pose":
-        return f"The pose that would best {told}: {_pose(diagnosis, wanted)}."
-    if wanted.kind == "repeats" and wanted.apart:
-        return f"Repeat some poses, and label them in a column {wanted.name}: this would {told}."
-    if wanted.kind == "repeats":
+    names = [diagnosis.title(name) for name in wanted.apart[:2]]
+    told = f"tell {' from '.join(names)}" if names else "tell the leading explanations apart"
+    told = f"show whether to believe in {names[0]}" if len(names) == 1 else told
+    if wanted.kind == "repeats" and not names:
         return "Repeat a few poses in another order and on another day: this shows how much of the remainder repeats."
-    if wanted.apart:
-        return f"Repeat some poses with another load, and record {wanted.name}: this would {told}."
-    return f"Record {wanted.name}: {_remainder(wanted)}, and {_why(diagnosis, wanted)}."
+    if wanted.kind == "column" and not names:
+        return f"Record {wanted.name}: {_why(diagnosis, wanted)}."
+    declared = f" ({wanted.name})" if wanted.name else ""
+    pose = _pose(diagnosis, wanted)
+    return _TO_DO[wanted.kind].format(told=told, declared=declared, name=wanted.name, pose=pose)
 
 
-def _shows(diagnosis: Diagnosis, wanted: Wanted) -> str:
-    names = _titles(diagnosis, wanted.apart[:2])
-    if len(names) == 1:
-        return f"show whether to believe in {names[0]}"
-    return f"tell {' from '.join(names)}" if names else "tell the leading explanations apart"
-
-
-def _remainder(wanted: Wanted) -> str:
-    own = wanted.follows and wanted.place.endswith(wanted.follows)
-    enters = f" enters at {wanted.place}" if wanted.place else ""
-    follows = f" follows {'its position' if own else wanted.follows}" if wanted.follows else ""
-    return "a remainder" + (" and".join(part for part in (enters, follows) if part) or " is unexplained")
+_TO_DO = {
+    "frame": "A frame measured on its own, and declared known{declared}, would {told}.",
+    "range": "More poses over the whole range of every joint would {told}.",
+    "pose": "The pose that would best {told}: {pose}.",
+    "repeats": "Repeat some poses, and label them in a column {name}: this would {told}.",
+    "column": "Repeat some poses with another load, and record {name}: this would {told}.",
+}
 
 
 def _why(diagnosis: Diagnosis, wanted: Wanted) -> str:
-    if wanted.whether:
-        return f"this would show whether {wanted.whether} causes it"
-    untested = _titles(diagnosis, wanted.untested[:_MOST_UNTESTED])
-    if len(wanted.untested) > _MOST_UNTESTED:
-        untested.append(f"{len(wanted.untested) - _MOST_UNTESTED} more")
-    return f"{listed(untested)} could not be tested" if untested else "this may be what it follows"
-
-
-def _titles(diagnosis: Diagnosis, names: Sequence[str]) -> list[str]:
-    return [diagnosis.title(name) for name in names]
+    """Say where a remainder enters and what it follows, and what a column would show of it."""
+    own = wanted.follows and wanted.place.endswith(wanted.follows)
+    enters = f" enters at {wanted.place}" if wanted.place else ""
+    follows = f" follows {'its position' if own else wanted.follows}" if wanted.follows else ""
+    remainder = " and".join(filter(None, (enters, follows))) or " is unexplained"
+    untested = [diagnosis.title(name) for name in wanted.untested[:_MOST_UNTESTED]]
+    if more := len(wanted.untested) - len(untested):
+        untested.append(f"{more} more")
+    why = f"{listed(untested)} could not be tested" if untested else "this may be what it follows"
+    return f"a remainder{remainder}, and " + (
+        f"this would show whether {wanted.whether} causes it" if wanted.whether else why
+    )
 
 
 def _pose(diagnosis: Diagnosis, wanted: Wanted) -> str:

@@ -154,25 +154,11 @@ def _scene(
 
 
 def arrows(displacements: Array, magnification: float, size: float, thicker: float = 1.0) -> tuple[Array, Array]:
-    """Return the turns and stretches that make arrows of copies of :func:`unit_arrow`.
+    """Return what makes arrows of displacements (N, 3), m, of copies of :func:`unit_arrow`.
 
-    Parameters
-    ----------
-    displacements
-        (N, 3) m.
-    magnification
-        How many times longer than the displacements arrows are.
-    size
-        Of the scene, m: bounds how thick and how long they are.
-    thicker
-        By how much those bounds on the thickness are wider.
-
-    Returns
-    -------
-    turns
-        (N, 4) unit quaternions wxyz that turn the z axis along them.
-    stretches
-        (N, 3) factors along the arrow's own axes; the last is the length, m.
+    Unit quaternions wxyz (N, 4) turn the z axis along them; factors (N, 3) stretch the arrow along its own axes, the
+    last of them to its length, m. The ``size`` of the scene, m, bounds how long it is, and how thick: ``thicker`` times
+    as usual.
     """
     lengths = np.minimum(magnification * np.linalg.norm(displacements, axis=1), settings.LONGEST_ARROW * size)
     bounds = thicker * size * settings.NARROWEST, thicker * size * settings.WIDEST
@@ -196,12 +182,7 @@ def unit_arrow() -> Any:
 def readable(displacements: Array, size: float) -> float:
     """Return the magnification, 1, 2 or 5 times a power of ten, at which large arrows are as long as settings say.
 
-    Parameters
-    ----------
-    displacements
-        (N, 3) m.
-    size
-        Of the scene, m.
+    Displacements (N, 3) and the size of the scene are in m.
     """
     lengths = np.linalg.norm(displacements, axis=1)
     large = float(np.quantile(lengths, settings.LARGE_GAP)) if len(lengths) else 0.0

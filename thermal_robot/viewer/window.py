@@ -90,23 +90,11 @@ _SHORTEST = 1e-6
 
 
 def solids(urdf: str, folder: Path, size: float) -> dict[str, Any]:
-    """Return the shape of each link that has one.
+    """Return by link, in the order of the URDF, a ``trimesh.Trimesh`` in its frame, m.
 
-    Parameters
-    ----------
-    urdf
-        XML text.
-    folder
-        From which paths of meshes start.
-    size
-        Of the scene, m: sticks are as thick as suits it.
-
-    Returns
-    -------
-    dict
-        By link, in the order of the URDF, a ``trimesh.Trimesh`` in its frame, m. A link whose meshes are missing is a
-        stick to each joint that it carries; so are all links where none has a shape. A
-        :class:`~thermal_robot.errors.Note` names a file.
+    A link whose meshes are missing is a stick to each joint that it carries; so are all links where none has a shape.
+    A :class:`~thermal_robot.errors.Note` names a file. Paths of meshes start from ``folder``; sticks are as thick as
+    suits the ``size`` of the scene, m.
 
     Raises
     ------
@@ -149,17 +137,7 @@ def _sticks(link: str, joints: Iterable[Any], size: float) -> list[Any]:
 
 
 class Puppet:
-    """The robot in the browser, in the colours of its places.
-
-    Parameters
-    ----------
-    nodes
-        What adds nodes: the ``scene`` of a viser server.
-    scene
-        What to show.
-    shapes
-        By link, as :func:`solids` returns them.
-    """
+    """The robot in the browser, in the colours of its places: nodes of a viser scene, shaped as :func:`solids` says."""
 
     def __init__(self, nodes: Any, scene: Scene, shapes: Mapping[str, Any]) -> None:
         import trimesh
@@ -219,22 +197,9 @@ class Puppet:
 
 
 class Cloud:
-    """The arrows of some rows, which begin where the robot was predicted to be.
+    """Arrows of displacements (N, 3), m, root frame, which begin where the robot was predicted to be: one viser node.
 
-    Parameters
-    ----------
-    nodes
-        What adds nodes: the ``scene`` of a viser server.
-    name
-        Of the node.
-    scene
-        What is shown.
-    vectors
-        (N, 3) displacements of all rows, m, root frame.
-    colour
-        Of rows that were not set aside.
-    thicker
-        How many times as thick as usual they are.
+    Rows that were set aside are grey, the others of the ``colour``; all are so many times ``thicker`` than usual.
     """
 
     def __init__(
@@ -264,14 +229,7 @@ BACK, ON, WORST = "previous", "next", "largest gap"
 class Window:
     """A scene that is served on the loopback address until it is closed.
 
-    Parameters
-    ----------
-    scene
-        What to show.
-    shapes
-        By link, as :func:`solids` returns them.
-    port
-        Where to listen; the next free one where it is taken, 0 for any.
+    Shapes of links are as :func:`solids` returns them. The next free port is taken where ``port`` is; 0 asks for any.
     """
 
     def __init__(self, scene: Scene, shapes: Mapping[str, Any], port: int) -> None:
