@@ -62,7 +62,7 @@ FREE = {
 }
 """Rooms that may import less than what stands before them: one draws what it is given, three need no campaign."""
 TYPES = {"report": {f"thermal_robot.diagnosis.{n}" for n in ("result", "values", "calibration")}}
-TYPES["report"] |= {"thermal_robot.fleet.wear_result", "thermal_robot.shapes.arm"}
+TYPES["report"] |= {"thermal_robot.fleet.wear_result", "thermal_robot.shapes"}
 """What a room may know beyond that by type alone: the report sees values, and nothing that computes them."""
 
 MODULES = sorted(ROOT.rglob("*.py"))

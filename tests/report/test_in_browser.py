@@ -14,8 +14,7 @@ import numpy as np
 import pytest
 from matplotlib.image import imread
 
-import thermal_robot as tr
-from thermal_robot.report import html, html_parts
+from thermal_robot.report import html
 
 BROWSER = next(filter(None, map(shutil.which, ("chromium", "chromium-browser", "google-chrome"))), None)
 OPTIONS = (
@@ -90,9 +89,9 @@ class Handler(SimpleHTTPRequestHandler):
 
 
 @pytest.fixture(scope="module")
-def served(tmp_path_factory):
+def served(tmp_path_factory, demo):
     folder = tmp_path_factory.mktemp("page")
-    (folder / "page.html").write_text(html(tr.diagnose(tr.demo_campaign())), encoding="utf-8")
+    (folder / "page.html").write_text(html(demo), encoding="utf-8")
     server = ThreadingHTTPServer(("127.0.0.1", 0), partial(Handler, directory=str(folder)))
     threading.Thread(target=server.serve_forever, daemon=True).start()
     yield folder, f"http://127.0.0.1:{server.server_port}"
@@ -151,10 +150,10 @@ onload="this.contentDocument.querySelectorAll('.tr-wide')[1].scrollLeft = 9999">
 def test_a_shadow_tells_on_which_side_there_is_more(served, tmp_path):
     """Boxes that are wide, wide and scrolled to their end, and narrow: where pixels are darker than paper."""
     folder, address = served
-    boxes = [html_parts.wide(f'<div style="width: {px}px; height: 100px"></div>', "a box") for px in (900, 900, 50)]
+    boxes = [f'<div class="tr-wide"><div style="width: {px}px; height: 100px"></div></div>' for px in (900, 900, 50)]
     height = 100  # of a box, pixels
-    page = html_parts.document("boxes", "".join(boxes))
-    (folder / "wide.html").write_text(page, encoding="utf-8")
+    head = (folder / "page.html").read_text(encoding="utf-8").partition("<header>")[0]
+    (folder / "wide.html").write_text(f"{head}{''.join(boxes)}</main></body></html>", encoding="utf-8")
     (folder / "scrolled.html").write_text(SCROLLED, encoding="utf-8")
     shot = tmp_path / "shot.png"
     command = [BROWSER, *OPTIONS, "--hide-scrollbars", f"--user-data-dir={tmp_path}", f"--screenshot={shot}"]

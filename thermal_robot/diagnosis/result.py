@@ -41,7 +41,7 @@ if TYPE_CHECKING:
     from thermal_robot.diagnosis.updated import Updated
     from thermal_robot.inference.fit import Fit
     from thermal_robot.iso9283.performance import Performance
-    from thermal_robot.shapes.arm import Arm
+    from thermal_robot.shapes import Arm
 
 SCHEMA = "thermal-robot/diagnosis/2"
 
@@ -226,7 +226,7 @@ class Diagnosis:
         >>> arm.poses.shape
         (2, 8, 4, 4)
         """
-        from thermal_robot.shapes.arm import arm
+        from thermal_robot.shapes import arm
 
         if not self.usable or self.fit is None:
             return None

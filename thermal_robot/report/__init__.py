@@ -11,14 +11,7 @@ from importlib.resources import files
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from thermal_robot.report.page import fragment, html
-    from thermal_robot.report.page_campaigns import (
-        comparison_fragment,
-        comparison_html,
-        fleet_html,
-        plot_wear,
-        wear_html,
-    )
+    from thermal_robot.report.page import comparison_fragment, comparison_html, fleet_html, fragment, html, wear_html
     from thermal_robot.report.plain_text import calibration_text, text
     from thermal_robot.report.plots import (
         explain_figure,
@@ -26,6 +19,7 @@ if TYPE_CHECKING:
         plot_how_far,
         plot_map,
         plot_remainder,
+        plot_wear,
         plot_where,
         plot_which,
     )
@@ -58,8 +52,7 @@ __all__ = [
     "wear_html",
 ]
 _HOMES = {
-    "page": ("fragment", "html"),
-    "page_campaigns": ("comparison_fragment", "comparison_html", "fleet_html", "plot_wear", "wear_html"),
+    "page": ("comparison_fragment", "comparison_html", "fleet_html", "fragment", "html", "wear_html"),
     "plain_text": ("calibration_text", "text"),
     "text_campaigns": ("comparison_headline", "comparison_text", "fleet_text"),
     "words": ("advice", "headline"),

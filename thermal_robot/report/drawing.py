@@ -78,16 +78,8 @@ def title(axes: Axes, text: str) -> None:
 def note(axes: Axes, text: str) -> None:
     """Say in an empty panel why it is empty."""
     axes.axis("off")
-    axes.text(
-        0.5,
-        0.5,
-        plain(text),
-        ha="center",
-        va="center",
-        color=MUTED,
-        fontsize=NORMAL,
-        transform=axes.transAxes,
-    )
+    middle: dict[str, Any] = {"ha": "center", "va": "center", "transform": axes.transAxes}
+    axes.text(0.5, 0.5, plain(text), color=MUTED, fontsize=NORMAL, **middle)
 
 
 def log_axis(axes: Axes, low: float, high: float) -> None:

@@ -1,39 +1,19 @@
-"""A diagnosis as plain text: what the command line prints."""
+"""A diagnosis and a calibration as plain text: what the command line prints."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from textwrap import fill
 from typing import TYPE_CHECKING
 
-from thermal_robot.report import units
-from thermal_robot.report.words import (
-    NO_BREAK,
-    STATUS,
-    bound,
-    described,
-    details,
-    facts,
-    hardest,
-    in_words,
-    more,
-    needs,
-    noise,
-    one_sigma,
-    rows_used,
-    sentences,
-    told_as,
-    turned,
-    with_aside,
-)
+from thermal_robot.report import units, words
+from thermal_robot.report.words import WIDTH
 
 if TYPE_CHECKING:
     from thermal_robot.diagnosis.calibration import Calibrated, Calibration
     from thermal_robot.diagnosis.result import Diagnosis
     from thermal_robot.diagnosis.values import Finding
 
-
-WIDTH = 96
 _BAR = 24
 _NAME = 26
 
@@ -50,44 +30,32 @@ def text(diagnosis: Diagnosis) -> str:
     -------
     str
         Plain text, at most 96 columns wide unless a name is longer, without a newline at the end: the verdict, how
-        far the gap shrinks, which effects cause it, where they act, what stays unexplained, what to measure next.
+        far the gap shrinks, which effects cause it, where they act, what stays unexplained, what to measure next. Of a
+        table that does not fit the robot what is wrong with it, and nothing of the robot.
     """
-    if not diagnosis.usable:
-        return "\n\n".join("\n".join(block) for block in _unusable(diagnosis))
-    blocks = [
-        [_wrap(s, "") for s in (*turned(diagnosis), diagnosis.summary, *details(diagnosis))],
-        list(_facts(diagnosis)),
-        ["HOW FAR", *_how_far(diagnosis)],
-        ["WHICH", *_which(diagnosis)],
-        ["WHERE", *_where(diagnosis)],
-        ["UNEXPLAINED", *(_wrap(s) for s in sentences(diagnosis))],
-        ["ISO 9283", *_criteria(diagnosis)],
-        ["NEXT", *_next(diagnosis)],
-        ["WARNINGS", *(_wrap(w, "  - ") for w in diagnosis.warnings)],
-    ]
-    return "\n\n".join("\n".join(block) for block in blocks if len(block) > 1 or block is blocks[0])
-
-
-def _unusable(diagnosis: Diagnosis) -> Iterator[list[str]]:
-    """Say what is wrong with the table, and nothing of the robot."""
-    yield [_wrap(diagnosis.summary, "")]
-    yield list(_facts(diagnosis))
-    yield ["NEXT", _wrap(diagnosis.advice)]
-    if diagnosis.warnings:
-        yield ["WARNINGS", *(_wrap(w, "  - ") for w in diagnosis.warnings)]
+    facts = [_wrap(said, f"{name.lower():11}") for name, said in words.facts(diagnosis).items() if name != "Rows used"]
+    warnings = ["WARNINGS", *(_wrap(w, "  - ") for w in diagnosis.warnings)]
+    if diagnosis.usable:
+        first = [*words.turned(diagnosis), diagnosis.summary, *words.details(diagnosis)]
+        blocks = [
+            ["HOW FAR", *_how_far(diagnosis)],
+            ["WHICH", *_which(diagnosis)],
+            ["WHERE", *_where(diagnosis)],
+            ["UNEXPLAINED", *map(_wrap, words.sentences(diagnosis))],
+            ["ISO 9283", *_criteria(diagnosis)],
+            ["NEXT", *_next(diagnosis)],
+        ]
+    else:
+        first, blocks = [diagnosis.summary], [["NEXT", _wrap(diagnosis.advice)]]
+    told = [[_wrap(s, "") for s in first], facts, *(block for block in (*blocks, warnings) if len(block) > 1)]
+    return "\n\n".join("\n".join(block) for block in told)
 
 
 def _wrap(sentence: str, indent: str = "  ", hang: int = 0) -> str:
     """Break a sentence into lines, but not between a number and its unit; the first line begins with ``indent``."""
     rest = " " * (len(indent) + hang)
-    lines = fill(bound(sentence), WIDTH, initial_indent=indent, subsequent_indent=rest, break_on_hyphens=False)
-    return lines.replace(NO_BREAK, " ")
-
-
-def _facts(diagnosis: Diagnosis) -> Iterator[str]:
-    for heading, said in facts(diagnosis).items():
-        if heading != "Rows used":  # told beside the gap
-            yield _wrap(said, f"{heading.lower():11}")
+    lines = fill(words.bound(sentence), WIDTH, initial_indent=indent, subsequent_indent=rest, break_on_hyphens=False)
+    return lines.replace(words.NO_BREAK, " ")
 
 
 def _how_far(diagnosis: Diagnosis) -> Iterator[str]:
@@ -95,28 +63,22 @@ def _how_far(diagnosis: Diagnosis) -> Iterator[str]:
     before, after, held_before, held_after, floor = units.together(
         (gap.rms_before, gap.rms_after, held.rms_before, held.rms_after, gap.noise_floor), "m"
     )
-    lines = [("gap, rms distance", before, after, rows_used(diagnosis))]
+    lines = [("gap, rms distance", before, after, words.rows_used(diagnosis))]
     if gap.orientation_before is not None:
-        pair = units.together((gap.orientation_before, gap.orientation_after), "rad")
-        lines.append(("gap of orientation, rms", pair[0], pair[1], ""))
-    lines.append(
-        (
-            "gap on rows held out",
-            held_before,
-            held_after,
-            f"not used for the fit: {held.scheme}, {held.folds} folds",
-        )
-    )
+        turned = units.together((gap.orientation_before, gap.orientation_after), "rad")
+        lines.append(("gap of orientation, rms", turned[0], turned[1], ""))
+    said = f"not used for the fit: {held.scheme}, {held.folds} folds"
+    lines.append(("gap on rows held out", held_before, held_after, said))
     wide = max(len(cell) for line in lines for cell in line[1:3])
     for name, first, second, note in lines:
         yield f"  {name:{_NAME}}{first:>{wide}} → {second:<{wide}}   {note}".rstrip()
-    if told := with_aside(diagnosis):
+    if told := words.with_aside(diagnosis):
         yield _wrap(told, f"  {'':{_NAME}}")
-    shrinkage = f"{units.percent(held.shrinkage)}   95 % interval {_bounds(held.shrinkage_ci95)}"
-    yield f"  {'shrinkage, held out':{_NAME}}{shrinkage}"
-    if told := hardest(diagnosis):
+    interval = f"95 % interval {_bounds(held.shrinkage_ci95)}"
+    yield f"  {'shrinkage, held out':{_NAME}}{units.percent(held.shrinkage)}   {interval}"
+    if told := words.hardest(diagnosis):
         yield _wrap(told, f"  {'hardest hold-out':{_NAME}}")
-    yield _wrap(noise(diagnosis, floor), f"  {'noise floor':{_NAME}}")
+    yield _wrap(words.noise(diagnosis, floor), f"  {'noise floor':{_NAME}}")
     yield _wrap(
         "Shrinkage is the share of the gap's mean square that the correction removes. Figures of rows held out "
         "have the noise of these rows in them."
@@ -130,43 +92,36 @@ def _bounds(bounds: tuple[float, float] | None) -> str:
 def _which(diagnosis: Diagnosis) -> Iterator[str]:
     wide = max([len(f.name) for f in diagnosis.effects], default=0)
     yield f"    {'':{wide}}{'probability':>13}   share of the gap, on rows held out (95 %)"
-    for status, heading in STATUS.items():
-        group = [f for f in diagnosis.effects if told_as(f) == status]
+    for status, heading in words.STATUS.items():
+        group = [f for f in diagnosis.effects if words.told_as(f) == status]
         if group:
             yield f"  {heading}"
         elif status == "found":
             yield "  found: none"
         for finding in group:
-            if status in ("found", "confounded", "contained"):
-                yield from _at_length(finding, wide, diagnosis)
-            else:
-                yield _in_short(finding, wide, diagnosis.joint_names)
-    if told := one_sigma(diagnosis):
+            yield from _effect(finding, status, wide, diagnosis)
+    if told := words.one_sigma(diagnosis):
         yield _wrap(told)
 
 
-def _share(finding: Finding) -> str:
-    bounds = f"({_bounds(finding.shrinkage_ci95)})" if finding.shrinkage_ci95 else ""
-    return f"{units.percent(finding.shrinkage):>7}  {bounds}".rstrip()
-
-
-def _at_length(finding: Finding, wide: int, diagnosis: Diagnosis) -> Iterator[str]:
-    inner = " " * 6
-    yield f"    {finding.name:{wide}}{units.probability(finding.probability):>13}   {_share(finding)}"
-    before, shown, after = described(finding, diagnosis)
-    yield from (_wrap(told, inner, hang) for told, hang in before)
+def _effect(finding: Finding, status: str, wide: int, diagnosis: Diagnosis) -> Iterator[str]:
+    if status == "not_testable":
+        needs = words.needs(finding, diagnosis.joint_names)
+        yield _wrap(f"needs {needs}", f"    {finding.name:{wide}}{'':13}   ")
+        return
+    bounds = f"  ({_bounds(finding.shrinkage_ci95)})" if finding.shrinkage_ci95 else ""
+    line = f"    {finding.name:{wide}}{units.probability(finding.probability):>13}   "
+    line += f"{units.percent(finding.shrinkage):>7}{bounds}"
+    if status not in ("found", "confounded", "contained"):
+        rivals = ", ".join(finding.confounded_with)
+        yield _wrap(f"; cannot be told apart from {rivals}", line) if rivals else line
+        return
+    yield line
+    before, shown, after = words.described(finding, diagnosis)
+    yield from (_wrap(told, " " * 6, hang) for told, hang in before)
     column = max([len(name) for name, _ in shown], default=0)
-    for name, value in shown:
-        yield f"{inner}{name:{column}}  {value}"
-    yield from (_wrap(told, inner, hang) for told, hang in after)
-
-
-def _in_short(finding: Finding, wide: int, joints: Sequence[str]) -> str:
-    if finding.status == "not_testable":
-        return _wrap(f"needs {needs(finding, joints)}", f"    {finding.name:{wide}}{'':13}   ")
-    told = f"; cannot be told apart from {', '.join(finding.confounded_with)}" if finding.confounded_with else ""
-    line = f"    {finding.name:{wide}}{units.probability(finding.probability):>13}   {_share(finding)}"
-    return _wrap(told, line) if told else line
+    yield from (f"      {name:{column}}  {value}" for name, value in shown)
+    yield from (_wrap(told, " " * 6, hang) for told, hang in after)
 
 
 def _where(diagnosis: Diagnosis) -> Iterator[str]:
@@ -180,6 +135,7 @@ def _where(diagnosis: Diagnosis) -> Iterator[str]:
 
 
 def _bars(heading: str, shares: Mapping[str, float], ranked: bool = True, most: int = 7) -> Iterator[str]:
+    """Draw shares as bars of characters, full at one; nothing for what is not above zero."""
     if not shares:
         return
     ordered = sorted(shares.items(), key=lambda item: -item[1]) if ranked else list(shares.items())
@@ -187,17 +143,13 @@ def _bars(heading: str, shares: Mapping[str, float], ranked: bool = True, most: 
     yield f"  {heading}"
     wide = max([_NAME, *(len(name) for name, _ in shown)])
     for name, share in shown:
-        yield f"    {name:{wide}}  {bar(share):{_BAR}}  {units.percent(share):>7}"
+        halves = round(2 * _BAR * min(max(share, 0.0), 1.0)) if share == share else 0
+        bar = "█" * (halves // 2) + "▌" * (halves % 2)
+        yield f"    {name:{wide}}  {bar:{_BAR}}  {units.percent(share):>7}"
     if not shown:
         yield "    none above 0.5 %"
     elif rest := ordered[len(shown) :]:
-        yield f"    {more(len(rest), rest[0][1])}"
-
-
-def bar(share: float, width: int = _BAR) -> str:
-    """Draw a share as a bar of characters, full at one; nothing for what is not above zero."""
-    halves = round(2 * width * min(max(share, 0.0), 1.0)) if share == share else 0
-    return "█" * (halves // 2) + "▌" * (halves % 2)
+        yield f"    {words.more(len(rest), rest[0][1])}"
 
 
 def _criteria(diagnosis: Diagnosis) -> Iterator[str]:
@@ -205,13 +157,12 @@ def _criteria(diagnosis: Diagnosis) -> Iterator[str]:
     found = diagnosis.performance
     if found is None:
         return
-    lines = [
+    for name, value, after in (
         ("pose accuracy AP", found.accuracy, found.corrected),
         ("pose repeatability RP", found.repeatability, None),
-    ]
-    lines += [("path accuracy AT", found.path_accuracy, found.path_corrected)]
-    lines += [("path repeatability RT", found.path_repeatability, None)]
-    for name, value, after in lines:
+        ("path accuracy AT", found.path_accuracy, found.path_corrected),
+        ("path repeatability RT", found.path_repeatability, None),
+    ):
         if value is not None:
             shown = units.together((value, after), "m")
             yield f"  {name:{_NAME}}{' → '.join(shown if after is not None else shown[:1])}"
@@ -250,12 +201,14 @@ def calibration_text(calibration: Calibration) -> str:
 def _lines(found: Calibration) -> Iterator[str]:
     yield fill(
         f"{found.robot}, {found.tool_frame}: {found.samples} samples of {found.measures}, {len(found.outliers)} set "
-        f"aside. Fitted as asked, not chosen: {in_words([effect.title for effect in found.effects])}.",
+        f"aside. Fitted as asked, not chosen: {words.in_words([effect.title for effect in found.effects])}.",
         WIDTH,
     )
-    yield _shrunk("gap, rms", found.rms_before, found.rms_after, "m")
+    sizes = [("gap, rms", found.rms_before, found.rms_after, "m")]
     if found.turned_before is not None and found.turned_after is not None:
-        yield _shrunk("turn, rms", found.turned_before, found.turned_after, "rad")
+        sizes.append(("turn, rms", found.turned_before, found.turned_after, "rad"))
+    for name, before, after, unit in sizes:
+        yield f"{name:<16}{' → '.join(units.together([before, after], unit))} on the rows that were fitted"
     yield f"noise, per axis {units.quantity(found.noise, 'm')}"
     if found.unexplained:
         yield fill(
@@ -264,17 +217,12 @@ def _lines(found: Calibration) -> Iterator[str]:
             WIDTH,
         )
     for effect in found.effects:
-        yield ""
-        yield from _effect(effect)
+        yield from ("", *_calibrated(effect))
     for warning in found.warnings:
         yield fill(f"Note: {warning}", WIDTH)
 
 
-def _shrunk(name: str, before: float, after: float, unit: str) -> str:
-    return f"{name:<16}{' → '.join(units.together([before, after], unit))} on the rows that were fitted"
-
-
-def _effect(effect: Calibrated) -> Iterator[str]:
+def _calibrated(effect: Calibrated) -> Iterator[str]:
     part = f", a part of {effect.inside}" if effect.inside not in ("", effect.name) else ""
     yield f"{effect.title} ({effect.name}{part}), ± one standard deviation"
     known = [p for p in effect.parameters if p.identified]
@@ -284,4 +232,5 @@ def _effect(effect: Calibrated) -> Iterator[str]:
     hidden = [p.name for p in effect.parameters if not p.identified]
     for label, names in (("not determined", hidden), ("not seen apart from the others or the frames", effect.unseen)):
         if names:
-            yield fill(f"{label}: {in_words(names, between='; ')}", WIDTH, initial_indent="  ", subsequent_indent="  ")
+            said = f"{label}: {words.in_words(names, between='; ')}"
+            yield fill(said, WIDTH, initial_indent="  ", subsequent_indent="  ")

@@ -1,9 +1,12 @@
-"""The figures of a diagnosis: how far the gap shrinks, which effects, where they act, what remains."""
+"""The figures of results: how far the gap shrinks, which effects, where they act, what remains, what campaigns share.
+
+Colours, axes and the Matplotlib figure behind them stand in :mod:`thermal_robot.report.drawing`.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from math import ceil
 from textwrap import fill
 from typing import TYPE_CHECKING, Any
 
@@ -41,15 +44,19 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
     from thermal_robot.diagnosis.result import Diagnosis
-    from thermal_robot.diagnosis.values import Explained, Finding, Place, Rows
+    from thermal_robot.diagnosis.values import Explained, Finding, Place
+    from thermal_robot.fleet.wear_result import Wear, Worn
 
-
+Look = dict[str, Any]
+"""Options of Matplotlib."""
+_SAID: Look = {"fontsize": SMALL, "color": INK, "va": "center"}
+_KEY: Look = {"fontsize": SMALL, "labelcolor": INK, "frameon": False}
 _BELOW_KEY = 0.77  # of a panel's height for the bars; the key stands above
 _ROOM = 1.08  # beside the outermost bins, as a factor
 
 
 def plot_how_far(diagnosis: Diagnosis) -> Figure:
-    """Draw how many rows have which distance |gap|: before, after, and after while the row was held out.
+    """Draw histograms of the distance |gap|: before, after, and after while the row was held out.
 
     Returns
     -------
@@ -60,15 +67,13 @@ def plot_how_far(diagnosis: Diagnosis) -> Figure:
     pose = diagnosis.gap.orientation_before is not None and diagnosis.rows.gap.shape[1] >= 6
     figure = Drawing(7.6, 5.6 if pose else 3.5)
     panels = figure.subplots(2 if pose else 1, 1, squeeze=False)[:, 0]
-    draw_how_far(panels[0], diagnosis)
-    title(panels[0], "Position: measured against predicted")
-    if pose:
-        draw_how_far(panels[1], diagnosis, turned=True)
-        title(panels[1], "Orientation: measured against predicted")
+    for axes, turned, what in zip(panels, (False, True), ("Position", "Orientation"), strict=False):
+        _draw_how_far(axes, diagnosis, turned)
+        title(axes, f"{what}: measured against predicted")
     return figure
 
 
-def draw_how_far(axes: Axes, diagnosis: Diagnosis, turned: bool = False) -> None:
+def _draw_how_far(axes: Axes, diagnosis: Diagnosis, turned: bool = False) -> None:
     """Draw the distances of the position into a panel, or the angles of the orientation if ``turned``."""
     rows, gap, used = diagnosis.rows, diagnosis.gap, ~diagnosis.rows.outliers
     held, floor = rows.held_out_after[np.isfinite(rows.held_out_after)], gap.noise_floor
@@ -89,68 +94,41 @@ def _draw_distances(axes: Axes, before: Array, after: Array, held_out: Array, sa
     if not everything.size:
         note(axes, "There is no gap to be drawn.")
         return
-    bins = _bins(everything, len(before), floor)
-    before, after, held_out = (np.clip(v, bins[0], bins[-1]) for v in (before, after, held_out))
-    # the outline before is the broader one, so that it is seen where the one after covers it
-    _draw_shape(axes, before, bins, BEFORE, f"before: rms {said[0]}", width=3.0, fill=0.5)
-    _draw_shape(axes, after, bins, AFTER, f"after: rms {said[1]}", fill=0.6)
-    if held_out.size:
-        _draw_shape(axes, held_out, bins, THIRD, f"after, on rows held out: rms {said[2]}", style=(0, (4, 2)))
+    # a few rows that happen to fit perfectly must not stretch the axis over decades
+    low, high = float(np.quantile(everything, 0.01)) / 1.6, float(everything.max()) * 1.25
     if floor > 0.0:
-        label = f"noise floor: rms {said[3]}"
-        along = axes.get_xaxis_transform()
-        axes.plot([floor] * 2, [0.0, _BELOW_KEY], transform=along, color=INK, linewidth=1.2, linestyle=":", label=label)
+        low, high = min(low, floor / 1.3), max(high, floor * 1.3)
+    bins = np.geomspace(low, high, int(np.clip(2.2 * np.sqrt(len(before)), 14, 60)))
+    # the outline before is the broader one, so that it is seen where the one after covers it
+    _draw_shape(axes, before, bins, 0.5, f"before: rms {said[0]}", color=BEFORE, linewidth=3.0)
+    _draw_shape(axes, after, bins, 0.6, f"after: rms {said[1]}", color=AFTER, linewidth=1.5)
+    if held_out.size:
+        label = f"after, on rows held out: rms {said[2]}"
+        _draw_shape(axes, held_out, bins, 0.0, label, color=THIRD, linewidth=1.5, linestyle=(0, (4, 2)))
+    if floor > 0.0:
+        look: Look = {"color": INK, "linewidth": 1.2, "linestyle": ":", "label": f"noise floor: rms {said[3]}"}
+        axes.plot([floor] * 2, [0.0, _BELOW_KEY], transform=axes.get_xaxis_transform(), **look)
     # room beside the outermost bins, so that none looks cut off
-    log_axis(axes, float(bins[0]) / _ROOM, float(bins[-1]) * _ROOM)
+    log_axis(axes, low / _ROOM, high * _ROOM)
     axes.set_ylabel("rows")
     axes.set_ylim(0.0, axes.get_ylim()[1] / _BELOW_KEY)
     axes.locator_params(axis="y", integer=True, nbins=5)
-    axes.legend(
-        loc="upper left",
-        ncols=2,
-        fontsize=SMALL,
-        labelcolor=INK,
-        facecolor=PAPER,
-        edgecolor="none",
-        framealpha=0.9,
-        handlelength=1.6,
-    )
+    box: Look = {"frameon": True, "facecolor": PAPER, "edgecolor": "none", "framealpha": 0.9}
+    axes.legend(loc="upper left", ncols=2, handlelength=1.6, **_KEY | box)
     tidy(axes)
 
 
-def _bins(values: Array, rows: int, floor: float) -> Array:
-    """Return edges of bins that are equally wide on a logarithmic axis and hold the noise floor, too."""
-    # a few rows that happen to fit perfectly must not stretch the axis over decades
-    low, high = float(np.quantile(values, 0.01)) / 1.6, float(values.max()) * 1.25
-    if floor > 0.0:
-        low, high = min(low, floor / 1.3), max(high, floor * 1.3)
-    return np.geomspace(low, high, int(np.clip(2.2 * np.sqrt(rows), 14, 60)))
-
-
-def _draw_shape(
-    axes: Axes,
-    values: Array,
-    bins: Array,
-    colour: str,
-    label: str,
-    *,
-    width: float = 1.5,
-    style: Any = "-",
-    fill: float = 0.0,
-) -> None:
-    """Draw a histogram from its first filled bin to its last: the outline, and the area with opacity ``fill``."""
-    counts, _ = np.histogram(values, bins)
+def _draw_shape(axes: Axes, values: Array, bins: Array, opacity: float, label: str, **line: Any) -> None:
+    """Draw a histogram from its first filled bin to its last: the outline, and the area with an opacity above 0."""
+    counts, _ = np.histogram(np.clip(values, bins[0], bins[-1]), bins)
     filled = np.flatnonzero(counts)
-    part = slice(int(filled[0]), int(filled[-1]) + 1)
-    counts, edges = counts[part], bins[part.start : part.stop + 1]
-    if fill > 0.0:
-        axes.stairs(counts, edges, color=colour, alpha=fill, fill=True, linewidth=0, label=label)
-    line = axes.stairs(counts, edges, color=colour, linewidth=width, linestyle=style)
-    if fill == 0.0:
-        line.set_label(label)
+    counts, edges = counts[filled[0] : filled[-1] + 1], bins[filled[0] : filled[-1] + 2]
+    if opacity > 0.0:
+        axes.stairs(counts, edges, color=line["color"], alpha=opacity, fill=True, linewidth=0, label=label)
+    axes.stairs(counts, edges, label=None if opacity > 0.0 else label, **line)
 
 
-_LOOK: dict[str, dict[str, Any]] = {
+_LOOK: dict[str, Look] = {
     "found": {"color": AFTER, "edgecolor": AFTER},
     "confounded": {"color": "none", "edgecolor": AFTER, "hatch": "////"},
     "contained": {"color": FAINT, "edgecolor": AFTER},
@@ -170,44 +148,29 @@ def plot_which(diagnosis: Diagnosis) -> Figure:
     """
     figure = Drawing(7.6, 1.3 + 0.27 * max(len(diagnosis.effects), 3))
     axes = figure.subplots()
-    draw_which(axes, diagnosis)
+    _draw_which(axes, diagnosis)
     title(axes, "What each effect explains, and how probable it is")
     return figure
 
 
-def draw_which(axes: Axes, diagnosis: Diagnosis, *, brief: bool = False) -> None:
+def _draw_which(axes: Axes, diagnosis: Diagnosis, brief: bool = False) -> None:
     """Draw the candidates into a panel, ``brief`` where there is no room to say what an effect would need."""
     ordered = by_status(diagnosis)
     if not ordered:
         note(axes, "No effect was tried.")
         return
-    low, high = -0.02, 1.0
-    for line, finding in enumerate(ordered):
+    inks = [INK if f.status in ("found", "confounded") else MUTED for f in ordered]
+    beside: Look = {**_SAID, "transform": axes.get_yaxis_transform()}
+    for line, (finding, ink) in enumerate(zip(ordered, inks, strict=True)):
         if finding.status == "not_testable":
             said = "not testable" if brief else f"not testable: needs {needs(finding, diagnosis.joint_names)}"
-            axes.text(1.0, line, plain(said), va="center", fontsize=SMALL, color=MUTED, style="italic")
-            continue
-        low = min(low, *(finding.shrinkage_ci95 or (0.0, 0.0)))
-        high = max(high, *(finding.shrinkage_ci95 or (0.0, 0.0)))
-        _draw_bar(axes, line, finding)
-        axes.text(
-            1.02,
-            line,
-            units.probability(finding.probability),
-            transform=axes.get_yaxis_transform(),
-            va="center",
-            fontsize=SMALL,
-            color=INK if finding.status in ("found", "confounded") else MUTED,
-        )
-    axes.text(
-        1.02,
-        -0.95,
-        "probability",
-        transform=axes.get_yaxis_transform(),
-        fontsize=SMALL,
-        color=MUTED,
-        va="center",
-    )
+            axes.text(1.0, line, plain(said), **_SAID | {"color": MUTED}, style="italic")
+        else:
+            _draw_share(axes, line, finding)
+            axes.text(1.02, line, units.probability(finding.probability), **beside | {"color": ink})
+    axes.text(1.02, -0.95, "probability", **beside | {"color": MUTED})
+    bounds = [bound for f in ordered if f.status != "not_testable" for bound in f.shrinkage_ci95 or ()]
+    low, high = min([-0.02, *bounds]), max([1.0, *bounds])
     axes.set_yticks(range(len(ordered)), [plain(f.name) for f in ordered])
     axes.set_ylim(len(ordered) - 0.4, -1.3)
     axes.set_xlim(100.0 * max(low, _FURTHEST_BELOW_ZERO) - 1.0, 100.0 * min(high, _FURTHEST) + 2.0)
@@ -215,17 +178,17 @@ def draw_which(axes: Axes, diagnosis: Diagnosis, *, brief: bool = False) -> None
     axes.set_xlabel("share of the gap's mean square on rows held out, 95 % interval (%)")
     tidy(axes, grid="x")
     axes.tick_params(axis="y", length=0)
-    for label, finding in zip(axes.get_yticklabels(), ordered, strict=True):
-        label.set_color(INK if finding.status in ("found", "confounded") else MUTED)
+    for label, ink in zip(axes.get_yticklabels(), inks, strict=True):
+        label.set_color(ink)
 
 
-def _draw_bar(axes: Axes, line: int, finding: Finding) -> None:
+def _draw_share(axes: Axes, line: int, finding: Finding) -> None:
     share = 100.0 * (finding.shrinkage or 0.0)
     axes.barh(line, share, height=0.62, linewidth=0.9, **_LOOK[finding.status])
     if finding.shrinkage_ci95 is not None:
-        low, high = (100.0 * b for b in finding.shrinkage_ci95)
-        axes.plot([low, high], [line, line], color=INK, linewidth=1.1)
-        axes.plot([low, high], [line, line], linestyle="none", marker="|", markersize=6, color=INK)
+        bounds = [100.0 * b for b in finding.shrinkage_ci95]
+        axes.plot(bounds, [line, line], color=INK, linewidth=1.1)
+        axes.plot(bounds, [line, line], linestyle="none", marker="|", markersize=6, color=INK)
 
 
 _Group = tuple[str, Mapping[str, float], str]
@@ -250,20 +213,19 @@ def plot_where(diagnosis: Diagnosis) -> Figure:
         grid = figure.add_gridspec(2, 2, height_ratios=(lines - rest, rest))
         places = [grid[:, k] if n == lines else grid[0, k] for k, n in enumerate((left, right))]
         panels = np.array([figure.add_subplot(place) for place in places])
-    draw_where(panels[0], diagnosis)
+    _draw_where(panels[0], diagnosis)
     title(panels[0], "Where along the chain")
     _draw_groups(panels[1], other)
     title(panels[1], "By axis and by quantity")
     return figure
 
 
-def draw_where(axes: Axes, diagnosis: Diagnosis) -> None:
+def _draw_where(axes: Axes, diagnosis: Diagnosis) -> None:
     """Draw joints and links into a panel, the root above, the tool below, then what lies beyond them."""
-    chain = _chain(diagnosis)
-    if not _placed(chain):
+    if _placed(_chain(diagnosis)):
+        _draw_groups(axes, _chain(diagnosis))
+    else:
         note(axes, "No effect was found,\nso none is placed along the chain.")
-        return
-    _draw_groups(axes, chain)
 
 
 def _placed(chain: Sequence[_Group]) -> bool:
@@ -273,9 +235,8 @@ def _placed(chain: Sequence[_Group]) -> bool:
 def _chain(diagnosis: Diagnosis) -> list[_Group]:
     where = diagnosis.where
     names = dict.fromkeys((*diagnosis.joint_names, *where.joints)) if where.joints else {}
-    joints = {name: where.joints.get(name, 0.0) for name in names}
     groups = (
-        ("joints, from root to tool", joints, AFTER),
+        ("joints, from root to tool", {name: where.joints.get(name, 0.0) for name in names}, AFTER),
         ("links, from root to tool", where.links, THIRD),
         ("beyond joints and links", where.beyond, BEFORE),
     )
@@ -283,12 +244,12 @@ def _chain(diagnosis: Diagnosis) -> list[_Group]:
 
 
 def _other(diagnosis: Diagnosis) -> list[_Group]:
-    where = diagnosis.where
-    quantities = dict(sorted(where.covariates.items(), key=lambda item: -item[1])[:_MOST_QUANTITIES])
-    groups: list[_Group] = [("axes of the root frame", where.axes, MUTED)]
-    if quantities:
-        groups.append(("quantities, each alone", quantities, AFTER))
-    return groups
+    quantities = sorted(diagnosis.where.covariates.items(), key=lambda item: -item[1])[:_MOST_QUANTITIES]
+    groups = [
+        ("axes of the root frame", diagnosis.where.axes, MUTED),
+        ("quantities, each alone", dict(quantities), AFTER),
+    ]
+    return groups if quantities else groups[:1]
 
 
 def _lines(groups: Sequence[_Group]) -> float:
@@ -297,25 +258,21 @@ def _lines(groups: Sequence[_Group]) -> float:
 
 def _draw_groups(axes: Axes, groups: Sequence[_Group]) -> None:
     """Draw groups of bars below each other; the axis ends a little beyond the longest."""
-    ticks: list[float] = []
-    names: list[str] = []
+    ticks: dict[float, str] = {}
     line = 0.0
     largest = max((100.0 * s for _, shares, _ in groups for s in shares.values()), default=0.0)
     end = min(max(1.18 * largest, 10.0), 118.0)
     for heading, shares, colour in groups:
-        axes.text(0.01 * end, line, heading, fontsize=SMALL, color=MUTED, va="center", style="italic")
-        line += 1.0
+        axes.text(0.01 * end, line, heading, **_SAID | {"color": MUTED}, style="italic")
         for name, share in shares.items():
+            line += 1.0
             axes.barh(line, end, height=0.66, color=FAINT, alpha=0.35, linewidth=0)
             axes.barh(line, 100.0 * max(share, 0.0), height=0.66, color=colour, linewidth=0)
             if share >= 5e-4:
-                beside = 100.0 * share + 0.01 * end
-                axes.text(beside, line, units.percent(share), fontsize=SMALL, color=INK, va="center")
-            ticks.append(line)
-            names.append(name)
-            line += 1.0
-        line += _BETWEEN
-    axes.set_yticks(ticks, [plain(n) for n in names])
+                axes.text(100.0 * share + 0.01 * end, line, units.percent(share), **_SAID)
+            ticks[line] = plain(name)
+        line += 1.0 + _BETWEEN
+    axes.set_yticks(list(ticks), list(ticks.values()))
     axes.set_ylim(line - _BETWEEN - 0.4, -0.8)
     axes.set_xlim(0.0, end)
     axes.set_xlabel("share of the gap's mean square (%)")
@@ -329,38 +286,6 @@ _FILLED = 0.84  # of a panel's height; the key stands above
 _SHAPES = (0.85, 1.6)  # width to height of a panel
 
 
-@dataclass(frozen=True, eq=False)
-class _View:
-    """Arrows as they are seen in one plane.
-
-    Attributes
-    ----------
-    start, before, after
-        (N, 2) positions and exaggerated arrows, m.
-    factor
-        How many times longer than in truth the arrows are.
-    sample
-        A round length of the gap for the key, m.
-    """
-
-    start: Array
-    before: Array
-    after: Array
-    factor: float
-    sample: float
-
-    def limits(self) -> tuple[Array, Array]:
-        """Return middle and size of what is to be seen, (2,) each, with a small margin."""
-        ends = np.vstack([self.start, self.start + self.before, self.start + self.after])
-        low, high = ends.min(axis=0), ends.max(axis=0)
-        return (low + high) / 2.0, 1.06 * np.maximum(high - low, 1e-6)
-
-    def shape(self) -> float:
-        """Return the width of the panel over its height."""
-        _, size = self.limits()
-        return float(np.clip(_FILLED * size[0] / size[1], *_SHAPES))
-
-
 def plot_map(diagnosis: Diagnosis) -> Figure:
     """Draw the gap before and after at the positions of the tool, from above and from the side.
 
@@ -370,56 +295,87 @@ def plot_map(diagnosis: Diagnosis) -> Figure:
         Arrows are exaggerated; the labels say by how much. Rows that were set aside are left out.
     """
     planes = _planes(diagnosis)
-    shapes = [_panel_shape(diagnosis, plane) for plane in planes.values()]
+    shapes = [_shape(diagnosis, plane) for plane in planes.values()]
     figure = Drawing(9.2, min(0.9 + 8.0 / sum(shapes), 5.2))
-    panels = figure.subplots(1, 2, width_ratios=shapes)
-    for axes, (heading, plane) in zip(panels, planes.items(), strict=True):
-        draw_map(axes, diagnosis, *plane)
+    for axes, (heading, plane) in zip(figure.subplots(1, 2, width_ratios=shapes), planes.items(), strict=True):
+        _draw_map(axes, diagnosis, plane)
         title(axes, heading)
     return figure
 
 
-def broader_view(diagnosis: Diagnosis) -> tuple[str, tuple[int, int]]:
-    """Return heading and axes of the view that fills a panel that is broader than high better."""
-    return max(_planes(diagnosis).items(), key=lambda view: _panel_shape(diagnosis, view[1]))
-
-
 def _planes(diagnosis: Diagnosis) -> dict[str, tuple[int, int]]:
+    """Return the axes of the root frame across and up in each view."""
     position = diagnosis.rows.position
     broad = int(np.argmax(np.ptp(position[:, :2], axis=0))) if len(position) else 0
     return {"Seen from above": (0, 1), "Seen from the side": (broad, 2)}
 
 
-def _panel_shape(diagnosis: Diagnosis, plane: tuple[int, int]) -> float:
-    view = _view(diagnosis, *plane)
-    return view.shape() if view else 1.0
+def _arrows(diagnosis: Diagnosis, plane: tuple[int, int]) -> tuple[Array, Array, Array, float]:
+    """Return (N, 2) starts and exaggerated gaps before and after in a plane, m, and how many times they are longer.
+
+    There are none where all rows were set aside or are at one place, or no gap is left.
+    """
+    rows, used = diagnosis.rows, mapped(diagnosis)
+    factor = exaggeration(diagnosis, used, _LONGEST)
+    chosen = np.ix_(used[thinned(len(used), _ARROWS)] if factor else used[:0], np.array(plane))
+    times = factor or 1.0
+    return rows.position[chosen], rows.gap[chosen] * times, rows.remainder[chosen] * times, times
 
 
-def draw_map(axes: Axes, diagnosis: Diagnosis, across: int, up: int) -> None:
-    """Draw the arrows into a panel: ``across`` and ``up`` are the axes of the root frame that span it."""
-    view = _view(diagnosis, across, up)
-    if view is None:
+def _extent(start: Array, before: Array, after: Array) -> tuple[Array, Array, float]:
+    """Return middle and size, (2,) m each with a small margin, of what arrows fill, and a panel's width to height."""
+    ends = np.vstack([start, start + before, start + after])
+    low, high = ends.min(axis=0), ends.max(axis=0)
+    size = 1.06 * np.maximum(high - low, 1e-6)
+    return (low + high) / 2.0, size, float(np.clip(_FILLED * size[0] / size[1], *_SHAPES))
+
+
+def _shape(diagnosis: Diagnosis, plane: tuple[int, int]) -> float:
+    *arrows, _ = _arrows(diagnosis, plane)
+    return _extent(*arrows)[2] if len(arrows[0]) else 1.0
+
+
+def _draw_map(axes: Axes, diagnosis: Diagnosis, plane: tuple[int, int]) -> None:
+    start, before, after, factor = _arrows(diagnosis, plane)
+    if not len(start):
         note(axes, "No two places with a gap are left to be mapped.")
         return
-    _frame(axes, view)
-    for arrows, colour, label in ((view.before, BEFORE, "before"), (view.after, AFTER, "after")):
-        axes.quiver(
-            *view.start.T,
-            *arrows.T,
-            color=colour,
-            label=label,
-            units="inches",
-            width=0.018,
-            minlength=1.5,
-            angles="xy",
-            scale_units="xy",
-            scale=1.0,
-        )
-    axes.legend(loc="upper left", ncols=2, fontsize=SMALL, labelcolor=INK, frameon=False, borderaxespad=0.2)
-    _key(axes, view)
-    axes.set_xlabel(f"{'xyz'[across]} of the root frame (m)")
-    axes.set_ylabel(f"{'xyz'[up]} of the root frame (m)")
+    # all arrows undistorted, with room above them for the key
+    middle, size, shape = _extent(start, before, after)
+    width = max(size[0], shape * size[1] / _FILLED)
+    height = width / shape
+    axes.set_xlim(middle[0] - width / 2.0, middle[0] + width / 2.0)
+    axes.set_ylim(middle[1] - _FILLED * height / 2.0, middle[1] + (1.0 - _FILLED / 2.0) * height)
+    axes.set_aspect("equal", adjustable="box")
+    axes.locator_params(axis="both", nbins=6)
+    true: Look = {
+        "units": "inches",
+        "width": 0.018,
+        "minlength": 1.5,
+        "angles": "xy",
+        "scale_units": "xy",
+        "scale": 1.0,
+    }
+    for arrows, colour, label in ((before, BEFORE, "before"), (after, AFTER, "after")):
+        axes.quiver(*start.T, *arrows.T, color=colour, label=label, **true)
+    axes.legend(loc="upper left", ncols=2, borderaxespad=0.2, **_KEY)
+    _draw_scale(axes, units.round_down(_typical(diagnosis, mapped(diagnosis))), factor)
+    axes.set_xlabel(f"{'xyz'[plane[0]]} of the root frame (m)")
+    axes.set_ylabel(f"{'xyz'[plane[1]]} of the root frame (m)")
     tidy(axes, grid="both")
+
+
+def _draw_scale(axes: Axes, sample: float, factor: float) -> None:
+    """Draw below the legend how long an arrow of a round gap, m, is."""
+    below = ScaledTranslation(0.09, -0.35, axes.figure.dpi_scale_trans)
+    along = blended_transform_factory(axes.transData, axes.transAxes) + below
+    start = axes.get_xlim()[0]
+    tip = (start + sample * factor, 1.0)
+    arrow: Look = {"arrowstyle": "-|>", "color": INK, "linewidth": 1.3, "shrinkA": 0.0, "shrinkB": 0.0}
+    axes.annotate("", tip, (start, 1.0), xycoords=along, textcoords=along, arrowprops=arrow)
+    times = f"{factor:,.0f}".replace(",", "\u2009")
+    said = f"gap of {units.quantity(sample, 'm')}, drawn {times} times larger"
+    axes.annotate(said, tip, (6.0, 0.0), xycoords=along, textcoords="offset points", **_SAID)
 
 
 def mapped(diagnosis: Diagnosis) -> NDArray[np.int64]:
@@ -445,43 +401,6 @@ def _typical(diagnosis: Diagnosis, used: NDArray[np.int64]) -> float:
     return float(np.quantile(np.linalg.norm(diagnosis.rows.gap[used, :3], axis=1), 0.95))
 
 
-def _view(diagnosis: Diagnosis, across: int, up: int) -> _View | None:
-    """Return the arrows in a plane; ``None`` where all rows were set aside or are at one place, or no gap is left."""
-    rows, used = diagnosis.rows, mapped(diagnosis)
-    factor = exaggeration(diagnosis, used, _LONGEST)
-    if factor is None:
-        return None
-    plane = np.ix_(used[thinned(len(used), _ARROWS)], np.array([across, up]))
-    sample = units.round_down(_typical(diagnosis, used))
-    return _View(rows.position[plane], rows.gap[plane] * factor, rows.remainder[plane] * factor, factor, sample)
-
-
-def _frame(axes: Axes, view: _View) -> None:
-    """Show all arrows undistorted, with room above them for the key."""
-    middle, size = view.limits()
-    width = max(size[0], view.shape() * size[1] / _FILLED)
-    height = width / view.shape()
-    axes.set_xlim(middle[0] - width / 2.0, middle[0] + width / 2.0)
-    axes.set_ylim(middle[1] - _FILLED * height / 2.0, middle[1] + (1.0 - _FILLED / 2.0) * height)
-    axes.set_aspect("equal", adjustable="box")
-    axes.locator_params(axis="both", nbins=6)
-
-
-def _key(axes: Axes, view: _View) -> None:
-    """Show below the legend how long an arrow of a round gap is drawn."""
-    below = ScaledTranslation(0.09, -0.35, axes.figure.dpi_scale_trans)
-    along = blended_transform_factory(axes.transData, axes.transAxes) + below
-    start = axes.get_xlim()[0]
-    tip = (start + view.sample * view.factor, 1.0)
-    arrow = {"arrowstyle": "-|>", "color": INK, "linewidth": 1.3, "shrinkA": 0.0, "shrinkB": 0.0}
-    axes.annotate("", tip, (start, 1.0), xycoords=along, textcoords=along, arrowprops=arrow)
-    times = f"{view.factor:,.0f}".replace(",", "\u2009")
-    said = f"gap of {units.quantity(view.sample, 'm')}, drawn {times} times larger"
-    axes.annotate(
-        said, tip, (6.0, 0.0), xycoords=along, textcoords="offset points", va="center", fontsize=SMALL, color=INK
-    )
-
-
 _MIDDLES = 60
 _LEVELS = 12
 _FEW_CROSSES = 25
@@ -500,58 +419,44 @@ def plot_remainder(diagnosis: Diagnosis) -> Figure:
         line is the running median, the band two sigma of the noise; crosses are rows that were set aside, at the
         edge where they lie beyond it.
     """
-    rows = diagnosis.rows
-    columns = [("row in the file", rows.rows.astype(float))]
-    followed = _followed(diagnosis)
-    if followed is not None:
-        columns.append(followed)
-    figure = Drawing(7.6 if followed is None else 9.2, 4.6)
+    rows, noise = diagnosis.rows, diagnosis.gap.noise_floor / np.sqrt(3.0)
+    columns = [("row in the file", rows.rows.astype(float)), *_followed(diagnosis)]
+    figure = Drawing(7.6 if len(columns) == 1 else 9.2, 4.6)
     panels = figure.subplots(3, len(columns), squeeze=False, sharey=True, sharex="col")
-    best, limit = _extent(diagnosis)
+    # rows that were set aside do not decide how far the axes go
+    largest = max(np.abs(rows.remainder[~rows.outliers, :3]).max(initial=0.0), 2.4 * noise, 1e-12)
+    best = units.scale("m", largest)
     for k, axis in enumerate("xyz"):
         for (_, along), axes in zip(columns, panels[k], strict=True):
-            _draw_remainder(axes, along, rows.remainder[:, k] * best.factor, rows.outliers, limit)
-            band = 2.0 * diagnosis.gap.noise_floor / np.sqrt(3.0) * best.factor
+            values = rows.remainder[:, k] * best.factor
+            _draw_remainder(axes, along, values, rows.outliers, 1.15 * largest * best.factor)
+            band = 2.0 * noise * best.factor
             axes.axhspan(-band, band, color=FAINT, linewidth=0, zorder=0, label="±2 σ of the noise")
             tidy(axes, grid="")
         panels[k][0].set_ylabel(f"{axis} ({best.unit})")
     for (name, _), axes in zip(columns, panels[2], strict=True):
         axes.set_xlabel(plain(name))
     title(panels[0][0], "Remainder, row by row")
-    if followed is not None:
-        title(panels[0][1], f"Against {diagnosis.unexplained.depends_on[0].covariate}")
-    handles, labels = panels[0][0].get_legend_handles_labels()
-    figure.legend(handles, labels, loc="outside lower center", ncols=4, fontsize=SMALL, labelcolor=INK, frameon=False)
+    for axes in panels[0][1:]:
+        title(axes, f"Against {diagnosis.unexplained.depends_on[0].covariate}")
+    figure.legend(*panels[0][0].get_legend_handles_labels(), loc="outside lower center", ncols=4, **_KEY)
     return figure
 
 
-def _followed(diagnosis: Diagnosis) -> tuple[str, Array] | None:
-    """Return label and values of the quantity that the remainder follows most; ``None`` if not recorded."""
+def _followed(diagnosis: Diagnosis) -> list[tuple[str, Array]]:
+    """Return label and values of the quantity that the remainder follows most; none if not recorded."""
     if not diagnosis.unexplained.depends_on:
-        return None
+        return []
     name, rows = diagnosis.unexplained.depends_on[0].covariate, diagnosis.rows
-    if name in rows.covariates:
-        return _labelled(name, rows), np.asarray(rows.covariates[name], dtype=float)
-    if name == "order":  # not recorded: the rows as they stand in the file
-        return "order of the rows", np.arange(len(rows.rows), dtype=float)
-    if name in diagnosis.joint_names:
-        return _labelled(name, rows), rows.q[:, diagnosis.joint_names.index(name)]
-    return None
-
-
-def _labelled(name: str, rows: Rows) -> str:
-    """Return a quantity's name with its unit, as an axis bears it."""
     unit = rows.units.get(name) or _WITHOUT_UNIT.get(name.partition(".")[0], "")
-    return f"{name} ({unit})" if unit else name
-
-
-def _extent(diagnosis: Diagnosis) -> tuple[units.Scale, float]:
-    """Return the unit and the largest value drawn, which rows that were set aside do not decide."""
-    rows = diagnosis.rows
-    used = np.abs(rows.remainder[~rows.outliers, :3])
-    largest = max(float(used.max()) if used.size else 0.0, 2.4 * diagnosis.gap.noise_floor / np.sqrt(3.0), 1e-12)
-    best = units.scale("m", largest)
-    return best, 1.15 * largest * best.factor
+    label = f"{name} ({unit})" if unit else name
+    if name in rows.covariates:
+        return [(label, np.asarray(rows.covariates[name], dtype=float))]
+    if name == "order":  # not recorded: the rows as they stand in the file
+        return [("order of the rows", np.arange(len(rows.rows), dtype=float))]
+    if name in diagnosis.joint_names:
+        return [(label, rows.q[:, diagnosis.joint_names.index(name)])]
+    return []
 
 
 def _draw_remainder(axes: Axes, along: Array, values: Array, aside: NDArray[np.bool_], limit: float) -> None:
@@ -559,29 +464,13 @@ def _draw_remainder(axes: Axes, along: Array, values: Array, aside: NDArray[np.b
     used, marked = np.flatnonzero(known & ~aside), np.flatnonzero(known & aside)
     drawn = used[thinned(len(used))]
     many, few = len(used) > RASTER_ABOVE, len(marked) <= _FEW_CROSSES
-    axes.plot(
-        along[drawn],
-        values[drawn],
-        linestyle="none",
-        marker="o",
-        markersize=1.6 if many else 3.0,
-        markeredgewidth=0,
-        color=MUTED,
-        alpha=0.35 if many else 0.7,
-        rasterized=many,
-        label="remainder",
-    )
+    dots: Look = {"marker": "o", "markersize": 1.6 if many else 3.0, "markeredgewidth": 0, "color": MUTED}
+    shown: Look = {"alpha": 0.35 if many else 0.7, "rasterized": many, "label": "remainder"}
+    axes.plot(along[drawn], values[drawn], linestyle="none", **dots, **shown)
     _draw_middles(axes, along[used], values[used])
-    axes.plot(
-        along[marked],
-        np.clip(values[marked], -_EDGE * limit, _EDGE * limit),
-        linestyle="none",
-        marker="x",
-        markersize=6.0 if few else 3.0,
-        markeredgewidth=1.8 if few else 0.9,
-        color=BEFORE,
-        label="set aside",
-    )
+    held = np.clip(values[marked], -_EDGE * limit, _EDGE * limit)
+    crosses: Look = {"marker": "x", "markersize": 6.0 if few else 3.0, "markeredgewidth": 1.8 if few else 0.9}
+    axes.plot(along[marked], held, linestyle="none", **crosses, color=BEFORE, label="set aside")
     axes.set_ylim(-limit, limit)
     axes.axhline(0.0, color=MUTED, linewidth=0.7)
 
@@ -590,21 +479,13 @@ def _draw_middles(axes: Axes, along: Array, values: Array) -> None:
     """Draw medians: a line over equally many rows each, or a dash at each value of a quantity with few of them."""
     levels = np.unique(along)
     if len(levels) <= _LEVELS:  # between two directions of approach there is nothing that a line could tell
-        middle = np.array([np.median(values[along == level]) for level in levels])
-        axes.plot(
-            levels,
-            middle,
-            linestyle="none",
-            marker="_",
-            markersize=22.0,
-            markeredgewidth=2.2,
-            color=AFTER,
-            label="median at each value",
-        )
+        middle = [np.median(values[along == level]) for level in levels]
+        dash: Look = {"linestyle": "none", "marker": "_", "markersize": 22.0, "markeredgewidth": 2.2}
+        axes.plot(levels, middle, color=AFTER, label="median at each value", **dash)
         return
     order = np.argsort(along, kind="stable")
     parts = np.array_split(order, int(np.clip(1.4 * np.sqrt(len(order)), 1, _MIDDLES)))
-    where, middle = (np.array([np.median(of[part]) for part in parts]) for of in (along, values))
+    where, middle = ([np.median(of[part]) for part in parts] for of in (along, values))
     axes.plot(where, middle, color=AFTER, linewidth=1.8, label="running median")
 
 
@@ -618,7 +499,7 @@ _STEPS = [1, 2, 5, 10]
 
 
 def explain_figure(explained: Explained) -> Figure:
-    """Draw one panel a place, largest share first.
+    """Draw what one effect explains, one panel a place, the largest share first.
 
     Returns
     -------
@@ -633,118 +514,72 @@ def explain_figure(explained: Explained) -> Figure:
     across = count if count <= _ACROSS else (2 if count == 4 else _ACROSS)
     down = -(-count // across)
     figure = Drawing((5.4, 7.6, 9.6)[across - 1], 0.95 + 2.55 * down)
-    panels = figure.subplots(down, across, squeeze=False)
-    for axes in panels.ravel()[len(places) :]:
+    panels = figure.subplots(down, across, squeeze=False).ravel()
+    for axes in panels[len(places) :]:
         axes.axis("off")
-    limits = _limits(explained)
-    for k, (place, axes) in enumerate(zip(places, panels.ravel(), strict=False)):
-        low, high = limits[place.unit]
-        scale = units.scale(_si(place), max(abs(low), abs(high)))
+    error = "error less its mean" if any(place.centred for place in places) else "error"
+    for k, (place, axes) in enumerate(zip(places, panels, strict=False)):
+        low, high = _limits(places, place.unit)
+        unit = place.unit.split(" ")[0]
+        scale = units.scale(unit, max(abs(low), abs(high)))
         _draw_place(axes, place, scale.factor)
         axes.set_ylim(low * scale.factor, high * scale.factor)
-        axes.set_title(_heading(place), loc="left", fontsize=NORMAL, color=INK, fontweight="bold", pad=6)
+        heading = plain(f"{place.words}: {units.percent(place.share, 0)}")
+        axes.set_title(heading, loc="left", fontsize=NORMAL, color=INK, fontweight="bold", pad=6)
         if k % across == 0 or place.unit != places[k - 1].unit:
-            axes.set_ylabel(f"{_error(explained)} ({scale.unit}{place.unit.removeprefix(_si(place))})")
+            axes.set_ylabel(f"{error} ({scale.unit}{place.unit.removeprefix(unit)})")
         else:
             axes.tick_params(labelleft=False)
     more = f"; {explained.left_out} smaller places are not shown" if explained.left_out else ""
     figure.suptitle(plain(f"What {explained.effect} explains{more}"), x=0.01, ha="left", fontsize=11.0, color=INK)
     if places:
-        handles, labels = panels[0][0].get_legend_handles_labels()
-        shown = figure.legend(
-            handles,
-            labels,
-            loc="outside lower center",
-            ncols=3,
-            fontsize=SMALL,
-            labelcolor=INK,
-            frameon=False,
-            markerscale=5.0 / handles[0].get_markersize(),
-        )
-        for handle in shown.legend_handles:
-            if handle is not None:
-                handle.set_alpha(1.0)
+        handles, labels = panels[0].get_legend_handles_labels()
+        large: Look = {"markerscale": 5.0 / handles[0].get_markersize()}
+        shown = figure.legend(handles, labels, loc="outside lower center", ncols=3, **_KEY, **large)
+        for handle in filter(None, shown.legend_handles):
+            handle.set_alpha(1.0)
     return figure
 
 
-def _error(explained: Explained) -> str:
-    """Call the error by its name: less a constant where the frames take that up at a place."""
-    return "error less its mean" if any(place.centred for place in explained.places) else "error"
-
-
-def _si(place: Place) -> str:
-    return place.unit.split(" ")[0]
-
-
-def _heading(place: Place) -> str:
-    return plain(f"{place.words}: {units.percent(place.share, 0)}")
-
-
-def _seen(place: Place) -> Array:
+def _seen(place: Place) -> NDArray[np.bool_]:
     """(n,) True for rows whose noise does not hide the error."""
     return np.asarray(place.spread <= _UNSEEN * np.median(place.spread))
 
 
-def _limits(explained: Explained) -> dict[str, tuple[float, float]]:
-    """By unit, where the error's axis ends in all panels: a few noisy rows must not decide it."""
-    reached: dict[str, list[Array]] = {}
-    for place in explained.places:
-        points = np.concatenate([place.before, place.after])[np.tile(_seen(place), 2)]
-        ends = np.quantile(points, [1.0 - _HIGH, _HIGH]) if points.size else np.zeros(2)
-        reached.setdefault(place.unit, []).extend([ends, place.line[1], np.zeros(1)])
-    limits = {}
-    for unit, parts in reached.items():
-        low, high = float(np.concatenate(parts).min()), float(np.concatenate(parts).max())
-        room = max(0.08 * (high - low), 1e-12)
-        limits[unit] = low - room, high + room
-    return limits
-
-
-def _spacing(place: Place) -> float:
-    """Return how far the few values of a quantity lie apart; 0 where it has many."""
-    if not place.levels:
-        return 0.0
-    step = float(np.diff(np.unique(place.values)).min(initial=np.inf))
-    return step if np.isfinite(step) else 1.0
-
-
-def _law(place: Place, step: float) -> tuple[Array, Array]:
-    """Return the fitted law as a line, in pieces of its own at each of few values."""
-    along, law = place.line
-    if not place.levels:
-        return along, law
-    half = 0.34 * step
-    pieces = np.column_stack([along - half, along + half, np.full(len(along), np.nan)])
-    return pieces.ravel(), np.repeat(law, 3)
+def _limits(places: Sequence[Place], unit: str) -> tuple[float, float]:
+    """Return where the error's axis ends in all panels of a unit: a few noisy rows must not decide it."""
+    reached = [np.zeros(1)]
+    for place in (place for place in places if place.unit == unit):
+        points = np.concatenate([place.before[_seen(place)], place.after[_seen(place)]])
+        reached += [np.quantile(points, [1.0 - _HIGH, _HIGH]) if points.size else np.zeros(0), place.line[1]]
+    low, high = float(np.concatenate(reached).min()), float(np.concatenate(reached).max())
+    room = max(0.08 * (high - low), 1e-12)
+    return low - room, high + room
 
 
 def _draw_place(axes: Axes, place: Place, factor: float) -> None:
     rows = np.flatnonzero(_seen(place))
     rows = rows[thinned(len(rows), _POINTS)]
-    many = len(rows) > _MANY
-    step = _spacing(place)
+    many, levels = len(rows) > _MANY, np.unique(place.values)
+    step = 0.0  # how far the few values of a quantity lie apart; 0 where it has many
+    if place.levels:
+        step = float(np.diff(levels).min()) if len(levels) > 1 else 1.0
     beside = np.random.default_rng(0).uniform(-0.5, 0.5, len(rows)) * 0.7 * _APART * step
-    for error, colour, label, side in (
-        (place.before, MUTED, "as measured", -1.0),
-        (place.after, AFTER, "with this effect taken off", 1.0),
+    dots: Look = {"linestyle": "none", "marker": "o", "markersize": 1.8 if many else 3.2, "markeredgewidth": 0}
+    shown: Look = {"alpha": 0.35 if many else 0.6, "rasterized": many}
+    for error, side, colour, label in (
+        (place.before, -1.0, MUTED, "as measured"),
+        (place.after, 1.0, AFTER, "with this effect taken off"),
     ):
-        axes.plot(
-            place.values[rows] + beside + side * 0.6 * _APART * step,
-            error[rows] * factor,
-            linestyle="none",
-            marker="o",
-            markersize=1.8 if many else 3.2,
-            markeredgewidth=0,
-            color=colour,
-            alpha=0.35 if many else 0.6,
-            rasterized=many,
-            label=label,
-        )
+        along = place.values[rows] + beside + side * 0.6 * _APART * step
+        axes.plot(along, error[rows] * factor, color=colour, label=label, **dots, **shown)
     axes.axhline(0.0, color=MUTED, linewidth=0.7)
-    along, law = _law(place, step)
+    along, law = place.line
+    if place.levels:  # a piece of its own at each value
+        along = (along[:, None] + 0.34 * step * np.array([-1.0, 1.0, np.nan])).ravel()
+        law = np.repeat(law, 3)
     axes.plot(along, law * factor, color=BEFORE, linewidth=2.0, label="fitted law")
-    levels = FixedLocator(np.unique(place.values).tolist())
-    axes.xaxis.set_major_locator(levels if place.levels else MaxNLocator(5, steps=_STEPS))
+    axes.xaxis.set_major_locator(FixedLocator(levels.tolist()) if place.levels else MaxNLocator(5, steps=_STEPS))
     axes.yaxis.set_major_locator(MaxNLocator(5, steps=_STEPS))
     axes.margins(x=0.04)
     unit = f" ({place.quantity_unit})" if place.quantity_unit else ""
@@ -755,23 +590,119 @@ def _draw_place(axes: Axes, place: Place, factor: float) -> None:
 
 def overview(diagnosis: Diagnosis, *, headline: bool = True) -> Figure:
     """Draw how far, which, where, and the map of the gap, under the sentence of the verdict if ``headline``."""
-    lines = max(
-        len(diagnosis.effects),
-        len(diagnosis.joint_names) + len(diagnosis.where.links) + len(diagnosis.where.beyond),
-        12,
-    )
-    figure = Drawing(12.5, 5.4 + 0.2 * lines)
+    places = len(diagnosis.joint_names) + len(diagnosis.where.links) + len(diagnosis.where.beyond)
+    figure = Drawing(12.5, 5.4 + 0.2 * max(len(diagnosis.effects), places, 12))
     (how_far, which), (where, map_) = figure.subplots(2, 2)
-    draw_how_far(how_far, diagnosis)
+    _draw_how_far(how_far, diagnosis)
     title(how_far, "How far")
-    draw_which(which, diagnosis, brief=True)
+    _draw_which(which, diagnosis, brief=True)
     title(which, "Which")
-    draw_where(where, diagnosis)
+    _draw_where(where, diagnosis)
     title(where, "Where")
-    heading, plane = broader_view(diagnosis)
-    draw_map(map_, diagnosis, *plane)
+    # the view that fills a panel that is broader than high better
+    heading, plane = max(_planes(diagnosis).items(), key=lambda view: _shape(diagnosis, view[1]))
+    _draw_map(map_, diagnosis, plane)
     title(map_, f"The gap, {heading[0].lower()}{heading[1:]}")
     if headline:
         said = plain(fill(bound(diagnosis.summary), 115))
         figure.suptitle(said, x=0.01, ha="left", fontsize=LARGE + 1, color=INK, fontweight="bold")
     return figure
+
+
+_MOST_DIFFERENCES = 24
+_LEADING = 12
+
+
+def plot_differences(comparison: Mapping[str, Any]) -> Figure:
+    """Draw the difference of each parameter of a comparison in its standard deviations, the largest first."""
+    known = [p for effect in comparison["effects"] for p in effect["parameters"] if p["std"]]
+    told = sorted(((p["name"], p["difference"] / p["std"]) for p in known), key=lambda one: -abs(one[1]))
+    told = told[:_MOST_DIFFERENCES]
+    figure = Drawing(7.6, 1.2 + 0.26 * max(len(told), 1))
+    axes = figure.subplots()
+    colours = [AFTER if abs(size) > 3.0 else BEFORE for _, size in told]
+    axes.barh(range(len(told)), [size for _, size in told], color=colours, height=0.62)
+    axes.axvline(0.0, color=INK, linewidth=0.8)
+    axes.set_xlabel("difference in standard deviations; dark beyond three")
+    _name_bars(axes, [name for name, _ in told], "Parameters that differ most between two campaigns")
+    return figure
+
+
+def plot_fleet(summary: Mapping[str, Any]) -> Figure:
+    """Draw in how many robots each effect was found, of those in which it could be."""
+    counts = [effect for effect in summary["effects"] if effect["found"]][:_LEADING]
+    figure = Drawing(7.6, 1.2 + 0.3 * len(counts))
+    axes = figure.subplots()
+    places = range(len(counts))
+    axes.barh(places, [c["testable"] for c in counts], color="none", edgecolor=BEFORE, height=0.62)
+    axes.barh(places, [c["found"] for c in counts], color=AFTER, height=0.62)
+    axes.set_xlabel("robots: found (filled), could be tested (frame)")
+    for place, c in enumerate(counts):
+        axes.annotate(f"{c['found']}", (c["found"], place), (4, 0), textcoords="offset points", **_SAID)
+    _name_bars(axes, [c["effect"].replace("_", " ") for c in counts], "Effects by how often they were found")
+    return figure
+
+
+def _name_bars(axes: Axes, names: Sequence[str], heading: str) -> None:
+    """Name horizontal bars, the first above."""
+    axes.set_yticks(range(len(names)), [plain(name) for name in names])
+    axes.invert_yaxis()
+    tidy(axes, grid="x")
+    title(axes, heading)
+
+
+_COLUMNS, _MOST = 2, 12
+
+
+def plot_wear(wear: Wear) -> Figure:
+    """Draw the parameters over time, those that ring first: dots as each campaign has them, with one deviation.
+
+    Returns
+    -------
+    Figure
+        A line as its kind has it, orange where it rings; a grey band where a jump lies with 95 %; the limit dashed
+        where it is near.
+    """
+    shown = [worn for worn in wear.parameters if worn.comparable][:_MOST]
+    lines = max(ceil(len(shown) / _COLUMNS), 1)
+    figure = Drawing(8.6, 0.5 + 2.0 * lines)
+    panels = figure.subplots(lines, _COLUMNS, squeeze=False, sharex=True).ravel()
+    for axes, worn in zip(panels, shown, strict=False):
+        _draw_worn(axes, wear, worn)
+    for axes in panels[len(shown) :]:
+        axes.axis("off")
+    for axes in panels[max(len(shown) - _COLUMNS, 0) : len(shown)]:
+        axes.set_xlabel(f"days since {wear.campaigns[0].date}" if wear.dated else "campaign")
+        axes.tick_params(labelbottom=True)
+    if not shown:
+        note(panels[0], "No parameter can be compared.")
+    return figure
+
+
+def _draw_worn(axes: Axes, wear: Wear, worn: Worn) -> None:
+    """Draw one parameter about its middle, so that what changes is seen beside what it is."""
+    seen = [k for k, value in enumerate(worn.values) if value is not None]
+    times = np.array([visit.time for visit in wear.campaigns]) + (0.0 if wear.dated else 1.0)
+    values, stds = (np.array([each[k] for k in seen], dtype=float) for each in (worn.values, worn.stds))
+    fitted, along, jump = np.array(worn.fitted), times, worn.jump
+    middle = float(np.mean(fitted))
+    scale = units.scale(worn.unit, float(np.max(np.abs(values - middle) + stds)))
+    if jump is not None:  # it stands upright between the campaigns beside it
+        if worn.alarm:
+            axes.axvspan(times[jump.earliest], times[jump.latest], color=FAINT, linewidth=0)
+        beside = slice(jump.after, jump.after + 2)
+        along = np.insert(times, jump.after + 1, [times[beside].mean()] * 2)
+        fitted = np.insert(fitted, jump.after + 1, fitted[beside])
+    look: Look = {"color": BEFORE, "linewidth": 2.0} if worn.alarm else {"color": MUTED, "linewidth": 1.2}
+    axes.plot(along, scale.factor * (fitted - middle), **look)
+    dots: Look = {"fmt": "o", "markersize": 3.5, "color": AFTER, "ecolor": AFTER, "elinewidth": 1.0}
+    axes.errorbar(times[seen], scale.factor * (values - middle), scale.factor * stds, **dots)
+    low, high = axes.get_ylim()
+    for limit in () if worn.crossing is None else (worn.crossing.limit, -worn.crossing.limit):
+        if low < (place := scale.factor * (limit - middle)) < high:
+            axes.axhline(place, color=INK, linestyle="--", linewidth=0.9)
+    tidy(axes)
+    axes.set_ylabel(scale.unit or "1", fontsize=SMALL)
+    said = f"ALARM: {worn.kind}" if worn.alarm else f"moved: {units.probability(worn.moved)}"
+    weight: Look = {"color": INK, "fontweight": "bold"} if worn.alarm else {"color": MUTED, "fontweight": "normal"}
+    axes.set_title(plain(f"{worn.parameter}\n{said}"), loc="left", fontsize=SMALL, **weight)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
 from itertools import product
 from typing import TYPE_CHECKING
 
@@ -19,6 +18,8 @@ if TYPE_CHECKING:
 
 MOST_WORDS = 45
 """Of a headline."""
+WIDTH = 96
+"""Columns of a text."""
 _MOST_CAUSES = 3  # that a headline names; the others are counted
 _MOST_OF_A_NAME = 9  # words: of a longer title the headline says the beginning
 _WEIGHTY = 0.95  # of what all causes together explain: the fewest that hold it are named, the others counted
@@ -63,33 +64,28 @@ def _wordings(diagnosis: Diagnosis) -> Iterator[str]:
         which = "none of the effects that were considered" if diagnosis.narrowed else "no known effect"
         for place in (_place(left), ""):
             yield f"The gap of {size} is explained by {which}{place}."
-    elif not (causes := systematic(diagnosis)):
+    elif not (found := causes(diagnosis)):
         gap = diagnosis.gap
         rest = _unexplained(diagnosis, remaining, gap.rms_before, gap.held_out.rms_before_with_aside)
-        names = listed([_name(diagnosis, f) for f in scattering(diagnosis)])
+        names = listed([_name(diagnosis, f) for f in causes(diagnosis, random=True)])
         yield f"The gap of {size} is scatter: {names} ({_sure(diagnosis)}){rest}; no correction removes scatter."
     else:
         first, rivals = (_MOST_CAUSES, 2, 1), (True, False)
         worse, the = _worse(diagnosis), "the" if diagnosis.gap.worse else "The"
         for most, beside in product(first, rivals):
-            names = _causes(diagnosis, causes, most, beside)
-            for told in _how_far(diagnosis, remaining, len(causes) > 1):
+            names = _causes(diagnosis, found, most, beside)
+            for told in _how_far(diagnosis, remaining, len(found) > 1):
                 yield f"{worse}{the} gap of {size} comes from {names} ({_sure(diagnosis)}); {told}."
 
 
-def systematic(diagnosis: Diagnosis) -> list[Finding]:
-    """Return the causes that a correction can remove, the largest share first."""
-    return [f for f in map(diagnosis.finding, diagnosis.verdict) if not f.random]
+def causes(diagnosis: Diagnosis, random: bool = False) -> list[Finding]:
+    """Return the causes that a correction can remove, or the random ones, which none can; the largest share first."""
+    return [f for f in map(diagnosis.finding, diagnosis.verdict) if f.random is random]
 
 
-def scattering(diagnosis: Diagnosis) -> list[Finding]:
-    """Return the causes that no correction can remove."""
-    return [f for f in map(diagnosis.finding, diagnosis.verdict) if f.random]
-
-
-def weighty(causes: Sequence[Finding], most: int = _MOST_CAUSES) -> list[Finding]:
+def weighty(found: Sequence[Finding], most: int = _MOST_CAUSES) -> list[Finding]:
     """Return the causes that a headline names: the fewest that hold most of what is explained, at most so many."""
-    known = sorted(filter(sized, causes), key=lambda f: -(f.shrinkage or 0.0)) or list(causes)
+    known = sorted(filter(sized, found), key=lambda f: -(f.shrinkage or 0.0)) or list(found)
     held = np.cumsum([max(f.shrinkage or 0.0, 0.0) for f in known] or [0.0])
     return known[: min(int(np.searchsorted(held, _WEIGHTY * held[-1])) + 1, most)]
 
@@ -105,7 +101,7 @@ def sized(finding: Finding) -> bool:
 def unnamed(diagnosis: Diagnosis) -> list[Finding]:
     """Return the causes that the headline counts without naming them."""
     text = headline(diagnosis)
-    return [f for f in systematic(diagnosis) if _name(diagnosis, f) not in text]
+    return [f for f in causes(diagnosis) if _name(diagnosis, f) not in text]
 
 
 def _worse(diagnosis: Diagnosis) -> str:
@@ -158,11 +154,11 @@ def _sure(diagnosis: Diagnosis) -> str:
     return f"{units.percent(probability, 0)} sure" if probability < _SURE else "more than 99 % sure"
 
 
-def _causes(diagnosis: Diagnosis, causes: Sequence[Finding], most: int, beside: bool) -> str:
+def _causes(diagnosis: Diagnosis, found: Sequence[Finding], most: int, beside: bool) -> str:
     """Name the first few, each with what the data cannot tell it from, and count the others."""
-    named = weighty(causes, most)
+    named = weighty(found, most)
     names = [_name(diagnosis, f) + _doubt(diagnosis, f, beside) for f in named]
-    fewer = len(causes) - len(named)
+    fewer = len(found) - len(named)
     return listed([*names, *(["a smaller one"] if fewer == 1 else [f"{fewer} smaller ones"] if fewer else [])])
 
 
@@ -194,7 +190,7 @@ def _how_far(diagnosis: Diagnosis, remaining: Unexplained, several: bool) -> Ite
     elif gap.hardest is not None:
         hard = f"; held out by {gap.hardest.name}, {length(gap.hardest.rms_after)}"
     full = f"correcting for {it} removes {units.percent(held.shrinkage)} of its mean square on held-out data"
-    scatter = "; there is also scatter" * bool(scattering(diagnosis))
+    scatter = "; there is also scatter" * bool(causes(diagnosis, random=True))
     yield f"{full} and leaves {leaves}{_rest(diagnosis, remaining)}{hard}{scatter}"
     yield f"{full} and leaves {leaves}{_rest(diagnosis, remaining)}{hard}"
     short = f"correcting removes {units.percent(held.shrinkage)} on held-out data and leaves {leaves}"
@@ -240,9 +236,9 @@ def length(metres: float) -> str:
     return f"{metres * factor:.3g} {unit}"
 
 
-def listed(names: Sequence[str]) -> str:
-    """Put names one after the other: ``a, b and c``."""
-    return "".join(names) if len(names) < 2 else ", ".join(names[:-1]) + " and " + names[-1]
+def listed(names: Sequence[str], last: str = "and") -> str:
+    """Put names one after the other: ``a, b and c``, or with another word before the last."""
+    return "".join(names) if len(names) < 2 else f"{', '.join(names[:-1])} {last} {names[-1]}"
 
 
 def _place(unexplained: Unexplained) -> str:
@@ -292,47 +288,31 @@ def by_status(diagnosis: Diagnosis) -> list[Finding]:
     return [f for status in STATUS for f in diagnosis.effects if told_as(f) == status]
 
 
-@dataclass(frozen=True)
-class Shown:
-    """An effect's parameters as far as they are printed.
+Lines = list[tuple[str, int]]
 
-    Attributes
-    ----------
-    heading
-        What was chosen; empty where all are shown.
-    shown
-        Name, and value with its standard deviation and unit.
-    more
-        How many identified ones are not shown.
-    undetermined
-        Names of those that the data do not determine; empty where there is none.
-    unseen
-        How many the data do not see, or not beside the others, with their names; empty where there is none.
+
+def described(finding: Finding, diagnosis: Diagnosis) -> tuple[Lines, list[tuple[str, str]], Lines]:
+    """Return what is said of an effect before its parameters, these as name and value, and what after.
+
+    Lines stand with how far they hang. All of a few parameters are shown, in the order of the chain, else the most
+    significant.
     """
-
-    heading: str
-    shown: tuple[tuple[str, str], ...]
-    more: int
-    undetermined: str
-    unseen: str
-
-
-def parameters(finding: Finding) -> Shown:
-    """Choose the parameters to print: all of a few in the order of the chain, else the most significant."""
     known = [p for p in finding.parameters if p.identified and p.value is not None]
     chosen, heading, hidden = known, "", finding.unseen
     if len(known) > _ALL_UP_TO:
         chosen = sorted(known, key=lambda p: -abs(p.value or 0.0) / max(p.std or 0.0, 1e-300))[:_MOST]
         heading = f"the {_MOST} most significant of {len(known)} parameters:"
+    more, where = len(known) - len(chosen), _places(finding)
     # where there is a size, it says what is known; a constant that the frames can take up is no news
-    undetermined = [] if finding.size else [p.name for p in finding.parameters if p not in known]
-    return Shown(
-        heading,
-        tuple((p.name, units.estimate(p, chosen)) for p in chosen),
-        len(known) - len(chosen),
-        in_words(undetermined, most=4, between="; "),  # names hold commas
-        f"{len(hidden)} not seen apart from the others or the frames: {in_words(hidden, 6, '; ')}" if hidden else "",
-    )
+    free = [] if finding.size else [p.name for p in finding.parameters if p not in known]
+    names = in_words(free, most=4, between="; "), in_words(hidden, 6, "; ")  # they hold commas
+    before = [(_rivals(finding, diagnosis), 0), (_law(finding), 0), (f"where: {where}" if where else "", 7)]
+    before += [(_in_joints(finding), 2), (heading, 0)]
+    after = [(f"and {more} more, listed in the JSON" if more else "", 0)]
+    after += [(f"not determined by these data: {names[0]}" if free else "", 2)]
+    after += [(f"{len(hidden)} not seen apart from the others or the frames: {names[1]}" if hidden else "", 2)]
+    shown = [(p.name, units.estimate(p, chosen)) for p in chosen]
+    return [line for line in before if line[0]], shown, [line for line in after if line[0]]
 
 
 def in_words(names: Sequence[str], most: int = 10, between: str = ", ") -> str:
@@ -348,29 +328,24 @@ def bound(sentence: str) -> str:
     return _TOGETHER.sub(NO_BREAK, sentence)
 
 
-def rows_in_words(rows: Sequence[int], most: int = 10) -> str:
+def _rows(rows: Sequence[int]) -> str:
     """Say which rows of the file: ``rows 17, 80 and 3 more``."""
-    return f"{'row' if len(rows) == 1 else 'rows'} {in_words([str(r) for r in rows], most)}"
-
-
-def set_aside(diagnosis: Diagnosis) -> str:
-    """Say which rows were set aside, and how rows are counted: ``as outliers: rows 8, 24, 74, 90 of the file ...``."""
-    rows = f"as outliers: {rows_in_words(diagnosis.outliers)} of the file (its header is row 1)"
-    return rows if diagnosis.outliers else "no row"
-
-
-def struck(diagnosis: Diagnosis) -> str:
-    """Say which rows a fault of the table struck; empty where it struck all, or there is none."""
-    fault = diagnosis.misfit.fault if diagnosis.misfit else None
-    return rows_in_words(fault.rows) if fault and fault.rows else ""
+    return f"{'row' if len(rows) == 1 else 'rows'} {in_words([str(r) for r in rows])}"
 
 
 def facts(diagnosis: Diagnosis) -> dict[str, str]:
     """Return what stands above all else, by its heading: verdict, campaign, and which rows and effects count."""
-    told = {"Verdict": verdict(diagnosis), "Campaign": campaign(diagnosis)}
+    what = "position and orientation" if diagnosis.measures == "pose" else "position"
+    name = f"{diagnosis.campaign}: " if diagnosis.campaign else ""
+    rows = f"{diagnosis.samples} {'row' if diagnosis.samples == 1 else 'rows'}"
+    campaign = f"{name}robot {diagnosis.robot}, tool frame {diagnosis.tool_frame}, {rows}, {what} measured"
+    told = {"Verdict": _verdict(diagnosis), "Campaign": campaign}
     if diagnosis.usable:
-        told |= {"Set aside": set_aside(diagnosis), "Rows used": rows_used(diagnosis), "Left out": left_out(diagnosis)}
-    told["Struck"] = struck(diagnosis)
+        aside = f"as outliers: {_rows(diagnosis.outliers)} of the file (its header is row 1)"
+        told["Set aside"] = aside if diagnosis.outliers else "no row"
+        told |= {"Rows used": rows_used(diagnosis), "Left out": _left_out(diagnosis)}
+    elif diagnosis.misfit and diagnosis.misfit.fault and diagnosis.misfit.fault.rows:
+        told["Struck"] = _rows(diagnosis.misfit.fault.rows)
     return {heading: said for heading, said in told.items() if said}
 
 
@@ -390,14 +365,12 @@ def hardest(diagnosis: Diagnosis) -> str:
     return f"{before} → {after}, held out by {scheme.name} ({scheme.held_out}): {times} times the average"
 
 
-def places(finding: Finding, most: int = 4) -> str:
+def _places(finding: Finding, most: int = 4) -> str:
     """Say where an effect sits, its largest shares first; empty where that is not known."""
     shown = [p for p in finding.locations if p.share >= _NEGLIGIBLE][:most] or list(finding.locations[:1])
     said = ", ".join(f"{p.words} {units.percent(p.share)}" for p in shown)
     rest = finding.locations[len(shown) :]
-    if not rest:
-        return said
-    return f"{said} and {more(len(rest), rest[0].share)}"
+    return f"{said} and {more(len(rest), rest[0].share)}" if rest else said
 
 
 def more(count: int, largest: float) -> str:
@@ -411,7 +384,7 @@ def turned(diagnosis: Diagnosis) -> list[str]:
     return [f"Note: {said}." for said in diagnosis.warnings if "read with the other sign" in said]
 
 
-def verdict(diagnosis: Diagnosis) -> str:
+def _verdict(diagnosis: Diagnosis) -> str:
     """Name the explanation and how probable exactly this one is."""
     if not diagnosis.usable:
         return "none: robot and table do not belong together"
@@ -420,21 +393,17 @@ def verdict(diagnosis: Diagnosis) -> str:
     return said + ("; a remainder stays unexplained" if diagnosis.unexplained.flagged else "")
 
 
-def campaign(diagnosis: Diagnosis) -> str:
-    """Say what was measured on which robot."""
-    what = "position and orientation" if diagnosis.measures == "pose" else "position"
-    name = f"{diagnosis.campaign}: " if diagnosis.campaign else ""
-    rows = f"{diagnosis.samples} {'row' if diagnosis.samples == 1 else 'rows'}"
-    return f"{name}robot {diagnosis.robot}, tool frame {diagnosis.tool_frame}, {rows}, {what} measured"
+def noise(diagnosis: Diagnosis, floor: str = "") -> str:
+    """Say what noise alone would leave, where that is known from, and how the gap after compares with it.
 
-
-def noise(diagnosis: Diagnosis, floor: str) -> str:
-    """Say what noise alone would leave, where that is known from, and how the gap after compares with it."""
+    The ``floor`` is written in the unit that suits the gap, unless it is given.
+    """
     gap = diagnosis.gap
+    floor = floor or units.together((gap.rms_before, gap.rms_after, gap.noise_floor), "m")[2]
     parts = [floor, _SOURCES.get(gap.noise_source, gap.noise_source)]
     if gap.noise_floor > 0.0:
         parts.append(f"the gap after correction is {gap.rms_after / gap.noise_floor:.2f} times that")
-    return "; ".join(p for p in parts if p)
+    return "; ".join(filter(None, parts))
 
 
 def with_aside(diagnosis: Diagnosis) -> str:
@@ -444,12 +413,6 @@ def with_aside(diagnosis: Diagnosis) -> str:
         return ""
     before, after = units.together((held.rms_before_with_aside, held.rms_after_with_aside), "m")
     return f"with the {'row' if count == 1 else f'{count} rows'} set aside in it: {before} → {after}"
-
-
-def noise_of(diagnosis: Diagnosis) -> str:
-    """Say the same of a diagnosis that stands alone, in the unit that suits the gap."""
-    gap = diagnosis.gap
-    return noise(diagnosis, units.together((gap.rms_before, gap.rms_after, gap.noise_floor), "m")[2])
 
 
 def needs(finding: Finding, joints: Sequence[str]) -> str:
@@ -462,10 +425,10 @@ def needs(finding: Finding, joints: Sequence[str]) -> str:
     for quantity, columns in by_quantity.items():
         of_joints = any(c.removeprefix(quantity) in joints for c in columns)
         named.append(columns[0] if len(columns) == 1 else f"{quantity}<{'joint' if of_joints else 'link'}>")
-    return one_of(named)
+    return listed(named, "or")
 
 
-def law(finding: Finding) -> str:
+def _law(finding: Finding) -> str:
     """Describe a law that was discovered in the data, its size and what it usually is; empty for a known effect."""
     if not finding.quantity:
         return ""
@@ -475,7 +438,7 @@ def law(finding: Finding) -> str:
     return "; ".join(part for part in (*told, f"usually {finding.usually}" if finding.usually else "") if part)
 
 
-def in_joints(finding: Finding) -> str:
+def _in_joints(finding: Finding) -> str:
     """Say how much a known effect does in each joint, the largest first; empty where its parameters say it."""
     if finding.quantity or not finding.size:
         return ""
@@ -483,7 +446,7 @@ def in_joints(finding: Finding) -> str:
     return f"{finding.size[0].what}: {in_words(told, most=4)}"
 
 
-def rivals(finding: Finding, diagnosis: Diagnosis) -> str:
+def _rivals(finding: Finding, diagnosis: Diagnosis) -> str:
     """Say of which effect it is a part, or what it cannot be told from and how to see what is not preferred."""
     if not finding.confounded_with:
         return ""
@@ -496,20 +459,7 @@ def rivals(finding: Finding, diagnosis: Diagnosis) -> str:
     return f"{said}; --without {finding.name} shows what would then stand in its place"
 
 
-def described(
-    finding: Finding, diagnosis: Diagnosis
-) -> tuple[list[tuple[str, int]], tuple[tuple[str, str], ...], list[tuple[str, int]]]:
-    """Return what is said of an effect before its parameters, these, and what after: lines with how far they hang."""
-    known = parameters(finding)
-    where = f"where: {places(finding)}" if finding.locations else ""
-    more = f"and {known.more} more, listed in the JSON" if known.more else ""
-    free = f"not determined by these data: {known.undetermined}" if known.undetermined else ""
-    before = (rivals(finding, diagnosis), 0), (law(finding), 0), (where, 7), (in_joints(finding), 2), (known.heading, 0)
-    after = (more, 0), (free, 2), (known.unseen, 2)
-    return [line for line in before if line[0]], known.shown, [line for line in after if line[0]]
-
-
-def left_out(diagnosis: Diagnosis) -> str:
+def _left_out(diagnosis: Diagnosis) -> str:
     """Say which effects the user left out, and how he asked for that; empty where he did not."""
     out, kept = diagnosis.left_out, [f.name for f in diagnosis.effects if f.quantity is None]
     if not out:
@@ -549,7 +499,7 @@ def sentences(diagnosis: Diagnosis) -> Iterator[str]:
     if left.locations:
         likely = [p for p in left.locations if p.share >= _UNLIKELY][:3] or left.locations[:1]
         spots = [f"{p.words} ({units.probability(p.share)})" for p in likely]
-        yield f"It enters most probably at {one_of(spots)}."
+        yield f"It enters most probably at {listed(spots, 'or')}."
     known_laws = laws(diagnosis)
     if left.depends_on and not known_laws:
         quantities = [f"{d.covariate} ({units.p_value(d.p_value)})" for d in left.depends_on[:3]]
@@ -558,41 +508,28 @@ def sentences(diagnosis: Diagnosis) -> Iterator[str]:
         yield f"{found.name} describes part of it: {found.describes or 'a law'}."
 
 
-def one_of(items: Sequence[str]) -> str:
-    """List alternatives: ``a, b or c``."""
-    if len(items) < 2:
-        return "".join(items)
-    return f"{', '.join(items[:-1])} or {items[-1]}"
-
-
 _SURER = 0.05  # by which a single effect is surer than all together, so that a reader asks why
-_TOLD, _MOST_OTHERS = (
-    0.01,
-    3,
-)  # probability from which another effect is told that may be at work, too, and how many are
-
-if TYPE_CHECKING:
-    from thermal_robot.diagnosis.result import Diagnosis
+_TOLD, _MOST_OTHERS = 0.01, 3  # probability from which another effect is told that may be at work, and how many are
 
 
 def details(diagnosis: Diagnosis) -> Iterator[str]:
     """Yield a sentence for each thing that the headline leaves out and no table says."""
     if not diagnosis.usable:
         return
-    causes, chance = systematic(diagnosis), scattering(diagnosis)
+    found, chance = causes(diagnosis), causes(diagnosis, random=True)
     if slight := [diagnosis.title(f.name) for f in unnamed(diagnosis)]:
         yield f"{'The smaller one is' if len(slight) == 1 else 'The smaller ones are'} {listed(slight)}."
-    for f in causes:
+    for f in found:
         if f.confounded_with:
             rivals = " or ".join(map(diagnosis.title, f.confounded_with))
             yield f"{capitalised(diagnosis.title(f.name))} cannot be told apart from {rivals}."
-    if unsized := [diagnosis.title(f.name) for f in causes if not sized(f)]:
+    if unsized := [diagnosis.title(f.name) for f in found if not sized(f)]:
         yield f"How large it is these data do not determine: {listed(unsized)}."
     yield from _beside(diagnosis)
-    if causes and chance:
+    if found and chance:
         names = listed([diagnosis.title(f.name) for f in chance])
         yield f"There is also scatter, which no correction removes: {names}."
-    if laws := sum(f.quantity is not None for f in causes):
+    if laws := sum(f.quantity is not None for f in found):
         which = "None of the effects that were considered" if diagnosis.narrowed else "No known effect"
         shapes = "the shape of the law that was" if laws == 1 else f"the shapes of the {laws} laws that were"
         yield f"{which} has {shapes} found."
@@ -643,48 +580,40 @@ def advice(diagnosis: Diagnosis) -> str:
         return f"{first}; then diagnose again."
     if wanted is None:
         return ""
-    told = _shows(diagnosis, wanted)
-    if wanted.kind == "frame":
-        declared = f" ({wanted.name})" if wanted.name else ""
-        return f"A frame measured on its own, and declared known{declared}, would {told}."
-    if wanted.kind == "range":
-        return f"More poses over the whole range of every joint would {told}."
-    if wanted.kind == "pose":
-        return f"The pose that would best {told}: {_pose(diagnosis, wanted)}."
-    if wanted.kind == "repeats" and wanted.apart:
-        return f"Repeat some poses, and label them in a column {wanted.name}: this would {told}."
-    if wanted.kind == "repeats":
+    names = [diagnosis.title(name) for name in wanted.apart[:2]]
+    told = f"tell {' from '.join(names)}" if names else "tell the leading explanations apart"
+    told = f"show whether to believe in {names[0]}" if len(names) == 1 else told
+    if wanted.kind == "repeats" and not names:
         return "Repeat a few poses in another order and on another day: this shows how much of the remainder repeats."
-    if wanted.apart:
-        return f"Repeat some poses with another load, and record {wanted.name}: this would {told}."
-    return f"Record {wanted.name}: {_remainder(wanted)}, and {_why(diagnosis, wanted)}."
+    if wanted.kind == "column" and not names:
+        return f"Record {wanted.name}: {_why(diagnosis, wanted)}."
+    declared = f" ({wanted.name})" if wanted.name else ""
+    pose = _pose(diagnosis, wanted)
+    return _TO_DO[wanted.kind].format(told=told, declared=declared, name=wanted.name, pose=pose)
 
 
-def _shows(diagnosis: Diagnosis, wanted: Wanted) -> str:
-    names = _titles(diagnosis, wanted.apart[:2])
-    if len(names) == 1:
-        return f"show whether to believe in {names[0]}"
-    return f"tell {' from '.join(names)}" if names else "tell the leading explanations apart"
-
-
-def _remainder(wanted: Wanted) -> str:
-    own = wanted.follows and wanted.place.endswith(wanted.follows)
-    enters = f" enters at {wanted.place}" if wanted.place else ""
-    follows = f" follows {'its position' if own else wanted.follows}" if wanted.follows else ""
-    return "a remainder" + (" and".join(part for part in (enters, follows) if part) or " is unexplained")
+_TO_DO = {
+    "frame": "A frame measured on its own, and declared known{declared}, would {told}.",
+    "range": "More poses over the whole range of every joint would {told}.",
+    "pose": "The pose that would best {told}: {pose}.",
+    "repeats": "Repeat some poses, and label them in a column {name}: this would {told}.",
+    "column": "Repeat some poses with another load, and record {name}: this would {told}.",
+}
 
 
 def _why(diagnosis: Diagnosis, wanted: Wanted) -> str:
-    if wanted.whether:
-        return f"this would show whether {wanted.whether} causes it"
-    untested = _titles(diagnosis, wanted.untested[:_MOST_UNTESTED])
-    if len(wanted.untested) > _MOST_UNTESTED:
-        untested.append(f"{len(wanted.untested) - _MOST_UNTESTED} more")
-    return f"{listed(untested)} could not be tested" if untested else "this may be what it follows"
-
-
-def _titles(diagnosis: Diagnosis, names: Sequence[str]) -> list[str]:
-    return [diagnosis.title(name) for name in names]
+    """Say where a remainder enters and what it follows, and what a column would show of it."""
+    own = wanted.follows and wanted.place.endswith(wanted.follows)
+    enters = f" enters at {wanted.place}" if wanted.place else ""
+    follows = f" follows {'its position' if own else wanted.follows}" if wanted.follows else ""
+    remainder = " and".join(filter(None, (enters, follows))) or " is unexplained"
+    untested = [diagnosis.title(name) for name in wanted.untested[:_MOST_UNTESTED]]
+    if more := len(wanted.untested) - len(untested):
+        untested.append(f"{more} more")
+    why = f"{listed(untested)} could not be tested" if untested else "this may be what it follows"
+    return f"a remainder{remainder}, and " + (
+        f"this would show whether {wanted.whether} causes it" if wanted.whether else why
+    )
 
 
 def _pose(diagnosis: Diagnosis, wanted: Wanted) -> str:

@@ -1,0 +1,127 @@
+"""The numbers and tables of a diagnosis' page, as text: sizes of the gap, rows set aside, frames, correlations."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from thermal_robot.arrays import Array
+from thermal_robot.report import units
+
+if TYPE_CHECKING:
+    from thermal_robot.diagnosis.result import Diagnosis
+
+Table = dict[str, Any]
+"""``label``, ``heads``, ``rows`` of cells, and how many of the first columns hold ``words``, not numbers."""
+
+_MOST_ROWS = 0.95  # quantile of the gap that a table tells beside rms and largest
+_MOST_OUTLIERS = 40
+_STRONG = 0.5  # of a correlation: below it a third parameter changes little by what is known of another
+_MOST_CORRELATIONS = 10
+_FRAMES = {"base": "root frame of the robot, as the instrument sees it", "tool": "target, in the tool frame"}
+
+
+def numbers(diagnosis: Diagnosis) -> list[tuple[str, str, str, list[str]]]:
+    """Return the rms gap before and after and the shrinkage held out: kind, heading, value and what stands below it."""
+    gap, held = diagnosis.gap, diagnosis.gap.held_out
+    before, after, floor = units.together((gap.rms_before, gap.rms_after, gap.noise_floor), "m")
+    turned = ["", ""]
+    if gap.orientation_before is not None:
+        pair = units.together((gap.orientation_before, gap.orientation_after), "rad")
+        turned = [f"orientation {value}" for value in pair]
+    pair = units.together((held.rms_before, held.rms_after), "m")
+    bounds = f"95 % interval {units.interval(held.shrinkage_ci95)} %".replace(" %", "\N{NO-BREAK SPACE}%")
+    return [
+        ("before", "Gap before, rms", before, [turned[0]]),
+        ("after", "Gap after, rms", after, [turned[1], f"noise floor {floor}"]),
+        ("held", "Shrinkage on rows held out", units.percent(held.shrinkage), [bounds, " → ".join(pair)]),
+    ]
+
+
+def extremes(diagnosis: Diagnosis) -> Table:
+    """Return rms, 95 % quantile and maximum of the distance, and the rms along each axis, before and after.
+
+    Rows set aside are left out. Of rows held out a diagnosis has distances alone.
+    """
+    rows = diagnosis.rows
+    kept, sizes = ~rows.outliers, {}
+    for name, gap in (("before", rows.gap), ("after", rows.remainder)):
+        along = np.sqrt(np.mean(gap[kept, :3] ** 2, axis=0)) if kept.any() else ()
+        sizes[f"all rows, {name}"] = (*_sizes(np.linalg.norm(gap[kept, :3], axis=1)), *along)
+    for name, distance in (("before", rows.held_out_before), ("after", rows.held_out_after)):
+        sizes[f"rows held out, {name}"] = _sizes(distance[np.isfinite(distance)])
+    best = units.scale("m", max((size for line in sizes.values() for size in line), default=0.0))
+    return {
+        "label": "The gap before and after: rms, 95 % quantile, largest, along each axis",
+        "heads": (f"gap in {best.unit}", "rms", "95 % below", "largest", "rms along x", "along y", "along z"),
+        "rows": [
+            [name, *(units.number(size * best.factor) for size in line), *[""] * (6 - len(line))]
+            for name, line in sizes.items()
+            if line
+        ],
+    }
+
+
+def _sizes(distance: Array) -> tuple[float, ...]:
+    """Return rms, 95 % quantile and maximum of distances; nothing of none."""
+    if not len(distance):
+        return ()
+    return float(np.sqrt(np.mean(distance**2))), float(np.quantile(distance, _MOST_ROWS)), float(distance.max())
+
+
+def set_aside(diagnosis: Diagnosis) -> tuple[Table, int]:
+    """Return how far off the rows are that were set aside, before and after, and how many more there are."""
+    rows = diagnosis.rows
+    chosen = np.isin(rows.rows, diagnosis.outliers)
+    before, after = (np.linalg.norm(part[chosen, :3], axis=1) for part in (rows.gap, rows.remainder))
+    best = units.scale("m", max(before.max(initial=0.0), after.max(initial=0.0)))
+    cells = best.factor * np.column_stack([before, after, rows.remainder[chosen, :3]])
+    sizes = ("gap", "remainder", *(f"remainder {axis}" for axis in "xyz"))
+    told = [
+        [str(row), *map(units.number, values)]
+        for row, values in zip(rows.rows[chosen].tolist(), cells.tolist(), strict=True)
+    ]
+    table = {
+        "label": "Rows that were set aside",
+        "heads": ("row in the file", *(f"{size} ({best.unit})" for size in sizes)),
+        "rows": told[:_MOST_OUTLIERS],
+        "words": 0,
+    }
+    return table, max(len(told) - _MOST_OUTLIERS, 0)
+
+
+def frames(diagnosis: Diagnosis) -> Table:
+    """Return where the robot stands and where the target sits: mm, and roll, pitch and yaw in degrees."""
+    rows = []
+    for name, pose in diagnosis.frames.iterrows():
+        turns = pose[["roll", "pitch", "yaw"]]
+        told = [_fixed(1e3 * value, 3) for value in pose[["x", "y", "z"]]]
+        told += [_fixed(np.degrees(value), 4) if np.isfinite(value) else "" for value in turns]
+        rows.append([_FRAMES[str(name)], *told])
+    heads = ("frame", "x (mm)", "y (mm)", "z (mm)", "roll (°)", "pitch (°)", "yaw (°)")
+    return {"label": "Fitted frames", "heads": heads, "rows": rows}
+
+
+def _fixed(value: float, digits: int) -> str:
+    """Write a figure with so many decimals; what rounds to zero has no sign."""
+    return f"{round(value, digits) + 0.0:.{digits}f}".replace("-", "−")
+
+
+def correlations(diagnosis: Diagnosis) -> tuple[Table, str]:
+    """Return the ten strongest correlations between the parameters, and in words how many are not shown."""
+    covariance = diagnosis.covariance
+    std = np.sqrt(covariance.to_numpy().diagonal())
+    first, second = np.triu_indices(len(std), 1)
+    correlation = (covariance.to_numpy() / np.outer(std, std))[first, second]
+    order = np.argsort(-np.abs(correlation), kind="stable")
+    strong = [k for k in order if abs(correlation[k]) > _STRONG]
+    names = [f"{parameter} ({effect})" for effect, parameter in covariance.index]
+    rows = [[names[first[k]], names[second[k]], _fixed(correlation[k], 2)] for k in strong[:_MOST_CORRELATIONS]]
+    heads = ("parameter", "known only together with", "correlation")
+    table = {"label": "Strongest correlations of the parameters", "heads": heads, "rows": rows, "words": 2}
+    if not strong:
+        return table, f"No two parameters have a correlation beyond ±{_STRONG}." if len(order) else ""
+    hidden = len(strong) - len(rows)
+    more = f" and {hidden} beyond ±{_STRONG}" if hidden else ""
+    return table, f"Not shown: {len(order) - len(strong)} correlations within ±{_STRONG}{more}."

@@ -1,1 +1,0 @@
-"""What a robot looks like: the shapes of its URDF, as they are and as coarse hulls."""
