@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
-from thermal_robot.kinematics.urdf import bare, encoded, nearest, parse_urdf, tags
+from thermal_robot.kinematics.urdf import nearest, parse_urdf, read
 
 
 @dataclass(frozen=True)
@@ -58,12 +58,11 @@ class Coupling:
 
 def mimics(urdf: str, source: str = "the robot description") -> dict[str, Mimic]:
     """Read what every joint with a ``<mimic>`` tag follows, which Pinocchio's default parsing drops."""
-    found, every = {}, tags(bare(encoded(urdf)), source)
-    for tag in every:
-        if tag.path == ("robot", "joint", "mimic") and (name := every[tag.parent].attributes.get("name")):
-            said = tag.attributes
+    found = {}
+    for joint in read(urdf, source).iterfind("joint[@name]"):
+        for said in joint.iterfind("mimic"):
             times, offset = float(said.get("multiplier", 1.0)), float(said.get("offset", 0.0))
-            found[name] = Mimic(said.get("joint", ""), times, offset)
+            found[joint.get("name")] = Mimic(said.get("joint", ""), times, offset)
     return found
 
 
