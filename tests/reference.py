@@ -14,8 +14,7 @@ import pinocchio as pin
 from numpy.typing import ArrayLike, NDArray
 
 from thermal_robot.kinematics.augmented import augmented_model, to_pinocchio
-from thermal_robot.kinematics.frames import ChainFrames
-from thermal_robot.kinematics.walk import Displacement
+from thermal_robot.kinematics.frames import ChainFrames, Displacement
 
 if TYPE_CHECKING:
     from thermal_robot.robot import Robot

@@ -3,6 +3,7 @@
 from thermal_robot.kinematics.augmented import AugmentedModel, augmented_model, elongation_jacobian, growing, link_poses
 from thermal_robot.kinematics.frames import (
     ChainFrames,
+    Displacement,
     chain_frames,
     frame_jacobians,
     placement_sensitivities,
@@ -19,7 +20,6 @@ from thermal_robot.kinematics.lie import (
     rotation_to_quaternion,
     rotation_to_rpy,
 )
-from thermal_robot.kinematics.walk import Displacement
 
 __all__ = [
     "AugmentedModel",

@@ -9,10 +9,9 @@ from numpy.typing import ArrayLike
 
 from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
-from thermal_robot.kinematics import lanes
-from thermal_robot.kinematics.frames import ChainFrames, as_rows, chain_frames, engine_for
+from thermal_robot.kinematics.frames import as_rows, chain_frames, compute
+from thermal_robot.kinematics.lanes import ChainFrames, result
 from thermal_robot.kinematics.model import REVOLUTE
-from thermal_robot.kinematics.walk import result
 
 if TYPE_CHECKING:
     from thermal_robot.robot import Robot
@@ -64,12 +63,7 @@ def gravity_torques(
     """
     q = as_rows(robot, q) if frames is None else frames.tool_position
     mass, com = _payload(payload, payload_com, len(q))
-    out = result(out, len(q), robot.n)
-    if frames is None:
-        engine_for(robot, len(q)).gravity(robot, q, mass, com, out)
-    else:
-        lanes.gravity(robot, q, mass, com, out, frames.rows_last())
-    return out
+    return compute("gravity", robot, q, result(out, len(q), robot.n), com, mass, frames)
 
 
 def segment_loads(

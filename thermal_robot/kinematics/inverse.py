@@ -22,9 +22,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
-from thermal_robot.kinematics.frames import ChainFrames, as_rows, chain_frames, frame_jacobians
+from thermal_robot.kinematics.frames import ChainFrames, Displacement, as_rows, chain_frames, frame_jacobians
 from thermal_robot.kinematics.lie import log3
-from thermal_robot.kinematics.walk import Displacement
 
 if TYPE_CHECKING:
     from thermal_robot.robot import Robot
