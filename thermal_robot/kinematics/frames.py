@@ -57,12 +57,11 @@ def compute(
     frame, ``None`` for its origin; the mass of a payload there () or (N,) kg. With ``frames`` ``q`` is not read.
     """
     arguments = [] if what == "poses" else [point] if mass is None else [point, mass]
-    one_for_all = np.ndim(point) < 2 and not np.ndim(mass)
     if frames is not None:
         getattr(lanes, what)(robot, q, out, *arguments, frames)
     elif len(q) <= settings.FEW and len(robot.chain.placed) <= settings.MOST_PLACEMENTS:
         getattr(thin, what)(robot, q, out, *arguments)
-    elif len(q) >= settings.MANY and one_for_all and compiled.installed():
+    elif len(q) >= settings.MANY and np.ndim(point) < 2 and not np.ndim(mass) and compiled.installed():
         compiled.run(what, robot, q, out, *arguments)
     else:
         getattr(lanes, what)(robot, q, out, *arguments)

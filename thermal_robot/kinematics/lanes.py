@@ -280,11 +280,10 @@ def _joints(arm: Arm, chain: Chain, q: Array, more: Array | None, part: slice) -
 
 def _turn(frame: Array, a: int, b: int, sine: Array, cosine: Array, out: Array) -> None:
     """Turn column a of every frame towards column b."""
-    term, rest = scratch("term", 3, len(sine)), 3 - a - b
-    np.multiply(frame[:, a], cosine, out=out[:, a])
-    out[:, a] += np.multiply(frame[:, b], sine, out=term)
-    np.multiply(frame[:, b], cosine, out=out[:, b])
-    out[:, b] -= np.multiply(frame[:, a], sine, out=term)
+    one, other, term, rest = frame[:, a], frame[:, b], scratch("term", 3, len(sine)), 3 - a - b
+    first, second = np.multiply(one, cosine, out=out[:, a]), np.multiply(other, cosine, out=out[:, b])
+    first += np.multiply(other, sine, out=term)
+    second -= np.multiply(one, sine, out=term)
     out[:, rest], out[:, 3] = frame[:, rest], frame[:, 3]
 
 

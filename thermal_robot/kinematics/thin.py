@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import threading
-from collections.abc import Iterator
-from itertools import repeat
+from collections.abc import Iterable
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -69,28 +68,36 @@ class _Own:
         rows[:, self.moves] = q
         return rows
 
-    def frames_at(self, point: Array | None, rows: int) -> Iterator[int]:
-        """Yield for each row the frame of the tool, or one that is put at a point of it, (3,) or (N, 3)."""
+    def frames_at(self, point: Array | None, rows: int) -> Iterable[int]:
+        """Return for each row the frame of the tool, or one that is put at a point of it, (3,) or (N, 3)."""
         if point is None:
-            yield from repeat(self.tool, rows)
-        else:
-            for at in np.atleast_2d(point):
-                self.model.frames[self.point].placement = self.end * pin.SE3(np.eye(3), at)
-                yield from repeat(self.point, 1 if point.ndim == 2 else rows)
+            return [self.tool] * rows
+        if point.ndim == 2:
+            return map(self._placed_at, point)
+        return [self._placed_at(point)] * rows
+
+    def _placed_at(self, point: Array) -> int:
+        self.model.frames[self.point].placement = self.end * pin.SE3(np.eye(3), point)
+        number: int = self.point
+        return number
 
 
-_kept = threading.local()  # what Pinocchio works in must not be shared
+class _Kept(threading.local):
+    """Models of each thread, of joints alone and of all placements: what Pinocchio works in must not be shared."""
+
+    def __init__(self) -> None:
+        self.models: tuple[WeakKeyDictionary[Chain, _Own], ...] = (WeakKeyDictionary(), WeakKeyDictionary())
+
+
+_kept = _Kept()
 
 
 def _own(chain: Chain, placed: bool = False) -> _Own:
-    """Return the model of a chain, made once in each thread."""
-    name = "placed" if placed else "plain"
-    if not hasattr(_kept, name):
-        setattr(_kept, name, WeakKeyDictionary())
-    models: WeakKeyDictionary[Chain, _Own] = getattr(_kept, name)
-    if chain not in models:
-        models[chain] = _Own(chain, placed)
-    return models[chain]
+    models = _kept.models[placed]
+    found = models.get(chain)
+    if found is None:
+        found = models[chain] = _Own(chain, placed)
+    return found
 
 
 def _joint(chain: Chain, k: int) -> pin.JointModel:
