@@ -65,6 +65,10 @@ def same_frames(ours, theirs):
 
 @pytest.fixture(scope="module")
 def oracle(arm, configurations):
+    return oracle_of(arm, configurations)
+
+
+def oracle_of(arm, configurations):
     """Configurations of an arm, those with all joints at zero and at a quarter turn among them, and what is right."""
     q = configurations(arm, ROWS)
     q[0], q[1] = 0.0, 0.5 * np.pi
