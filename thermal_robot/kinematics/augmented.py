@@ -5,7 +5,7 @@ With these every segment with a length may grow along itself (Kluz et al. 2018, 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike, NDArray
 from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics.frames import ChainFrames, as_rows, chain_frames
-from thermal_robot.kinematics.model import unit_motion
+from thermal_robot.kinematics.thin import joint_model
 
 if TYPE_CHECKING:
     from thermal_robot.robot import Robot
@@ -161,90 +161,55 @@ def augmented_model(robot: Robot) -> AugmentedModel:
     """Build the Pinocchio model in which every segment with a length begins with a virtual prismatic joint.
 
     A fixed frame with a length between two joints (``column_top`` of the RV-M2) gets a virtual joint of its own, so
-    that two elongations of one body are two coordinates.
-
-    Parameters
-    ----------
-    robot
-        The robot. Placements are those of its Pinocchio model, so that the batch functions can be checked against it;
-        of its ``chain`` only names and coupling are read, and of its segments the directions.
-
-    Returns
-    -------
-    AugmentedModel
-        At zero elongations the same robot.
+    that two elongations of one body are two coordinates. At zero elongations it is the same robot.
     """
-    source, model = robot.model, pin.Model()
-    model.name = robot.model.name
-    model.gravity.linear = robot.gravity
-    directions = {segment.index: segment.direction for segment in robot.segments}
-    root = _frame(source, robot.root_frame, pin.FrameType.BODY)
+    chain, coupling, model = robot.chain, robot.chain.coupling, pin.Model()
+    model.name, model.gravity.linear = robot.model.name, robot.gravity
     model.addFrame(pin.Frame(robot.root_frame, 0, 0, pin.SE3.Identity(), pin.FrameType.BODY))
-    parent, here = 0, root.placement  # ``here``: where joint ``parent`` stands in the body of the source
+    directions = {segment.index: segment.direction for segment in robot.segments}
+    links = (*chain.parent_links[1:], robot.tool_frame)
     placements: dict[int, int] = {}
-    links = (*robot.chain.parent_links[1:], robot.tool_frame)
-    for k, (name, link) in enumerate(zip(robot.chain.names, links, strict=True)):
-        moves = source.existJointName(name)
-        number = source.getJointId(name)
-        at = source.jointPlacements[number] if moves else _frame(source, name, pin.FrameType.FIXED_JOINT).placement
-        offset = here.actInv(at)
-        if k in directions:
-            if np.any(directions[k]):
-                parent = model.addJoint(
-                    parent, pin.JointModelPrismaticUnaligned(directions[k]), offset, ELONGATION + name
-                )
-                placements[k], offset, here = parent, pin.SE3.Identity(), at
-            if moves:
-                parent = _add_movable(model, parent, robot, name, offset)
-                placements.setdefault(k, parent)
-                offset, here = pin.SE3.Identity(), pin.SE3.Identity()
-        model.addFrame(pin.Frame(link, parent, 0, offset, pin.FrameType.BODY))
+    parent, here, movable = 0, pin.SE3.Identity(), chain.movable.tolist()
+    for k, (name, link) in enumerate(zip(chain.names, links, strict=True)):
+        here = here * pin.SE3(chain.rotations[k], chain.translations[k])
+        joints = []
+        if np.any(directions.get(k, 0.0)):
+            joints.append((pin.JointModelPrismaticUnaligned(directions[k]), ELONGATION + name, ()))
+        if k in movable:
+            joints.append((joint_model(chain, k), name, _limits(robot, movable.index(k))))
+        for joint, called, limits in joints:
+            parent, here = model.addJoint(parent, joint, here, called, *limits), pin.SE3.Identity()
+            placements.setdefault(k, parent)
+        model.addFrame(pin.Frame(link, parent, 0, here, pin.FrameType.BODY))
+
+    def columns(called: Iterable[str]) -> NDArray[np.int64]:
+        return np.array([model.joints[model.getJointId(name)].idx_q for name in called], dtype=np.int64)
+
+    rows, joints = columns(chain.names[k] for k in movable), columns(chain.names[movable[j]] for j in coupling.driving)
+    matrix, offset = np.eye(model.nq), np.zeros(model.nq)
+    matrix[rows], offset[rows] = 0.0, coupling.offset
+    matrix[np.ix_(rows, joints)] = coupling.matrix
     names = tuple(robot.segments[s].name for s in growing(robot))
-    chain = robot.chain
-    joints = _columns(model, [chain.names[k] for k in chain.movable[chain.coupling.driving]])
     return AugmentedModel(
         model,
         joints,
-        _columns(model, [ELONGATION + name for name in names]),
+        columns(ELONGATION + name for name in names),
         names,
         tuple(placements[segment.index] for segment in robot.segments),
         model.getFrameId(robot.tool_frame, pin.FrameType.BODY),
-        *_coupled(model, robot, joints),
+        matrix,
+        offset,
     )
 
 
-def _columns(model: pin.Model, names: Sequence[str]) -> NDArray[np.int64]:
-    return np.array([model.joints[model.getJointId(name)].idx_q for name in names], dtype=np.int64)
-
-
-def _coupled(model: pin.Model, robot: Robot, joints: NDArray[np.int64]) -> tuple[Array, Array]:
-    """Write the robot's coupling for the coordinates of the model, virtual joints included."""
-    movable = _columns(model, [robot.chain.names[k] for k in robot.chain.movable])
-    matrix, offset = np.eye(model.nq), np.zeros(model.nq)
-    matrix[movable] = 0.0
-    matrix[np.ix_(movable, joints)] = robot.chain.coupling.matrix
-    offset[movable] = robot.chain.coupling.offset
-    return matrix, offset
-
-
-def _add_movable(model: pin.Model, parent: int, robot: Robot, name: str, placement: pin.SE3) -> int:
-    joint = robot.model.joints[robot.model.getJointId(name)]
-    # A continuous joint has two coordinates in Pinocchio, its cosine and sine; here it has one.
-    one = joint if joint.nq == 1 else pin.JointModelRevoluteUnaligned(unit_motion(robot.model, joint)[3:])
-    free = np.full(1, np.inf)
+def _limits(robot: Robot, row: int) -> tuple[Array, ...]:
+    """Return what Pinocchio wants of a movable joint: no bounds of effort and speed, and those of its position."""
+    free, coupling = np.full(1, np.inf), robot.chain.coupling
     low, high = -free, free
-    coupling = robot.chain.coupling
-    row = [robot.chain.names[k] for k in robot.chain.movable].index(name)
-    if row in coupling.driving:
-        j = coupling.driving.tolist().index(row)
+    for j in np.flatnonzero(coupling.driving == row):
         ends = coupling.matrix[row, j] * np.array([robot.lower[j], robot.upper[j]]) + coupling.offset[row]
         low, high = ends.min(keepdims=True), ends.max(keepdims=True)
-    added: int = model.addJoint(parent, one, placement, name, free, free, low, high)
-    return added
-
-
-def _frame(model: pin.Model, name: str, kind: pin.FrameType) -> pin.Frame:
-    return model.frames[model.getFrameId(name, kind)]
+    return free, free, low, high
 
 
 def link_poses(robot: Robot, q: ArrayLike) -> Array:

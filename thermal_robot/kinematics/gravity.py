@@ -17,9 +17,6 @@ if TYPE_CHECKING:
     from thermal_robot.robot import Robot
 
 _AT_TOOL = (0.0, 0.0, 0.0)
-_NO_PAYLOAD = np.asarray(0.0), np.zeros(3)
-for _constant in _NO_PAYLOAD:
-    _constant.setflags(write=False)  # every call shares them
 
 
 def gravity_torques(
@@ -161,8 +158,6 @@ def static_regressor(robot: Robot, q: ArrayLike, *, frames: ChainFrames | None =
 
 
 def _payload(payload: ArrayLike | None, com: ArrayLike, rows: int) -> tuple[Array, Array]:
-    if payload is None and com is _AT_TOOL:
-        return _NO_PAYLOAD
     mass = np.asarray(0.0 if payload is None else payload, dtype=float)
     centre = np.asarray(com, dtype=float)
     if mass.shape not in ((), (rows,)):

@@ -11,7 +11,7 @@ import math
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import Any, NamedTuple, Protocol
+from typing import TYPE_CHECKING, NamedTuple
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -22,6 +22,9 @@ from thermal_robot.errors import RobotError
 from thermal_robot.kinematics import settings
 from thermal_robot.kinematics.lie import sines_and_cosines
 from thermal_robot.kinematics.model import FIXED, PRISMATIC, REVOLUTE, Chain
+
+if TYPE_CHECKING:
+    from thermal_robot.robot import Robot
 
 _FRAME = 12 * 8
 """Bytes of one frame of one configuration."""
@@ -72,34 +75,6 @@ def result(out: Array | None, rows: int, *shape: int) -> Array:
     if not out.flags.writeable:
         raise RobotError("out must not be written to: give an array that may be, or none")
     return out
-
-
-class Chained(Protocol):
-    """A chain with a name; a :class:`~thermal_robot.Robot` is one."""
-
-    @property
-    def name(self) -> str:
-        """Name of the robot, for messages."""
-
-    @property
-    def n(self) -> int:
-        """Number of joints that can be driven."""
-
-    @property
-    def segments(self) -> Sequence[Any]:
-        """The placements that may be displaced, from the root on."""
-
-    @property
-    def chain(self) -> Chain:
-        """Constant arrays of its elements."""
-
-
-class Weighted(Chained, Protocol):
-    """A chain on which gravity pulls; a :class:`~thermal_robot.Robot` is one."""
-
-    @property
-    def gravity(self) -> NDArray[np.float64]:
-        """(3,) m/s² in the root frame."""
 
 
 class ChainFrames(NamedTuple):
@@ -321,7 +296,7 @@ def written(out: Array, part: slice) -> Iterator[Array]:
 
 
 def visit(
-    robot: Chained, q: Array, out: Array, given: ChainFrames | None, do: Callable[[ChainFrames, slice, Array], None]
+    robot: Robot, q: Array, out: Array, given: ChainFrames | None, do: Callable[[ChainFrames, slice, Array], None]
 ) -> None:
     """Call a function with the frames of one chunk of configurations after another, and where to write its results.
 
@@ -358,7 +333,7 @@ def cross(a: Array, b: Array, out: Array, term: Array) -> None:
         out[i] -= term
 
 
-def poses(robot: Chained, q: Array, out: Array, moved: Moved = NOWHERE) -> None:
+def poses(robot: Robot, q: Array, out: Array, moved: Moved = NOWHERE) -> None:
     """Write the poses of the tool, (N, 4, 4), displaced or not."""
     elements = len(robot.chain.names)
     for part in chunks(len(q), 4):
@@ -369,7 +344,7 @@ def poses(robot: Chained, q: Array, out: Array, moved: Moved = NOWHERE) -> None:
             walk(robot.chain, q, moved, part, frames, frames[-1])
 
 
-def jacobians(robot: Chained, q: Array, out: Array, point: Array | None, given: ChainFrames | None = None) -> None:
+def jacobians(robot: Robot, q: Array, out: Array, point: Array | None, given: ChainFrames | None = None) -> None:
     """Write the Jacobians at a point of the tool, (N, 6, n)."""
     chain, plain = robot.chain, arm_of(robot.chain).plain
 
@@ -391,7 +366,7 @@ def jacobians(robot: Chained, q: Array, out: Array, point: Array | None, given: 
     visit(robot, q, out, given, write)
 
 
-def placements(robot: Chained, q: Array, out: Array, point: Array | None, given: ChainFrames | None = None) -> None:
+def placements(robot: Robot, q: Array, out: Array, point: Array | None, given: ChainFrames | None = None) -> None:
     """Write the sensitivities of a point of the tool to every placement, (N, 6, S, 6)."""
 
     def write(frames: ChainFrames, part: slice, out: Array) -> None:
@@ -408,7 +383,7 @@ def placements(robot: Chained, q: Array, out: Array, point: Array | None, given:
     visit(robot, q, out, given, write)
 
 
-def gravity(robot: Weighted, q: Array, out: Array, com: Array, mass: Array, given: ChainFrames | None = None) -> None:
+def gravity(robot: Robot, q: Array, out: Array, com: Array, mass: Array, given: ChainFrames | None = None) -> None:
     """Write the torques, (N, n), that hold the arm and a payload: its mass, () or (N,), at ``com`` in the tool."""
     chain, plain, pull = robot.chain, arm_of(robot.chain).plain, robot.gravity
 

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterable
+from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 import numpy as np
 import pinocchio as pin
 
 from thermal_robot.arrays import Array
-from thermal_robot.kinematics.lanes import Chained, Weighted, arm_of
+from thermal_robot.kinematics.lanes import arm_of
 from thermal_robot.kinematics.model import FIXED, REVOLUTE, Chain
+
+if TYPE_CHECKING:
+    from thermal_robot.robot import Robot
 
 _ALONG = {
     (True, 0): pin.JointModelRX,
@@ -43,7 +47,7 @@ class _Own:
         for k, place in enumerate(places):
             here = here * place
             if k in joint_of or (placed and k in segments):
-                joint = self.model.addJoint(joint, _joint(chain, k), here, str(k))
+                joint = self.model.addJoint(joint, joint_model(chain, k), here, str(k))
                 here = pin.SE3.Identity()
             if k in joint_of:
                 body = pin.Inertia(float(chain.masses[joint_of[k]]), chain.mass_centres[joint_of[k]], np.zeros((3, 3)))
@@ -100,7 +104,8 @@ def _own(chain: Chain, placed: bool = False) -> _Own:
     return found
 
 
-def _joint(chain: Chain, k: int) -> pin.JointModel:
+def joint_model(chain: Chain, k: int) -> pin.JointModel:
+    """Return Pinocchio's joint of one coordinate for an element; a fixed one slides along x."""
     axis = chain.axes[k] if chain.kinds[k] != FIXED else np.array([1.0, 0.0, 0.0])
     turns = chain.kinds[k] == REVOLUTE
     w = int(np.argmax(axis))
@@ -109,7 +114,7 @@ def _joint(chain: Chain, k: int) -> pin.JointModel:
     return pin.JointModelRevoluteUnaligned(axis) if turns else pin.JointModelPrismaticUnaligned(axis)
 
 
-def poses(robot: Chained, q: Array, out: Array) -> None:
+def poses(robot: Robot, q: Array, out: Array) -> None:
     """Write the poses of the tool, (N, 4, 4)."""
     own = _own(robot.chain)
     model, data, tool = own.model, own.data, own.tool
@@ -118,7 +123,7 @@ def poses(robot: Chained, q: Array, out: Array) -> None:
         out[i] = pin.updateFramePlacement(model, data, tool).homogeneous
 
 
-def jacobians(robot: Chained, q: Array, out: Array, point: Array | None) -> None:
+def jacobians(robot: Robot, q: Array, out: Array, point: Array | None) -> None:
     """Write the Jacobians at a point of the tool, (N, 6, n)."""
     own = _own(robot.chain)
     model, data, plain = own.model, own.data, own.plain
@@ -130,7 +135,7 @@ def jacobians(robot: Chained, q: Array, out: Array, point: Array | None) -> None
         out[i] = found if plain else found @ own.coupling.matrix
 
 
-def placements(robot: Chained, q: Array, out: Array, point: Array | None) -> None:
+def placements(robot: Robot, q: Array, out: Array, point: Array | None) -> None:
     """Write the sensitivities of a point of the tool to every placement, (N, 6, S, 6)."""
     own = _own(robot.chain, placed=True)
     model, data, shape = own.model, own.data, out.shape[1:]
@@ -140,7 +145,7 @@ def placements(robot: Chained, q: Array, out: Array, point: Array | None) -> Non
         out[i] = found.reshape(shape)
 
 
-def gravity(robot: Weighted, q: Array, out: Array, com: Array, mass: Array) -> None:
+def gravity(robot: Robot, q: Array, out: Array, com: Array, mass: Array) -> None:
     """Write the torques, (N, n), that hold the arm and a payload: its mass, () or (N,), at ``com`` in the tool."""
     own = _own(robot.chain)
     model, data = own.model, own.data
@@ -158,7 +163,7 @@ def gravity(robot: Weighted, q: Array, out: Array, com: Array, mass: Array) -> N
         out[:, 0] = 0.0
 
 
-def _turning_about(own: _Own, robot: Weighted) -> bool:
+def _turning_about(own: _Own, robot: Robot) -> bool:
     """Whether the first joint turns about gravity: it carries nothing, which Pinocchio tells to rounding only."""
     chain = robot.chain
     first = int(chain.movable[0])
