@@ -1,11 +1,7 @@
-"""The four channels: the displaced robot against its linear response, by central differences; links anywhere."""
-
-import io
+"""The four channels: the displaced robot against its linear response, by central differences."""
 
 import numpy as np
-import pinocchio as pin
 import pytest
-import yourdfpy
 
 from thermal_robot import kinematics as kin
 
@@ -102,33 +98,3 @@ def test_the_stretched_arm(rv_m2):
     pose = kin.tool_poses(rv_m2, np.zeros(5))[0]
     np.testing.assert_allclose(pose[:3, 3], [0.0, 0.12 + 0.25 + 0.20 + 0.15, 0.40], atol=1e-15)
     np.testing.assert_allclose(pose[:3, :3], np.eye(3), atol=1e-15)
-
-
-def test_links_are_where_pinocchio_has_them_in_the_whole_robot(rv_m2, configurations):
-    model = pin.buildModelFromXML(rv_m2.urdf)
-    data, q = model.createData(), configurations(rv_m2, ROWS)
-    for row, configuration in zip(kin.link_poses(rv_m2, q), q, strict=True):
-        pin.framesForwardKinematics(model, data, configuration)
-        expected = [data.oMf[model.getFrameId(link)].homogeneous for link in rv_m2.urdf_links]
-        np.testing.assert_allclose(row, expected, atol=1e-9)
-
-
-def test_links_of_the_chain_are_where_the_batch_kinematics_have_them(arm, configurations):
-    q = configurations(arm, 5)
-    found = dict(zip(arm.urdf_links, np.moveaxis(kin.link_poses(arm, q), 1, 0), strict=True))
-    np.testing.assert_allclose(found[arm.tool_frame], kin.tool_poses(arm, q), atol=1e-9)
-    np.testing.assert_allclose(found[arm.root_frame], np.broadcast_to(np.eye(4), (5, 4, 4)), atol=1e-12)
-    frames = kin.chain_frames(arm, q)
-    for k, link in enumerate(arm.chain.parent_links):
-        placed = found[link][:, :3, :3] @ arm.chain.translations[k] + found[link][:, :3, 3]
-        np.testing.assert_allclose(placed, frames.positions[:, k], atol=1e-9)
-
-
-def test_a_branch_beside_the_chain_stands_where_it_is_held(awkward, awkward_urdf):
-    whole = yourdfpy.URDF.load(io.StringIO(awkward_urdf), load_meshes=False, build_scene_graph=True)
-    q = 0.5 * (np.maximum(awkward.lower, -1.0) + np.minimum(awkward.upper, 1.0))
-    q[awkward.joint_names.index("slide")] = 0.0  # yourdfpy takes an axis for a unit vector, which this one is not
-    # the lift below the root frame does not matter here; the branch may turn from −0.9 to −0.3 only: nearest to zero
-    whole.update_cfg({**dict(zip(awkward.joint_names, q, strict=True)), "lift": 0.2, "branch_joint": -0.3})
-    for link, pose in zip(awkward.urdf_links, kin.link_poses(awkward, q)[0], strict=True):
-        np.testing.assert_allclose(pose, whole.get_transform(link, awkward.root_frame), atol=1e-9, err_msg=link)

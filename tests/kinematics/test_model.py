@@ -10,7 +10,7 @@ from coupled import COUPLED, PARALLELOGRAM, joint, link, urdf
 
 from thermal_robot import kinematics as kin
 from thermal_robot.errors import RobotError
-from thermal_robot.kinematics.augmented import to_pinocchio
+from thermal_robot.kinematics.links import to_pinocchio
 from thermal_robot.kinematics.model import (
     FIXED,
     PRISMATIC,

@@ -10,10 +10,10 @@ from arms import MOST, arms, urdfs
 from fuzz import checks, corpus, harmless
 from hypothesis import find, given
 from hypothesis import strategies as st
-from kinematics import test_augmented as augmented
 from kinematics import test_engines as engines
 from kinematics import test_frames as frames
 from kinematics import test_gravity as gravity
+from kinematics import test_links as links
 from kinematics import test_model as model
 
 from thermal_robot.campaign import Units, campaign_from_table, read_campaign
@@ -23,10 +23,10 @@ LAWS = (
     engines.test_all_is_pinocchios,
     engines.test_frames_are_pinocchios_displaced_or_not,
     frames.test_joint_and_segment_channels_are_jacobian_and_placement_sensitivity,
-    augmented.test_pinocchios_jacobian_is_the_placement_sensitivity_along_each_segment,
-    augmented.test_at_zero_elongation_it_is_the_same_robot,
-    augmented.test_elongated_it_is_the_elongated_robot,
-    augmented.test_jacobian_is_the_finite_difference,
+    links.test_pinocchios_jacobian_is_the_placement_sensitivity_along_each_segment,
+    links.test_at_zero_elongation_it_is_the_same_robot,
+    links.test_elongated_it_is_the_elongated_robot,
+    links.test_jacobian_is_the_finite_difference,
     gravity.test_torque_is_the_gradient_of_the_potential_energy,
     gravity.test_the_moment_on_a_segment_holds_its_joint_and_those_that_mimic_it,
     gravity.test_what_a_segment_carries_is_what_pinocchio_says,

@@ -1,6 +1,5 @@
 """Poses, Jacobians, placement sensitivities and gravity torques in batches; the one room with Pinocchio."""
 
-from thermal_robot.kinematics.augmented import AugmentedModel, augmented_model, elongation_jacobian, growing, link_poses
 from thermal_robot.kinematics.frames import (
     ChainFrames,
     Displacement,
@@ -20,14 +19,13 @@ from thermal_robot.kinematics.lie import (
     rotation_to_quaternion,
     rotation_to_rpy,
 )
+from thermal_robot.kinematics.links import elongation_jacobian, growing, link_poses
 
 __all__ = [
-    "AugmentedModel",
     "ChainFrames",
     "Displacement",
     "Reached",
     "align",
-    "augmented_model",
     "chain_frames",
     "elongation_jacobian",
     "exp3",

@@ -4,17 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import numpy as np
 
 from thermal_robot.arrays import Array
 from thermal_robot.compiling import in_pieces, loads, rows_at_once
 from thermal_robot.kinematics import settings
-from thermal_robot.kinematics.lanes import arm_of, rows_last, scratch
-
-if TYPE_CHECKING:
-    from thermal_robot.robot import Robot
+from thermal_robot.kinematics.lanes import Chained, arm_of, rows_last, scratch
 
 
 def installed() -> bool:
@@ -22,7 +19,7 @@ def installed() -> bool:
     return loads("thermal_robot.kinematics.kernels")
 
 
-def run(what: str, robot: Robot, q: Array, out: Array, point: Array | None = None, mass: Array | None = None) -> None:
+def run(what: str, robot: Chained, q: Array, out: Array, point: Array | None = None, mass: Array | None = None) -> None:
     """Let a kernel write the rows of ``out``; the point (3,) and the mass of a payload are one for all rows."""
     from thermal_robot.kinematics import kernels
 

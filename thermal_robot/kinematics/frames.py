@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,11 +10,8 @@ from numpy.typing import ArrayLike
 from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics import compiled, lanes, settings, thin
-from thermal_robot.kinematics.lanes import BASE, TOOL, ChainFrames, Moved, chunks, result, walk
+from thermal_robot.kinematics.lanes import BASE, TOOL, Chained, ChainFrames, Moved, chunks, result, walk
 from thermal_robot.kinematics.lie import exp6
-
-if TYPE_CHECKING:
-    from thermal_robot.robot import Robot
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,7 +43,7 @@ class Displacement:
 
 def compute(
     what: str,
-    robot: Robot,
+    robot: Chained,
     q: Array,
     out: Array,
     point: Array | None = None,
@@ -71,7 +67,7 @@ def compute(
     return out
 
 
-def _ready(robot: Robot, displacement: Displacement | None, rows: int) -> Moved:
+def _ready(robot: Chained, displacement: Displacement | None, rows: int) -> Moved:
     """Make a displacement ready for that many rows; what is displaced by nothing is left out."""
     if displacement is None:
         return lanes.NOWHERE
@@ -104,7 +100,7 @@ def _motions(twists: dict[int, Array]) -> dict[int, Array]:
     return motions
 
 
-def chain_frames(robot: Robot, q: ArrayLike, displacement: Displacement | None = None) -> ChainFrames:
+def chain_frames(robot: Chained, q: ArrayLike, displacement: Displacement | None = None) -> ChainFrames:
     """Frames of every chain element and of the tool.
 
     Parameters
@@ -132,7 +128,7 @@ def chain_frames(robot: Robot, q: ArrayLike, displacement: Displacement | None =
 
 
 def tool_poses(
-    robot: Robot, q: ArrayLike, displacement: Displacement | None = None, *, out: Array | None = None
+    robot: Chained, q: ArrayLike, displacement: Displacement | None = None, *, out: Array | None = None
 ) -> Array:
     """Pose of the tool frame in the root frame.
 
@@ -161,7 +157,7 @@ def tool_poses(
     return out
 
 
-def as_rows(robot: Robot, q: ArrayLike) -> Array:
+def as_rows(robot: Chained, q: ArrayLike) -> Array:
     """Return the configurations as an (N, n) array of floats."""
     rows = np.asarray(q, dtype=float)
     if rows.ndim < 2:
@@ -176,7 +172,7 @@ def as_rows(robot: Robot, q: ArrayLike) -> Array:
 
 
 def frame_jacobians(
-    robot: Robot,
+    robot: Chained,
     q: ArrayLike,
     *,
     frames: ChainFrames | None = None,
@@ -217,7 +213,7 @@ def frame_jacobians(
 
 
 def placement_sensitivities(
-    robot: Robot,
+    robot: Chained,
     q: ArrayLike,
     *,
     frames: ChainFrames | None = None,

@@ -11,7 +11,7 @@ import math
 import threading
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from typing import TYPE_CHECKING, NamedTuple
+from typing import Any, NamedTuple, Protocol
 from weakref import WeakKeyDictionary
 
 import numpy as np
@@ -22,9 +22,6 @@ from thermal_robot.errors import RobotError
 from thermal_robot.kinematics import settings
 from thermal_robot.kinematics.lie import sines_and_cosines
 from thermal_robot.kinematics.model import FIXED, PRISMATIC, REVOLUTE, Chain
-
-if TYPE_CHECKING:
-    from thermal_robot.robot import Robot
 
 _FRAME = 12 * 8
 """Bytes of one frame of one configuration."""
@@ -75,6 +72,21 @@ def result(out: Array | None, rows: int, *shape: int) -> Array:
     if not out.flags.writeable:
         raise RobotError("out must not be written to: give an array that may be, or none")
     return out
+
+
+class Chained(Protocol):
+    """What the engines ask of a robot: the attributes of these names of :class:`~thermal_robot.Robot`."""
+
+    @property
+    def name(self) -> str: ...  # noqa: D102
+    @property
+    def n(self) -> int: ...  # noqa: D102
+    @property
+    def segments(self) -> Sequence[Any]: ...  # noqa: D102
+    @property
+    def chain(self) -> Chain: ...  # noqa: D102
+    @property
+    def gravity(self) -> Array: ...  # noqa: D102
 
 
 class ChainFrames(NamedTuple):
@@ -296,7 +308,7 @@ def written(out: Array, part: slice) -> Iterator[Array]:
 
 
 def visit(
-    robot: Robot, q: Array, out: Array, given: ChainFrames | None, do: Callable[[ChainFrames, slice, Array], None]
+    robot: Chained, q: Array, out: Array, given: ChainFrames | None, do: Callable[[ChainFrames, slice, Array], None]
 ) -> None:
     """Call a function with the frames of one chunk of configurations after another, and where to write its results.
 
@@ -333,7 +345,7 @@ def cross(a: Array, b: Array, out: Array, term: Array) -> None:
         out[i] -= term
 
 
-def poses(robot: Robot, q: Array, out: Array, moved: Moved = NOWHERE) -> None:
+def poses(robot: Chained, q: Array, out: Array, moved: Moved = NOWHERE) -> None:
     """Write the poses of the tool, (N, 4, 4), displaced or not."""
     elements = len(robot.chain.names)
     for part in chunks(len(q), 4):
@@ -344,7 +356,7 @@ def poses(robot: Robot, q: Array, out: Array, moved: Moved = NOWHERE) -> None:
             walk(robot.chain, q, moved, part, frames, frames[-1])
 
 
-def jacobians(robot: Robot, q: Array, out: Array, point: Array | None, given: ChainFrames | None = None) -> None:
+def jacobians(robot: Chained, q: Array, out: Array, point: Array | None, given: ChainFrames | None = None) -> None:
     """Write the Jacobians at a point of the tool, (N, 6, n)."""
     chain, plain = robot.chain, arm_of(robot.chain).plain
 
@@ -366,7 +378,7 @@ def jacobians(robot: Robot, q: Array, out: Array, point: Array | None, given: Ch
     visit(robot, q, out, given, write)
 
 
-def placements(robot: Robot, q: Array, out: Array, point: Array | None, given: ChainFrames | None = None) -> None:
+def placements(robot: Chained, q: Array, out: Array, point: Array | None, given: ChainFrames | None = None) -> None:
     """Write the sensitivities of a point of the tool to every placement, (N, 6, S, 6)."""
 
     def write(frames: ChainFrames, part: slice, out: Array) -> None:
@@ -383,7 +395,7 @@ def placements(robot: Robot, q: Array, out: Array, point: Array | None, given: C
     visit(robot, q, out, given, write)
 
 
-def gravity(robot: Robot, q: Array, out: Array, com: Array, mass: Array, given: ChainFrames | None = None) -> None:
+def gravity(robot: Chained, q: Array, out: Array, com: Array, mass: Array, given: ChainFrames | None = None) -> None:
     """Write the torques, (N, n), that hold the arm and a payload: its mass, () or (N,), at ``com`` in the tool."""
     chain, plain, pull = robot.chain, arm_of(robot.chain).plain, robot.gravity
 

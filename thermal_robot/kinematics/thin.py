@@ -4,18 +4,14 @@ from __future__ import annotations
 
 import threading
 from collections.abc import Iterable
-from typing import TYPE_CHECKING
 from weakref import WeakKeyDictionary
 
 import numpy as np
 import pinocchio as pin
 
 from thermal_robot.arrays import Array
-from thermal_robot.kinematics.lanes import arm_of
+from thermal_robot.kinematics.lanes import Chained, arm_of
 from thermal_robot.kinematics.model import FIXED, REVOLUTE, Chain
-
-if TYPE_CHECKING:
-    from thermal_robot.robot import Robot
 
 _ALONG = {
     (True, 0): pin.JointModelRX,
@@ -47,7 +43,7 @@ class _Own:
         for k, place in enumerate(places):
             here = here * place
             if k in joint_of or (placed and k in segments):
-                joint = self.model.addJoint(joint, joint_model(chain, k), here, str(k))
+                joint = self.model.addJoint(joint, _joint(chain, k), here, str(k))
                 here = pin.SE3.Identity()
             if k in joint_of:
                 body = pin.Inertia(float(chain.masses[joint_of[k]]), chain.mass_centres[joint_of[k]], np.zeros((3, 3)))
@@ -104,8 +100,7 @@ def _own(chain: Chain, placed: bool = False) -> _Own:
     return found
 
 
-def joint_model(chain: Chain, k: int) -> pin.JointModel:
-    """Return Pinocchio's joint of one coordinate for an element; a fixed one slides along x."""
+def _joint(chain: Chain, k: int) -> pin.JointModel:
     axis = chain.axes[k] if chain.kinds[k] != FIXED else np.array([1.0, 0.0, 0.0])
     turns = chain.kinds[k] == REVOLUTE
     w = int(np.argmax(axis))
@@ -114,7 +109,7 @@ def joint_model(chain: Chain, k: int) -> pin.JointModel:
     return pin.JointModelRevoluteUnaligned(axis) if turns else pin.JointModelPrismaticUnaligned(axis)
 
 
-def poses(robot: Robot, q: Array, out: Array) -> None:
+def poses(robot: Chained, q: Array, out: Array) -> None:
     """Write the poses of the tool, (N, 4, 4)."""
     own = _own(robot.chain)
     model, data, tool = own.model, own.data, own.tool
@@ -123,7 +118,7 @@ def poses(robot: Robot, q: Array, out: Array) -> None:
         out[i] = pin.updateFramePlacement(model, data, tool).homogeneous
 
 
-def jacobians(robot: Robot, q: Array, out: Array, point: Array | None) -> None:
+def jacobians(robot: Chained, q: Array, out: Array, point: Array | None) -> None:
     """Write the Jacobians at a point of the tool, (N, 6, n)."""
     own = _own(robot.chain)
     model, data, plain = own.model, own.data, own.plain
@@ -135,7 +130,7 @@ def jacobians(robot: Robot, q: Array, out: Array, point: Array | None) -> None:
         out[i] = found if plain else found @ own.coupling.matrix
 
 
-def placements(robot: Robot, q: Array, out: Array, point: Array | None) -> None:
+def placements(robot: Chained, q: Array, out: Array, point: Array | None) -> None:
     """Write the sensitivities of a point of the tool to every placement, (N, 6, S, 6)."""
     own = _own(robot.chain, placed=True)
     model, data, shape = own.model, own.data, out.shape[1:]
@@ -145,7 +140,7 @@ def placements(robot: Robot, q: Array, out: Array, point: Array | None) -> None:
         out[i] = found.reshape(shape)
 
 
-def gravity(robot: Robot, q: Array, out: Array, com: Array, mass: Array) -> None:
+def gravity(robot: Chained, q: Array, out: Array, com: Array, mass: Array) -> None:
     """Write the torques, (N, n), that hold the arm and a payload: its mass, () or (N,), at ``com`` in the tool."""
     own = _own(robot.chain)
     model, data = own.model, own.data
@@ -163,7 +158,7 @@ def gravity(robot: Robot, q: Array, out: Array, com: Array, mass: Array) -> None
         out[:, 0] = 0.0
 
 
-def _turning_about(own: _Own, robot: Robot) -> bool:
+def _turning_about(own: _Own, robot: Chained) -> bool:
     """Whether the first joint turns about gravity: it carries nothing, which Pinocchio tells to rounding only."""
     chain = robot.chain
     first = int(chain.movable[0])

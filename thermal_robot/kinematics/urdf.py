@@ -186,7 +186,7 @@ class _Figures(NamedTuple):
 
     what: str
     expected: str
-    count: int = 1
+    many: int = 1
     most: float = _LARGEST
 
 
@@ -312,7 +312,7 @@ def _wrong(element: Element, kind: str) -> Iterator[str]:
         words = element.get(key).split()
         values = [float(word) for word in words if _NUMBER.fullmatch(word)]
         found[key] = values
-        sound = len(values) == len(words) == figures.count and all(abs(value) <= figures.most for value in values)
+        sound = len(values) == len(words) == figures.many and all(abs(value) <= figures.most for value in values)
         nothing = (name == "mass" and min(values, default=0.0) < 0.0) or (
             name == "axis" and kind in _MOVABLE and not any(values)
         )
