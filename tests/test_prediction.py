@@ -50,8 +50,8 @@ def test_noise_is_counted_where_it_is_asked_for(warm):
     spread = found.model.spread
     less, more = (found.model.prediction(fresh, noise=noise).std for noise in (False, True))
     np.testing.assert_allclose(more**2 - less**2, np.broadcast_to(spread.noise**2, less.shape), rtol=1e-9)
-    # 120 rows tell a deviation of three axes to 4 %; what neither frames nor effects tell is added
-    assert np.sqrt((spread.noise**2 + spread.beyond**2).mean()) == pytest.approx(NOISE, rel=0.15)
+    # what neither frames nor effects tell is added, and 120 rows tell that to a tenth of the noise
+    assert np.sqrt((spread.noise**2 + spread.beyond**2).mean()) == pytest.approx(NOISE, rel=0.19)
 
 
 def test_a_row_outside_what_was_measured_is_marked_and_less_sure(warm):

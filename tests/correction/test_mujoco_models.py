@@ -223,6 +223,8 @@ def test_what_cannot_be_used_is_told(rv_m2, arm, own, tmp_path, monkeypatch):
     (tmp_path / "own.xml").write_bytes(own.replace("keep", "ké").encode("latin-1"))
     with pytest.raises(CampaignError, match=r"own\.xml.*UTF-8"):
         calibrated_mjcf(displaced(arm, 5), tmp_path / "own.xml")
+    with pytest.raises(CampaignError, match="the MJCF: is no XML"):  # MuJoCo reads the first root alone
+        calibrated_mjcf(displaced(arm, 5), own + "<mujoco/>")
     campaign, text = Campaign("commands", rv_m2, np.zeros((2, 5))), mjcf_of_urdf(rv_m2.urdf)
     (tmp_path / "m.xml").write_text("<mujoco")
     jointed = "<mujoco><worldbody><body><joint/></body></worldbody></mujoco>"

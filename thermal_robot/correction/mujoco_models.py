@@ -20,7 +20,7 @@ from thermal_robot.correction.robot_files import Calibrated, calibrated_urdf, ta
 from thermal_robot.errors import CampaignError
 from thermal_robot.kinematics import quaternion_to_rotation, rotation_to_quaternion
 from thermal_robot.kinematics.model import PRISMATIC, mimics
-from thermal_robot.kinematics.urdf import text_of, tree
+from thermal_robot.kinematics.urdf import text_of, tree, unsound
 from thermal_robot.robot import Robot
 
 _NO_MASS = {"boundmass": 1e-9, "boundinertia": 1e-12, "balanceinertia": True, "fusestatic": False}
@@ -203,8 +203,11 @@ class _Patched:
         base = known(model, "body", robot.robot.root_frame)
         try:
             text = path.read_text(encoding="utf-8") if path else str(mjcf)
+            problem = unsound(text)
         except UnicodeDecodeError as error:
-            raise CampaignError(name, "is no XML in UTF-8", found=str(error)) from None
+            problem = str(error)
+        if problem:
+            raise CampaignError(name, "is no XML in UTF-8", found=problem)
         return cls(robot, name, text, tree(text), model, data, np.eye(4) if base is None else pose_of(data.body(base)))
 
     def place(self) -> None:

@@ -60,25 +60,35 @@ def text_of(root: Element, before: str, notes: Sequence[str] = ()) -> str:
     return "\n".join([*declared, *(etree.tostring(p, encoding="unicode", with_tail=False) for p in parts), ""])
 
 
+def unsound(text: str) -> str:
+    """Say what is not XML in a text, in expat's words, but for what :func:`tree` lets pass; else nothing."""
+    try:
+        expat.ParserCreate("utf-8").Parse(_seen(text).encode(errors="replace"), True)
+    except expat.ExpatError as error:
+        return str(error)
+    return ""
+
+
+def _seen(text: str) -> str:
+    """Blank comments, with all else in its place: urdfdom takes ``--`` in a comment, XML does not."""
+    return _HIDDEN.sub(lambda span: re.sub(r"[^\n]", " ", span[0]), text)
+
+
 @lru_cache(maxsize=1)  # a robot is read, checked and cut out of the same text
 def read(urdf: str, source: str) -> Element:
     """Parse a URDF that nobody has read, without its comments; the tree is shared and must not be changed.
 
     Refused, by the name ``source``, is what is empty, no XML, another kind of file, or deeper or wider than any robot.
     """
-    # comments are blanked, with all else in its place: urdfdom takes ``--`` in a comment, XML does not
-    seen = _HIDDEN.sub(lambda span: re.sub(r"[^\n]", " ", span[0]), urdf)
+    seen, root, problem = _seen(urdf), None, ""
     if not seen.strip():
         raise RobotError(f"{source} is empty", name=source)
-    root = None
     with contextlib.suppress(etree.XMLSyntaxError):  # whose words are not expat's
         root = tree(seen)
-    problem = "" if root is None else _foreign(root)
-    if not problem:
-        try:
-            expat.ParserCreate("utf-8").Parse(seen.encode(errors="replace"), True)
-        except expat.ExpatError as error:
-            problem = f"is not XML: {error}"
+    if root is not None:
+        problem = _foreign(root)
+    if not problem and (reason := unsound(urdf)):
+        problem = f"is not XML: {reason}"
     if problem:
         raise RobotError(f"{source} {problem}", name=source)
     return root
