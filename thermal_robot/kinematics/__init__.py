@@ -1,7 +1,6 @@
 """Poses, Jacobians, placement sensitivities and gravity torques in batches; the one room with Pinocchio."""
 
 from thermal_robot.kinematics.frames import (
-    ChainFrames,
     Displacement,
     chain_frames,
     frame_jacobians,
@@ -10,6 +9,7 @@ from thermal_robot.kinematics.frames import (
 )
 from thermal_robot.kinematics.gravity import gravity_torques, segment_loads, static_regressor
 from thermal_robot.kinematics.inverse import Reached, inverse_kinematics, nearest_postures
+from thermal_robot.kinematics.lanes import ChainFrames
 from thermal_robot.kinematics.lie import (
     align,
     exp3,

@@ -60,11 +60,15 @@ def compute(
         getattr(lanes, what)(robot, q, out, *arguments, frames)
     elif len(q) <= settings.FEW and len(robot.chain.placed) <= settings.MOST_PLACEMENTS:
         getattr(thin, what)(robot, q, out, *arguments)
-    elif len(q) >= settings.MANY and np.ndim(point) < 2 and not np.ndim(mass) and compiled.installed():
+    elif len(q) >= settings.MANY and _one_for_all(point, mass) and compiled.installed():
         compiled.run(what, robot, q, out, *arguments)
     else:
         getattr(lanes, what)(robot, q, out, *arguments)
     return out
+
+
+def _one_for_all(point: Array | None, mass: Array | None) -> bool:
+    return (point is None or point.ndim == 1) and (mass is None or mass.ndim == 0)
 
 
 def _ready(robot: Chained, displacement: Displacement | None, rows: int) -> Moved:

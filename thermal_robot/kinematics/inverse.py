@@ -21,7 +21,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
-from thermal_robot.kinematics.frames import ChainFrames, Displacement, as_rows, chain_frames, frame_jacobians
+from thermal_robot.kinematics.frames import Displacement, as_rows, chain_frames, frame_jacobians
+from thermal_robot.kinematics.lanes import ChainFrames
 from thermal_robot.kinematics.lie import log3
 
 if TYPE_CHECKING:

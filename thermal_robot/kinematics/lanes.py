@@ -242,7 +242,8 @@ def walk(chain: Chain, q: Array, moved: Moved, part: slice, frames: Array | Sequ
         elif kind != FIXED:
             if kind == TURNS_ALIGNED:
                 frame = np.matmul(arm.aligned[k].T, frame, out=scratch("aligned", *frame.shape))
-            _turn(frame, *arm.turns[k].tolist(), sines[j], cosines[j], free)
+            a, b = arm.turns[k].tolist()
+            _turn(frame, a, b, sines[j], cosines[j], free)
     if here is not None and arm.kinds[-1] == TURNS_ALIGNED:
         np.matmul(arm.back.T, here, out=tool)
     elif tool is not here:

@@ -10,7 +10,8 @@ from numpy.typing import ArrayLike
 
 from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
-from thermal_robot.kinematics.frames import ChainFrames, as_rows, chain_frames
+from thermal_robot.kinematics.frames import as_rows, chain_frames
+from thermal_robot.kinematics.lanes import ChainFrames
 
 if TYPE_CHECKING:
     from thermal_robot.robot import Robot
