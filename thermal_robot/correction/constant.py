@@ -254,7 +254,7 @@ def determined(
 
 
 def _known(state: Array, covariance: Array, k: int) -> tuple[Array, Array]:
-    """Return mean (K,) and covariance (K, K) once one parameter is known to be zero."""
+    """Conditional mean (K,) and covariance (K, K) of a normal distribution, given that one parameter is zero."""
     variance, along = covariance[k, k], covariance[:, k]
     share = along / variance if variance > 0.0 else np.zeros(len(along))
     mean, rest = state - share * state[k], covariance - np.outer(share, along)

@@ -435,13 +435,13 @@ class CorrectedModel:
         """Return samples with what the model reads, and nothing else that a table may hold."""
         if not isinstance(samples, Campaign):
             samples = self.samples(samples)
-        samples = read_alike(samples, self.robot, self.settings.turned)
-        self._require_needed(samples)
-        read = {name: values for name, values in samples.covariates.items() if name in self.needs}
-        if self.last_order is not None and self.counts_anew(samples):
+        rows: Campaign = read_alike(samples, self.robot, self.settings.turned)
+        self._require_needed(rows)
+        read = {name: values for name, values in rows.covariates.items() if name in self.needs}
+        if self.last_order is not None and self.counts_anew(rows):
             # such an order does not say when a sample would be measured: what settles is taken as settled
-            read["order"] = np.full(samples.samples, self.last_order[1])
-        return replace(samples, covariates=read)
+            read["order"] = np.full(rows.samples, self.last_order[1])
+        return replace(rows, covariates=read)
 
     def _require_needed(self, samples: Campaign) -> None:
         """Refuse samples that lack a column, or a cell of it; the error names the column, and the row of the cell."""

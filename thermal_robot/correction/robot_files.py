@@ -412,7 +412,7 @@ def _parameters(robot: Calibrated, like: Array | None = None) -> tuple[Array, Ar
 
 
 def link(theta: float, d: float, a: float, alpha: float, beta: float) -> Array:
-    """(4, 4) motion from one axis to the next: Rz(θ) Tz(d) Tx(a) Rx(α) Ry(β)."""
+    """Denavit-Hartenberg-Hayati transform (4, 4) from one axis to the next: Rz(θ) Tz(d) Tx(a) Rx(α) Ry(β)."""
     pose, turned = np.eye(4), _turned(2, theta)
     pose[:3, 3] = turned @ np.array([a, 0.0, d])
     pose[:3, :3] = turned @ _turned(0, alpha) @ _turned(1, beta)

@@ -105,7 +105,7 @@ def _motions(twists: dict[int, Array]) -> dict[int, Array]:
 
 
 def chain_frames(robot: Chained, q: ArrayLike, displacement: Displacement | None = None) -> ChainFrames:
-    """Frames of every chain element and of the tool.
+    """Forward kinematics: frames of every chain element and of the tool.
 
     Parameters
     ----------
@@ -134,7 +134,7 @@ def chain_frames(robot: Chained, q: ArrayLike, displacement: Displacement | None
 def tool_poses(
     robot: Chained, q: ArrayLike, displacement: Displacement | None = None, *, out: Array | None = None
 ) -> Array:
-    """Pose of the tool frame in the root frame.
+    """Forward kinematics: pose of the tool frame in the root frame.
 
     Parameters
     ----------
@@ -224,7 +224,7 @@ def placement_sensitivities(
     point: ArrayLike | None = None,
     out: Array | None = None,
 ) -> Array:
-    """Twist of the tool frame, in root axes at the point, for a unit twist of each segment's placement.
+    """Kinematic regressor: twist of the tool, in root axes at the point, for a unit twist of each segment's placement.
 
     The placement is perturbed on its right, in its own frame: P exp(ξ). With displaced ``frames`` it is the
     displaced placement that is perturbed further. The columns of translation hold the virtual prismatic

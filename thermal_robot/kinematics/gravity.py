@@ -28,7 +28,7 @@ def gravity_torques(
     frames: ChainFrames | None = None,
     out: Array | None = None,
 ) -> Array:
-    """Torque or force of each joint that holds the arm and its payload still.
+    """Generalized gravity: torque or force of each joint that holds the arm and its payload still.
 
     It is the gradient of the potential energy by the joint positions: ``pinocchio.computeGeneralizedGravity``
     with the payload as a point mass. A joint that others mimic holds them, too.
@@ -71,7 +71,7 @@ def segment_loads(
     payload_com: ArrayLike = _AT_TOOL,
     frames: ChainFrames | None = None,
 ) -> Array:
-    """Wrench that gravity puts on the far end of each segment: the weight of everything beyond it.
+    """Gravity wrench on the far end of each segment: the weight of everything beyond it.
 
     Parameters
     ----------
@@ -116,7 +116,7 @@ def segment_loads(
 
 
 def static_regressor(robot: Robot, q: ArrayLike, *, frames: ChainFrames | None = None) -> Array:
-    """Return what a kilogram, and a first moment of a kilogram-metre, in each body asks of each joint.
+    """Regressor of statics: what a kilogram, and a first moment of a kilogram-metre, in each body asks of each joint.
 
     Holding torques are linear in the masses and first moments of the bodies (Pinocchio's ``computeStaticRegressor``):
     τ_j = Σ_b Y_jb · (m_b, m_b c_b).

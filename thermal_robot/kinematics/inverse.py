@@ -132,7 +132,7 @@ def inverse_kinematics(
 def nearest_postures(
     robot: Robot, poses: ArrayLike, *, tool: ArrayLike | None = None, near: ArrayLike | None = None
 ) -> Reached:
-    """Find joint positions that bring the tool to poses, from anywhere: of the postures that are found the nearest.
+    """Multi-start inverse kinematics: of the postures found that bring the tool to poses the nearest.
 
     Parameters
     ----------

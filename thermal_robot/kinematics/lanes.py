@@ -217,7 +217,7 @@ def _about(axis: Array) -> tuple[int, tuple[int, int], Array]:
 
 
 def walk(chain: Chain, q: Array, moved: Moved, part: slice, frames: Array | Sequence[Array], tool: Array) -> None:
-    """Write the frames of a chunk of configurations.
+    """Forward kinematics of a chunk of configurations: write the frames of all elements and of the tool.
 
     Of the N rows of ``q`` the chunk ``part`` has C. ``frames`` are K arrays (3, 4, C) to write to: the frame after the
     placement of each element, before its motion; consecutive ones must not be the same. ``tool`` is (3, 4, C).
@@ -347,7 +347,7 @@ def cross(a: Array, b: Array, out: Array, term: Array) -> None:
 
 
 def poses(robot: Chained, q: Array, out: Array, moved: Moved = NOWHERE) -> None:
-    """Write the poses of the tool, (N, 4, 4), displaced or not."""
+    """Forward kinematics of the tool, (N, 4, 4), displaced or not."""
     elements = len(robot.chain.names)
     for part in chunks(len(q), 4):
         pair = scratch("frames", 2, 3, 4, part.stop - part.start)
@@ -358,7 +358,7 @@ def poses(robot: Chained, q: Array, out: Array, moved: Moved = NOWHERE) -> None:
 
 
 def jacobians(robot: Chained, q: Array, out: Array, point: Array | None, given: ChainFrames | None = None) -> None:
-    """Write the Jacobians at a point of the tool, (N, 6, n)."""
+    """Geometric Jacobian at a point of the tool, (N, 6, n)."""
     chain, plain = robot.chain, arm_of(robot.chain).plain
 
     def write(frames: ChainFrames, part: slice, out: Array) -> None:
@@ -380,7 +380,7 @@ def jacobians(robot: Chained, q: Array, out: Array, point: Array | None, given: 
 
 
 def placements(robot: Chained, q: Array, out: Array, point: Array | None, given: ChainFrames | None = None) -> None:
-    """Write the sensitivities of a point of the tool to every placement, (N, 6, S, 6)."""
+    """Kinematic regressor: sensitivities of a point of the tool to every placement, (N, 6, S, 6)."""
 
     def write(frames: ChainFrames, part: slice, out: Array) -> None:
         end, size = target(frames, point, part), out.shape[-1]
@@ -397,7 +397,7 @@ def placements(robot: Chained, q: Array, out: Array, point: Array | None, given:
 
 
 def gravity(robot: Chained, q: Array, out: Array, com: Array, mass: Array, given: ChainFrames | None = None) -> None:
-    """Write the torques, (N, n), that hold the arm and a payload: its mass, () or (N,), at ``com`` in the tool."""
+    """Generalized gravity, (N, n), of the arm and a payload: its mass, () or (N,), at ``com`` in the tool."""
     chain, plain, pull = robot.chain, arm_of(robot.chain).plain, robot.gravity
 
     def write(frames: ChainFrames, part: slice, out: Array) -> None:

@@ -23,7 +23,7 @@ def growing(robot: Robot) -> tuple[int, ...]:
 
 
 def elongation_jacobian(robot: Robot, q: ArrayLike, *, rows: int = 3, frames: ChainFrames | None = None) -> Array:
-    """Displacement of the tool, in root axes, for a unit elongation of each segment with a length (Eqs 6–11).
+    """Jacobian of the tool's place, in root axes, by the elongation of each segment with a length (Eqs 6–11).
 
     The columns are unit vectors: the directions of the segments. They are the same for every point of the tool, and
     an elongation turns nothing, so that the displacement is linear in the elongations, not only to first order.
@@ -61,7 +61,7 @@ def elongation_jacobian(robot: Robot, q: ArrayLike, *, rows: int = 3, frames: Ch
 
 
 def link_poses(robot: Robot, q: ArrayLike) -> Array:
-    """Pose of every link of the URDF in the root frame, by Pinocchio, one configuration after another.
+    """Forward kinematics of every link of the URDF in the root frame, by Pinocchio, row after row.
 
     Parameters
     ----------

@@ -110,7 +110,7 @@ def _joint(chain: Chain, k: int) -> pin.JointModel:
 
 
 def poses(robot: Chained, q: Array, out: Array) -> None:
-    """Write the poses of the tool, (N, 4, 4)."""
+    """Forward kinematics of the tool, (N, 4, 4)."""
     own = _own(robot.chain)
     model, data, tool = own.model, own.data, own.tool
     for i, row in enumerate(own.joints(q)):
@@ -119,7 +119,7 @@ def poses(robot: Chained, q: Array, out: Array) -> None:
 
 
 def jacobians(robot: Chained, q: Array, out: Array, point: Array | None) -> None:
-    """Write the Jacobians at a point of the tool, (N, 6, n)."""
+    """Geometric Jacobian at a point of the tool, (N, 6, n)."""
     own = _own(robot.chain)
     model, data, plain = own.model, own.data, own.plain
     frames = own.frames_at(point, len(q))
@@ -131,7 +131,7 @@ def jacobians(robot: Chained, q: Array, out: Array, point: Array | None) -> None
 
 
 def placements(robot: Chained, q: Array, out: Array, point: Array | None) -> None:
-    """Write the sensitivities of a point of the tool to every placement, (N, 6, S, 6)."""
+    """Kinematic regressor: sensitivities of a point of the tool to every placement, (N, 6, S, 6)."""
     own = _own(robot.chain, placed=True)
     model, data, shape = own.model, own.data, out.shape[1:]
     for i, (row, frame) in enumerate(zip(own.joints(q), own.frames_at(point, len(q)), strict=True)):
@@ -141,7 +141,7 @@ def placements(robot: Chained, q: Array, out: Array, point: Array | None) -> Non
 
 
 def gravity(robot: Chained, q: Array, out: Array, com: Array, mass: Array) -> None:
-    """Write the torques, (N, n), that hold the arm and a payload: its mass, () or (N,), at ``com`` in the tool."""
+    """Generalized gravity, (N, n), of the arm and a payload: its mass, () or (N,), at ``com`` in the tool."""
     own = _own(robot.chain)
     model, data = own.model, own.data
     if own.pull is not robot.gravity:
