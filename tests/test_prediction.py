@@ -84,6 +84,11 @@ def test_a_saved_model_is_as_sure(warm):
     whole = found.model.prediction(fresh, noise=True)
     np.testing.assert_allclose(again.std, whole.std, rtol=1e-9)
     assert again.outside == whole.outside
+    # and a command as the prediction at its joint positions
+    commands = found.model.corrected_commands(fresh.take([0, 1, 2]))
+    there = found.model.prediction(replace(fresh.take([0, 1, 2]), q=commands.q))
+    np.testing.assert_allclose(commands.std, there.std, rtol=1e-9)
+    assert commands.outside == there.outside
     # who takes effects out is told no deviation
     assert np.isnan(replace(found.model, effects=(), needs=()).prediction(fresh).std).all()
     assert np.isnan(replace(found.model, spread=None).prediction(fresh).std).all()

@@ -186,6 +186,7 @@ def test_poses_in_space_are_reached_by_the_real_target(source):
     for poses, told in (
         (away, "row 4: out of reach"),
         (2.0 * wanted, "no poses"),
+        ([[["a"]]], "no poses"),
         ([[0.1], [0.1, 0.2]], "no rows of numbers"),
     ):
         with pytest.raises(CampaignError, match=told):

@@ -182,6 +182,8 @@ def test_an_order_is_taken_at_its_word_unless_it_starts_again(rv_m2):
     np.testing.assert_array_equal(at(np.arange(20)), settled)
     assert np.abs(at(np.arange(20) + 50) - settled).max() > NOISE / 10  # said to be in the middle: taken so
     assert np.abs(at(np.zeros(20)) - settled).max() > NOISE
+    assert model.counts_anew(by_order(few, np.arange(20)))
+    assert not replace(model, last_order=None).counts_anew(by_order(few, np.arange(20)))
     again = CorrectedModel.from_dict(model.to_dict())
     assert again.last_order == model.last_order == (0.0, 119.0)
 
