@@ -74,7 +74,13 @@ def in_pieces(kernel: Callable[..., None], constants: tuple[Any, ...], rows: int
     cuts = [rows * piece // count for piece in range(count + 1)]
 
     def work(piece: int) -> None:
-        _called(kernel, *constants, cuts[piece], cuts[piece + 1], *out)
+        # a full disk stops numba when it has compiled a function and is to keep it; the next try goes on from there
+        for left in range(MOST_UNKEPT, -1, -1):
+            try:
+                return kernel(*constants, cuts[piece], cuts[piece + 1], *out)
+            except OSError:
+                if not left:
+                    raise
 
     if workers < 2:
         for piece in range(count):
@@ -97,13 +103,3 @@ def _pool(workers: int) -> ThreadPoolExecutor:
 
 if hasattr(os, "register_at_fork"):
     os.register_at_fork(after_in_child=_pool.cache_clear)  # threads are not forked
-
-
-def _called(kernel: Callable[..., None], *arguments: Any) -> None:
-    # A full disk stops numba when it has compiled a function and is to keep it; the next try goes on from there.
-    for _ in range(MOST_UNKEPT):
-        try:
-            return kernel(*arguments)
-        except OSError:
-            continue
-    kernel(*arguments)

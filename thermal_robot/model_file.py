@@ -144,15 +144,16 @@ def _spread(value: Any, path: str) -> Spread:
     more = {"wider": _covariance, "prior": listed(NOT_NEGATIVE), "between": three}
     more["levels"] = mapping(listed(text("a label")))
     held = record({**known, **more}, may_lack=tuple(more))(value, path)
-    if held.get("wider", held["covariance"]).shape != held["covariance"].shape:
+    rows = len(held["covariance"])
+    if len(held.get("wider", held["covariance"])) != rows:
         raise MisfitError(below(path, "wider"), value["wider"], "a matrix of the shape of covariance")
-    prior = np.array(held["prior"], dtype=float) if "prior" in held else None
-    if prior is not None and len(prior) > len(held["covariance"]):
+    if len(held.get("prior", ())) > rows:
         raise MisfitError(below(path, "prior"), value["prior"], "a deviation for each parameter of the effects")
-    beyond, noise = (np.array(held[name]) for name in ("beyond", "noise"))
-    between = np.array(held["between"]) if "between" in held else None
+    vectors = {
+        name: np.array(held[name], dtype=float) for name in ("beyond", "noise", "prior", "between") if name in held
+    }
     levels = {name: tuple(own) for name, own in held.get("levels", {}).items()}
-    return Spread(held["covariance"], beyond, noise, held["ranges"], held.get("wider"), prior, levels, between)
+    return Spread(**{**held, **vectors, "levels": levels})
 
 
 def _written_robot(robot: Robot) -> dict[str, Any]:

@@ -159,7 +159,7 @@ class Prediction(NamedTuple):
 
 
 def sensitivity(observations: Observations, effects: Sequence[Effect]) -> Array:
-    """(N, 3, K) derivative of the target's position by the unknown frames and the effects' parameters.
+    """Jacobian (N, 3, K) of the target's position by the unknown frames and the effects' parameters.
 
     Columns as :func:`~thermal_robot.inference.columns.frame_columns` orders them, those that turn the target left out,
     then each effect's parameters. In the axes of the measurement frame; m a unit of each.
@@ -179,7 +179,7 @@ def moves(names: Sequence[str]) -> NDArray[np.bool_]:
 
 
 def by_parameters(moved: Array, covariance: Array) -> Array:
-    """(N, 3) variance per axis that the covariance (K, K) of parameters makes, m²: diag(J C Jᵀ), J (N, 3, K)."""
+    """Propagated variance (N, 3) per axis of a covariance C (K, K) of parameters, m²: diag(J C Jᵀ), J (N, 3, K)."""
     found = np.empty(moved.shape[:2])
     for part in chunks(len(found)):
         found[part] = ((moved[part] @ covariance) * moved[part]).sum(axis=2)

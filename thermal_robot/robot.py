@@ -319,24 +319,14 @@ def _build(
     folder: Path | None = None,
 ) -> Robot:
     built = build_chain_model(urdf, tool_frame, root_frame, gravity, source)
-    chain = built.chain
+    chain, joints = built["chain"], built["joint_names"]
     return Robot(
-        name=built.model.name,
         urdf=urdf,
         tool_frame=tool_frame,
-        root_frame=built.root_frame,
-        gravity=built.gravity,
-        joint_names=built.joint_names,
-        joint_types=built.joint_types,
-        lower=built.lower,
-        upper=built.upper,
         has_masses=bool(np.any(chain.masses > 0.0)),
-        segments=tuple(_segment(chain, built.joint_names, int(k)) for k in chain.placed),
-        chain=chain,
-        model=built.model,
-        urdf_links=built.urdf_links,
-        urdf_joints=built.urdf_joints,
+        segments=tuple(_segment(chain, joints, int(k)) for k in chain.placed),
         folder=folder,
+        **built,
     )
 
 

@@ -86,25 +86,15 @@ def test_all_at_once_with_five_six_and_seven_joints(rv_m2):
         assert (found.direction.max() < 1e-8) == (robot.n >= 6)
 
 
-def test_without_an_effect_commands_stay(rv_m2):
+def test_commands_stay_where_nothing_moves_the_chain_and_a_zero_is_taken_off(rv_m2):
     samples = rows_of(rv_m2)
-    model = model_of(samples, CHAIN, scale=0.0)
-    np.testing.assert_array_equal(model.corrected_commands(samples).q, samples.q)
-
-
-def test_what_the_instrument_adds_moves_no_robot(rv_m2):
-    samples = rows_of(rv_m2)
-    model = model_of(samples, ["instrument_scale"])
-    assert model.effects[0][1].any()
-    np.testing.assert_array_equal(model.corrected_commands(samples).q, samples.q)
-
-
-def test_a_zero_is_taken_off_the_command_of_its_joint(rv_m2):
-    samples = rows_of(rv_m2)
-    model = model_of(samples, ["joint_offset"], seed=5)
-    _, values = model.effects[0]
-    found = model.corrected_commands(samples)
-    np.testing.assert_allclose(found.q, samples.q - values, rtol=0, atol=1e-9)
+    np.testing.assert_array_equal(model_of(samples, CHAIN, scale=0.0).corrected_commands(samples).q, samples.q)
+    # what the instrument adds moves no robot
+    scale, zeros = model_of(samples, ["instrument_scale"]), model_of(samples, ["joint_offset"], seed=5)
+    assert scale.effects[0][1].any()
+    np.testing.assert_array_equal(scale.corrected_commands(samples).q, samples.q)
+    found = zeros.corrected_commands(samples)
+    np.testing.assert_allclose(found.q, samples.q - zeros.effects[0][1], rtol=0, atol=1e-9)
 
 
 def test_conditions_and_directions_count(rv_m2):
@@ -140,9 +130,8 @@ def test_what_is_out_of_reach_is_an_error_with_its_row(rv_m2):
 
 def test_no_command_lies_beyond_a_limit(rv_m2):
     samples = rows_of(rv_m2, rows=6)
-    effect = model_of(samples, ["joint_offset"]).effects[0][0]
     model = model_of(samples, ["joint_offset"])
-    model = replace(model, effects=((effect, np.array([0.0, 1e-3, 0.0, 0.0, 0.0])),))
+    model = replace(model, effects=((model.effects[0][0], np.array([0.0, 1e-3, 0.0, 0.0, 0.0])),))
 
     def at(position):
         q = samples.q.copy()
@@ -155,12 +144,14 @@ def test_no_command_lies_beyond_a_limit(rv_m2):
         found = model.corrected_commands(at(position)).q
         assert (found <= rv_m2.upper).all()
         np.testing.assert_allclose(found[4, 1], position - 1e-3, atol=1e-9)
-    with pytest.raises(CampaignError, match=r"row 6, column 'joint_2': .*beyond its limit"):
-        model.corrected_commands(at(upper + 2e-3))
-    with pytest.raises(CampaignError, match=r"row 6, column 'joint_2': .*found 4 rad, expected.*1\.745"):
-        model.corrected_commands(at(4.0))
-    with pytest.raises(CampaignError, match=r"found 229.183 deg \(4 rad\), expected a position from"):
-        model.corrected_commands(replace(at(4.0), units=type(samples.units)("deg", "mm")))
+    degrees = replace(at(4.0), units=type(samples.units)("deg", "mm"))
+    for poses, told in (
+        (at(upper + 2e-3), r"row 6, column 'joint_2': .*beyond its limit"),
+        (at(4.0), r"row 6, column 'joint_2': .*found 4 rad, expected.*1\.745"),
+        (degrees, r"found 229.183 deg \(4 rad\), expected a position from"),
+    ):
+        with pytest.raises(CampaignError, match=told):
+            model.corrected_commands(poses)
     with pytest.raises(CampaignError, match=r"nor in 5 more rows.*arrays are in rad"):
         model.corrected_commands(np.degrees(samples.q), {name: 0.0 for name in samples.covariates})
 
@@ -186,18 +177,20 @@ def test_poses_in_space_are_reached_by_the_real_target(source):
     samples = rows_of(robot, rows=10)
     model = model_of(samples, ["joint_offset", "joint_compliance"], seed=8)
     wanted = tool_poses(robot, samples.q) @ model.frames.tool
-    told = {name: 0.0 for name in samples.covariates}
-    found = model.corrected_commands(wanted, told)
+    found = model.corrected_commands(wanted, {name: 0.0 for name in samples.covariates})
     there = replace(samples, covariates={name: np.zeros(10) for name in samples.covariates})
     reached = really(model, there, found.q)
     np.testing.assert_allclose(reached[:, :3, 3], wanted[:, :3, 3], rtol=0, atol=1e-9)
-    wanted[3, :3, 3] += 10.0
-    with pytest.raises(CampaignError, match="row 4: out of reach"):
-        model.corrected_commands(wanted, told)
-    with pytest.raises(CampaignError, match="no poses"):
-        model.corrected_commands(2.0 * wanted, told)
-    with pytest.raises(CampaignError, match="no rows of numbers"):
-        model.corrected_commands([[0.1], [0.1, 0.2]], told)
+    away = wanted.copy()
+    away[3, :3, 3] += 10.0
+    for poses, told in (
+        (away, "row 4: out of reach"),
+        (2.0 * wanted, "no poses"),
+        ([[["a"]]], "no poses"),
+        ([[0.1], [0.1, 0.2]], "no rows of numbers"),
+    ):
+        with pytest.raises(CampaignError, match=told):
+            model.corrected_commands(poses, there.covariates)
 
 
 ROBOTS = {"rv_m2": ("builtin:rv_m2", "tool0"), "ur10": ("example-robot-data:ur10", "tool0")}

@@ -1,4 +1,4 @@
-"""The four channels: the exactly displaced robot against its linear response, by central differences."""
+"""The four channels: the displaced robot against its linear response, by central differences."""
 
 import numpy as np
 import pytest
@@ -7,6 +7,7 @@ from thermal_robot import kinematics as kin
 
 STEP = 1e-5
 TOLERANCE = 2e-9  # STEP² times lengths of a metre or two, and rounding over STEP
+ROWS = 20
 
 
 def twist_between(before, after):
@@ -15,71 +16,52 @@ def twist_between(before, after):
     return np.concatenate([after[:, :3, 3] - before[:, :3, 3], turn], axis=1)
 
 
-def central_difference(robot, q, displace):
-    """Twist of the tool for a unit of what ``displace`` scales."""
-    below, above = (kin.tool_poses(robot, q, displace(step)) for step in (-STEP, STEP))
-    return twist_between(below, above) / (2 * STEP)
-
-
-@pytest.fixture
-def displaced(arm):
-    """Large errors everywhere but in the segments, to differentiate about."""
+def response(robot, q, **channel):
+    """Twist of the tool by a channel, each row of which has an error of one unit, about errors everywhere."""
+    ((name, units),) = channel.items()
     rng = np.random.default_rng(5)
-    return kin.Displacement(joint=rng.normal(0, 0.3, arm.n), base=rng.normal(0, 0.3, 6), tool=rng.normal(0, 0.3, 6))
+    # large errors but in the segments, which are differentiated about zero
+    about = {"joint": rng.normal(0, 0.3, robot.n), "segment": np.zeros((len(robot.segments), 6))}
+    about |= {"base": rng.normal(0, 0.3, 6), "tool": rng.normal(0, 0.3, 6)}
+    about = about if name in ("joint", "segment") else {name: np.zeros(6)}
+    for unit in units:
+        ends = (kin.Displacement(**{**about, name: about[name] + h * unit}) for h in (-STEP, STEP))
+        yield twist_between(*(kin.tool_poses(robot, q, moved) for moved in ends)) / (2 * STEP)
+    yield kin.chain_frames(robot, q, kin.Displacement(**about))
 
 
-def test_joint_channel_is_the_jacobian(arm, configurations, displaced):
-    q = configurations(arm, 20)
-    jacobians = kin.frame_jacobians(arm, q, frames=kin.chain_frames(arm, q, displaced))
-    for j, unit in enumerate(np.eye(arm.n)):
-        response = central_difference(
-            arm,
-            q,
-            lambda h, u=unit: kin.Displacement(joint=displaced.joint + h * u, base=displaced.base, tool=displaced.tool),
-        )
-        np.testing.assert_allclose(jacobians[:, :, j], response, rtol=0.0, atol=TOLERANCE)
+def test_joint_and_segment_channels_are_jacobian_and_placement_sensitivity(arm, configurations):
+    q, s = configurations(arm, ROWS), len(arm.segments)
+    *found, frames = response(arm, q, joint=np.eye(arm.n))
+    jacobians = kin.frame_jacobians(arm, q, frames=frames)
+    np.testing.assert_allclose(jacobians, np.stack(found, axis=-1), rtol=0.0, atol=TOLERANCE)
+    *found, frames = response(arm, q, segment=np.eye(s * 6).reshape(-1, s, 6))
+    sensitivities = kin.placement_sensitivities(arm, q, frames=frames).reshape(ROWS, 6, -1)
+    np.testing.assert_allclose(sensitivities, np.stack(found, axis=-1), rtol=0.0, atol=TOLERANCE)
 
 
-def test_segment_channel_is_the_placement_sensitivity(arm, configurations, displaced):
-    q = configurations(arm, 20)
-    sensitivities = kin.placement_sensitivities(arm, q, frames=kin.chain_frames(arm, q, displaced))
-    units = np.eye(len(arm.segments) * 6).reshape(-1, len(arm.segments), 6)
-    for column, unit in enumerate(units):
-        response = central_difference(
-            arm, q, lambda h, u=unit: kin.Displacement(displaced.joint, h * u, displaced.base, displaced.tool)
-        )
-        expected = sensitivities.reshape(len(q), 6, -1)[:, :, column]
-        np.testing.assert_allclose(expected, response, rtol=0.0, atol=TOLERANCE)
-
-
-def test_base_channel_moves_the_whole_robot(arm, configurations):
-    q = configurations(arm, 20)
-    position = kin.tool_poses(arm, q)[:, :3, 3]
-    for unit in np.eye(6):
-        response = central_difference(arm, q, lambda h, u=unit: kin.Displacement(base=h * u))
-        expected = np.concatenate([unit[:3] + np.cross(unit[3:], position), np.tile(unit[3:], (20, 1))], axis=1)
-        np.testing.assert_allclose(expected, response, rtol=0.0, atol=TOLERANCE)
-
-
-def test_tool_channel_turns_with_the_tool(arm, configurations):
-    q = configurations(arm, 20)
-    rotation = kin.tool_poses(arm, q)[:, :3, :3]
-    for unit in np.eye(6):
-        response = central_difference(arm, q, lambda h, u=unit: kin.Displacement(tool=h * u))
-        expected = np.concatenate([rotation @ unit[:3], rotation @ unit[3:]], axis=1)
-        np.testing.assert_allclose(expected, response, rtol=0.0, atol=TOLERANCE)
+def test_base_channel_moves_the_whole_robot_and_tool_channel_turns_with_the_tool(arm, configurations):
+    q = configurations(arm, ROWS)
+    poses = kin.tool_poses(arm, q)
+    rotation, position = poses[:, :3, :3], poses[:, :3, 3]
+    *base, _ = response(arm, q, base=np.eye(6))
+    *tool, _ = response(arm, q, tool=np.eye(6))
+    for unit, of_base, of_tool in zip(np.eye(6), base, tool, strict=True):
+        whole = np.concatenate([unit[:3] + np.cross(unit[3:], position), np.tile(unit[3:], (ROWS, 1))], axis=1)
+        np.testing.assert_allclose(of_base, whole, rtol=0.0, atol=TOLERANCE)
+        turned = np.concatenate([rotation @ unit[:3], rotation @ unit[3:]], axis=1)
+        np.testing.assert_allclose(of_tool, turned, rtol=0.0, atol=TOLERANCE)
 
 
 def test_what_the_sum_of_the_channels_leaves_out_is_of_second_order(arm, configurations):
-    q = configurations(arm, 20)
-    rng = np.random.default_rng(6)
+    q, rng = configurations(arm, ROWS), np.random.default_rng(6)
     joint, base, tool = rng.normal(size=arm.n), rng.normal(size=6), rng.normal(size=6)
     segment = rng.normal(size=(len(arm.segments), 6))
     nominal = kin.tool_poses(arm, q)
     rotation, position = nominal[:, :3, :3], nominal[:, :3, 3]
     linear = kin.frame_jacobians(arm, q) @ joint
     linear += np.einsum("nask,sk->na", kin.placement_sensitivities(arm, q), segment)
-    linear += np.concatenate([base[:3] + np.cross(base[3:], position), np.tile(base[3:], (20, 1))], axis=1)
+    linear += np.concatenate([base[:3] + np.cross(base[3:], position), np.tile(base[3:], (ROWS, 1))], axis=1)
     linear += np.concatenate([rotation @ tool[:3], rotation @ tool[3:]], axis=1)
 
     def left_out(size):
@@ -90,16 +72,29 @@ def test_what_the_sum_of_the_channels_leaves_out_is_of_second_order(arm, configu
 
 
 def test_elongation_lengthens_the_placement_and_turns_nothing(arm):
-    growing = [s for s, segment in enumerate(arm.segments) if segment.length > 0.0]
+    growing, q = [s for s, segment in enumerate(arm.segments) if segment.length > 0.0], np.zeros((1, arm.n))
     assert growing
+    before = kin.chain_frames(arm, q)
     for s in growing:
-        segment = arm.segments[s]
-        twists = np.zeros((len(arm.segments), 6))
+        segment, twists = arm.segments[s], np.zeros((len(arm.segments), 6))
         twists[s, :3] = 1e-3 * segment.direction
-        q = np.zeros((1, arm.n))
-        before, after = kin.chain_frames(arm, q), kin.chain_frames(arm, q, kin.Displacement(segment=twists))
+        after, k = kin.chain_frames(arm, q, kin.Displacement(segment=twists)), segment.index
         np.testing.assert_array_equal(after.rotations, before.rotations)
-        moved = after.positions[0, segment.index] - before.positions[0, segment.index]
-        k = segment.index
+        moved = after.positions[0, k] - before.positions[0, k]
         parent = before.rotations[0, k] @ arm.chain.rotations[k].T
         np.testing.assert_allclose(moved, 1e-3 * parent @ arm.chain.translations[k] / segment.length, atol=1e-15)
+
+
+def test_a_point_moves_as_the_tool_and_its_lever(arm, configurations):
+    q, point = configurations(arm, ROWS), np.array([0.05, -0.1, 0.2])
+    at_point, at_tool = (kin.frame_jacobians(arm, q, point=p) for p in (point, None))
+    lever = kin.tool_poses(arm, q)[:, :3, :3] @ point
+    moved = at_tool[:, :3] + np.cross(at_tool[:, 3:], lever[:, :, None], axis=1)
+    np.testing.assert_allclose(at_point[:, :3], moved, atol=1e-13)
+    np.testing.assert_allclose(at_point[:, 3:], at_tool[:, 3:], atol=1e-13)
+
+
+def test_the_stretched_arm(rv_m2):
+    pose = kin.tool_poses(rv_m2, np.zeros(5))[0]
+    np.testing.assert_allclose(pose[:3, 3], [0.0, 0.12 + 0.25 + 0.20 + 0.15, 0.40], atol=1e-15)
+    np.testing.assert_allclose(pose[:3, :3], np.eye(3), atol=1e-15)

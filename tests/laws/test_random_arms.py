@@ -5,44 +5,35 @@ import tempfile
 from pathlib import Path
 from random import Random
 
-import numpy as np
 import pytest
 from arms import MOST, arms, urdfs
 from fuzz import checks, corpus, harmless
 from hypothesis import find, given
 from hypothesis import strategies as st
-from kinematics import test_augmented as augmented
+from kinematics import test_engines as engines
 from kinematics import test_frames as frames
 from kinematics import test_gravity as gravity
-from kinematics import test_hanging as hanging
-from kinematics import test_jacobians as jacobians
+from kinematics import test_links as links
 from kinematics import test_model as model
 
 from thermal_robot.campaign import Units, campaign_from_table, read_campaign
-from thermal_robot.kinematics import Displacement
 from thermal_robot.robot import load_robot
 
-GROWS = augmented.test_segments_with_a_length_are_those_that_grow
 LAWS = (
-    jacobians.test_frames_are_pinocchios,
-    jacobians.test_jacobians_are_pinocchios,
-    jacobians.test_placement_sensitivities_are_pinocchios_regressor,
-    jacobians.test_gravity_torques_are_pinocchios,
-    frames.test_joint_channel_is_the_jacobian,
-    frames.test_segment_channel_is_the_placement_sensitivity,
-    augmented.test_pinocchios_jacobian_is_the_placement_sensitivity_along_each_segment,
-    GROWS,
-    augmented.test_at_zero_elongation_it_is_the_same_robot,
-    augmented.test_elongated_it_is_the_elongated_robot,
-    augmented.test_jacobian_is_the_finite_difference,
+    engines.test_all_is_pinocchios,
+    engines.test_frames_are_pinocchios_displaced_or_not,
+    frames.test_joint_and_segment_channels_are_jacobian_and_placement_sensitivity,
+    links.test_pinocchios_jacobian_is_the_placement_sensitivity_along_each_segment,
+    links.test_at_zero_elongation_it_is_the_same_robot,
+    links.test_elongated_it_is_the_elongated_robot,
+    links.test_jacobian_is_the_finite_difference,
     gravity.test_torque_is_the_gradient_of_the_potential_energy,
     gravity.test_the_moment_on_a_segment_holds_its_joint_and_those_that_mimic_it,
     gravity.test_what_a_segment_carries_is_what_pinocchio_says,
     gravity.test_the_static_regressor_gives_the_torques,
-    hanging.test_what_hangs_is_the_sum_over_the_tree_up_to_the_next_joint_of_the_chain,
     model.test_every_placement_is_a_rotation_and_every_axis_a_unit_vector,
     model.test_masses_and_their_centres_are_pinocchios,
-    model.test_all_names_of_the_urdf_are_there,
+    model.test_names_and_what_hangs_are_those_of_the_whole_tree,
     model.test_a_joints_unit_motion_is_how_it_moves,
 )
 """Each takes an arm, and draws configurations of it."""
@@ -54,9 +45,9 @@ def test_a_law_of_the_fixed_arms(law, configurations):
 
     @given(arm=arms())
     def holds(arm):
-        base, tool = np.random.default_rng(5).normal(0.0, 0.3, (2, 6))
-        displaced = Displacement(joint=np.linspace(-0.4, 0.4, arm.n), base=base, tool=tool)
-        known = {"arm": arm, "configurations": configurations, "point": (0.05, -0.1, 0.2), "displaced": displaced}
+        known = {"arm": arm, "configurations": configurations, "engine": None}
+        if "oracle" in asked:
+            known["oracle"] = engines.oracle_of(arm, configurations)
         law(**{name: known[name] for name in asked})
 
     holds()

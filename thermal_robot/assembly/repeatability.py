@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from thermal_robot.arrays import Array
 from thermal_robot.errors import EstimationError, RobotError
 from thermal_robot.kinematics import frame_jacobians
-from thermal_robot.kinematics.walk import chunks, result, rows_last
+from thermal_robot.kinematics.lanes import chunks, result, rows_last
 from thermal_robot.robot import Robot
 
 _EXACT = 1e-6

@@ -1,20 +1,17 @@
 """What of a model is constant: the same in all configurations and conditions, so that a robot file can hold it.
 
-No effect is asked for by name. Each parameter's unit responses are read in rows whose configurations and conditions are
-all different. Those that are one number, or one twist, in all of them are constant. Others become constant once the
-temperature is fixed: they are read again in rows of one temperature that has lasted, and must change with it.
+No effect is asked for by name: each parameter's unit responses are read in rows that differ in everything, and are
+constant where they are one number, or one twist, in all. Others are so at one temperature that has lasted: they are
+read again in rows of that one, and must change with it.
 
-**Undetermined** constants can be taken out: the others take the values that they have then. To take a parameter out
-alone would leave those that were fitted beside it where they are, and what two of them do together would be half done.
-So each is set to zero as a piece of knowledge. What the posterior of frames and parameters, N(m, C), says of the others
-once θ_k = 0 is their conditional mean m − C_k m_k / C_kk and covariance C − C_k C_kᵀ / C_kk: what a fit without θ_k
-finds, as far as the model is linear in its errors. The least significant goes first, and significance is judged anew
-each time: of two of which only the sum is known, one stays.
+**Undetermined** constants can be taken out: each is set to zero as a piece of knowledge. What the posterior of frames
+and parameters, N(m, C), says of the others once θ_k = 0 is their conditional mean m − C_k m_k / C_kk and covariance
+C − C_k C_kᵀ / C_kk: what a fit without θ_k finds, as far as the model is linear in its errors. The least significant
+goes first, and significance is judged anew each time: of two of which only the sum is known, one stays.
 
-**Zeros** to enter in a controller. Where a model holds zero offsets, these are they. Where it holds geometry instead, a
-part of that is zeros: it is told in other coordinates, the zeros first and then the errors of the axes after Denavit
-and Hartenberg, as the diagnosis tells it (:mod:`thermal_robot.inference.inside`). What the unknown frames can take up
-nobody sees, and it is not told.
+**Zeros** to enter in a controller are a model's zero offsets. Where it holds geometry instead, a part of that is zeros:
+it is told in other coordinates, the zeros first and then the errors of the axes after Denavit and Hartenberg, as the
+diagnosis tells it (:mod:`thermal_robot.inference.inside`). What the unknown frames can take up is not told.
 """
 
 from __future__ import annotations
@@ -257,7 +254,7 @@ def determined(
 
 
 def _known(state: Array, covariance: Array, k: int) -> tuple[Array, Array]:
-    """Return mean (K,) and covariance (K, K) once one parameter is known to be zero."""
+    """Conditional mean (K,) and covariance (K, K) of a normal distribution, given that one parameter is zero."""
     variance, along = covariance[k, k], covariance[:, k]
     share = along / variance if variance > 0.0 else np.zeros(len(along))
     mean, rest = state - share * state[k], covariance - np.outer(share, along)

@@ -17,7 +17,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, overload
@@ -93,37 +93,7 @@ class Commands:
     direction: Array
 
 
-def corrected(
-    samples: Campaign, frames: Frames, effects: Sequence[tuple[Effect, Array]], spread: Spread | None
-) -> Commands:
-    """Return the commands that bring the real target to the nominal poses of samples.
-
-    A pose that cannot be reached within the limits, and a joint beyond its limit, is refused with its row.
-    """
-    robot, tool = samples.robot, frames.tool
-    farthest = np.array([FARTHEST[kind] for kind in robot.joint_types])
-    # a row beyond a limit is solved as it stands; the correction may bring it back
-    low = np.minimum(np.maximum(samples.q - farthest, robot.lower), samples.q)
-    high = np.maximum(np.minimum(samples.q + farthest, robot.upper), samples.q)
-
-    def displaced(q: Array) -> Displacement:
-        there = replace(samples, q=q, travelled=samples.since_turn)
-        return displacement(observe(there, frames), effects)[0]
-
-    wanted = tool_poses(robot, samples.q) @ tool
-    found = inverse_kinematics(robot, wanted, samples.q, tool=tool, displaced=displaced, within=(low, high))
-    _require_within_limits(samples, found.q)
-    _require_reached(samples, found.miss)
-    q = np.clip(found.q, robot.lower, robot.upper)
-    there = replace(samples, q=q, travelled=samples.since_turn)
-    if spread is None:
-        return Commands(q, np.full((samples.samples, 3), np.nan), ((),) * samples.samples, found.turned)
-    outside = spread.outside(there, effects)
-    std = spread.std(observe(there, frames, displacement=displaced(q)), effects, outside, noise=False)
-    return Commands(q, std, outside, found.turned)
-
-
-def nominal_positions(robot: Robot, frames: Frames, poses: ArrayLike) -> Array:
+def _nominal_positions(robot: Robot, frames: Frames, poses: ArrayLike) -> Array:
     """(N, n) joint positions, rad or m, at which the nominal robot brings the target to poses (N, 4, 4), root frame.
 
     One that is out of reach is refused by its row among them, which count from 1.
@@ -170,89 +140,8 @@ def _in_units(samples: Campaign, joint: int, position: float) -> str:
     return f"{own} ({si[0]})" if si else own
 
 
-def _require_reached(samples: Campaign, miss: Array) -> None:
-    missed = np.flatnonzero(~(miss <= MISSED))
-    if missed.size:
-        row = int(missed[0])
-        more = f", and so are {missed.size - 1} more rows" if missed.size > 1 else ""
-        raise CampaignError(
-            samples.name,
-            f"the pose of this row is out of reach for the real robot{more}",
-            row=int(samples.rows[row]),
-            found=f"{1e3 * miss[row]:.3g} mm are left",
-            expected="a pose within the limits, and away from singular ones",
-        )
-
-
-NAME = "<conditions>"
-"""What such samples are called in messages."""
-
-
-def of_arrays(
-    robot: Robot, settings: Settings, q: Any, conditions: Mapping[str, ArrayLike], needs: Collection[str] = ()
-) -> Campaign:
-    """Return samples to predict: (N, n) joint positions, rad or m, and conditions in SI, by column name.
-
-    ``needs``: columns that the model needs; what an effect of the user's own reads may have any name.
-    """
-    _require_known(robot, conditions, needs)
-    given = {}
-    try:
-        rows = np.atleast_2d(np.asarray(q, dtype=float))
-        for key, value in conditions.items():
-            given[key] = np.broadcast_to(np.asarray(value, dtype=float), len(rows)).copy()
-    except (TypeError, ValueError) as error:
-        what = f"an array (N, {robot.n}), and for each condition one number or N"
-        raise CampaignError(NAME, "these are no rows of numbers", found=str(error), expected=what) from error
-    return Campaign(name=NAME, robot=robot, q=rows, covariates=given, **settings.of_rows())
-
-
-def _require_known(robot: Robot, conditions: Mapping[str, ArrayLike], needs: Collection[str]) -> None:
-    """Refuse a condition that neither the model needs nor any campaign has."""
-    known = dict.fromkeys(needs) | names.conditions(robot.joint_names, robot.urdf_links)
-    for name in conditions:
-        if name not in known:
-            raise CampaignError(
-                NAME,
-                f"nothing has this name{names.did_you_mean(str(name), known)}",
-                column=str(name),
-                expected=", ".join(needs) or "none, as the model needs no condition",
-            )
-
-
-def require_needed(samples: Campaign, needs: Sequence[str], effects: Sequence[Effect], simulated: bool) -> None:
-    """Refuse samples that lack a column, or a cell of it, that a model needs.
-
-    ``simulated``: the model corrects the prediction of the user's own simulator. The error names the column, and the
-    row of an empty cell.
-    """
-    for column in needs:
-        if column not in samples.covariates:
-            reason = _reason(samples, needs, effects, column)
-            raise CampaignError(samples.name, reason, column=column, found="no such column", expected="numbers")
-        gaps = np.flatnonzero(samples.missing.get(column, np.zeros(0, dtype=bool)))
-        if gaps.size:
-            row, reason = int(samples.rows[gaps[0]]), _reason(samples, needs, effects, column)
-            raise CampaignError(
-                samples.name, reason, row=row, column=column, found="an empty cell", expected="a number"
-            )
-    if simulated and samples.simulated_position is None:
-        raise CampaignError(
-            samples.name,
-            "the model corrects the prediction of your simulator",
-            column="sim.x",
-            found="no such column",
-            expected="sim.x, sim.y, sim.z",
-        )
-
-
-def _reason(samples: Campaign, needs: Sequence[str], effects: Sequence[Effect], column: str) -> str:
-    """Say which effects of the model need a column."""
-    # what they read is asked of rows that have all columns; any possible values will do
-    whole = {name: np.ones(samples.samples) for name in needs}
-    seen = observe(replace(samples, covariates=whole, missing={}))
-    own = [effect.name for effect in effects if _depends(effect, seen, column)]
-    return f"the model ({', '.join(own or [effect.name for effect in effects])}) needs this column"
+_NAME = "<conditions>"
+"""What samples from arrays are called in messages."""
 
 
 def _depends(effect: Effect, seen: Observations, column: str) -> bool:
@@ -260,14 +149,6 @@ def _depends(effect: Effect, seen: Observations, column: str) -> bool:
         return column in depends_on(effect, seen)
     except EffectError:  # it may refuse such values: then it reads them
         return True
-
-
-def require_finite(samples: Campaign, position: Array) -> None:
-    """Refuse positions (N, 3) that are not finite, by the first row."""
-    wrong = np.flatnonzero(~np.isfinite(position).all(axis=1))
-    if wrong.size:
-        row = int(samples.rows[wrong[0]])
-        raise CampaignError(samples.name, "the values of this row lead to no finite position", row=row)
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -400,7 +281,10 @@ class CorrectedModel:
         moved, instrument = displacement(nominal, self.effects)
         corrected = observe(samples, self.frames, displacement=moved)
         position = corrected.predicted_position + (0.0 if instrument is None else instrument)
-        require_finite(samples, position)
+        wrong = np.flatnonzero(~np.isfinite(position).all(axis=1))
+        if wrong.size:
+            row = int(samples.rows[wrong[0]])
+            raise CampaignError(samples.name, "the values of this row lead to no finite position", row=row)
         turned = self.measures == "pose"
         orientation = rotation_to_quaternion(self.frames.base[:3, :3] @ corrected.rotation) if turned else None
         if self.spread is None:
@@ -445,10 +329,10 @@ class CorrectedModel:
         [[0.1, 0.2016, -0.3037, 0.4023, 0.5]]
         """
         if conditions is None and not isinstance(poses, (np.ndarray, list, tuple)):
-            return self._commands(poses)
+            return self._commands(self._ready(poses))
         if np.asarray(poses, dtype=object).ndim == 3:
-            poses = nominal_positions(self.robot, self.frames, poses)  # type: ignore[arg-type]
-        return self._commands(self.samples_at(poses, conditions))
+            poses = _nominal_positions(self.robot, self.frames, poses)  # type: ignore[arg-type]
+        return self._commands(self._ready(self.samples_at(poses, conditions)))
 
     def commanded(self, samples: pd.DataFrame, commands: Commands) -> pd.DataFrame:
         """Return samples with the commands in the place of their joint positions, in the units of the campaign.
@@ -475,8 +359,39 @@ class CorrectedModel:
         q, std, outside, missed = commands.q, commands.std, commands.outside, commands.direction
         return with_commands(samples, self.robot, q, std, outside, missed, self.settings.units)
 
-    def _commands(self, samples: Campaign | str | Path | pd.DataFrame | ArrayLike) -> Commands:
-        return corrected(self._ready(samples), self.frames, self.effects, self.spread)
+    def _commands(self, samples: Campaign) -> Commands:
+        """Solve for the commands; refuse, by its row, a joint beyond its limit and a pose that is out of reach."""
+        robot, frames, effects = samples.robot, self.frames, self.effects
+        farthest = np.array([FARTHEST[kind] for kind in robot.joint_types])
+        # a row beyond a limit is solved as it stands; the correction may bring it back
+        low = np.minimum(np.maximum(samples.q - farthest, robot.lower), samples.q)
+        high = np.maximum(np.minimum(samples.q + farthest, robot.upper), samples.q)
+
+        def at(q: Array) -> Campaign:
+            return replace(samples, q=q, travelled=samples.since_turn)
+
+        def displaced(q: Array) -> Displacement:
+            return displacement(observe(at(q), frames), effects)[0]
+
+        wanted = tool_poses(robot, samples.q) @ frames.tool
+        found = inverse_kinematics(robot, wanted, samples.q, tool=frames.tool, displaced=displaced, within=(low, high))
+        _require_within_limits(samples, found.q)
+        missed = np.flatnonzero(~(found.miss <= MISSED))
+        if missed.size:
+            row, more = int(missed[0]), f", and so are {missed.size - 1} more rows" if missed.size > 1 else ""
+            raise CampaignError(
+                samples.name,
+                f"the pose of this row is out of reach for the real robot{more}",
+                row=int(samples.rows[row]),
+                found=f"{1e3 * found.miss[row]:.3g} mm are left",
+                expected="a pose within the limits, and away from singular ones",
+            )
+        q = np.clip(found.q, robot.lower, robot.upper)
+        if self.spread is None:
+            return Commands(q, np.full((samples.samples, 3), np.nan), ((),) * samples.samples, found.turned)
+        outside = self.spread.outside(at(q), effects)
+        std = self.spread.std(observe(at(q), frames, displacement=displaced(q)), effects, outside, noise=False)
+        return Commands(q, std, outside, found.turned)
 
     def samples_at(self, q: Any, conditions: Mapping[str, ArrayLike] | None = None) -> Campaign:
         """Return samples to predict, from arrays instead of a table.
@@ -499,16 +414,59 @@ class CorrectedModel:
         >>> model.samples_at([0.1, 0.2, -0.3, 0.4, 0.5], {"temperature": 26.0})
         <Campaign '<conditions>': 1 samples to predict, 5 joints, 1 covariate>
         """
-        return of_arrays(self.robot, self.settings, q, conditions or {}, self.needs)
+        known = dict.fromkeys(self.needs) | names.conditions(self.robot.joint_names, self.robot.urdf_links)
+        for name in conditions or {}:
+            if name not in known:
+                reason = f"nothing has this name{names.did_you_mean(str(name), known)}"
+                expected = ", ".join(self.needs) or "none, as the model needs no condition"
+                raise CampaignError(_NAME, reason, column=str(name), expected=expected)
+        try:
+            rows = np.atleast_2d(np.asarray(q, dtype=float))
+            given = {
+                name: np.broadcast_to(np.asarray(value, dtype=float), len(rows)).copy()
+                for name, value in (conditions or {}).items()
+            }
+        except (TypeError, ValueError) as error:
+            what = f"an array (N, {self.robot.n}), and for each condition one number or N"
+            raise CampaignError(_NAME, "these are no rows of numbers", found=str(error), expected=what) from error
+        return Campaign(name=_NAME, robot=self.robot, q=rows, covariates=given, **self.settings.of_rows())
 
     def _ready(self, samples: Any) -> Campaign:
         """Return samples with what the model reads, and nothing else that a table may hold."""
         if not isinstance(samples, Campaign):
             samples = self.samples(samples)
-        samples = read_alike(samples, self.robot, self.settings.turned)
-        require_needed(samples, self.needs, [effect for effect, _ in self.effects], self.simulated)
-        read = {name: values for name, values in samples.covariates.items() if name in self.needs}
-        return self._in_sequence(replace(samples, covariates=read))
+        rows: Campaign = read_alike(samples, self.robot, self.settings.turned)
+        self._require_needed(rows)
+        read = {name: values for name, values in rows.covariates.items() if name in self.needs}
+        if self.last_order is not None and self.counts_anew(rows):
+            # such an order does not say when a sample would be measured: what settles is taken as settled
+            read["order"] = np.full(rows.samples, self.last_order[1])
+        return replace(rows, covariates=read)
+
+    def _require_needed(self, samples: Campaign) -> None:
+        """Refuse samples that lack a column, or a cell of it; the error names the column, and the row of the cell."""
+        for column in self.needs:
+            gaps = np.flatnonzero(samples.missing.get(column, np.zeros(0, dtype=bool)))
+            if column in samples.covariates and not gaps.size:
+                continue
+            # what the effects read is asked of rows that have all columns; any possible values will do
+            whole = {name: np.ones(samples.samples) for name in self.needs}
+            seen = observe(replace(samples, covariates=whole, missing={}))
+            every = [effect.name for effect, _ in self.effects]
+            own = [effect.name for effect, _ in self.effects if _depends(effect, seen, column)]
+            reason = f"the model ({', '.join(own or every)}) needs this column"
+            if column not in samples.covariates:
+                raise CampaignError(samples.name, reason, column=column, found="no such column", expected="numbers")
+            row, found = int(samples.rows[gaps[0]]), "an empty cell"
+            raise CampaignError(samples.name, reason, row=row, column=column, found=found, expected="a number")
+        if self.simulated and samples.simulated_position is None:
+            raise CampaignError(
+                samples.name,
+                "the model corrects the prediction of your simulator",
+                column="sim.x",
+                found="no such column",
+                expected="sim.x, sim.y, sim.z",
+            )
 
     def counts_anew(self, samples: Campaign) -> bool:
         """Tell whether the ``order`` of the samples merely numbers the rows of their own file.
@@ -525,17 +483,6 @@ class CorrectedModel:
             return False
         first, last = self.last_order
         return len(order) < last - first and np.array_equal(order, first + np.arange(len(order)))
-
-    def _in_sequence(self, samples: Campaign) -> Campaign:
-        """Give samples whose ``order`` counts anew the last order of the campaign.
-
-        Such an order does not say when a sample would be measured. Effects that settle over the campaign are then taken
-        as settled.
-        """
-        if self.last_order is None or not self.counts_anew(samples):
-            return samples
-        late = np.full(samples.samples, self.last_order[1])
-        return replace(samples, covariates={**samples.covariates, "order": late})
 
     def samples(self, table: str | Path | pd.DataFrame | Table) -> Campaign:
         """Read a table of commands and conditions in the units of the campaign that the model was fitted to.

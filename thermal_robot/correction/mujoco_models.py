@@ -6,28 +6,25 @@ MJCF of its own, translated from its URDF.
 
 from __future__ import annotations
 
-import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
-from xml.parsers.expat import ExpatError
-from xml.sax.saxutils import quoteattr
 
 import numpy as np
+from lxml import etree
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import Campaign
 from thermal_robot.correction.robot_files import Calibrated, calibrated_urdf, target_link
 from thermal_robot.errors import CampaignError
 from thermal_robot.kinematics import quaternion_to_rotation, rotation_to_quaternion
-from thermal_robot.kinematics.model import PRISMATIC, Mimic, mimics
-from thermal_robot.kinematics.urdf import Edit, Tag, changed, comment, encoded, indent, tags, with_values
+from thermal_robot.kinematics.model import PRISMATIC, mimics
+from thermal_robot.kinematics.urdf import text_of, tree, unsound
+from thermal_robot.robot import Robot
 
 _NO_MASS = {"boundmass": 1e-9, "boundinertia": 1e-12, "balanceinertia": True, "fusestatic": False}
 """Of the compiler: links without masses are let be, and links that do not move stay bodies of their own."""
-_MIMIC = re.compile(r"<mimic\b[^>]*>(\s*</mimic>)?")
-_MESH = re.compile(r"<(visual|collision)\b(?:(?!</\1>).)*?<mesh\b.*?</\1>", re.DOTALL)
 
 
 def mujoco_or_error() -> Any:
@@ -72,42 +69,39 @@ def mjcf_of_urdf(urdf: str) -> str:
     '<mujoco model="rv_m2'
     """
     mujoco = mujoco_or_error()
+    root = tree(urdf)
+    for part in root.xpath("//mimic | //visual[.//mesh] | //collision[.//mesh]"):
+        part.getparent().remove(part)
     try:
-        spec = mujoco.MjSpec.from_string(_MIMIC.sub("", _MESH.sub("", urdf)))
+        spec = mujoco.MjSpec.from_string(etree.tostring(root, encoding="unicode"))
         for name, value in _NO_MASS.items():
             setattr(spec.compiler, name, value)
         model = spec.compile()
-        text = spec.to_xml()
+        root = tree(spec.to_xml())
     except (ValueError, mujoco.FatalError) as error:
         raise CampaignError("the URDF", "MuJoCo does not take it", found=" ".join(str(error).split())) from None
-    return _exact(text, model, "".join(_equalities(model, mimics(urdf))))
-
-
-def _equalities(model: Any, found: Mapping[str, Mimic]) -> Iterator[str]:
-    """Yield what makes joints that move follow others: MuJoCo 3.3.0 does not read that from a URDF."""
-    for joint, mimic in found.items():
+    _with_all_digits(root, model)
+    # MuJoCo 3.3.0 does not read from a URDF that joints follow others
+    follows = etree.Element("equality")
+    for joint, mimic in mimics(urdf).items():
         if None not in (known(model, "joint", joint), known(model, "joint", mimic.joint)):
             numbers = digits([mimic.offset, mimic.multiplier, 0, 0, 0])
-            yield f'    <joint joint1={quoteattr(joint)} joint2={quoteattr(mimic.joint)} polycoef="{numbers}"/>\n'
+            etree.SubElement(follows, "joint", joint1=joint, joint2=mimic.joint, polycoef=numbers)
+    if len(follows):
+        root.append(follows)
+    etree.indent(root)
+    return text_of(root, "")
 
 
-def _exact(text: str, model: Any, equalities: str) -> str:
-    """Give a model that MuJoCo wrote, in six digits, all of them; and its equalities."""
-    content = encoded(text)
-    found = tags(content)
-    end = found[0].close
-    edits: list[Edit] = [(end, end, f"\n  <equality>\n{equalities}  </equality>\n")] if equalities else []
-    for tag in found:
-        values: dict[str, tuple[Array, Sequence[float]]] = {}
-        if tag.path[-1] == "body":
-            body = model.body(tag.attributes["name"])
-            values = {"pos": (body.pos, (0.0, 0.0, 0.0)), "quat": (body.quat, (1.0, 0.0, 0.0, 0.0))}
-        elif tag.path[-1] == "joint":
-            joint = model.joint(tag.attributes["name"])
-            values = {"axis": (joint.axis, (0.0, 0.0, 1.0)), "range": (joint.range, (0.0, 0.0))}
-        new = {name: digits(value) for name, (value, usual) in values.items() if value.tolist() != list(usual)}
-        edits += [with_values(content, tag, new)] if new else []
-    return changed(content, edits)
+def _with_all_digits(root: Any, model: Any) -> None:
+    """Give the bodies and joints of a model that MuJoCo wrote, in six digits, all of them."""
+    usual = {"pos": [0.0, 0.0, 0.0], "quat": [1.0, 0.0, 0.0, 0.0], "axis": [0.0, 0.0, 1.0], "range": [0.0, 0.0]}
+    for kind, names in (("body", ("pos", "quat")), ("joint", ("axis", "range"))):
+        for element in root.iterfind(f"worldbody//{kind}"):
+            for name in names:
+                values = getattr(getattr(model, kind)(element.get("name")), name)
+                if values.tolist() != usual[name]:
+                    element.set(name, digits(values))
 
 
 def digits(values: Any) -> str:
@@ -115,37 +109,18 @@ def digits(values: Any) -> str:
     return " ".join(repr(float(value)) for value in values)
 
 
-@dataclass(frozen=True, eq=False)
-class Bodies:
-    """Where the bodies of a ``mujoco.MjModel`` are while its joints stand somewhere; ``data`` changes with them."""
+def moved(model: Any, data: Any, positions: Mapping[str, float]) -> None:
+    """Put joints of a ``mujoco.MjData`` to positions (rad or m) by name; the others stay."""
+    for name, position in positions.items():
+        data.qpos[model.joint(name).qposadr[0]] = position
+    mujoco_or_error().mj_kinematics(model, data)
 
-    model: Any
-    data: Any
 
-    @classmethod
-    def of(cls, model: Any) -> Bodies:
-        """Return those of a model, its joints where it starts."""
-        bodies = cls(model, mujoco_or_error().MjData(model))
-        bodies.move({})
-        return bodies
-
-    def move(self, positions: Mapping[str, float]) -> None:
-        """Put joints to positions (rad or m) by name; the others stay."""
-        for name, position in positions.items():
-            self.data.qpos[self.model.joint(name).qposadr[0]] = position
-        mujoco_or_error().mj_kinematics(self.model, self.data)
-
-    def pose(self, body: int) -> Array:
-        """(4, 4) of a body in the world, m."""
-        return _pose(self.data.xpos[body], self.data.xmat[body].reshape(3, 3))
-
-    def site(self, site: int) -> Array:
-        """(4, 4) of a site in the world, m."""
-        return _pose(self.data.site_xpos[site], self.data.site_xmat[site].reshape(3, 3))
-
-    def line(self, joint: int) -> tuple[Array, Array]:
-        """Return a point (3,) of a joint's axis, m, and its direction (3,), in the world."""
-        return np.array(self.data.xanchor[joint]), np.array(self.data.xaxis[joint])
+def pose_of(placed: Any) -> Array:
+    """(4, 4) in the world, m, of a body or a site of a ``mujoco.MjData``."""
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = placed.xmat.reshape(3, 3), placed.xpos
+    return pose
 
 
 def known(model: Any, kind: str, name: str) -> int | None:
@@ -153,12 +128,6 @@ def known(model: Any, kind: str, name: str) -> int | None:
     mujoco = mujoco_or_error()
     number = mujoco.mj_name2id(model, getattr(mujoco.mjtObj, f"mjOBJ_{kind.upper()}"), name)
     return None if number < 0 else int(number)
-
-
-def _pose(position: Array, rotation: Array) -> Array:
-    pose = np.eye(4)
-    pose[:3, :3], pose[:3, 3] = rotation, position
-    return pose
 
 
 _BESIDE, _ASKEW = 0.02, 0.05
@@ -204,172 +173,162 @@ def calibrated_mjcf(robot: Calibrated, mjcf: str | Path | None = None) -> str:
     True
     """
     notes = [*robot.notes("an MJCF"), *_BEYOND]
-    if mjcf is None:
-        # the translation drops all comments
-        content = encoded(mjcf_of_urdf(calibrated_urdf(robot)))
-        start = tags(content)[0].start
-        return changed(content, [(start, start, comment(notes))])
+    if mjcf is None:  # the translation drops all comments
+        return text_of(tree(mjcf_of_urdf(calibrated_urdf(robot))), "", notes)
     patched = _Patched.of(robot, mjcf)
-    start = patched.tags[0].start
-    return changed(patched.content, [(start, start, comment(notes)), *patched.edits()])
+    patched.place()
+    return text_of(patched.root, patched.text, notes)
 
 
 @dataclass(frozen=True, eq=False)
 class _Patched:
     """A model of the user's own beside the robot, both with all joints at zero.
 
-    ``content`` is its text in bytes, ``tags`` where its elements stand; ``root`` (4, 4) the pose of the robot's root
-    frame in the model's world.
+    ``root`` is the root element of its ``text``; ``base`` (4, 4) the pose of the robot's root frame in its world.
     """
 
     robot: Calibrated
     name: str
-    content: bytes
-    tags: tuple[Tag, ...]
+    text: str
+    root: Any
     model: Any
-    bodies: Bodies
-    root: Array
+    data: Any
+    base: Array
 
     @classmethod
     def of(cls, robot: Calibrated, mjcf: str | Path) -> _Patched:
-        path = Path(mjcf) if isinstance(mjcf, Path) or not mjcf.lstrip().startswith("<") else None
-        model = compiled(path or mjcf)
-        name = str(path or "the MJCF")
-        chain = robot.robot.chain
-        moving = [chain.names[k] for k in chain.movable]
-        for joint in moving:
-            if known(model, "joint", joint) is None:
-                own = ", ".join(model.joint(j).name or "(unnamed)" for j in range(model.njnt))
-                raise CampaignError(
-                    name, f"has no joint {joint!r}", found=own or "no joint", expected="the URDF's names"
-                )
-        bodies = Bodies.of(model)
-        bodies.move(dict.fromkeys(moving, 0.0))
+        name, model, path = _own_model(mjcf, robot.robot)
+        data = mujoco_or_error().MjData(model)
+        moved(model, data, dict.fromkeys(_moving(robot.robot), 0.0))
         base = known(model, "body", robot.robot.root_frame)
-        root = np.eye(4) if base is None else bodies.pose(base)
         try:
-            content = encoded(path.read_text(encoding="utf-8") if path else str(mjcf))
-            return cls(robot, name, content, tags(content), model, bodies, root)
-        except (UnicodeDecodeError, ExpatError) as error:
-            raise CampaignError(name, "is no XML in UTF-8", found=str(error)) from None
+            text = path.read_text(encoding="utf-8") if path else str(mjcf)
+            problem = unsound(text)
+        except UnicodeDecodeError as error:
+            problem = str(error)
+        if problem:
+            raise CampaignError(name, "is no XML in UTF-8", found=problem)
+        return cls(robot, name, text, tree(text), model, data, np.eye(4) if base is None else pose_of(data.body(base)))
 
-    def edits(self) -> list[Edit]:
-        """Return the changes: bodies of joints and of the tool frame that are placed anew, and the target."""
+    def place(self) -> None:
+        """Place the bodies of joints and the tool frame anew, and add the target."""
         chain, placed = self.robot.robot.chain, self.robot.placements
         nominal = np.tile(np.eye(4), (len(placed), 1, 1))
         nominal[:, :3, :3], nominal[:, :3, 3] = chain.rotations, chain.translations
-        found: list[Edit] = []
-        at, before, after, last = self.root, np.eye(4), np.eye(4), 0
+        at, before, after, last = self.base, np.eye(4), np.eye(4), 0
         for k, name in enumerate(chain.names):
             at, before, after = at @ nominal[k], before @ nominal[k], after @ placed[k]
             if k in chain.movable:
                 last = self._carrier(name, at, k)
-                found += self._moved(name, last, self._change(self.bodies.pose(last), at, before, after))
+                self._move(name, last, _change(pose_of(self.data.body(last)), at, before, after))
                 before, after = np.eye(4), np.eye(4)
-        stands = self._tool(at)
-        change = self._change(stands, at, before, after)
-        found += self._tool_moved(last, stands, change)
-        target, was = self.robot.target, known(self.model, "site", target_link(self.robot.robot.tool_frame))
+        tool = self.robot.robot.tool_frame
+        body, site = (known(self.model, kind, tool) for kind in ("body", "site"))
+        # the tool frame stands where its body or site is in the model, else where the URDF has it
+        found = self.data.body(body) if body is not None else None if site is None else self.data.site(site)
+        stands = at if found is None else pose_of(found)
+        change = _change(stands, at, before, after)
+        if body is not None and body != last:
+            self._move("", body, change)
+        elif body is None and site is not None and not np.array_equal(change, np.eye(4)):
+            for tag in self.root.xpath("(//site[@name=$tool])[1]", tool=tool):
+                carrier = pose_of(self.data.body(int(self.model.site_bodyid[site])))
+                _set_pose(tag, np.linalg.inv(carrier) @ stands @ change)
+        target, was = self.robot.target, known(self.model, "site", target_link(tool))
         if was is not None and self.robot.compared is not None:
             # the campaign was compared with this target, wherever the declared one is
-            target = target @ np.linalg.inv(self.robot.compared) @ np.linalg.inv(stands) @ self.bodies.site(was)
-        return [*found, self._site(last, np.linalg.inv(self.bodies.pose(last)) @ stands @ change @ target)]
-
-    def _tool(self, at: Array) -> Array:
-        """(4, 4) pose of the tool frame: that of its body or site in the model, else where the URDF has it."""
-        name = self.robot.robot.tool_frame
-        body, site = (known(self.model, kind, name) for kind in ("body", "site"))
-        return self.bodies.pose(body) if body is not None else at if site is None else self.bodies.site(site)
-
-    def _tool_moved(self, last: int, stands: Array, change: Array) -> list[Edit]:
-        """Return the edit that places the tool frame anew, where it is a body or a site of its own."""
-        name = self.robot.robot.tool_frame
-        body, site = (known(self.model, kind, name) for kind in ("body", "site"))
-        if body is not None:
-            return [] if body == last else self._moved("", body, change)
-        tag = next((t for t in self.tags if t.path[-1] == "site" and t.attributes.get("name") == name), None)
-        if site is None or tag is None or np.array_equal(change, np.eye(4)):
-            return []
-        pose = np.linalg.inv(self.bodies.pose(int(self.model.site_bodyid[site]))) @ stands @ change
-        return [with_values(self.content, tag, {**_placed(pose), **_OTHER_WAYS})]
-
-    @staticmethod
-    def _change(held: Array, at: Array, before: Array, after: Array) -> Array:
-        """(4, 4) X = C⁻¹ R⁻¹ R' C: how what a joint's frame holds moves, in its own frame, as R becomes R'."""
-        if np.array_equal(before, after):
-            return np.eye(4)
-        behind = np.linalg.inv(at) @ held
-        return np.asarray(np.linalg.inv(behind) @ np.linalg.inv(before) @ after @ behind)
+            seen = np.linalg.inv(stands) @ pose_of(self.data.site(was))
+            target = target @ np.linalg.inv(self.robot.compared) @ seen
+        self._set_target(last, np.linalg.inv(pose_of(self.data.body(last))) @ stands @ change @ target)
 
     def _carrier(self, joint: str, at: Array, k: int) -> int:
         """Return the body of a joint, whose axis must lie where the robot has it."""
         number = int(known(self.model, "joint", joint) or 0)
-        point, direction = self.bodies.line(number)
-        axis = at[:3, :3] @ self.robot.robot.chain.axes[k]
-        askew = float(np.arctan2(np.linalg.norm(np.cross(axis, direction)), axis @ direction))
-        beside = float(np.linalg.norm(np.cross(axis, at[:3, 3] - point)))
-        slides = self.robot.robot.chain.kinds[k] == PRISMATIC
-        if askew > _ASKEW or (beside > _BESIDE and not slides):
+        chain, there = self.robot.robot.chain, self.data.joint(number)
+        axis = at[:3, :3] @ chain.axes[k]
+        askew = float(np.arctan2(np.linalg.norm(np.cross(axis, there.xaxis)), axis @ there.xaxis))
+        beside = float(np.linalg.norm(np.cross(axis, at[:3, 3] - there.xanchor)))
+        if askew > _ASKEW or (beside > _BESIDE and chain.kinds[k] != PRISMATIC):
             problem = f"with all joints at zero, the axis of {joint!r} is not where the URDF has it"
             found = f"it {1e3 * beside:.3g} mm beside and {np.degrees(askew):.3g}° askew"
             raise CampaignError(self.name, problem, found=found, expected="a model of the same robot")
         return int(self.model.jnt_bodyid[number])
 
-    def _moved(self, joint: str, body: int, change: Array) -> list[Edit]:
-        """Return the edit that places a body anew: N X N⁻¹ L takes the place of L.
+    def _move(self, joint: str, body: int, change: Array) -> None:
+        """Place a body anew: N X N⁻¹ L takes the place of L.
 
         N is the body's pose in its parent while its joint is at zero, which is L only where the joint has no ``ref``.
         """
         if np.array_equal(change, np.eye(4)):
-            return []
-        inside = np.linalg.inv(self.bodies.pose(int(self.model.body_parentid[body]))) @ self.bodies.pose(body)
-        own = np.eye(4)
-        own[:3, :3] = quaternion_to_rotation(self.model.body_quat[body])
-        own[:3, 3] = self.model.body_pos[body]
-        pose = inside @ change @ np.linalg.inv(inside) @ own
-        return [with_values(self.content, self._tag(joint, body), {**_placed(pose), **_OTHER_WAYS})]
+            return
+        parent = pose_of(self.data.body(int(self.model.body_parentid[body])))
+        inside, own = np.linalg.inv(parent) @ pose_of(self.data.body(body)), np.eye(4)
+        own[:3, :3], own[:3, 3] = quaternion_to_rotation(self.model.body_quat[body]), self.model.body_pos[body]
+        _set_pose(self._tag(joint, body), inside @ change @ np.linalg.inv(inside) @ own)
 
-    def _tag(self, joint: str, body: int) -> Tag:
-        """Return where a body stands in the text: by its name, or by the joint in it."""
+    def _tag(self, joint: str, body: int) -> Any:
+        """Return the element of a body: by its name, or by the joint in it."""
         name = self.model.body(body).name
-        for tag in self.tags:
-            own = tag.path[-1] == "joint" and joint and tag.attributes.get("name") == joint and "worldbody" in tag.path
-            named = tag.path[-1] == "body" and name and tag.attributes.get("name") == name
-            found = self.tags[tag.parent] if own else tag if named else None
-            if found is not None and not {"frame", "replicate"} & set(found.path):
-                self._require_first(joint, body)
-                return found
-        problem = f"the tag of body {name or body!r} is not in this file, or stands in a <frame>"
-        raise CampaignError(self.name, problem, expected="a model in one file: save it by MuJoCo")
-
-    def _require_first(self, joint: str, body: int) -> None:
+        found = self.root.xpath(
+            "(//worldbody//joint[$joint and @name=$joint]/.. | //body[$name and @name=$name])"
+            "[not(ancestor-or-self::frame or ancestor-or-self::replicate)]",
+            joint=joint,
+            name=name,
+        )
+        if not found:
+            problem = f"the tag of body {name or body!r} is not in this file, or stands in a <frame>"
+            raise CampaignError(self.name, problem, expected="a model in one file: save it by MuJoCo")
         first = self.model.joint(int(self.model.body_jntadr[body])).name if joint else ""
         if first != joint:
             problem = f"joint {joint!r} has no body of its own: it shares one with {first!r}"
             raise CampaignError(self.name, problem, expected="a body between the two")
+        return found[0]
 
-    def _site(self, body: int, pose: Array) -> Edit:
-        """Return the insertion of the target into the body of the last joint."""
-        chain, tool = self.robot.robot.chain, target_link(self.robot.robot.tool_frame)
-        carrier = self._tag(chain.names[int(chain.movable[-1])], body)
-        for tag in self.tags:
-            if tag.path[-1] == "site" and tag.attributes.get("name") == tool:
-                if self.tags[tag.parent] != carrier:
-                    expected = f"it in the body of joint {chain.names[int(chain.movable[-1])]!r}"
-                    raise CampaignError(
-                        self.name, f"has a site {tool!r} already", found="it elsewhere", expected=expected
-                    )
-                return with_values(self.content, tag, {**_placed(pose), **_OTHER_WAYS})
-        values = "".join(f' {name}="{value}"' for name, value in _placed(pose).items())
-        return (
-            carrier.stop,
-            carrier.stop,
-            f"{indent(self.content, carrier.start)}  <site name={quoteattr(tool)}{values}/>",
-        )
+    def _set_target(self, body: int, pose: Array) -> None:
+        """Put the target into the body of the last joint."""
+        joint, tool = _moving(self.robot.robot)[-1], target_link(self.robot.robot.tool_frame)
+        carrier = self._tag(joint, body)
+        for site in self.root.xpath("(//site[@name=$tool])[1]", tool=tool):
+            if site.getparent() is not carrier:
+                problem, expected = f"has a site {tool!r} already", f"it in the body of joint {joint!r}"
+                raise CampaignError(self.name, problem, found="it elsewhere", expected=expected)
+            return _set_pose(site, pose)
+        site = etree.Element("site", name=tool)
+        site.tail = carrier.text
+        carrier.insert(0, site)
+        return _set_pose(site, pose)
 
 
-def _placed(pose: Array) -> Mapping[str, str]:
-    return {"pos": digits(pose[:3, 3]), "quat": digits(rotation_to_quaternion(pose[:3, :3]))}
+def _change(held: Array, at: Array, before: Array, after: Array) -> Array:
+    """(4, 4) X = C⁻¹ R⁻¹ R' C: how what a joint's frame holds moves, in its own frame, as R becomes R'."""
+    if np.array_equal(before, after):
+        return np.eye(4)
+    behind = np.linalg.inv(at) @ held
+    return np.asarray(np.linalg.inv(behind) @ np.linalg.inv(before) @ after @ behind)
+
+
+def _set_pose(element: Any, pose: Array) -> None:
+    """Place a body or a site in its parent; a quaternion takes the place of any other way of turning it."""
+    for name in ("euler", "axisangle", "xyaxes", "zaxis"):
+        element.attrib.pop(name, None)
+    element.set("pos", digits(pose[:3, 3]))
+    element.set("quat", digits(rotation_to_quaternion(pose[:3, :3])))
+
+
+def _moving(robot: Robot) -> list[str]:
+    """Names of the joints of the chain that move, mimicking ones too."""
+    return [robot.chain.names[k] for k in robot.chain.movable]
+
+
+def _own_model(mjcf: str | Path, robot: Robot) -> tuple[str, Any, Path | None]:
+    """Return what to call an MJCF, its ``mujoco.MjModel`` and its file; it must have the robot's joints."""
+    path = Path(mjcf) if isinstance(mjcf, Path) or not mjcf.lstrip().startswith("<") else None
+    name, model = str(path or "the MJCF"), compiled(path or mjcf)
+    for joint in _moving(robot):
+        if known(model, "joint", joint) is None:
+            own = ", ".join(model.joint(j).name or "(unnamed)" for j in range(model.njnt)) or "no joint"
+            raise CampaignError(name, f"has no joint {joint!r}", found=own, expected="the URDF's names of joints")
+    return name, model, path
 
 
 def with_simulator(campaign: Campaign, mjcf: str | Path) -> Campaign:
@@ -408,20 +367,15 @@ def with_simulator(campaign: Campaign, mjcf: str | Path) -> Campaign:
     >>> bool(abs(seen.simulated_position - sound.position).max() < 1e-9)
     True
     """
-    path = Path(mjcf) if isinstance(mjcf, Path) or not mjcf.lstrip().startswith("<") else None
-    name, model, robot = str(path or "the MJCF"), compiled(path or mjcf), campaign.robot
-    moving = [robot.chain.names[k] for k in robot.chain.movable]
-    for joint in moving:
-        if known(model, "joint", joint) is None:
-            raise CampaignError(name, f"has no joint {joint!r}", expected="the URDF's names of joints")
+    robot = campaign.robot
+    name, model, _ = _own_model(mjcf, robot)
     kind, number, held = _target(name, model, campaign)
-    root = known(model, "body", robot.root_frame) or 0
+    data, root = mujoco_or_error().MjData(model), known(model, "body", robot.root_frame) or 0
     seen = np.empty((campaign.samples, 4, 4))
-    bodies = Bodies.of(model)
     for i, row in enumerate(robot.chain.coupling.positions(campaign.q).tolist()):
-        bodies.move(dict(zip(moving, row, strict=True)))
-        carrier = bodies.site(number) if kind == "site" else bodies.pose(number)
-        seen[i] = np.linalg.inv(bodies.pose(root)) @ carrier @ held
+        moved(model, data, dict(zip(_moving(robot), row, strict=True)))
+        carrier = pose_of(getattr(data, kind)(number))
+        seen[i] = np.linalg.inv(pose_of(data.body(root))) @ carrier @ held
     turned = rotation_to_quaternion(seen[:, :3, :3]) if campaign.orientation is not None else None
     return replace(campaign, simulated_position=seen[:, :3, 3], simulated_orientation=turned)
 

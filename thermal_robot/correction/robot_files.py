@@ -28,7 +28,7 @@ from thermal_robot.correction.constant import Told, constant, determined
 from thermal_robot.correction.model import CorrectedModel
 from thermal_robot.effects import settings
 from thermal_robot.errors import CampaignError
-from thermal_robot.kinematics import Displacement, exp6, rotation_to_rpy
+from thermal_robot.kinematics import Displacement, exp3, exp6, rotation_to_rpy
 from thermal_robot.kinematics.model import PRISMATIC
 from thermal_robot.kinematics.urdf import rewritten, xyz_rpy
 from thermal_robot.robot import Robot
@@ -99,7 +99,9 @@ class Calibrated:
         for s, k in enumerate(chain.placed):
             placed[k] = placed[k] @ exp6(segments[s])
         for j, k in enumerate(chain.movable):
-            placed[k] = placed[k] @ exp6(unit_twist(self.robot, int(k)) * self.joints[j])
+            along = np.zeros((2, 3))
+            along[0 if chain.kinds[k] == PRISMATIC else 1] = chain.axes[k] * self.joints[j]
+            placed[k] = placed[k] @ exp6(along.ravel())
         return placed
 
     @property
@@ -212,12 +214,6 @@ def target_link(tool_frame: str) -> str:
     return f"{tool_frame}_target"
 
 
-def unit_twist(robot: Robot, element: int) -> Array:
-    """(6,) twist of a chain's element a unit of its motion, in its own frame; zero for a fixed one."""
-    axis, slides = robot.chain.axes[element], robot.chain.kinds[element] == PRISMATIC
-    return np.concatenate([axis, np.zeros(3)] if slides else [np.zeros(3), axis])
-
-
 def calibrated_urdf(robot: Calibrated) -> str:
     """Return the URDF of the calibrated robot.
 
@@ -313,7 +309,9 @@ NEARLY_PARALLEL = 0.1
 """Sine of the angle of two axes below which β takes the place of d: as where the errors of axes are told."""
 _DUST = 1e-14
 """rad, m."""
-_ANGLES, _LENGTHS = ("theta", "alpha", "beta", "roll", "pitch", "yaw"), ("d", "a", "x", "y", "z")
+_JOINT, _POSE = ("theta", "d", "a", "alpha", "beta"), ("x", "y", "z", "roll", "pitch", "yaw")
+_ANGLES = ("theta", "alpha", "beta", "roll", "pitch", "yaw")
+"""Figures of a joint and of a pose; the other ones are lengths."""
 
 
 def dh_table(robot: Calibrated, convention: Convention = "standard", units: Units | None = None) -> pd.DataFrame:
@@ -369,18 +367,19 @@ def dh_table(robot: Calibrated, convention: Convention = "standard", units: Unit
         kind = "prismatic" if chain.kinds[k] == PRISMATIC else "revolute"
         follows = "" if leader is None else robot.robot.joint_names[leader]
         times = 0.0 if leader is None else float(coupling.matrix[j, leader])
-        numbers = dict(zip(("theta", "d", "a", "alpha", "beta"), joints[j].tolist(), strict=True))
+        numbers = dict(zip(_JOINT, joints[j].tolist(), strict=True))
         rows.append({"joint": chain.names[k], "type": kind, "follows": follows, "multiplier": times, **numbers})
     rows.append({"joint": robot.robot.tool_frame, "type": "tool", **_as_pose(tool)})
-    order = ["joint", "type", "follows", "multiplier", "theta", "d", "a", "alpha", "beta"]
-    table = pd.DataFrame(rows)[[*order, "x", "y", "z", "roll", "pitch", "yaw"]]
-    scales = {**dict.fromkeys(_ANGLES, units.angle_scale), **dict.fromkeys(_LENGTHS, units.length_scale)}
-    names = {**dict.fromkeys(_ANGLES, units.angle), **dict.fromkeys(_LENGTHS, units.length)}
-    for name, scale in scales.items():
+    table = pd.DataFrame(rows)[["joint", "type", "follows", "multiplier", *_JOINT, *_POSE]]
+    told = {}
+    for name in (*_JOINT, *_POSE):
+        angle = name in _ANGLES
         # what rounding leaves of a zero is no figure of a robot
-        table[name] = table[name].where(~(table[name].abs() < _DUST), 0.0) / scale
+        table[name] = table[name].where(~(table[name].abs() < _DUST), 0.0)
+        table[name] /= units.angle_scale if angle else units.length_scale
+        told[name] = f"{name} [{units.angle if angle else units.length}]"
     table.insert(0, "convention", convention)
-    return table.rename(columns={name: f"{name} [{unit}]" for name, unit in names.items()})
+    return table.rename(columns=told)
 
 
 def _parameters(robot: Calibrated, like: Array | None = None) -> tuple[Array, Array, Array]:
@@ -413,19 +412,16 @@ def _parameters(robot: Calibrated, like: Array | None = None) -> tuple[Array, Ar
 
 
 def link(theta: float, d: float, a: float, alpha: float, beta: float) -> Array:
-    """(4, 4) motion from one axis to the next: Rz(θ) Tz(d) Tx(a) Rx(α) Ry(β)."""
-    pose = _turned(2, theta)
-    pose[:3, 3] = pose[:3, :3] @ np.array([a, 0.0, d])
-    pose[:3, :3] = (pose @ _turned(0, alpha) @ _turned(1, beta))[:3, :3]
+    """Denavit-Hartenberg-Hayati transform (4, 4) from one axis to the next: Rz(θ) Tz(d) Tx(a) Rx(α) Ry(β)."""
+    pose, turned = np.eye(4), _turned(2, theta)
+    pose[:3, 3] = turned @ np.array([a, 0.0, d])
+    pose[:3, :3] = turned @ _turned(0, alpha) @ _turned(1, beta)
     return pose
 
 
 def _turned(axis: int, angle: float) -> Array:
-    pose, (one, other) = np.eye(4), [k % 3 for k in (axis + 1, axis + 2)]
-    pose[one, one] = pose[other, other] = np.cos(angle)
-    pose[other, one] = np.sin(angle)
-    pose[one, other] = -np.sin(angle)
-    return pose
+    """(3, 3) rotation about the x, y or z axis (0, 1, 2)."""
+    return exp3(angle * np.eye(3)[axis])
 
 
 def _first(point: Array, axis: Array) -> Array:
@@ -449,7 +445,7 @@ def _to_next(frame: Array, line: tuple[Array, Array]) -> Array:
         foot = origin - axis * (origin[2] / axis[2])
         a = float(np.hypot(foot[0], foot[1]))
         theta = float(np.arctan2(foot[1], foot[0])) if a > 0.0 else 0.0
-        seen = _turned(2, theta)[:3, :3].T @ axis
+        seen = _turned(2, theta).T @ axis
         # Rx(α) Ry(β) z = (sin β, −sin α cos β, cos α cos β)
         alpha = float(np.arctan2(-seen[1], seen[2]))
         beta = float(np.arctan2(seen[0], np.hypot(seen[1], seen[2])))
@@ -460,7 +456,7 @@ def _to_next(frame: Array, line: tuple[Array, Array]) -> Array:
     normal, a = (-normal, -a) if a < 0.0 else (normal, a)
     theta = float(np.arctan2(normal[1], normal[0]))
     d = float(origin[2] - axis[2] * (origin[:2] @ axis[:2]) / across**2)
-    seen = _turned(2, theta)[:3, :3].T @ axis
+    seen = _turned(2, theta).T @ axis
     return np.array([theta, d, a, float(np.arctan2(-seen[1], seen[2])), 0.0])
 
 
@@ -473,4 +469,4 @@ def _last(frame: Array, end: Array) -> Array:
 
 def _as_pose(pose: Array) -> dict[str, float]:
     numbers = [*pose[:3, 3].tolist(), *rotation_to_rpy(pose[:3, :3]).tolist()]
-    return dict(zip(("x", "y", "z", "roll", "pitch", "yaw"), numbers, strict=True))
+    return dict(zip(_POSE, numbers, strict=True))

@@ -1,8 +1,7 @@
 """Poses, Jacobians, placement sensitivities and gravity torques in batches; the one room with Pinocchio."""
 
-from thermal_robot.kinematics.augmented import AugmentedModel, augmented_model, elongation_jacobian, growing, link_poses
 from thermal_robot.kinematics.frames import (
-    ChainFrames,
+    Displacement,
     chain_frames,
     frame_jacobians,
     placement_sensitivities,
@@ -10,6 +9,7 @@ from thermal_robot.kinematics.frames import (
 )
 from thermal_robot.kinematics.gravity import gravity_torques, segment_loads, static_regressor
 from thermal_robot.kinematics.inverse import Reached, inverse_kinematics, nearest_postures
+from thermal_robot.kinematics.lanes import ChainFrames
 from thermal_robot.kinematics.lie import (
     align,
     exp3,
@@ -19,15 +19,13 @@ from thermal_robot.kinematics.lie import (
     rotation_to_quaternion,
     rotation_to_rpy,
 )
-from thermal_robot.kinematics.walk import Displacement
+from thermal_robot.kinematics.links import elongation_jacobian, growing, link_poses
 
 __all__ = [
-    "AugmentedModel",
     "ChainFrames",
     "Displacement",
     "Reached",
     "align",
-    "augmented_model",
     "chain_frames",
     "elongation_jacobian",
     "exp3",

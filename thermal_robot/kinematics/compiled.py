@@ -10,8 +10,8 @@ import numpy as np
 
 from thermal_robot.arrays import Array
 from thermal_robot.compiling import in_pieces, loads, rows_at_once
-from thermal_robot.kinematics import lanes, settings
-from thermal_robot.kinematics.walk import Chained, Weighted, arm_of, rows_last, scratch
+from thermal_robot.kinematics import settings
+from thermal_robot.kinematics.lanes import Chained, arm_of, rows_last, scratch
 
 
 def installed() -> bool:
@@ -19,46 +19,19 @@ def installed() -> bool:
     return loads("thermal_robot.kinematics.kernels")
 
 
-def poses(robot: Chained, q: Array, out: Array) -> None:
-    """Write the poses of the tool, (N, 4, 4)."""
+def run(what: str, robot: Chained, q: Array, out: Array, point: Array | None = None, mass: Array | None = None) -> None:
+    """Let a kernel write the rows of ``out``; the point (3,) and the mass of a payload are one for all rows."""
     from thermal_robot.kinematics import kernels
 
-    _run(kernels.poses, (arm_of(robot.chain, None),), q, out)
+    arm = arm_of(robot.chain)
+    constants: tuple[Any, ...] = (arm if point is None else arm._replace(point=np.array(point)),)
+    if mass is not None:
+        constants += np.array(robot.gravity, dtype=float), float(mass)
+    _write(getattr(kernels, what), constants, q, out)
 
 
-def jacobians(robot: Chained, q: Array, point: Array | None, out: Array) -> None:
-    """Write the Jacobians at a point of the tool, (N, 6, n); a point of each row is left to NumPy."""
-    from thermal_robot.kinematics import kernels
-
-    if point is not None and point.ndim == 2:
-        lanes.jacobians(robot, q, point, out)
-    else:
-        _run(kernels.jacobians, (arm_of(robot.chain, point),), q, out)
-
-
-def placements(robot: Chained, q: Array, point: Array | None, out: Array) -> None:
-    """Write the sensitivities of a point of the tool, (N, 6, S, 6); a point of each row is left to NumPy."""
-    from thermal_robot.kinematics import kernels
-
-    if point is not None and point.ndim == 2:
-        lanes.placements(robot, q, point, out)
-    else:
-        _run(kernels.placements, (arm_of(robot.chain, point),), q, out)
-
-
-def gravity(robot: Weighted, q: Array, mass: Array, com: Array, out: Array) -> None:
-    """Write the holding torques, (N, n); payloads that differ from row to row are left to NumPy."""
-    from thermal_robot.kinematics import kernels
-
-    if mass.ndim:
-        lanes.gravity(robot, q, mass, com, out)
-    else:
-        pull = np.array(robot.gravity, dtype=float)
-        _run(kernels.gravity, (arm_of(robot.chain, com), pull, float(mass)), q, out)
-
-
-def _run(kernel: Callable[..., None], constants: tuple[Any, ...], q: Array, out: Array) -> None:
-    """Let the kernel write the rows of ``out``, in pieces, in threads."""
+def _write(kernel: Callable[..., None], constants: tuple[Any, ...], q: Array, out: Array) -> None:
+    """Let the kernel write, in pieces, in threads."""
     rows = rows_last(out)
     if np.may_share_memory(q, out):
         q = q.copy()

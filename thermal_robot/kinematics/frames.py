@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Protocol
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -11,62 +10,102 @@ from numpy.typing import ArrayLike
 from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics import compiled, lanes, settings, thin
-from thermal_robot.kinematics.lanes import Places
-from thermal_robot.kinematics.walk import Chained, Displaced, Displacement, Weighted, chunks, result, rows_last, walk
-
-
-class Engine(Protocol):
-    """What every engine can do: write the results of N configurations ``q``, (N, n), into ``out``.
-
-    A point of the tool is (3,) or (N, 3) m in its frame, ``None`` for its origin; the mass of a payload () or (N,) kg.
-    """
-
-    def poses(self, robot: Chained, q: Array, out: Array) -> None:
-        """Write the poses of the tool, (N, 4, 4)."""
-
-    def jacobians(self, robot: Chained, q: Array, point: Array | None, out: Array) -> None:
-        """Write the Jacobians at the point, (N, 6, n)."""
-
-    def placements(self, robot: Chained, q: Array, point: Array | None, out: Array) -> None:
-        """Write the sensitivities of the point to every placement, (N, 6, S, 6)."""
-
-    def gravity(self, robot: Weighted, q: Array, mass: Array, com: Array, out: Array) -> None:
-        """Write the torques that hold the arm and the payload, (N, n)."""
-
-
-def engine_for(robot: Chained, rows: int) -> Engine:
-    """Return the engine that is fastest for that many configurations."""
-    if rows <= settings.FEW and thin.covers(robot):
-        return thin
-    return compiled if rows >= settings.MANY and compiled.installed() else lanes
+from thermal_robot.kinematics.lanes import BASE, TOOL, Chained, ChainFrames, Moved, chunks, result, walk
+from thermal_robot.kinematics.lie import exp6
 
 
 @dataclass(frozen=True, eq=False)
-class ChainFrames:
-    """Frames of N configurations in the axes of the root frame, for K chain elements (fixed URDF joints too).
+class Displacement:
+    """Small errors in the four places where error enters a chain; ``None`` means none there.
+
+    The displaced tool pose is ``exp(base) · Π_k [P_k · exp(segment_k) · motion_k(q_k + joint_k)] ·
+    exp(tool)``; every array may have a row for each configuration or be one row for all. Twists are ordered
+    (linear m, angular rad). A joint that mimics another follows it where that one really is: ``q + joint``.
 
     Parameters
     ----------
-    rotations, positions
-        (N, K, 3, 3) and (N, K, 3) m: after the placement of each element, displaced or not, and before its
-        motion. The memory is laid out with N last, for speed.
-    tool_rotation, tool_position
-        (N, 3, 3) and (N, 3) m of the tool frame.
+    joint
+        (N, n) or (n,) rad or m, added to the joint positions.
+    segment
+        (N, S, 6) or (S, 6): twist of each segment's placement, in its own frame (a right perturbation,
+        ``LOCAL`` in Pinocchio).
+    base
+        (N, 6) or (6,) in the root frame.
+    tool
+        (N, 6) or (6,) in the tool frame.
     """
 
-    rotations: Array
-    positions: Array
-    tool_rotation: Array
-    tool_position: Array
+    joint: ArrayLike | None = None
+    segment: ArrayLike | None = None
+    base: ArrayLike | None = None
+    tool: ArrayLike | None = None
 
-    def rows_last(self) -> Places:
-        """Return the same with the N last, as the engines want them."""
-        arrays = (self.rotations, self.positions, self.tool_rotation, self.tool_position)
-        return Places(*map(rows_last, arrays))
+
+def compute(
+    what: str,
+    robot: Chained,
+    q: Array,
+    out: Array,
+    point: Array | None = None,
+    mass: Array | None = None,
+    frames: ChainFrames | None = None,
+) -> Array:
+    """Let the engine that is fastest for so many configurations ``q``, (N, n), write into ``out``, and return that.
+
+    ``what`` is ``poses``, ``jacobians``, ``placements`` or ``gravity``. A point of the tool is (3,) or (N, 3) m in its
+    frame, ``None`` for its origin; the mass of a payload there () or (N,) kg. With ``frames`` ``q`` is not read.
+    """
+    arguments = [] if what == "poses" else [point] if mass is None else [point, mass]
+    if frames is not None:
+        getattr(lanes, what)(robot, q, out, *arguments, frames)
+    elif len(q) <= settings.FEW and len(robot.chain.placed) <= settings.MOST_PLACEMENTS:
+        getattr(thin, what)(robot, q, out, *arguments)
+    elif len(q) >= settings.MANY and _one_for_all(point, mass) and compiled.installed():
+        compiled.run(what, robot, q, out, *arguments)
+    else:
+        getattr(lanes, what)(robot, q, out, *arguments)
+    return out
+
+
+def _one_for_all(point: Array | None, mass: Array | None) -> bool:
+    return (point is None or point.ndim == 1) and (mass is None or mass.ndim == 0)
+
+
+def _ready(robot: Chained, displacement: Displacement | None, rows: int) -> Moved:
+    """Make a displacement ready for that many rows; what is displaced by nothing is left out."""
+    if displacement is None:
+        return lanes.NOWHERE
+    shapes = {"joint": (robot.n,), "segment": (len(robot.segments), 6), "base": (6,), "tool": (6,)}
+    found: dict[str, Array] = {}
+    for name, shape in shapes.items():
+        value = getattr(displacement, name)
+        if value is None:
+            continue
+        array = np.asarray(value, dtype=float)
+        if array.shape not in (shape, (rows, *shape)):
+            raise RobotError(
+                f"displacement {name!r} of shape {array.shape} does not fit: expected {shape} or {(rows, *shape)}",
+                name=robot.name,
+            )
+        found[name] = array[None] if array.shape == shape else array
+    twists = {end: found[name] for end, name in ((BASE, "base"), (TOOL, "tool")) if name in found}
+    if "segment" in found:
+        twists |= {int(k): found["segment"][:, s] for s, k in enumerate(robot.chain.placed)}
+    return Moved(found.get("joint"), _motions({k: own for k, own in twists.items() if np.any(own)}))
+
+
+def _motions(twists: dict[int, Array]) -> dict[int, Array]:
+    """(4, 4, N) of each of (N, 6) twists, (4, 4, 1) where all rows are the same, as most errors of an arm are."""
+    same = [k for k, own in twists.items() if (own == own[:1]).all()]
+    alike = exp6(np.array([twists[k][0] for k in same]).reshape(-1, 6))
+    motions = {k: motion[:, :, None] for k, motion in zip(same, alike, strict=True)}
+    for k in twists.keys() - motions.keys():
+        motions[k] = np.ascontiguousarray(np.moveaxis(exp6(twists[k]), 0, -1))
+    return motions
 
 
 def chain_frames(robot: Chained, q: ArrayLike, displacement: Displacement | None = None) -> ChainFrames:
-    """Frames of every chain element and of the tool.
+    """Forward kinematics: frames of every chain element and of the tool.
 
     Parameters
     ----------
@@ -83,7 +122,7 @@ def chain_frames(robot: Chained, q: ArrayLike, displacement: Displacement | None
         If ``q`` or a displacement does not have the shape that the robot asks for.
     """
     q = as_rows(robot, q)
-    moved = Displaced.of(robot, displacement, len(q))
+    moved = _ready(robot, displacement, len(q))
     elements = len(robot.chain.names)
     frames = np.empty((elements + 1, 3, 4, len(q)))
     for part in chunks(len(q), elements):
@@ -95,7 +134,7 @@ def chain_frames(robot: Chained, q: ArrayLike, displacement: Displacement | None
 def tool_poses(
     robot: Chained, q: ArrayLike, displacement: Displacement | None = None, *, out: Array | None = None
 ) -> Array:
-    """Pose of the tool frame in the root frame.
+    """Forward kinematics: pose of the tool frame in the root frame.
 
     Parameters
     ----------
@@ -117,9 +156,8 @@ def tool_poses(
     q = as_rows(robot, q)
     out = result(out, len(q), 4, 4)
     if displacement is None:
-        engine_for(robot, len(q)).poses(robot, q, out)
-    else:
-        lanes.poses(robot, q, out, Displaced.of(robot, displacement, len(q)))
+        return compute("poses", robot, q, out)
+    lanes.poses(robot, q, out, _ready(robot, displacement, len(q)))
     return out
 
 
@@ -174,12 +212,8 @@ def frame_jacobians(
         If an array has not the shape that the robot asks for.
     """
     q = as_rows(robot, q) if frames is None else frames.tool_position
-    at, out = _point(point, len(q)), result(out, len(q), 6, robot.n)
-    if frames is None:
-        engine_for(robot, len(q)).jacobians(robot, q, at, out)
-    else:
-        lanes.jacobians(robot, q, at, out, frames.rows_last())
-    return out
+    out = result(out, len(q), 6, robot.n)
+    return compute("jacobians", robot, q, out, _point(point, len(q)), frames=frames)
 
 
 def placement_sensitivities(
@@ -190,7 +224,7 @@ def placement_sensitivities(
     point: ArrayLike | None = None,
     out: Array | None = None,
 ) -> Array:
-    """Twist of the tool frame, in root axes at the point, for a unit twist of each segment's placement.
+    """Kinematic regressor: twist of the tool, in root axes at the point, for a unit twist of each segment's placement.
 
     The placement is perturbed on its right, in its own frame: P exp(ξ). With displaced ``frames`` it is the
     displaced placement that is perturbed further. The columns of translation hold the virtual prismatic
@@ -213,12 +247,8 @@ def placement_sensitivities(
         If an array has not the shape that the robot asks for.
     """
     q = as_rows(robot, q) if frames is None else frames.tool_position
-    at, out = _point(point, len(q)), result(out, len(q), 6, len(robot.chain.placed), 6)
-    if frames is None:
-        engine_for(robot, len(q)).placements(robot, q, at, out)
-    else:
-        lanes.placements(robot, q, at, out, frames.rows_last())
-    return out
+    out = result(out, len(q), 6, len(robot.chain.placed), 6)
+    return compute("placements", robot, q, out, _point(point, len(q)), frames=frames)
 
 
 def _point(point: ArrayLike | None, rows: int) -> Array | None:

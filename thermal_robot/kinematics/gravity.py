@@ -9,18 +9,14 @@ from numpy.typing import ArrayLike
 
 from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
-from thermal_robot.kinematics import lanes
-from thermal_robot.kinematics.frames import ChainFrames, as_rows, chain_frames, engine_for
+from thermal_robot.kinematics.frames import as_rows, chain_frames, compute
+from thermal_robot.kinematics.lanes import ChainFrames, result
 from thermal_robot.kinematics.model import REVOLUTE
-from thermal_robot.kinematics.walk import result
 
 if TYPE_CHECKING:
     from thermal_robot.robot import Robot
 
 _AT_TOOL = (0.0, 0.0, 0.0)
-_NO_PAYLOAD = np.asarray(0.0), np.zeros(3)
-for _constant in _NO_PAYLOAD:
-    _constant.setflags(write=False)  # every call shares them
 
 
 def gravity_torques(
@@ -32,7 +28,7 @@ def gravity_torques(
     frames: ChainFrames | None = None,
     out: Array | None = None,
 ) -> Array:
-    """Torque or force of each joint that holds the arm and its payload still.
+    """Generalized gravity: torque or force of each joint that holds the arm and its payload still.
 
     It is the gradient of the potential energy by the joint positions: ``pinocchio.computeGeneralizedGravity``
     with the payload as a point mass. A joint that others mimic holds them, too.
@@ -64,12 +60,7 @@ def gravity_torques(
     """
     q = as_rows(robot, q) if frames is None else frames.tool_position
     mass, com = _payload(payload, payload_com, len(q))
-    out = result(out, len(q), robot.n)
-    if frames is None:
-        engine_for(robot, len(q)).gravity(robot, q, mass, com, out)
-    else:
-        lanes.gravity(robot, q, mass, com, out, frames.rows_last())
-    return out
+    return compute("gravity", robot, q, result(out, len(q), robot.n), com, mass, frames)
 
 
 def segment_loads(
@@ -80,7 +71,7 @@ def segment_loads(
     payload_com: ArrayLike = _AT_TOOL,
     frames: ChainFrames | None = None,
 ) -> Array:
-    """Wrench that gravity puts on the far end of each segment: the weight of everything beyond it.
+    """Gravity wrench on the far end of each segment: the weight of everything beyond it.
 
     Parameters
     ----------
@@ -100,9 +91,9 @@ def segment_loads(
     """
     frames = chain_frames(robot, q) if frames is None else frames
     chain, rows = robot.chain, len(frames.tool_position)
-    places, (mass, com) = frames.rows_last(), _payload(payload, payload_com, rows)
-    rotations, positions = places.rotations, places.positions
-    moment = mass * (places.tool_position + np.einsum("ijn,j->in", places.tool_rotation, com))
+    rotations, positions = _with_tool(frames)
+    mass, com = _payload(payload, payload_com, rows)
+    moment = mass * (positions[-1] + com @ rotations[-1])
     segment_of = {int(k): s for s, k in enumerate(chain.placed)}
     joint_of = {int(k): j for j, k in enumerate(chain.movable)}
     gravity = robot.gravity[:, None]
@@ -110,10 +101,8 @@ def segment_loads(
     loads = np.empty((rows, len(segment_of), 6))
     for k in range(len(chain.names) - 1, -1, -1):
         if k in joint_of:
-            j, last = joint_of[k], k + 1 == len(chain.names)
-            rotation = places.tool_rotation if last else rotations[k + 1]
-            position = places.tool_position if last else positions[k + 1]
-            moment = moment + chain.masses[j] * (position + chain.mass_centres[j] @ rotation)
+            j = joint_of[k]
+            moment = moment + chain.masses[j] * (positions[k + 1] + chain.mass_centres[j] @ rotations[k + 1])
             mass = mass + chain.masses[j]
         if k not in segment_of:
             continue
@@ -121,15 +110,13 @@ def segment_loads(
         beyond = mass + chain.hanging[k]
         about = moment + chain.hanging[k] * (positions[k] + chain.hanging_centres[k] @ rotations[k])
         turned = np.cross(about - beyond * positions[k], gravity, axis=0)
-        loads[:, segment_of[k], :3] = np.einsum(
-            "imn,in->nm", rotations[k], np.broadcast_to(beyond * gravity, (3, rows))
-        )
-        loads[:, segment_of[k], 3:] = np.einsum("imn,in->nm", rotations[k], turned)
+        for part, wrench in ((slice(0, 3), np.broadcast_to(beyond * gravity, (3, rows))), (slice(3, 6), turned)):
+            loads[:, segment_of[k], part] = np.einsum("imn,in->nm", rotations[k], wrench)
     return loads
 
 
 def static_regressor(robot: Robot, q: ArrayLike, *, frames: ChainFrames | None = None) -> Array:
-    """Return what a kilogram, and a first moment of a kilogram-metre, in each body asks of each joint.
+    """Regressor of statics: what a kilogram, and a first moment of a kilogram-metre, in each body asks of each joint.
 
     Holding torques are linear in the masses and first moments of the bodies (Pinocchio's ``computeStaticRegressor``):
     τ_j = Σ_b Y_jb · (m_b, m_b c_b).
@@ -146,29 +133,31 @@ def static_regressor(robot: Robot, q: ArrayLike, *, frames: ChainFrames | None =
         first moment (x, y, z) in the frame of the element after that joint (the tool frame for the last).
     """
     frames = chain_frames(robot, q) if frames is None else frames
-    chain, rows = robot.chain, len(frames.tool_position)
-    bodies = len(chain.movable)
+    chain, (rotations, positions) = robot.chain, (np.moveaxis(each, -1, 0) for each in _with_tool(frames))
+    rows, bodies = len(positions), len(chain.movable)
     regressor = np.zeros((rows, bodies, bodies, 4))
     for j, k in enumerate(chain.movable):
-        axis = frames.rotations[:, k] @ chain.axes[k]
+        axis = rotations[:, k] @ chain.axes[k]
         turn = -np.cross(robot.gravity, axis)  # −g · (axis × lever) = turn · lever
         for b in range(j, bodies):
             after = chain.movable[b] + 1
-            last = after == len(chain.names)
-            rotation = frames.tool_rotation if last else frames.rotations[:, after]
-            position = frames.tool_position if last else frames.positions[:, after]
             if chain.kinds[k] == REVOLUTE:
-                regressor[:, j, b, 0] = ((position - frames.positions[:, k]) * turn).sum(axis=1)
-                regressor[:, j, b, 1:] = np.einsum("nim,ni->nm", rotation, turn)
+                regressor[:, j, b, 0] = ((positions[:, after] - positions[:, k]) * turn).sum(axis=1)
+                regressor[:, j, b, 1:] = np.einsum("nim,ni->nm", rotations[:, after], turn)
             else:
                 regressor[:, j, b, 0] = -axis @ robot.gravity
     driven = chain.coupling.matrix.T @ regressor.reshape(rows, bodies, -1)
     return np.asarray(driven.reshape(rows, robot.n, bodies, 4))
 
 
+def _with_tool(frames: ChainFrames) -> tuple[Array, Array]:
+    """Return rotations (K + 1, 3, 3, N) and positions (K + 1, 3, N) of the elements and behind them of the tool."""
+    places = frames.rows_last()
+    rotations = np.concatenate([places.rotations, places.tool_rotation[None]])
+    return rotations, np.concatenate([places.positions, places.tool_position[None]])
+
+
 def _payload(payload: ArrayLike | None, com: ArrayLike, rows: int) -> tuple[Array, Array]:
-    if payload is None and com is _AT_TOOL:
-        return _NO_PAYLOAD
     mass = np.asarray(0.0 if payload is None else payload, dtype=float)
     centre = np.asarray(com, dtype=float)
     if mass.shape not in ((), (rows,)):

@@ -1,30 +1,29 @@
-"""Joint positions at which a chain, displaced or not, brings a point of its tool to given poses.
+"""Inverse kinematics of a chain, displaced or not, by damped least squares within the joints' limits.
 
 Two steps, both on the exact kinematics. First Levenberg-Marquardt on the point and the direction of the tool at once,
 
     min_q |p* − p(q)|² + a² |log(R* Rᵀ(q))|²,    a the arm that weighs an angle against a length,
 
-within a box of joint positions, so that a joint at its limit stays there and the others do its work (a projected
-method: the coordinates at a bound that would leave it are held). Then Newton steps of least length on the point alone,
-Δq = J_p⁺ (p* − p): where not all six coordinates can be had (fewer than six joints, a singular pose, a limit) the point
-has priority, and the direction is the nearest that the first step found. An arm with more than six joints stays near
-where it starts, as each step is the shortest that does it.
+within a box of joint positions by projection: joints at a bound that would leave it are held, and the others do their
+work. Then Newton steps of least length on the point alone, Δq = J_p⁺ (p* − p): where not all six coordinates can be had
+(fewer than six joints, a singular pose, a limit) the point has priority, and the direction is the nearest that the
+first step found. An arm with more than six joints stays near where it starts, as each step is the shortest.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
-from thermal_robot.kinematics.frames import ChainFrames, as_rows, chain_frames, frame_jacobians
+from thermal_robot.kinematics.frames import Displacement, as_rows, chain_frames, frame_jacobians
+from thermal_robot.kinematics.lanes import ChainFrames
 from thermal_robot.kinematics.lie import log3
-from thermal_robot.kinematics.walk import Displacement
 
 if TYPE_CHECKING:
     from thermal_robot.robot import Robot
@@ -53,8 +52,7 @@ _SMALLEST = 1e-6
 """Of the largest singular value of J_p: directions in which joints hardly move the point are not used."""
 
 
-@dataclass(frozen=True, eq=False)
-class Reached:
+class Reached(NamedTuple):
     """Where a chain was brought.
 
     Attributes
@@ -134,7 +132,7 @@ def inverse_kinematics(
 def nearest_postures(
     robot: Robot, poses: ArrayLike, *, tool: ArrayLike | None = None, near: ArrayLike | None = None
 ) -> Reached:
-    """Find joint positions that bring the tool to poses, from anywhere: of the postures that are found the nearest.
+    """Multi-start inverse kinematics: of the postures found that bring the tool to poses the nearest.
 
     Parameters
     ----------
@@ -159,11 +157,10 @@ def nearest_postures(
     rows = len(np.asarray(poses, dtype=float))
     first = np.broadcast_to((low + high) / 2.0 if near is None else as_rows(robot, near), (rows, robot.n))
     drawn = np.random.default_rng(0).uniform(low, high, (STARTS, robot.n))
-    best: Reached | None = None
-    for start in (first, *(np.broadcast_to(each, first.shape) for each in drawn)):
-        found = inverse_kinematics(robot, poses, start, tool=tool)
-        best = found if best is None else _better(best, found, first)
-    assert best is not None  # there is one start at least
+    best = inverse_kinematics(robot, poses, first, tool=tool)
+    for start in drawn:
+        found = inverse_kinematics(robot, poses, np.broadcast_to(start, first.shape), tool=tool)
+        best = _better(best, found, first)
     return best
 
 
@@ -173,8 +170,7 @@ def _better(one: Reached, other: Reached, near: Array) -> Reached:
     far = [np.linalg.norm(each.q - near, axis=1) for each in (one, other)]
     alike = np.abs(cost[1] - cost[0]) <= ARM * _SAME
     taken = np.where(alike, far[1] < far[0], cost[1] < cost[0])[:, None]
-    pairs = (one.q, other.q), (one.position, other.position), (one.direction, other.direction)
-    return Reached(*(np.where(taken, b, a) for a, b in pairs))
+    return Reached(*(np.where(taken, b, a) for a, b in zip(one, other, strict=True)))
 
 
 @dataclass(frozen=True, eq=False)

@@ -3,9 +3,8 @@
 Imported only where numba is installed. Every loop over lanes has the same fixed length and no branch, so that the
 compiler makes vector instructions of it and each lane is computed alike, wherever it stands in a block and whichever
 thread works on it. What is worked on stands in one flat array, the room: rows of ``LANES`` numbers, given by their
-place in it. So the compiler knows how far the rows of a frame are apart, and writes four of them in one loop; of rows
-that may overlap it would make no vectors. All kernels stand in this file, for numba looks at nothing else to see
-whether what it has kept is old: touch it where ``LANES`` is changed.
+place in it; so the compiler knows how far rows are apart. All kernels stand in this file, for numba looks at nothing
+else to see whether what it has kept is old: touch it where ``LANES`` or ``Arm`` is changed.
 """
 
 from __future__ import annotations
@@ -16,8 +15,8 @@ import numpy as np
 
 from thermal_robot.arrays import Array
 from thermal_robot.compiling import compiled
+from thermal_robot.kinematics.lanes import SLIDES, TURNS, TURNS_ALIGNED, Arm
 from thermal_robot.kinematics.settings import LANES, LARGEST_REDUCED
-from thermal_robot.kinematics.walk import SLIDES, TURNS, TURNS_ALIGNED, Arm
 
 WIDE = np.uint64(LANES)
 _QUARTERS = 2.0 / math.pi
@@ -69,7 +68,7 @@ def turn(room: Array, x: int, large: bool) -> None:
 
 @compiled
 def follow(room: Array, place: Array, x: int, to: int) -> None:
-    """Follow the frame in twelve rows by a constant placement, (3, 4)."""
+    """Follow the frame in twelve rows by a constant placement, whose first three rows are read."""
     a0, a1, a2, a3 = place[0]
     b0, b1, b2, b3 = place[1]
     c0, c1, c2, c3 = place[2]
@@ -86,7 +85,7 @@ def follow(room: Array, place: Array, x: int, to: int) -> None:
 
 @compiled
 def turn_and_follow(room: Array, a: int, b: int, joint: int, place: Array, x: int, to: int) -> None:
-    """Turn column a of the frame in twelve rows towards column b, and follow it by a constant placement, (3, 4).
+    """Turn column a of the frame in twelve rows towards column b, and follow it by a constant placement.
 
     Sine and cosine are the second and third row from ``joint``.
     """

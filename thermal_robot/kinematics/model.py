@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 import pinocchio as pin
@@ -16,7 +17,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
-from thermal_robot.kinematics.urdf import bare, encoded, nearest, parse_urdf, tags
+from thermal_robot.kinematics.urdf import nearest, parse_urdf, read
 
 
 @dataclass(frozen=True)
@@ -26,10 +27,6 @@ class Mimic:
     joint: str
     multiplier: float = 1.0
     offset: float = 0.0
-
-    def after(self, before: Mimic) -> Mimic:
-        """Return what is followed in the end, where ``joint`` itself follows as ``before`` says."""
-        return Mimic(before.joint, self.multiplier * before.multiplier, self.multiplier * before.offset + self.offset)
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,6 +43,9 @@ class Coupling:
     matrix: Array
     offset: Array
 
+    def __post_init__(self) -> None:
+        _freeze(self.driving, self.matrix, self.offset)
+
     def positions(self, q: Array) -> Array:
         """Return the (N, M) positions of the movable joints at (N, n) positions of the driving ones."""
         return q @ self.matrix.T + self.offset
@@ -58,12 +58,11 @@ class Coupling:
 
 def mimics(urdf: str, source: str = "the robot description") -> dict[str, Mimic]:
     """Read what every joint with a ``<mimic>`` tag follows, which Pinocchio's default parsing drops."""
-    found, every = {}, tags(bare(encoded(urdf)), source)
-    for tag in every:
-        if tag.path == ("robot", "joint", "mimic") and (name := every[tag.parent].attributes.get("name")):
-            said = tag.attributes
+    found = {}
+    for joint in read(urdf, source).iterfind("joint[@name]"):
+        for said in joint.iterfind("mimic"):
             times, offset = float(said.get("multiplier", 1.0)), float(said.get("offset", 0.0))
-            found[name] = Mimic(said.get("joint", ""), times, offset)
+            found[joint.get("name")] = Mimic(said.get("joint", ""), times, offset)
     return found
 
 
@@ -100,7 +99,8 @@ def _end(name: str, found: Mapping[str, Mimic], joints: Collection[str]) -> Mimi
         if end.joint not in found:
             return end
         seen.append(end.joint)
-        end = end.after(found[end.joint])
+        before = found[end.joint]
+        end = Mimic(before.joint, end.multiplier * before.multiplier, end.multiplier * before.offset + end.offset)
 
 
 def couple(names: Sequence[str], ends: Mapping[str, Mimic], beside: Collection[str] = ()) -> Coupling:
@@ -121,10 +121,7 @@ def couple(names: Sequence[str], ends: Mapping[str, Mimic], beside: Collection[s
         offset[j] = end.offset
         if end.joint in column:
             matrix[j, column[end.joint]] = end.multiplier
-    numbers = np.array(list(driving.values()), dtype=np.int64)
-    for array in (numbers, matrix, offset):
-        array.setflags(write=False)
-    return Coupling(tuple(driving), numbers, matrix, offset)
+    return Coupling(tuple(driving), np.array(list(driving.values()), dtype=np.int64), matrix, offset)
 
 
 def common_limits(
@@ -287,40 +284,8 @@ class Chain:
     hanging: Array
     hanging_centres: Array
 
-
-@dataclass(frozen=True, eq=False)
-class ChainModel:
-    """What Pinocchio says about a URDF between two of its links.
-
-    Parameters
-    ----------
-    model
-        ``pinocchio.Model`` reduced to the M movable joints of the chain, mimicking ones too; its gravity is set.
-    root_frame
-        Name of the link in which poses are expressed.
-    gravity
-        (3,) m/s² in the root frame.
-    joint_names, joint_types
-        Name, and ``revolute``, ``continuous`` or ``prismatic``, of each driving joint.
-    lower, upper
-        (n,) limits in rad or m of the driving joints, narrowed to those of the joints that mimic them; infinite
-        where there is none.
-    chain
-        Constant arrays for the batch functions.
-    urdf_links, urdf_joints
-        Names of all links and of all joints of the URDF, in the chain or not, fixed joints too.
-    """
-
-    model: pin.Model
-    root_frame: str
-    gravity: Array
-    joint_names: tuple[str, ...]
-    joint_types: tuple[str, ...]
-    lower: Array
-    upper: Array
-    chain: Chain
-    urdf_links: tuple[str, ...]
-    urdf_joints: tuple[str, ...]
+    def __post_init__(self) -> None:
+        _freeze(*vars(self).values())
 
 
 def build_chain_model(
@@ -329,63 +294,66 @@ def build_chain_model(
     root_frame: str | None,
     gravity: Array | None,
     source: str = "the robot description",
-) -> ChainModel:
-    """Read a URDF and keep the chain from the root frame to the tool frame; every other joint is held.
+) -> dict[str, Any]:
+    """Read a URDF and keep the chain from the root frame to the tool frame; return those fields of a robot by name.
 
-    A joint is held at 0, or at the limit nearest to 0; one that mimics another, where that one takes it. One outside
-    that a joint of the chain mimics is no part of the chain and yet drives it: it is one of its joints. Without a root
-    frame it is the root link of the URDF, without ``gravity`` (3,) 9.81 m/s² down its z axis. :class:`RobotError` if
-    the text is not a URDF, a link is unknown, the tool is not below the root frame, the chain holds no movable joint or
-    one of another kind, or one that mimics what does not exist, has no single position, or is in the end itself.
+    A joint that is not in the chain is held at 0, or at the limit nearest to 0; one that mimics another, where that one
+    takes it. One outside that a joint of the chain mimics is no part of the chain and yet drives it: it is one of its
+    joints. Without a root frame it is the root link of the URDF, without ``gravity`` (3,) 9.81 m/s² down its z axis.
+    :class:`RobotError` if the text is not a URDF, a link is unknown, the tool is not below the root frame, the chain
+    holds no movable joint or one of another kind, or one that mimics what does not exist, has no single position, or is
+    in the end itself.
     """
     full = parse_urdf(urdf, source)
     links = {frame.name: i for i, frame in enumerate(full.frames) if frame.type == pin.FrameType.BODY}
-    root = _find_link(full, links, root_frame, "root frame") if root_frame is not None else min(links.values())
-    tool = _find_link(full, links, tool_frame, "tool frame")
-    elements = _elements_between(full, root, tool)
+    root = min(links.values()) if root_frame is None else _find_link(full, links, root_frame, "root frame")
+    elements = _elements_between(full, root, _find_link(full, links, tool_frame, "tool frame"))
+    joints = [f.name for i, f in enumerate(full.frames) if i > 0 and f.type in _JOINTS]  # the first is the world
     # a fixed joint stays where it is, whatever it is said to mimic
     found = {name: mimic for name, mimic in mimics(urdf, source).items() if full.existJointName(name)}
-    ends = followed(found, _joint_names(full), [full.frames[e].name for e in elements])
+    ends = followed(found, joints, [full.frames[e].name for e in elements])
     held = held_configuration(full, ends)
     moving = [full.frames[e] for e in elements if full.frames[e].type == pin.FrameType.JOINT]
-    in_chain = {frame.parentJoint: _joint_type(full, frame.name) for frame in moving}
+    for frame in moving:
+        _joint_type(full, frame.name)
+    in_chain = {frame.parentJoint for frame in moving}
     model = _reduced(full, [j for j in range(1, full.njoints) if j not in in_chain], held)
     names = tuple(model.names)[1:]
     coupling = couple(names, ends, tuple(full.names)[1:])
     if not len(coupling.driving):
         raise RobotError("the chain has no movable joint between its root frame and its tool frame")
-
     data = full.createData()
     pin.framesForwardKinematics(full, data, held)
     root_rotation = data.oMf[root].rotation
     if gravity is None:
         gravity = root_rotation.T @ np.array([0.0, 0.0, -STANDARD_GRAVITY])
     model.gravity.linear = root_rotation @ gravity
-
-    joint_types = tuple(_joint_type(full, name) for name in coupling.names)
     lower, upper = common_limits(coupling, names, *_limits(model, names), _limits(full, coupling.names))
-    chain = _chain_arrays(full, model, elements, held, coupling)
     _freeze(gravity, lower, upper)
-    return ChainModel(
-        model,
-        full.frames[root].name,
-        gravity,
-        coupling.names,
-        joint_types,
-        lower,
-        upper,
-        chain,
-        tuple(links),
-        _joint_names(full),
-    )
+    return {
+        "name": model.name,
+        "root_frame": full.frames[root].name,
+        "gravity": gravity,
+        "joint_names": coupling.names,
+        "joint_types": tuple(_joint_type(full, name) for name in coupling.names),
+        "lower": lower,
+        "upper": upper,
+        "chain": _chain_arrays(full, model, elements, held, coupling),
+        "model": model,
+        "urdf_links": tuple(links),
+        "urdf_joints": tuple(joints),
+    }
+
+
+_JOINTS = (pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT)
 
 
 def leaf_links(urdf: str, source: str = "the robot description") -> tuple[str, ...]:
     """Links at the ends of the tree: what a tool frame is usually chosen from."""
     model = parse_urdf(urdf, source)
-    links = [i for i, frame in enumerate(model.frames) if frame.type == pin.FrameType.BODY]
     parents = {frame.parentFrame for frame in model.frames}
-    return tuple(model.frames[i].name for i in links if i not in parents)
+    ends = [f for i, f in enumerate(model.frames) if f.type == pin.FrameType.BODY and i not in parents]
+    return tuple(frame.name for frame in ends)
 
 
 def _reduced(full: pin.Model, held_joints: list[int], held: Array) -> pin.Model:
@@ -410,37 +378,35 @@ def _reduced(full: pin.Model, held_joints: list[int], held: Array) -> pin.Model:
 
 def _chain_arrays(full: pin.Model, model: pin.Model, elements: list[int], held: Array, coupling: Coupling) -> Chain:
     frames = [full.frames[e] for e in elements]
-    placements = [_placement(full, e) for e in elements]
+    placements = []
+    for frame in frames:  # of a URDF joint, in the frame of its parent link
+        moves = frame.type == pin.FrameType.JOINT
+        placed = full.jointPlacements[frame.parentJoint] if moves else frame.placement
+        placements.append(full.frames[frame.parentFrame].placement.actInv(placed))
     kinds, axes = _kinds_and_axes(full, frames)
     movable = np.flatnonzero(kinds)
-    masses = np.array([model.inertias[j].mass for j in range(1, model.njoints)])
+    bodies = list(model.inertias)[1:]
     centres = np.empty((len(movable), 3))
     for j, k in enumerate(movable.tolist()):
-        centre = model.inertias[j + 1].lever
-        centres[j] = placements[k + 1].actInv(centre) if k + 1 < len(elements) else centre
-    rotations = np.array([p.rotation for p in placements])
+        centres[j] = placements[k + 1].actInv(bodies[j].lever) if k + 1 < len(elements) else bodies[j].lever
     translations = np.array([p.translation for p in placements])
     long = np.linalg.norm(translations, axis=1) > SHORTEST_SEGMENT
     long[movable] = True
-    placed = np.flatnonzero(long)
     hanging, hanging_centres = hanging_masses(full, elements, held)
-    _freeze(rotations, translations, kinds, axes, movable, placed, masses, centres, hanging, hanging_centres)
-    names = tuple(frame.name for frame in frames)
-    parents = tuple(full.frames[frame.parentFrame].name for frame in frames)
     return Chain(
-        names,
-        parents,
-        rotations,
-        translations,
-        kinds,
-        axes,
-        movable,
-        coupling,
-        placed,
-        masses,
-        centres,
-        hanging,
-        hanging_centres,
+        names=tuple(frame.name for frame in frames),
+        parent_links=tuple(full.frames[frame.parentFrame].name for frame in frames),
+        rotations=np.array([p.rotation for p in placements]),
+        translations=translations,
+        kinds=kinds,
+        axes=axes,
+        movable=movable,
+        coupling=coupling,
+        placed=np.flatnonzero(long),
+        masses=np.array([body.mass for body in bodies]),
+        mass_centres=centres,
+        hanging=hanging,
+        hanging_centres=hanging_centres,
     )
 
 
@@ -454,15 +420,6 @@ def _kinds_and_axes(full: pin.Model, frames: list[pin.Frame]) -> tuple[NDArray[n
             if not np.isclose(np.linalg.norm(axes[k]), 1.0):
                 raise RobotError(f"the axis of joint {frame.name!r} has no direction", name=frame.name)
     return kinds, axes
-
-
-def _placement(model: pin.Model, element: int) -> pin.SE3:
-    """Placement of a URDF joint in the frame of its parent link."""
-    frame = model.frames[element]
-    parent = model.frames[frame.parentFrame].placement
-    if frame.type == pin.FrameType.JOINT:
-        return parent.actInv(model.jointPlacements[frame.parentJoint])
-    return parent.actInv(frame.placement)
 
 
 def unit_motion(model: pin.Model, joint: pin.JointModel) -> Array:
@@ -483,7 +440,7 @@ def _elements_between(model: pin.Model, root: int, tool: int) -> list[int]:
                 f"tool frame {model.frames[tool].name!r} is not below root frame {model.frames[root].name!r}",
                 name=model.frames[tool].name,
             )
-        if model.frames[frame].type in (pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT):
+        if model.frames[frame].type in _JOINTS:
             elements.append(frame)
         frame = model.frames[frame].parentFrame
     return elements[::-1]
@@ -502,12 +459,6 @@ def _joint_type(model: pin.Model, name: str) -> str:
         f"joint {name!r} of the chain is {named}; only revolute, continuous, prismatic and fixed joints are supported",
         name=name,
     )
-
-
-def _joint_names(model: pin.Model) -> tuple[str, ...]:
-    """Names of all joints of the URDF; the frame that Pinocchio puts first is the world, and no joint."""
-    kinds = (pin.FrameType.JOINT, pin.FrameType.FIXED_JOINT)
-    return tuple(frame.name for i, frame in enumerate(model.frames) if i > 0 and frame.type in kinds)
 
 
 def _limits(model: pin.Model, names: Sequence[str]) -> tuple[Array, Array]:
@@ -533,6 +484,7 @@ def _find_link(model: pin.Model, links: dict[str, int], name: str, role: str) ->
     )
 
 
-def _freeze(*arrays: NDArray[np.generic]) -> None:
-    for array in arrays:
-        array.setflags(write=False)
+def _freeze(*values: Any) -> None:
+    for value in values:
+        if isinstance(value, np.ndarray):
+            value.setflags(write=False)

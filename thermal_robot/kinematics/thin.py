@@ -3,15 +3,15 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Iterable
 from weakref import WeakKeyDictionary
 
 import numpy as np
 import pinocchio as pin
 
 from thermal_robot.arrays import Array
-from thermal_robot.kinematics import settings
+from thermal_robot.kinematics.lanes import Chained, arm_of
 from thermal_robot.kinematics.model import FIXED, REVOLUTE, Chain
-from thermal_robot.kinematics.walk import Chained, Weighted, steps
 
 _ALONG = {
     (True, 0): pin.JointModelRX,
@@ -35,7 +35,7 @@ class _Own:
     """
 
     def __init__(self, chain: Chain, placed: bool) -> None:
-        self.model, self.plain, self.coupling = pin.Model(), steps(chain).plain, chain.coupling
+        self.model, self.plain, self.coupling = pin.Model(), arm_of(chain).plain, chain.coupling
         joint, here = 0, pin.SE3.Identity()
         joint_of = {int(k): j for j, k in enumerate(chain.movable)}
         segments = set(chain.placed.tolist())
@@ -68,28 +68,35 @@ class _Own:
         rows[:, self.moves] = q
         return rows
 
-    def placed_at(self, point: Array) -> int:
-        """Put the frame of the point there, and return its number."""
+    def frames_at(self, point: Array | None, rows: int) -> Iterable[int]:
+        """Return for each row the frame of the tool, or one that is put at a point of it, (3,) or (N, 3)."""
+        if point is None:
+            return [self.tool] * rows
+        if point.ndim == 2:
+            return map(self._placed_at, point)
+        return [self._placed_at(point)] * rows
+
+    def _placed_at(self, point: Array) -> int:
         self.model.frames[self.point].placement = self.end * pin.SE3(np.eye(3), point)
         number: int = self.point
         return number
 
 
 class _Kept(threading.local):
-    """Models of each thread: what Pinocchio works in must not be shared."""
+    """Models of each thread, of joints alone and of all placements: what Pinocchio works in must not be shared."""
 
     def __init__(self) -> None:
-        self.plain: WeakKeyDictionary[Chain, _Own] = WeakKeyDictionary()
-        self.placed: WeakKeyDictionary[Chain, _Own] = WeakKeyDictionary()
+        self.models: tuple[WeakKeyDictionary[Chain, _Own], ...] = (WeakKeyDictionary(), WeakKeyDictionary())
 
 
 _kept = _Kept()
 
 
-def _own(chain: Chain) -> _Own:
-    found = _kept.plain.get(chain)
+def _own(chain: Chain, placed: bool = False) -> _Own:
+    models = _kept.models[placed]
+    found = models.get(chain)
     if found is None:
-        found = _kept.plain[chain] = _Own(chain, placed=False)
+        found = models[chain] = _Own(chain, placed)
     return found
 
 
@@ -102,13 +109,8 @@ def _joint(chain: Chain, k: int) -> pin.JointModel:
     return pin.JointModelRevoluteUnaligned(axis) if turns else pin.JointModelPrismaticUnaligned(axis)
 
 
-def covers(robot: Chained) -> bool:
-    """Whether Pinocchio's memory for a chain of that length is small."""
-    return len(robot.chain.placed) <= settings.MOST_PLACEMENTS
-
-
 def poses(robot: Chained, q: Array, out: Array) -> None:
-    """Write the poses of the tool, (N, 4, 4)."""
+    """Forward kinematics of the tool, (N, 4, 4)."""
     own = _own(robot.chain)
     model, data, tool = own.model, own.data, own.tool
     for i, row in enumerate(own.joints(q)):
@@ -116,38 +118,30 @@ def poses(robot: Chained, q: Array, out: Array) -> None:
         out[i] = pin.updateFramePlacement(model, data, tool).homogeneous
 
 
-def jacobians(robot: Chained, q: Array, point: Array | None, out: Array) -> None:
-    """Write the Jacobians at a point of the tool, (N, 6, n)."""
+def jacobians(robot: Chained, q: Array, out: Array, point: Array | None) -> None:
+    """Geometric Jacobian at a point of the tool, (N, 6, n)."""
     own = _own(robot.chain)
     model, data, plain = own.model, own.data, own.plain
-    frame = own.tool if point is None else own.placed_at(point) if point.ndim == 1 else own.point
-    for i, row in enumerate(own.joints(q)):
-        if point is not None and point.ndim == 2:
-            own.placed_at(point[i])
+    frames = own.frames_at(point, len(q))
+    for i, (row, frame) in enumerate(zip(own.joints(q), frames, strict=True)):
         found = pin.computeFrameJacobian(model, data, row, frame, pin.LOCAL_WORLD_ALIGNED)
         if found.ndim == 1:  # of one joint Pinocchio gives a vector
             found = found[:, None]
         out[i] = found if plain else found @ own.coupling.matrix
 
 
-def placements(robot: Chained, q: Array, point: Array | None, out: Array) -> None:
-    """Write the sensitivities of a point of the tool to every placement, (N, 6, S, 6)."""
-    own = _kept.placed.get(robot.chain)
-    if own is None:
-        own = _kept.placed[robot.chain] = _Own(robot.chain, placed=True)
-    model, data = own.model, own.data
-    frame = own.tool if point is None else own.placed_at(point) if point.ndim == 1 else own.point
-    shape = out.shape[1:]
-    for i, row in enumerate(own.joints(q)):
-        if point is not None and point.ndim == 2:
-            own.placed_at(point[i])
+def placements(robot: Chained, q: Array, out: Array, point: Array | None) -> None:
+    """Kinematic regressor: sensitivities of a point of the tool to every placement, (N, 6, S, 6)."""
+    own = _own(robot.chain, placed=True)
+    model, data, shape = own.model, own.data, out.shape[1:]
+    for i, (row, frame) in enumerate(zip(own.joints(q), own.frames_at(point, len(q)), strict=True)):
         pin.forwardKinematics(model, data, row)
         found = pin.computeFrameKinematicRegressor(model, data, frame, pin.LOCAL_WORLD_ALIGNED)
         out[i] = found.reshape(shape)
 
 
-def gravity(robot: Weighted, q: Array, mass: Array, com: Array, out: Array) -> None:
-    """Write the torques, (N, n), that hold the arm and a payload: its mass, () or (N,), at ``com`` in the tool."""
+def gravity(robot: Chained, q: Array, out: Array, com: Array, mass: Array) -> None:
+    """Generalized gravity, (N, n), of the arm and a payload: its mass, () or (N,), at ``com`` in the tool."""
     own = _own(robot.chain)
     model, data = own.model, own.data
     if own.pull is not robot.gravity:
@@ -158,13 +152,13 @@ def gravity(robot: Weighted, q: Array, mass: Array, com: Array, out: Array) -> N
         out[i] = found if own.plain else found @ own.coupling.matrix
     if mass.ndim or mass:
         lift = np.empty((len(q), 6, robot.n))
-        jacobians(robot, q, com, lift)
+        jacobians(robot, q, lift, com)
         out -= mass[..., None] * (robot.gravity @ lift[:, :3])
     if own.idle:
         out[:, 0] = 0.0
 
 
-def _turning_about(own: _Own, robot: Weighted) -> bool:
+def _turning_about(own: _Own, robot: Chained) -> bool:
     """Whether the first joint turns about gravity: it carries nothing, which Pinocchio tells to rounding only."""
     chain = robot.chain
     first = int(chain.movable[0])

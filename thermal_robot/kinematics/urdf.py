@@ -1,39 +1,38 @@
-"""URDF text: read, checked, changed in place, and parsed to a Pinocchio model.
+"""URDF by libxml2 (lxml): read, checked, changed in place, and parsed to a Pinocchio model.
 
-XML is read once, and changed in a few places; it stays as it stands everywhere else, to the last blank: a parser that
-writes a tree anew loses comments, the order of attributes or the digits of numbers. Of a URDF that nobody has read it
-refuses what urdfdom takes without a word, or needs hours or all memory for: a text that is no XML, deep or wide.
-urdfdom leaves out a link's inertia, without an error, where its mass is written ``3,42`` or is empty; takes a mass of
-−3 kg as it is; and reads past ``<pose>`` or ``<orgin>``. Kinematics or torques are then wrong and nobody is told.
+Comments, the order of attributes and the digits of numbers stay where nothing is changed. Of a URDF that nobody has
+read it refuses what urdfdom takes without a word, or needs hours or all memory for: a text that is no XML, deep or
+wide. urdfdom leaves out a link's inertia, without an error, where its mass is written ``3,42`` or is empty; takes a
+mass of −3 kg as it is; and reads past ``<pose>`` or ``<orgin>``. Kinematics or torques are then wrong and nobody is
+told.
 """
 
 from __future__ import annotations
 
 import contextlib
+import copy
 import difflib
 import os
 import re
 import sys
 import tempfile
 import threading
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import lru_cache
-from typing import TypeAlias
+from typing import Any, NamedTuple, TypeAlias
 from xml.parsers import expat
-from xml.sax.saxutils import quoteattr
 
 import pinocchio as pin
+from lxml import etree
 
 from thermal_robot.arrays import Array
 from thermal_robot.errors import RobotError
 from thermal_robot.kinematics.lie import rotation_to_rpy
 
-Edit: TypeAlias = "tuple[int, int, str]"
-"""First byte, byte behind the last one, and the text in its place; an insertion where the two are the same."""
+Element: TypeAlias = Any
+"""An element of lxml, which has no types."""
 
-_HIDDEN = re.compile(rb"<!--.*?(?:-->|\Z)|<!\[CDATA\[.*?(?:\]\]>|\Z)|<\?.*?\?>", re.DOTALL)
-_START = re.compile(rb"<[^\s/>]+(?:\s+[^\s=>]+\s*=\s*(?:\"[^\"]*\"|'[^']*'))*\s*/?>")
+_HIDDEN = re.compile(r"<!--.*?(?:-->|\Z)|<!\[CDATA\[.*?(?:\]\]>|\Z)|<\?.*?\?>", re.DOTALL)
 _DEEPEST = 100
 """Elements within each other: no robot has more than ten, and urdfdom refuses 500."""
 _MOST_ATTRIBUTES = 100
@@ -41,151 +40,77 @@ _MOST_ATTRIBUTES = 100
 MOST_JOINTS = 1000
 """Joints, fixed ones too: the largest humanoids have 220, and Pinocchio's stack ends between 3000 and 4000."""
 IS_XACRO = "is a xacro file; expand it to URDF first (xacro robot.xacro > robot.urdf)"
-_FOREIGN = {
-    "sdf": "is an SDF file",
-    "mujoco": "is an MJCF file (MuJoCo)",
-    "COLLADA": "is a mesh (COLLADA)",
-}
-_ENCODING = re.compile(rb"(\A\s*<\?xml[^>]*?\sencoding\s*=\s*)(\"[^\"]*\"|'[^']*')")
+_FOREIGN = {"sdf": "is an SDF file", "mujoco": "is an MJCF file (MuJoCo)", "COLLADA": "is a mesh (COLLADA)"}
 
 
-@dataclass(frozen=True)
-class Tag:
-    """An element where it begins.
-
-    ``path``: its name after those of the elements that it stands in, outermost first. ``start``, ``stop``: first byte
-    of its first tag, and the byte behind that. ``close``: first byte of its last tag, ``start`` where it has but one.
-    ``parent``: number of the element that it stands in; -1 for the outermost.
-    """
-
-    path: tuple[str, ...]
-    attributes: Mapping[str, str]
-    start: int
-    stop: int
-    close: int
-    parent: int
-
-    @property
-    def empty(self) -> bool:
-        """Whether it has but one tag."""
-        return self.close == self.start
+def tree(text: str) -> Element:
+    """Parse XML; ``--`` in comments and prefixes that nobody declared, as URDFs in use have, do no harm."""
+    # a text in Python has left its encoding behind, whatever it declares
+    parser = etree.XMLParser(encoding="utf-8", recover=True, resolve_entities=False)
+    return etree.fromstring(text.encode(errors="replace"), parser)
 
 
-def encoded(text: str) -> bytes:
-    """Return the bytes whose places are counted: UTF-8, and a declaration that says so."""
-    return _ENCODING.sub(rb'\1"utf-8"', text.encode(errors="replace"), count=1)
+def text_of(root: Element, before: str, notes: Sequence[str] = ()) -> str:
+    """Write XML, with notes as a comment before its root; declared, as UTF-8, where the text ``before`` was."""
+    parts = [*reversed(list(root.itersiblings(preceding=True))), root, *root.itersiblings()]
+    if notes:  # a comment may hold no two hyphens in succession
+        lines = "\n".join(re.sub(r"-(?=-)", "- ", line) for line in notes).rstrip("-")
+        parts.insert(parts.index(root), etree.Comment(f"\n{lines}\n"))
+    declared = ["<?xml version='1.0' encoding='utf-8'?>"] if before.lstrip().startswith("<?xml") else []
+    return "\n".join([*declared, *(etree.tostring(p, encoding="unicode", with_tail=False) for p in parts), ""])
 
 
-def bare(content: bytes) -> bytes:
-    """Blank comments, raw text and declarations, all else in its place: urdfdom takes ``--`` in a comment, XML not."""
-    return _HIDDEN.sub(lambda span: re.sub(rb"[^\n]", b" ", span[0]), content)
+def unsound(text: str) -> str:
+    """Say what is not XML in a text, in expat's words, but for what :func:`tree` lets pass; else nothing."""
+    try:
+        expat.ParserCreate("utf-8").Parse(_seen(text).encode(errors="replace"), True)
+    except expat.ExpatError as error:
+        return str(error)
+    return ""
+
+
+def _seen(text: str) -> str:
+    """Blank comments, with all else in its place: urdfdom takes ``--`` in a comment, XML does not."""
+    return _HIDDEN.sub(lambda span: re.sub(r"[^\n]", " ", span[0]), text)
 
 
 @lru_cache(maxsize=1)  # a robot is read, checked and cut out of the same text
-def tags(content: bytes, source: str = "") -> tuple[Tag, ...]:
-    """Return the elements in the order in which they begin; comments are not read, so they may hold anything.
+def read(urdf: str, source: str) -> Element:
+    """Parse a URDF that nobody has read, without its comments; the tree is shared and must not be changed.
 
-    With a ``source``, its name in errors, it is a URDF that nobody has read: it is refused if it is empty, no XML,
-    another kind of file, or deeper or wider than any robot. Without, :class:`expat.ExpatError` tells what is no XML.
+    Refused, by the name ``source``, is what is empty, no XML, another kind of file, or deeper or wider than any robot.
     """
-    reader = _Reader(bare(content), source)
-    if source and not content.strip():
-        raise reader.refused("is empty")
-    try:
-        reader.parser.Parse(reader.seen, True)
-    except expat.ExpatError as problem:
-        if not source:
-            raise
-        raise reader.refused(f"is not XML: {problem}") from problem
-    return tuple(reader.found)
+    seen, root, problem = _seen(urdf), None, ""
+    if not seen.strip():
+        raise RobotError(f"{source} is empty", name=source)
+    with contextlib.suppress(etree.XMLSyntaxError):  # whose words are not expat's
+        root = tree(seen)
+    if root is not None:
+        problem = _foreign(root)
+    if not problem and (reason := unsound(urdf)):
+        problem = f"is not XML: {reason}"
+    if problem:
+        raise RobotError(f"{source} {problem}", name=source)
+    return root
 
 
-class _Reader:
-    """What expat calls."""
-
-    def __init__(self, seen: bytes, source: str) -> None:
-        self.seen, self.source = seen, source
-        self.found: list[Tag] = []
-        self.open: list[int] = []
-        self.joints = 0
-        # a text in Python has left its encoding behind, whatever it declares
-        self.parser = expat.ParserCreate("utf-8")
-        self.parser.StartElementHandler, self.parser.EndElementHandler = self.begin, self.finish
-        if source:
-            self.parser.EntityDeclHandler = self.entity
-
-    def refused(self, problem: str) -> RobotError:
-        return RobotError(f"{self.source} {problem}", name=self.source)
-
-    def entity(self, name: str, *_: object) -> None:
-        raise self.refused(
-            f"declares the XML entity {name!r}, which no URDF reader expands; write its text in its place"
-        )
-
-    def begin(self, name: str, attributes: dict[str, str]) -> None:
-        if self.source:
-            self.guard(name, attributes)
-        start = self.parser.CurrentByteIndex
-        tag = _START.match(self.seen, start)
-        parent = self.open[-1] if self.open else -1
-        path = (*(self.found[parent].path if self.open else ()), name)
-        self.open.append(len(self.found))
-        self.found.append(Tag(path, attributes, start, tag.end() if tag else start, start, parent))
-
-    def guard(self, name: str, attributes: dict[str, str]) -> None:
-        # a tag of xacro whose prefix is not declared is left over from an expanded file
-        if name.startswith("xacro:") and self.open and "xmlns:xacro" in self.found[0].attributes:
-            raise self.refused(IS_XACRO)
-        if not self.open and name != "robot":
-            kind = _FOREIGN.get(name, "is XML")
-            raise self.refused(f"{kind} but not a URDF: its root element is <{name}>, expected <robot>")
-        if len(self.open) == _DEEPEST or len(attributes) > _MOST_ATTRIBUTES:
-            what = "elements within each other" if len(self.open) == _DEEPEST else "attributes of one element"
-            raise self.refused(f"has more than 100 {what}, which no URDF has")
-        self.joints += len(self.open) == 1 and name == "joint"
-        if self.joints > MOST_JOINTS:
-            raise self.refused(f"has more than {MOST_JOINTS} joints: cut it to the arm")
-
-    def finish(self, _: str) -> None:
-        number = self.open.pop()
-        tag = self.found[number]
-        if self.seen[tag.stop - 2 : tag.stop] != b"/>":
-            self.found[number] = replace(tag, close=self.parser.CurrentByteIndex)
-
-
-def with_values(content: bytes, tag: Tag, values: Mapping[str, str | None]) -> Edit:
-    """Return the change that gives a tag other attributes; ``None`` takes one away, the others stay as they stand."""
-    text = content[tag.start : tag.stop].decode()
-    for name, value in values.items():
-        known = re.search(rf"\s+{re.escape(name)}\s*=\s*(?:\"[^\"]*\"|'[^']*')", text)
-        said = "" if value is None else f' {name}="{value}"'
-        if known:
-            text = text[: known.start()] + said + text[known.end() :]
-        elif said:
-            end = re.search(r"\s*/?>\Z", text)
-            at = end.start() if end else len(text)
-            text = text[:at] + said + text[at:]
-    return tag.start, tag.stop, text
-
-
-def changed(content: bytes, edits: Iterable[Edit]) -> str:
-    """Return the text with all changes, which do not overlap; those of one place in their order."""
-    parts, last = [], 0
-    for start, stop, text in sorted(edits, key=lambda edit: edit[:2]):
-        parts += [content[last:start], text.encode()]
-        last = stop
-    return b"".join([*parts, content[last:]]).decode()
-
-
-def comment(lines: Iterable[str]) -> str:
-    """Return lines as an XML comment, which may hold no two hyphens in succession."""
-    return "<!--\n" + "\n".join(re.sub(r"-(?=-)", "- ", line) for line in lines).rstrip("-") + "\n-->\n"
-
-
-def indent(content: bytes, start: int) -> str:
-    """Return the blanks before a place in its line, as text that begins a new line there."""
-    before = content[content.rfind(b"\n", 0, start) + 1 : start]
-    return "\n" + before.decode() if not before.strip() else ""
+def _foreign(root: Element) -> str:
+    """Say what no URDF has: entities, another root, tags of xacro, more of anything than a robot."""
+    declared = root.getroottree().docinfo.internalDTD
+    for entity in () if declared is None else declared.entities():
+        return f"declares the XML entity {entity.name!r}, which no URDF reader expands; write its text in its place"
+    if root.tag != "robot":
+        return f"{_FOREIGN.get(root.tag, 'is XML')} but not a URDF: its root element is <{root.tag}>, expected <robot>"
+    # a tag of xacro whose prefix is not declared is left over from an expanded file
+    if "xacro" in root.nsmap and any(element.prefix == "xacro" for element in root.iter()):
+        return IS_XACRO
+    for what, found in (
+        (f"{_DEEPEST} elements within each other", f"//*[count(ancestor::*) = {_DEEPEST}]"),
+        (f"{_MOST_ATTRIBUTES} attributes of one element", f"//*[count(@*) > {_MOST_ATTRIBUTES}]"),
+    ):
+        if root.xpath(found):
+            return f"has more than {what}, which no URDF has"
+    return f"has more than {MOST_JOINTS} joints: cut it to the arm" if len(root.findall("joint")) > MOST_JOINTS else ""
 
 
 # Redirecting the process's output streams is global: one thread at a time.
@@ -196,28 +121,21 @@ _STREAMS = threading.Lock()
 def parse_urdf(urdf: str, source: str) -> pin.Model:
     """Build the Pinocchio model of a whole URDF, or say why ``source`` is none; meshes are not read."""
     said: list[str] = []
-    content = bare(encoded(urdf))
-    whole = with_limits(content, tags(content, source))
+    root = copy.deepcopy(read(urdf, source))
+    for joint in root.iterfind("joint"):
+        # urdfdom asks for limits that nobody here uses; bounds of 0 and 0 stand for none
+        limit = joint.find("limit")
+        limit = etree.SubElement(joint, "limit") if limit is None else limit
+        for name in ("effort", "velocity"):
+            limit.set(name, limit.get(name, "0"))
     try:
         with _quiet(said):
-            return pin.buildModelFromXML(whole)
+            return pin.buildModelFromXML(etree.tostring(root, encoding="unicode"))
     except (ValueError, RuntimeError) as error:
         reasons = re.findall(r"Error:\s+(.*)", "".join(said))
-        why = IS_XACRO if b"<xacro:" in content else f"is not a valid URDF: {reasons[0] if reasons else error}"
+        left = any(str(element.tag).startswith("xacro:") for element in root.iter())
+        why = IS_XACRO if left else f"is not a valid URDF: {reasons[0] if reasons else error}"
         raise RobotError(f"{source} {why}", name=source) from error
-
-
-def with_limits(content: bytes, found: Sequence[Tag]) -> str:
-    """Give each joint the limits that urdfdom asks for and nobody here uses; bounds of 0 and 0 stand for none."""
-    limits = {t.parent: t for t in found if t.path == ("robot", "joint", "limit")}
-    edits: list[Edit] = []
-    for number, tag in enumerate(found):
-        if tag.path == ("robot", "joint") and number not in limits:
-            edits.append((tag.close, tag.close, '<limit effort="0" velocity="0"/>'))
-    for tag in limits.values():
-        more = "".join(f' {name}="0"' for name in ("effort", "velocity") if name not in tag.attributes)
-        edits.append((tag.start + len("<limit"), tag.start + len("<limit"), more))
-    return changed(content, edits).lstrip()
 
 
 def nearest(name: str, known: Iterable[str]) -> tuple[str, ...]:
@@ -261,28 +179,43 @@ process at 1000. A mobile robot with two arms and hands has 101."""
 _ALIKE = 0.7
 """Likeness (0..1, by :mod:`difflib`) from which a word is taken for a typing error of one that URDF knows: ``orgin``
 for ``origin`` has 0.91, ``axes`` for ``axis`` 0.75; extensions in use (``contact``, ``hardware``) stay below 0.6."""
-_THREE = "three numbers"
 _MOVABLE = ("revolute", "continuous", "prismatic")
 _FREEDOMS = {**dict.fromkeys(_MOVABLE, 1), "planar": 3, "floating": 6}
-_INERTIAS = ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 _HARMLESS = ("calibration", "dynamics", "safety_controller", "visual", "collision")
-_ELEMENTS: dict[tuple[str, ...], tuple[str, ...]] = {
-    (): ("link", "joint"),
-    ("joint",): ("origin", "parent", "child", "axis", "limit", "mimic"),
-    ("link",): ("inertial",),
-    ("link", "inertial"): ("origin", "mass", "inertia"),
+_ELEMENTS = {
+    "": ("link", "joint"),
+    "joint": ("origin", "parent", "child", "axis", "limit", "mimic"),
+    "link": ("inertial",),
+    "link/inertial": ("origin", "mass", "inertia"),
 }
 """Elements that say where things are and what they weigh, by what they stand in; others of any name are let pass."""
-_ATTRIBUTES = {
-    "origin": ("xyz", "rpy"),
-    "axis": ("xyz",),
-    "limit": ("lower", "upper", "effort", "velocity"),
-    "mimic": ("joint", "multiplier", "offset"),
-    "parent": ("link",),
-    "child": ("link",),
-    "mass": ("value",),
-    "inertia": _INERTIAS,
+
+
+class _Figures(NamedTuple):
+    """What stands in an attribute: its name to a user, what is expected there, how many figures, none larger."""
+
+    what: str
+    expected: str
+    many: int = 1
+    most: float = _LARGEST
+
+
+_INERTIA = {
+    name: _Figures(f"inertia {name}", "a number of kg·m²") for name in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")
 }
+_LIMIT = {name: _Figures(f"limit {name}", "a number", most=_NO_LIMIT) for name in ("lower", "upper")}
+_ATTRIBUTES: dict[str, dict[str, _Figures | None]] = {
+    "origin": {"xyz": _Figures("origin", "three numbers, m", 3), "rpy": _Figures("origin", "three numbers, rad", 3)},
+    "axis": {"xyz": _Figures("axis", "three numbers that are not all zero", 3)},
+    "limit": {**_LIMIT, "effort": None, "velocity": None},
+    "mimic": {"joint": None, **{n: _Figures(f"mimic {n}", "a number") for n in ("multiplier", "offset")}},
+    "parent": {"link": None},
+    "child": {"link": None},
+    "mass": {"value": _Figures("mass", "a number of kg that is not negative")},
+    # the sign of an inertia plays no part in statics, and exporters write −5e-20 for nothing
+    "inertia": {n: _Figures(f"inertia {n}", "a number of kg·m²") for n in ("ixx", "ixy", "ixz", "iyy", "iyz", "izz")},
+}
+"""Attributes of these elements, with what is asked of their figures."""
 _MEANT = {
     **dict.fromkeys(("pose", "transform", "frame", "position", "translation", "rotation", "xyz", "rpy"), "origin"),
     **dict.fromkeys(("min", "max", "range", "bounds"), "limit"),
@@ -292,8 +225,8 @@ _MEANT = {
 }
 """Elements of other formats, and what says the same in a URDF."""
 _MEANT_OF_LIMIT = {"min": "lower", "low": "lower", "max": "upper", "high": "upper"}
-
-Attributes = Mapping[str, str]
+_ONCE = {"link/inertial", "link/inertial/mass", *(f"joint/{name}" for name in _ELEMENTS["joint"])}
+"""Elements of which urdfdom reads the first alone."""
 
 
 @lru_cache(maxsize=1)
@@ -302,64 +235,61 @@ def require_numbers(urdf: str, source: str) -> None:
 
     The error names the link or joint, what stands there, and what is meant or expected; or says why it is no URDF.
     """
-    content = bare(encoded(urdf))
-    found = tags(content, source)
-    inside: dict[int, list[Tag]] = {}
-    owner, freedoms = 0, 0
-    for number, tag in enumerate(found[1:], start=1):
-        if len(tag.path) == 2:
-            owner = number
-        inside.setdefault(owner, []).append(tag)
-    for first, *others in inside.values():
-        kind, name = first.path[1], first.attributes.get("name", "")
-        problem = next(_problems(content, first, others), "")
+    freedoms = 0
+    for owner in read(urdf, source).iterchildren("*"):
+        kind, name = owner.tag, owner.get("name", "")
+        problem = next(_problems(owner), "")
         if problem:
-            known = f"{kind} {_short(name)}" if kind in _ELEMENTS[()] else "it"
+            known = f"{kind} {_short(name)}" if kind in _ELEMENTS[""] else "it"
             raise RobotError(f"{source}: {known}{problem}", name=name)
-        freedoms += _FREEDOMS.get(first.attributes.get("type", ""), 0) if kind == "joint" else 0
+        freedoms += _FREEDOMS.get(owner.get("type", ""), 0) if kind == "joint" else 0
     if freedoms > MOST_MOVING:
         raise RobotError(f"{source} has {freedoms} joints that move, expected at most {MOST_MOVING}: cut it to the arm")
 
 
-def _problems(content: bytes, first: Tag, others: Sequence[Tag]) -> Iterator[str]:
+def _walk(element: Element, place: str) -> Iterator[tuple[str, Element]]:
+    """Yield an element and all in it, each with the path of what it stands in below the robot."""
+    yield place, element
+    for child in element.iterchildren("*"):
+        yield from _walk(child, f"{place}/{element.tag}".lstrip("/"))
+
+
+def _problems(owner: Element) -> Iterator[str]:
     """Say what is wrong with a link or a joint, one thing after the other."""
-    kind, seen = first.attributes.get("type", ""), set()
-    yield from _unknown((), first)
-    for tag in (first, *others):
-        path = tag.path[1:]
+    seen, name = set(), owner.get("name", "")
+    if owner.tag == "joint" and (not name or name != name.strip()):
+        yield ": expected a name without blanks around it"  # a table's column has none
+    for place, element in _walk(owner, ""):
+        path = f"{place}/{element.tag}".lstrip("/")
         if path in _ONCE and path in seen:
-            yield f": there are two <{path[-1]}>, expected one"
+            yield f": there are two <{element.tag}>, expected one"
         seen.add(path)
-        yield from _unknown(path[:-1], tag) if path[1:] else ()
-        if path[:-1] in _ELEMENTS and path[-1] in _ATTRIBUTES:
-            yield from _unread(content, tag)
-        problem = _CHECKS[path](tag.attributes, kind) if path in _CHECKS else ""
-        if problem:
-            yield f": {problem}"
-    if ("link", "inertial") in seen and ("link", "inertial", "mass") not in seen:
+        yield from _unknown(place, element)
+        if element.tag in _ELEMENTS.get(place, ()) and element.tag in _ATTRIBUTES:
+            yield from _unread(element)
+            yield from (f": {problem}" for problem in _wrong(element, owner.get("type", "")))
+    if "link/inertial" in seen and "link/inertial/mass" not in seen:
         yield ": its <inertial> has no <mass>, expected one"
 
 
-def _unknown(place: tuple[str, ...], tag: Tag) -> Iterator[str]:
+def _unknown(place: str, element: Element) -> Iterator[str]:
     """Say which element is meant by one that URDF does not know, where it would place or move something."""
-    name = tag.path[-1]
-    known = _ELEMENTS.get(place)
-    if known is None or ":" in name or name in (*known, *_HARMLESS):
+    name, known = element.tag, _ELEMENTS.get(place)
+    if known is None or ":" in name or element.prefix or name in (*known, *_HARMLESS):
         return
-    meant = _MEANT.get(name.lower()) if place in (("joint",), ("link",)) else None
+    meant = _MEANT.get(name.lower()) if place in ("joint", "link") else None
     meant = meant if meant in known else _alike(name, known)
-    if not meant and place == ("joint",) and {"xyz", "rpy"} & set(tag.attributes):
+    if not meant and place == "joint" and {"xyz", "rpy"} & set(element.attrib):
         meant = "origin"
     if meant:
         yield f" has a <{name}>, which URDF does not know: is <{meant}> meant?"
 
 
-def _unread(content: bytes, tag: Tag) -> Iterator[str]:
+def _unread(element: Element) -> Iterator[str]:
     """Say what is written in an element that URDF does not read there."""
-    name = tag.path[-1]
-    known = _ATTRIBUTES[name]
-    for key, value in tag.attributes.items():
-        if key in known or ":" in key:
+    name, known = element.tag, list(_ATTRIBUTES[element.tag])
+    for key, value in element.attrib.items():
+        if key in known or ":" in key or key.startswith("{"):
             continue
         if name == "limit":
             meant = _MEANT_OF_LIMIT.get(key.lower()) or _alike(key, known[:2])
@@ -368,89 +298,40 @@ def _unread(content: bytes, tag: Tag) -> Iterator[str]:
             meant = _alike(key, known) or (" or ".join(known) if figures else "")
         if meant:
             yield f" has {key}={_short(value)} in its <{name}>, which URDF does not know: is {meant} meant?"
-    text = content[tag.stop : max(tag.close, tag.stop)].decode().strip()
-    if text:
-        yield f": its <{name}> holds {_short(text)}, expected attributes, as <{name} {known[0]}=…/>"
+    text = (element.text or "") + "".join(etree.tostring(child, encoding="unicode") for child in element)
+    if text.strip():
+        yield f": its <{name}> holds {_short(text.strip())}, expected attributes, as <{name} {known[0]}=…/>"
 
 
 def _alike(name: str, known: Iterable[str]) -> str:
     return next(iter(difflib.get_close_matches(name.lower(), list(known), n=1, cutoff=_ALIKE)), "")
 
 
-def _joint(attributes: Attributes, _: str) -> str:
-    name = attributes.get("name", "")
-    # a table's column has no blanks around its name
-    return "" if name and name == name.strip() else "expected a name without blanks around it"
-
-
-def _mass(attributes: Attributes, _: str) -> str:
-    if "value" not in attributes:
-        return "its <mass> has no value, expected a number of kg"
-    return _wrong(attributes, "value", "mass", "a number of kg that is not negative", 1, lambda m: m[0] >= 0.0)
-
-
-def _axis(attributes: Attributes, kind: str) -> str:
-    if kind in _MOVABLE and "xyz" not in attributes:
-        return f"its <axis> has no xyz, expected {_THREE}"
-    expected = f"{_THREE} that are not all zero"
-    return _wrong(attributes, "xyz", "axis", expected, 3, lambda v: any(v) or kind not in _MOVABLE)
-
-
-def _limit(attributes: Attributes, kind: str) -> str:
-    if kind not in ("revolute", "prismatic"):
-        return ""
-    for name in ("lower", "upper"):
-        if problem := _wrong(attributes, name, f"limit {name}", "a number", 1, most=_NO_LIMIT):
-            return problem
-    low, high = float(attributes.get("lower", "0")), float(attributes.get("upper", "0"))
-    return f"its limits are {low:g} and {high:g}, expected the lower one first" if low > high else ""
-
-
-def _each(*checks: tuple[str, str, str, int]) -> Callable[[Attributes, str], str]:
-    """Check several attributes alike; the first that is wrong is told."""
-    return lambda attributes, _: next(filter(None, (_wrong(attributes, *check) for check in checks)), "")
-
-
-_origin = _each(("xyz", "origin", f"{_THREE}, m", 3), ("rpy", "origin", f"{_THREE}, rad", 3))
-_CHECKS: dict[tuple[str, ...], Callable[[Attributes, str], str]] = {
-    ("link", "inertial", "mass"): _mass,
-    # its sign plays no part in statics, and exporters write −5e-20 for nothing
-    ("link", "inertial", "inertia"): _each(*((name, f"inertia {name}", "a number of kg·m²", 1) for name in _INERTIAS)),
-    ("link", "inertial", "origin"): _origin,
-    ("joint",): _joint,
-    ("joint", "origin"): _origin,
-    ("joint", "axis"): _axis,
-    ("joint", "mimic"): _each(*((name, f"mimic {name}", "a number", 1) for name in ("multiplier", "offset"))),
-    ("joint", "limit"): _limit,
-}
-_ONCE = {
-    ("link", "inertial"),
-    ("link", "inertial", "mass"),
-    *(("joint", part) for part in ("origin", "parent", "child", "axis", "limit", "mimic")),
-}
-"""Elements of which urdfdom reads the first alone."""
-
-
-def _wrong(
-    attributes: Attributes,
-    name: str,
-    what: str,
-    expected: str,
-    count: int,
-    holds: Callable[[list[float]], bool] = lambda _: True,
-    *,
-    most: float = _LARGEST,
-) -> str:
-    """Return what is wrong with an attribute; empty where it is right, or absent and so its default."""
-    text = attributes.get(name)
-    if text is None:
-        return ""
-    words = text.split()
-    if len(words) == count and all(_NUMBER.fullmatch(word) for word in words):
-        values = [float(word) for word in words]
-        if all(abs(value) <= most for value in values) and holds(values):
-            return ""
-    return f"{what} is {_short(text)}, expected {expected}"
+def _wrong(element: Element, kind: str) -> Iterator[str]:
+    """Say which figures of an element are none, or impossible; ``kind`` is that of its joint."""
+    name, found = element.tag, {}
+    if name == "mass" and "value" not in element.attrib:
+        yield "its <mass> has no value, expected a number of kg"
+    if name == "axis" and "xyz" not in element.attrib and kind in _MOVABLE:
+        yield "its <axis> has no xyz, expected three numbers"
+    if name == "limit" and kind not in ("revolute", "prismatic"):
+        return
+    for key, figures in _ATTRIBUTES[name].items():
+        if figures is None or key not in element.attrib:
+            continue
+        words = element.get(key).split()
+        values = [float(word) for word in words if _NUMBER.fullmatch(word)]
+        found[key] = values
+        sound = len(values) == len(words) == figures.many and all(abs(value) <= figures.most for value in values)
+        nothing = (name == "mass" and min(values, default=0.0) < 0.0) or (
+            name == "axis" and kind in _MOVABLE and not any(values)
+        )
+        if not sound or nothing:
+            yield f"{figures.what} is {_short(element.get(key))}, expected {figures.expected}"
+    if name == "limit":
+        (low,), (high,) = found.get("lower", [0.0]), found.get("upper", [0.0])
+        if low > high:
+            yield f"its limits are {low:g} and {high:g}, expected the lower one first"
 
 
 def _short(text: str, most: int = 60) -> str:
@@ -470,61 +351,42 @@ def rewritten(
     joint has the link's name and ``_joint``. A link that is carried so already is placed anew; it must have no other's
     name.
     """
-    content = encoded(urdf)
-    found = tags(content)
-    robot = found[0]
-    joints = {t.attributes.get("name", ""): k for k, t in enumerate(found) if t.path == ("robot", "joint")}
-    edits: list[Edit] = [(robot.start, robot.start, comment(notes))] if notes else []
-    placed, more = dict(origins), ""
+    root, placed = tree(urdf), dict(origins)
+    joints = {joint.get("name", ""): joint for joint in root.iterfind("joint")}
     for link, (parent, pose) in (links or {}).items():
-        joint = f"{link}_joint"
-        if _is_carried(found, joints.get(joint), link, parent):
-            placed[joint] = pose
+        name = f"{link}_joint"
+        placed[name] = pose
+        if _carries(joints.get(name), link, parent):
             continue
-        _require_new(found, link, joint)
-        ends = f"<parent link={quoteattr(parent)}/><child link={quoteattr(link)}/>"
-        made = f'<joint name={quoteattr(joint)} type="fixed">{ends}{_origin_tag(pose)}</joint>'
-        more += f"  <link name={quoteattr(link)}/>\n  {made}\n"
-    edits += [(robot.close, robot.close, more)] if more else []
+        for kind, new in (("link", link), ("joint", name)):
+            if any(element.get("name") == new for element in root.iterfind(kind)):
+                raise RobotError(f"the robot has a {kind} {new!r} already, which would be added: rename it", name=new)
+        etree.SubElement(root, "link", name=link)
+        joints[name] = etree.SubElement(root, "joint", name=name, type="fixed")
+        etree.SubElement(joints[name], "parent", link=parent)
+        etree.SubElement(joints[name], "child", link=link)
     for name, pose in placed.items():
         if name not in joints:
             raise RobotError(f"there is no joint {name!r} to be placed", name=name)
-        edits.append(_placed(content, found, joints[name], pose))
-    return changed(content, edits)
+        origin = joints[name].find("origin")
+        if origin is None:
+            origin = etree.Element("origin")
+            joints[name].insert(0, origin)
+        for key, value in zip(("xyz", "rpy"), xyz_rpy(pose), strict=True):
+            origin.set(key, value)
+    return text_of(root, urdf, notes)
+
+
+def _carries(joint: Element | None, link: str, parent: str) -> bool:
+    """Tell whether this is a fixed joint by which the parent carries the link already."""
+    if joint is None or joint.get("type") != "fixed":
+        return False
+    return [end.get("link") for name in ("parent", "child") for end in joint.iterfind(name)] == [parent, link]
 
 
 def xyz_rpy(pose: Array) -> tuple[str, str]:
     """Return the translation (m) and the roll, pitch and yaw (rad) of a (4, 4) pose with all digits, as URDFs do."""
-    return tuple(  # type: ignore[return-value]
+    xyz, rpy = (
         " ".join(repr(float(value)) for value in values) for values in (pose[:3, 3], rotation_to_rpy(pose[:3, :3]))
     )
-
-
-def _origin_tag(pose: Array) -> str:
-    xyz, rpy = xyz_rpy(pose)
-    return f'<origin xyz="{xyz}" rpy="{rpy}"/>'
-
-
-def _placed(content: bytes, found: Sequence[Tag], joint: int, pose: Array) -> Edit:
-    """Return the change that gives a joint an origin, in the tag that it has or in one of its own."""
-    inside = [t for t in found if t.parent == joint]
-    own = next((t for t in inside if t.path[-1] == "origin"), None)
-    if own is None:
-        first = inside[0].start
-        return first, first, _origin_tag(pose) + indent(content, first)
-    xyz, rpy = xyz_rpy(pose)
-    return with_values(content, own, {"xyz": xyz, "rpy": rpy})
-
-
-def _is_carried(found: Sequence[Tag], joint: int | None, link: str, parent: str) -> bool:
-    """Tell whether a fixed joint of this number carries the link on its parent already."""
-    if joint is None or found[joint].attributes.get("type") != "fixed":
-        return False
-    ends = {t.path[-1]: t.attributes.get("link") for t in found if t.parent == joint}
-    return (ends.get("parent"), ends.get("child")) == (parent, link)
-
-
-def _require_new(found: Sequence[Tag], link: str, joint: str) -> None:
-    for kind, name in (("link", link), ("joint", joint)):
-        if any(t.path == ("robot", kind) and t.attributes.get("name") == name for t in found):
-            raise RobotError(f"the robot has a {kind} {name!r} already, which would be added: rename it", name=name)
+    return xyz, rpy

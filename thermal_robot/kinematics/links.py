@@ -1,0 +1,95 @@
+"""How segments grow (Kluz et al. 2018, Eqs 6–11: virtual prismatic joints), and the poses of all links."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pinocchio as pin
+from numpy.typing import ArrayLike
+
+from thermal_robot.arrays import Array
+from thermal_robot.errors import RobotError
+from thermal_robot.kinematics.frames import as_rows, chain_frames
+from thermal_robot.kinematics.lanes import ChainFrames
+
+if TYPE_CHECKING:
+    from thermal_robot.robot import Robot
+
+
+def growing(robot: Robot) -> tuple[int, ...]:
+    """Return which of the robot's segments have a length along which they can grow; S of them, from the root on."""
+    return tuple(s for s, segment in enumerate(robot.segments) if np.any(segment.direction))
+
+
+def elongation_jacobian(robot: Robot, q: ArrayLike, *, rows: int = 3, frames: ChainFrames | None = None) -> Array:
+    """Jacobian of the tool's place, in root axes, by the elongation of each segment with a length (Eqs 6–11).
+
+    The columns are unit vectors: the directions of the segments. They are the same for every point of the tool, and
+    an elongation turns nothing, so that the displacement is linear in the elongations, not only to first order.
+
+    Parameters
+    ----------
+    robot
+        The robot.
+    q
+        (N, n) rad or m; (n,) counts as one configuration.
+    rows
+        3 for the position alone, 6 for the twist (linear first; its angular rows are zero).
+    frames
+        From :func:`~thermal_robot.kinematics.chain_frames`, to save computing them again or to differentiate a
+        displaced chain.
+
+    Returns
+    -------
+    ndarray
+        (N, rows, S) m/m; S segments as by :func:`growing`.
+
+    Raises
+    ------
+    RobotError
+        If ``q`` does not have the shape that the robot asks for, or ``rows`` is neither 3 nor 6.
+    """
+    if rows not in (3, 6):
+        raise RobotError(f"an elongation Jacobian has 3 or 6 rows, not {rows}", name=robot.name)
+    frames = chain_frames(robot, as_rows(robot, q)) if frames is None else frames
+    chosen = [robot.segments[s] for s in growing(robot)]
+    out = np.zeros((len(frames.tool_position), rows, len(chosen)))
+    for column, segment in enumerate(chosen):
+        out[:, :3, column] = frames.rotations[:, segment.index] @ segment.direction
+    return out
+
+
+def link_poses(robot: Robot, q: ArrayLike) -> Array:
+    """Forward kinematics of every link of the URDF in the root frame, by Pinocchio, row after row.
+
+    Parameters
+    ----------
+    robot
+        The robot; joints beside its chain stand where they are held.
+    q
+        (N, n) rad or m; (n,) counts as one configuration.
+
+    Returns
+    -------
+    ndarray
+        (N, L, 4, 4) homogeneous matrices, lengths in m, in the order of ``robot.urdf_links``.
+    """
+    model, data = robot.model, robot.model.createData()
+    frames = [model.getFrameId(link, pin.FrameType.BODY) for link in robot.urdf_links]
+    root = frames[robot.urdf_links.index(robot.root_frame)]
+    configurations = to_pinocchio(robot, q)
+    poses = np.empty((len(configurations), len(frames), 4, 4))
+    for i, configuration in enumerate(configurations):
+        pin.framesForwardKinematics(model, data, configuration)
+        poses[i] = [data.oMf[root].actInv(data.oMf[frame]).homogeneous for frame in frames]
+    return poses
+
+
+def to_pinocchio(robot: Robot, q: ArrayLike) -> Array:
+    """Write (N, n) configurations as Pinocchio does, (N, nq): mimicking ones too, continuous as cosine and sine."""
+    rows = robot.chain.coupling.positions(np.atleast_2d(np.asarray(q, dtype=float)))
+    columns = []
+    for joint, position in zip(list(robot.model.joints)[1:], rows.T, strict=True):
+        columns += [np.cos(position), np.sin(position)] if joint.nq == 2 else [position]
+    return np.column_stack(columns)
