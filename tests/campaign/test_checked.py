@@ -10,7 +10,7 @@ import pytest
 
 from thermal_robot import diagnose
 from thermal_robot.campaign import Campaign
-from thermal_robot.campaign.checked import checked_array, checked_noise
+from thermal_robot.campaign.checked import checked_array
 from thermal_robot.datasets import demo_campaign
 from thermal_robot.errors import CampaignError
 
@@ -70,7 +70,6 @@ def test_lists_and_other_kinds_of_number_are_taken(campaign: Campaign) -> None:
     again = replace(campaign, q=campaign.q.tolist(), noise_position=np.float32(0.5), noise_orientation=0)
     np.testing.assert_array_equal(again.q, campaign.q)
     assert (again.noise_position, again.noise_orientation) == (0.5, None)
-    assert checked_noise("<c>", "noise", None) is None
 
 
 def test_the_callers_array_stays_writable() -> None:

@@ -15,7 +15,8 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.distance import cdist
 
-from thermal_robot.campaign.campaign import Campaign, FloatArray
+from thermal_robot.arrays import Array
+from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.names import CLOCK, axes_of, listed
 from thermal_robot.campaign.names import POSITION as XYZ
 from thermal_robot.campaign.table import told_rows
@@ -52,26 +53,20 @@ def marks(campaign: Campaign) -> tuple[Mask, list[str]]:
     sentences
         One for each figure, with its rows.
     """
+    places = [] if campaign.position is None else [(XYZ, campaign.position)]
+    if campaign.targets is not None:
+        axes = map(axes_of, campaign.targets.numbers)
+        places = list(zip(axes, campaign.targets.points.swapaxes(0, 1), strict=True))
     rows, sentences = np.zeros(campaign.samples, dtype=bool), []
-    for names, points in _places(campaign):
+    for names, points in places if campaign.samples >= FEWEST_ROWS else []:
         for found, sentence in _of_points(campaign, names, points):
             rows |= found
             sentences.append(sentence)
     return rows, sentences
 
 
-def _places(campaign: Campaign) -> Iterator[tuple[tuple[str, ...], FloatArray]]:
-    """Yield the columns of each target, and its places (N, 3), m; NaN where it was not seen."""
-    if campaign.samples < FEWEST_ROWS or campaign.position is None:
-        return
-    if campaign.targets is None:
-        yield XYZ, campaign.position
-    else:
-        for k, number in enumerate(campaign.targets.numbers):
-            yield axes_of(number), campaign.targets.points[:, k]
-
-
-def _of_points(campaign: Campaign, names: tuple[str, ...], points: FloatArray) -> Iterator[tuple[Mask, str]]:
+def _of_points(campaign: Campaign, names: tuple[str, ...], points: Array) -> Iterator[tuple[Mask, str]]:
+    """Yield the rows of each mark and a sentence, of the places (N, 3) in some columns, m; NaN where none was seen."""
     q, scale = campaign.q, campaign.units.length_scale
     seen = np.asarray(np.isfinite(points).all(axis=1))
     places, figures = _equal(q, points, seen), [_equal(q, points[:, k], seen) for k in range(3)]
@@ -93,7 +88,7 @@ def _of_points(campaign: Campaign, names: tuple[str, ...], points: FloatArray) -
                 yield rows, f"{name} is {told_by}: a mark of a missing value?"
 
 
-def _equal(q: FloatArray, values: FloatArray, seen: Mask) -> list[Mask]:
+def _equal(q: Array, values: Array, seen: Mask) -> list[Mask]:
     """Return the rows of each value that stands with several commands, the most frequent first."""
     _, group, counts = np.unique(values[seen], axis=0, return_inverse=True, return_counts=True)
     groups = np.full(len(seen), -1)
@@ -102,18 +97,18 @@ def _equal(q: FloatArray, values: FloatArray, seen: Mask) -> list[Mask]:
     return [rows for rows in several if _moved(q, rows)]
 
 
-def _moved(q: FloatArray, rows: Mask) -> bool:
+def _moved(q: Array, rows: Mask) -> bool:
     """Tell whether rows have different commands."""
     return bool(rows.sum() > 1 and np.ptp(q[rows], axis=0).max() > SAME_COMMAND)
 
 
-def _astray(away: FloatArray, rows: Mask, seen: Mask, times: float) -> bool:
+def _astray(away: Array, rows: Mask, seen: Mask, times: float) -> bool:
     """Tell whether rows are farther from the regression than the others, and a minority."""
     others = seen & ~rows
     return bool(rows.sum() < others.sum() and np.median(away[rows]) > times * np.median(away[others]))
 
 
-def _away(campaign: Campaign, points: FloatArray, seen: Mask) -> FloatArray:
+def _away(campaign: Campaign, points: Array, seen: Mask) -> Array:
     """(N, 3) distance of each coordinate from its regression on the nominal poses (least absolute deviations)."""
     poses = tool_poses(campaign.robot, campaign.q)
     known = [np.ones((len(poses), 1)), poses[:, :3, 3], poses[:, :3, :3].reshape(-1, 9)]
@@ -183,7 +178,7 @@ def _by_chance(campaign: Campaign) -> float:
     return float(alike * (counts * (counts - 1) / 2).sum())
 
 
-def step_of(values: FloatArray) -> float:
+def step_of(values: Array) -> float:
     """Return the largest power of ten, 1000 at most, of which all figures are multiples; 0 where there is none."""
     for power in range(3, -7, -1):
         parts = values * 10.0**-power
@@ -255,23 +250,17 @@ def doubts(campaign: Campaign) -> list[str]:
     """Return the sentences, none for an ordinary campaign."""
     marked, lost = marks(campaign)
     seen = campaign.take(~marked) if marked.any() else campaign
+    checks = (_limits, _time, _speed, _pose_labels, _temperature, _payload, _noise, _slides)
     return [
         *_beside(campaign),
         *lost,
         *doubled(campaign),
         *_angle_unit(campaign),
         *([*_length_unit(seen)] or _apart(seen)),
-        *_limits(campaign),
-        *_time(campaign),
-        *_speed(campaign),
-        *_pose_labels(campaign),
-        *_temperature(campaign),
-        *_payload(campaign),
-        *_noise(campaign),
-        *_slides(campaign),
+        *(sentence for check in checks for sentence in check(campaign)),
         *_rounded(seen),
-        *_grid(campaign, _reach(campaign)),
-        *_simulator(campaign, _reach(campaign)),
+        *_grid(campaign),
+        *_simulator(campaign),
     ]
 
 
@@ -280,28 +269,26 @@ def _beside(campaign: Campaign) -> Iterator[str]:
     robot = campaign.robot
     for joint in (name for name in robot.joint_names if name not in robot.chain.names):
         led = [segment.name for segment in robot.segments if segment.joint == joint]
-        follow = (
-            f"joint {led[0]!r} of the chain mimics" if len(led) == 1 else f"joints {listed(led)} of the chain mimic"
-        )
-        yield f"{follow} {joint!r}, which is outside the chain: its column is read"
+        word, verb = ("joint", "mimics") if len(led) == 1 else ("joints", "mimic")
+        yield f"{word} {listed(led)} of the chain {verb} {joint!r}, which is outside the chain: its column is read"
 
 
 def _angle_unit(campaign: Campaign) -> Iterator[str]:
     robot, units = campaign.robot, campaign.units
-    turning = np.array([kind != "prismatic" for kind in robot.joint_types])
-    values = np.abs(campaign.q[:, turning])
+    turning = np.flatnonzero([kind != "prismatic" for kind in robot.joint_types])
+    values = campaign.q[:, turning]
     if not values.size:
         return
-    if units.angle == "rad" and values.max() > 2 * math.pi * MOST_TURNS:
-        row, joint = np.unravel_index(int(values.argmax()), values.shape)
-        name = np.array(robot.joint_names)[turning][joint]
+    most = float(np.abs(values).max())
+    if units.angle == "rad" and most > 2 * math.pi * MOST_TURNS:
+        row, joint = np.unravel_index(int(np.abs(values).argmax()), values.shape)
         yield (
-            f"joint {str(name)!r} is commanded to {campaign.q[:, turning][row, joint]:.6g} rad in row "
+            f"joint {robot.joint_names[turning[joint]]!r} is commanded to {values[row, joint]:.6g} rad in row "
             f'{campaign.rows[row]}, more than two turns: is angle_unit = "deg" meant?'
         )
-    small = values.max() <= math.radians(LEAST_ANGLE)
-    if units.angle == "deg" and campaign.samples >= FEWEST_COMMANDS and small and np.ptp(values) > 0:
-        yield f'no joint leaves ±{values.max() / units.angle_scale:.3g} degrees: is angle_unit = "rad" meant?'
+    small = most <= math.radians(LEAST_ANGLE)
+    if units.angle == "deg" and campaign.samples >= FEWEST_COMMANDS and small and np.ptp(np.abs(values)) > 0:
+        yield f'no joint leaves ±{most / units.angle_scale:.3g} degrees: is angle_unit = "rad" meant?'
 
 
 def _reach(campaign: Campaign) -> float:
@@ -349,15 +336,13 @@ def in_another_unit(factor: float) -> str:
 
 def _length_unit(campaign: Campaign) -> Iterator[str]:
     """Compare lengths with the arm's reach: a wrong unit is wrong by a thousand, so coarse bounds do."""
-    robot, unit = campaign.robot, campaign.units.length
-    reach = _reach(campaign)
-    factor = another_unit(campaign)
+    robot, reach, factor = campaign.robot, _reach(campaign), another_unit(campaign)
     if factor is not None:
         yield f"{in_another_unit(factor)}, {reach:.3g} m together"
         return
     if not np.isfinite(reach):
         return
-    ask = f'the arm reaches {reach:.3g} m: is length_unit = "{unit}" right?'
+    ask = f'the arm reaches {reach:.3g} m: is length_unit = "{campaign.units.length}" right?'
     target = float(np.linalg.norm(campaign.target))
     if target > FARTHEST_TARGET * reach:
         yield f"the target lies {target:.3g} m away from {robot.tool_frame!r} and {ask}"
@@ -401,19 +386,18 @@ def _apart(campaign: Campaign) -> Iterator[str]:
 
 def _limits(campaign: Campaign) -> Iterator[str]:
     robot = campaign.robot
-    bounds = zip(robot.joint_names, robot.joint_types, np.isinf(robot.lower) | np.isinf(robot.upper), strict=True)
-    free = [name for name, kind, unbound in bounds if kind != "continuous" and unbound]
+    joints = list(zip(robot.joint_names, robot.joint_types, campaign.q.T, robot.lower, robot.upper, strict=True))
+    free = [name for name, kind, _, *bounds in joints if kind != "continuous" and np.isinf(bounds).any()]
     if free:
         yield f"the URDF gives no limits for {listed(free)}: no command is checked against any there"
-    for j, (name, kind) in enumerate(zip(robot.joint_names, robot.joint_types, strict=True)):
-        q, lower, upper = campaign.q[:, j], float(robot.lower[j]), float(robot.upper[j])
+    for name, kind, q, lower, upper in joints:
         outside = (q < lower - LIMIT_TOLERANCE) | (q > upper + LIMIT_TOLERANCE)
         if outside.any():
             first = int(np.argmax(outside))
             scale, unit = campaign.units.joint_scale(kind), campaign.units.joint_unit(kind)
             limit = upper if q[first] > upper else lower
             yield (
-                f"joint {name!r} is outside its limits in {_rows(int(outside.sum()))}, first in row "
+                f"joint {name!r} is outside its limits in {_rows(outside)}, first in row "
                 f"{campaign.rows[first]}: {q[first] / scale:.6g} {unit}, limit {limit / scale:.6g} {unit}"
             )
 
@@ -435,27 +419,21 @@ def _speed(campaign: Campaign) -> Iterator[str]:
     if outside.any():
         first = int(np.argmax(outside))
         yield (
-            f"column 'speed' is outside 0..1 in {_rows(int(outside.sum()))}, "
-            f"first in row {campaign.rows[first]}: {speed[first]:.6g}; "
-            "it is a fraction of the maximum, not per cent"
+            f"column 'speed' is outside 0..1 in {_rows(outside)}, first in row {campaign.rows[first]}: "
+            f"{speed[first]:.6g}; it is a fraction of the maximum, not per cent"
         )
 
 
 def _pose_labels(campaign: Campaign) -> Iterator[str]:
-    labels = campaign.pose_labels
-    if labels is None:
-        return
-    different = [
-        str(label)
-        for label in np.unique(labels[labels != ""])
-        if np.ptp(campaign.q[labels == label], axis=0).max() > SAME_COMMAND
-    ]
+    labels = np.empty(0, dtype=str) if campaign.pose_labels is None else campaign.pose_labels
+    known = [str(label) for label in np.unique(labels[labels != ""])]
+    different = [label for label in known if np.ptp(campaign.q[labels == label], axis=0).max() > SAME_COMMAND]
     if different:
         yield f"rows with the same pose label have different joint commands: {listed(different, 5)}"
 
 
-def _rows(count: int) -> str:
-    return f"{count} row{'s' if count != 1 else ''}"
+def _rows(chosen: Mask) -> str:
+    return f"{int(chosen.sum())} row{'s' if chosen.sum() != 1 else ''}"
 
 
 def _temperature(campaign: Campaign) -> Iterator[str]:
@@ -463,17 +441,13 @@ def _temperature(campaign: Campaign) -> Iterator[str]:
     told = [(f"column {n!r} has a median of", float(np.median(campaign.covariates[n]))) for n in names]
     for what, value in (*told, ("the reference temperature is", campaign.reference_temperature)):
         if value > WARMEST:
-            unit = "kelvin" if value > HOTTEST else "degrees Fahrenheit"
-            yield f"{what} {value:.4g} °C: are these {unit}?"
+            yield f"{what} {value:.4g} °C: are these {'kelvin' if value > HOTTEST else 'degrees Fahrenheit'}?"
 
 
 def _payload(campaign: Campaign) -> Iterator[str]:
-    payload = campaign.covariates.get("payload")
-    if payload is None:
-        return
-    heaviest, arm = float(payload.max()), campaign.robot.mass
-    if heaviest > (HEAVIEST * arm if campaign.robot.has_masses else HEAVIEST_ALONE):
-        beside = f", and the arm weighs {arm:.3g} kg" if campaign.robot.has_masses else ""
+    heaviest, robot = float(campaign.covariates.get("payload", np.zeros(1)).max()), campaign.robot
+    if heaviest > (HEAVIEST * robot.mass if robot.has_masses else HEAVIEST_ALONE):
+        beside = f", and the arm weighs {robot.mass:.3g} kg" if robot.has_masses else ""
         yield f"the payload is up to {heaviest:.4g} kg{beside}: are these grams?"
 
 
@@ -490,9 +464,8 @@ def _noise(campaign: Campaign) -> Iterator[str]:
 
 def _slides(campaign: Campaign) -> Iterator[str]:
     robot = campaign.robot
-    for j, (name, kind) in enumerate(zip(robot.joint_names, robot.joint_types, strict=True)):
-        limit = max(abs(float(robot.lower[j])), abs(float(robot.upper[j])))
-        farthest = float(np.abs(campaign.q[:, j]).max())
+    limits, commanded = np.maximum(np.abs(robot.lower), np.abs(robot.upper)), np.abs(campaign.q).max(axis=0)
+    for name, kind, limit, farthest in zip(robot.joint_names, robot.joint_types, limits, commanded, strict=True):
         if kind == "prismatic" and math.isfinite(limit) and farthest > SLIDES * limit:
             yield (
                 f"joint {name!r} slides, is commanded to {farthest:.4g} m and its limit is {limit:.4g} m: "
@@ -504,18 +477,16 @@ def _rounded(campaign: Campaign) -> Iterator[str]:
     if campaign.position is None or campaign.samples < FEWEST_ROWS or not np.ptp(campaign.position) > 0.0:
         return
     step = step_of(campaign.position / campaign.units.length_scale) * campaign.units.length_scale
-    noise = campaign.noise_position
-    if step and (step / math.sqrt(12.0) > noise if noise else step > ROUNDED_TO):
+    alone, noise = step / math.sqrt(12.0), campaign.noise_position
+    if step and (alone > noise if noise else step > ROUNDED_TO):
         stated = f", and the noise is stated as {1e3 * noise:.3g} mm" if noise else ""
-        yield (
-            f"the measured positions are rounded to {1e3 * step:.3g} mm, "
-            f"which alone is a noise of {1e3 * step / math.sqrt(12.0):.2g} mm{stated}"
-        )
+        rounded = f"the measured positions are rounded to {1e3 * step:.3g} mm"
+        yield f"{rounded}, which alone is a noise of {1e3 * alone:.2g} mm{stated}"
 
 
-def _grid(campaign: Campaign, reach: float) -> Iterator[str]:
-    robot, units = campaign.robot, campaign.units
-    turning = [j for j, kind in enumerate(robot.joint_types) if kind != "prismatic"]
+def _grid(campaign: Campaign) -> Iterator[str]:
+    units, reach = campaign.units, _reach(campaign)
+    turning = [j for j, kind in enumerate(campaign.robot.joint_types) if kind != "prismatic"]
     values = campaign.q[:, turning] / units.angle_scale
     if not turning or campaign.samples < FEWEST_ROWS or not math.isfinite(reach):
         return
@@ -531,8 +502,8 @@ def _grid(campaign: Campaign, reach: float) -> Iterator[str]:
         )
 
 
-def _simulator(campaign: Campaign, reach: float) -> Iterator[str]:
-    predicted = campaign.simulated_position
+def _simulator(campaign: Campaign) -> Iterator[str]:
+    predicted, reach = campaign.simulated_position, _reach(campaign)
     if predicted is None or campaign.samples < FEWEST_ROWS or not math.isfinite(reach):
         return
     poses = tool_poses(campaign.robot, campaign.q)

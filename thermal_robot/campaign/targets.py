@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from scipy.special import chdtri
 
 from thermal_robot.arrays import Array
-from thermal_robot.kinematics import rotation_to_quaternion
+from thermal_robot.kinematics import align, rotation_to_quaternion
 
 Mask = NDArray[np.bool_]
 
@@ -71,8 +71,7 @@ class Posed:
 
 def telling(points: Array) -> Mask:
     """(N,) the rows in which three or more of the targets (N, K, 3) are seen that do not lie on a line."""
-    seen = _seen(points)
-    return np.asarray((seen.sum(axis=1) >= FEWEST) & _wide(np.nan_to_num(points), seen))
+    return _wide(points, _seen(points))
 
 
 def posed(numbers: tuple[int, ...], points: Array) -> Posed | None:
@@ -96,8 +95,9 @@ def posed(numbers: tuple[int, ...], points: Array) -> Posed | None:
         return None
     middle = found - found.mean(axis=0)
     places = middle @ _axes(middle).T
-    turn, shift = _moved(places, np.nan_to_num(points), seen)
-    left = np.where(seen[:, :, None], np.nan_to_num(points) - shift[:, None] - places @ turn.transpose(0, 2, 1), 0.0)
+    motion = align(places, np.nan_to_num(points), seen.astype(float))
+    turn, shift = motion[:, :3, :3], motion[:, :3, 3]
+    left = np.nan_to_num(points - shift[:, None] - places @ turn.transpose(0, 2, 1))
     freedom = 3 * seen.sum(axis=1) - 6
     deviation = np.sqrt((left**2).sum(axis=(1, 2)) / freedom)
     sigma = float(np.median(deviation * np.sqrt(freedom / chdtri(freedom, 0.5))))
@@ -120,11 +120,12 @@ def _seen(points: Array) -> Mask:
 
 
 def _wide(points: Array, seen: Mask) -> Mask:
-    """(N,) whether what is seen of (N, K, 3) points is wider than a line."""
-    count = np.maximum(seen.sum(axis=1), 1)[:, None]
-    apart = np.where(seen[:, :, None], points - ((seen[:, :, None] * points).sum(axis=1) / count)[:, None], 0.0)
-    extent = np.linalg.svd(apart, compute_uv=False)
-    return np.asarray(extent[:, 1] > LINE * extent[:, 0]) if extent.shape[1] > 1 else np.zeros(len(points), dtype=bool)
+    """(N,) whether what is seen of (N, K, 3) points is three or more of them, and wider than a line."""
+    points, count = np.where(seen[:, :, None], points, 0.0), seen.sum(axis=1)
+    middle = points.sum(axis=1) / np.maximum(count, 1)[:, None]
+    extent = np.linalg.svd(np.where(seen[:, :, None], points - middle[:, None], 0.0), compute_uv=False)
+    wide = extent[:, 1] > LINE * extent[:, 0] if extent.shape[1] > 1 else False
+    return np.asarray((count >= FEWEST) & wide)
 
 
 def _places(points: Array, seen: Mask) -> Array:
@@ -133,37 +134,20 @@ def _places(points: Array, seen: Mask) -> Array:
     places = np.where(seen[first][:, None], points[first], np.nan)
     extent = float(np.linalg.norm(np.ptp(points[first][seen[first]], axis=0)))
     for _ in range(ROUNDS):
-        known = np.isfinite(places).all(axis=1)
-        use = seen & known
-        rows = (use.sum(axis=1) >= FEWEST) & _wide(points, use)
-        turn, shift = _moved(np.nan_to_num(places), points[rows], use[rows])
-        local = (points[rows] - shift[:, None]) @ turn
-        distance = np.linalg.norm(local - np.nan_to_num(places), axis=2)
-        scale = TAIL * float(np.median(distance[use[rows]])) + TINY
+        known, before = np.isfinite(places).all(axis=1), places
+        rows = _wide(points, seen & known)
+        use, own = (seen & known)[rows], np.nan_to_num(places)
+        motion = align(own, points[rows], use.astype(float))
+        local = (points[rows] - motion[:, None, :3, 3]) @ motion[:, :3, :3]
+        distance = np.linalg.norm(local - own, axis=2)
+        scale = TAIL * float(np.median(distance[use])) + TINY
         weight = seen[rows] * np.where(known, 1.0 / (1.0 + (distance / scale) ** 2), 1.0)
         total = weight.sum(axis=0)[:, None]
-        before = places
         places = np.where(total > 0.0, (weight[:, :, None] * local).sum(axis=0) / np.maximum(total, TINY), np.nan)
         linked = bool((np.isfinite(places) == np.isfinite(before)).all())
         if linked and np.nanmax(np.abs(places - before)) < SETTLED * extent:
             break
     return np.asarray(places)
-
-
-def _moved(places: Array, points: Array, seen: Mask) -> tuple[Array, Array]:
-    """(N, 3, 3) and (N, 3): the motions that bring the places (K, 3) onto the points seen, least squares.
-
-    Umeyama, *IEEE PAMI* 13 (1991), without scale; reflections excluded.
-    """
-    share = seen / seen.sum(axis=1)[:, None]
-    to_mean = np.einsum("nk,nka->na", share, points)
-    from_mean = share @ places
-    apart = places - from_mean[:, None]
-    u, _, vt = np.linalg.svd(np.einsum("nk,nka,nkb->nab", share, points - to_mean[:, None], apart))
-    sign = np.ones((len(points), 3))
-    sign[:, 2] = np.linalg.det(u) * np.linalg.det(vt)
-    turn = (u * sign[:, None]) @ vt
-    return turn, to_mean - np.einsum("nab,nb->na", turn, from_mean)
 
 
 def _spread(places: Array, seen: Mask) -> Array:
@@ -184,8 +168,7 @@ def sigma_of_all(sigmas: Array, targets: Targets | None) -> tuple[float, float |
     ``sigmas`` (N,) are of a point in each row, m; of equal ones it is they themselves, to the last digit.
     """
     alike = bool(sigmas.min() == sigmas.max())
-    whole = float(sigmas[0]) if alike else float(np.sqrt((sigmas**2).mean()))
-    return told_by(whole, targets)
+    return told_by(float(sigmas[0]) if alike else float(np.sqrt((sigmas**2).mean())), targets)
 
 
 def told_by(sigma: float, targets: Targets | None) -> tuple[float, float | None]:
@@ -208,9 +191,7 @@ def relative_sigmas(sigmas: Array | None, whole: float | None, targets: Targets 
     factor = np.ones(1) if sigmas is None or not whole else sigmas / of_a_point(whole, targets)
     if targets is not None:
         found = targets.spread / np.repeat(targets.typical, 3) * factor[:, None]
-        found = found if turned else found[:, :3]
-    elif bool((factor == 1.0).all()):
-        return None
     else:
-        found = np.column_stack([factor] * 3 + [np.ones(len(factor))] * (3 if turned else 0))
+        found = np.column_stack([factor] * 3 + [np.ones(len(factor))] * 3)
+    found = found if turned else found[:, :3]
     return None if bool((found == 1.0).all()) else found

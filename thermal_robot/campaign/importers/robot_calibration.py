@@ -47,9 +47,8 @@ def _read_calibration(files: Sequence[Path], plan: Plan) -> Source:
         commands = _table(str(file), [_pose(str(file), k, pose) for k, pose in enumerate(documents[0])])
         tables = [each for each in files if each != file]
         if not tables:
-            raise CampaignError(
-                str(file), "holds poses and no measurements", expected="the table of measured points as a second file"
-            )
+            expected = "the table of measured points as a second file"
+            raise CampaignError(str(file), "holds poses and no measurements", expected=expected)
         both, notes = joined(read_table(tables[0], plan.layout()), commands)
         return Source(both, planned(_UNITS), notes)
     files_of(files, "SAMPLES.yaml, or POSES.yaml MEASURED.csv", 1, 1)
@@ -112,12 +111,9 @@ def _only_sensor(file: str, documents: Sequence[Any]) -> str:
     """Return the sensor of all observations, where it is one."""
     sensors = sorted({each["sensor_name"] for sample in documents for each in _observations(sample)})
     if len(sensors) != 1:
-        raise CampaignError(
-            file,
-            "it is not clear which sensor measured" if sensors else "there are no observations",
-            found=listed(sensors) if sensors else None,
-            expected="[recording] sensor in the mapping" if sensors else "samples of robot_calibration",
-        )
+        problem = "it is not clear which sensor measured" if sensors else "there are no observations"
+        expected = "[recording] sensor in the mapping" if sensors else "samples of robot_calibration"
+        raise CampaignError(file, problem, found=listed(sensors) if sensors else None, expected=expected)
     return str(sensors[0])
 
 
@@ -160,9 +156,8 @@ def _configured(file: Path) -> dict[str, dict[str, Any]]:
     whole = documents[0] if documents and isinstance(documents[0], dict) else {}
     task = _within(whole, "tasks", "calibration") or _within(whole, "calibration")
     if not task:
-        raise CampaignError(
-            str(file), "is no configuration of FIGAROH", key="calibration", expected="tasks.calibration, or calibration"
-        )
+        expected = "tasks.calibration, or calibration"
+        raise CampaignError(str(file), "is no configuration of FIGAROH", key="calibration", expected=expected)
     chain = _within(task, "kinematics") or task
     pose = _within(task, "measurements", "poses").get("tool_pose", task.get("tip_pose"))
     sections: dict[str, dict[str, Any]] = {"robot": {}, "frames": {}}
