@@ -427,8 +427,7 @@ def describe(campaign: Campaign) -> str:
     return description.text(campaign)
 
 
-GRAVITY = "gravity"
-"""The quantity that no column holds: the robot has it."""
+GRAVITY = "gravity"  # The quantity that no column holds: the robot has it
 
 
 def turned_round(campaign: Campaign, quantity: str) -> Campaign:

@@ -14,13 +14,11 @@ from thermal_robot.campaign.settings import ABSOLUTE_ZERO
 from thermal_robot.errors import CampaignError
 from thermal_robot.schema import LARGEST
 
-SMALLEST = 1e-30
-"""In any unit: what is nearer to 0 is 0; a picometre in metres is 1e-12."""
+SMALLEST = 1e-30  # In any unit: what is nearer to 0 is 0; a picometre in metres is 1e-12
 QUATERNION_TOLERANCE = 0.1
 """A quaternion whose length differs from 1 by more is a mistake, not a rounding: four parts that are written with one
 decimal change the length by at most 0.05 · √4."""
-LARGEST_COMMAND = 1e6
-"""rad or m: 160 000 turns, which leave ten digits for the angle."""
+LARGEST_COMMAND = 1e6  # rad or m: 160 000 turns, which leave ten digits for the angle
 
 Rows: TypeAlias = "NDArray[np.int64]"
 
@@ -48,21 +46,10 @@ def no_orientation(quaternions: Array) -> int | None:
 
 
 def checked_array(file: str, key: str, value: Any, shape: tuple[int, ...], kind: Any) -> NDArray[Any]:
-    """Return a value as an array, read-only; a copy unless it already was: the caller's own stays writable.
+    """Return a value as an array of a shape and type, read-only; a copy unless it was: the caller's stays writable.
 
-    Parameters
-    ----------
-    file, key
-        What it belongs to, and its name, for a message.
-    value
-        Anything.
-    shape, kind
-        What it must have, and the type that it is given: ``np.float64``, ``np.int64``, ``np.bool_`` or ``np.str_``.
-
-    Raises
-    ------
-    CampaignError
-        Something else than numbers, another shape, a figure that is not finite or larger than any.
+    Refused, by ``file`` and ``key``, are something else than numbers, another shape, and a figure that is not finite or
+    larger than any. ``kind`` is ``np.float64``, ``np.int64``, ``np.bool_`` or ``np.str_``.
     """
     try:
         array = _as_array(value, kind)

@@ -16,8 +16,7 @@ from thermal_robot.campaign.units import covariate_scale, unit_of
 from thermal_robot.percents import percent
 from thermal_robot.tables import html_table
 
-_MOST_SESSIONS = 8
-"""Sessions named in one line; more would not fit beside each other on a terminal."""
+_MOST_SESSIONS = 8  # Sessions named in one line; more would not fit beside each other on a terminal
 
 
 def text(campaign: Any) -> str:

@@ -9,20 +9,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from thermal_robot.campaign import settings as kinds
 from thermal_robot.campaign.checked import SMALLEST
 from thermal_robot.campaign.names import did_you_mean, listed
-from thermal_robot.campaign.settings import (
-    ANGLE_UNIT,
-    GEARS,
-    HOW_MOVED,
-    LENGTH_UNIT,
-    PRIORS,
-    SIGMA,
-    TEMPERATURE,
-    VECTOR,
-    WORD,
-    Settings,
-)
+from thermal_robot.campaign.settings import Settings
 from thermal_robot.errors import CampaignError
 from thermal_robot.files import is_file, is_folder
 from thermal_robot.schema import Kind, MisfitError, record, shown, text, word
@@ -33,7 +23,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-_KNOWN = word(("unknown", "known"), WORD)
+_KNOWN = word(("unknown", "known"), kinds.WORD)
 
 
 def _named(meaning: str) -> Kind:
@@ -41,7 +31,7 @@ def _named(meaning: str) -> Kind:
 
 
 def _sigma(value: Any, path: str) -> float:
-    sigma = float(SIGMA(value, path))
+    sigma = float(kinds.SIGMA(value, path))
     if 0.0 < sigma < SMALLEST:
         raise MisfitError(path, value, "a number above 0, or 0 for not given", "smaller than any noise")
     return sigma
@@ -49,7 +39,7 @@ def _sigma(value: Any, path: str) -> float:
 
 def _vector(value: Any, path: str) -> Any:
     try:
-        return VECTOR(value, path)
+        return kinds.VECTOR(value, path)
     except MisfitError:
         raise MisfitError(path, value, "three numbers in brackets, such as [0.0, 0.0, 80.0]") from None
 
@@ -61,19 +51,22 @@ KINDS: dict[str, Mapping[str, Kind] | Kind] = {
         "root_frame": _named("the URDF link where the chain starts"),
         "kinematics": _named("the path of a kinematics.yaml of Universal Robots"),
         "gravity": _vector,
-        "moves": HOW_MOVED,
-        "reference_temperature": TEMPERATURE,
+        "moves": kinds.HOW_MOVED,
+        "reference_temperature": kinds.TEMPERATURE,
     },
-    "measurements": {"file": _named("the path of the table"), "angle_unit": ANGLE_UNIT, "length_unit": LENGTH_UNIT},
+    "measurements": {
+        "file": _named("the path of the table"),
+        "angle_unit": kinds.ANGLE_UNIT,
+        "length_unit": kinds.LENGTH_UNIT,
+    },
     "frames": {"base": _KNOWN, "tool": _KNOWN, "target": _vector},
     "noise": {"position": _sigma, "orientation": _sigma},
     "payload": {"com": _vector},
-    "priors": PRIORS,
-    "gears": GEARS,
+    "priors": kinds.PRIORS,
+    "gears": kinds.GEARS,
 }
 """What each key of each section of campaign.toml may be; priors and gears have keys of the user's own."""
-_LARGEST_FILE = 1 << 16
-"""Bytes: it holds a few lines, and a line for every joint and every effect."""
+_LARGEST_FILE = 1 << 16  # Bytes: it holds a few lines, and a line for every joint and every effect
 
 
 class Document:
@@ -224,8 +217,7 @@ def _absent(path: Path) -> CampaignError:
     return CampaignError(str(path), problem + beside, expected=f"{FILE_NAME}, or the folder that holds it")
 
 
-_LARGEST_YAML = 64 << 20
-"""Bytes: ten thousand samples of a calibration as text; it takes a minute to read them."""
+_LARGEST_YAML = 64 << 20  # Bytes: ten thousand samples of a calibration as text; it takes a minute to read them
 WITH_YAML = 'pip install "thermal-robot[yaml]"'
 
 

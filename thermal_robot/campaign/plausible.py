@@ -25,18 +25,15 @@ from thermal_robot.kinematics import align, tool_poses
 
 Mask = NDArray[np.bool_]
 
-FEWEST_ROWS = 10
-"""Rows from which figures that all end alike were rounded, and are no accident."""
+FEWEST_ROWS = 10  # Rows from which figures that all end alike were rounded, and are no accident
 ASTRAY_PLACE, ASTRAY_FIGURE = 3.0, 10.0
 """Times the others' median distance from the regression beyond which rows with one place, or one figure of a place,
 hold a mark: three figures that are equal by chance are rare, one of a rounded table is not."""
 SAME_COMMAND = 1e-3
 """rad or m within which commands of one pose count as the same: a controller that reports where it stopped repeats a
 pose to better than that, and a pose of its own is farther away."""
-ROUNDING = 1e-6
-"""Share of a coordinate's spread that counts as no distance: the last digits of exact figures."""
-ROUNDS = 30
-"""Of reweighted least squares, after which the least absolute deviations have settled to a per cent."""
+ROUNDING = 1e-6  # Share of a coordinate's spread that counts as no distance: the last digits of exact figures
+ROUNDS = 30  # Of reweighted least squares, after which the least absolute deviations have settled to a per cent
 STEADIEST = 1e-6
 """m per axis: no arm repeats to better, so that equal figures that are finer were copied and not measured."""
 RARE = 0.05
@@ -44,15 +41,7 @@ RARE = 0.05
 
 
 def marks(campaign: Campaign) -> tuple[Mask, list[str]]:
-    """Find the figures that stand for a place that was not seen.
-
-    Returns
-    -------
-    rows
-        (N,) those that hold one.
-    sentences
-        One for each figure, with its rows.
-    """
+    """Return the (N,) rows that hold a figure for a place that was not seen, and a sentence for each such figure."""
     places = [] if campaign.position is None else [(XYZ, campaign.position)]
     if campaign.targets is not None:
         axes = map(axes_of, campaign.targets.numbers)
@@ -191,15 +180,13 @@ def _figure(value: float) -> str:
     return f"{value + 0.0:.10g}".replace("-", "−")
 
 
-LIMIT_TOLERANCE = 1e-6
-"""rad or m by which a command may pass a limit: the last digit of a file is not a violation."""
+LIMIT_TOLERANCE = 1e-6  # rad or m by which a command may pass a limit: the last digit of a file is not a violation
 MOST_TURNS = 2
 """Turns that no command in rad exceeds: wrists and cables allow at most two to either side, and 13 degrees, read as
 rad, are more."""
 LEAST_ANGLE = 2 * math.pi
 """Degrees that some joint of a real campaign exceeds; commands in rad, read as degrees, stay within one turn's 2π."""
-FEWEST_COMMANDS = 3
-"""Rows from which small commands are a habit and not an accident."""
+FEWEST_COMMANDS = 3  # Rows from which small commands are a habit and not an accident
 FARTHEST_TARGET = 3.0
 """Reaches of the arm within which a target sits on it: a long tool is shorter, a length read in a unit a thousand times
 too large is longer by far. The next three bounds are as coarse for the same reason."""
@@ -222,10 +209,8 @@ LARGEST_EXTENT = 4.0
 across; the other two allow for commands outside it."""
 SMALLEST_EXTENT = 1 / 200
 """Share of the reach over which measured positions extend at least, once enough joints move: 5 mm for an arm of 1 m."""
-MOVES = 0.5
-"""rad or m of a joint's range that carry the target visibly."""
-MOVING_JOINTS = 3
-"""Joints that may move and leave the target in place: those of a wrist about a target on its axes."""
+MOVES = 0.5  # rad or m of a joint's range that carry the target visibly
+MOVING_JOINTS = 3  # Joints that may move and leave the target in place: those of a wrist about a target on its axes
 
 WARMEST, HOTTEST = 55.0, 150.0
 """°C that the median temperature of a robot does not exceed, whose motors run at 50: a hall of 20 °C has 68 °F; and
@@ -238,8 +223,7 @@ COARSEST_TURN, FINEST = 0.1, 1e-7
 reaches: a laser tracker has some ten micrometres."""
 ROUNDED_TO = 5e-4
 """m: positions that are read to no better are told of where no noise is stated: every arm repeats to better."""
-GRID = 5e-5
-"""m: what rounded commands move the tool, rms, from which that is told: half the repeatability of good arms."""
+GRID = 5e-5  # m: what rounded commands move the tool, rms, from which that is told: half the repeatability of good arms
 SLIDES = 10.0
 """Times its farther limit: a slide that is commanded beyond is read in a wrong unit, the next one being a thousand."""
 ANOTHER_ROBOT = 0.02

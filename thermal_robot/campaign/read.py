@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from thermal_robot.arrays import Array
 from thermal_robot.campaign import names
+from thermal_robot.campaign import settings as kinds
 from thermal_robot.campaign.campaign import Campaign
 from thermal_robot.campaign.checked import (
     LARGEST_COMMAND,
@@ -27,23 +28,7 @@ from thermal_robot.campaign.document import FILE_NAME, read_declaration
 from thermal_robot.campaign.names import CLOCK, split_name
 from thermal_robot.campaign.plausible import doubts
 from thermal_robot.campaign.recognise import Columns, named, recognise
-from thermal_robot.campaign.settings import (
-    ANGLE_UNIT,
-    GEARS,
-    HOW_MOVED,
-    LENGTH_UNIT,
-    MOVES,
-    PRIORS,
-    SAME_CONFIGURATION,
-    SIGMA,
-    STANDARD_TEMPERATURE,
-    TEMPERATURE,
-    VECTOR,
-    WORD,
-    Settings,
-    as_vector,
-    given,
-)
+from thermal_robot.campaign.settings import MOVES, SAME_CONFIGURATION, STANDARD_TEMPERATURE, Settings, as_vector, given
 from thermal_robot.campaign.table import Table, read_table, table_from_frame
 from thermal_robot.campaign.targets import FEWEST, Posed, posed, telling, told_by
 from thermal_robot.campaign.turning import arrivals
@@ -56,30 +41,13 @@ from thermal_robot.schema import boolean, optional, text, word
 if TYPE_CHECKING:
     import pandas as pd
 
-MINIMUM_POSES = 3
-"""Distinct configurations without which a rigid frame can turn about the line through two points."""
+MINIMUM_POSES = 3  # Distinct configurations without which a rigid frame can turn about the line through two points
 
 
 def build_campaign(table: Table, settings: Settings, robot: Robot, *, name: str, measured: bool = True) -> Campaign:
-    """Validate a table and return the campaign.
+    """Validate a table and return the campaign; what cannot be used is refused with row and column.
 
-    Parameters
-    ----------
-    table
-        As read.
-    settings
-        Units and everything else that is not in the table.
-    robot
-        The chain that the joint columns command.
-    name
-        Name of the campaign.
-    measured
-        Whether the rows were measured; otherwise they are to be predicted and measured columns are ignored.
-
-    Raises
-    ------
-    CampaignError
-        Whatever cannot be used, with row and column.
+    Rows that were not ``measured`` are to be predicted, and their measured columns are ignored.
     """
     units = settings.units
     table = named(table, robot, units)
@@ -219,8 +187,7 @@ def _too_few(file: str, campaign: Campaign) -> list[str]:
 
 ASTRAY = 10.0
 """Times the usual deviation from which on targets of a row are said not to keep their places: noise comes to five."""
-LOOSE = 2.0
-"""Times the stated noise from which on targets are said to move against each other."""
+LOOSE = 2.0  # Times the stated noise from which on targets are said to move against each other
 
 
 def of_targets(table: Table, columns: Columns, settings: Settings) -> tuple[Table, Posed, list[str]]:
@@ -406,8 +373,7 @@ def read_samples(
     return build_campaign(table_from_frame(path), settings, robot, name="table", measured=False)
 
 
-FILE = "<table>"
-"""What messages call the data frame."""
+FILE = "<table>"  # What messages call the data frame
 _NOISE = "a finite number above 0, or None"
 
 
@@ -483,27 +449,27 @@ def campaign_from_table(
     require("campaign_from_table(), table", table, (pd.DataFrame,), "a pandas DataFrame")
     angle_unit = table.attrs.get("angle_unit", SI.angle) if angle_unit is None else angle_unit
     length_unit = table.attrs.get("length_unit", SI.length) if length_unit is None else length_unit
-    frame = word(("known", "unknown"), WORD)
+    frame = word(("known", "unknown"), kinds.WORD)
     arguments: dict[
         str, tuple[Any, ...]
     ] = {  # section and key of campaign.toml, name, value, kind, and what is expected where the kind says less
-        "robot.moves": ("moves", moves, HOW_MOVED),
-        "robot.reference_temperature": ("reference_temperature", reference_temperature, TEMPERATURE),
-        "measurements.angle_unit": ("angle_unit", angle_unit, ANGLE_UNIT),
-        "measurements.length_unit": ("length_unit", length_unit, LENGTH_UNIT),
+        "robot.moves": ("moves", moves, kinds.HOW_MOVED),
+        "robot.reference_temperature": ("reference_temperature", reference_temperature, kinds.TEMPERATURE),
+        "measurements.angle_unit": ("angle_unit", angle_unit, kinds.ANGLE_UNIT),
+        "measurements.length_unit": ("length_unit", length_unit, kinds.LENGTH_UNIT),
         "frames.base": ("base", base, frame),
         "frames.tool": ("tool", tool, frame),
-        "frames.target": ("target", target, VECTOR, "three numbers"),
-        "noise.position": ("noise_position", noise_position, optional(SIGMA), _NOISE),
-        "noise.orientation": ("noise_orientation", noise_orientation, optional(SIGMA), _NOISE),
-        "payload.com": ("payload_com", payload_com, VECTOR, "three numbers"),
+        "frames.target": ("target", target, kinds.VECTOR, "three numbers"),
+        "noise.position": ("noise_position", noise_position, optional(kinds.SIGMA), _NOISE),
+        "noise.orientation": ("noise_orientation", noise_orientation, optional(kinds.SIGMA), _NOISE),
+        "payload.com": ("payload_com", payload_com, kinds.VECTOR, "three numbers"),
     }
     stated: dict[str, dict[str, Any]] = {}
     for place, argument in arguments.items():
         section, key = place.split(".")
         stated.setdefault(section, {})[key] = given(FILE, *argument)
-    stated["priors"] = given(FILE, "priors", {} if priors is None else priors, PRIORS)
-    stated["gears"] = given(FILE, "gears", {} if gears is None else gears, GEARS)
+    stated["priors"] = given(FILE, "priors", {} if priors is None else priors, kinds.PRIORS)
+    stated["gears"] = given(FILE, "gears", {} if gears is None else gears, kinds.GEARS)
     ends = {"tool_frame": robot.tool_frame, "root_frame": robot.root_frame, "gravity": as_vector(robot.gravity)}
     settings = Settings.stated(stated, urdf="", **ends)
     check_joints(FILE, "gears", settings.gears, robot.joint_names)

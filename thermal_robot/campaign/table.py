@@ -174,22 +174,17 @@ def told_rows(numbers: NDArray[np.int64]) -> str:
 _DECIMAL_COMMA = re.compile(r"[+\-−]?\d*,\d+([eE][+-]?\d+)?")
 _MARKED = re.compile(r" *# *(?=[^\s,;#])")  # a column of numbers that is called # is no mark
 _MOST_BLANK_LINES = 100_000  # in succession: nobody scrolls past so many
-LARGEST_TABLE = 256 << 20
-"""Bytes: a million rows of ten columns with all digits, which are read in 1.5 GB."""
-MOST_CELLS = 20_000_000
-"""The same, for a file whose cells are short or packed."""
-MOST_COLUMNS = 1000
-"""Logs of two arms with every quantity that a controller knows have a few hundred."""
-PARQUET = (".parquet", ".pq")
-"""Endings of the names of Parquet files."""
+LARGEST_TABLE = 256 << 20  # Bytes: a million rows of ten columns with all digits, which are read in 1.5 GB
+MOST_CELLS = 20_000_000  # The same, for a file whose cells are short or packed
+MOST_COLUMNS = 1000  # Logs of two arms with every quantity that a controller knows have a few hundred
+PARQUET = (".parquet", ".pq")  # Endings of the names of Parquet files
 WORKBOOKS = {".xlsx": "openpyxl", ".xlsm": "openpyxl", ".ods": "odfpy"}
 """Endings of the names of workbooks, and what pandas reads them with."""
 NO_PARQUET = "Parquet files need pyarrow, which is not installed"
 WITH_PARQUET = 'pip install "thermal-robot[parquet]", or the table as CSV'
 WITH_EXCEL = 'pip install "thermal-robot[excel]", or the table as CSV'
 _ONE_ROW = "one row per measurement"
-SPACE = " "
-"""A separator of which any number is one, as of blanks and tabs in a list that is lined up for the eye."""
+SPACE = " "  # A separator of which any number is one, as of blanks and tabs in a list that is lined up for the eye
 
 
 @dataclass(frozen=True)
@@ -204,8 +199,7 @@ class Layout:
     comment: str = ""  # lines that begin so are left out; empty where there are none
 
 
-PLAIN = Layout()
-"""A header and rows, nothing else."""
+PLAIN = Layout()  # A header and rows, nothing else
 
 
 def read_table(path: Path, layout: Layout = PLAIN) -> Table:
@@ -284,22 +278,10 @@ def _table(file: str, lines: Iterable[list[str]], named: bool, comma: bool = Tru
 
 
 def table_from_frame(frame: pd.DataFrame, file: str = "<table>", *, first_row: int | None = None) -> Table:
-    """Return a pandas data frame as a table.
+    """Return a pandas data frame as a table; refuse one without rows, or with a column twice.
 
-    Parameters
-    ----------
-    frame
-        The data.
-    file
-        What to call it in messages.
-    first_row
-        Number of the first row; without it rows are known by an integer index of the frame, so that
-        ``frame.loc[row]`` finds the one a message speaks of, or by position from 0.
-
-    Raises
-    ------
-    CampaignError
-        No rows, a duplicate column.
+    Rows are numbered from ``first_row``; without it they are known by an integer index of the frame, so that
+    ``frame.loc[row]`` finds the one a message speaks of, or by position from 0.
     """
     import pandas as pd
 

@@ -26,19 +26,16 @@ from thermal_robot.kinematics import align, rotation_to_quaternion
 
 Mask = NDArray[np.bool_]
 
-FEWEST = 3
-"""Targets without which a pose can turn about the line through two."""
+FEWEST = 3  # Targets without which a pose can turn about the line through two
 LINE = 0.01
 """Width over length of what is seen below which it is a line: the turn about it would be known a hundred times worse
 than the others."""
-ROUNDS = 100
-"""Rounds of the analysis at most; a few are enough where the noise is small beside the distances."""
+ROUNDS = 100  # Rounds of the analysis at most; a few are enough where the noise is small beside the distances
 SETTLED = 1e-12
 """Share of the targets' extent by which their places still move when they are found: rounding moves them by 1e-15."""
 TAIL = 3.0
 """Times the median distance from which on a target counts less for its place (Cauchy): one row in a few is gross."""
-TINY = 1e-30
-"""m, where exact figures leave no distance."""
+TINY = 1e-30  # m, where exact figures leave no distance
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,17 +74,8 @@ def telling(points: Array) -> Mask:
 def posed(numbers: tuple[int, ...], points: Array) -> Posed | None:
     """Find the places of the targets, and the pose of their common frame in each row.
 
-    Parameters
-    ----------
-    numbers
-        K numbers.
-    points
-        (N, K, 3) measured places, m, of rows that are :func:`telling`; NaN where a target was not seen.
-
-    Returns
-    -------
-    Posed
-        ``None`` where a target is never seen beside three others whose places are known.
+    ``points`` are (N, K, 3) measured places, m, of K ``numbers`` in rows that are :func:`telling`; NaN where a target
+    was not seen. ``None`` is returned where one is never seen beside three others whose places are known.
     """
     seen = _seen(points)
     found = _places(np.nan_to_num(points), seen)

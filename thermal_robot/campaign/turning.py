@@ -40,16 +40,9 @@ def since_turns(
     until they slip, the stop operators of Prandtl and Ishlinskii (Kuhnen, *Modeling, identification and compensation of
     complex hysteretic nonlinearities*, 2003). At the first row of a session they are slack.
 
-    Parameters
-    ----------
-    q
-        (N, n) commanded positions, rad or m: the robot goes straight from one to the next.
-    names
-        Of the n joints.
-    covariates
-        By name; ``time`` or ``order`` says which row comes after which. Without either the answer is empty.
-    sessions
-        (N,) label of the uninterrupted run that a row belongs to; ``None`` where there is one.
+    ``q`` are (N, n) commanded positions of n joints, rad or m: the robot goes straight on to the next. ``time`` or
+    ``order`` among the covariates says which row comes after which; without either the answer is empty. ``sessions``
+    are (N,) labels of the uninterrupted run that a row belongs to; ``None`` where there is one.
     """
     since, strain = np.zeros_like(q), np.zeros((*q.shape, len(SLIPS)))
     runs = list(_runs(covariates, sessions, len(q)))

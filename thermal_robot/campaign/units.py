@@ -9,8 +9,7 @@ from thermal_robot.campaign.names import NOISE, PER_JOINT, PER_LINK, POSITION, S
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot
 
-ANGLE_UNITS: dict[str, float] = {"rad": 1.0, "deg": math.pi / 180.0}
-"""Radians in one of the unit."""
+ANGLE_UNITS: dict[str, float] = {"rad": 1.0, "deg": math.pi / 180.0}  # Radians in one of the unit
 LENGTH_UNITS = {"m": 1.0, "mm": 1e-3, "um": 1e-6, "cm": 1e-2, "inch": 0.0254, "in": 0.0254, "ft": 0.3048}
 """Metres in one of the unit; inch and foot are the international ones of 1959, exact."""
 
@@ -65,8 +64,7 @@ class Units:
         return self.length if joint_type == "prismatic" else self.angle
 
 
-SI = Units()
-"""What everything is in once it has been read."""
+SI = Units()  # What everything is in once it has been read
 
 
 def unit_of(column: str, robot: Robot, units: Units = SI) -> str:

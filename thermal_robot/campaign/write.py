@@ -89,19 +89,9 @@ def write_planned(
     Beside campaign.toml and the robot stand plan.csv, all that is planned, and measurements.csv, the same with empty
     cells where something is to be recorded: the target's place and the temperatures.
 
-    Parameters
-    ----------
-    commands
-        A campaign without measured positions; one with orientations asks for these, too.
-    directory, comments
-        As for :func:`write_campaign`.
-    derived
-        Columns that follow from the order of the rows, and are left out.
-
-    Raises
-    ------
-    CampaignError
-        A directory that cannot be written; one that holds a campaign.toml: somebody may have filled in its table.
+    ``commands`` has no measured positions; with orientations it asks for these, too. ``derived`` columns
+    follow from the order of the rows, and are left out. A directory that holds a campaign.toml is refused: somebody may
+    have filled in its table.
     """
     folder = Path(directory)
     if (folder / FILE_NAME).exists():

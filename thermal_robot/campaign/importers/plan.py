@@ -30,24 +30,12 @@ from thermal_robot.campaign.units import ANGLE_UNITS, LENGTH_UNITS
 from thermal_robot.campaign.ur_kinematics import with_kinematics
 from thermal_robot.errors import CampaignError
 from thermal_robot.robot import Robot, load_robot
-from thermal_robot.schema import (
-    NOT_NEGATIVE,
-    POSITIVE,
-    Kind,
-    MisfitError,
-    below,
-    boolean,
-    number,
-    record,
-    text,
-    whole,
-    word,
-)
+from thermal_robot.schema import NOT_NEGATIVE, POSITIVE, Kind, MisfitError, below, boolean, number, record, text, word
 from thermal_robot.schema import listed as list_of
+from thermal_robot.schema import whole as whole_number
 from thermal_robot.urdf_text import BUILTIN, EXAMPLE_ROBOT_DATA
 
-JOINTS = "joints"
-"""Key of the list that names the columns of all joints, in the order of the chain."""
+JOINTS = "joints"  # Key of the list that names the columns of all joints, in the order of the chain
 
 
 @dataclass(frozen=True)
@@ -130,7 +118,7 @@ def _either(of_text: Kind, other: Kind, kind: type) -> Kind:
     return lambda value, path: (of_text if isinstance(value, kind) else other)(value, path)
 
 
-_SOURCE = _either(whole(1), text("the name of a column, or its number from 1"), int)
+_SOURCE = _either(whole_number(1), text("the name of a column, or its number from 1"), int)
 _FIELDS: dict[str, Kind] = {
     "column": _SOURCE,
     "sum": list_of(_SOURCE),
@@ -170,8 +158,7 @@ _SEQUENCES = tuple(
     "".join(axes) for letters in ("XYZ", "xyz") for axes in itertools.product(letters, repeat=3)
     if axes[0] != axes[1] != axes[2]
 )  # fmt: skip
-_TURNED = 0.01
-"""By how much the product of a matrix with its transpose may differ from 1: figures with two decimals do."""
+_TURNED = 0.01  # By how much the product of a matrix with its transpose may differ from 1: figures with two decimals do
 
 
 @dataclass(frozen=True)
@@ -248,13 +235,12 @@ def orientation_kind(value: Any, path: str) -> dict[str, Orientation]:
     return {"stated": Orientation(**given)}
 
 
-JOINING = ("key", "targets")
-"""What ``[table]`` says of names, and not of how a file is laid out."""
+JOINING = ("key", "targets")  # What ``[table]`` says of names, and not of how a file is laid out
 _SEPARATORS = {"comma": ",", "semicolon": ";", "tab": "\t", "space": SPACE}
 _NAME = text("a name")
 _LAID_OUT: Mapping[str, Kind] = {
     "separator": word(_SEPARATORS),
-    "skip": whole(0),
+    "skip": whole_number(0),
     "header": boolean,
     "comment": text("the first letters of a comment"),
 }
@@ -267,7 +253,7 @@ KINDS: dict[str, Mapping[str, Kind] | Kind] = {
     "orientation": orientation_kind,
     "recording": {
         **dict.fromkeys(("joints", "pose", "sensor"), _NAME),
-        "feature": whole(1),
+        "feature": whole_number(1),
         "offset": number(),
         **dict.fromkeys(("tolerance", "standstill", "velocity"), POSITIVE),
         "settling": NOT_NEGATIVE,
@@ -374,21 +360,8 @@ def files_of(files: Sequence[Path], expected: str, least: int, most: int) -> Non
 def campaign_of(source: Source, plan: Plan, robot: Robot, name: str) -> tuple[Campaign, tuple[str, ...]]:
     """Return the campaign of a table, and in sentences how many rows it has and what was left out.
 
-    Parameters
-    ----------
-    source
-        The table, with what its format says of it.
-    plan
-        All that is said of it, the user's mapping first.
-    robot
-        Whose joints the columns command.
-    name
-        Of the campaign.
-
-    Raises
-    ------
-    CampaignError
-        Whatever cannot be used, with row and column of the table.
+    ``plan`` is all that is said of the table, the user's mapping first. What cannot be used is refused with row and
+    column of the table.
     """
     table = source.table
     columns = _columns(table, plan, robot)

@@ -32,8 +32,7 @@ from thermal_robot.files import is_file
 
 _NUMBER = r"[-+]?(?:\d+\.?\d*|\.\d+)(?:E[-+]?\d+)?"
 _AXIS = r"A\d|E\d|[re]ax_\w"
-_ABSENT = 8.9e9
-"""An external axis that ABB's controller does not have is 9E9."""
+_ABSENT = 8.9e9  # An external axis that ABB's controller does not have is 9E9
 _EXTERNAL = tuple(f"eax_{letter}" for letter in "abcdef")
 _TARGETS = {
     (6, 6): (*(f"rax_{k}" for k in range(1, 7)), *_EXTERNAL),

@@ -128,8 +128,7 @@ ROBOT_CALIBRATION = Format(
 )
 
 
-_UNIVERSE = "universe"
-"""What Pinocchio calls the frame before the first joint: the root of the URDF."""
+_UNIVERSE = "universe"  # What Pinocchio calls the frame before the first joint: the root of the URDF
 
 
 def _read_figaroh(files: Sequence[Path], plan: Plan) -> Source:

@@ -44,10 +44,8 @@ WINDOW = 0.2
 VELOCITY = 1e-3
 """rad/s or m/s: slower than that a joint stands. In the tolerance of a pair a target 1 m away then moves 50 µm at most,
 and mostly not at all."""
-STANDSTILL = 0.5
-"""s that a robot stands at least: shorter is a turning point, or still swings."""
-SETTLING = 0.25
-"""s after stopping that are not used: arms swing out at some 10 Hz, and controllers settle."""
+STANDSTILL = 0.5  # s that a robot stands at least: shorter is a turning point, or still swings
+SETTLING = 0.25  # s after stopping that are not used: arms swing out at some 10 Hz, and controllers settle
 TOLERANCE = 0.05
 """s between a row's instant and the sample paired with it; instruments measure twenty times a second or more."""
 
@@ -132,15 +130,12 @@ LONGEST = 2_000_000
 UNEXPLAINED = 0.1
 """Share of the spread of the measured places that may be left once lag and frames are fitted: a robot that is bent by
 millimetres leaves less than 0.01, two recordings that have nothing to do with each other more than 0.5."""
-MOVING = 0.1
-"""Share of the fastest speed from which a sample tells the time: at rest it does not."""
-MOST = 2000
-"""Samples in motion that are fitted; more take time and add little."""
+MOVING = 0.1  # Share of the fastest speed from which a sample tells the time: at rest it does not
+MOST = 2000  # Samples in motion that are fitted; more take time and add little
 BLOCKS = 10
 """Parts of the recording of which each is left out once: their scatter is the deviation of the lag, whatever the errors
 of the robot that the fit knows nothing of (Tukey's jackknife)."""
-LEAST = 60
-"""Samples in motion that a fit of ten figures and its scatter want."""
+LEAST = 60  # Samples in motion that a fit of ten figures and its scatter want
 
 
 @dataclass(frozen=True)
@@ -239,8 +234,7 @@ coming."""
 _PLACE = re.compile(r"(?:^|[./])(?:position|point|translation)[./](?P<axis>[xyz])$")
 _TURN = re.compile(r"(?:^|[./])(?:orientation|rotation)[./](?P<axis>[xyzw])$")
 _WITHOUT_HEADER = Layout(",", 0, False)
-_BEFORE_NAMES = 2
-"""Fields of a stamp, sec and nanosec, at the beginning of each line without a header."""
+_BEFORE_NAMES = 2  # Fields of a stamp, sec and nanosec, at the beginning of each line without a header
 
 
 def read_streams(file: Path, joints: Sequence[str]) -> tuple[Stream | None, Stream | None]:

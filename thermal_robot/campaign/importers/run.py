@@ -28,8 +28,7 @@ FORMATS: dict[str, Format] = {
     "ipa_ur10": IPA_UR10,
 }
 """Formats by name, in the order of the help."""
-IMPORTED = "Imported by `thermal-robot import"
-"""What the first line of a campaign.toml says that was imported."""
+IMPORTED = "Imported by `thermal-robot import"  # What the first line of a campaign.toml says that was imported
 
 
 class Imported(NamedTuple):
@@ -43,16 +42,8 @@ class Imported(NamedTuple):
 def import_files(format: str, files: Sequence[Path], directory: Path, plan: Plan | None = None) -> Imported:
     """Read files of a format and write them as a campaign.
 
-    Parameters
-    ----------
-    format
-        One of :data:`~thermal_robot.campaign.importers.run.FORMATS`.
-    files
-        As many as the format has.
-    directory
-        Of the campaign; is made if need be. A campaign in it is replaced where it was imported, too.
-    plan
-        What the user says beyond the files; it counts for more than what the format says.
+    The directory is made if need be; a campaign in it is replaced where it was imported, too. ``plan`` is what the user
+    says beyond the files; it counts for more than what the format says.
 
     Raises
     ------

@@ -37,8 +37,7 @@ from thermal_robot.campaign.names import listed
 from thermal_robot.campaign.table import PLAIN, SPACE, Cells, Layout, Table, read_table
 from thermal_robot.errors import CampaignError
 
-_FEW = 3
-"""Names of either table that a sentence shows: enough to see how the two spell them."""
+_FEW = 3  # Names of either table that a sentence shows: enough to see how the two spell them
 
 
 def commands(file: Path, plan: Plan) -> Table:
@@ -70,20 +69,10 @@ def _fits(table: Table) -> bool:
 def joined(measured: Table, commanded: Table, key: str = "") -> tuple[Table, tuple[str, ...]]:
     """Return one table with the columns of both, and in sentences what was left out.
 
-    A point that was measured several times makes several rows. Rows come in the order of the measurements.
-
-    Parameters
-    ----------
-    measured, commanded
-        The tables. Messages speak of rows and columns of the measured one.
-    key
-        Column of the measured table that holds the names of points; that of the commands is the one that has most of
-        them. Empty where the rows of both are in the same order.
-
-    Raises
-    ------
-    CampaignError
-        Tables of different lengths without names, a point that is commanded twice, no name in common.
+    A point that was measured several times makes several rows, in the order of the measurements. ``key`` is the column
+    of the measured table that holds the names of points; that of the commands is the one that has most of them. Without
+    it the rows of both are in the same order. Refused are tables of different lengths without names, a point that is
+    commanded twice, and no name in common; messages speak of rows and columns of the measured table.
     """
     taken = ""
     notes: tuple[str, ...] = (f"rows of {measured.file} and {commanded.file} joined in their order",)
