@@ -402,10 +402,8 @@ def _speed(campaign: Campaign) -> Iterator[str]:
     outside = (speed < 0) | (speed > 1)
     if outside.any():
         first = int(np.argmax(outside))
-        yield (
-            f"column 'speed' is outside 0..1 in {_rows(outside)}, first in row {campaign.rows[first]}: "
-            f"{speed[first]:.6g}; it is a fraction of the maximum, not per cent"
-        )
+        where = f"{_rows(outside)}, first in row {campaign.rows[first]}: {speed[first]:.6g}"
+        yield f"column 'speed' is outside 0..1 in {where}; it is a fraction of the maximum, not per cent"
 
 
 def _pose_labels(campaign: Campaign) -> Iterator[str]:

@@ -68,22 +68,10 @@ SI = Units()  # What everything is in once it has been read
 
 
 def unit_of(column: str, robot: Robot, units: Units = SI) -> str:
-    """Say in which unit a column of the table is.
+    """Say in which unit a column of a robot's table is: in those of the file, else in SI, as a campaign's values are.
 
-    Parameters
-    ----------
-    column
-        Its name: a joint of the chain, ``x``, ``sim.x``, or a covariate such as ``velocity.<joint>``.
-    robot
-        The chain: joints that turn are in rad, prismatic ones in m.
-    units
-        Of the file; SI where absent, the unit of the values of a :class:`~thermal_robot.campaign.Campaign`.
-
-    Returns
-    -------
-    str
-        Empty for a number without a unit (a direction of approach, a share of the speed, an order, part of a
-        quaternion) and for a column that the format does not define.
+    It is empty for a number without a unit (a direction of approach, a share of the speed, an order, part of a
+    quaternion) and for a column that the format does not define.
     """
     kinds = dict(zip(robot.joint_names, robot.joint_types, strict=True))
     if column in kinds:

@@ -165,22 +165,11 @@ def with_prediction(
     outside: Sequence[Sequence[str]],
     units: Units,
 ) -> pd.DataFrame:
-    """Return samples with what is predicted of them.
+    """Return N samples of a robot with what is predicted of them; measured columns of theirs go, all others stay.
 
-    Parameters
-    ----------
-    samples
-        N rows; their other columns are kept as they stand, but for those of measurements.
-    robot
-        Whose table it is.
-    position, std
-        (N, 3) m: of the target, and one standard deviation per axis.
-    orientation
-        (N, 4) unit quaternions wxyz, or ``None``.
-    outside
-        Per row: names of the columns in which it leaves what was measured.
-    units
-        Lengths are given in their length unit.
+    ``position`` and ``std`` are (N, 3) m, of the target and one standard deviation per axis, and are given in the
+    length unit; ``orientation`` (N, 4) unit quaternions wxyz; ``outside`` names per row the columns in which it leaves
+    what was measured.
     """
     place = dict(zip(names.POSITION, np.asarray(position).T / units.length_scale, strict=True))
     turn = {} if orientation is None else dict(zip(names.ORIENTATION, np.asarray(orientation).T, strict=True))
@@ -196,24 +185,10 @@ def with_commands(
     direction: ArrayLike,
     units: Units,
 ) -> pd.DataFrame:
-    """Return samples with corrected commands in the place of their joint positions.
+    """Return N samples of a robot with corrected commands, (N, n) rad or m, in the place of their joint positions.
 
-    Parameters
-    ----------
-    samples
-        N rows; their other columns are kept as they stand, but for those of measurements.
-    robot
-        Whose joints they are.
-    q
-        (N, n) rad or m: what to command.
-    std
-        (N, 3) m: one standard deviation per axis of where the target will be.
-    outside
-        Per row: names of the columns in which it leaves what was measured.
-    direction
-        (N,) rad by which the target's direction is missed.
-    units
-        Of the table's joints and lengths.
+    ``std`` (N, 3) m and ``outside`` are as of :func:`with_prediction`; ``direction`` (N,) rad is by how much the
+    target's direction is missed. All is given in the units of the table.
     """
     found = headings(samples.columns, robot)
     own, there = {}, {str(name).strip(): str(name) for name in samples.columns}
@@ -235,12 +210,9 @@ def _known(std: ArrayLike, outside: Sequence[Sequence[str]], units: Units) -> di
 def _beside(samples: pd.DataFrame, found: Mapping[str, Heading], columns: dict[str, Any]) -> pd.DataFrame:
     """Return samples with further columns; theirs of these names, and measured ones, whatever they are called, go."""
     called = {heading.column: name for name, heading in found.items()}
-
-    def goes(column: str) -> bool:
-        name = called.get(column, column)
-        return name in names.MEASURED or names.target_of(name) is not None or column in columns
-
-    return samples[[name for name in samples.columns if not goes(str(name).strip())]].assign(**columns)
+    meant = [called.get(str(name).strip(), str(name).strip()) for name in samples.columns]
+    goes = [name in names.MEASURED or names.target_of(name) is not None or name in columns for name in meant]
+    return samples.loc[:, ~np.array(goes, dtype=bool)].assign(**columns)
 
 
 def write_predictions(path: str | Path, predictions: pd.DataFrame) -> None:

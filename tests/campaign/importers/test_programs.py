@@ -40,7 +40,9 @@ QUATERNIONS = np.array([[0.5, 0.5, -0.5, 0.5], [1, 0, 0, 0], [0, 0, 0.6, 0.8], [
 
 
 def rapid(kind: str, moves: str = "") -> str:
-    head = "MODULE calib\n  PERS tooldata t1:=[TRUE,[[114.7,0,121.3],[0.92,0,0.38,0]],[0.1,[40,0,50],[1,0,0,0],0,0,0]];\n"
+    head = (
+        "MODULE calib\n  PERS tooldata t1:=[TRUE,[[114.7,0,121.3],[0.92,0,0.38,0]],[0.1,[40,0,50],[1,0,0,0],0,0,0]];\n"
+    )
     rows = []
     for name, axes, place, turn in zip(NAMES, AXES, PLACES, QUATERNIONS, strict=True):
         told = bracket(axes) if kind == "jointtarget" else f"{bracket(place)},{bracket(turn)},[0,-1,0,4]"

@@ -79,9 +79,8 @@ def stream(file: str, time: Array, values: Array, names: Sequence[str]) -> Strea
     kept = ~(np.isnan(time) | np.isnan(values).any(axis=1))
     _, first = np.unique(time[kept], return_index=True)
     if len(first) < 2:
-        raise CampaignError(
-            file, "has fewer than two samples", found=f"{len(first)} of {', '.join(names)}", expected="a recording"
-        )
+        found = f"{len(first)} of {', '.join(names)}"
+        raise CampaignError(file, "has fewer than two samples", found=found, expected="a recording")
     return Stream(file, time[kept][first], values[kept][first], tuple(names))
 
 
