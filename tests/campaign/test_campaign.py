@@ -102,7 +102,7 @@ WRONG: dict[str, Any] = {
     "units": [None, "mm"],
     "targets": ["three", 3],
     "moves": [None, "sideways", ["direct"]],
-    "warnings": [None, "text"],
+    "warnings": [None, "text", [1]],
     "base_known": ["unknown"],
 }
 
@@ -140,6 +140,7 @@ def test_lists_other_kinds_of_number_and_quaternions_of_few_digits_are_taken(dem
     plain = demo.take(np.arange(3))
     rounded = np.round(np.full((3, 4), [0.924, 0.383, 0.0, 0.0]), 2)
     changes = {"noise_position": np.float32(0.5), "noise_orientation": 0, "orientation": rounded}
+    changes |= {"extra": ["a\0b"], "warnings": ("\ud800",)}  # whatever a table's header or cell held
     again = replace(plain, q=plain.q.tolist(), rows=np.array([4.0, 5.0, 6.0]), **changes)
     np.testing.assert_array_equal(again.q, plain.q)
     np.testing.assert_array_equal(again.orientation, rounded)

@@ -27,7 +27,7 @@ from thermal_robot.campaign.turning import clock_of, since_turns
 from thermal_robot.campaign.units import Units, covariate_scale
 from thermal_robot.errors import CampaignError, require
 from thermal_robot.robot import Robot, load_robot
-from thermal_robot.schema import Kind, MisfitError, boolean, listed, mapping, number, text
+from thermal_robot.schema import Kind, MisfitError, boolean, listed, mapping, number
 
 if TYPE_CHECKING:
     import pandas as pd
@@ -54,7 +54,7 @@ def _sigma(value: Any, path: str) -> float | None:
 
 
 _SIZES = mapping(number(least=SMALLEST, expected="a number above 0"))
-_TEXTS = listed(text(empty=True), expected="a tuple of texts")
+_TEXTS = listed(_instance(str, "a tuple of texts"), expected="a tuple of texts")
 _KINDS: dict[str, Kind] = {
     "robot": _instance(Robot, "a robot, from load_robot"),
     "units": _instance(Units, "Units"),

@@ -11,7 +11,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, TextIO, TypeAlias
+from typing import TYPE_CHECKING, Any, TextIO, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -83,8 +83,8 @@ class Table:
             Text, a number that is infinite or larger than any, or an empty cell where none may be.
         """
         cells, held = self.columns[column], self._values(column)
-        if None in held:
-            index = held.index(None)
+        index = _first_text(held)
+        if index is not None:
             mixed = self.decimal_comma and "." in str(cells[index])
             expected = "a number" + (" with a decimal comma, as elsewhere in this file" if mixed else "")
             problem = "text where a number should be"
@@ -132,25 +132,28 @@ class Table:
 
     def first_text(self, column: str) -> int | None:
         """Return the index of the first cell that is not a number, ``None`` for a numeric column."""
-        held = self._values(column)
-        return held.index(None) if None in held else None
+        return _first_text(self._values(column))
 
     def is_empty(self, column: str) -> bool:
         """Return whether no cell of the column holds anything."""
-        return not any(self.text(column))
+        cells = self.columns[column]
+        return bool(np.isnan(cells).all()) if isinstance(cells, np.ndarray) else not any(self.text(column))
 
-    def _values(self, column: str) -> list[float | None]:
+    def _values(self, column: str) -> Any:
         """Return the number in each cell, NaN for an empty one, ``None`` for text."""
         cells = self.columns[column]
         if isinstance(cells, np.ndarray):
-            values: list[float | None] = cells.tolist()
-            return values
+            return cells
         if not self.decimal_comma and "_" not in "".join(cells):
             try:
                 return [float(cell) for cell in cells]  # nearly every column of nearly every file
             except ValueError:
                 pass
         return [_number(cell, self.decimal_comma) for cell in cells]
+
+
+def _first_text(values: Any) -> int | None:
+    return None if isinstance(values, np.ndarray) or None not in values else int(values.index(None))
 
 
 def _number(cell: str, comma: bool) -> float | None:

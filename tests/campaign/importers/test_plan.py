@@ -39,13 +39,12 @@ def test_the_one_that_is_over_counts_key_by_key():
     assert [both.get("columns", axis).sources for axis in "xy"] == [("c",), ("b",)]
     assert both.layout().skip == 3
     assert both.get("noise", "position") == 0.1
-
-
-def test_an_orientation_is_stated_as_a_whole():
     matrix = planned({"orientation": {"kind": "matrix", "columns": list(range(1, 10))}})
     vector = planned({"orientation": {"kind": "rotation_vector", "unit": "deg", "columns": ["a", "b", "c"]}})
-    assert vector.over(matrix).get("orientation", "stated").kind == "rotation_vector"
+    assert vector.over(matrix).get("orientation", "stated").kind == "rotation_vector"  # as a whole
     assert Plan().over(matrix).get("orientation", "stated").kind == "matrix"
+    layout = planned({"table": {"separator": "tab", "comment": "#", "header": False, "key": "n"}}).layout()
+    assert (layout.separator, layout.skip, layout.header, layout.comment) == ("\t", 0, False, "#")
 
 
 def test_the_robot_lies_beside_the_mapping(tmp_path):
@@ -69,11 +68,6 @@ def test_what_is_not_stated_is_asked_for():
     robot = planned({"robot": {"urdf": "builtin:rv_m2", "tool_frame": "tool0"}}).robot()
     with pytest.raises(CampaignError, match="no angle_unit is stated"):
         Plan().settings(robot)
-
-
-def test_a_separator_is_a_word():
-    layout = planned({"table": {"separator": "tab", "comment": "#", "header": False, "key": "n"}}).layout()
-    assert (layout.separator, layout.skip, layout.header, layout.comment) == ("\t", 0, False, "#")
 
 
 TABLE = Table(
