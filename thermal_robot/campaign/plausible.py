@@ -1,4 +1,4 @@
-"""What is accepted but doubtful: a plain sentence each, for the user to judge; rows that measured nothing of their own.
+"""Plausibility checks of a campaign: a plain sentence each, for the user to judge; marks and copied rows.
 
 Marks of a lost beam, old readings and copies of other rows. Instruments write −9999, 999, 0 0 0 or their last reading
 where they see no target. Such a figure stands in several rows to the last digit, and it does not follow the robot:
@@ -98,7 +98,7 @@ def _astray(away: Array, rows: Mask, seen: Mask, times: float) -> bool:
 
 
 def _away(campaign: Campaign, points: Array, seen: Mask) -> Array:
-    """(N, 3) distance of each coordinate from its regression on the nominal poses (least absolute deviations)."""
+    """Residual (N, 3) of the least-absolute-deviation regression of each coordinate on the nominal poses."""
     poses = tool_poses(campaign.robot, campaign.q)
     known = [np.ones((len(poses), 1)), poses[:, :3, 3], poses[:, :3, :3].reshape(-1, 9)]
     different = len(np.unique(np.round(campaign.q[seen] / SAME_COMMAND), axis=0))
@@ -119,7 +119,7 @@ def _away(campaign: Campaign, points: Array, seen: Mask) -> Array:
 
 
 def copies(campaign: Campaign) -> Mask:
-    """(N,) the rows that say what an earlier one says in every column, and are no repeats.
+    """Duplicated rows, (N,): those that say what an earlier one says in every column, and are no repeats.
 
     A repeat may well measure the same digits, but not at the same time. Where none is recorded, equal rows are repeats
     if the figures are so coarse that some would agree by chance.
@@ -155,7 +155,7 @@ def _originals(campaign: Campaign) -> NDArray[np.int64]:
 
 
 def _by_chance(campaign: Campaign) -> float:
-    """Return how many pairs of repeats are expected to agree in all figures: those may be coarser than they scatter."""
+    """Return how many pairs of repeats are expected to agree in all figures, which may be coarser than they scatter."""
     _, pose, counts = np.unique(campaign.q, axis=0, return_inverse=True, return_counts=True)
     position, pose = np.asarray(campaign.position), pose.reshape(-1)
     middle = np.array([np.bincount(pose, axis) for axis in position.T]).T / counts[:, None]
@@ -168,7 +168,7 @@ def _by_chance(campaign: Campaign) -> float:
 
 
 def step_of(values: Array) -> float:
-    """Return the largest power of ten, 1000 at most, of which all figures are multiples; 0 where there is none."""
+    """Resolution: the largest power of ten, 1000 at most, of which all figures are multiples; 0 where there is none."""
     for power in range(3, -7, -1):
         parts = values * 10.0**-power
         if np.abs(parts - np.round(parts)).max() < 1e-6 * max(1.0, float(np.abs(parts).max()) * 1e-6):
@@ -231,7 +231,7 @@ ANOTHER_ROBOT = 0.02
 
 
 def doubts(campaign: Campaign) -> list[str]:
-    """Return the sentences, none for an ordinary campaign."""
+    """Return the sentences of all plausibility checks, none for an ordinary campaign."""
     marked, lost = marks(campaign)
     seen = campaign.take(~marked) if marked.any() else campaign
     checks = (_limits, _time, _speed, _pose_labels, _temperature, _payload, _noise, _slides)
@@ -276,7 +276,7 @@ def _angle_unit(campaign: Campaign) -> Iterator[str]:
 
 
 def _reach(campaign: Campaign) -> float:
-    """Return how far the arm reaches at most, m; infinite where a slide has no limit."""
+    """Maximum reach of the arm, m: the sum of its lengths; infinite where a slide has no limit."""
     robot = campaign.robot
     travel = np.maximum(np.abs(robot.lower), np.abs(robot.upper))[np.array(robot.joint_types) == "prismatic"]
     return sum(segment.length for segment in robot.segments) + float(travel.sum())
@@ -342,7 +342,7 @@ def _length_unit(campaign: Campaign) -> Iterator[str]:
 
 
 def _apart(campaign: Campaign) -> Iterator[str]:
-    """Compare two measured points with what commands and target allow: whatever the base, their distance stays."""
+    """Compare distances of measured points with what commands and target allow: no rigid base changes them."""
     reach = _reach(campaign)
     simulated = campaign.simulated_position is not None
     if campaign.position is None or simulated or campaign.samples < FEWEST_ROWS or not np.isfinite(reach):

@@ -253,7 +253,7 @@ def _doubts(table: Table, told: Posed, settings: Settings) -> list[str]:
 
 
 def fill(column: str, values: Array, clock: Array | None = None) -> tuple[Array, str]:
-    """Return a covariate (N,) without NaN, and in plain words how its gaps were filled.
+    """Impute the gaps of a covariate (N,), and say in plain words how.
 
     A direction, velocity or acceleration that nobody noted is 0, which says "unknown" or "at rest". A payload or speed
     stays until it is changed. Everything else varies smoothly: linear in between, held at both ends. ``clock`` (N,)

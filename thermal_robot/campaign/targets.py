@@ -1,10 +1,10 @@
-"""Several targets of one pose: where they sit on the tool, and the pose of their common frame in each row.
+"""Generalised Procrustes analysis of several targets: their places on the tool, and the pose of each row.
 
 In row i target k is seen at y_ik = t_i + R_i s_k + noise, with its unknown place s_k on the tool the same in all rows.
-The places are those to which all rows together are nearest once each is moved rigidly (generalised Procrustes analysis:
-Gower, *Psychometrika* 40, 1975); what is free in them is a rigid motion of all, which the unknown tool frame takes up.
-The common frame has its origin in their mean and the axes of their principal moments. Of a row, (R_i, t_i) then tells
-all that its targets say of the robot: the rest is how they move against each other.
+The places are those to which all rows together are nearest once each is moved rigidly (Gower, *Psychometrika* 40,
+1975); what is free in them is a rigid motion of all, which the unknown tool frame takes up. The common frame has its
+origin in their mean and the axes of their principal moments. Of a row, (R_i, t_i) then tells all that its targets say
+of the robot: the rest is how they move against each other.
 
 To first order the twist (t, ω) of that frame, in its own axes, has the covariance σ² (Σ_k J_kᵀ J_k)⁻¹ over the targets
 that are seen, with J_k = [1, −[s_k]×]. Where all are seen its six figures are independent; where some are not, what
@@ -40,7 +40,7 @@ TINY = 1e-30  # m, where exact figures leave no distance
 
 @dataclass(frozen=True, eq=False)
 class Targets:
-    """What was seen of K targets in N rows."""
+    """Coordinates of K targets in N rows, with their noise."""
 
     numbers: tuple[int, ...]  # K numbers, as of ``x.1``
     points: Array  # (N, K, 3) measured places, measurement frame, m; NaN where one was not seen
@@ -57,7 +57,7 @@ class Targets:
 
 @dataclass(frozen=True, eq=False)
 class Posed:
-    """Targets, and what they tell of each row."""
+    """Targets, and the pose of their common frame in each row."""
 
     targets: Targets  # of the rows that tell a pose
     # position, orientation: (N, 3) m and (N, 4) unit quaternions wxyz of their common frame
@@ -72,7 +72,7 @@ def telling(points: Array) -> Mask:
 
 
 def posed(numbers: tuple[int, ...], points: Array) -> Posed | None:
-    """Find the places of the targets, and the pose of their common frame in each row.
+    """Generalised Procrustes analysis: the places of the targets, and the pose of their common frame in each row.
 
     ``points`` are (N, K, 3) measured places, m, of K ``numbers`` in rows that are :func:`telling`; NaN where a target
     was not seen. ``None`` is returned where one is never seen beside three others whose places are known.
@@ -117,7 +117,7 @@ def _wide(points: Array, seen: Mask) -> Mask:
 
 
 def _places(points: Array, seen: Mask) -> Array:
-    """(K, 3) places of the targets in the axes of the row that shows most of them; NaN of one that cannot be linked."""
+    """Robust Procrustes mean, (K, 3), in the axes of the row that shows most targets; NaN of one that is not linked."""
     first = int(np.argmax(seen.sum(axis=1)))
     places = np.where(seen[first][:, None], points[first], np.nan)
     extent = float(np.linalg.norm(np.ptp(points[first][seen[first]], axis=0)))
@@ -139,7 +139,7 @@ def _places(points: Array, seen: Mask) -> Array:
 
 
 def _spread(places: Array, seen: Mask) -> Array:
-    """(N, 6) of :class:`Targets`; of the place the root mean square over its axes, as the frame turns with the tool."""
+    """Propagated standard deviation, (N, 6) of :class:`Targets`; of the place the root mean square over its axes."""
     jacobian = np.zeros((len(places), 3, 6))
     jacobian[:, :, :3] = np.eye(3)
     # the k-th axis of the turn moves a target by e_k × s
@@ -151,7 +151,7 @@ def _spread(places: Array, seen: Mask) -> Array:
 
 
 def sigma_of_all(sigmas: Array, targets: Targets | None) -> tuple[float, float | None]:
-    """Return one sigma of positions, m, and where several targets tell it of turns, rad: root mean squares over rows.
+    """Root mean square standard deviation of positions, m, and where several targets tell it of turns, rad.
 
     ``sigmas`` (N,) are of a point in each row, m; of equal ones it is they themselves, to the last digit.
     """
@@ -170,7 +170,7 @@ def of_a_point(sigma: float, targets: Targets | None) -> float:
 
 
 def relative_sigmas(sigmas: Array | None, whole: float | None, targets: Targets | None, turned: bool) -> Array | None:
-    """(N, m) one sigma of each figure of a row over that of all rows; ``None`` where it is one for all.
+    """Relative standard deviation (N, m) of each figure of a row to that of all rows; ``None`` where it is 1.
 
     ``sigmas`` (N,) are of a point in each row, m, ``None`` where one holds for all; ``whole`` of positions, of all
     rows, m. Where orientations were measured, ``turned``, m is 6; their noise is the same in all rows unless targets

@@ -1,4 +1,4 @@
-"""What a joint remembers of its moves: how far it has gone since it last turned round, and what elements hold it."""
+"""Hysteresis of joints: distance since the last reversal, and the strains of Prandtl–Ishlinskii stop operators."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def moves(q: Array) -> NDArray[np.bool_]:
 def since_turns(
     q: Array, names: tuple[str, ...], covariates: Mapping[str, Array], sessions: NDArray[np.str_] | None
 ) -> dict[str, Array]:
-    """Return (N,) by joint: the signed distance from its last turning point, rad or m; negative on the way down.
+    """Signed distance from the last reversal, (N,) by joint, rad or m; negative on the way down.
 
     At the first row of a session no turn is known: the distance is that from there. Beside it stands, by the name
     :func:`strained`, what elements of each of :data:`SLIPS` are strained by, rad or m: springs that follow the joint
@@ -58,7 +58,7 @@ def since_turns(
 def arrivals(
     q: Array, names: tuple[str, ...], covariates: Mapping[str, Array], sessions: NDArray[np.str_] | None
 ) -> dict[str, Array]:
-    """Return (N,) by ``approach.<joint>``: the side from which each joint came, as the order of rows tells it.
+    """Directions of approach, (N,) by ``approach.<joint>``, as the order of rows tells them.
 
     +1 where the joint was increasing on its way from the row before, −1 where it was decreasing; one that did not move
     keeps the side that it had. 0 at the first row of a session, where nothing is known. It holds for a robot that goes
@@ -94,7 +94,7 @@ def strained(joint: str, slip: float) -> str:
 
 
 def _strains(path: Array) -> Array:
-    """(N, n, K) strains of elements of joints that pass positions (N, n) in this order."""
+    """Prandtl–Ishlinskii stop operators: strains (N, n, K) of joints that pass positions (N, n) in this order."""
     most = np.array(SLIPS)
     found = np.zeros((*path.shape, len(most)))
     for row, move in enumerate(np.diff(path, axis=0)):

@@ -60,7 +60,7 @@ class Stream:
     names: tuple[str, ...]  # of the k columns: joints, or x y z and perhaps qw qx qy qz
 
     def between(self, times: Array) -> Array:
-        """Return (M, k) values between the samples, on straight lines; held beyond the ends."""
+        """Linear interpolation, (M, k); held beyond the ends."""
         return np.column_stack([np.interp(times, self.time, column) for column in self.values.T])
 
     def scaled(self, scale: Array) -> Stream:
@@ -68,7 +68,7 @@ class Stream:
         return replace(self, values=self.values * scale)
 
     def nearest(self, times: Array) -> NDArray[np.int64]:
-        """Return (M,) indices of the samples that are nearest in time."""
+        """Nearest neighbours in time: (M,) indices of samples."""
         after = np.clip(np.searchsorted(self.time, times), 1, len(self.time) - 1)
         earlier = times - self.time[after - 1] < self.time[after] - times
         return np.where(earlier, after - 1, after)
@@ -139,7 +139,7 @@ LEAST = 60  # Samples in motion that a fit of ten figures and its scatter want
 
 @dataclass(frozen=True)
 class Lag:
-    """By how much the clocks differ."""
+    """Offset of two clocks."""
 
     value: float  # s: the robot's clock shows that much more than the instrument's at the same instant
     std: float  # one standard deviation, s
@@ -147,7 +147,9 @@ class Lag:
 
 
 def lag(joints: Stream, target: Stream, robot: Robot, place: Array) -> Lag:
-    """Estimate by how much two recordings' clocks differ; refuse those that show no motion in common, or hardly any.
+    """Clock offset by cross-correlation of speeds, then least squares; its deviation by the jackknife.
+
+    Recordings that show no motion in common, or hardly any, are refused.
 
     The target's positions are in any frame that stands still; ``place`` (3,), m, is where it roughly is on the tool.
     """
@@ -177,7 +179,7 @@ def lag(joints: Stream, target: Stream, robot: Robot, place: Array) -> Lag:
 
 
 def _by_speed(joints: Stream, target: Stream, robot: Robot, place: Array) -> float:
-    """Return the lag at which the speeds of recordings that begin at 0 are most alike, s."""
+    """Lag of the largest cross-correlation of the speeds of recordings that begin at 0, s."""
     from scipy.signal import correlate, correlation_lags
 
     spans = [stream.time[-1] for stream in (joints, target)]
@@ -192,16 +194,16 @@ def _by_speed(joints: Stream, target: Stream, robot: Robot, place: Array) -> flo
 
 
 def _speeds(stream: Stream, times: Array) -> Array:
-    """Return (M,) m/s of the target at some instants, over two steps of them."""
+    """Central differences: (M,) m/s of the target at some instants."""
     places = stream.between(times)[:, :3]
     speeds: Array = np.linalg.norm(np.gradient(places, times, axis=0), axis=1)
     return speeds
 
 
 def _fitted(joints: Stream, target: Stream, robot: Robot, chosen: Any, start: Array) -> tuple[Array, float]:
-    """Return lag, motion of the instrument's frame and place of the target that fit samples, and what is left, m rms.
+    """Least squares: lag, motion of the instrument's frame and place of the target; and what is left, m rms.
 
-    Least squares. The motion turns about the aligned start, so that ten figures near nothing are sought.
+    The motion turns about the aligned start, so that ten figures near nothing are sought.
     """
     from scipy.optimize import least_squares
 
