@@ -25,19 +25,14 @@ from thermal_robot.kinematics import align, tool_poses
 
 Mask = NDArray[np.bool_]
 
-FEWEST_ROWS = 10  # Rows from which figures that all end alike were rounded, and are no accident
+FEWEST_ROWS = 10  # rows from which figures that all end alike were rounded, and are no accident
+# residuals over the others' median that tell a mark: three figures that are equal by chance are rare, one is not
 ASTRAY_PLACE, ASTRAY_FIGURE = 3.0, 10.0
-"""Times the others' median distance from the regression beyond which rows with one place, or one figure of a place,
-hold a mark: three figures that are equal by chance are rare, one of a rounded table is not."""
-SAME_COMMAND = 1e-3
-"""rad or m within which commands of one pose count as the same: a controller that reports where it stopped repeats a
-pose to better than that, and a pose of its own is farther away."""
-ROUNDING = 1e-6  # Share of a coordinate's spread that counts as no distance: the last digits of exact figures
-ROUNDS = 30  # Of reweighted least squares, after which the least absolute deviations have settled to a per cent
-STEADIEST = 1e-6
-"""m per axis: no arm repeats to better, so that equal figures that are finer were copied and not measured."""
-RARE = 0.05
-"""Expected number of repeats that agree by chance above which equal rows are repeats that the figures cannot tell."""
+SAME_COMMAND = 1e-3  # rad or m: controllers repeat a pose to better, and a pose of its own is farther away
+ROUNDING = 1e-6  # share of a coordinate's spread that counts as no distance: the last digits of exact figures
+ROUNDS = 30  # of reweighted least squares, after which the least absolute deviations have settled to a per cent
+STEADIEST = 1e-6  # m per axis: no arm repeats to better, so that equal figures that are finer were copied
+RARE = 0.05  # expected number of repeats that agree by chance, above which equal rows may be repeats
 
 
 def marks(campaign: Campaign) -> tuple[Mask, list[str]]:
@@ -181,53 +176,40 @@ def _figure(value: float) -> str:
 
 
 LIMIT_TOLERANCE = 1e-6  # rad or m by which a command may pass a limit: the last digit of a file is not a violation
-MOST_TURNS = 2
-"""Turns that no command in rad exceeds: wrists and cables allow at most two to either side, and 13 degrees, read as
-rad, are more."""
-LEAST_ANGLE = 2 * math.pi
-"""Degrees that some joint of a real campaign exceeds; commands in rad, read as degrees, stay within one turn's 2π."""
-FEWEST_COMMANDS = 3  # Rows from which small commands are a habit and not an accident
-FARTHEST_TARGET = 3.0
-"""Reaches of the arm within which a target sits on it: a long tool is shorter, a length read in a unit a thousand times
-too large is longer by far. The next three bounds are as coarse for the same reason."""
-WORST_INSTRUMENT = 0.01
-"""Share of the reach that is an instrument's one-sigma at most: 1 cm for an arm of 1 m, worse than a tape measure."""
-LONGEST_ARM, SHORTEST_ARM, THOUSAND = 100.0, 0.01, 1000.0
-"""m: what no arm exceeds, nor falls short of: mobile cranes reach 90 m, arms under a microscope some centimetres; by
-what lengths are wrong that were converted to m twice."""
-LONG_ARM, APART, TINY = 10.0, 0.4, 1e-9
-"""m: an arm that is longer is looked at: excavators reach 15; natural logarithm within which measured and predicted
-extents tell the unit of the URDF: cm and inches are 0.93 apart, a target beside the tool changes them by less; and m,
-an extent that is none."""
+MOST_TURNS = (
+    2  # turns of a command at most: wrists and cables allow two to either side; 13 degrees read as rad are more
+)
+LEAST_ANGLE = 2 * math.pi  # degrees that a real campaign exceeds; commands in rad read as degrees stay within one turn
+FEWEST_COMMANDS = 3  # rows from which small commands are a habit and not an accident
+# lengths are compared with the reach by coarse bounds, as one that is read in a wrong unit is a thousand times off
+FARTHEST_TARGET = 3.0  # reaches within which a target sits on the arm: a long tool is shorter
+WORST_INSTRUMENT = (
+    0.01  # reaches, one sigma of an instrument at most: 1 cm for an arm of 1 m, worse than a tape measure
+)
+LARGEST_EXTENT = 4.0  # reaches with the target: the ball that it can reach is two across; two more for commands outside
+SMALLEST_EXTENT = 1 / 200  # reaches over which positions extend at least, once enough joints move: 5 mm for 1 m
+MOVES = 0.5  # rad or m of a joint's range that carry the target visibly
+MOVING_JOINTS = 3  # joints that may move and leave the target in place: those of a wrist about a target on its axes
+LONGEST_ARM, SHORTEST_ARM = 100.0, 0.01  # m: mobile cranes reach 90 m, arms under a microscope some centimetres
+THOUSAND = 1000.0  # by what lengths are too short that were converted to m twice
+LONG_ARM = 10.0  # m: an arm that is longer is looked at; excavators reach 15
+APART = 0.4  # ln of extents within which they tell a unit: cm and inches are 0.93 apart, a target changes them by less
+TINY = 1e-9  # m, an extent that is none
 URDF_UNITS = {"mm": "a thousand", "cm": "a hundred", "inch": "39"}
 """Units in which URDFs were exported, and how many times too long their links then are."""
-LONG_TOOL, WORST_ARM, PAIRED = 0.5, 0.05, 200
-"""m: as far as a target whose place is to be fitted may sit from the tool frame: a welding gun, a long pointer; share
-of the reach by which no arm errs; and rows, spread evenly, whose distances from each other are looked at."""
-LARGEST_EXTENT = 4.0
-"""Reaches (with the target) over which measured positions extend at most: the ball that the target can reach is two
-across; the other two allow for commands outside it."""
-SMALLEST_EXTENT = 1 / 200
-"""Share of the reach over which measured positions extend at least, once enough joints move: 5 mm for an arm of 1 m."""
-MOVES = 0.5  # rad or m of a joint's range that carry the target visibly
-MOVING_JOINTS = 3  # Joints that may move and leave the target in place: those of a wrist about a target on its axes
-
-WARMEST, HOTTEST = 55.0, 150.0
-"""°C that the median temperature of a robot does not exceed, whose motors run at 50: a hall of 20 °C has 68 °F; and
-that no robot reaches, whose grease ends at 120: 20 °C are 293 K."""
-HEAVIEST, HEAVIEST_ALONE = 3.0, 1000.0
-"""Payload over the arm's own mass, which no arm carries: the strongest carry as much as they weigh, and grams are a
-thousand; and in kg where the URDF has no masses: the largest robots carry as much."""
-COARSEST_TURN, FINEST = 0.1, 1e-7
-"""rad that no instrument's one-sigma exceeds, 6 degrees; and m, a tenth of a micrometre, that none that measures robots
-reaches: a laser tracker has some ten micrometres."""
-ROUNDED_TO = 5e-4
-"""m: positions that are read to no better are told of where no noise is stated: every arm repeats to better."""
-GRID = 5e-5  # m: what rounded commands move the tool, rms, from which that is told: half the repeatability of good arms
-SLIDES = 10.0
-"""Times its farther limit: a slide that is commanded beyond is read in a wrong unit, the next one being a thousand."""
-ANOTHER_ROBOT = 0.02
-"""Of the reach: a simulator of the same robot, however its lengths were measured, is nearer to the URDF than that."""
+LONG_TOOL = 0.5  # m from the tool frame at most of a target whose place is fitted: a welding gun, a long pointer
+WORST_ARM = 0.05  # reaches by which no arm errs
+PAIRED = 200  # rows, spread evenly, whose distances from each other are looked at
+WARMEST = 55.0  # °C, median of a robot at most, whose motors run at 50: a hall of 20 °C has 68 °F
+HOTTEST = 150.0  # °C that no robot reaches, whose grease ends at 120: 20 °C are 293 K
+HEAVIEST = 3.0  # payload over the arm's mass at most: the strongest carry what they weigh, and grams are a thousand
+HEAVIEST_ALONE = 1000.0  # kg, payload at most where the URDF has no masses: the largest robots carry as much
+COARSEST_TURN = 0.1  # rad that no instrument's one-sigma exceeds, 6 degrees
+FINEST = 1e-7  # m that no instrument that measures robots reaches: a laser tracker has some ten micrometres
+ROUNDED_TO = 5e-4  # m: positions read to no better are told of where no noise is stated; every arm repeats to better
+GRID = 5e-5  # m rms by which rounded commands move the tool, from which that is told: half of what good arms repeat to
+SLIDES = 10.0  # limits of a slide: what is commanded beyond is in a wrong unit, the next one being a thousand
+ANOTHER_ROBOT = 0.02  # reaches: a simulator of the same robot, however measured, is nearer to the URDF
 
 
 def doubts(campaign: Campaign) -> list[str]:

@@ -28,15 +28,12 @@ Vector: TypeAlias = tuple[float, float, float]
 
 MOVES = ("direct", "unknown")
 """Whether the robot goes straight from pose to pose in the order of the rows, which tells whence each joint came."""
-STANDARD_TEMPERATURE = 20.0  # °C; ISO 1, the temperature at which lengths are specified unless somebody says otherwise
-MOST_PIPED = 500_000_000
-"""Bytes that are taken from standard input: a million rows of forty columns; a pipe that never ends must end here."""
+STANDARD_TEMPERATURE = 20.0  # °C; ISO 1, at which lengths are specified unless somebody says otherwise
+MOST_PIPED = 500_000_000  # bytes from standard input: a million rows of forty columns; an endless pipe must end here
 STILL = 1e-4
 """rad or m within which a joint stands still: the encoder of one that is held jitters by a microradian, seldom by
 fifty, and nothing that follows a joint's position shows over less."""
-SAME_CONFIGURATION = 9
-"""Decimals of a command, rad or m, to which it is compared: a nanoradian is far below what any controller resolves and
-far above what the conversion of units rounds."""
+SAME_CONFIGURATION = 9  # decimals, rad or m, to which commands are compared: finer than controllers, coarser than units
 ABSOLUTE_ZERO = -273.15  # °C
 
 WORD = "unknown word"

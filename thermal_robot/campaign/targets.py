@@ -26,15 +26,11 @@ from thermal_robot.kinematics import align, rotation_to_quaternion
 
 Mask = NDArray[np.bool_]
 
-FEWEST = 3  # Targets without which a pose can turn about the line through two
-LINE = 0.01
-"""Width over length of what is seen below which it is a line: the turn about it would be known a hundred times worse
-than the others."""
-ROUNDS = 100  # Rounds of the analysis at most; a few are enough where the noise is small beside the distances
-SETTLED = 1e-12
-"""Share of the targets' extent by which their places still move when they are found: rounding moves them by 1e-15."""
-TAIL = 3.0
-"""Times the median distance from which on a target counts less for its place (Cauchy): one row in a few is gross."""
+FEWEST = 3  # targets without which a pose can turn about the line through two
+LINE = 0.01  # width over length of a line: the turn about it would be known a hundred times worse than the others
+ROUNDS = 100  # of the analysis at most; a few are enough where the noise is small beside the distances
+SETTLED = 1e-12  # share of the extent by which places still move when they are found: rounding moves them by 1e-15
+TAIL = 3.0  # median distances from which on a target counts less for its place (Cauchy): one row in a few is gross
 TINY = 1e-30  # m, where exact figures leave no distance
 
 

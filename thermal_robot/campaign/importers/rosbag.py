@@ -38,16 +38,11 @@ from thermal_robot.files import is_file, is_folder
 from thermal_robot.kinematics import align, exp3, tool_poses
 from thermal_robot.robot import Robot
 
-WINDOW = 0.2
-"""s over which the velocity of a joint is taken: it averages the steps of an encoder, 1e-5 rad of which are then
-1e-4 rad/s at most."""
-VELOCITY = 1e-3
-"""rad/s or m/s: slower than that a joint stands. In the tolerance of a pair a target 1 m away then moves 50 µm at most,
-and mostly not at all."""
+WINDOW = 0.2  # s over which a joint's velocity is taken: steps of an encoder, 1e-5 rad, are then 1e-4 rad/s at most
+VELOCITY = 1e-3  # rad/s or m/s below which a joint stands: a target 1 m away moves 50 µm in a pair's tolerance
 STANDSTILL = 0.5  # s that a robot stands at least: shorter is a turning point, or still swings
 SETTLING = 0.25  # s after stopping that are not used: arms swing out at some 10 Hz, and controllers settle
-TOLERANCE = 0.05
-"""s between a row's instant and the sample paired with it; instruments measure twenty times a second or more."""
+TOLERANCE = 0.05  # s between a row's instant and its sample: instruments measure twenty times a second or more
 
 
 @dataclass(frozen=True)
@@ -122,19 +117,13 @@ def paired(
     return Pairs(middles[near], joints.values[own[near]], target.values[seen[near]], short, lonely)
 
 
-FINEST = 0.005
-"""s between the instants at which speeds are compared: faster than that no joint state is published as a rule."""
-LONGEST = 2_000_000
-"""Instants of either recording that are compared: three hours at the finest step; longer ones take a coarser step."""
-UNEXPLAINED = 0.1
-"""Share of the spread of the measured places that may be left once lag and frames are fitted: a robot that is bent by
-millimetres leaves less than 0.01, two recordings that have nothing to do with each other more than 0.5."""
-MOVING = 0.1  # Share of the fastest speed from which a sample tells the time: at rest it does not
-MOST = 2000  # Samples in motion that are fitted; more take time and add little
-BLOCKS = 10
-"""Parts of the recording of which each is left out once: their scatter is the deviation of the lag, whatever the errors
-of the robot that the fit knows nothing of (Tukey's jackknife)."""
-LEAST = 60  # Samples in motion that a fit of ten figures and its scatter want
+FINEST = 0.005  # s between instants at which speeds are compared: joint states are published no faster as a rule
+LONGEST = 2_000_000  # instants that are compared: three hours at the finest step; longer ones take a coarser step
+UNEXPLAINED = 0.1  # share of the places' spread left by the fit: a bent robot leaves 0.01, foreign recordings 0.5
+MOVING = 0.1  # share of the fastest speed from which a sample tells the time: at rest it does not
+MOST = 2000  # samples in motion that are fitted; more take time and add little
+BLOCKS = 10  # parts of the recording for Tukey's jackknife: honest whatever errors the fit knows nothing of
+LEAST = 60  # samples in motion that a fit of ten figures and its scatter want
 
 
 @dataclass(frozen=True)
