@@ -212,7 +212,10 @@ def recognise(table: Table, robot: Robot, *, measured: bool) -> Columns:
         A joint or a coordinate without a column, some of a quaternion's four, a name with two meanings.
     """
     _refuse_two_meanings(table, robot)
-    _require_joints(table, robot)
+    chain = f"{robot.root_frame!r} to {robot.tool_frame!r}"
+    beside = [name for name in robot.joint_names if name not in robot.chain.names]
+    more = f", and so does {listed(beside)}, which moves it by joints that mimic" if beside else ""
+    _require(table, robot.joint_names, f"every movable joint of the chain from {chain} needs a column{more}")
     targets, warnings = _targets(table, robot) if measured else ((), [])
     if measured and not targets:
         _require(table, names.POSITION, "a measured position needs x, y and z")
@@ -308,13 +311,6 @@ def _refuse_two_meanings(table: Table, robot: Robot) -> None:
             problem = "this name is both a joint of the chain and a column that the format defines"
             remedy = "a joint of another name; rename it in the URDF and in the table"
             raise table.error(problem, column, expected=remedy)
-
-
-def _require_joints(table: Table, robot: Robot) -> None:
-    chain = f"{robot.root_frame!r} to {robot.tool_frame!r}"
-    beside = [name for name in robot.joint_names if name not in robot.chain.names]
-    more = f", and so does {listed(beside)}, which moves it by joints that mimic" if beside else ""
-    _require(table, robot.joint_names, f"every movable joint of the chain from {chain} needs a column{more}")
 
 
 def _require(table: Table, wanted: Sequence[str], why: str) -> None:

@@ -41,10 +41,11 @@ def _read_calibration(files: Sequence[Path], plan: Plan) -> Source:
     """Read samples; the first feature of ``[recording] sensor`` is the target unless ``feature`` says another."""
     file = next((file for file in files if is_yaml(file)), files[0])
     documents = read_yaml(file)
-    if len(documents) == 1 and isinstance(documents[0], list) and any(_is_sample(item) for item in documents[0]):
-        documents = documents[0]  # samples in one list rather than in documents of their own
-    if len(documents) == 1 and isinstance(documents[0], list):
-        commands = _table(str(file), [_pose(str(file), k, pose) for k, pose in enumerate(documents[0])])
+    listed_once = documents[0] if len(documents) == 1 and isinstance(documents[0], list) else []
+    if any(isinstance(item, dict) and "observations" in item for item in listed_once):
+        documents = listed_once  # samples in one list rather than in documents of their own
+    elif listed_once or documents == [[]]:
+        commands = _table(str(file), [_positions(str(file), k, pose) for k, pose in enumerate(listed_once)])
         tables = [each for each in files if each != file]
         if not tables:
             expected = "the table of measured points as a second file"
@@ -60,10 +61,6 @@ def _read_calibration(files: Sequence[Path], plan: Plan) -> Source:
     )
 
 
-def _is_sample(item: Any) -> bool:
-    return isinstance(item, dict) and "observations" in item
-
-
 def _table(file: str, rows: Sequence[Mapping[str, float]]) -> Table:
     """Return rows of figures by name as a table; the rows are counted from 1, as samples are."""
     columns = {
@@ -72,14 +69,11 @@ def _table(file: str, rows: Sequence[Mapping[str, float]]) -> Table:
     return Table(file, columns, np.arange(1, len(rows) + 1))
 
 
-def _pose(file: str, index: int, pose: Any) -> dict[str, float]:
-    """Return a capture pose as joint positions by name."""
+def _positions(file: str, index: int, pose: Any, keys: tuple[str, str] = ("joints", "positions")) -> dict[str, float]:
+    """Return a capture pose, or the joint states of a sample, as joint positions by name."""
     if not isinstance(pose, dict):
         raise _odd(file, index, pose, "joints and positions")
-    return _positions(file, index, pose.get("joints"), pose.get("positions"))
-
-
-def _positions(file: str, index: int, names: Any, positions: Any) -> dict[str, float]:
+    names, positions = (pose.get(key) for key in keys)
     fits = isinstance(names, list) and isinstance(positions, list) and len(names) == len(positions) > 0
     if not fits or not all(isinstance(p, (int, float)) for p in positions):
         raise _odd(file, index, {"joints": names, "positions": positions}, "as many positions as joints, numbers")
@@ -91,7 +85,7 @@ def _sample(file: str, index: int, sample: Any, sensor: str, feature: int) -> di
     state = sample.get("joint_states") if isinstance(sample, dict) else None
     if not isinstance(state, dict):
         raise _odd(file, index, sample, "joint_states and observations")
-    row = _positions(file, index, state.get("name"), state.get("position"))
+    row = _positions(file, index, state, ("name", "position"))
     seen = {each["sensor_name"]: each.get("features") or [] for each in _observations(sample)}
     features = seen.get(sensor, [])
     if len(features) < feature:
