@@ -73,7 +73,8 @@ def _positions(file: str, index: int, pose: Any, keys: tuple[str, str] = ("joint
     """Return a capture pose, or the joint states of a sample, as joint positions by name."""
     if not isinstance(pose, dict):
         raise _odd(file, index, pose, "joints and positions")
-    names, positions = (pose.get(key) for key in keys)
+    given: list[Any] = [pose.get(key) for key in keys]
+    names, positions = given
     fits = isinstance(names, list) and isinstance(positions, list) and len(names) == len(positions) > 0
     if not fits or not all(isinstance(p, (int, float)) for p in positions):
         raise _odd(file, index, {"joints": names, "positions": positions}, "as many positions as joints, numbers")
